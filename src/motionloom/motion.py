@@ -1,0 +1,127 @@
+"""`Motion`: a skeleton moving through time. What every part of the project outside diffusion speaks.
+
+Metres, seconds, radians; right-handed, +Y up, a person faces +Z at rest; quaternions ``(w, x, y, z)``;
+frames before joints before coordinates.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.skeleton import Skeleton
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Poses of one skeleton at a constant frame rate."""
+
+    skeleton: Skeleton
+    fps: float
+    """Frames per second."""
+    root: Array
+    """(frames, 3) metres: joint 0 in the world."""
+    rotations: Array
+    """(frames, joints, 4): each joint's orientation in its parent's frame; joint 0 in the world."""
+    translations: Array | None = None
+    """(frames, joints, 3) metres in the parent's frame, for the rare motion whose bones change length; row 0 unused."""
+
+    def __post_init__(self) -> None:
+        for name in ("root", "rotations", "translations"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, np.asarray(value, dtype=np.float64))
+        frames, joints = len(self.root), len(self.skeleton)
+        if self.root.shape != (frames, 3) or self.rotations.shape != (frames, joints, 4) or frames == 0:
+            raise MotionloomError(
+                f"a motion of {joints} joints needs root (frames, 3) and rotations (frames, {joints}, 4), at least one "
+                f"frame; got {self.root.shape} and {self.rotations.shape}"
+            )
+        if self.translations is not None and self.translations.shape != (frames, joints, 3):
+            raise MotionloomError(f"translations must be ({frames}, {joints}, 3); got {self.translations.shape}")
+        if not (np.isfinite(self.fps) and self.fps > 0):
+            raise MotionloomError(f"the frame rate must be a positive number; got {self.fps}")
+        values = [self.root, self.rotations] + ([] if self.translations is None else [self.translations])
+        if not all(np.isfinite(v).all() for v in values):
+            raise MotionloomError("the motion has numbers that are not finite (NaN or infinity)")
+
+    def __len__(self) -> int:
+        return len(self.root)
+
+    @property
+    def seconds(self) -> float:
+        """Length in seconds: frames / fps."""
+        return len(self) / self.fps
+
+    def world_rotations(self) -> Array:
+        """(frames, joints, 4): world_from_joint."""
+        world = np.empty_like(self.rotations)
+        world[:, 0] = self.rotations[:, 0]
+        for j, p in enumerate(self.skeleton.parents[1:], start=1):
+            world[:, j] = rot.multiply(world[:, p], self.rotations[:, j])
+        return world
+
+    def positions(self) -> Array:
+        """(frames, joints, 3) metres in the world: forward kinematics."""
+        world = self.world_rotations()
+        places = np.empty((len(self), len(self.skeleton), 3))
+        places[:, 0] = self.root
+        for j, p in enumerate(self.skeleton.parents[1:], start=1):
+            offset = self.skeleton.offsets[j] if self.translations is None else self.translations[:, j]
+            places[:, j] = places[:, p] + rot.rotate(world[:, p], np.broadcast_to(offset, (len(self), 3)))
+        return places
+
+    def frames(self, start: int, stop: int) -> "Motion":
+        """Frames ``start`` to ``stop`` (half-open)."""
+        return replace(
+            self,
+            root=self.root[start:stop],
+            rotations=self.rotations[start:stop],
+            translations=None if self.translations is None else self.translations[start:stop],
+        )
+
+    def crop(self, start_s: float, end_s: float) -> "Motion":
+        """The part from ``start_s`` to ``end_s`` seconds, at least one frame."""
+        start, stop = round(start_s * self.fps), round(end_s * self.fps)
+        if not 0 <= start < stop <= len(self):
+            raise MotionloomError(f"cannot crop {start_s} to {end_s} s from a motion of {self.seconds:.3f} s")
+        return self.frames(start, stop)
+
+    def resample(self, fps: float) -> "Motion":
+        """The same motion at another frame rate: places linearly, rotations spherically interpolated by time."""
+        if not (np.isfinite(fps) and fps > 0):
+            raise MotionloomError(f"the frame rate must be a positive number; got {fps}")
+        if fps == self.fps:
+            return self
+        count = int(np.floor((len(self) - 1) / self.fps * fps + 1e-6)) + 1
+        at = np.arange(count) * (self.fps / fps)
+        low = np.minimum(at.astype(int), len(self) - 1)
+        high = np.minimum(low + 1, len(self) - 1)
+        amount = at - low
+
+        def lerp(x: Array) -> Array:
+            a = amount.reshape(-1, *[1] * (x.ndim - 1))
+            return x[low] * (1 - a) + x[high] * a
+
+        turned = rot.slerp(self.rotations[low], self.rotations[high], np.broadcast_to(amount[:, None], self.rotations[low].shape[:2]))
+        moved = None if self.translations is None else lerp(self.translations)
+        return replace(self, fps=float(fps), root=lerp(self.root), rotations=turned, translations=moved)
+
+    def mirror(self) -> "Motion":
+        """Left and right exchanged: reflected in the plane x = 0, joint names swapped by side.
+
+        Exact on a skeleton whose two sides have the same lengths; elsewhere each limb keeps its own bones.
+        """
+        pairs = list(self.skeleton.mirror_pairs())
+        flip = np.array([-1.0, 1.0, 1.0])
+        moved = None if self.translations is None else self.translations[:, pairs] * flip
+        return replace(
+            self,
+            root=self.root * flip,
+            rotations=self.rotations[:, pairs] * np.array([1.0, 1.0, -1.0, -1.0]),
+            translations=moved,
+        )

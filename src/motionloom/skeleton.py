@@ -1,0 +1,153 @@
+"""Skeletons are data: names, parents, rest offsets. A new skeleton is a new value, never a subclass.
+
+The *rest pose* is what forward kinematics gives when every rotation is the identity. Units are metres,
++Y is up, a person in rest pose faces +Z and has the left side at +X.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom.errors import MotionloomError
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """A tree of joints. Joint 0 is the root and parents come before their children."""
+
+    names: tuple[str, ...]
+    """One unique name per joint."""
+    parents: tuple[int, ...]
+    """Index of each joint's parent; -1 for joint 0 only."""
+    offsets: NDArray[np.float64]
+    """(joints, 3) metres: each joint in its parent's frame. Row 0 is where the file put the root at rest."""
+    ends: frozenset[int] = frozenset()
+    """Joints that are mere bone tips (BVH End Sites): they have a place and never a rotation of their own."""
+    groups: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    """Named sets of joints, such as ``left_arm``."""
+
+    def __post_init__(self) -> None:
+        offsets = np.asarray(self.offsets, dtype=np.float64)
+        object.__setattr__(self, "offsets", offsets)
+        if not (len(self.names) == len(self.parents) == len(offsets)) or not self.names:
+            raise MotionloomError(
+                f"a skeleton needs as many names as parents and offsets, at least one; "
+                f"got {len(self.names)}, {len(self.parents)} and {len(offsets)}"
+            )
+        if len(set(self.names)) != len(self.names):
+            twice = sorted({n for n in self.names if self.names.count(n) > 1})
+            raise MotionloomError(f"joint names must be unique; {', '.join(twice)} appear more than once")
+        if self.parents[0] != -1 or any(not 0 <= p < j for j, p in enumerate(self.parents[1:], start=1)):
+            raise MotionloomError("the first joint must be the only root and parents must come before children")
+        if not np.isfinite(offsets).all():
+            raise MotionloomError("the skeleton's offsets must be finite numbers")
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, Skeleton)
+            and self.names == other.names
+            and self.parents == other.parents
+            and self.ends == other.ends
+            and np.array_equal(self.offsets, other.offsets)
+        )
+
+    def index(self, name: str) -> int:
+        """Number of the joint called ``name``; an error lists the joints there are."""
+        if name not in self.names:
+            raise MotionloomError(f"no joint {name!r}; the joints are {', '.join(self.names)}")
+        return self.names.index(name)
+
+    def children(self, joint: int) -> tuple[int, ...]:
+        """Direct children of a joint."""
+        return tuple(j for j, p in enumerate(self.parents) if p == joint)
+
+    def resolve(self, names: Iterable[str]) -> tuple[int, ...]:
+        """Joint numbers for a mix of joint and group names, in skeleton order."""
+        chosen: set[int] = set()
+        for name in names:
+            chosen.update(self.groups[name] if name in self.groups else (self.index(name),))
+        return tuple(sorted(chosen))
+
+    def rest_positions(self) -> NDArray[np.float64]:
+        """(joints, 3) metres: joint positions in rest pose, the root at its own offset."""
+        places = self.offsets.copy()
+        for j, p in enumerate(self.parents[1:], start=1):
+            places[j] += places[p]
+        return places
+
+    def bone_lengths(self) -> NDArray[np.float64]:
+        """(joints,) metres from each joint to its parent; 0 for the root."""
+        lengths = np.linalg.norm(self.offsets, axis=-1)
+        lengths[0] = 0.0
+        return lengths
+
+    def mirror_pairs(self) -> tuple[int, ...]:
+        """For each joint the joint on the other side (itself on the middle line), found by name."""
+        return tuple(self.names.index(m) if (m := _other_side(n, self.names)) else j for j, n in enumerate(self.names))
+
+
+_SIDES = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"))
+
+
+def _other_side(name: str, names: tuple[str, ...]) -> str | None:
+    candidates = [name.replace(a, b, 1) for x, y in _SIDES for a, b in ((x, y), (y, x)) if a in name]
+    for a, b in (("l", "r"), ("r", "l"), ("L", "R"), ("R", "L")):
+        if name.startswith(a):
+            candidates.append(b + name[1:])
+        for glue in ("_", ".", "-", " "):
+            candidates += [name.replace(glue + a, glue + b, 1)] if glue + a in name else []
+            candidates += [name.replace(a + glue, b + glue, 1)] if a + glue in name else []
+    return next((c for c in candidates if c != name and c in names), None)
+
+
+_SMPL22 = """pelvis - | left_hip pelvis | right_hip pelvis | spine1 pelvis | left_knee left_hip | right_knee right_hip
+| spine2 spine1 | left_ankle left_knee | right_ankle right_knee | spine3 spine2 | left_foot left_ankle
+| right_foot right_ankle | neck spine3 | left_collar spine3 | right_collar spine3 | head neck
+| left_shoulder left_collar | right_shoulder right_collar | left_elbow left_shoulder | right_elbow right_shoulder
+| left_wrist left_elbow | right_wrist right_elbow"""
+
+# Bone lengths of the uniform HumanML3D person by child joint 1..21, metres (specs of the published data set).
+HUMANML_BONE_LENGTHS: tuple[float, ...] = (
+    0.1031, 0.1099, 0.1316, 0.3936, 0.3902, 0.1432, 0.4324, 0.4256, 0.0574, 0.1434, 0.1494,
+    0.2194, 0.1375, 0.1434, 0.1030, 0.1316, 0.1230, 0.2568, 0.2631, 0.2660, 0.2699,
+)  # fmt: skip
+
+# Directions of a natural T-pose, by child joint 1..21 (our own; the published pipeline's rest directions are not a pose).
+_T_POSE = (
+    (0.62, -0.78, 0), (-0.62, -0.78, 0), (0, 1, -0.15), (0, -1, 0), (0, -1, 0), (0, 1, 0), (0, -1, -0.06), (0, -1, -0.06),
+    (0, 1, 0.05), (0.1, -0.42, 0.9), (-0.1, -0.42, 0.9), (0, 1, -0.12), (0.55, 0.83, -0.08), (-0.55, 0.83, -0.08),
+    (0, 0.86, 0.5), (1, 0.25, -0.1), (-1, 0.25, -0.1), (1, 0, 0), (-1, 0, 0), (1, 0, 0), (-1, 0, 0),
+)  # fmt: skip
+
+_SMPL22_GROUPS = {
+    "left_leg": (1, 4, 7, 10),
+    "right_leg": (2, 5, 8, 11),
+    "left_arm": (13, 16, 18, 20),
+    "right_arm": (14, 17, 19, 21),
+    "torso": (0, 3, 6, 9),
+    "head_neck": (12, 15),
+    "feet": (7, 8, 10, 11),
+    "hands": (20, 21),
+    "lower_body": (0, 1, 2, 4, 5, 7, 8, 10, 11),
+    "upper_body": (3, 6, 9, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21),
+}
+
+
+def _smpl22() -> Skeleton:
+    pairs = [entry.split() for entry in _SMPL22.split("|")]
+    names = tuple(name for name, _ in pairs)
+    parents = tuple(-1 if parent == "-" else names.index(parent) for _, parent in pairs)
+    directions = np.array(_T_POSE, dtype=np.float64)
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+    offsets = np.concatenate([np.zeros((1, 3)), directions * np.array(HUMANML_BONE_LENGTHS)[:, None]])
+    offsets[0, 1] = -offsets[[1, 4, 7, 10], 1].sum()  # the toes stand on the floor at rest
+    return Skeleton(names, parents, offsets, groups=_SMPL22_GROUPS)
+
+
+SMPL22: Skeleton = _smpl22()
+"""The 22 body joints of SMPL in HumanML3D's order, the uniform person in a T-pose standing on the floor."""
