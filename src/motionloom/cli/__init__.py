@@ -1,0 +1,50 @@
+"""The command line: turns words into calls, nothing else. Heavy libraries are imported by the commands, not here."""
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+
+FAMILIES = ("generate", "files", "data", "train", "evaluate", "bench", "weights")
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> None:  # type: ignore[override]
+        """One sentence and exit code 2, without the page of usage."""
+        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The whole command line as one parser."""
+    top = _Parser(prog="motionloom", description="Human motion from words: generate, export, look at, train and measure it.")
+    top.add_argument("--version", action="store_true", help="print the version and end")
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", parser_class=_Parser)
+    for family in FAMILIES:
+        importlib.import_module(f"motionloom.cli.{family}").add(commands)
+    return top
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; 0 done, 2 a mistake in what was asked or given, 130 interrupted."""
+    from motionloom.errors import MotionloomError
+
+    top = parser()
+    arguments = top.parse_args(argv)
+    if arguments.version:
+        from importlib.metadata import version
+
+        print(f"motionloom {version('motionloom')}")
+        return 0
+    if not hasattr(arguments, "run"):
+        top.print_help()
+        return 2
+    try:
+        return arguments.run(arguments) or 0
+    except MotionloomError as error:
+        print(f"motionloom: {error}", file=sys.stderr)
+    except OSError as error:
+        print(f"motionloom: {error.strerror or error}: {error.filename or ''}".rstrip(": "), file=sys.stderr)
+    except KeyboardInterrupt:
+        print("motionloom: interrupted", file=sys.stderr)
+        return 130
+    return 2

@@ -1,0 +1,5 @@
+"""Not filled yet."""
+
+
+def add(subparsers) -> None:
+    """Register nothing."""
