@@ -1,0 +1,1 @@
+"""Recorded numbers of the published implementations, rebuilt from formulas and compared (see `runner`)."""

@@ -1,0 +1,123 @@
+"""Runs the recorded cases: rebuild the input from a rule, compute, compare.
+
+A test of a group reads
+
+    @pytest.mark.parametrize("case", cases("diffusion", kind="schedule"))
+    def test_schedule(case): compare(case, "beta", published(cosine(case.config["steps"])).beta)
+
+Where the recorded numbers are absent every such test is skipped with a reason. Arrays are compared as
+`numpy.asarray(array)`, so torch tensors (CPU) and numbers will do.
+"""
+
+import functools
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.shared import SHARED, shared
+
+# What a stream's numbers are for (rule R1); model m draws its weights from stream WEIGHTS + m.
+MOTION, TEXT, NOISE, KNOWN, MASK, WEIGHTS = 1, 2, 3, 4, 5, 10
+
+_UNSCALED = ("emb_trans_or_not.weight", "hidden")
+_NORMS = ("norm1.weight", "norm2.weight", "norm.weight", "output_net.1.weight")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One recorded run."""
+
+    group: str
+    name: str
+    config: Mapping[str, Any]
+    """What was run, and everything needed to rebuild its input."""
+    outputs: Mapping[str, Mapping[str, Any]]
+    """How each output is stored and how near it must be."""
+    lists: Mapping[str, Any]
+    """What a case without numbers lists: `keys` (names and shapes) and counts, or `dims`."""
+
+    def expected(self, output: str) -> np.ndarray:
+        """The stored elements of an output: every `stride`-th one of the flattened array."""
+        return _arrays(self.group)[self.outputs[output]["key"]]
+
+
+def cases(group: str, *, kind: str | None = None) -> list[Any]:
+    """The cases of a group (of one `config["kind"]`) for `pytest.mark.parametrize`, named as recorded."""
+    path = SHARED / "conformance" / f"{group}.json"
+    if not path.exists():
+        reason = f"{path} is not there: this test needs the material beside the repository (MOTIONLOOM_SHARED)"
+        return [pytest.param(None, id=f"{group}-absent", marks=pytest.mark.skip(reason=reason))]
+    found = [_case(group, record) for record in json.loads(path.read_text())["cases"]]
+    return [pytest.param(c, id=c.name) for c in found if kind in (None, c.config["kind"])]
+
+
+def case(group: str, name: str) -> Case:
+    """One case by name, inside a test; skips the test where the recorded numbers are absent."""
+    records = json.loads(shared(f"conformance/{group}.json").read_text())["cases"]
+    return next(_case(group, record) for record in records if record["name"] == name)
+
+
+def stream(seed: int, k: int) -> np.random.Generator:
+    """The stream of rule R1; `k` is MOTION, TEXT, NOISE, KNOWN, MASK or WEIGHTS + m."""
+    return np.random.Generator(np.random.PCG64([seed, k]))
+
+
+def normal(rng: np.random.Generator, shape: Iterable[int]) -> np.ndarray:
+    """The next float32 standard normal array of a stream."""
+    return rng.standard_normal(tuple(shape), dtype=np.float32)
+
+
+def weights(
+    names_and_shapes: Mapping[str, Iterable[int]] | Iterable[tuple[str, Iterable[int]]],
+    seed: int,
+    m: int = 0,
+    *,
+    scale: float = 0.05,
+) -> dict[str, np.ndarray]:
+    """Weights of model m by rule R2 (HumanMAC: scale 0.03); sinusoid tables (`.pe`) are left out."""
+    rng, result = stream(seed, WEIGHTS + m), {}
+    for name, shape in sorted(dict(names_and_shapes).items()):
+        if name.endswith(".pe"):
+            continue
+        drawn = normal(rng, shape)
+        result[name] = drawn if name.endswith(_UNSCALED) else drawn * np.float32(scale)
+        if name.endswith(_NORMS):
+            result[name] = result[name] + np.float32(1)
+    return result
+
+
+def compare(case: Case, output: str, array: Any) -> None:
+    """Assert that `array` is the recorded output: shape, stored elements, and mean, std, abs_sum of the whole."""
+    spec, actual = case.outputs[output], np.asarray(array)
+    what = f"{case.group}/{case.name}/{output}"
+    assert list(actual.shape) == spec["shape"], f"{what}: shape {list(actual.shape)}, recorded {spec['shape']}"
+    assert np.isfinite(actual).all(), f"{what}: not finite"
+    whole = actual.astype(np.float64)
+    atol, rtol = spec["atol"], spec.get("rtol", 0.0)
+    np.testing.assert_allclose(
+        whole.reshape(-1)[:: spec["stride"]], case.expected(output).reshape(-1), rtol=rtol, atol=atol, err_msg=what
+    )
+    _near(f"{what}: mean", whole.mean(), spec["mean"], atol, rtol)
+    _near(f"{what}: std", whole.std(), spec["std"], atol, rtol)
+    _near(f"{what}: abs_sum", np.abs(whole).sum(), spec["abs_sum"], atol * whole.size, rtol * whole.size)
+
+
+def _near(what: str, actual: float, expected: float, atol: float, rtol: float) -> None:
+    rounding = 1e-12 * max(1.0, abs(expected))  # the order of a float64 sum is not part of the answer
+    assert abs(actual - expected) <= atol + rtol * abs(expected) + rounding, f"{what} {actual}, recorded {expected}"
+
+
+def _case(group: str, record: Mapping[str, Any]) -> Case:
+    own = ("name", "config", "outputs")
+    lists = {key: value for key, value in record.items() if key not in own}
+    return Case(group, record["name"], record["config"], dict(record.get("outputs") or {}), lists)
+
+
+@functools.cache
+def _arrays(group: str) -> Mapping[str, np.ndarray]:
+    with np.load(shared(f"conformance/{group}.npz"), allow_pickle=False) as stored:
+        return dict(stored)
