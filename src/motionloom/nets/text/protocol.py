@@ -1,0 +1,92 @@
+"""What every text encoder gives, and the cache they share."""
+
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class TextEmbedding:
+    """Encoded texts, float32.
+
+    tokens: (rows, words, width) one state per word piece, start and end marks included; zero where mask is False.
+    mask: (rows, words) bool, True = a real piece, False = padding.
+    pooled: (rows, width) one vector per text.
+    """
+
+    tokens: Tensor
+    mask: Tensor
+    pooled: Tensor
+
+    def to(self, device: torch.device | str) -> "TextEmbedding":
+        """The same embedding on another device."""
+        return TextEmbedding(self.tokens.to(device), self.mask.to(device), self.pooled.to(device))
+
+
+class TextEncoder(Protocol):
+    """Texts in, `TextEmbedding` out. A row never depends on the other rows."""
+
+    @property
+    def name(self) -> str:
+        """Short identifier, written into checkpoints: "minilm", "clip", "distilbert"."""
+        ...
+
+    @property
+    def width(self) -> int:
+        """Channels of tokens and pooled."""
+        ...
+
+    def encode(self, texts: Sequence[str] | str) -> TextEmbedding:
+        """Encode texts (a single string counts as one row)."""
+        ...
+
+
+Row = tuple[Tensor, Tensor]
+"""One encoded text: its states (words, width) without padding, and its pooled vector (width,)."""
+
+
+def as_rows(texts: Sequence[str] | str) -> list[str]:
+    """The texts as a list of well-formed strings; half surrogate pairs, which no tokenizer takes, become '?'."""
+    rows = [texts] if isinstance(texts, str) else list(texts)
+    return [text.encode("utf-8", "replace").decode("utf-8") for text in rows]
+
+
+def stack_rows(rows: Sequence[Row], width: int) -> TextEmbedding:
+    """Pad rows of different lengths with zeros into one embedding."""
+    words = max((len(states) for states, _ in rows), default=0)
+    device = rows[0][0].device if rows else torch.device("cpu")
+    tokens = torch.zeros(len(rows), words, width, device=device)
+    mask = torch.zeros(len(rows), words, dtype=torch.bool, device=device)
+    pooled = torch.zeros(len(rows), width, device=device)
+    for index, (states, vector) in enumerate(rows):
+        tokens[index, : len(states)] = states
+        mask[index, : len(states)] = True
+        pooled[index] = vector
+    return TextEmbedding(tokens, mask, pooled)
+
+
+class RowCache:
+    """Least-recently-used cache from text to encoded row."""
+
+    def __init__(self, size: int = 1024) -> None:
+        self.size = size
+        self._rows: OrderedDict[str, Row] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def fetch(self, texts: Sequence[str], encode: Callable[[list[str]], list[Row]]) -> list[Row]:
+        """The rows of all texts; `encode` is called once, with the distinct texts not seen lately."""
+        missing = [text for text in dict.fromkeys(texts) if text not in self._rows]
+        fresh = dict(zip(missing, encode(missing))) if missing else {}
+        rows = [fresh[text] if text in fresh else self._rows[text] for text in texts]
+        for text, row in zip(texts, rows):
+            self._rows[text] = row
+            self._rows.move_to_end(text)
+        while len(self._rows) > self.size:
+            self._rows.popitem(last=False)
+        return rows
