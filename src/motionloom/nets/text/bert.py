@@ -30,12 +30,16 @@ class Layer(nn.Module):
 
 
 class Bert(nn.Module):
-    """ids (rows, words) and mask (rows, words; True = real) -> last hidden states (rows, words, width)."""
+    """ids (rows, words) and mask (rows, words; True = real) -> last hidden states (rows, words, width).
+
+    The embedding tables hold no values until a state dict is loaded.
+    """
 
     def __init__(self, *, vocabulary: int, places: int, width: int, heads: int, hidden: int, layers: int) -> None:
         super().__init__()
-        self.words = nn.Embedding(vocabulary, width)
-        self.places = nn.Embedding(places, width)  # the first segment's embedding is already added
+        # Tables are left undrawn: drawing normal numbers on torch's meta device costs a second of imports.
+        self.words = nn.Embedding.from_pretrained(torch.empty(vocabulary, width))
+        self.places = nn.Embedding.from_pretrained(torch.empty(places, width))  # segment 0 is already added
         self.norm = nn.LayerNorm(width, EPSILON)
         self.layers = nn.ModuleList(Layer(width, heads, hidden) for _ in range(layers))
 
