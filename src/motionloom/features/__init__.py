@@ -1,0 +1,1 @@
+"""Codecs between motions and the numbers that networks see."""
