@@ -3,7 +3,6 @@
 How it was made and how far it is from the original: docs/decisions/0002-text-encoder.md.
 """
 
-import warnings
 from collections.abc import Iterator, Sequence
 
 import torch
@@ -12,13 +11,12 @@ from torch.nn import functional as F
 
 from motionloom.errors import MotionloomError
 from motionloom.nets.text.bert import Bert
-from motionloom.nets.text.protocol import Row, RowCache, TextEmbedding, as_rows, stack_rows
+from motionloom.nets.text.protocol import Row, RowCache, TextEmbedding, as_rows, cut, stack_rows
 from motionloom.nets.text.quantise import dequantise, quantise
 from motionloom.nets.text.wordpiece import END, SPECIALS, START, make_tokenizer
 
 HEAD_WIDTH = 32
 LENGTH = 64  # word pieces, start and end marks included
-CHARACTERS = 20_000  # longer prompts are cut before they are split; 62 pieces never need as many
 BATCH_WORDS = 2048
 VOCABULARY = "vocabulary"
 SCALE = ".scale"
@@ -79,11 +77,9 @@ class MiniLM:
 
     def to(self, device: torch.device | str) -> "MiniLM":
         """The same encoder on another device, with an empty cache."""
-        return MiniLM.from_tensors(self._packed, cache=self._cache.size)._move(device)
-
-    def _move(self, device: torch.device | str) -> "MiniLM":
-        self.net.to(device)
-        return self
+        moved = MiniLM.from_tensors(self._packed, cache=self._cache.size)
+        moved.net.to(device)
+        return moved
 
     def encode(self, texts: Sequence[str] | str) -> TextEmbedding:
         """Tokens (rows, words <= 64, width), mask (rows, words), pooled (rows, width) of unit length.
@@ -94,11 +90,9 @@ class MiniLM:
 
     def ids(self, text: str) -> list[int]:
         """Word-piece ids of one text with start and end marks, at most 64 of them (warns where it had to cut)."""
-        pieces = self._tokenizer.encode(text[:CHARACTERS], add_special_tokens=False).ids
         room = self.net.places.num_embeddings - 2
-        if len(pieces) > room or len(text) > CHARACTERS:
-            warnings.warn(f"The text has more than {room} word pieces; the rest is ignored.", stacklevel=2)
-        return [self._start, *pieces[:room], self._end]
+        pieces = cut(text, lambda part: self._tokenizer.encode(part, add_special_tokens=False).ids, room)
+        return [self._start, *pieces, self._end]
 
     @torch.no_grad()
     def _encode(self, texts: list[str]) -> list[Row]:

@@ -1,5 +1,6 @@
 """What every text encoder gives, and the cache they share."""
 
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,6 +8,8 @@ from typing import Protocol
 
 import torch
 from torch import Tensor
+
+CHARACTERS = 20_000
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,17 @@ def as_rows(texts: Sequence[str] | str) -> list[str]:
     """The texts as a list of well-formed strings; half surrogate pairs, which no tokenizer takes, become '?'."""
     rows = [texts] if isinstance(texts, str) else list(texts)
     return [text.encode("utf-8", "replace").decode("utf-8") for text in rows]
+
+
+def cut(text: str, split: Callable[[str], list[int]], room: int) -> list[int]:
+    """The ids of the text's first `room` pieces; warns where there are more.
+
+    Texts beyond CHARACTERS are shortened first, so that a hostile prompt costs no time in the tokenizer.
+    """
+    ids = split(text[:CHARACTERS])
+    if len(ids) > room or len(text) > CHARACTERS:
+        warnings.warn(f"The text has more than {room} word pieces; the rest is ignored.", stacklevel=2)
+    return ids[:room]
 
 
 def stack_rows(rows: Sequence[Row], width: int) -> TextEmbedding:
