@@ -23,7 +23,7 @@ def formula_joints(case: Case) -> np.ndarray:
     bones = humanml.OFFSETS * (c["scale"] * (1 + 0.06 * np.sin(np.arange(22))))[:, None]
     step = c["speed"] * np.stack([np.sin(theta), 0 * theta, np.cos(theta)], -1)
     place = np.zeros((c["frames"], 22, 3))
-    place[:, 0] = [0.5, 0.95, -0.2] + np.cumsum(step, 0) - step
+    place[:, 0] = np.array([0.5, 0.95, -0.2]) + np.cumsum(step, 0) - step
     place[:, 0, 1] += 0.03 * np.sin(0.3 * np.arange(c["frames"]))
     world = [rot.multiply(yaw, local[:, 0])]
     for joint, p in enumerate(SMPL22.parents[1:], start=1):

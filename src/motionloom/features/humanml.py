@@ -9,11 +9,13 @@ shoulders in the heading; the heading of frame 0 is forced to +Z; see `heading_q
 from the rest directions, without twist, and not those of a body model; `motionloom.features.ik` makes real ones.
 """
 
+from itertools import pairwise
 from typing import Literal, overload
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
@@ -135,7 +137,7 @@ def contacts(positions: np.ndarray) -> Array:
 def encode(positions: np.ndarray, *, heading: Heading = "compatible") -> NDArray[np.float32]:
     """(frames, 22, 3) metres at 20 fps, `uniform` and `canonical`, to features (frames - 1, 263).
 
-    With ``corrected`` the smoothed facing of frame 0 need not be +Z: decoding then gives the motion turned so that it is.
+    With ``corrected`` the smoothed facing of frame 0 need not be +Z; decoding gives the motion turned so that it is.
     """
     positions = _checked(positions)
     if len(positions) < 2:
@@ -193,15 +195,13 @@ def resample_positions(positions: np.ndarray, fps: float, *, target: float = FPS
 
 # Features to positions
 
-_Tensor = torch.Tensor
-
 
 @overload
-def recover_root(features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]: ...
+def recover_root(features: Tensor) -> tuple[Tensor, Tensor]: ...
 @overload
 def recover_root(features: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
-def recover_root(features: torch.Tensor | np.ndarray):
-    """Integrate the root: features (..., frames, 263) to heading quaternion (..., frames, 4) and place (..., frames, 3).
+def recover_root(features: Tensor | np.ndarray):
+    """Integrate the root: features (..., frames, 263) to heading (..., frames, 4) and place (..., frames, 3) in metres.
 
     The quaternion turns the world into the heading frame; frame 0 is at x = z = 0 facing +Z.
     """
@@ -217,10 +217,10 @@ def recover_root(features: torch.Tensor | np.ndarray):
 
 
 @overload
-def decode_positions(features: torch.Tensor) -> torch.Tensor: ...
+def decode_positions(features: Tensor) -> Tensor: ...
 @overload
 def decode_positions(features: np.ndarray) -> np.ndarray: ...
-def decode_positions(features: torch.Tensor | np.ndarray):
+def decode_positions(features: Tensor | np.ndarray):
     """Features (..., frames, 263) to joint positions (..., frames, 22, 3) in metres; differentiable for tensors.
 
     Reads the root and the places of the joints (the first 67 numbers) only, which need not have constant bones.
@@ -237,10 +237,10 @@ def decode_positions(features: torch.Tensor | np.ndarray):
 
 
 @overload
-def positions_from_rot6d(features: torch.Tensor, offsets: np.ndarray = OFFSETS) -> torch.Tensor: ...
+def positions_from_rot6d(features: Tensor, offsets: np.ndarray = OFFSETS) -> Tensor: ...
 @overload
 def positions_from_rot6d(features: np.ndarray, offsets: np.ndarray = OFFSETS) -> np.ndarray: ...
-def positions_from_rot6d(features: torch.Tensor | np.ndarray, offsets: np.ndarray = OFFSETS):
+def positions_from_rot6d(features: Tensor | np.ndarray, offsets: np.ndarray = OFFSETS):
     """The other decoder: (..., frames, 22, 3) metres by forward kinematics of the rotations on constant bones.
 
     As published, the heading quaternion itself (world into heading, not its inverse) stands at the head of every chain.
@@ -254,10 +254,10 @@ def positions_from_rot6d(features: torch.Tensor | np.ndarray, offsets: np.ndarra
     zero, one, c, s = torch.zeros_like(w), torch.ones_like(w), 1 - 2 * y * y, 2 * w * y
     head = torch.stack([c, zero, s, zero, one, zero, -s, zero, c], dim=-1).unflatten(-1, (3, 3))
     bones = torch.as_tensor(offsets, dtype=features.dtype, device=features.device)
-    places: list[torch.Tensor] = [root] * 22
+    places: list[Tensor] = [root] * 22
     for chain in _CHAINS:
         world = head
-        for before, j in zip(chain, chain[1:]):
+        for before, j in pairwise(chain):
             world = world @ local[..., j - 1, :, :]
             places[j] = places[before] + world @ bones[j]
     return torch.stack(places, dim=-2)
@@ -294,7 +294,7 @@ def _checked(positions: np.ndarray) -> Array:
     return positions
 
 
-def _check_width(features: torch.Tensor | np.ndarray) -> None:
+def _check_width(features: Tensor | np.ndarray) -> None:
     if features.ndim < 2 or features.shape[-1] != WIDTH:
         raise MotionloomError(f"features must be (..., frames, {WIDTH}); got {tuple(features.shape)}")
 
@@ -319,18 +319,18 @@ def _to_forward(facing: np.ndarray) -> Array:
     return rot.shortest_arc(facing, np.array([0.0, 0.0, 1.0]))
 
 
-def _later(x: _Tensor) -> _Tensor:
+def _later(x: Tensor) -> Tensor:
     """One frame later, 0 in frame 0."""
     return torch.cat([torch.zeros_like(x[..., :1]), x[..., :-1]], dim=-1)
 
 
-def _turn_back(half: _Tensor, x: _Tensor, z: _Tensor) -> tuple[_Tensor, _Tensor]:
+def _turn_back(half: Tensor, x: Tensor, z: Tensor) -> tuple[Tensor, Tensor]:
     """Turn by -2 half about +Y: from the heading frame into the world."""
     c, s = (2 * half).cos(), (2 * half).sin()
     return x * c - z * s, x * s + z * c
 
 
-def _columns_to_matrix(columns: _Tensor) -> _Tensor:
+def _columns_to_matrix(columns: Tensor) -> Tensor:
     """(..., 6) to matrices (..., 3, 3): Gram-Schmidt on the first two columns (Zhou et al., CVPR 2019)."""
     x = torch.nn.functional.normalize(columns[..., :3], dim=-1)
     z = torch.nn.functional.normalize(torch.linalg.cross(x, columns[..., 3:]), dim=-1)
