@@ -1,0 +1,326 @@
+"""Biovision hierarchy files (BVH), in and out.
+
+A BVH file is a tree of joints with offsets, then one row of channels per frame. It says neither its unit nor
+which way is up; see `guess_unit`. Position channels *replace* the OFFSET of their joint. End Sites become joints
+named ``"<parent> End Site"`` and are listed in ``Skeleton.ends``.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.io import text
+from motionloom.motion import Motion
+from motionloom.skeleton import Skeleton
+
+Array = NDArray[np.float64]
+MAX_JOINTS = 10_000
+_CHANNELS = {f"{axis}{kind}": (axis, kind) for axis in "XYZ" for kind in ("position", "rotation")}
+_SAME_PLACE = 2e-5  # metres: position channels that move less than this are constant
+
+
+@dataclass(frozen=True)
+class Bvh:
+    """A BVH file: the motion, and what is needed to write it back the way it came."""
+
+    motion: Motion
+    unit: float
+    """Metres per unit of length in the file."""
+    orders: Mapping[str, str]
+    """Order of the rotation channels by joint name, such as ``"ZXY"``."""
+
+
+@dataclass
+class _Joint:
+    name: str
+    parent: int
+    line: int
+    end: bool = False
+    offset: tuple[float, ...] | None = None
+    channels: tuple[str, ...] = ()
+
+
+def load_bvh(path: Path | str, *, fps: float | None = None, unit: float | None = None) -> Motion:
+    """Read a BVH file as a `Motion` in metres.
+
+    ``unit`` is metres per unit of the file (None: `guess_unit`); ``fps`` replaces the rate the file states.
+    Raises `MotionloomError` with file and line for whatever is wrong with the file.
+    """
+    return read_bvh(path, fps=fps, unit=unit).motion
+
+
+def read_bvh(path: Path | str, *, fps: float | None = None, unit: float | None = None) -> Bvh:
+    """Like `load_bvh`, with the unit and the channel orders."""
+    data = text.read_text(path)
+    split = re.search(rb"^[ \t]*MOTION\b[ \t]*", data, re.MULTILINE | re.IGNORECASE)
+    if not re.match(rb"\s*HIERARCHY\b", data, re.IGNORECASE):
+        raise MotionloomError(f"{path} is not a BVH file: it does not begin with HIERARCHY")
+    if split is None:
+        raise MotionloomError(f"{path} has no MOTION part; the file is cut off or not a BVH file")
+    joints = _hierarchy(data[: split.start()], path)
+    rate, values = _frames(data, split.end(), sum(len(j.channels) for j in joints), path)
+    return _assemble(joints, values, rate if fps is None else fps, unit)
+
+
+# Hierarchy -----------------------------------------------------------------------------------------------------------
+
+
+class _Words:
+    """The words of the hierarchy with their lines; braces are words of their own."""
+
+    def __init__(self, data: bytes, path: Path | str) -> None:
+        self.path = path
+        self.words = [
+            (word, number)
+            for number, line in enumerate(data.split(b"\n"), start=1)
+            for word in text.word(line).replace("{", " { ").replace("}", " } ").split()
+        ]
+        self.at = 0
+
+    def next(self, wanted: str) -> str:
+        if self.at >= len(self.words):
+            raise MotionloomError(f"{self.path}: the hierarchy ends where {wanted} should follow")
+        self.at += 1
+        return self.words[self.at - 1][0]
+
+    @property
+    def line(self) -> int:
+        return self.words[max(self.at - 1, 0)][1]
+
+    def fail(self, message: str) -> MotionloomError:
+        return MotionloomError(f"{self.path}, line {self.line}: {message}")
+
+    def name(self) -> str:
+        """Everything up to the opening brace: names may hold spaces and colons."""
+        parts: list[str] = []
+        while (part := self.next("'{'")) != "{":
+            parts.append(part)
+            if part == "}" or len(parts) > 50:
+                raise self.fail("a joint's name must be followed by '{'")
+        return " ".join(parts)
+
+    def numbers(self, count: int, what: str) -> tuple[float, ...]:
+        found = []
+        for _ in range(count):
+            word = self.next(f"{count} numbers of {what}")
+            value = text.number(word)
+            if value is None:
+                raise self.fail(f"{what} needs {count} finite numbers; {text.shown(word)} is none")
+            found.append(value)
+        return tuple(found)
+
+
+def _hierarchy(data: bytes, path: Path | str) -> list[_Joint]:
+    """The joints in file order; a loop with a stack, so that depth costs nothing."""
+    words = _Words(data, path)
+    words.next("HIERARCHY")
+    joints: list[_Joint] = []
+    open_joints: list[int] = []
+    while words.at < len(words.words):
+        word = words.next("a joint")
+        key = word.upper()
+        if key in ("ROOT", "JOINT", "END"):
+            _open_joint(words, key, joints, open_joints)
+        elif word == "}":
+            if not open_joints:
+                raise words.fail("'}' without a '{' before it")
+            open_joints.pop()
+        elif key in ("OFFSET", "CHANNELS") and open_joints:
+            _describe(words, key, joints[open_joints[-1]])
+        else:
+            raise words.fail(f"{text.shown(word)} is not expected here; a joint, OFFSET, CHANNELS or a brace is")
+    if not joints:
+        raise MotionloomError(f"{path}: the hierarchy has no ROOT")
+    if open_joints:
+        raise words.fail(f"the joint {text.shown(joints[open_joints[-1]].name)} is never closed with '}}'")
+    _check_joints(joints, path)
+    return joints
+
+
+def _open_joint(words: _Words, key: str, joints: list[_Joint], open_joints: list[int]) -> None:
+    line, name = words.line, words.name()
+    if (key == "ROOT") != (not open_joints):
+        raise words.fail("ROOT must stand outside of braces and JOINT or End Site inside")
+    if key == "ROOT" and joints:
+        raise words.fail("a second ROOT; files with several skeletons are not read, so save each person to a file of its own")
+    if open_joints and joints[open_joints[-1]].end:
+        raise words.fail("an End Site cannot hold joints")
+    if len(joints) >= MAX_JOINTS:
+        raise words.fail(f"more than {MAX_JOINTS} joints")
+    if key != "END" and not name:
+        raise words.fail(f"{key} without a name")
+    joints.append(_Joint(name, open_joints[-1] if open_joints else -1, line, end=key == "END"))
+    open_joints.append(len(joints) - 1)
+
+
+def _check_joints(joints: list[_Joint], path: Path | str) -> None:
+    """Unique names, an OFFSET each; End Sites get their names here, when all others are known."""
+    taken: set[str] = set()
+    for joint in joints:
+        if not joint.end and joint.name in taken:
+            raise MotionloomError(f"{path}, line {joint.line}: a second joint is called {text.shown(joint.name)}; rename one")
+        if joint.offset is None and not joint.end:
+            raise MotionloomError(f"{path}, line {joint.line}: the joint {text.shown(joint.name)} has no OFFSET")
+        taken |= set() if joint.end else {joint.name}
+    for joint in joints:
+        if joint.end:
+            base, copy = end_name(joints[joint.parent].name), 1
+            joint.name = base
+            while joint.name in taken:
+                copy += 1
+                joint.name = f"{base} {copy}"
+            taken.add(joint.name)
+
+
+def end_name(parent: str) -> str:
+    """The name of a joint's End Site."""
+    return f"{parent} End Site"
+
+
+def _describe(words: _Words, key: str, joint: _Joint) -> None:
+    if key == "OFFSET":
+        joint.offset = words.numbers(3, "OFFSET")
+        return
+    count = words.next("the number of channels")
+    if not re.fullmatch(r"[0-6]", count):
+        raise words.fail(f"CHANNELS needs a count from 0 to 6; got {text.shown(count)}")
+    if joint.channels or joint.end:
+        raise words.fail(f"{text.shown(joint.name)} cannot have these CHANNELS: it is an End Site or has channels already")
+    channels = tuple(words.next("a channel").capitalize() for _ in range(int(count)))
+    for name in channels:
+        if name not in _CHANNELS:
+            raise words.fail(f"{text.shown(name)} is not a channel; Xposition ... Zrotation are")
+    if len(set(channels)) != len(channels):
+        raise words.fail(f"{text.shown(joint.name)} has the same channel twice: {' '.join(channels)}")
+    joint.channels = channels
+
+
+# Frames --------------------------------------------------------------------------------------------------------------
+
+_HEAD = re.compile(rb"\s*Frames?[ \t]*:?[ \t]*(\S*)[ \t]*\n\s*Frame[ \t_]*Time[ \t]*:?[ \t]*(\S*)[ \t]*(?:\n|\Z)", re.IGNORECASE)
+_RATES = (10, 12, 12.5, 15, 20, 24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 72, 90, 100, 120, 200, 240)
+
+
+def _frames(data: bytes, start: int, columns: int, path: Path | str) -> tuple[float, Array]:
+    """Frames per second and the (frames, columns) numbers."""
+    line = data.count(b"\n", 0, start) + 1
+    head = _HEAD.match(data, start)
+    if head is None:
+        raise MotionloomError(f"{path}, line {line}: MOTION must be followed by 'Frames: N' and 'Frame Time: SECONDS'")
+    count, rate = head[1], frame_rate(text.word(head[2]))
+    if not re.fullmatch(rb"[0-9]{1,12}", count) or int(count) == 0:
+        raise MotionloomError(f"{path}, line {line + 1}: Frames must be a whole number above 0; got {text.shown(count)}")
+    if rate is None:
+        raise MotionloomError(f"{path}: Frame Time must be a number of seconds above 0; got {text.shown(head[2])}")
+    if columns == 0:
+        raise MotionloomError(f"{path} has no channels, so nothing moves in it")
+    first = line + data.count(b"\n", start, head.end())
+    values = text.numbers(data[head.end() :], path=path, first_line=first)
+    if len(values) != int(count) * columns:
+        _complain(data[head.end() :], int(count), columns, path=path, first=first)
+    return rate, values.reshape(-1, columns)
+
+
+def frame_rate(seconds: str) -> float | None:
+    """Frames per second for a frame time as printed: ``0.033`` and ``0.0333333`` are both 30.
+
+    The usual rate is taken whose frame time, cut or rounded to the printed digits, is what the file says and
+    differs by at most 1.2 %; otherwise the exact reciprocal. None if it is not a positive number.
+    """
+    value = text.number(seconds)
+    if value is None or not 1e-6 <= value <= 1e4:
+        return None
+    mantissa, _, exponent = seconds.lower().partition("e")
+    digit = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+    near = [r for r in (*_RATES, max(round(1 / value), 1)) if abs(1 / r - value) < digit and abs(r * value - 1) < 0.012]
+    return float(min(near, key=lambda r: abs(r * value - 1))) if near else 1 / value
+
+
+def _complain(data: bytes, count: int, columns: int, *, path: Path | str, first: int) -> None:
+    rows = 0
+    for line, row in enumerate(data.split(b"\n"), start=first):
+        found = len(row.split())
+        rows += found > 0
+        if found not in (0, columns):
+            raise MotionloomError(f"{path}, line {line}: {found} numbers where the hierarchy has {columns} channels")
+    raise MotionloomError(f"{path} says {count} frames but holds {rows}; it was cut off or its Frames line is wrong")
+
+
+# Assembly ------------------------------------------------------------------------------------------------------------
+
+
+def _assemble(joints: list[_Joint], values: Array, fps: float, unit: float | None) -> Bvh:
+    offsets = np.array([j.offset or (0.0, 0.0, 0.0) for j in joints])
+    parents = tuple(j.parent for j in joints)
+    places, moving = _places(joints, values, offsets)
+    scale = guess_unit(parents, np.where(moving[:, None], 0.0, offsets)) if unit is None else unit
+    root = places.pop(0, np.broadcast_to(offsets[0], (len(values), 3))) * scale
+    translations = None
+    if any(np.ptp(p, axis=0).max() * scale > _SAME_PLACE for p in places.values()):
+        translations = np.broadcast_to(offsets, (len(values), *offsets.shape)) * scale
+    for j, place in places.items():
+        if np.ptp(place, axis=0).max() * scale <= _SAME_PLACE:
+            offsets[j] = place[0]
+        if translations is not None:
+            translations[:, j] = place * scale
+    skeleton = Skeleton(
+        tuple(j.name for j in joints), parents, offsets * scale, frozenset(i for i, j in enumerate(joints) if j.end)
+    )
+    rotations, orders = _rotations(joints, values)
+    return Bvh(Motion(skeleton, fps, root, rotations, translations), scale, orders)
+
+
+def _columns(joints: list[_Joint]) -> list[int]:
+    """First column of each joint."""
+    return list(np.cumsum([0, *(len(j.channels) for j in joints[:-1])]))
+
+
+def _places(joints: list[_Joint], values: Array, offsets: Array) -> tuple[dict[int, Array], NDArray[np.bool_]]:
+    """(frames, 3) places of the joints that have position channels, and which joints but the root do move."""
+    places: dict[int, Array] = {}
+    moving = np.zeros(len(joints), dtype=bool)
+    for j, (joint, column) in enumerate(zip(joints, _columns(joints))):
+        for at, channel in enumerate(joint.channels):
+            axis, kind = _CHANNELS[channel]
+            if kind == "position":
+                place = places.setdefault(j, np.tile(offsets[j], (len(values), 1)))
+                place[:, "XYZ".index(axis)] = values[:, column + at]
+        moving[j] = j in places and bool((np.ptp(places[j], axis=0) > 0).any())
+    return places, moving
+
+
+def _rotations(joints: list[_Joint], values: Array) -> tuple[Array, dict[str, str]]:
+    """(frames, joints, 4) quaternions, computed together for all joints of one channel order."""
+    rotations = np.tile(rot.IDENTITY, (len(values), len(joints), 1))
+    groups: dict[str, list[tuple[int, list[int]]]] = {}
+    for j, (joint, column) in enumerate(zip(joints, _columns(joints))):
+        turns = [(c[0], column + at) for at, c in enumerate(joint.channels) if c.endswith("rotation")]
+        if turns:
+            groups.setdefault("".join(axis for axis, _ in turns), []).append((j, [at for _, at in turns]))
+    for order, members in groups.items():
+        angles = np.radians(values[:, [columns for _, columns in members]])
+        rotations[:, [j for j, _ in members]] = rot.euler_to_quat(order, angles)
+    return rotations, {joints[j].name: order for order, members in groups.items() for j, _ in members}
+
+
+def guess_unit(parents: tuple[int, ...], offsets: Array) -> float:
+    """Metres per unit for a skeleton of unknown unit, from the longest way along its bones, tip to tip.
+
+    On an adult that way (toe to fingertip or skull) is 1.6 to 2.6 m in any pose. Below 4.2 units it is taken
+    for metres, 25 to 55 for the unit of the CMU skeleton files (0.0564 m), 55 to 110 for inches, 450 and
+    more for millimetres, and anything else for centimetres. Wrong for a doll, a giant or a lone hand: say the unit.
+    """
+    reach = np.zeros(len(parents))
+    longest = 0.0
+    for j in range(len(parents) - 1, 0, -1):
+        way = reach[j] + float(np.linalg.norm(offsets[j]))
+        longest = max(longest, reach[parents[j]] + way)
+        reach[parents[j]] = max(reach[parents[j]], way)
+    table = ((0.2, 0.01), (4.2, 1.0), (25.0, 0.01), (55.0, 0.0254 / 0.45), (110.0, 0.0254), (450.0, 0.01))
+    return next((unit for below, unit in table if longest < below), 0.001)

@@ -1,0 +1,106 @@
+"""Reading text files of numbers from strangers: size, binary junk, bad numbers, all with the line in the message."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom.errors import MotionloomError
+
+MAX_BYTES = 2 * 1024**3
+"""Files above this size (2 GB) are refused."""
+_CHUNK = 16 * 1024**2
+
+
+def read_bytes(path: Path | str, *, max_bytes: int = MAX_BYTES) -> bytes:
+    """The file's bytes; raises `MotionloomError` if it is missing, a folder, empty or larger than ``max_bytes``."""
+    path = Path(path)
+    if path.is_dir():
+        raise MotionloomError(f"{path} is a folder; name a file in it")
+    try:
+        size = path.stat().st_size
+        if size > max_bytes:
+            raise MotionloomError(f"{path} has {size / 1e9:.1f} GB; files above {max_bytes / 1e9:.1f} GB are not read")
+        data = path.read_bytes()
+    except (OSError, ValueError) as error:
+        if isinstance(error, MotionloomError):
+            raise
+        raise MotionloomError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from None
+    if not data.strip():
+        raise MotionloomError(f"{path} is empty")
+    return data
+
+
+def read_text(path: Path | str, *, max_bytes: int = MAX_BYTES) -> bytes:
+    """The bytes of a text file with plain line ends (``\\n``) and without a byte-order mark; refuses binary junk."""
+    data = read_bytes(path, max_bytes=max_bytes)
+    if b"\0" in data:
+        raise MotionloomError(f"{path} is not a text file: it holds binary data")
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return data.removeprefix(b"\xef\xbb\xbf")
+
+
+def word(raw: bytes) -> str:
+    """Bytes as text that is safe to print: UTF-8 where it is, Latin-1 where it is not."""
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
+
+
+def shown(raw: bytes | str, limit: int = 40) -> str:
+    """A piece of a file as it may appear in a message: quoted, without control characters, not too long."""
+    text = word(raw) if isinstance(raw, bytes) else raw
+    return repr(text if len(text) <= limit else text[: limit - 3] + "...")
+
+
+def number(raw: bytes | str) -> float | None:
+    """A finite decimal number or None."""
+    try:
+        value = float(raw)
+    except ValueError:
+        return None
+    return value if np.isfinite(value) and b"_" not in (raw if isinstance(raw, bytes) else raw.encode()) else None
+
+
+def numbers(data: bytes, *, path: Path | str, first_line: int) -> NDArray[np.float64]:
+    """All numbers of a block of text in one flat array, in time linear in its length.
+
+    ``first_line`` is the line of the file on which the block begins, for messages.
+    """
+    parts: list[NDArray[np.float64]] = []
+    start = 0
+    while start < len(data):
+        stop = len(data) if len(data) - start <= _CHUNK else data.rfind(b"\n", start, start + _CHUNK) + 1
+        stop = stop if stop > start else len(data)
+        chunk = data[start:stop]
+        values = _parse(chunk)
+        if values is None:
+            _complain(chunk, path, first_line + data.count(b"\n", 0, start))
+        else:
+            parts.append(values)
+        start = stop
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def _parse(chunk: bytes) -> NDArray[np.float64] | None:
+    if not chunk.strip():
+        return np.empty(0)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            values = np.fromstring(chunk.decode("ascii"), dtype=np.float64, sep=" ")
+    except (ValueError, DeprecationWarning, UnicodeDecodeError):
+        return None
+    return values if np.isfinite(values).all() else None
+
+
+def _complain(chunk: bytes, path: Path | str, line: int) -> None:
+    for text in chunk.split(b"\n"):
+        for raw in text.split():
+            if number(raw) is None:
+                raise MotionloomError(f"{path}, line {line}: {shown(raw)} is not a finite number")
+        line += 1
+    raise MotionloomError(f"{path}: the block of numbers that ends at line {line} cannot be read")
