@@ -1,0 +1,93 @@
+"""Reading joint names: which part of the body, which side. Names from Mixamo, CMU conversions, Biped, Unreal,
+Rokoko, Perception Neuron, Xsens, VRM, SMPL and their relatives; plain spelling differences are ignored.
+"""
+
+import re
+
+from motionloom.skeleton import Skeleton
+
+Parts = dict[str, int]
+"""Body part, such as ``left_knee`` or ``pelvis``, to joint number."""
+
+_TOKEN = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
+_LEFT, _RIGHT = {"left", "l", "lt", "lft"}, {"right", "r", "rt", "rgt"}
+_NOISE = {"bip", "bip001", "mixamorig", "cc", "base", "armature", "character", "skeleton", "skel", "jnt", "joint", "bone",
+          "bn", "def", "org", "rig", "robot", "valve", "biped", "j", "m", "avg", "f", "sim", "rl"}  # fmt: skip
+_HELPERS = {"twist", "roll", "ik", "pole", "end", "nub", "tip", "site", "target", "effector", "share", "corrective"}
+
+# Words of each part in order of preference: an earlier word wins where a skeleton has several.
+_SIDED: dict[str, tuple[str, ...]] = {
+    "hip": ("upleg", "upperleg", "thigh", "femur", "hip"),
+    "knee": ("lowerleg", "lowleg", "loleg", "shin", "calf", "tibia", "knee", "leg"),
+    "ankle": ("ankle", "foot"),
+    "foot": ("toebase", "toe", "toes", "ball", "foot"),
+    "collar": ("clavicle", "collar", "collarbone", "innershoulder", "shoulder"),
+    "shoulder": ("upperarm", "uparm", "humerus", "shldr", "arm", "shoulder"),
+    "elbow": ("lowerarm", "lowarm", "loarm", "forearm", "elbow", "radius"),
+    "wrist": ("wrist", "hand"),
+}
+_MIDDLE: dict[str, tuple[str, ...]] = {
+    "pelvis": ("pelvis", "hips", "hip", "lowertorso"),
+    "neck": ("neck", "lowerneck", "neckbase"),
+    "head": ("head",),
+}
+
+
+def _tokens(name: str) -> list[str]:
+    bare = re.split(r"[:|]", name)[-1]
+    return [t.lower() for t in _TOKEN.findall(bare)]
+
+
+def _words() -> set[str]:
+    return {w for words in (*_SIDED.values(), *_MIDDLE.values()) for w in words}
+
+
+def _side(tokens: list[str]) -> tuple[str, list[str]]:
+    """``left``, ``right`` or ``middle`` and the tokens that remain."""
+    for side, marks in (("left", _LEFT), ("right", _RIGHT)):
+        if any(t in marks for t in tokens):
+            return side, [t for t in tokens if t not in marks]
+    for i, token in enumerate(tokens):  # run together, as in lfemur or rightupleg
+        for side, marks in (("left", _LEFT), ("right", _RIGHT)):
+            for mark in sorted(marks, key=len, reverse=True):
+                if token.startswith(mark) and token[len(mark) :] in _words():
+                    return side, [*tokens[:i], token[len(mark) :], *tokens[i + 1 :]]
+    return "middle", tokens
+
+
+def read_name(name: str) -> tuple[str, str]:
+    """Side and word of one joint name: ``mixamorig:LeftUpLeg`` -> ``("left", "upleg")``; helpers give ``""``."""
+    side, tokens = _side(_tokens(name))
+    if any(t in _HELPERS for t in tokens):
+        return side, ""
+    numbers = [t for t in tokens if t.isdigit() and t not in ("0", "00", "1", "01")]
+    kept = [t for t in tokens if not t.isdigit() and t not in _NOISE]
+    return side, "" if numbers else "".join(kept)
+
+
+def parts_by_name(skeleton: Skeleton) -> Parts:
+    """The parts whose joints the names tell, sided ones as ``left_knee``; what is not named is left out."""
+    found: dict[tuple[str, str], int] = {}
+    for j in range(len(skeleton)):
+        if j not in skeleton.ends:
+            found.setdefault(read_name(skeleton.names[j]), j)  # parents come first: the upper of two wins
+    parts: Parts = {}
+    for part, words in _MIDDLE.items():
+        joint = next((found["middle", w] for w in words if ("middle", w) in found), None)
+        if joint is not None:
+            parts[part] = joint
+    for side in ("left", "right"):
+        parts.update(_sided(side, found))
+    return parts
+
+
+def _sided(side: str, found: dict[tuple[str, str], int]) -> Parts:
+    here = {word: j for (s, word), j in found.items() if s == side}
+    limb = {part: next((here[w] for w in words if w in here), None) for part, words in _SIDED.items()}
+    if limb["foot"] is not None and limb["foot"] == limb["ankle"]:
+        limb["foot"] = None  # "foot" is the toe joint only where an "ankle" stands above it
+    if limb["collar"] is not None and limb["collar"] == limb["shoulder"]:
+        limb["collar"] = None  # "shoulder" is the collar bone only where an upper arm hangs on it
+    if limb["hip"] is None and "leg" in here and "knee" in here:
+        limb["hip"], limb["knee"] = here["leg"], here["knee"]
+    return {f"{side}_{part}": j for part, j in limb.items() if j is not None}

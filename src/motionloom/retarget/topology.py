@@ -1,0 +1,139 @@
+"""Finding a body in a tree of joints by its shape: two legs that go down, a spine that goes up, arms that branch off."""
+
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom.retarget.names import Parts
+from motionloom.skeleton import Skeleton
+
+Array = NDArray[np.float64]
+
+
+def ancestors(skeleton: Skeleton, joint: int) -> list[int]:
+    """The joint, its parent and so on up to the root."""
+    line = [joint]
+    while line[-1] != 0:
+        line.append(skeleton.parents[line[-1]])
+    return line
+
+
+def is_above(skeleton: Skeleton, upper: int, lower: int) -> bool:
+    """Whether ``upper`` is ``lower`` or one of its ancestors."""
+    return upper in ancestors(skeleton, lower)
+
+
+def common_ancestor(skeleton: Skeleton, joints: list[int]) -> int:
+    """The lowest joint that is above all the given ones."""
+    return max(set.intersection(*(set(ancestors(skeleton, j)) for j in joints)))
+
+
+def path_down(skeleton: Skeleton, upper: int, lower: int) -> list[int]:
+    """Joints from ``upper`` to ``lower``, both included."""
+    line = ancestors(skeleton, lower)
+    return line[: line.index(upper) + 1][::-1]
+
+
+def parts_by_shape(skeleton: Skeleton) -> Parts | None:
+    """Body parts of a skeleton in an upright rest pose with the left side at +X (or where the toes say), else None."""
+    rest = skeleton.rest_positions()
+    chains = [_longest_chain(skeleton, j) for j in range(len(skeleton))]
+    for pelvis in range(len(skeleton)):
+        legs = _pair(skeleton, pelvis, chains, rest, down=True)
+        if legs is None:
+            continue
+        above = [j for j in range(len(skeleton)) if is_above(skeleton, pelvis, j) and not any(is_above(skeleton, g[0], j) for g in legs)]
+        for chest in above:
+            arms = _pair(skeleton, chest, chains, rest, down=False)
+            if arms is not None and not set(arms[0]) & {*legs[0], *legs[1]}:
+                return _name_parts(skeleton, rest, pelvis, legs, chest=chest, arms=arms)
+    return None
+
+
+def _longest_chain(skeleton: Skeleton, joint: int) -> list[int]:
+    """The way down from a joint to the tip that lies farthest along the bones."""
+    reach = np.zeros(len(skeleton))
+    below = [-1] * len(skeleton)
+    for j in range(len(skeleton) - 1, joint, -1):
+        parent, length = skeleton.parents[j], reach[j] + float(np.linalg.norm(skeleton.offsets[j]))
+        if length > reach[parent] or below[parent] < 0:
+            reach[parent], below[parent] = length, j
+    line = [joint]
+    while below[line[-1]] >= 0:
+        line.append(below[line[-1]])
+    return line
+
+
+def _pair(skeleton: Skeleton, joint: int, chains: list[list[int]], rest: Array, *, down: bool) -> tuple[list[int], list[int]] | None:
+    """Two mirror-like limbs that hang on a joint beside a third branch: legs reach far below it, arms do not."""
+    children = skeleton.children(joint)
+    height = np.ptp(rest[:, 1])
+    best: tuple[float, tuple[list[int], list[int]]] | None = None
+    if len(children) < 3:
+        return None
+    for a, b in combinations(children, 2):
+        limbs = (chains[a], chains[b])
+        if min(map(len, limbs)) < 3:
+            continue
+        lengths = [_length(skeleton, limb) for limb in limbs]
+        drops = [float(rest[joint, 1] - rest[limb[-1], 1]) for limb in limbs]
+        apart = float(np.linalg.norm(rest[limbs[0][-1]] - rest[limbs[1][-1]]))
+        alike = abs(lengths[0] - lengths[1]) < 0.25 * max(lengths) and abs(drops[0] - drops[1]) < 0.15 * height
+        if alike and apart > 0.05 * height and (min(drops) > 0.3 * height) == down and min(lengths) > 0.2 * height:
+            score = sum(lengths)
+            best = max(best, (score, limbs), key=lambda x: x[0]) if best else (score, limbs)
+    return best[1] if best else None
+
+
+def _length(skeleton: Skeleton, line: list[int]) -> float:
+    return float(np.linalg.norm(skeleton.offsets[line], axis=-1).sum())
+
+
+def _name_parts(
+    skeleton: Skeleton, rest: Array, pelvis: int, legs: tuple[list[int], list[int]], *, chest: int, arms: tuple[list[int], list[int]]
+) -> Parts | None:
+    leg_joints = [_limb(skeleton, leg) for leg in legs]
+    arm_joints = [_limb(skeleton, arm) for arm in arms]
+    tops = [j for j in skeleton.children(chest) if j not in (arms[0][0], arms[1][0])]
+    if None in leg_joints or None in arm_joints or not tops:
+        return None
+    left = _left(rest, [x for x in leg_joints if x])
+    parts: Parts = {"pelvis": pelvis}
+    for chains, names in ((leg_joints, ("hip", "knee", "ankle", "foot")), (arm_joints, ("shoulder", "elbow", "wrist"))):
+        ordered = sorted((c for c in chains if c), key=lambda c: -float(rest[c[0]] @ left))
+        for side, chain in zip(("left", "right"), ordered):
+            parts |= {f"{side}_{name}": j for name, j in zip(names, chain)}
+    for side in ("left", "right"):
+        above = skeleton.parents[parts[f"{side}_shoulder"]]
+        if above != chest:
+            parts[f"{side}_collar"] = above
+    top = max(tops, key=lambda j: float(rest[_longest_chain(skeleton, j)[-1], 1]))
+    line = [j for j in _longest_chain(skeleton, top) if j not in skeleton.ends]
+    if not line:
+        return None
+    parts["neck"] = line[0]
+    parts["head"] = line[min(1, len(line) - 1)]
+    return parts
+
+
+def _limb(skeleton: Skeleton, chain: list[int]) -> list[int] | None:
+    """The joint above the two longest bones in a row, the two below it, and what follows."""
+    if len(chain) < 3:
+        return None
+    lengths = np.linalg.norm(skeleton.offsets[chain], axis=-1)
+    at = int(np.argmax(np.minimum(lengths[1:-1], lengths[2:])))
+    return chain[at : at + 4]
+
+
+def _left(rest: Array, legs: list[list[int]]) -> Array:
+    """Unit vector to the person's left: +X, or what the toes in front of the ankles say."""
+    across = rest[legs[0][0]] - rest[legs[1][0]]
+    across = across * np.array([1.0, 0.0, 1.0])
+    across = across / max(float(np.linalg.norm(across)), 1e-9)
+    toes = [rest[leg[3]] - rest[leg[2]] for leg in legs if len(leg) > 3]
+    forward = np.sum(toes, axis=0) * np.array([1.0, 0.0, 1.0]) if toes else np.zeros(3)
+    forward = forward - across * float(forward @ across)
+    if np.linalg.norm(forward) < 0.02:
+        forward = np.array([0.0, 0.0, 1.0])
+    return np.cross([0.0, 1.0, 0.0], forward / np.linalg.norm(forward))
