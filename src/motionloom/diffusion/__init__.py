@@ -1,0 +1,44 @@
+"""Diffusion on plain tensors: schedules, solvers, one sampling loop, and the two kinds of edits.
+
+Nothing here knows about motion. Read `schedule`, `solvers`, `sampling`, then `denoisers` and `constraints`.
+"""
+
+from .constraints import Constraint, chain, handshake, observe
+from .denoisers import Denoiser, Weight, blend, from_noise, guide, inpaint, join_rows, mix
+from .sampling import Snapshot, masked_draw, restart, row_draw, run, sample
+from .schedule import Draw, Schedule, State, cosine, from_betas, levels, linear
+from .solvers import DDPM, SOLVERS, Ddim, DpmSolver2M, Solver, Step
+
+__all__ = [
+    "DDPM",
+    "SOLVERS",
+    "Constraint",
+    "Ddim",
+    "Denoiser",
+    "DpmSolver2M",
+    "Draw",
+    "Schedule",
+    "Snapshot",
+    "Solver",
+    "State",
+    "Step",
+    "Weight",
+    "blend",
+    "chain",
+    "cosine",
+    "from_betas",
+    "from_noise",
+    "guide",
+    "handshake",
+    "inpaint",
+    "join_rows",
+    "levels",
+    "linear",
+    "masked_draw",
+    "mix",
+    "observe",
+    "restart",
+    "row_draw",
+    "run",
+    "sample",
+]

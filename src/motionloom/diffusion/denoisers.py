@@ -1,0 +1,108 @@
+"""Guesses of the clean data, and the edits of a guess: functions from denoisers to denoisers.
+
+A denoiser answers E[x_0 | x_level]; everything it is conditioned on was bound before the sampler's loop. Here
+are the ways to bind and to edit:
+
+    guide       u + s (c - u)                    classifier-free guidance (Ho & Salimans 2022), one network call
+    inpaint     (1 - m) guess + m known          hard (m is 0 or 1) and soft
+    from_noise  (x - noise * e) / signal         a network that predicts the noise e
+    blend       sum of w_i guess_i               several models, e.g. DiffusionBlending
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any, TypeAlias, TypeVar
+
+import torch
+from torch import Tensor
+
+from .schedule import Schedule, State
+
+Denoiser: TypeAlias = Callable[[State, int], State]
+"""(state, its level) -> guess of the clean data, of the same shape."""
+
+Weight: TypeAlias = float | Tensor | Callable[[int], float | Tensor]
+"""A factor of a guess: a number, a tensor that broadcasts to the state, or either as a function of the level."""
+
+C = TypeVar("C")
+
+
+def join_rows(first: Any, second: Any) -> Any:
+    """The rows of two conditions, one after the other: tensors, None, and (named) tuples of such."""
+    if isinstance(first, Tensor):
+        return torch.cat([first, second])
+    if isinstance(first, tuple):
+        parts = [join_rows(a, b) for a, b in zip(first, second, strict=True)]
+        return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
+    if first is None and second is None:
+        return None
+    raise TypeError(f"cannot join the rows of {type(first).__name__} and {type(second).__name__}: give `join`")
+
+
+def guide(
+    net: Callable[[State, int, C], State],
+    cond: C,
+    null: C,
+    scale: float | Tensor,
+    *,
+    join: Callable[[C, C], C] = join_rows,
+) -> Denoiser:
+    """Classifier-free guidance, u + scale * (c - u), as one call of `net` on a doubled batch.
+
+    `net(state, level, condition)` answers the clean data; `cond` and `null` hold one entry per row, with all that
+    belongs to rows inside them (also lengths), because the network is shown (conditional rows, unconditional
+    rows). `join` puts two conditions behind each other; it is called once, here. `scale` is a number or a tensor
+    (rows,). Where every scale is 1 only the conditional pass is made, where every scale is 0 only the
+    unconditional one; a row with scale 0 or 1 gets exactly that pass's answer beside any other rows.
+    """
+    scales = torch.as_tensor(scale).detach().cpu().reshape(-1)
+    if not bool(torch.isfinite(scales).all()):
+        raise ValueError("the guidance scale must be finite")
+    for only, bound in ((0.0, null), (1.0, cond)):
+        if bool((scales == only).all()):
+            return lambda x, level: net(x, level, bound)
+    both = join(cond, null)
+
+    def guided(x: State, level: int) -> State:
+        if len(scales) not in (1, len(x)):
+            raise ValueError(f"there are {len(scales)} guidance scales for {len(x)} rows: give one, or one per row")
+        conditional, unconditional = net(torch.cat([x, x]), level, both).to(x.dtype).chunk(2)
+        s = scales.to(x).view((-1,) + (1,) * (x.ndim - 1))
+        return torch.lerp(unconditional, conditional, s)  # exact at both ends
+
+    return guided
+
+
+def inpaint(denoise: Denoiser, known: State, mask: Tensor) -> Denoiser:
+    """Holds the guess to `known` where `mask` is 1 (True), leaves it alone at 0, mixes linearly in between."""
+    return lambda x, level: mix(denoise(x, level), known, mask)
+
+
+def mix(free: State, known: State, mask: Tensor) -> State:
+    """(1 - mask) * free + mask * known; a boolean mask selects. The three broadcast."""
+    if mask.dtype == torch.bool:
+        return torch.where(mask, known, free)
+    return (1.0 - mask) * free + mask * known
+
+
+def from_noise(net: Callable[[State, int], Tensor], schedule: Schedule) -> Denoiser:
+    """The denoiser of a network that predicts the noise in the state (Ho et al. 2020, eq. 15)."""
+
+    def denoise(x: State, level: int) -> State:
+        signal, noise = schedule.at(level)
+        return (x - noise * net(x, level)) / signal
+
+    return denoise
+
+
+def blend(denoisers: Sequence[Denoiser], weights: Sequence[Weight]) -> Denoiser:
+    """The weighted sum of several guesses; the weights are used as they are (usually they sum to 1)."""
+    if not denoisers or len(denoisers) != len(weights):
+        raise ValueError(f"blending needs one weight per denoiser, got {len(weights)} for {len(denoisers)}")
+
+    def blended(x: State, level: int) -> State:
+        total = torch.zeros_like(x)
+        for denoise, weight in zip(denoisers, weights):
+            total = total + (weight(level) if callable(weight) else weight) * denoise(x, level)
+        return total
+
+    return blended

@@ -1,0 +1,112 @@
+"""The walk from noise to data: guess the clean data, move to a cleaner level, and again.
+
+    draw = row_draw(range(seed, seed + rows))
+    x = draw(torch.empty(rows, tokens, features))
+    motion = run(guide(net, text, nothing, 2.5), x, levels=levels(schedule, 20), solver=DpmSolver2M(),
+                 schedule=schedule, draw=draw)
+
+There are two places to interfere: the denoiser (an edit of the guess, `denoisers`) and `constrain` (an edit of the
+state after each move, `constraints`). Gradients are the caller's affair: wrap a run in `torch.inference_mode()`.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from .constraints import Constraint, chain
+from .denoisers import Denoiser
+from .schedule import Draw, Schedule, State
+from .solvers import Solver, Step
+
+
+class Snapshot(NamedTuple):
+    """What there is after one move."""
+
+    level: int
+    """The level that was reached."""
+    state: State
+    clean: State
+    """The guess that the move was made with."""
+
+
+def sample(
+    denoise: Denoiser,
+    x: State,
+    *,
+    levels: Sequence[int],
+    solver: Solver,
+    schedule: Schedule,
+    draw: Draw,
+    constrain: Constraint | None = None,
+) -> Iterator[Snapshot]:
+    """Walk `x`, a state at `levels[0]`, through strictly falling `levels`; one snapshot per move.
+
+    The walk is lazy: stop iterating and it stops. `denoise` sees the levels but the last.
+    """
+    for level in levels:
+        schedule.check(level)
+    if not levels or any(s >= t for t, s in pairwise(levels)):
+        raise ValueError(f"the levels of a walk must fall strictly, got {list(levels)}")
+    return _walk(denoise, x, levels, solver.start(schedule), draw, constrain or chain())
+
+
+def _walk(
+    denoise: Denoiser, x: State, levels: Sequence[int], step: Step, draw: Draw, constrain: Constraint
+) -> Iterator[Snapshot]:
+    for t, s in pairwise(levels):
+        clean = denoise(x, t)
+        x = constrain(step(x, clean, t, s, draw), s)
+        yield Snapshot(s, x, clean)
+
+
+def run(
+    denoise: Denoiser,
+    x: State,
+    *,
+    levels: Sequence[int],
+    solver: Solver,
+    schedule: Schedule,
+    draw: Draw,
+    constrain: Constraint | None = None,
+) -> State:
+    """The state at the end of `sample`; `x` itself where there is only one level."""
+    state = x
+    for snapshot in sample(denoise, x, levels=levels, solver=solver, schedule=schedule, draw=draw, constrain=constrain):
+        state = snapshot.state
+    return state
+
+
+def restart(clean: State, schedule: Schedule, level: int, draw: Draw) -> State:
+    """Clean data taken to `level` with fresh noise: the start of a walk that keeps what this noise leaves of it."""
+    return schedule.noised(clean, level, draw(clean))
+
+
+def row_draw(seeds: Sequence[int], lengths: Sequence[int] | None = None) -> Draw:
+    """Noise that belongs to rows: row i draws from its own generator, seeded with `seeds[i]`.
+
+    So a row's noise does not depend on the other rows, on their count or order, or on the device: it is drawn
+    in float32 on the CPU and moved. With `lengths` (valid tokens per row) a row draws for those tokens only and
+    gets zeros behind them, so that its noise does not depend on the padding either.
+    """
+    generators = [torch.Generator().manual_seed(seed) for seed in seeds]
+    if lengths is not None and len(lengths) != len(generators):
+        raise ValueError(f"there are {len(lengths)} lengths for {len(generators)} seeds")
+
+    def draw(like: Tensor) -> Tensor:
+        if len(like) != len(generators):
+            raise ValueError(f"noise for {len(like)} rows was asked of {len(generators)} seeds: give one seed per row")
+        noise = torch.zeros(like.shape)
+        for row, generator in enumerate(generators):
+            valid = noise[row] if lengths is None else noise[row, : lengths[row]]
+            valid.copy_(torch.randn(valid.shape, generator=generator))
+        return noise.to(like)
+
+    return draw
+
+
+def masked_draw(draw: Draw, mask: Tensor) -> Draw:
+    """Noise scaled by (1 - mask): none where the state is to stay noise-free (noise-filtered control, soft too)."""
+    return lambda like: draw(like) * (1.0 - mask.to(like.dtype))

@@ -1,0 +1,142 @@
+"""Group `sampling`: whole ancestral runs on a formula and on the published network, by this package's one loop.
+
+Recorded motions are (batch, channels, 1, frames); states are (rows, tokens, features) = (batch, frames, channels).
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from motionloom.diffusion import (
+    DDPM,
+    Denoiser,
+    Draw,
+    chain,
+    cosine,
+    guide,
+    handshake,
+    inpaint,
+    masked_draw,
+    observe,
+    restart,
+    run,
+)
+from tests.conformance.runner import KNOWN, MASK, NOISE, TEXT, Case, case, cases, compare, normal, stream, weights
+
+Net = Callable[[Tensor, int, Tensor], Tensor]
+
+
+def to_state(motion: np.ndarray) -> Tensor:
+    return torch.from_numpy(motion[:, :, 0].swapaxes(1, 2).copy())
+
+
+def to_motion(state: Tensor) -> np.ndarray:
+    return state.numpy().swapaxes(1, 2)[:, :, None]
+
+
+def recorded_draw(recorded: Case) -> Draw:
+    """The stream of noise of a run, one array after the other."""
+    rng = stream(recorded.config["seed"], NOISE)
+    return lambda like: to_state(normal(rng, recorded.config["shape"]))
+
+
+def dummy(recorded: Case) -> tuple[Net, Tensor, Tensor]:
+    """The formula; a condition is (factor, shift) per row."""
+    rows, channels = recorded.config["shape"][:2]
+    w = torch.linspace(-1, 1, channels)
+
+    def net(x: Tensor, level: int, cond: Tensor) -> Tensor:
+        time = (level - 1) / recorded.config["steps"]
+        f = torch.tanh(w * x) + 0.1 * torch.sin(torch.roll(x, 1, dims=1) + time)
+        return cond[:, :1, None] * f + cond[:, 1:, None]
+
+    cond = torch.tensor([[1.0, math.sin(row + 1)] for row in range(rows)])
+    return net, cond, torch.tensor([[0.7, 0.0]] * rows)
+
+
+def published_network(recorded: Case) -> tuple[Net, Tensor, Tensor]:
+    """The published encoder with weights by rule; a condition is the text feature, zeros without text."""
+    prior = pytest.importorskip("motionloom.nets.prior", reason="the published network is not built yet")
+    shapes = case("mdm_forward", "state_dict_humanml263").lists["keys"]
+    filled = weights([(name, shape) for name, shape in shapes], recorded.config["seed"])
+    module = prior.from_published({name: torch.from_numpy(array) for name, array in filled.items()}).eval()
+    text = torch.from_numpy(normal(stream(recorded.config["seed"], TEXT), (recorded.config["shape"][0], 512)))
+    return (lambda x, level, cond: module(x, level, cond)), text, torch.zeros_like(text)
+
+
+def denoiser_of(recorded: Case) -> Denoiser:
+    net, cond, null = {"dummy": dummy, "mdm": published_network}[recorded.config["network"]](recorded)
+    scale = recorded.config["guidance"]
+    if recorded.config["unconditional"]:
+        scale = 0.0
+    return guide(net, cond, null, 1.0 if scale is None else torch.tensor(scale))
+
+
+def mask_of(recorded: Case) -> Tensor:
+    name, (_, channels, _, frames) = recorded.config["mask"], recorded.config["shape"]
+    if name == "soft":
+        shape = tuple(recorded.config["shape"])
+        return to_state(stream(recorded.config["seed"], MASK).random(shape, dtype=np.float32))
+    mask = torch.zeros(frames, channels, dtype=torch.bool)
+    if name.startswith("frames:"):
+        a, b = map(int, name.removeprefix("frames:").split("-"))
+        mask[:a], mask[b:] = True, True
+    else:
+        mask[:, case("control_masks", name).lists["dims"]] = True
+    return mask
+
+
+def start_of(recorded: Case, known: Tensor, draw: Draw) -> tuple[Tensor, int]:
+    """The starting state and its level."""
+    schedule, skip = cosine(recorded.config["steps"]), recorded.config["skip"]
+    level = schedule.steps - skip
+    if recorded.config["init"]:
+        return restart(known, schedule, level, draw), level
+    if skip:
+        return restart(torch.zeros_like(known), schedule, level, draw), level
+    return draw(known), level
+
+
+@pytest.mark.parametrize("recorded", cases("sampling", kind="sampling"))
+def test_whole_runs_give_the_published_samples(recorded):
+    config, schedule = recorded.config, cosine(recorded.config["steps"])
+    denoise, draw, constraints, count = denoiser_of(recorded), recorded_draw(recorded), [], 0
+    known = to_state(normal(stream(config["seed"], KNOWN), config["shape"]))
+
+    def counted(like: Tensor) -> Tensor:
+        nonlocal count
+        count += 1
+        return draw(like)
+
+    if config["mask"]:
+        mask = mask_of(recorded)
+        denoise = inpaint(denoise, known, mask)
+        if config["noise_masked"]:
+            constraints.append(observe(known, mask, schedule, torch.zeros_like))
+    if config["handshake"]:
+        constraints.append(handshake(config["handshake"]["lengths"], config["handshake"]["h"]))
+    with torch.inference_mode():
+        x, level = start_of(recorded, known, counted)
+        if config["noise_masked"]:
+            x = constraints[0](x, level)
+        walk = range(level, -1, -1)
+        x = run(denoise, x, levels=walk, solver=DDPM, schedule=schedule, draw=counted, constrain=chain(*constraints))
+    assert count == config["noise_draws"]
+    compare(recorded, "sample", to_motion(x))
+
+
+@pytest.mark.parametrize("recorded", [c for c in cases("sampling") if c.id in ("mdm_control_root", "sampling-absent")])
+def test_noise_filtered_control_is_also_a_masked_draw(recorded):
+    schedule, config = cosine(recorded.config["steps"]), recorded.config
+    known, mask = to_state(normal(stream(config["seed"], KNOWN), config["shape"])), mask_of(recorded)
+    draw = masked_draw(recorded_draw(recorded), mask)
+    with torch.inference_mode():
+        x = restart(known, schedule, schedule.steps, draw)
+        denoise = inpaint(denoiser_of(recorded), known, mask)
+        walk = range(schedule.steps, -1, -1)
+        x = run(denoise, x, levels=walk, solver=DDPM, schedule=schedule, draw=draw)
+    compare(recorded, "sample", to_motion(x))
