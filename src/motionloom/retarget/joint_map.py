@@ -9,6 +9,7 @@ shape of the tree (`topology`). A user may override any joint.
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -84,8 +85,8 @@ _ASF = """pelvis root | hip {s}hipjoint | spine1 lowerback | knee {s}femur | spi
 _DAZ = """pelvis hip abdomen 0.5 | hip {s}Thigh | spine1 abdomen | knee {s}Shin | spine2 chest | ankle {s}Foot
 | spine3 chest neck 0.2 | foot {s}Foot~End~Site | neck neck | collar {s}Collar {s}Shldr 0.4 | head head
 | shoulder {s}Shldr | elbow {s}ForeArm | wrist {s}Hand"""
-_BANDAI = """pelvis Hips Spine 0.25 | hip UpperLeg_{s} | spine1 Spine | knee LowerLeg_{s} | spine2 Chest | ankle Foot_{s}
-| spine3 Chest Neck 0.2 | foot Toes_{s} | neck Neck | collar Shoulder_{s} | head Head
+_BANDAI = """pelvis Hips Spine 0.25 | hip UpperLeg_{s} | spine1 Spine | knee LowerLeg_{s} | spine2 Chest
+| ankle Foot_{s} | spine3 Chest Neck 0.2 | foot Toes_{s} | neck Neck | collar Shoulder_{s} | head Head
 | shoulder UpperArm_{s} | elbow LowerArm_{s} | wrist Hand_{s}"""
 _FAMILIES = ((_ASF, "l", "r"), (_DAZ, "l", "r"), (_BANDAI, "L", "R"))
 _MIDDLE = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
@@ -125,7 +126,7 @@ def _humanoid(skeleton: Skeleton, given: Mapping[str, Mapping[str, float]]) -> d
     parts = named if not _missing(skeleton, named) else (parts_by_shape(skeleton) or {}) | hints
     missing = _missing(skeleton, parts)
     if missing:
-        missing = [m for m in _missing(skeleton, named)] or missing
+        missing = _missing(skeleton, named) or missing
         raise MotionloomError(
             f"the skeleton is not a humanoid that can be read: no joint was found for {', '.join(missing)} among "
             f"{_shown(skeleton)}; name the missing ones in a joint map (SMPL joint: joint of the file)"
@@ -143,7 +144,7 @@ def _missing(skeleton: Skeleton, parts: Parts) -> list[str]:
     lost = [part for part in _NEEDED if part not in parts]
     for side in ("left", "right"):
         for limb in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")):
-            for upper, lower in zip(limb, limb[1:]):
+            for upper, lower in pairwise(limb):
                 a, b = parts.get(f"{side}_{upper}"), parts.get(f"{side}_{lower}")
                 if a is not None and b is not None and not is_above(skeleton, a, b):
                     lost.append(f"{side}_{lower}")
@@ -237,7 +238,7 @@ def _read_override(skeleton: Skeleton, override: Override | None) -> dict[str, d
         return {}
     data = _load_json(Path(override)) if isinstance(override, str | Path) else override
     if not isinstance(data, Mapping):
-        raise MotionloomError(f"a joint map is an object such as {{\"left_knee\": \"LeftLeg\"}}; got {type(data).__name__}")
+        raise MotionloomError(f'a joint map is an object such as {{"left_knee": "Shin"}}; got {type(data).__name__}')
     return {str(part): _check_point(skeleton, str(part), value) for part, value in data.items()}
 
 
@@ -257,12 +258,14 @@ def _check_point(skeleton: Skeleton, part: str, value: object) -> dict[str, floa
         raise MotionloomError(f"the joint map speaks of {part!r}; the joints are {', '.join(SMPL22.names)}")
     point = {value: 1.0} if isinstance(value, str) else value
     if not isinstance(point, Mapping) or not point:
-        raise MotionloomError(f"the joint map gives {part} as {value!r}; a joint name or weights of joint names are needed")
+        raise MotionloomError(f"the joint map gives {part} as {value!r}; a name or weights of names are needed")
     for name, weight in point.items():
         if name not in skeleton.names:
-            raise MotionloomError(f"the joint map gives {part} as {name!r}; the skeleton's joints are {_shown(skeleton)}")
+            raise MotionloomError(f"the joint map gives {part} as {name!r}; the joints are {_shown(skeleton)}")
         if isinstance(weight, bool) or not isinstance(weight, int | float) or not np.isfinite(weight):
-            raise MotionloomError(f"the joint map gives {part} the weight {weight!r}; numbers that add up to 1 are needed")
+            raise MotionloomError(
+                f"the joint map gives {part} the weight {weight!r}; numbers adding up to 1 are needed"
+            )
     total = sum(float(w) for w in point.values())
     if abs(total - 1.0) > 1e-6:
         raise MotionloomError(f"the joint map's weights for {part} add up to {total:g}; they must add up to 1")

@@ -11,8 +11,10 @@ Parts = dict[str, int]
 
 _TOKEN = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
 _LEFT, _RIGHT = {"left", "l", "lt", "lft"}, {"right", "r", "rt", "rgt"}
-_NOISE = {"bip", "bip001", "mixamorig", "cc", "base", "armature", "character", "skeleton", "skel", "jnt", "joint", "bone",
-          "bn", "def", "org", "rig", "robot", "valve", "biped", "j", "m", "avg", "f", "sim", "rl"}  # fmt: skip
+_NOISE = frozenset(
+    ("bip", "bip001", "biped", "mixamorig", "cc", "rl", "base", "armature", "character", "skeleton", "skel", "robot")
+    + ("jnt", "joint", "bone", "bn", "def", "org", "rig", "valve", "sim", "avg", "c", "j", "m", "f")
+)
 _HELPERS = {"twist", "roll", "ik", "pole", "end", "nub", "tip", "site", "target", "effector", "share", "corrective"}
 
 # Words of each part in order of preference: an earlier word wins where a skeleton has several.

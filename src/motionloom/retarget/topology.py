@@ -1,4 +1,4 @@
-"""Finding a body in a tree of joints by its shape: two legs that go down, a spine that goes up, arms that branch off."""
+"""Finding a body in a tree of joints by its shape: two legs go down, a spine goes up, arms branch off."""
 
 from itertools import combinations
 
@@ -43,8 +43,8 @@ def parts_by_shape(skeleton: Skeleton) -> Parts | None:
         legs = _pair(skeleton, pelvis, chains, rest, down=True)
         if legs is None:
             continue
-        above = [j for j in range(len(skeleton)) if is_above(skeleton, pelvis, j) and not any(is_above(skeleton, g[0], j) for g in legs)]
-        for chest in above:
+        below = (j for j in range(pelvis, len(skeleton)) if is_above(skeleton, pelvis, j))
+        for chest in (j for j in below if not any(is_above(skeleton, leg[0], j) for leg in legs)):
             arms = _pair(skeleton, chest, chains, rest, down=False)
             if arms is not None and not set(arms[0]) & {*legs[0], *legs[1]}:
                 return _name_parts(skeleton, rest, pelvis, legs, chest=chest, arms=arms)
@@ -65,7 +65,9 @@ def _longest_chain(skeleton: Skeleton, joint: int) -> list[int]:
     return line
 
 
-def _pair(skeleton: Skeleton, joint: int, chains: list[list[int]], rest: Array, *, down: bool) -> tuple[list[int], list[int]] | None:
+def _pair(
+    skeleton: Skeleton, joint: int, chains: list[list[int]], rest: Array, *, down: bool
+) -> tuple[list[int], list[int]] | None:
     """Two mirror-like limbs that hang on a joint beside a third branch: legs reach far below it, arms do not."""
     children = skeleton.children(joint)
     height = np.ptp(rest[:, 1])
@@ -91,7 +93,13 @@ def _length(skeleton: Skeleton, line: list[int]) -> float:
 
 
 def _name_parts(
-    skeleton: Skeleton, rest: Array, pelvis: int, legs: tuple[list[int], list[int]], *, chest: int, arms: tuple[list[int], list[int]]
+    skeleton: Skeleton,
+    rest: Array,
+    pelvis: int,
+    legs: tuple[list[int], list[int]],
+    *,
+    chest: int,
+    arms: tuple[list[int], list[int]],
 ) -> Parts | None:
     leg_joints = [_limb(skeleton, leg) for leg in legs]
     arm_joints = [_limb(skeleton, arm) for arm in arms]
