@@ -12,6 +12,7 @@ import hashlib
 import importlib.metadata
 import json
 import os
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -99,18 +100,23 @@ def compress(captions: Iterable[str], entries: int = ENTRIES) -> tuple[dict[str,
     return pack(pruned, [vocabulary[place] for place in kept]), metadata
 
 
-def main() -> None:
+def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m motionloom.nets.text.compress", description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--captions", type=Path, help="JSON lines, plain or gzipped")
     parser.add_argument("--entries", type=int, default=ENTRIES, help="word pieces to keep (default %(default)s)")
     options = parser.parse_args()
-    tensors, metadata = compress(read_captions(options.captions) if options.captions else [], options.entries)
+    try:
+        tensors, metadata = compress(read_captions(options.captions) if options.captions else [], options.entries)
+    except (MotionloomError, OSError, KeyError, json.JSONDecodeError) as error:
+        print(f"Could not make the encoder: {error}", file=sys.stderr)
+        return 2
     partial = options.out.with_name(options.out.name + ".part")
-    save_file(tensors, partial, metadata=metadata)
+    save_file(tensors, partial, metadata={"text": json.dumps(metadata)})  # one entry: their order is not fixed
     os.replace(partial, options.out)
     print(f"{options.out}: {options.out.stat().st_size / 1e6:.2f} MB, {metadata['changes']}")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -52,6 +52,8 @@ class MiniLM:
             vocabulary = read_vocabulary(tensors[VOCABULARY])
             weights = _unpack(tensors)
             places, width = weights["places.weight"].shape
+            if places < 3 or width % HEAD_WIDTH:
+                raise ValueError(f"{places} places of width {width}")
             layers = len({key.split(".")[1] for key in weights if key.startswith("layers.")})
             hidden = weights["layers.0.hidden_in.weight"].shape[0]
             with torch.device("meta"):  # nothing is drawn at random only to be overwritten
@@ -59,7 +61,7 @@ class MiniLM:
                     vocabulary=len(vocabulary),
                     places=places,
                     width=width,
-                    heads=max(width // HEAD_WIDTH, 1),
+                    heads=width // HEAD_WIDTH,
                     hidden=hidden,
                     layers=layers,
                 )
@@ -153,7 +155,7 @@ def write_vocabulary(vocabulary: Sequence[str]) -> Tensor:
 
 def read_vocabulary(data: Tensor) -> list[str]:
     """The inverse of `write_vocabulary`; raises ValueError where pieces repeat or a special one is missing."""
-    vocabulary = data.to(torch.uint8).numpy().tobytes().decode("utf-8").split("\n")
+    vocabulary = data.to(torch.uint8).cpu().numpy().tobytes().decode("utf-8").split("\n")
     if len(set(vocabulary)) != len(vocabulary) or not set(SPECIALS) <= set(vocabulary):
         raise ValueError("its vocabulary has repeated pieces or lacks a special one")
     return vocabulary

@@ -1,0 +1,245 @@
+"""The embedded encoder against naive BERT, transformers' BERT, its own padding, hostile texts and hostile tensors."""
+
+import math
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from safetensors.torch import load_file, save_file
+from torch import Tensor
+
+from motionloom.errors import MotionloomError
+from motionloom.nets.text import MiniLM, TextEncoder
+from motionloom.nets.text.bert import Bert, from_huggingface
+from motionloom.nets.text.minilm import pack, read_vocabulary, write_vocabulary
+from tests.nets.text.tiny import HIDDEN, LAYERS, PLACES, VOCABULARY, WIDTH, weights
+
+SENTENCES = ["a person walks.", "", "a person turns left, turns right, jumping and walking unaffably", "left"]
+
+
+@pytest.fixture(scope="module")
+def encoder() -> MiniLM:
+    return MiniLM.from_tensors(pack(weights(), VOCABULARY))
+
+
+def naive_bert(state: dict[str, np.ndarray], ids: list[int]) -> np.ndarray:
+    """Devlin et al. 2019 word by word and head by head, float64."""
+
+    def norm(x: np.ndarray, name: str) -> np.ndarray:
+        centred = x - x.mean(-1, keepdims=True)
+        return centred / np.sqrt((centred**2).mean(-1, keepdims=True)) * state[f"{name}.weight"] + state[f"{name}.bias"]
+
+    def linear(x: np.ndarray, name: str) -> np.ndarray:
+        return x @ state[f"{name}.weight"].T + state[f"{name}.bias"]
+
+    x = norm(state["words.weight"][ids] + state["places.weight"][: len(ids)], "norm")
+    for layer in range(LAYERS):
+        query, key, value = np.split(linear(x, f"layers.{layer}.attention_in"), 3, axis=1)
+        mixed = np.zeros_like(x)
+        for head in range(WIDTH // 32):
+            part = slice(32 * head, 32 * head + 32)
+            for word in range(len(ids)):
+                scores = np.exp(key[:, part] @ query[word, part] / math.sqrt(32))
+                mixed[word, part] = scores / scores.sum() @ value[:, part]
+        x = norm(x + linear(mixed, f"layers.{layer}.attention_out"), f"layers.{layer}.attention_norm")
+        hidden = linear(x, f"layers.{layer}.hidden_in")
+        hidden = hidden * 0.5 * (1 + np.vectorize(math.erf)(hidden / math.sqrt(2)))
+        x = norm(x + linear(hidden, f"layers.{layer}.hidden_out"), f"layers.{layer}.hidden_norm")
+    return x
+
+
+def test_tokens_are_those_of_a_naive_bert(encoder: MiniLM) -> None:
+    state = {name: value.double().numpy() for name, value in encoder.net.state_dict().items()}
+    for text in SENTENCES:
+        expected = naive_bert(state, encoder.ids(text))
+        np.testing.assert_allclose(encoder.encode(text).tokens[0].numpy(), expected, atol=2e-5)
+
+
+def test_renamed_weights_give_what_transformers_gives() -> None:
+    transformers = pytest.importorskip("transformers", reason="the extra 'clip' is not installed")
+    torch.manual_seed(0)
+    config = transformers.BertConfig(
+        vocab_size=50, hidden_size=64, num_hidden_layers=2, num_attention_heads=2, intermediate_size=96
+    )
+    theirs = transformers.BertModel(config).eval()
+    for value in theirs.parameters():
+        torch.nn.init.normal_(value, std=0.2)
+    ours = Bert(vocabulary=50, places=16, width=64, heads=2, hidden=96, layers=2)
+    ours.load_state_dict(from_huggingface(theirs.state_dict(), places=16))
+    ids = torch.randint(0, 50, (3, 9))
+    mask = torch.arange(9) < torch.tensor([9, 5, 2])[:, None]
+    with torch.no_grad():
+        expected = theirs(input_ids=ids, attention_mask=mask.long()).last_hidden_state
+        torch.testing.assert_close(ours(ids, mask)[mask], expected[mask], atol=2e-5, rtol=0)
+
+
+def test_a_row_does_not_depend_on_its_batch(encoder: MiniLM) -> None:
+    batch = MiniLM.from_tensors(encoder.to_tensors()).encode(SENTENCES)
+    for row, text in enumerate(SENTENCES):
+        alone = MiniLM.from_tensors(encoder.to_tensors()).encode([text])
+        words = alone.tokens.shape[1]
+        assert batch.mask[row].sum() == words
+        torch.testing.assert_close(batch.tokens[row, :words], alone.tokens[0], atol=1e-5, rtol=0)
+        torch.testing.assert_close(batch.pooled[row], alone.pooled[0], atol=1e-5, rtol=0)
+
+
+def test_many_texts_come_back_in_order(encoder: MiniLM) -> None:
+    texts = [f"{'person ' * (place % 40)}{'turns walk' if place % 2 else 'left'} {place}" for place in range(200)]
+    batch = MiniLM.from_tensors(encoder.to_tensors()).encode(texts)
+    for row in range(0, 200, 17):
+        torch.testing.assert_close(batch.pooled[row], encoder.encode(texts[row]).pooled[0], atol=1e-5, rtol=0)
+
+
+def test_padding_is_zero_and_pooled_is_the_unit_mean_of_the_words(encoder: MiniLM) -> None:
+    out = encoder.encode(SENTENCES)
+    assert (out.tokens[~out.mask] == 0).all()
+    mean = out.tokens.sum(1) / out.mask.sum(1, keepdim=True)
+    torch.testing.assert_close(out.pooled, mean / mean.norm(dim=1, keepdim=True))
+
+
+def test_an_empty_text_is_its_start_and_end(encoder: MiniLM) -> None:
+    assert [encoder.vocabulary[place] for place in encoder.ids("")] == ["[CLS]", "[SEP]"]
+    assert encoder.encode("").tokens.shape == (1, 2, WIDTH)
+    assert encoder.encode([]).tokens.shape[0] == 0
+
+
+def test_ten_thousand_words_are_cut_at_64_pieces_with_a_warning(encoder: MiniLM) -> None:
+    with pytest.warns(UserWarning, match="62 word pieces"):
+        out = encoder.encode("walk " * 10_000)
+    assert out.tokens.shape == (1, PLACES, WIDTH)
+    torch.testing.assert_close(out.tokens, encoder.encode(" ".join(["walk"] * 62)).tokens)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.text(alphabet=st.characters(), max_size=300))
+def test_every_text_encodes_to_finite_numbers(encoder: MiniLM, text: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        out = encoder.encode(text)
+    assert 2 <= out.tokens.shape[1] <= PLACES
+    assert out.tokens.isfinite().all()
+
+
+def test_recent_texts_are_not_computed_again_and_the_cache_stays_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    encoder = MiniLM.from_tensors(pack(weights(), VOCABULARY), cache=2)
+    seen: list[int] = []
+    forward = encoder.net.forward
+
+    def counted(ids: Tensor, mask: Tensor) -> Tensor:
+        seen.append(len(ids))
+        return forward(ids, mask)
+
+    monkeypatch.setattr(encoder.net, "forward", counted)
+    first = encoder.encode(["left", "right", "left"])
+    first.tokens.zero_()  # the caller's copy, not the cache's
+    again = encoder.encode(["right", "left"])
+    assert sum(seen) == 2
+    assert again.tokens.abs().sum() > 0
+    encoder.encode("jump")  # pushes out "right", the older of the two
+    encoder.encode("left")
+    assert sum(seen) == 3
+    encoder.encode("right")
+    assert sum(seen) == 4
+
+
+def test_tensors_survive_a_file(encoder: MiniLM, tmp_path: Path) -> None:
+    save_file(encoder.to_tensors(), tmp_path / "x.safetensors")
+    again = MiniLM.from_tensors(load_file(tmp_path / "x.safetensors"))
+    assert again.vocabulary == tuple(VOCABULARY)
+    assert torch.equal(
+        again.encode(SENTENCES).tokens, MiniLM.from_tensors(encoder.to_tensors()).encode(SENTENCES).tokens
+    )
+
+
+def test_packed_weights_stay_close_to_the_float_ones(encoder: MiniLM) -> None:
+    exact = weights()
+    for name, value in encoder.net.state_dict().items():
+        assert (value - exact[name]).abs().max() < 0.006, name
+
+
+def without(tensors: dict[str, Tensor], name: str) -> dict[str, Tensor]:
+    return {key: value for key, value in tensors.items() if key != name}
+
+
+@pytest.mark.parametrize("name", ["vocabulary", "words.weight", "words.weight.scale", "layers.1.hidden_in.weight"])
+def test_a_missing_tensor_is_named_in_one_sentence(encoder: MiniLM, name: str) -> None:
+    with pytest.raises(MotionloomError, match="damaged"):
+        MiniLM.from_tensors(without(encoder.to_tensors(), name))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"norm.weight": torch.full((WIDTH,), math.nan)},
+        {"norm.weight": torch.ones(WIDTH + 1)},
+        {"words.weight.scale": torch.full((len(VOCABULARY),), math.inf, dtype=torch.float16)},
+        {"words.weight.scale": torch.ones(3, dtype=torch.float16)},
+        {"places.weight": torch.zeros(WIDTH)},
+        {"places.weight": torch.zeros(1, WIDTH)},
+        {"vocabulary": write_vocabulary(VOCABULARY[:-1])},
+        {"vocabulary": write_vocabulary([*VOCABULARY[:-1], "left"])},
+        {"vocabulary": write_vocabulary(["x", *VOCABULARY[1:]])},
+        {"vocabulary": torch.full((40,), 255, dtype=torch.uint8)},
+        {"vocabulary": torch.zeros(3, 3)},
+        {"layers.0.attention_in.weight": torch.zeros(3, WIDTH, HIDDEN)},
+        {"extra": torch.zeros(3)},
+    ],
+    ids=lambda change: next(iter(change)),
+)
+def test_damaged_tensors_are_refused(encoder: MiniLM, change: dict[str, Tensor]) -> None:
+    with pytest.raises(MotionloomError, match="damaged"):
+        MiniLM.from_tensors({**encoder.to_tensors(), **change})
+
+
+def test_the_vocabulary_survives_as_bytes() -> None:
+    assert read_vocabulary(write_vocabulary([*VOCABULARY, "é", "日"])) == [*VOCABULARY, "é", "日"]
+
+
+def test_it_is_a_text_encoder(encoder: MiniLM) -> None:
+    as_protocol: TextEncoder = encoder
+    assert (as_protocol.name, as_protocol.width) == ("minilm", WIDTH)
+    torch.testing.assert_close(encoder.to("cpu").encode("left").pooled, encoder.encode("left").pooled)
+
+
+def shipped() -> dict[str, Tensor]:
+    """The text tensors of the default weights in the package; skips where those are not built yet."""
+    for file in sorted((Path(__file__).parents[3] / "src/motionloom/weights").glob("*.safetensors")):
+        found = {name[5:]: value for name, value in load_file(file).items() if name.startswith("text.")}
+        if found:
+            return found
+    pytest.skip("no weights with a text encoder inside src/motionloom/weights")
+
+
+def test_the_shipped_encoder_gives_the_teachers_numbers() -> None:
+    """Recorded from sentence-transformers 6.2 with all-MiniLM-L6-v2 in float32."""
+    encoder = MiniLM.from_tensors(shipped())
+    texts = ["a person walks forward and turns left.", "someone jumps up twice"]
+    for text, recorded in zip(texts, RECORDED):
+        assert (encoder.encode(text).pooled[0, :8] - torch.tensor(recorded)).abs().max() < 0.005
+
+
+def test_the_shipped_encoder_loads_and_encodes_fast() -> None:
+    """Limits three times what one slow core takes (0.1 s and 11 ms), so that a busy machine passes."""
+    tensors = shipped()
+    MiniLM.from_tensors(tensors)
+    start = time.perf_counter()
+    encoder = MiniLM.from_tensors(tensors)
+    assert time.perf_counter() - start < 0.3
+    encoder.encode("warm up")
+    times = []
+    for count in range(5):
+        start = time.perf_counter()
+        encoder.encode(f"a person walks forward {count} steps and turns left")
+        times.append(time.perf_counter() - start)
+    assert min(times) < 0.03
+
+
+RECORDED = [
+    [-0.00924, 0.00566, -0.00032, 0.02777, 0.03344, 0.05497, 0.07887, 0.01693],
+    [-0.00988, -0.0001, 0.03315, -0.02678, -0.04497, 0.01603, 0.06788, 0.0297],
+]
