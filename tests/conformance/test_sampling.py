@@ -62,7 +62,7 @@ def published_network(recorded: Case) -> tuple[Net, Tensor, Tensor]:
     """The published encoder with weights by rule; a condition is the text feature, zeros without text."""
     prior = pytest.importorskip("motionloom.nets.prior", reason="the published network is not built yet")
     shapes = case("mdm_forward", "state_dict_humanml263").lists["keys"]
-    filled = weights([(name, shape) for name, shape in shapes], recorded.config["seed"])
+    filled = weights(shapes, recorded.config["seed"])
     module = prior.from_published({name: torch.from_numpy(array) for name, array in filled.items()}).eval()
     text = torch.from_numpy(normal(stream(recorded.config["seed"], TEXT), (recorded.config["shape"][0], 512)))
     return (lambda x, level, cond: module(x, level, cond)), text, torch.zeros_like(text)
