@@ -1,0 +1,70 @@
+# make demo: a sentence becomes a motion.   make test: every test.   make help: the rest.
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+BIN := $(VENV)/bin
+JOBS ?= 2
+PIP := $(BIN)/python -m pip install --no-input -qq --disable-pip-version-check -c constraints.txt
+PROMPT ?= a person walks forward and waves
+SUFFIXES := bvh glb npz mp4 png
+# One thread per test process: JOBS processes times torch's own threads would fight for the same cores.
+ONE_THREAD := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+.PHONY: help demo test check lint format types imports install dev pictures tables wheel clean
+.DEFAULT_GOAL := help
+
+help:  ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20
+
+demo: $(VENV)/.runtime  ## install, run the main job on the shipped weights, write out/
+	@mkdir -p out
+	$(BIN)/motionloom generate "$(PROMPT)" --seed 1 $(foreach s,$(SUFFIXES),--out out/demo.$(s))
+	@echo && echo "Written to $(CURDIR)/out:" && ls -l $(foreach s,$(SUFFIXES),out/demo.$(s))
+	@echo "Open demo.bvh or demo.glb in Blender (File > Import), demo.mp4 in any player."
+
+test: $(VENV)/.dev  ## install the dev extras, run every test, those of the README and the examples too
+	$(ONE_THREAD) $(BIN)/python -m pytest -q -n $(JOBS) --dist loadfile $(PYTEST_FLAGS)
+
+check: lint types imports  ## everything but the tests
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check . && $(BIN)/ruff format --check .
+
+format: $(VENV)/.dev  ## rewrite the sources in the house's form
+	$(BIN)/ruff check --fix . && $(BIN)/ruff format .
+
+types: $(VENV)/.dev
+	$(BIN)/pyright --pythonpath $(BIN)/python
+
+imports: $(VENV)/.dev
+	$(BIN)/lint-imports
+
+install: $(VENV)/.runtime  ## only the virtual environment and the package
+
+dev: $(VENV)/.dev  ## the same with what tests and checks need
+
+pictures: $(VENV)/.runtime  ## draw the README's pictures anew, with the shipped weights
+	$(BIN)/python tools/make_pictures.py
+
+tables: $(VENV)/.runtime  ## copy the tables of benchmarks/ into the README
+	$(BIN)/python tools/fill_readme.py
+
+wheel: $(VENV)/.runtime  ## build dist/motionloom-*.whl, weights inside
+	$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --no-build-isolation -w dist .
+
+# The stamps make a second `make` free; the package is installed in place, so edits to src/ need no reinstall.
+$(VENV)/.runtime: pyproject.toml constraints.txt
+	@test -n "$(PYTHON)" || { echo "No python3.11 found; say where it is: make $(MAKECMDGOALS) PYTHON=/path/to/python3.11" >&2; exit 2; }
+	@echo "Installing the pinned packages into $(VENV) (PyTorch is large; this happens once) ..."
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(PIP) setuptools
+	@$(PIP) --no-build-isolation -e .
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.runtime
+	@echo "Installing the test tools into $(VENV) ..."
+	@$(PIP) --no-build-isolation -e '.[dev]'
+	@touch $@
+
+clean:  ## remove the environment, the outputs and every cache
+	rm -rf $(VENV) out build dist .pytest_cache .ruff_cache .import_linter_cache .hypothesis src/*.egg-info
+	find src tests examples tools -name __pycache__ -type d -prune -exec rm -rf {} +
