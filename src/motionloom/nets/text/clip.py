@@ -6,6 +6,7 @@ from pathlib import Path
 
 import torch
 
+from motionloom.errors import MotionloomError
 from motionloom.nets.text.hub import Pretrained, open_pretrained
 from motionloom.nets.text.protocol import Row, RowCache, TextEmbedding, as_rows, cut, stack_rows
 
@@ -26,7 +27,13 @@ class ClipText:
 
     def __init__(self, parts: Pretrained, *, length: int = HUMANML_LENGTH, cache: int = 1024) -> None:
         self._model, self._tokenizer = parts.model, parts.tokenizer
-        places = int(self._model.config.max_position_embeddings)
+        config = self._model.config
+        if config.hidden_size != config.projection_dim:
+            raise MotionloomError(
+                f"This CLIP has states of width {config.hidden_size} and pooled vectors of width "
+                f"{config.projection_dim}; name one where they agree, as in {HUB_NAME}."
+            )
+        places = int(config.max_position_embeddings)
         if not 2 <= length <= places:
             raise ValueError(f"length {length} is not in 2..{places}")
         self.length = length
