@@ -60,7 +60,9 @@ def load_asf_amc(asf: Path | str, amc: Path | str, *, fps: float | None = None, 
     """
     skeleton = read_asf(asf)
     values, degrees = read_amc(amc, skeleton)
-    return _assemble(skeleton, values, degrees, AMC_FPS if fps is None else fps, skeleton.unit if unit is None else unit)
+    return _assemble(
+        skeleton, values, degrees, AMC_FPS if fps is None else fps, skeleton.unit if unit is None else unit
+    )
 
 
 # ASF -----------------------------------------------------------------------------------------------------------------
@@ -119,7 +121,9 @@ def _numbers(words: list[str], count: int, where: tuple[Path | str, int, str]) -
     values = [text.number(w) for w in words[:count]]
     if len(values) < count or None in values:
         path, number, what = where
-        raise MotionloomError(f"{path}, line {number}: {what} needs {count} finite number(s); got {text.shown(' '.join(words))}")
+        raise MotionloomError(
+            f"{path}, line {number}: {what} needs {count} finite number(s); got {text.shown(' '.join(words))}"
+        )
     return tuple(v for v in values if v is not None)
 
 
@@ -128,7 +132,9 @@ def _root(lines: list[Line], path: Path | str, scale: float) -> Bone:
     number, dofs = found.get("order", (0, ["TX", "TY", "TZ", "RX", "RY", "RZ"]))
     dofs = tuple(w.lower() for w in dofs)
     if len(set(dofs)) != len(dofs) or not set(dofs) <= {"tx", "ty", "tz", "rx", "ry", "rz"}:
-        raise MotionloomError(f"{path}, line {number}: the root's order must name TX TY TZ RX RY RZ; got {text.shown(' '.join(dofs))}")
+        raise MotionloomError(
+            f"{path}, line {number}: the root's order must name TX TY TZ RX RY RZ; got {text.shown(' '.join(dofs))}"
+        )
     values = []
     for key in ("position", "orientation"):
         number, words = found.get(key, (0, ["0", "0", "0"]))
@@ -178,7 +184,9 @@ def _bone(block: dict[str, Line], path: Path | str, line: int, *, scale: float) 
     number, dofs = block.get("dof", (line, []))
     dofs = tuple(d.lower() for d in dofs)
     if len(set(dofs)) != len(dofs) or not set(dofs) <= {"rx", "ry", "rz"}:
-        raise MotionloomError(f"{path}, line {number}: a bone may turn by rx, ry and rz; got {text.shown(' '.join(dofs))}")
+        raise MotionloomError(
+            f"{path}, line {number}: a bone may turn by rx, ry and rz; got {text.shown(' '.join(dofs))}"
+        )
     end = direction * length
     if not np.isfinite(end).all():
         raise MotionloomError(f"{path}, line {line}: the bone {text.shown(name)} is infinitely long")
@@ -208,7 +216,9 @@ def _tree(lines: list[Line], names: list[str], path: Path | str) -> tuple[list[i
         stack += reversed(children.get(order[-1], []))
     if len(order) != len(names):
         lost = next(n for i, n in enumerate(names) if i not in set(order))
-        raise MotionloomError(f"{path}: the bone {text.shown(lost)} does not hang on the root; the hierarchy is cyclic or incomplete")
+        raise MotionloomError(
+            f"{path}: the bone {text.shown(lost)} does not hang on the root; the hierarchy is cyclic or incomplete"
+        )
     place = {bone: at for at, bone in enumerate(order)}
     return order, tuple(-1 if b == 0 else place[parent_of[b]] for b in order)
 
@@ -251,17 +261,27 @@ def _close_frame(seen: set[bytes], whole: set[bytes], where: tuple[Path | str, i
         raise MotionloomError(f"{path}, line {line}: frame {frame} is empty; the file is cut off or no AMC file")
     if seen != whole:
         odd = text.word(min(seen ^ whole))
-        raise MotionloomError(f"{path}, line {line}: frame {frame} {'lacks' if min(seen ^ whole) in whole else 'adds'} {text.shown(odd)}, unlike the first; the file is cut off or damaged")
+        raise MotionloomError(
+            f"{path}, line {line}: frame {frame} {'lacks' if min(seen ^ whole) in whole else 'adds'} {text.shown(odd)}, unlike the first; the file is cut off or damaged"
+        )
     return whole
 
 
-def _check_row(words: list[bytes], dofs: dict[bytes, int], seen: set[bytes], *, where: tuple[Path | str, int, bool]) -> None:
+def _check_row(
+    words: list[bytes], dofs: dict[bytes, int], seen: set[bytes], *, where: tuple[Path | str, int, bool]
+) -> None:
     path, line, begun = where
     name = words[0]
     if not begun:
-        raise MotionloomError(f"{path}, line {line}: {text.shown(name)} before the first frame number; is this an AMC file?")
+        raise MotionloomError(
+            f"{path}, line {line}: {text.shown(name)} before the first frame number; is this an AMC file?"
+        )
     if dofs.get(name) != len(words) - 1:
-        known = f"has {dofs[name]} in the ASF file" if name in dofs else "is no turning bone of the ASF file; do the two belong together?"
+        known = (
+            f"has {dofs[name]} in the ASF file"
+            if name in dofs
+            else "is no turning bone of the ASF file; do the two belong together?"
+        )
         raise MotionloomError(f"{path}, line {line}: {text.shown(name)} with {len(words) - 1} numbers {known}")
     if name in seen:
         raise MotionloomError(f"{path}, line {line}: {text.shown(name)} appears twice in one frame")
@@ -273,7 +293,9 @@ def _check_counters(counters: list[int], path: Path | str) -> None:
     steps = np.diff(np.array(counters))
     if len(steps) and (steps[0] < 1 or (steps != steps[0]).any()):
         at = int(np.argmax(steps != steps[0])) if steps[0] >= 1 else 0
-        raise MotionloomError(f"{path}: frame {counters[at]} is followed by frame {counters[at + 1]}; frames are missing or out of order")
+        raise MotionloomError(
+            f"{path}: frame {counters[at]} is followed by frame {counters[at + 1]}; frames are missing or out of order"
+        )
 
 
 def _values(words: list[bytes], frames: int, data: bytes, *, path: Path | str) -> Array:

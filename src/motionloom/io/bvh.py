@@ -16,13 +16,15 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io import text
+from motionloom.io.bvh_writer import SAME_PLACE, end_name, save_bvh
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
+
+__all__ = ["Bvh", "guess_unit", "load_bvh", "read_bvh", "save_bvh"]
 
 Array = NDArray[np.float64]
 MAX_JOINTS = 10_000
 _CHANNELS = {f"{axis}{kind}": (axis, kind) for axis in "XYZ" for kind in ("position", "rotation")}
-_SAME_PLACE = 2e-5  # metres: position channels that move less than this are constant
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ def _hierarchy(data: bytes, path: Path | str) -> list[_Joint]:
     if open_joints:
         raise words.fail(f"the joint {text.shown(joints[open_joints[-1]].name)} is never closed with '}}'")
     _check_joints(joints, path)
-    return joints
+    return _without_empty_ends(joints)
 
 
 def _open_joint(words: _Words, key: str, joints: list[_Joint], open_joints: list[int]) -> None:
@@ -148,7 +150,9 @@ def _open_joint(words: _Words, key: str, joints: list[_Joint], open_joints: list
     if (key == "ROOT") != (not open_joints):
         raise words.fail("ROOT must stand outside of braces and JOINT or End Site inside")
     if key == "ROOT" and joints:
-        raise words.fail("a second ROOT; files with several skeletons are not read, so save each person to a file of its own")
+        raise words.fail(
+            "a second ROOT; files with several skeletons are not read, so save each person to a file of its own"
+        )
     if open_joints and joints[open_joints[-1]].end:
         raise words.fail("an End Site cannot hold joints")
     if len(joints) >= MAX_JOINTS:
@@ -164,7 +168,9 @@ def _check_joints(joints: list[_Joint], path: Path | str) -> None:
     taken: set[str] = set()
     for joint in joints:
         if not joint.end and joint.name in taken:
-            raise MotionloomError(f"{path}, line {joint.line}: a second joint is called {text.shown(joint.name)}; rename one")
+            raise MotionloomError(
+                f"{path}, line {joint.line}: a second joint is called {text.shown(joint.name)}; rename one"
+            )
         if joint.offset is None and not joint.end:
             raise MotionloomError(f"{path}, line {joint.line}: the joint {text.shown(joint.name)} has no OFFSET")
         taken |= set() if joint.end else {joint.name}
@@ -178,9 +184,12 @@ def _check_joints(joints: list[_Joint], path: Path | str) -> None:
             taken.add(joint.name)
 
 
-def end_name(parent: str) -> str:
-    """The name of a joint's End Site."""
-    return f"{parent} End Site"
+def _without_empty_ends(joints: list[_Joint]) -> list[_Joint]:
+    kept = [i for i, j in enumerate(joints) if not (j.end and not any(j.offset or ()))]
+    place = {old: new for new, old in enumerate(kept)} | {-1: -1}
+    for i in kept:
+        joints[i].parent = place[joints[i].parent]
+    return [joints[i] for i in kept]
 
 
 def _describe(words: _Words, key: str, joint: _Joint) -> None:
@@ -191,7 +200,9 @@ def _describe(words: _Words, key: str, joint: _Joint) -> None:
     if not re.fullmatch(r"[0-6]", count):
         raise words.fail(f"CHANNELS needs a count from 0 to 6; got {text.shown(count)}")
     if joint.channels or joint.end:
-        raise words.fail(f"{text.shown(joint.name)} cannot have these CHANNELS: it is an End Site or has channels already")
+        raise words.fail(
+            f"{text.shown(joint.name)} cannot have these CHANNELS: it is an End Site or has channels already"
+        )
     channels = tuple(words.next("a channel").capitalize() for _ in range(int(count)))
     for name in channels:
         if name not in _CHANNELS:
@@ -203,8 +214,31 @@ def _describe(words: _Words, key: str, joint: _Joint) -> None:
 
 # Frames --------------------------------------------------------------------------------------------------------------
 
-_HEAD = re.compile(rb"\s*Frames?[ \t]*:?[ \t]*(\S*)[ \t]*\n\s*Frame[ \t_]*Time[ \t]*:?[ \t]*(\S*)[ \t]*(?:\n|\Z)", re.IGNORECASE)
-_RATES = (10, 12, 12.5, 15, 20, 24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 72, 90, 100, 120, 200, 240)
+_HEAD = re.compile(
+    rb"\s*Frames?[ \t]*:?[ \t]*(\S*)[ \t]*\n\s*Frame[ \t_]*Time[ \t]*:?[ \t]*(\S*)[ \t]*(?:\n|\Z)", re.IGNORECASE
+)
+_RATES = (
+    10,
+    12,
+    12.5,
+    15,
+    20,
+    24000 / 1001,
+    24,
+    25,
+    30000 / 1001,
+    30,
+    48,
+    50,
+    60000 / 1001,
+    60,
+    72,
+    90,
+    100,
+    120,
+    200,
+    240,
+)
 
 
 def _frames(data: bytes, start: int, columns: int, path: Path | str) -> tuple[float, Array]:
@@ -215,7 +249,9 @@ def _frames(data: bytes, start: int, columns: int, path: Path | str) -> tuple[fl
         raise MotionloomError(f"{path}, line {line}: MOTION must be followed by 'Frames: N' and 'Frame Time: SECONDS'")
     count, rate = head[1], frame_rate(text.word(head[2]))
     if not re.fullmatch(rb"[0-9]{1,12}", count) or int(count) == 0:
-        raise MotionloomError(f"{path}, line {line + 1}: Frames must be a whole number above 0; got {text.shown(count)}")
+        raise MotionloomError(
+            f"{path}, line {line + 1}: Frames must be a whole number above 0; got {text.shown(count)}"
+        )
     if rate is None:
         raise MotionloomError(f"{path}: Frame Time must be a number of seconds above 0; got {text.shown(head[2])}")
     if columns == 0:
@@ -262,10 +298,10 @@ def _assemble(joints: list[_Joint], values: Array, fps: float, unit: float | Non
     scale = guess_unit(parents, np.where(moving[:, None], 0.0, offsets)) if unit is None else unit
     root = places.pop(0, np.broadcast_to(offsets[0], (len(values), 3))) * scale
     translations = None
-    if any(np.ptp(p, axis=0).max() * scale > _SAME_PLACE for p in places.values()):
+    if any(np.ptp(p, axis=0).max() * scale > SAME_PLACE for p in places.values()):
         translations = np.broadcast_to(offsets, (len(values), *offsets.shape)) * scale
     for j, place in places.items():
-        if np.ptp(place, axis=0).max() * scale <= _SAME_PLACE:
+        if np.ptp(place, axis=0).max() * scale <= SAME_PLACE:
             offsets[j] = place[0]
         if translations is not None:
             translations[:, j] = place * scale
