@@ -1,0 +1,326 @@
+"""Joint positions to true rotations: an analytic body for export, with constant bones and without twist pops.
+
+Positions leave two things open: bones of a network's positions change length by centimetres, and the turn of a limb
+about its own length is visible only while its hinge (elbow, knee) is bent. Lengths are settled by the skeleton;
+the turn of a limb is the solution of one smoothing problem over the whole clip, see `hinge_axes`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.motion import Motion
+from motionloom.skeleton import SMPL22
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Limb:
+    """Two bones and a hinge: joints ``start - middle - end`` hanging on the frame of joint ``base``."""
+
+    base: int
+    start: int
+    middle: int
+    end: int
+    hinge: tuple[float, float, float]
+    """Axis of the bend at rest: the lower bone turns by a positive angle about it."""
+    tip: int | None = None
+    """The joint beyond the end (the toes), whose direction tells the turn of a straight leg."""
+
+
+LIMBS: tuple[Limb, ...] = (
+    Limb(0, 1, 4, 7, (1, 0, 0), 10),
+    Limb(0, 2, 5, 8, (1, 0, 0), 11),
+    Limb(9, 16, 18, 20, (0, -1, 0)),
+    Limb(9, 17, 19, 21, (0, 1, 0)),
+)
+"""Left leg, right leg, left arm, right arm."""
+
+_REST = SMPL22.offsets
+_LENGTHS = SMPL22.bone_lengths()
+_BENT = (np.sin(np.radians(6)), np.sin(np.radians(25)))
+"""Sines of the bends at which a hinge begins to tell the turn of its limb, and tells it fully."""
+_STIFFNESS = 1.0
+"""How strongly the turn of a limb is kept from frame to frame at 20 fps, against 1 for a well bent hinge."""
+_NEARLY_STRAIGHT = (0.95, 0.995)
+"""Shares of full reach between which the observed bend takes over from the observed distance."""
+
+
+def motion_from_positions(positions: np.ndarray, fps: float) -> Motion:
+    """The 22-joint person who takes the given places as well as constant bones can.
+
+    ``positions`` (frames, 22, 3) in metres, of a person of about the size of `motionloom.skeleton.SMPL22` (put others
+    through `motionloom.features.humanml.uniform` first); bones may breathe. Wrists and ankles reach their places when
+    the limb is long enough; rotations are continuous in time, signs too. Raises `MotionloomError` for other shapes
+    and numbers that are not finite.
+    """
+    positions = np.asarray(positions, dtype=np.float64)
+    if positions.ndim != 3 or positions.shape[1:] != (22, 3) or len(positions) == 0:
+        raise MotionloomError(f"positions must be (frames, 22, 3) with at least one frame; got {positions.shape}")
+    if not np.isfinite(positions).all():
+        raise MotionloomError("the positions have numbers that are not finite (NaN or infinity)")
+    places = np.zeros_like(positions)
+    world = np.tile(rot.IDENTITY, (len(positions), 22, 1))
+    _solve_trunk(positions, places, world)
+    solve_limbs(positions, places, world, fps)
+    for ankle, toe in ((7, 10), (8, 11)):
+        places[:, toe] = places[:, ankle] + rot.rotate(world[:, ankle], _REST[toe])
+    return Motion(SMPL22, fps, places[:, 0], local_rotations(world))
+
+
+def local_rotations(world: np.ndarray) -> Array:
+    """World orientations (frames, 22, 4) to each joint's in its parent's frame, without sign flips in time."""
+    parents = list(SMPL22.parents[1:])
+    local = np.array(world)
+    local[:, 1:] = rot.multiply(rot.inverse(world[:, parents]), world[:, 1:])
+    return rot.unroll(rot.normalize(local))
+
+
+# Trunk
+
+
+def _solve_trunk(seen: Array, places: Array, world: Array) -> None:
+    """Fill in places and world orientations of pelvis, spine, neck, head and collars."""
+    world[:, 0] = _pelvis(seen)
+    chest = [12, 13, 14]
+    spare = (_REST[13] - _REST[14], seen[:, 13] - seen[:, 14])
+    world[:, 9] = fit_rotation(_REST[chest], seen[:, chest] - seen[:, 9:10], spare=spare)
+    for joint, share in ((3, 1 / 3), (6, 2 / 3)):
+        child = SMPL22.children(joint)[0]
+        guess = rot.slerp(world[:, 0], world[:, 9], np.full(len(seen), share))
+        world[:, joint] = aim(guess, _REST[child], _steadied(seen[:, child] - seen[:, joint], guess, child))
+    trunk = (3, 6, 9, 12, 13, 14, 1, 2)
+    for joint in trunk:
+        places[:, joint] = _end_of(joint, places, world)
+    # The trunk's joints need not lie to each other as the skeleton's do: share the error out instead of leaving it all
+    # to those far from the pelvis.
+    weights = np.array([1.0, 1, 1, 1, 2, 0, 0, 2, 2])
+    shift = np.einsum("j,fjk->fk", weights / weights.sum(), (seen - places)[:, (0, *trunk)])
+    places[:, (0, *trunk)] += shift[:, None]
+    for joint, child in ((12, 15), (13, 16), (14, 17)):
+        world[:, joint] = aim(world[:, 9], _REST[child], seen[:, child] - places[:, joint])
+        places[:, child] = _end_of(child, places, world)
+    # The neck's bone says where the head is, and only roughly where it looks.
+    world[:, 15] = rot.slerp(world[:, 9], world[:, 12], np.full(len(seen), 0.5))
+
+
+def _steadied(bone: Array, guess: Array, child: int) -> Array:
+    """The seen bone (frames, 3), mixed with the guessed one as far as its breathing length shows noise."""
+    length = np.linalg.norm(bone, axis=-1)
+    noise = float(np.std(length) / _LENGTHS[child])
+    return bone + min(2.0, 6.0 * noise) * rot.rotate(guess, np.broadcast_to(_REST[child], bone.shape))
+
+
+def _pelvis(seen: Array) -> Array:
+    bones = [1, 2, 3]
+    spare = (_REST[16] + _REST[13] - _REST[17] - _REST[14], seen[:, 16] - seen[:, 17])
+    return fit_rotation(_REST[bones], seen[:, bones] - seen[:, :1], spare=spare)
+
+
+def _end_of(joint: int, places: Array, world: Array) -> Array:
+    parent = SMPL22.parents[joint]
+    return places[:, parent] + rot.rotate(world[:, parent], _REST[joint])
+
+
+def fit_rotation(rest: np.ndarray, seen: np.ndarray, *, spare: tuple[np.ndarray, np.ndarray]) -> Array:
+    """World quaternions (frames, 4) that best turn ``rest`` (points, 3) into ``seen`` (frames, points, 3).
+
+    Kabsch, *Acta Cryst.* A32 (1976). Where the points lie on a line (left and right hip coincide), the ``spare`` pair
+    of vectors, rest (3,) and seen (frames, 3), tells the rest; elsewhere it has no say.
+    """
+    full = np.linalg.svd(rest.T @ rest)[1][1]
+    correlation = seen.swapaxes(-1, -2) @ rest
+    weakness = 1 - 2 * np.linalg.svd(correlation)[1][:, 1] / full
+    extra = spare[1][:, :, None] * spare[0]
+    extra /= np.linalg.norm(extra, axis=(-2, -1), keepdims=True).clip(1e-9)
+    u, _, vt = np.linalg.svd(correlation + 0.5 * full * weakness.clip(0)[:, None, None] * extra)
+    signs = np.ones((len(seen), 3))
+    signs[:, 2] = np.linalg.det(u @ vt)
+    return rot.matrix_to_quat((u * signs[:, None]) @ vt)
+
+
+def aim(orientation: np.ndarray, rest: np.ndarray, direction: np.ndarray) -> Array:
+    """Turn world orientations (frames, 4) the shortest way so that ``rest`` (3,) points along ``direction``."""
+    now = rot.rotate(orientation, np.broadcast_to(rest, direction.shape))
+    short = np.linalg.norm(direction, axis=-1, keepdims=True) < 1e-6
+    return rot.normalize(rot.multiply(rot.shortest_arc(now, np.where(short, now, direction)), orientation))
+
+
+# Limbs
+
+
+def solve_limbs(seen: np.ndarray, places: np.ndarray, world: np.ndarray, fps: float) -> None:
+    """Fill in places and world orientations of the arms and legs, feet included.
+
+    ``seen`` (frames, 22, 3) are the places wanted; ``places`` and ``world`` (frames, 22, ...) hold the solved trunk
+    with hips and shoulders and receive the rest.
+    """
+    axes = hinge_axes(seen, world, fps)
+    for limb, axis in zip(LIMBS, axes):
+        a, b, c = limb.start, limb.middle, limb.end
+        places[:, b], places[:, c] = two_bones(places[:, a], seen[:, [a, b, c]], axis, (_LENGTHS[b], _LENGTHS[c]))
+        world[:, a] = hinge_frame(limb, b, places[:, b] - places[:, a], axis)
+        world[:, b] = hinge_frame(limb, c, places[:, c] - places[:, b], axis)
+        world[:, c] = world[:, b]
+        if limb.tip is not None:
+            world[:, c] = aim(world[:, b], _REST[limb.tip], seen[:, limb.tip] - seen[:, c])
+
+
+def hinge_frame(limb: Limb, child: int, bone: np.ndarray, axis: np.ndarray) -> Array:
+    """World orientations (frames, 4) with the bone to ``child`` along ``bone`` and the limb's hinge nearest ``axis``."""
+
+    def frame(y: np.ndarray, x: np.ndarray) -> Array:
+        y = y / np.linalg.norm(y, axis=-1, keepdims=True).clip(1e-9)
+        x = _perpendicular(x, y)
+        return np.stack([x, y, np.cross(x, y)], axis=-1)
+
+    rest = frame(_REST[child], np.array(limb.hinge, dtype=np.float64))
+    return rot.matrix_to_quat(frame(bone, axis) @ rest.T)
+
+
+def two_bones(
+    start: np.ndarray, seen: np.ndarray, axis: np.ndarray, lengths: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Places of the middle and the end (frames, 3) of a limb that begins at ``start`` and has bones of given lengths.
+
+    ``seen`` (frames, 3, 3) are the wanted places of start, middle and end, ``axis`` (frames, 3) the hinge. The end
+    reaches its place; near full reach the observed bend decides how far it gets instead (exactly the same for bones of
+    the right length), since there a millimetre of distance is many degrees of bend. The middle lies on the side where
+    it is seen; as far as it must leave the straight line more than seen, it does so about the hinge.
+    """
+    first, second = lengths
+    upper, lower = _unit(seen[:, 1] - seen[:, 0]), _unit(seen[:, 2] - seen[:, 1])
+    bend = (upper * lower).sum(-1).clip(-1, 1)
+    by_bend = np.sqrt((first**2 + second**2 + 2 * first * second * bend).clip(0))
+    wanted = seen[:, 2] - start
+    distance = np.linalg.norm(wanted, axis=-1)
+    near = _smoothstep(distance / (first + second), *_NEARLY_STRAIGHT)
+    reach = np.clip(distance + near * (by_bend - distance), abs(first - second) + 1e-6, first + second)
+    line = _unit(wanted)
+    along = (first**2 + reach**2 - second**2) / (2 * reach)
+    off = np.sqrt((first**2 - along**2).clip(0))
+    side = _side(seen, line, axis, off)
+    middle = start + along[:, None] * line + off[:, None] * side
+    return middle, start + reach[:, None] * line
+
+
+def _side(seen: Array, line: Array, axis: Array, off: Array) -> Array:
+    """Unit vectors (frames, 3) across ``line`` towards the middle joint."""
+    chord = _unit(seen[:, 2] - seen[:, 0])
+    across = seen[:, 1] - seen[:, 0]
+    across = across - (across * chord).sum(-1, keepdims=True) * chord
+    across = rot.rotate(rot.shortest_arc(chord, line), across)
+    missing = (off - np.linalg.norm(across, axis=-1)).clip(0) + 2e-4
+    return _perpendicular(across + missing[:, None] * _unit(np.cross(line, axis)), line)
+
+
+def hinge_axes(seen: np.ndarray, world: np.ndarray, fps: float) -> Array:
+    """World hinge axes (limbs, frames, 3) of the four limbs, across their upper bones and smooth in time.
+
+    In the frame of the limb's base (pelvis, chest) a vector is carried along the upper bone without twist (parallel
+    transport); the hinge is an angle about the bone from there. That angle minimises: squared distance to the observed
+    bend plane, weighted by how much the hinge is bent; weakly, to the anatomical rest axis and the foot's own lateral
+    axis; plus the squared change per frame. So a straight limb turns evenly from one bent pose to the next and
+    cannot pop.
+    """
+    bases = [limb.base for limb in LIMBS]
+    local = rot.inverse(world[:, bases])
+
+    def bones(a: str, b: str) -> Array:
+        ends = [getattr(limb, b) for limb in LIMBS]
+        return _unit(rot.rotate(local, seen[:, ends] - seen[:, [getattr(limb, a) for limb in LIMBS]]))
+
+    upper, lower = bones("start", "middle"), bones("middle", "end")
+    first = transport(upper)
+    second = np.cross(upper, first)
+
+    def plane(v: Array) -> NDArray[np.complex128]:
+        return (v * first).sum(-1) + 1j * (v * second).sum(-1)
+
+    bend = plane(np.cross(upper, lower))
+    usual = plane(_usual_axes(seen, upper, lower, local))
+    strength = _smoothstep(np.abs(bend), *_BENT)
+    angle = _smooth_angles(bend, strength, usual, _STIFFNESS * (fps / 20) ** 2)
+    axes = np.cos(angle)[..., None] * first + np.sin(angle)[..., None] * second
+    return rot.rotate(world[:, bases], axes).swapaxes(0, 1)
+
+
+def _usual_axes(seen: Array, upper: Array, lower: Array, local: Array) -> Array:
+    """Where hinges point when no bend is seen (frames, limbs, 3): rest axis carried by the shortest arc; the foot."""
+    axes = np.empty_like(upper)
+    for i, limb in enumerate(LIMBS):
+        rest = np.broadcast_to(_REST[limb.middle], upper[:, i].shape)
+        axes[:, i] = rot.rotate(rot.shortest_arc(rest, upper[:, i]), np.array(limb.hinge, dtype=np.float64))
+        # the shortest arc has no answer for a limb that points against its rest direction
+        axes[:, i] *= (1.1 + (_unit(rest) * upper[:, i]).sum(-1, keepdims=True)).clip(0, 1)
+        if limb.tip is not None:
+            foot = rot.rotate(local[:, i], _unit(seen[:, limb.tip] - seen[:, limb.end]))
+            axes[:, i] = 0.3 * axes[:, i] + np.cross(foot, lower[:, i])
+    return axes
+
+
+def transport(directions: np.ndarray) -> Array:
+    """Unit vectors across ``directions`` (frames, ..., 3), carried from frame to frame by the shortest arc."""
+    start = np.where(np.abs(directions[0, ..., :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    result = np.empty_like(directions)
+    result[0] = _perpendicular(start, directions[0])
+    steps = rot.quat_to_matrix(rot.shortest_arc(directions[:-1], directions[1:])) if len(directions) > 1 else []
+    for t, step in enumerate(steps):
+        result[t + 1] = (step @ result[t][..., None])[..., 0]
+    return _perpendicular(result, directions)
+
+
+def _smooth_angles(bend: np.ndarray, strength: Array, usual: np.ndarray, stiffness: float) -> Array:
+    """Angles (frames, limbs) that follow ``bend`` where ``strength`` says so and hold elsewhere.
+
+    First on the circle as complex numbers, which needs no unwrapping, then refined as angles (Gauss-Newton), which
+    bounds the change per frame.
+    """
+    weight, weak = strength, 0.02 * np.abs(usual).clip(0, 1)
+    goal, hint = _on_circle(bend), _on_circle(usual)
+    angle = np.unwrap(np.angle(_tridiagonal(weight + weak + 1e-6, stiffness, weight * goal + weak * hint)), axis=0)
+    for _ in range(4):
+        pull = weight * np.angle(goal * np.exp(-1j * angle)) + weak * np.angle(hint * np.exp(-1j * angle))
+        angle = _tridiagonal(weight + weak + 1e-6, stiffness, (weight + weak + 1e-6) * angle + pull)
+    return angle
+
+
+def _tridiagonal(diagonal: Array, stiffness: float, right: np.ndarray) -> np.ndarray:
+    """Solve (diag + stiffness * path Laplacian) x = right along axis 0 (Thomas)."""
+    frames = len(right)
+    diagonal = diagonal + stiffness * (2.0 if frames > 1 else 0.0)
+    if frames > 1:
+        diagonal[[0, -1]] -= stiffness
+    x, ratio = np.array(right), np.zeros_like(diagonal)
+    x[0] = x[0] / diagonal[0]
+    for t in range(1, frames):
+        ratio[t - 1] = -stiffness / diagonal[t - 1]
+        diagonal[t] += stiffness * ratio[t - 1]
+        x[t] = (x[t] + stiffness * x[t - 1]) / diagonal[t]
+    for t in range(frames - 2, -1, -1):
+        x[t] = x[t] - ratio[t] * x[t + 1]
+    return x
+
+
+def _on_circle(z: np.ndarray) -> np.ndarray:
+    return z / np.abs(z).clip(1e-9)
+
+
+def _unit(v: np.ndarray) -> Array:
+    return v / np.linalg.norm(v, axis=-1, keepdims=True).clip(1e-9)
+
+
+def _perpendicular(v: np.ndarray, to: np.ndarray) -> Array:
+    """Unit part of ``v`` across the unit vectors ``to``; any one where there is none."""
+    part = v - (v * to).sum(-1, keepdims=True) * to
+    other = np.cross(to, np.where(np.abs(to[..., :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
+    return _unit(np.where(np.linalg.norm(part, axis=-1, keepdims=True) > 1e-9, part, other))
+
+
+def _smoothstep(x: np.ndarray, low: float, high: float) -> Array:
+    u = np.clip((x - low) / (high - low), 0, 1)
+    return u * u * (3 - 2 * u)
