@@ -1,6 +1,6 @@
-"""Putting a motion on another body."""
+"""Putting a motion on another body: any humanoid to any humanoid, and the 22-joint uniform person between."""
 
 from motionloom.retarget.joint_map import JointMap, joint_map
-from motionloom.retarget.transfer import joints22
+from motionloom.retarget.transfer import from_smpl22, joints22, retarget, to_smpl22
 
-__all__ = ["JointMap", "joint_map", "joints22"]
+__all__ = ["JointMap", "from_smpl22", "joint_map", "joints22", "retarget", "to_smpl22"]

@@ -11,10 +11,9 @@ Parts = dict[str, int]
 
 _TOKEN = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
 _LEFT, _RIGHT = {"left", "l", "lt", "lft"}, {"right", "r", "rt", "rgt"}
-_NOISE = frozenset(
-    ("bip", "bip001", "biped", "mixamorig", "cc", "rl", "base", "armature", "character", "skeleton", "skel", "robot")
-    + ("jnt", "joint", "bone", "bn", "def", "org", "rig", "valve", "sim", "avg", "c", "j", "m", "f")
-)
+_PREFIXES = {"bip", "bip001", "biped", "mixamorig", "cc", "rl", "base", "armature", "character", "skeleton", "skel"}
+_FILLERS = {"robot", "jnt", "joint", "bone", "bn", "def", "org", "rig", "valve", "sim", "avg", "c", "j", "m", "f"}
+_NOISE = _PREFIXES | _FILLERS
 _HELPERS = {"twist", "roll", "ik", "pole", "end", "nub", "tip", "site", "target", "effector", "share", "corrective"}
 
 # Words of each part in order of preference: an earlier word wins where a skeleton has several.

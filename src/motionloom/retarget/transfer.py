@@ -1,10 +1,24 @@
-"""Carrying a motion from one humanoid to another."""
+"""Carrying a motion from one humanoid to another.
+
+1. *Read*: the source's 22 joint places and the world orientation of its anatomical frames.
+2. *Scale*: the root's path, hips and feet by the ratio of leg lengths, feet set on the floor.
+3. *Write*: the target's joints take the same anatomical orientation with bones along the same directions.
+4. *Legs*: two-bone IK puts the feet where the scaled source has them, so that a planted foot stays planted.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from motionloom import rotations as rot
+from motionloom.limbs import bend
 from motionloom.motion import Motion
+from motionloom.retarget.anatomy import ARMS, CHILD, FEET, HEAD, TOES, Body, frame, read_body
+from motionloom.retarget.floor import Stance, read_stance
 from motionloom.retarget.joint_map import Override, joint_map
+from motionloom.retarget.measured import frames_of_positions, mean_rotation
+from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 
@@ -16,3 +30,217 @@ def joints22(motion: Motion, override: Override | None = None) -> Array:
     """
     points = joint_map(motion.skeleton, override)
     return np.einsum("sj,fjc->fsc", points.matrix(motion.skeleton), motion.positions())
+
+
+def to_smpl22(motion: Motion, override: Override | None = None) -> Motion:
+    """The motion on the uniform 22-joint person, its floor at y = 0."""
+    return retarget(motion, SMPL22, source_map=override)
+
+
+def from_smpl22(motion: Motion, target: Skeleton, override: Override | None = None) -> Motion:
+    """A motion of the uniform person on a user's skeleton: their hierarchy, offsets and rest pose.
+
+    Joints that the uniform person lacks (fingers, eyes, twist bones) keep their rest pose.
+    """
+    return retarget(motion, target, target_map=override)
+
+
+def retarget(
+    motion: Motion, target: Skeleton, *, source_map: Override | None = None, target_map: Override | None = None
+) -> Motion:
+    """The motion on another humanoid skeleton.
+
+    The world keeps its axes, the path shrinks or grows with the length of the legs, and the floor (where the
+    source's planted toes are) becomes y = 0. Bones keep the target's lengths exactly; bones of the source that
+    change length count by where they end. Raises `MotionloomError` if either skeleton is no humanoid.
+    """
+    source, body = read_body(motion.skeleton, source_map), read_body(target, target_map)
+    pose = _read_pose(motion, source)
+    stance = read_stance(pose.places, motion.fps, ankle_height=source.ankle_height)
+    goals = _scale(pose, stance, source, body)
+    world = _orient(pose, body)
+    return _place(world, goals, body, motion.fps)
+
+
+# 1. Read -------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _Pose:
+    places: Array
+    """(frames, 22, 3) metres."""
+    frames: Array
+    """(frames, 22, 4) world_from_anatomy."""
+
+
+def _read_pose(motion: Motion, source: Body) -> _Pose:
+    world = motion.world_rotations()
+    places = np.einsum("sj,fjc->fsc", source.points, motion.positions())
+    axes = source.frames if source.upright else _measured_axes(places, world, source)
+    frames = np.empty((len(motion), 22, 4))
+    for j, driver in enumerate(source.drivers):
+        above = SMPL22.parents[j]
+        if driver is not None:
+            frames[:, j] = rot.multiply(world[:, driver], axes[j])
+        elif CHILD[j] is None:
+            frames[:, j] = frames[:, above]
+        else:
+            frames[:, j] = frame(places[:, CHILD[j]] - places[:, j], _side_axis(frames[:, above], j))
+        if CHILD[j] is not None and j not in (0, *FEET):  # the places have the last word on where a bone points
+            bone = places[:, CHILD[j]] - places[:, j]
+            frames[:, j] = rot.multiply(_turn(rot.rotate(frames[:, j], np.eye(3)[0]), bone), frames[:, j])
+    return _Pose(places, frames)
+
+
+def _side_axis(above: Array, joint: int) -> Array:
+    """Second axis for a joint that nothing turns, from the frame above it: forward for arms, left elsewhere."""
+    first, second = rot.rotate(above, np.eye(3)[0]), rot.rotate(above, np.eye(3)[1])
+    return np.cross(second, first) if joint in ARMS and SMPL22.parents[joint] not in ARMS else second
+
+
+def _turn(a: Array, b: Array) -> Array:
+    """Smallest turn from a to b; none where b has no length."""
+    turn = rot.shortest_arc(a, b)
+    return np.where(np.linalg.norm(b, axis=-1, keepdims=True) > 1e-6, turn, rot.IDENTITY)
+
+
+def _measured_axes(places: Array, world: Array, source: Body) -> Array:
+    """joint_from_anatomy from the motion itself, for a skeleton whose rest pose is no pose."""
+    frames, sure = frames_of_positions(places)
+    axes = source.frames.copy()
+    for j, driver in enumerate(source.drivers):
+        if driver is not None and sure[:, j].sum() > 1.0:
+            axes[j] = mean_rotation(rot.multiply(rot.inverse(world[:, driver]), frames[:, j]), sure[:, j])
+    return axes
+
+
+# 2. Scale ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _Goals:
+    hips: Array
+    """(frames, 3) metres: the middle between the hip joints."""
+    toes: Array
+    """(frames, 2, 3) metres: left and right toe joint."""
+    poles: Array
+    """(frames, 2, 3) where the knees point."""
+
+
+def _scale(pose: _Pose, stance: Stance, source: Body, target: Body) -> _Goals:
+    ratio = target.leg / source.leg
+    up = np.array([0.0, 1.0, 0.0])
+    toes = (pose.places[:, TOES] - stance.toe * up) * ratio + target.toe_height * up
+    middle = pose.places[:, [1, 2]].mean(axis=1)
+    hips = (middle - (stance.toe + stance.ankle) * up) * ratio + (target.toe_height + target.ankle_height) * up
+    return _Goals(hips, toes, _knee_poles(pose))
+
+
+def _knee_poles(pose: _Pose) -> Array:
+    """Where the knee stands out from the line hip to ankle; on a nearly straight leg, ahead of its hinge."""
+    poles = []
+    for hip, knee, ankle in ((1, 4, 7), (2, 5, 8)):
+        line = pose.places[:, ankle] - pose.places[:, hip]
+        length = np.linalg.norm(line, axis=-1, keepdims=True)
+        line = line / np.maximum(length, 1e-9)
+        out = pose.places[:, knee] - pose.places[:, hip]
+        out = out - (out * line).sum(-1, keepdims=True) * line
+        ahead = np.cross(line, rot.rotate(pose.frames[:, hip], np.eye(3)[1]))
+        poles.append(out + 0.03 * length * ahead)
+    return np.stack(poles, axis=1)
+
+
+# 3. Write ------------------------------------------------------------------------------------------------------------
+
+
+def _orient(pose: _Pose, body: Body) -> Array:
+    """(frames, joints, 4) world orientation of the target's joints, before the legs are set."""
+    skeleton = body.skeleton
+    world = np.tile(rot.IDENTITY, (len(pose.places), len(skeleton), 1))
+    first = {driver: j for j, driver in reversed(list(enumerate(body.drivers))) if driver is not None}
+    for k in range(len(skeleton)):
+        if k not in first:
+            world[:, k] = world[:, skeleton.parents[k]] if k else rot.IDENTITY
+            continue
+        j = first[k]
+        world[:, k] = rot.multiply(pose.frames[:, j], rot.inverse(body.frames[j]))
+        end = _bone_end(body, j)
+        if end is not None and j not in (0, HEAD, *FEET):
+            along = rot.rotate(world[:, k], body.rest[end] - body.rest[j])
+            world[:, k] = rot.multiply(_turn(along, pose.places[:, end] - pose.places[:, j]), world[:, k])
+    return world
+
+
+def _bone_end(body: Body, joint: int) -> int | None:
+    """The next SMPL joint down the line that another of the target's joints turns (or none does)."""
+    end = CHILD[joint]
+    while end is not None and body.drivers[end] == body.drivers[joint] and CHILD[end] is not None:
+        end = CHILD[end]
+    return end
+
+
+# 4. Legs and root ----------------------------------------------------------------------------------------------------
+
+
+def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
+    places = np.einsum("sj,fjc->fsc", body.points, _positions(body.skeleton, world))
+    root = goals.hips - places[:, [1, 2]].mean(axis=1)
+    places = places + root[:, None]
+    ankles = goals.toes - (places[:, TOES] - places[:, FEET])
+    drop = _drop(places, ankles, body)
+    root, places = root - drop, places - drop[:, None]
+    for side, (hip, knee, ankle) in enumerate(((1, 4, 7), (2, 5, 8))):
+        middle, end = bend(
+            places[:, hip], ankles[:, side], goals.poles[:, side], upper=body.bone(hip), lower=body.bone(knee)
+        )
+        world = _aim(world, body, hip, places[:, knee] - places[:, hip], middle - places[:, hip])
+        world = _aim(world, body, knee, places[:, ankle] - places[:, knee], end - middle)
+    return Motion(body.skeleton, fps, root, _locals(body.skeleton, world))
+
+
+def _aim(world: Array, body: Body, joint: int, now: Array, wanted: Array) -> Array:
+    """Turn one bone without twist, and with it whatever follows it rigidly."""
+    driver = body.drivers[joint]
+    assert driver is not None
+    turned = world.copy()
+    turn = rot.shortest_arc(now, wanted)
+    stop = {d for j, d in enumerate(body.drivers) if d is not None and d != driver}
+    follows = {driver}
+    for k in range(driver + 1, len(body.skeleton)):
+        if body.skeleton.parents[k] in follows and k not in stop:
+            follows.add(k)
+    for k in follows:
+        turned[:, k] = rot.multiply(turn, world[:, k])
+    return turned
+
+
+def _drop(places: Array, ankles: Array, body: Body) -> Array:
+    """(frames, 3) how far the hips must come down so that both feet reach their goals, without jerks."""
+    need = np.zeros(len(places))
+    for side, hip in enumerate((1, 2)):
+        reach = (body.bone(hip) + body.bone(CHILD[hip] or hip)) * 0.9995
+        flat = np.linalg.norm((places[:, hip] - ankles[:, side])[:, [0, 2]], axis=-1)
+        height = places[:, hip, 1] - ankles[:, side, 1]
+        allowed = np.sqrt(np.maximum(reach**2 - flat**2, 0.0))
+        need = np.maximum(need, np.where(flat < reach, height - allowed, 0.0))
+    need = np.clip(need, 0.0, 0.15)
+    wide = np.max([np.roll(np.pad(need, 3, mode="edge"), s)[3 : 3 + len(need)] for s in range(-3, 4)], axis=0)
+    kernel = np.hanning(9)[1:-1] / np.hanning(9)[1:-1].sum()
+    smooth = np.convolve(np.pad(wide, 3, mode="edge"), kernel, mode="valid")
+    return smooth[:, None] * np.array([0.0, 1.0, 0.0])
+
+
+def _positions(skeleton: Skeleton, world: Array) -> Array:
+    """(frames, joints, 3) with joint 0 at the origin."""
+    places = np.zeros((*world.shape[:2], 3))
+    for j, p in enumerate(skeleton.parents[1:], start=1):
+        places[:, j] = places[:, p] + rot.rotate(world[:, p], np.broadcast_to(skeleton.offsets[j], (len(world), 3)))
+    return places
+
+
+def _locals(skeleton: Skeleton, world: Array) -> Array:
+    local = world.copy()
+    parents = list(skeleton.parents[1:])
+    if parents:
+        local[:, 1:] = rot.multiply(rot.inverse(world[:, parents]), world[:, 1:])
+    return rot.unroll(rot.normalize(local))

@@ -1,0 +1,231 @@
+"""Anatomical frames: what the bones' own coordinate axes mean on a given body.
+
+Every SMPL joint has an *anatomical frame* whose first axis runs along the bone and whose second is the axis that
+keeps the bone from twisting:
+
+    joint                  first axis           second axis
+    pelvis, spine, neck    up the spine         to the left
+    head                   up                   to the left
+    hip, knee              down the bone        to the left (the knee's hinge)
+    ankle, toe             forward on the sole  to the left
+    collar, arm, wrist     along the bone       forward (where the elbow bends to)
+
+`Body.frames` holds them in the coordinates of the joint that turns the bone (`joint_from_anatomy`), so that
+``world_from_anatomy = world_from_joint * joint_from_anatomy`` says the same about every body: two bodies strike
+the same pose when these agree. In a sensible rest pose (T, A or arms down; upright) they can be read off it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.retarget.joint_map import JointMap, Override, joint_map
+from motionloom.skeleton import SMPL22, Skeleton
+
+Array = NDArray[np.float64]
+
+CHILD: tuple[int | None, ...] = (
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+    9,
+    10,
+    11,
+    12,
+    None,
+    None,
+    15,
+    16,
+    17,
+    None,
+    18,
+    19,
+    20,
+    21,
+    None,
+    None,
+)
+"""The SMPL joint each SMPL joint's bone runs to."""
+LEGS, FEET, TOES = (1, 2, 4, 5), (7, 8), (10, 11)
+ARMS = (13, 14, 16, 17, 18, 19, 20, 21)
+HEAD = 15
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A skeleton read as a person."""
+
+    skeleton: Skeleton
+    points: Array
+    """(22, joints): SMPL positions = points @ joint positions."""
+    drivers: tuple[int | None, ...]
+    """Per SMPL joint the skeleton's joint that turns it."""
+    rest: Array
+    """(22, 3) metres: the SMPL joints in the skeleton's rest pose, whatever that pose is."""
+    frames: Array
+    """(22, 4) joint_from_anatomy."""
+    upright: bool
+    """Whether the frames are known; else the rest pose is no standing person and limbs have an arbitrary twist."""
+    ankle_height: float
+    """Metres from toe joint up to ankle on a flat foot."""
+    toe_height: float
+    """Metres from the ground up to the toe joint on a flat foot."""
+
+    @property
+    def leg(self) -> float:
+        """Metres of thigh and shin, mean of both sides."""
+        return float(np.mean([self.bone(1) + self.bone(4), self.bone(2) + self.bone(5)]))
+
+    def bone(self, joint: int) -> float:
+        """Metres from an SMPL joint to the one its bone runs to."""
+        child = CHILD[joint]
+        return 0.0 if child is None else float(np.linalg.norm(self.rest[child] - self.rest[joint]))
+
+
+def read_body(skeleton: Skeleton, override: Override | None = None) -> Body:
+    """Find the person in a skeleton; errors as `joint_map`."""
+    found = joint_map(skeleton, override)
+    points = found.matrix(skeleton)
+    rest = points @ skeleton.rest_positions()
+    axes = _rest_axes(rest)
+    if axes is not None:
+        ankle, toe = _foot_heights(skeleton, found, rest, axes)
+        return Body(skeleton, points, found.drivers(skeleton), rest, _rest_frames(rest, axes), True, ankle, toe)
+    foot = float(np.mean([np.linalg.norm(rest[10] - rest[7]), np.linalg.norm(rest[11] - rest[8])]))
+    if _is_bandai(skeleton):
+        frames, slope = _bandai_frames(rest), BANDAI_SOLE[2]
+    else:
+        frames, slope = _odd_frames(rest), 0.42
+    return Body(skeleton, points, found.drivers(skeleton), rest, frames, _is_bandai(skeleton), slope * foot, 0.0)
+
+
+def frame(first: Array, second: Array) -> Array:
+    """(..., 4) the frame whose first axis is ``first`` and whose second lies nearest to ``second``."""
+    x = _unit(first)
+    y = _unit(second - (second * x).sum(-1, keepdims=True) * x)
+    return rot.from_axes([x, y, np.cross(x, y)])
+
+
+def _unit(v: Array) -> Array:
+    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
+
+
+def _snap(v: Array) -> Array:
+    """The coordinate axis next to a direction if it is within 30 degrees, else the direction."""
+    v = _unit(v)
+    axis = np.zeros(3)
+    axis[np.argmax(np.abs(v))] = np.sign(v[np.argmax(np.abs(v))])
+    return axis if float(axis @ v) > np.cos(np.radians(30)) else v
+
+
+def _rest_axes(rest: Array) -> tuple[Array, Array, Array] | None:
+    """Left, up and forward in rest pose; None if it is no upright person."""
+    left, up = _snap(rest[1] - rest[2]), _snap(rest[12] - rest[0])
+    left = _unit(left - float(left @ up) * up)
+    thighs, shins = rest[[4, 5]] - rest[[1, 2]], rest[[7, 8]] - rest[[4, 5]]
+    toes = rest[[10, 11]] - rest[[7, 8]]
+    forward = np.cross(left, up)
+    sane = (
+        (_unit(thighs) @ up < -0.3).all()
+        and (_unit(shins) @ up < -0.3).all()
+        and (_unit(toes) @ forward > 0.1).all()
+        and float(_unit(rest[16] - rest[17]) @ left) > 0.7
+        and float(_unit(rest[15] - rest[0]) @ up) > 0.8
+    )
+    return (left, up, forward) if sane else None
+
+
+def _rest_frames(rest: Array, axes: tuple[Array, Array, Array]) -> Array:
+    """Anatomical frames of a standing rest pose, where joint axes and world axes coincide."""
+    left, up, forward = axes
+    frames = np.tile(rot.IDENTITY, (22, 1))
+    for j, child in enumerate(CHILD):
+        bone = rest[child] - rest[j] if child is not None else up
+        if np.linalg.norm(bone) < 1e-6:
+            bone = up
+        frames[j] = frame(bone, forward if j in ARMS else left)
+    frames[0] = frame(up, left)
+    frames[HEAD] = frame(up, left)
+    for foot, toe in zip(FEET, TOES):
+        heading = rest[toe] - rest[foot]
+        heading = heading - float(heading @ up) * up
+        frames[foot] = frames[toe] = frame(heading, left)
+    for elbow, wrist in ((18, 20), (19, 21)):
+        frames[wrist] = frames[elbow]
+    return frames
+
+
+def _foot_heights(
+    skeleton: Skeleton, found: JointMap, rest: Array, axes: tuple[Array, Array, Array]
+) -> tuple[float, float]:
+    """Toe to ankle and ground to toe on a flat foot; the ground is the lowest tip of the feet."""
+    up = axes[1]
+    ankle = float(np.mean((rest[[7, 8]] - rest[[10, 11]]) @ up))
+    heights = skeleton.rest_positions() @ up
+    depths = []
+    for foot, toe in zip(FEET, TOES):
+        lowest = heights[[j for j in range(len(skeleton)) if _hangs_on(skeleton, found, j, foot)]].min(initial=np.inf)
+        depths.append(max(float(rest[toe] @ up) - min(lowest, float(rest[toe] @ up)), 0.0))
+    return ankle, min(float(np.mean(depths)), 0.06)
+
+
+def _hangs_on(skeleton: Skeleton, found: JointMap, joint: int, part: int) -> bool:
+    names = {name for name, _ in found.points[part]}
+    while joint > 0 and skeleton.names[joint] not in names:
+        joint = skeleton.parents[joint]
+    return skeleton.names[joint] in names
+
+
+def _odd_frames(rest: Array) -> Array:
+    """What the offsets alone tell: bones, hip line and shoulder line; the twist of limbs is arbitrary."""
+    hips, shoulders = rest[1] - rest[2], rest[16] - rest[17]
+    frames = np.tile(rot.IDENTITY, (22, 1))
+    for j, child in enumerate(CHILD):
+        bone = rest[child] - rest[j] if child is not None else np.zeros(3)
+        if np.linalg.norm(bone) < 1e-6:
+            frames[j] = frames[max(k for k, c in enumerate(CHILD) if c == j)]
+            continue
+        second = {3: hips, 6: shoulders, 9: shoulders, 12: shoulders}.get(j, np.eye(3)[np.argmin(np.abs(bone))])
+        frames[j] = frame(bone, second)
+    turn = rot.inverse(frame(np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])))
+    swap = frame(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+    frames[0] = rot.multiply(rot.multiply(frame(hips, rest[3] - rest[0]), swap), turn)
+    return frames
+
+
+# Bandai Namco's skeleton has its bones along the local X axis (against it on the right) and a zero pose that is no
+# pose. The second axes were measured on its clips from the planes in which knees and elbows bend; they came out as
+# coordinate axes to within a degree. The sole slopes against the line from ankle to toe.
+BANDAI_LEFT_AXIS = {
+    0: (0, -1, 0),
+    **dict.fromkeys((1, 2, 4, 5, 7, 8, 10, 11), (0, 1, 0)),
+    **dict.fromkeys((3, 6, 9, 12, 15), (0, 0, 1)),
+}
+BANDAI_SOLE = (0.78, 0.0, 0.62)
+BANDAI_TOES = (0.92, 0.0, 0.40)
+
+
+def _is_bandai(skeleton: Skeleton) -> bool:
+    named = {"joint_Root", "Hips", "UpperLeg_L", "LowerArm_R", "Toes_L"} <= set(skeleton.names)
+    return named and abs(float(_unit(skeleton.offsets[skeleton.index("LowerLeg_L")])[0])) > 0.99
+
+
+def _bandai_frames(rest: Array) -> Array:
+    frames = np.tile(rot.IDENTITY, (22, 1))
+    for j, child in enumerate(CHILD):
+        out = -1.0 if SMPL22.names[j].startswith("right") else 1.0
+        bone = np.array([out, 0.0, 0.0])
+        if j in FEET:
+            bone = out * np.array(BANDAI_SOLE)
+        elif j in TOES:
+            bone = out * np.array(BANDAI_TOES)
+        elif child is not None and j != 0:
+            bone = rest[child] - rest[j]
+        second = np.array(BANDAI_LEFT_AXIS.get(j, (0.0, 0.0, out)), dtype=np.float64)
+        frames[j] = frame(bone, second)
+    return frames
