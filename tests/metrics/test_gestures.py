@@ -127,14 +127,33 @@ def test_limb_speed_leaves_out_travel_and_turning() -> None:
     assert gestures.limb_speed(p, FPS, (20, 21))[:, 0] == pytest.approx(FPS / 79)
 
 
-def test_kick_height_is_the_greatest_difference_of_the_ankles() -> None:
+def test_a_kick_is_the_height_of_a_foot_in_front_and_heels_behind_do_not_count() -> None:
     p = standing()
-    p[40, 8, 1] += 0.5
-    assert gestures.kick_height(p) == pytest.approx(0.5 / gestures.leg_length(standing()))
+    p[40, 8] += [0, 0.5, 0.6]
+    height, pace = gestures.kick_reach(p, FPS)
+    assert height == pytest.approx(0.5 / gestures.leg_length(standing()))
+    assert pace > 1
+    p = standing()
+    p[40, 8] += [0, 0.5, -0.6]
+    assert gestures.kick_reach(p, FPS)[0] == 0
+
+
+def test_a_thrust_goes_out_in_front_at_chest_height_and_raising_a_hand_is_none() -> None:
+    p = standing()
+    chest = p[:, J["right_shoulder"]]
+    out = np.clip(np.linspace(0, 1.2, 80), 0.3, 0.6)
+    p[:, 21] = chest + out[:, None] * [0, 0, 1.0]
+    assert gestures.wrist_thrust(p, FPS)[:, 1].max() == pytest.approx(1.2 / 79 * FPS, rel=0.1)
+    p[:, 21] = chest - out[:, None] * [0, 0, 1.0]  # backwards
+    assert gestures.wrist_thrust(p, FPS).max() == 0
+    p[:, 21] = chest + [0, -0.4, 0.4] + out[:, None] * [0, 1.0, 0.1]
+    assert gestures.wrist_thrust(p, FPS).max() == 0
 
 
 def test_climbing_stays_up_and_jumping_comes_down() -> None:
-    p = moved(standing(), np.linspace(0, 1, 80)[:, None] * [0, 1.0, 0])
+    up = np.repeat(np.clip(np.linspace(-0.5, 1.5, 80), 0, 1)[:, None], 3, axis=1) * [0, 1.0, 0]
+    p = moved(standing(), up)
     assert gestures.stance_rise(p, FPS) == pytest.approx(1, abs=0.1)
-    assert gestures.stance_rise(jumping(0.4), FPS) == pytest.approx(0)
-    assert gestures.stance_rise(p[::-1], FPS) == pytest.approx(-1, abs=0.1)
+    assert gestures.stance_rise(p[::-1], FPS) == pytest.approx(1, abs=0.1)
+    assert gestures.stance_rise(jumping(0.4), FPS) < 0.1
+    assert gestures.stance_rise(standing()[:3], FPS) == 0

@@ -54,9 +54,12 @@ def longest(mask: np.ndarray) -> int:
 
 
 def airborne(positions: np.ndarray, *, clearance: float = 0.05) -> list[Flight]:
-    """Times when toes and ankles of both feet are all at least ``clearance`` metres above where they stand."""
+    """Times when toes and ankles of both feet are all at least ``clearance`` metres above where they stand.
+
+    Where a joint stands is its 20th percentile: a toe that dips when it pushes off must not make the flat foot fly.
+    """
     p = np.asarray(positions, dtype=np.float64)
-    stand = np.percentile(p[:, FEET, 1], 5, axis=0)
+    stand = np.percentile(p[:, FEET, 1], 20, axis=0)
     lowest = (p[:, FEET, 1] - stand).min(axis=1)
     usual = np.median(p[:, 0, 1])
     return [
@@ -186,18 +189,41 @@ def limb_speed(positions: np.ndarray, fps: float, joints: tuple[int, ...]) -> Ar
     return np.linalg.norm(velocity(in_body(positions)[:, list(joints)], fps), axis=-1)
 
 
-def kick_height(positions: np.ndarray) -> float:
-    """Leg lengths by which the higher ankle is at most above the lower one."""
-    ankles = np.asarray(positions)[:, ANKLES, 1]
-    return float(np.abs(ankles[:, 0] - ankles[:, 1]).max() / leg_length(positions))
+def kick_reach(positions: np.ndarray, fps: float, *, distance: float = 0.4) -> tuple[float, float]:
+    """The best kick: height in leg lengths of an ankle over the other one, and m/s of that ankle just before.
+
+    Only an ankle at least ``distance`` leg lengths away from the pelvis across the floor, and not behind it, counts:
+    the high heels of a runner are behind.
+    """
+    body, leg = in_body(positions), leg_length(positions)
+    ankles = body[:, ANKLES]
+    height = (ankles[..., 1] - ankles[:, ::-1, 1]) / leg
+    away = (np.linalg.norm(ankles[..., [0, 2]], axis=-1) > distance * leg) & (ankles[..., 2] > -0.1 * leg)
+    height = np.where(away, height, 0.0)
+    frame, side = np.unravel_index(int(np.argmax(height)), height.shape)
+    pace = smooth(limb_speed(positions, fps, ANKLES), 3)[max(0, frame - round(fps / 2)) : frame + 1, side]
+    return float(height[frame, side]), float(pace.max())
+
+
+def wrist_thrust(positions: np.ndarray, fps: float) -> Array:
+    """(frames, 2) m/s at which each wrist shoots forward, away from the upright axis of the body, at chest height.
+
+    Unlike the extension of the arm it counts a blow that comes out of the turning trunk; a hand that is raised more
+    than it is thrust does not count.
+    """
+    p = np.asarray(positions, dtype=np.float64)
+    out = velocity(np.linalg.norm((p[:, WRISTS] - p[:, :1])[..., [0, 2]], axis=-1), fps)
+    up = velocity(p[:, WRISTS, 1] - p[:, :1, 1], fps)
+    level = (hands_height(p, over="spine1") > 0) & (hands_height(p) < 0.1) & (in_body(p)[:, WRISTS, 2] > 0.1)
+    return np.where(level & (smooth(out, 3) > np.abs(smooth(up, 3))), smooth(out, 3), 0.0)
 
 
 def stance_rise(positions: np.ndarray, fps: float) -> float:
-    """Metres that the lower foot gained from the lowest to the last third of a second: climbing, not jumping.
+    """Metres between the lowest and the highest place at which the lower foot stayed for three quarters of a second.
 
-    A jump comes down again; somebody on stairs or a ladder stays up. Negative for descending.
+    Somebody on stairs or a ladder stays up; a jump comes down again.
     """
-    lower = smooth(np.asarray(positions)[:, TOES, 1].min(axis=1), odd(fps / 3))
-    return float(lower[-1] - lower[0])
-
-
+    window = odd(0.75 * fps)
+    lower = smooth(np.asarray(positions)[:, TOES, 1].min(axis=1), 3)
+    kept = [lower[start : start + window].min() for start in range(max(1, len(lower) - window))]
+    return float(max(kept) - min(kept))
