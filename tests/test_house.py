@@ -1,0 +1,154 @@
+"""The house's own rules: what holds for every file, whoever wrote it."""
+
+import ast
+import re
+import shutil
+import subprocess
+import sys
+import time
+import zipfile
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+import motionloom
+
+ROOT = Path(__file__).parents[1]
+SOURCE = ROOT / "src" / "motionloom"
+FILES = sorted(SOURCE.rglob("*.py"))
+WEIGHTS = sorted((SOURCE / "weights").glob("*.safetensors"))
+MAX_FUNCTION_LINES = 70
+MAX_FILE_LINES = 450
+
+
+def run(*command: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, *command], capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_help_imports_neither_torch_nor_numpy() -> None:
+    """`motionloom --help` answers before any heavy library is loaded."""
+    code = (
+        "import sys, contextlib\n"
+        "from motionloom.cli import main\n"
+        "with contextlib.suppress(SystemExit): main(['--help'])\n"
+        "print('LOADED', sorted({'torch', 'numpy', 'roma', 'rich', 'PIL', 'transformers'} & set(sys.modules)))\n"
+    )
+    done = run("-c", code)
+    assert done.returncode == 0, done.stderr
+    assert "LOADED []" in done.stdout
+
+
+def test_help_is_quick() -> None:
+    """The best of five starts of `motionloom --help` takes under half a second."""
+    times = []
+    for _ in range(5):
+        start = time.perf_counter()
+        done = run("-c", "import sys; from motionloom.cli import main; sys.exit(main(['--help']))")
+        times.append(time.perf_counter() - start)
+        assert done.returncode == 0, done.stderr
+        if times[-1] < 0.5:
+            break
+    assert min(times) < 0.5
+
+
+def test_version_is_that_of_the_installed_package() -> None:
+    """`motionloom --version` prints pyproject's version."""
+    written = re.search(r'^version = "(.+)"', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
+    assert written is not None
+    assert written[1] == version("motionloom")
+    assert run("-c", "from motionloom.cli import main; main(['--version'])").stdout.split()[-1] == written[1]
+
+
+@pytest.mark.parametrize("name", getattr(motionloom, "__all__", []))
+def test_public_names_are_documented(name: str) -> None:
+    """Every public name exists, and every public class and function says what it does."""
+    value = getattr(motionloom, name)
+    if callable(value) and isinstance(getattr(value, "__module__", None), str):
+        assert (value.__doc__ or "").strip(), f"{name} has no docstring"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(SOURCE)))
+def test_sizes_and_docstrings(path: Path) -> None:
+    """Functions and files stay readable, and every module with code says what it is."""
+    text = path.read_text()
+    tree = ast.parse(text)
+    assert text.count("\n") <= MAX_FILE_LINES, f"over {MAX_FILE_LINES} lines"
+    assert not tree.body or ast.get_docstring(tree), "no module docstring"
+    long = [
+        f"{node.name} has {length} lines"
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and (length := (node.end_lineno or node.lineno) - node.lineno + 1) > MAX_FUNCTION_LINES
+    ]
+    assert not long, "; ".join(long)
+
+
+def forbidden_calls(tree: ast.AST) -> list[str]:
+    """Calls that could run code out of a file: pickle in any dress."""
+    found = []
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        name = ast.unparse(node.func)
+        options = {k.arg: ast.unparse(k.value) for k in node.keywords}
+        if name == "torch.load" and options.get("weights_only") != "True":
+            found.append(f"line {node.lineno}: torch.load without weights_only=True")
+        if options.get("allow_pickle", "False") != "False":
+            found.append(f"line {node.lineno}: allow_pickle")
+        if name.split(".")[0] in {"pickle", "dill", "joblib", "cloudpickle"} or name in {"eval", "exec", "os.system"}:
+            found.append(f"line {node.lineno}: {name}")
+        if options.get("shell") == "True":
+            found.append(f"line {node.lineno}: a shell")
+    return found
+
+
+def test_the_guard_against_pickle_sees_one() -> None:
+    """Each forbidden call is found and its harmless relative is not."""
+    bad = ["torch.load(p)", "np.load(p, allow_pickle=True)", "pickle.loads(b)", "eval(s)", "run(c, shell=True)"]
+    assert all(forbidden_calls(ast.parse(line)) for line in bad)
+    good = ["torch.load(p, weights_only=True)", "np.load(p, allow_pickle=False)", "net.eval()", "run([c])"]
+    assert not any(forbidden_calls(ast.parse(line)) for line in good)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(SOURCE)))
+def test_no_pickle_no_shell(path: Path) -> None:
+    """Nothing in the package unpickles, evaluates text or starts a shell."""
+    assert not forbidden_calls(ast.parse(path.read_text()))
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(SOURCE)))
+def test_public_functions_take_no_bags(path: Path) -> None:
+    """No public function takes ``**kwargs``."""
+    functions = (n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.FunctionDef))
+    assert not [f.name for f in functions if not f.name.startswith("_") and f.args.kwarg is not None]
+
+
+def test_no_utils_module() -> None:
+    """A module is named after what it does."""
+    assert not [p for p in FILES if p.stem in {"utils", "util", "helpers", "misc", "common"}]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not WEIGHTS, reason="no shipped weights in src/motionloom/weights")
+def test_the_wheel_carries_weights_and_licences(tmp_path: Path) -> None:
+    """`pip install .` gives the weights, their cards, the type marker and every licence text."""
+    tree = tmp_path / "tree"  # a copy: building in the checkout would leave a build/ there
+    shutil.copytree(SOURCE, tree / "src" / "motionloom", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(ROOT / "LICENSES", tree / "LICENSES")
+    for name in ("pyproject.toml", "README.md", "LICENSE", "NOTICE"):
+        shutil.copy(ROOT / name, tree)
+    done = run("-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", str(tmp_path), str(tree))
+    assert done.returncode == 0, done.stderr
+    with zipfile.ZipFile(next(tmp_path.glob("*.whl"))) as wheel:
+        names = set(wheel.namelist())
+    assert {f"motionloom/weights/{w.name}" for w in WEIGHTS} <= names
+    assert "motionloom/py.typed" in names
+    assert {n.rsplit("/", 1)[-1] for n in names if "dist-info" in n} >= {"LICENSE", "NOTICE", "Apache-2.0.txt"}
+    assert {f"motionloom/{p.relative_to(SOURCE).as_posix()}" for p in FILES} <= names
+
+
+@pytest.mark.skipif(not WEIGHTS, reason="no shipped weights in src/motionloom/weights")
+def test_shipped_weights_are_small() -> None:
+    """Each shipped weight file stays under 40 MB."""
+    assert all(w.stat().st_size < 40e6 for w in WEIGHTS)

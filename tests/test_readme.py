@@ -1,0 +1,164 @@
+"""What the documents say is true: their commands run, their Python runs, their links lead somewhere.
+
+In README.md a code block under ``<!-- run -->`` is executed, block after block in one empty folder. Every other
+``motionloom ...`` line of any document only has to be accepted by the parser, and every ``make`` line to be a target.
+"""
+
+import importlib.util
+import os
+import re
+import shlex
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from motionloom import cli
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
+BLOCK = re.compile(r"(<!-- run -->\n)?```(sh|python)\n(.*?)```", re.DOTALL)
+WEIGHTS = sorted((ROOT / "src" / "motionloom" / "weights").glob("*.safetensors"))
+needs_weights = pytest.mark.skipif(not WEIGHTS, reason="no shipped weights in src/motionloom/weights")
+
+
+def blocks(text: str) -> list[tuple[bool, str, str]]:
+    """(is it run?, language, code) of every shell and Python block."""
+    return [(bool(mark), language, code) for mark, language, code in BLOCK.findall(text)]
+
+
+def commands(text: str, program: str) -> list[str]:
+    """The lines of the shell blocks that call ``program``, continued lines joined, comments removed."""
+    lines = [line for _, language, code in blocks(text) if language == "sh" for line in code.replace("\\\n", " ").splitlines()]
+    return [line for line in lines if line.split("#")[0].split()[:1] == [program]]
+
+
+def tool(name: str) -> Any:
+    """A script of tools/ as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "tools" / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def execute(command: list[str], folder: Path) -> None:
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    environment = {**os.environ, "PATH": path, "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One folder for all of the README's blocks: later ones use the files of earlier ones."""
+    return tmp_path_factory.mktemp("readme")
+
+
+RUN = [(language, code) for run, language, code in blocks(README) if run]
+
+
+@needs_weights
+@pytest.mark.slow
+@pytest.mark.parametrize(("language", "code"), RUN, ids=[f"block{i}" for i in range(len(RUN))])
+def test_the_readmes_blocks_run(language: str, code: str, folder: Path) -> None:
+    """Every marked block of the README ends without an error."""
+    execute(["bash", "-euo", "pipefail", "-c", code] if language == "sh" else [sys.executable, "-c", code], folder)
+
+
+def test_the_readme_has_marked_blocks_of_both_kinds() -> None:
+    """The marker is spelled as this file expects, so the test above has something to run."""
+    assert {"sh", "python"} == {language for language, _ in RUN}
+
+
+@needs_weights
+@pytest.mark.slow
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.stem)
+def test_the_examples_run(example: Path, tmp_path: Path) -> None:
+    """Each numbered example runs from an empty folder."""
+    execute([sys.executable, str(example)], tmp_path)
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
+def test_documented_commands_exist(document: Path) -> None:
+    """Every `motionloom` line names a command with options it has; every `make` line names a target."""
+    text = document.read_text()
+    for line in commands(text, "motionloom"):
+        if "--help" in line or "--version" in line:
+            continue
+        try:
+            cli.parser().parse_args(shlex.split(line, comments=True)[1:])
+        except SystemExit:
+            pytest.fail(f"{document.name}: the command line does not know: {line}")
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    for line in commands(text, "make"):
+        words = [w for w in shlex.split(line, comments=True)[1:] if "=" not in w]
+        assert set(words) <= targets, f"{document.name}: no such target: {line}"
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
+def test_links_lead_to_files(document: Path) -> None:
+    """Every relative link and picture of a document is there."""
+    text = re.sub(r"```.*?```", "", document.read_text(), flags=re.DOTALL)
+    targets = [t.split("#")[0] for t in re.findall(r"\]\(([^)\s]+)\)", text) if not re.match(r"[a-z]+:|#", t)]
+    missing = [t for t in targets if not (document.parent / t).exists() and (WEIGHTS or not t.endswith(".png"))]
+    assert not missing, f"{document.name} links to {missing}"
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
+def test_named_files_exist(document: Path) -> None:
+    """Every path of the project that a document names in backticks is there."""
+    if document.name == "CHANGELOG.md":
+        pytest.skip("history may name what is gone")
+    pattern = r"`((?:src|tests|docs|examples|tools|benchmarks|recipes)/[\w./-]+)`"
+    named = set(re.findall(pattern, document.read_text()))
+    assert not [n for n in named if not (ROOT / n).exists()]
+
+
+@needs_weights
+def test_the_readmes_tables_are_the_measured_ones() -> None:
+    """Each marked table is filled, with exactly what the benchmark wrote: `make tables`."""
+    filler = tool("fill_readme")
+    assert filler.places(README)
+    assert all(filler.places(README).values()), "a table of the README is empty"
+    assert filler.fill(README) == README
+
+
+def test_tables_are_filled_from_files(tmp_path: Path) -> None:
+    """A marked place takes its file's text once, however often it is filled; one without a file stays."""
+    filler = tool("fill_readme")
+    (tmp_path / "a.md").write_text("| 1 |\n")
+    text = "x\n<!-- filled from a.md -->\nold\n<!-- end -->\n<!-- filled from b.md -->\nkept\n<!-- end -->\n"
+    once = filler.fill(text, tmp_path)
+    assert filler.places(once) == {"a.md": "| 1 |", "b.md": "kept"}
+    assert filler.fill(once, tmp_path) == once
+
+
+def test_contributing_fits_one_screen() -> None:
+    """CONTRIBUTING.md has at most 50 lines of at most 120 characters."""
+    lines = (ROOT / "CONTRIBUTING.md").read_text().splitlines()
+    assert len(lines) <= 50
+    assert max(map(len, lines)) <= 120
+
+
+def test_blocks_are_told_apart() -> None:
+    """The little parser of this file knows a marked block from a plain one and joins continued lines."""
+    text = textwrap.dedent(
+        """
+        <!-- run -->
+        ```sh
+        motionloom a \\
+          --b  # why
+        ```
+        ```python
+        x = 1
+        ```
+        """
+    )
+    assert [(run, language) for run, language, _ in blocks(text)] == [(True, "sh"), (False, "python")]
+    assert [shlex.split(line, comments=True) for line in commands(text, "motionloom")] == [["motionloom", "a", "--b"]]
