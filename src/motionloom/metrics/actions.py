@@ -15,6 +15,8 @@ Measures = dict[str, float]
 
 MEANING: dict[str, str] = {
     "travel": "m walked along the path",
+    "pace": "m/s, median while moving",
+    "gap": "distance from start to end / travel: 0 comes back",
     "advance": "m gone in the direction the chest points; backwards is negative",
     "sidestep": "m gone to one side of the chest",
     "facing_share": "advance / travel",
@@ -26,9 +28,17 @@ MEANING: dict[str, str] = {
     "rise": "m both feet gained and kept for three quarters of a second",
     "jump_rise": "m the pelvis flew above its usual height",
     "jump_clearance": "m both feet were off the floor",
+    "flights": "times both feet were off the floor for less than a second",
+    "one_leg": "s one foot was held up without a break",
+    "steps": "times a foot was lifted by 6 cm and put down",
     "hops": "hops on one foot while the other was held up",
     "kick": "leg lengths the kicking foot was above the other",
     "kick_speed": "m/s of the kicking foot against the body",
+    "kick_height": "leg lengths between the ankles at the most, behind as well",
+    "kick_snap": "m/s at which a leg is stretched",
+    "foot_speed": "m/s of the quicker foot against the body, 98th percentile",
+    "hands_up": "s both wrists stayed above the neck",
+    "both_over_head": "m the lower wrist got above the head; below is negative",
     "arms_raised": "s both wrists stayed at the height of the shoulders or above",
     "hand_over_neck": "m the higher wrist got above the neck; below is negative",
     "wave_swings": "swings of 4 cm or more of a raised hand",
@@ -44,6 +54,7 @@ MEANING: dict[str, str] = {
     "arm_energy": "m/s of the wrists against the body, mean",
     "leg_energy": "m/s of the ankles against the body, mean",
     "mean_stir": "m/s of all joints, mean",
+    "stir": "m/s of the quickest joint, 90th percentile",
 }
 """What each number is."""
 
@@ -59,13 +70,16 @@ def _path(p: Array, fps: float) -> Measures:
     left, _, forward = own.mean(axis=0) * (len(p) - 1) / fps
     travel = ph.travel(p, fps)
     turning = np.abs(ph.velocity(ph.smooth(ph.heading(p), ph.odd(fps / 4)), fps))
+    pace = ph.speed(p, fps)
     return {
         "travel": travel,
+        "pace": float(np.median(pace[pace > 0.3])) if (pace > 0.3).any() else 0.0,
+        "gap": float(np.linalg.norm(p[-1, 0, [0, 2]] - p[0, 0, [0, 2]])) / max(travel, 0.3),
         "advance": forward,
         "sidestep": abs(left),
         "facing_share": forward / max(travel, 0.3),
         "side_share": abs(left) / max(travel, 0.3),
-        "top_pace": float(np.percentile(ph.speed(p, fps), 90)),
+        "top_pace": float(np.percentile(pace, 90)),
         "turn": float(np.degrees(ph.turn(p))),
         "winding": float(abs(np.degrees(ph.winding(p, fps)))),
         "turning": float(np.degrees(turning.mean())),
@@ -76,13 +90,21 @@ def _path(p: Array, fps: float) -> Measures:
 def _legs(p: Array, fps: float) -> Measures:
     flights = [f for f in g.airborne(p) if f.stop - f.start < fps]  # longer is a ladder or a rope
     kick, kick_speed = g.kick_reach(p, fps)
+    feet = ph.smooth(g.limb_speed(p, fps, ph.ANKLES), 3)
+    apart = np.abs(p[:, ph.ANKLES[0], 1] - p[:, ph.ANKLES[1], 1])
     return {
+        "flights": len(flights),
+        "one_leg": g.longest(apart > 0.12) / fps,
+        "steps": sum(g.foot_height_peaks(p)),
+        "kick_height": float(apart.max() / g.leg_length(p)),
+        "kick_snap": float(ph.smooth(g.foot_extension_speed(p, fps), 3).max()),
+        "foot_speed": float(np.percentile(feet.max(axis=1), 98)),
         "jump_rise": max((f.rise for f in flights), default=0.0),
         "jump_clearance": max((f.clearance for f in flights), default=0.0),
         "hops": max(g.single_foot_hops(p)),
         "kick": kick,
         "kick_speed": kick_speed,
-        "leg_energy": float(ph.smooth(g.limb_speed(p, fps, ph.ANKLES), 3).mean()),
+        "leg_energy": float(feet.mean()),
     }
 
 
@@ -90,8 +112,15 @@ def _arms(p: Array, fps: float) -> Measures:
     shoulders = p[:, ph.WRISTS, 1] - p[:, (J["left_shoulder"], J["right_shoulder"]), 1]
     hands = ph.smooth(g.limb_speed(p, fps, ph.WRISTS), 3)
     return {
+        "hands_up": g.longest((g.hands_height(p, over="neck") > 0).all(axis=1)) / fps,
+        "both_over_head": g.hands_height(p).min(axis=1).max(),
         # 5 cm below still counts: the wrist is not the hand
-        "arms_raised": g.longest(np.asarray(shoulders > -0.05).all(axis=1)) / fps,
+        "kick_height": "leg lengths between the ankles at the most, behind as well",
+    "kick_snap": "m/s at which a leg is stretched",
+    "foot_speed": "m/s of the quicker foot against the body, 98th percentile",
+    "hands_up": "s both wrists stayed above the neck",
+    "both_over_head": "m the lower wrist got above the head; below is negative",
+    "arms_raised": g.longest((shoulders > -0.05).all(axis=1)) / fps,
         "hand_over_neck": g.hands_height(p, over="neck").max(),
         "wave_swings": max(g.wrist_swings(p, fps, amplitude=0.04)),
         "punch_speed": g.wrist_thrust(p, fps).max(),
@@ -103,6 +132,7 @@ def _arms(p: Array, fps: float) -> Measures:
 def _posture(p: Array, fps: float) -> Measures:
     height = ph.smooth(g.pelvis_height(p), 3)
     bend = np.degrees(ph.smooth(g.forward_bend(p), 3))
+    stir = np.linalg.norm(ph.velocity(ph.smooth(p, 3), fps), axis=-1)
     low, lowest = np.asarray(height < 0.85), np.asarray(height <= np.percentile(height, 10))
     ahead = ph.in_body(p)[:, ph.ANKLES, 2].mean(axis=1) / g.leg_length(p)
     return {
@@ -113,7 +143,8 @@ def _posture(p: Array, fps: float) -> Measures:
         "bend_when_low": float(np.median(bend[lowest])),
         "feet_ahead_when_low": float(np.median(ahead[lowest])),
         "knees": float(np.percentile(np.degrees(ph.smooth(g.knee_bend(p), 3)).min(axis=1), 98)),
-        "mean_stir": float(np.linalg.norm(ph.velocity(ph.smooth(p, 3), fps), axis=-1).mean()),
+        "mean_stir": float(stir.mean()),
+        "stir": float(np.percentile(stir.max(axis=1), 90)),
     }
 
 

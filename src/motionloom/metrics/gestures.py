@@ -43,12 +43,12 @@ class Flight:
     """Metres: greatest height of the pelvis over its median height in the clip."""
 
 
-def _spans(mask: np.ndarray) -> list[tuple[int, int]]:
+def _spans(mask: np.ndarray | np.bool_) -> list[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, dtype=int), [0]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def longest(mask: np.ndarray) -> int:
+def longest(mask: np.ndarray | np.bool_) -> int:
     """Frames of the longest unbroken stretch of True."""
     return max((stop - start for start, stop in _spans(mask)), default=0)
 
