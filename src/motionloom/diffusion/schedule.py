@@ -25,7 +25,7 @@ State: TypeAlias = Tensor
 Draw: TypeAlias = Callable[[Tensor], Tensor]
 """Standard normal noise of the shape, type and device of its argument."""
 
-Spacing: TypeAlias = Literal["index", "snr"]
+Spacing: TypeAlias = Literal["index", "quadratic", "snr"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +81,11 @@ class Schedule:
         if isinstance(level, int):
             a, b = self.at(level)
             return a * clean + b * noise
-        index = level.to(self.signal.device)
+        if level.device.type == "cpu":  # elsewhere looking would stall the device
+            self.check(int(level.min()))
+            self.check(int(level.max()))
         shape = (-1,) + (1,) * (clean.ndim - 1)
-        a, b = (table[index].to(clean).view(shape) for table in (self.signal, self.noise))
+        a, b = (table.to(clean)[level.to(clean.device)].view(shape) for table in (self.signal, self.noise))
         return a * clean + b * noise
 
     def check(self, level: int) -> None:
@@ -121,6 +123,8 @@ def levels(schedule: Schedule, steps: int, *, spacing: Spacing = "index") -> lis
     """A walk of `steps` moves from the noisiest level T down to 0: `steps + 1` strictly falling levels.
 
     "index": evenly spaced levels ("trailing" in diffusers; it starts at T, as Lin et al. 2024 recommend).
+    "quadratic": evenly spaced roots of the level (Song et al. 2021, D.3), denser near clean data. On normal data of
+    narrow and wide spread alike it keeps the spread best in 10 to 50 moves of DPM-Solver++(2M) on the cosine schedule.
     "snr": evenly spaced in log(signal / noise) from T to 1, then 0 (the spacing of the DPM-Solver paper).
     """
     top = schedule.steps
@@ -128,10 +132,12 @@ def levels(schedule: Schedule, steps: int, *, spacing: Spacing = "index") -> lis
         raise ValueError(f"cannot take {steps} steps over {top} levels: ask for 1 to {top}")
     if spacing == "index":
         wanted = [top * (steps - i) / steps for i in range(steps)]
+    elif spacing == "quadratic":
+        wanted = [top * ((steps - i) / steps) ** 2 for i in range(steps)]
     elif spacing == "snr":
         wanted = _even_in_log_snr(schedule, steps)
     else:
-        raise ValueError(f"no spacing {spacing!r}; there are 'index' and 'snr'")
+        raise ValueError(f"no spacing {spacing!r}; there are 'index', 'quadratic' and 'snr'")
     result = [top]
     for i, level in enumerate(wanted[1:], start=1):
         # stay below the last level, and leave one level for every step that is still to come

@@ -1,0 +1,92 @@
+"""Edits of the state: observing, handshakes, chains."""
+
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from motionloom.diffusion import SOLVERS, chain, cosine, handshake, inpaint, levels, observe, row_draw, run
+from tests.diffusion.exact import shared_draw, wavy
+
+SCHEDULE = cosine(40)
+
+
+def some(*shape, seed=0):
+    return shared_draw(seed)(torch.empty(shape))
+
+
+@pytest.mark.parametrize("level", [0, 1, 17, 40])
+def test_observed_numbers_carry_the_levels_share_of_signal_and_noise(level):
+    x, known, noise = some(2, 4, 3), some(2, 4, 3, seed=1), some(2, 4, 3, seed=2)
+    mask = torch.tensor([True, False, True])
+    held = observe(known, mask, SCHEDULE, lambda like: noise)(x, level)
+    signal, sigma = SCHEDULE.at(level)
+    torch.testing.assert_close(held[..., mask], signal * known[..., mask] + sigma * noise[..., mask])
+    assert torch.equal(held[..., ~mask], x[..., ~mask])
+
+
+def test_observing_without_noise_from_a_noiseless_start_is_what_inpainting_alone_would_do_without_noise():
+    known, mask = some(1, 4, 3), torch.tensor([True, False, False])
+    hold = observe(known, mask, SCHEDULE, torch.zeros_like)
+    denoise = inpaint(wavy, known, mask)
+    x = hold(some(1, 4, 3, seed=1), 40)
+    walk = levels(SCHEDULE, 40)
+    plain, held = (
+        run(denoise, x, levels=walk[:20], solver=SOLVERS["ddim"], schedule=SCHEDULE, draw=torch.zeros_like, constrain=c)
+        for c in (None, hold)
+    )
+    torch.testing.assert_close(plain, held, atol=1e-5, rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_a_run_that_observes_ends_on_the_known_data(name):
+    known, mask, draw = some(2, 4, 3), torch.tensor([[True], [False], [False], [True]]), row_draw([1, 2])
+    end = run(
+        wavy,
+        some(2, 4, 3, seed=1),
+        levels=levels(SCHEDULE, 8),
+        solver=SOLVERS[name],
+        schedule=SCHEDULE,
+        draw=draw,
+        constrain=observe(known, mask, SCHEDULE, draw),
+    )
+    assert torch.equal(end[:, [0, 3]], known[:, [0, 3]])
+
+
+def slowly_joined(x, lengths, overlap):
+    """The rule, number by number."""
+    x = x.clone()
+    for i in range(1, len(lengths)):
+        for j in range(overlap):
+            a, end = j / overlap, lengths[i - 1] - overlap + j
+            joined = (1 - a) * x[i - 1, end] + a * x[i, j]
+            x[i - 1, end] = joined
+            x[i, j] = joined
+    return x
+
+
+@given(data=st.data(), overlap=st.integers(1, 4), rows=st.integers(1, 4))
+def test_a_handshake_joins_the_end_of_each_row_with_the_beginning_of_the_next(data, overlap, rows):
+    lengths = data.draw(st.lists(st.integers(2 * overlap, 12), min_size=rows, max_size=rows))
+    x = some(rows, 12, 2)
+    before = x.clone()
+    joined = handshake(lengths, overlap)(x, 3)
+    torch.testing.assert_close(joined, slowly_joined(x, lengths, overlap))
+    for i in range(1, rows):
+        assert torch.equal(joined[i - 1, lengths[i - 1] - overlap : lengths[i - 1]], joined[i, :overlap])
+    assert torch.equal(x, before)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "overlap", "words"),
+    [([5, 5], 0, "positive"), ([5, 2], 3, "fit into rows"), ([5, 5, 5], 2, "2 rows"), ([5, 9], 2, "8 tokens")],
+)
+def test_handshakes_that_do_not_fit_are_refused(lengths, overlap, words):
+    with pytest.raises(ValueError, match=words):
+        handshake(lengths, overlap)(some(2, 8, 1), 3)
+
+
+def test_a_chain_applies_its_constraints_in_order_and_an_empty_one_nothing():
+    x = some(1, 2, 2)
+    assert torch.equal(chain(lambda x, level: x + level, lambda x, level: 2 * x)(x, 3), 2 * (x + 3))
+    assert chain()(x, 3) is x

@@ -1,0 +1,142 @@
+"""The loop: what it visits, what it yields, and that noise belongs to rows."""
+
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from motionloom.diffusion import (
+    SOLVERS,
+    cosine,
+    levels,
+    masked_draw,
+    restart,
+    row_draw,
+    run,
+    sample,
+)
+from tests.diffusion.exact import shared_draw, wavy
+
+SCHEDULE = cosine(40)
+
+
+def made(seeds, *, name="ddpm", tokens=6, lengths=None):
+    draw = row_draw(seeds, lengths)
+    x = draw(torch.empty(len(seeds), tokens, 3))
+    return run(wavy, x, levels=levels(SCHEDULE, 10), solver=SOLVERS[name], schedule=SCHEDULE, draw=draw)
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    seeds=st.lists(st.integers(0, 2**63 - 1), min_size=1, max_size=5),
+    name=st.sampled_from(sorted(SOLVERS)),
+    randomness=st.randoms(use_true_random=False),
+)
+def test_a_row_is_bit_for_bit_the_same_alone_in_a_batch_and_in_any_order(seeds, name, randomness):
+    together = made(seeds, name=name)
+    shuffled = randomness.sample(range(len(seeds)), len(seeds))
+    again = made([seeds[i] for i in shuffled], name=name)
+    for place, i in enumerate(shuffled):
+        assert torch.equal(again[place], together[i])
+        assert torch.equal(made([seeds[i]], name=name)[0], together[i])
+
+
+def test_a_row_with_a_length_is_the_same_under_any_padding():
+    padded = made([1, 2], tokens=9, lengths=[4, 9])
+    assert torch.equal(padded[0, :4], made([1], tokens=4)[0])
+    assert torch.equal(padded[1], made([2], tokens=9)[0])
+
+
+def test_row_noise_is_standard_normal_new_in_every_draw_and_different_between_rows():
+    draw = row_draw([0, 1])
+    first, second = (draw(torch.empty(2, 100, 100)) for _ in range(2))
+    numbers = torch.stack([first, second]).reshape(4, -1)
+    torch.testing.assert_close(torch.cov(numbers), torch.eye(4), atol=0.05, rtol=0)
+    torch.testing.assert_close(numbers.mean(1), torch.zeros(4), atol=0.05, rtol=0)
+
+
+def test_row_noise_takes_type_and_shape_of_its_argument():
+    noise = row_draw([3])(torch.empty(1, 2, 3, 4, dtype=torch.float64))
+    assert (noise.dtype, noise.shape) == (torch.float64, (1, 2, 3, 4))
+    assert torch.equal(noise.float(), row_draw([3])(torch.empty(1, 2, 3, 4)))
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+def test_row_noise_is_the_same_on_a_gpu():
+    on_gpu = row_draw([3, 4])(torch.empty(2, 5, 6, device="cuda"))
+    assert torch.equal(on_gpu.cpu(), row_draw([3, 4])(torch.empty(2, 5, 6)))
+
+
+def test_the_walk_visits_its_levels_guess_then_move_then_edit():
+    events = []
+
+    def denoise(x, level):
+        events.append(("guess", level))
+        return x + level
+
+    def constrain(x, level):
+        events.append(("edit", level))
+        return x * 0 + level
+
+    x = torch.zeros(1, 1, 1)
+    walk = sample(
+        denoise,
+        x,
+        levels=[9, 4, 0],
+        solver=SOLVERS["ddim"],
+        schedule=SCHEDULE,
+        draw=torch.zeros_like,
+        constrain=constrain,
+    )
+    assert events == []
+    snapshots = [(level, state.item(), clean.item()) for level, state, clean in walk]
+    assert events == [("guess", 9), ("edit", 4), ("guess", 4), ("edit", 0)]
+    assert snapshots == [(4, 4.0, 9.0), (0, 0.0, 8.0)]
+
+
+def test_a_walk_of_one_level_is_no_walk():
+    x = torch.ones(1, 2, 3)
+    assert run(wavy, x, levels=[7], solver=SOLVERS["dpm2m"], schedule=SCHEDULE, draw=torch.zeros_like) is x
+
+
+@pytest.mark.parametrize("walk", [[], [3, 3], [1, 2], [41, 0], [3, -1]])
+def test_levels_that_do_not_fall_or_do_not_exist_are_refused_before_anything_runs(walk):
+    with pytest.raises(ValueError, match="level"):
+        sample(
+            wavy, torch.zeros(1, 1, 1), levels=walk, solver=SOLVERS["ddpm"], schedule=SCHEDULE, draw=torch.zeros_like
+        )
+
+
+def test_a_run_changes_none_of_its_arguments_and_keeps_their_type():
+    x = shared_draw(0)(torch.empty(2, 3, 4, dtype=torch.float32))
+    before, walk = x.clone(), levels(SCHEDULE, 5)
+    for solver in SOLVERS.values():
+        end = run(wavy, x, levels=walk, solver=solver, schedule=SCHEDULE, draw=row_draw([0, 1]))
+        assert end.dtype == torch.float32
+        assert torch.equal(x, before)
+
+
+def test_a_restart_keeps_what_the_level_leaves_of_the_data():
+    clean = torch.full((1, 200, 200), 3.0)
+    noisy = restart(clean, SCHEDULE, 12, row_draw([5]))
+    signal, noise = SCHEDULE.at(12)
+    assert noisy.mean().item() == pytest.approx(3 * signal, abs=0.02)
+    assert noisy.std().item() == pytest.approx(noise, abs=0.02)
+    assert torch.equal(restart(clean, SCHEDULE, 0, row_draw([5])), clean)
+
+
+def test_a_masked_draw_is_silent_where_the_mask_holds():
+    mask = torch.tensor([True, False])
+    noise, plain = (draw(torch.empty(1, 3, 2)) for draw in (masked_draw(row_draw([1]), mask), row_draw([1])))
+    assert torch.equal(noise[..., 0], torch.zeros(1, 3))
+    assert torch.equal(noise[..., 1], plain[..., 1])
+
+
+@pytest.mark.parametrize(
+    "mistake",
+    [lambda: row_draw([1, 2])(torch.empty(3, 1, 1)), lambda: row_draw([1, 2], [4])],
+    ids=["rows", "lengths"],
+)
+def test_seeds_that_do_not_fit_the_rows_are_refused(mistake):
+    with pytest.raises(ValueError, match="seeds"):
+        mistake()
