@@ -171,7 +171,7 @@ def solve_limbs(seen: np.ndarray, places: np.ndarray, world: np.ndarray, fps: fl
 
 
 def hinge_frame(limb: Limb, child: int, bone: np.ndarray, axis: np.ndarray) -> Array:
-    """World orientations (frames, 4) with the bone to ``child`` along ``bone`` and the limb's hinge nearest ``axis``."""
+    """World orientations (frames, 4) with the bone to ``child`` along ``bone``, the hinge nearest ``axis``."""
 
     def frame(y: np.ndarray, x: np.ndarray) -> Array:
         y = y / np.linalg.norm(y, axis=-1, keepdims=True).clip(1e-9)

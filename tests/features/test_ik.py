@@ -1,0 +1,130 @@
+"""The body for export stands where the positions are, keeps its bones and never twists without being told."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.features.ik import LIMBS, motion_from_positions
+from motionloom.motion import Motion
+from motionloom.skeleton import SMPL22
+from tests.features.clips import real
+from tests.features.people import wander
+
+FPS = 20.0
+SEEDS = st.integers(0, 10_000)
+
+
+def turning_speeds(motion: Motion) -> np.ndarray:
+    """(frames - 1, 22) radians per second of each local rotation."""
+    q = motion.rotations
+    return np.linalg.norm(rot.quat_to_rotvec(rot.multiply(rot.inverse(q[:-1]), q[1:])), axis=-1) * motion.fps
+
+
+def bone_speeds(positions: np.ndarray, fps: float = FPS) -> np.ndarray:
+    """(frames - 1, 21) radians per second of each bone's direction."""
+    bones = positions[:, 1:] - positions[:, list(SMPL22.parents[1:])]
+    bones /= np.linalg.norm(bones, axis=-1, keepdims=True)
+    return np.arccos((bones[1:] * bones[:-1]).sum(-1).clip(-1, 1)) * fps
+
+
+@settings(max_examples=20, deadline=None)
+@given(SEEDS, st.floats(0.1, 0.8))
+def test_poses_give_back_their_own_positions(seed: int, amplitude: float) -> None:
+    positions = wander(seed, amplitude=amplitude).positions()
+    np.testing.assert_allclose(motion_from_positions(positions, FPS).positions(), positions, atol=1e-3)
+
+
+@settings(max_examples=10, deadline=None)
+@given(SEEDS)
+def test_a_single_frame_is_enough(seed: int) -> None:
+    positions = wander(seed, frames=1).positions()
+    np.testing.assert_allclose(motion_from_positions(positions, FPS).positions(), positions, atol=1e-3)
+
+
+@settings(max_examples=10, deadline=None)
+@given(SEEDS)
+def test_bent_limbs_give_back_their_own_rotations(seed: int) -> None:
+    motion = wander(seed, amplitude=0.4)
+    again = motion_from_positions(motion.positions(), FPS).world_rotations()
+    off = rot.quat_to_rotvec(rot.multiply(rot.inverse(motion.world_rotations()), again))
+    bend = np.linalg.norm(rot.quat_to_rotvec(motion.rotations), axis=-1)
+    for limb in LIMBS:
+        told = bend[:, limb.middle] > np.radians(40)
+        assert np.degrees(np.linalg.norm(off[told, limb.start], axis=-1)).max(initial=0) < 8
+
+
+def straight_arm(noise: float) -> np.ndarray:
+    """An arm that swings all but straight, the elbow off the line by noise that knows no side."""
+    frames = 60
+    turns = np.tile(rot.IDENTITY, (frames, 22, 1))
+    swing = 0.8 * np.sin(np.linspace(0, 9, frames))
+    turns[:, 16] = rot.multiply(
+        rot.rotvec_to_quat(swing[:, None] * [1, 0, 0]), rot.rotvec_to_quat(np.array([0, 0, -1.4]))
+    )
+    positions = Motion(SMPL22, FPS, np.tile([0, 0.9, 0], (frames, 1)), turns).positions()
+    positions[:, 18] += np.random.default_rng(0).normal(size=(frames, 3)) * noise
+    return positions
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002, 0.01])
+def test_a_straight_arm_does_not_twist(noise: float) -> None:
+    positions = straight_arm(noise)
+    speeds = turning_speeds(motion_from_positions(positions, FPS))
+    assert speeds[:, 16].max() < 1.5 * bone_speeds(positions).max()
+
+
+def test_a_knee_seen_bent_backwards_by_noise_keeps_its_axis() -> None:
+    positions = np.tile(SMPL22.rest_positions(), (40, 1, 1))
+    positions[:, 4, 2] += 0.01 * np.sin(np.arange(40) * 2.5)
+    knees = motion_from_positions(positions, FPS).world_rotations()[:, 4]
+    left = rot.rotate(knees, np.array([1.0, 0, 0]))
+    assert left[:, 0].min() > 0.99
+
+
+@settings(max_examples=8, deadline=None)
+@given(SEEDS, st.floats(0.002, 0.03))
+def test_noise_that_makes_bones_breathe_stays_bounded(seed: int, noise: float) -> None:
+    clean = wander(seed).positions()
+    positions = clean + np.random.default_rng(seed).normal(size=clean.shape) * noise
+    motion = motion_from_positions(positions, FPS)
+    error = np.linalg.norm(motion.positions() - positions, axis=-1)
+    assert error.mean() < 2 * noise + 1e-3
+    assert turning_speeds(motion).max() < 1.5 * bone_speeds(positions).max()
+    dots = (motion.rotations[1:] * motion.rotations[:-1]).sum(-1)
+    assert (dots > 0).all()
+
+
+def test_coincident_hips_leave_the_pelvis_in_line_with_the_chest() -> None:
+    motion = wander(7, amplitude=0.0)
+    positions = motion.positions()
+    positions[:, [1, 2]] = positions[:, [1, 2]].mean(1, keepdims=True)
+    found = motion_from_positions(positions, FPS).world_rotations()[:, 0]
+    off = rot.quat_to_rotvec(rot.multiply(rot.inverse(motion.world_rotations()[:, 0]), found))
+    assert np.degrees(np.linalg.norm(off, axis=-1)).max() < 15
+
+
+def test_everything_in_one_point_is_still_a_motion() -> None:
+    motion = motion_from_positions(np.zeros((4, 22, 3)), FPS)
+    assert np.isfinite(motion.positions()).all()
+
+
+@pytest.mark.parametrize("clip", ["07_01", "135_04", "05_02", "49_08"])
+def test_real_people_are_followed(clip: str) -> None:
+    positions = real(clip)
+    motion = motion_from_positions(positions, FPS)
+    error = np.linalg.norm(motion.positions() - positions, axis=-1)
+    assert error.mean() < 0.02
+    assert error[:, [7, 8, 15, 20, 21]].mean() < 0.005
+    assert turning_speeds(motion).max() < 1.5 * bone_speeds(positions).max()
+    bones = motion.positions()[:, 1:] - motion.positions()[:, list(SMPL22.parents[1:])]
+    assert np.abs(np.linalg.norm(bones, axis=-1) - SMPL22.bone_lengths()[1:]).max() < 1e-9
+
+
+def test_mistakes_are_told() -> None:
+    with pytest.raises(MotionloomError, match="positions must be"):
+        motion_from_positions(np.zeros((4, 21, 3)), FPS)
+    with pytest.raises(MotionloomError, match="not finite"):
+        motion_from_positions(np.full((4, 22, 3), np.inf), FPS)
