@@ -115,12 +115,7 @@ def _arms(p: Array, fps: float) -> Measures:
         "hands_up": g.longest((g.hands_height(p, over="neck") > 0).all(axis=1)) / fps,
         "both_over_head": g.hands_height(p).min(axis=1).max(),
         # 5 cm below still counts: the wrist is not the hand
-        "kick_height": "leg lengths between the ankles at the most, behind as well",
-    "kick_snap": "m/s at which a leg is stretched",
-    "foot_speed": "m/s of the quicker foot against the body, 98th percentile",
-    "hands_up": "s both wrists stayed above the neck",
-    "both_over_head": "m the lower wrist got above the head; below is negative",
-    "arms_raised": g.longest((shoulders > -0.05).all(axis=1)) / fps,
+        "arms_raised": g.longest((shoulders > -0.05).all(axis=1)) / fps,
         "hand_over_neck": g.hands_height(p, over="neck").max(),
         "wave_swings": max(g.wrist_swings(p, fps, amplitude=0.04)),
         "punch_speed": g.wrist_thrust(p, fps).max(),
