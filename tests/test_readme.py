@@ -20,7 +20,12 @@ from motionloom import cli
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DOCUMENTS = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    ROOT / "CHANGELOG.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
 EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
 BLOCK = re.compile(r"(<!-- run -->\n)?```(sh|python)\n(.*?)```", re.DOTALL)
 WEIGHTS = sorted((ROOT / "src" / "motionloom" / "weights").glob("*.safetensors"))
@@ -34,7 +39,12 @@ def blocks(text: str) -> list[tuple[bool, str, str]]:
 
 def commands(text: str, program: str) -> list[str]:
     """The lines of the shell blocks that call ``program``, continued lines joined, comments removed."""
-    lines = [line for _, language, code in blocks(text) if language == "sh" for line in code.replace("\\\n", " ").splitlines()]
+    lines = [
+        line
+        for _, language, code in blocks(text)
+        if language == "sh"
+        for line in code.replace("\\\n", " ").splitlines()
+    ]
     return [line for line in lines if line.split("#")[0].split()[:1] == [program]]
 
 
@@ -50,7 +60,9 @@ def tool(name: str) -> Any:
 def execute(command: list[str], folder: Path) -> None:
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
     environment = {**os.environ, "PATH": path, "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
 
 

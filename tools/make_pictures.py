@@ -1,6 +1,6 @@
 """Draw the README's pictures with the shipped weights, through the command line that a user has.
 
-    python tools/make_pictures.py [FOLDER]
+python tools/make_pictures.py [FOLDER]
 """
 
 import sys
