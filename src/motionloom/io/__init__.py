@@ -1,5 +1,6 @@
 """Motion files, in and out: the suffix picks the format."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -42,6 +43,8 @@ def load(
 
 
 def _check(path: Path, suffix: str, fps: float | None, *, unit: float | None, asf: Path | str | None) -> None:
+    if path.is_dir():
+        raise MotionloomError(f"{path} is a folder; name a file in it")
     if suffix == ".asf":
         raise MotionloomError(f"{path} is a skeleton without a motion; name the .amc file instead")
     if suffix not in READS:
@@ -58,19 +61,33 @@ def _check(path: Path, suffix: str, fps: float | None, *, unit: float | None, as
         raise MotionloomError(f"{path} has its own skeleton; an ASF file is for AMC files")
 
 
+def check_output(path: Path | str) -> Path:
+    """The path, if `save` could write there; ask before long work. Raises `MotionloomError` otherwise."""
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if path.is_dir():
+        raise MotionloomError(f"cannot write {path}: it is a folder; add a file name")
+    if suffix not in WRITES:
+        raise MotionloomError(
+            f"cannot write {path}: its name must end in {', '.join(WRITES)}; it ends in {suffix or 'none'}"
+        )
+    folder = path.absolute().parent
+    if not folder.is_dir():
+        raise MotionloomError(f"cannot write {path}: the folder {folder} does not exist; make it first")
+    if not os.access(folder, os.W_OK):
+        raise MotionloomError(f"cannot write {path}: the folder {folder} may not be written to")
+    return path
+
+
 def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequence[str] | None = None) -> Path:
     """Write one motion or several; the suffix picks BVH (in metres), GLB, NPZ, MP4, GIF or PNG; gives the path back.
 
     ``captions`` label pictures and films, one per motion. BVH and NPZ files hold one person. The file appears whole
     or not at all. Raises `MotionloomError` for another suffix or a place that cannot be written.
     """
-    path = Path(path)
+    path = check_output(path)
     several = [motions] if isinstance(motions, Motion) else list(motions)
     suffix = path.suffix.lower()
-    if suffix not in WRITES:
-        raise MotionloomError(
-            f"{path} cannot be written: its name must end in {', '.join(WRITES)}; it ends in {suffix or 'none'}"
-        )
     if not several or (len(several) > 1 and suffix in _ONE_PERSON):
         raise MotionloomError(f"{path} holds one motion; got {len(several)}, so give each its own file or write a .glb")
     if suffix == ".bvh":

@@ -260,10 +260,9 @@ def _close_frame(seen: set[bytes], whole: set[bytes], where: tuple[Path | str, i
     if not seen:
         raise MotionloomError(f"{path}, line {line}: frame {frame} is empty; the file is cut off or no AMC file")
     if seen != whole:
-        odd = text.word(min(seen ^ whole))
-        raise MotionloomError(
-            f"{path}, line {line}: frame {frame} {'lacks' if min(seen ^ whole) in whole else 'adds'} {text.shown(odd)}, unlike the first; the file is cut off or damaged"
-        )
+        odd = min(seen ^ whole)
+        change = f"frame {frame} {'lacks' if odd in whole else 'adds'} {text.shown(odd)}, unlike the first"
+        raise MotionloomError(f"{path}, line {line}: {change}; the file is cut off or damaged")
     return whole
 
 
@@ -331,8 +330,10 @@ def _local(bone: Bone, values: Array | None, scale: float, frames: int) -> Array
 
 
 def _layout(asf: Asf) -> tuple[list[str], list[int], list[int], list[int]]:
-    """Joint names, their parents, the bone at whose end each is (-1: at its parent's place) and which bone turns each."""
-    children = [[c for c, p in enumerate(asf.parents) if p == b] for b in range(len(asf.bones))]
+    """Joint names, parents, the bone at whose end each stands (-1: where its parent does), the bone that turns it."""
+    children: list[list[int]] = [[] for _ in asf.bones]
+    for bone, parent in enumerate(asf.parents[1:], start=1):
+        children[parent].append(bone)
     names, parents, ends, turns = ["root"], [-1], [-1], [0]
     end_joint = {0: 0}
     for b, bone in enumerate(asf.bones[1:], start=1):
@@ -351,12 +352,26 @@ def _layout(asf: Asf) -> tuple[list[str], list[int], list[int], list[int]]:
     return names, parents, ends, turns
 
 
-def _assemble(asf: Asf, values: dict[str, Array], degrees: bool, fps: float, unit: float) -> Motion:
-    names, parents, ends, turns = _layout(asf)
-    frames = len(next(iter(values.values())))
-    scale = np.pi / 180 if degrees else 1.0
+def load_skeleton(path: Path | str, *, unit: float | None = None) -> Skeleton:
+    """The skeleton of an ASF file in metres; its rest pose is the file's."""
+    asf = read_asf(path)
+    return _skeleton(asf, asf.unit if unit is None else unit)
+
+
+def _skeleton(asf: Asf, unit: float) -> Skeleton:
+    names, parents, ends, _ = _layout(asf)
+    if len(set(names)) != len(names):
+        raise MotionloomError("a bone of the ASF file is called like the start of another; rename it")
     offsets = np.array([asf.bones[b].end if b > 0 else (0.0, 0.0, 0.0) for b in ends]) * unit
-    rotations = np.tile(rot.IDENTITY, (frames, len(names), 1))
+    return Skeleton(tuple(names), tuple(parents), offsets)
+
+
+def _assemble(asf: Asf, values: dict[str, Array], degrees: bool, fps: float, unit: float) -> Motion:
+    skeleton, turns = _skeleton(asf, unit), _layout(asf)[3]
+    frames = len(next(iter(values.values())))
+    text.check_poses(frames, len(turns), "the motion")
+    scale = np.pi / 180 if degrees else 1.0
+    rotations = np.tile(rot.IDENTITY, (frames, len(turns), 1))
     for j, b in enumerate(turns):
         if b >= 0:
             rotations[:, j] = _local(asf.bones[b], values.get(asf.bones[b].name), scale, frames)
@@ -366,9 +381,7 @@ def _assemble(asf: Asf, values: dict[str, Array], degrees: bool, fps: float, uni
     for i, dof in enumerate(bone.dofs if given is not None else ()):
         if dof[0] == "t" and given is not None:
             root[:, "xyz".index(dof[1])] += given[:, i]
-    if len(set(names)) != len(names):
-        raise MotionloomError("a bone of the ASF file is called like the start of another; rename it")
-    return Motion(Skeleton(tuple(names), tuple(parents), offsets), fps, root * unit, rotations)
+    return Motion(skeleton, fps, root * unit, rotations)
 
 
 def find_asf(amc: Path | str) -> Path:

@@ -67,6 +67,7 @@ def read_bvh(path: Path | str, *, fps: float | None = None, unit: float | None =
         raise MotionloomError(f"{path} has no MOTION part; the file is cut off or not a BVH file")
     joints = _hierarchy(data[: split.start()], path)
     rate, values = _frames(data, split.end(), sum(len(j.channels) for j in joints), path)
+    text.check_poses(len(values), len(joints), path)
     return _assemble(joints, values, rate if fps is None else fps, unit)
 
 
@@ -113,7 +114,7 @@ class _Words:
             word = self.next(f"{count} numbers of {what}")
             value = text.number(word)
             if value is None:
-                raise self.fail(f"{what} needs {count} finite numbers; {text.shown(word)} is none")
+                raise self.fail(f"{what} needs {count} finite numbers below 1e9; {text.shown(word)} is none")
             found.append(value)
         return tuple(found)
 

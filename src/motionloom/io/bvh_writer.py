@@ -29,8 +29,8 @@ def save_bvh(motion: Motion, path: Path | str, *, order: str | Mapping[str, str]
 
     ``order`` is the order of the rotation channels, for all joints or by joint name (others ``"ZXY"``); ``unit`` is
     metres per unit of length in the file: 1 for Blender, which takes the numbers for metres, 0.01 for programs that
-    take them for centimetres (MotionBuilder, Maya, Unreal). Joints whose bones change length get position channels. A joint
-    at the tip of its branch that is no End Site itself gets one at zero distance, as some readers demand.
+    take them for centimetres (MotionBuilder, Maya, Unreal). Joints whose bones change length get position channels.
+    A joint at the tip of its branch that is no End Site itself gets one at zero distance, as some readers demand.
     """
     skeleton = motion.skeleton
     orders = [(order if isinstance(order, str) else order.get(n, "ZXY")).upper() for n in skeleton.names]
@@ -41,7 +41,7 @@ def save_bvh(motion: Motion, path: Path | str, *, order: str | Mapping[str, str]
         raise MotionloomError(f"the unit must be a positive number of metres; got {unit}")
     offsets, moving = _offsets(motion)
     sequence = _depth_first(skeleton)
-    tips = {j for j in skeleton.ends if not skeleton.children(j) and j not in moving and j != 0}
+    tips = set(skeleton.ends) - set(skeleton.parents) - moving - {0}
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
         file.write(
             "\n".join(_hierarchy(skeleton, sequence, tips, orders=orders, moving=moving, offsets=offsets / unit))

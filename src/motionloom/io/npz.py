@@ -114,21 +114,23 @@ def _unpack(archive: zipfile.ZipFile, member: zipfile.ZipInfo, path: Path | str)
     return flat.reshape(shape[::-1]).T if fortran else flat.reshape(shape)
 
 
+def _listed(arrays: dict[str, np.ndarray]) -> str:
+    return ", ".join(text.shown(n) for n in list(arrays)[:12]) or "none"
+
+
 def _array(
     arrays: dict[str, np.ndarray], name: str, shape: tuple[int | None, ...], *, path: Path | str, kinds: str = "fiu"
 ) -> np.ndarray:
     """The array of that name with the wanted shape (None: any length) and kind of number."""
     if name not in arrays:
-        raise MotionloomError(
-            f"{path} has no array '{name}'; it has {', '.join(map(text.shown, list(arrays)[:12])) or 'none'}"
-        )
+        raise MotionloomError(f"{path} has no array '{name}'; it has {_listed(arrays)}")
     found = arrays[name]
     same = len(found.shape) == len(shape) and all(w is None or w == n for w, n in zip(shape, found.shape))
     if not same or found.dtype.kind not in kinds:
         wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
         raise MotionloomError(f"{path}: '{name}' must have the shape {wanted}; it is {found.shape} of {found.dtype}")
-    if found.dtype.kind == "f" and not np.isfinite(found).all():
-        raise MotionloomError(f"{path}: '{name}' has numbers that are not finite (NaN or infinity)")
+    if kinds != "U" and not (np.abs(found.astype(np.float64)) <= text.LIMIT).all():
+        raise MotionloomError(f"{path}: '{name}' has numbers that are not finite (NaN or infinity) or above 1e9")
     return found
 
 
@@ -149,9 +151,8 @@ def _motion(arrays: dict[str, np.ndarray], fps: float, path: Path | str) -> Moti
     rotations = _array(arrays, "rotations", (len(root), joints, 4), path=path).astype(np.float64)
     lengths = np.linalg.norm(rotations, axis=-1)
     if not (np.abs(lengths - 1) < 1e-3).all():
-        raise MotionloomError(
-            f"{path}: 'rotations' must be unit quaternions; some have the length {lengths.flat[np.abs(lengths - 1).argmax()]:g}"
-        )
+        odd = lengths.flat[np.abs(lengths - 1).argmax()]
+        raise MotionloomError(f"{path}: 'rotations' must be unit quaternions; one has the length {odd:g}")
     moved = _array(arrays, "translations", (len(root), joints, 3), path=path) if "translations" in arrays else None
     groups = SMPL22.groups if names == SMPL22.names and parents == SMPL22.parents else {}
     try:
@@ -164,9 +165,7 @@ def _motion(arrays: dict[str, np.ndarray], fps: float, path: Path | str) -> Moti
 def _from_positions(arrays: dict[str, np.ndarray], fps: float | None, path: Path | str) -> Motion:
     name = next((n for n in _POSITIONS if n in arrays), None)
     if name is None:
-        raise MotionloomError(
-            f"{path} has neither 'rotations' nor 'positions'; it has {', '.join(map(text.shown, list(arrays)[:12])) or 'nothing'}"
-        )
+        raise MotionloomError(f"{path} has neither 'rotations' nor 'positions'; it has {_listed(arrays)}")
     places = _array(arrays, name, (None, len(SMPL22), 3), path=path).astype(np.float64)
     if fps is None or not len(places):
         raise MotionloomError(f"{path} has positions but no 'fps' or no frames; give the frame rate")

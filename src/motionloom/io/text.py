@@ -10,6 +10,10 @@ from motionloom.errors import MotionloomError
 
 MAX_BYTES = 2 * 1024**3
 """Files above this size (2 GB) are refused."""
+LIMIT = 1e9
+"""Numbers beyond this are no lengths or angles of anybody, and are refused with NaN and infinity."""
+MAX_POSES = 100_000_000
+"""Frames times joints that are read at most: a small file may claim very many of both."""
 _CHUNK = 16 * 1024**2
 
 
@@ -57,12 +61,21 @@ def shown(raw: bytes | str, limit: int = 40) -> str:
 
 
 def number(raw: bytes | str) -> float | None:
-    """A finite decimal number or None."""
+    """A decimal number within `LIMIT`, or None."""
+    digits = raw.decode("latin-1") if isinstance(raw, bytes) else raw
+    if not digits.isascii() or "_" in digits:
+        return None
     try:
-        value = float(raw)
+        value = float(digits)
     except ValueError:
         return None
-    return value if np.isfinite(value) and b"_" not in (raw if isinstance(raw, bytes) else raw.encode()) else None
+    return value if abs(value) <= LIMIT else None
+
+
+def check_poses(frames: int, joints: int, path: Path | str) -> None:
+    """Refuse what would not fit into memory."""
+    if frames * joints > MAX_POSES:
+        raise MotionloomError(f"{path} has {frames} frames of {joints} joints; at most {MAX_POSES:,} together are read")
 
 
 def numbers(data: bytes, *, path: Path | str, first_line: int) -> NDArray[np.float64]:
@@ -94,13 +107,13 @@ def _parse(chunk: bytes) -> NDArray[np.float64] | None:
             values = np.fromstring(chunk.decode("ascii"), dtype=np.float64, sep=" ")
     except (ValueError, DeprecationWarning, UnicodeDecodeError):
         return None
-    return values if np.isfinite(values).all() else None
+    return values if (np.abs(values) <= LIMIT).all() else None
 
 
 def _complain(chunk: bytes, path: Path | str, line: int) -> None:
     for text in chunk.split(b"\n"):
         for raw in text.split():
             if number(raw) is None:
-                raise MotionloomError(f"{path}, line {line}: {shown(raw)} is not a finite number")
+                raise MotionloomError(f"{path}, line {line}: {shown(raw)} is not a finite number below 1e9")
         line += 1
     raise MotionloomError(f"{path}: the block of numbers that ends at line {line} cannot be read")
