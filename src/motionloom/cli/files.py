@@ -109,7 +109,7 @@ def run_export(arguments: argparse.Namespace) -> None:
     if target.suffix.lower() == ".bvh":
         from motionloom.io.bvh import save_bvh
 
-        save_bvh(motion, target, order=arguments.order or orders, unit=arguments.out_unit or unit)
+        save_bvh(motion, target, order=arguments.order or orders, unit=arguments.out_unit or unit or 1.0)
     else:
         _only_bvh(arguments)
         io.save(motion, target)
@@ -139,22 +139,24 @@ def run_info(arguments: argparse.Namespace) -> None:
 
     motion, unit, _ = _read(arguments, arguments.input)
     info = describe(_crop(motion, arguments))
+    problems = list(info.problems)
+    if arguments.input.suffix.lower() == ".amc" and arguments.source_fps is None:
+        problems.append("an AMC file does not state its rate; 120 frames per second are assumed (--source-fps)")
     if arguments.json:
-        print(json.dumps({"file": str(arguments.input), "unit": unit, **asdict(info)}, indent=2))
+        print(json.dumps({"file": str(arguments.input), "unit": unit, **asdict(info), "problems": problems}, indent=2))
         return
     low, high = info.lowest, info.highest
     box = " x ".join(f"{h - l:.2f}" for l, h in zip(low, high))
     print(f"{arguments.input}")
     print(f"  skeleton  {info.skeleton}, {info.joints} joints, {info.ends} of them bone ends")
-    print(
-        f"  time      {_summary(motion)}" if len(motion) == info.frames else f"  time      {info.seconds:.2f} s of it"
-    )
+    print(f"  time      {info.frames} frames, {info.seconds:.2f} s at {info.fps:g} frames per second")
     print(f"  body      {info.height:.2f} m tall; the feet are at {info.floor:+.2f} m")
     print(f"  way       {info.path:.2f} m along the floor, ends {info.travel:.2f} m from the start")
     print(f"  space     {box} m (x, y up, z)")
-    print(f"  unit      {unit:g} m in the file")
-    for problem in info.problems or ("none seen",):
-        print(f"  problem   {problem}" if info.problems else f"  problems  {problem}")
+    if unit is not None:
+        print(f"  unit      {unit:g} m in the file")
+    for problem in problems:
+        print(f"  problem   {problem}")
 
 
 def _summary(motion: "Motion") -> str:
@@ -162,11 +164,11 @@ def _summary(motion: "Motion") -> str:
     return f"{frames}, {motion.seconds:.2f} s at {motion.fps:g} frames per second, {len(motion.skeleton)} joints"
 
 
-def _read(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float, dict[str, str]]":
-    """The motion, the unit of its file and, of a BVH, the orders of its rotations."""
+def _read(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float | None, dict[str, str]]":
+    """The motion and, of a BVH, the unit of its file and the orders of its rotations."""
     from motionloom import io
 
-    unit, orders = 1.0, {}
+    unit, orders = None, {}
     if path.suffix.lower() == ".bvh" and not path.is_dir() and arguments.asf is None:
         from motionloom.io.bvh import read_bvh
 
