@@ -71,8 +71,6 @@ class Body:
     """(22, 4) joint_from_anatomy."""
     upright: bool
     """Whether the frames are known; else the rest pose is no standing person and limbs have an arbitrary twist."""
-    ankle_height: float
-    """Metres from toe joint up to ankle on a flat foot."""
     toe_height: float
     """Metres from the ground up to the toe joint on a flat foot."""
 
@@ -94,14 +92,11 @@ def read_body(skeleton: Skeleton, override: Override | None = None) -> Body:
     rest = points @ skeleton.rest_positions()
     axes = _rest_axes(rest)
     if axes is not None:
-        ankle, toe = _foot_heights(skeleton, found, rest, axes)
-        return Body(skeleton, points, found.drivers(skeleton), rest, _rest_frames(rest, axes), True, ankle, toe)
-    foot = float(np.mean([np.linalg.norm(rest[10] - rest[7]), np.linalg.norm(rest[11] - rest[8])]))
-    if _is_bandai(skeleton):
-        frames, slope = _bandai_frames(rest), BANDAI_SOLE[2]
-    else:
-        frames, slope = _odd_frames(rest), 0.42
-    return Body(skeleton, points, found.drivers(skeleton), rest, frames, _is_bandai(skeleton), slope * foot, 0.0)
+        height = _toe_height(skeleton, found, rest, axes[1])
+        return Body(skeleton, points, found.drivers(skeleton), rest, _rest_frames(rest, axes), True, height)
+    known = _is_bandai(skeleton)
+    frames = _bandai_frames(rest) if known else _odd_frames(rest)
+    return Body(skeleton, points, found.drivers(skeleton), rest, frames, known, 0.0)
 
 
 def frame(first: Array, second: Array) -> Array:
@@ -160,18 +155,14 @@ def _rest_frames(rest: Array, axes: tuple[Array, Array, Array]) -> Array:
     return frames
 
 
-def _foot_heights(
-    skeleton: Skeleton, found: JointMap, rest: Array, axes: tuple[Array, Array, Array]
-) -> tuple[float, float]:
-    """Toe to ankle and ground to toe on a flat foot; the ground is the lowest tip of the feet."""
-    up = axes[1]
-    ankle = float(np.mean((rest[[7, 8]] - rest[[10, 11]]) @ up))
+def _toe_height(skeleton: Skeleton, found: JointMap, rest: Array, up: Array) -> float:
+    """From the ground to the toe joint on a flat foot; the ground is the lowest tip of the foot."""
     heights = skeleton.rest_positions() @ up
     depths = []
     for foot, toe in zip(FEET, TOES):
-        lowest = heights[[j for j in range(len(skeleton)) if _hangs_on(skeleton, found, j, foot)]].min(initial=np.inf)
-        depths.append(max(float(rest[toe] @ up) - min(lowest, float(rest[toe] @ up)), 0.0))
-    return ankle, min(float(np.mean(depths)), 0.06)
+        tips = [heights[j] for j in range(len(skeleton)) if _hangs_on(skeleton, found, j, foot)]
+        depths.append(max(float(rest[toe] @ up) - min(tips), 0.0))
+    return min(float(np.mean(depths)), 0.06)
 
 
 def _hangs_on(skeleton: Skeleton, found: JointMap, joint: int, part: int) -> bool:

@@ -56,10 +56,8 @@ def retarget(
     """
     source, body = read_body(motion.skeleton, source_map), read_body(target, target_map)
     pose = _read_pose(motion, source)
-    stance = read_stance(pose.places, motion.fps, ankle_height=source.ankle_height)
-    goals = _scale(pose, stance, source, body)
-    world = _orient(pose, body)
-    return _place(world, goals, body, motion.fps)
+    goals = _scale(pose, read_stance(pose.places, motion.fps), ratio=body.leg / source.leg, toe_height=body.toe_height)
+    return _place(_orient(pose, body), goals, body, motion.fps)
 
 
 # 1. Read -------------------------------------------------------------------------------------------------------------
@@ -119,21 +117,37 @@ def _measured_axes(places: Array, world: Array, source: Body) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Goals:
+    """What the target's feet and hips aim at, all scaled, in metres in the target's world."""
+
     hips: Array
-    """(frames, 3) metres: the middle between the hip joints."""
+    """(frames, 3) the middle between the hip joints, before the difference of the feet is made up for."""
+    ankles: Array
+    """(frames, 2, 3) where the source's ankles are, likewise."""
     toes: Array
-    """(frames, 2, 3) metres: left and right toe joint."""
+    """(frames, 2, 3) left and right toe joint: the target's toes go there."""
+    flat: NDArray[np.bool_]
+    """(frames, 2) whether the foot stands flat."""
+    forward: Array
+    """(frames, 3) where the pelvis faces, level; shorter where it faces up or down."""
     poles: Array
     """(frames, 2, 3) where the knees point."""
 
 
-def _scale(pose: _Pose, stance: Stance, source: Body, target: Body) -> _Goals:
-    ratio = target.leg / source.leg
+def _scale(pose: _Pose, stance: Stance, *, ratio: float, toe_height: float) -> _Goals:
     up = np.array([0.0, 1.0, 0.0])
-    toes = (pose.places[:, TOES] - stance.toe * up) * ratio + target.toe_height * up
-    middle = pose.places[:, [1, 2]].mean(axis=1)
-    hips = (middle - (stance.toe + stance.ankle) * up) * ratio + (target.toe_height + target.ankle_height) * up
-    return _Goals(hips, toes, _knee_poles(pose))
+    lift = toe_height * up
+    toes, ankles, hips = pose.places[:, TOES], pose.places[:, FEET], pose.places[:, [1, 2]].mean(axis=1)
+    under = stance.under(toes)[..., None] * up
+    middle = stance.ground(hips).mean(axis=-1, keepdims=True) * up
+    facing = np.cross(rot.rotate(pose.frames[:, 0], np.eye(3)[1]), rot.rotate(pose.frames[:, 0], np.eye(3)[0]))
+    return _Goals(
+        hips=(hips - middle) * ratio + lift,
+        ankles=(ankles - under) * ratio + lift,
+        toes=(toes - under) * ratio + lift,
+        flat=stance.flat,
+        forward=facing * np.array([1.0, 0.0, 1.0]),
+        poles=_knee_poles(pose),
+    )
 
 
 def _knee_poles(pose: _Pose) -> Array:
@@ -184,9 +198,9 @@ def _bone_end(body: Body, joint: int) -> int | None:
 
 def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
     places = np.einsum("sj,fjc->fsc", body.points, _positions(body.skeleton, world))
-    root = goals.hips - places[:, [1, 2]].mean(axis=1)
-    places = places + root[:, None]
     ankles = goals.toes - (places[:, TOES] - places[:, FEET])
+    root = goals.hips + _make_up(goals, ankles) - places[:, [1, 2]].mean(axis=1)
+    places = places + root[:, None]
     drop = _drop(places, ankles, body)
     root, places = root - drop, places - drop[:, None]
     for side, (hip, knee, ankle) in enumerate(((1, 4, 7), (2, 5, 8))):
@@ -196,6 +210,19 @@ def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
         world = _aim(world, body, hip, places[:, knee] - places[:, hip], middle - places[:, hip])
         world = _aim(world, body, knee, places[:, ankle] - places[:, knee], end - middle)
     return Motion(body.skeleton, fps, root, _locals(body.skeleton, world))
+
+
+def _make_up(goals: _Goals, ankles: Array) -> Array:
+    """(frames, 3) a shift of the hips for feet of another shape.
+
+    With its toes in the same place a longer or higher foot has its ankle elsewhere. The hips follow it, by one
+    height and one way forward for the whole clip, so that straight legs stay straight and the path stays smooth.
+    """
+    apart = ankles - goals.ankles
+    chosen = goals.flat if goals.flat.sum() >= 3 else np.ones_like(goals.flat)
+    height = float(np.median(apart[..., 1][chosen]))
+    ahead = (apart * goals.forward[:, None]).sum(-1)[chosen]
+    return height * np.array([0.0, 1.0, 0.0]) + float(np.median(ahead)) * goals.forward
 
 
 def _aim(world: Array, body: Body, joint: int, now: Array, wanted: Array) -> Array:
