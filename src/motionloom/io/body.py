@@ -1,0 +1,171 @@
+"""A simple body for a skeleton: one rounded piece per bone, fixed rigidly to the joint that carries it.
+
+Sizes come from `figure`. Pieces are measured in the joints' own frames over the whole motion, so a rest pose
+that is no natural pose (all bones along one axis, say) gives the same body.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.io.figure import Figure, figure
+from motionloom.motion import Motion
+
+Array = NDArray[np.float64]
+SIDES = 10
+_LIFT = np.array([-90.0, -50.0, 0.0, 0.0, 50.0, 90.0]) * np.pi / 180  # rings from pole to pole
+MAX_FRAMES = 400
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A closed surface carried by one joint."""
+
+    joint: int
+    side: int
+    """+1 left, -1 right, 0 middle, 2 skin."""
+    points: Array
+    """(vertices, 3) metres in the joint's frame."""
+    normals: Array
+    """(vertices, 3) of unit length."""
+    triangles: NDArray[np.int64]
+    """(triangles, 3), counter-clockwise from outside."""
+
+
+def body(motion: Motion) -> list[Piece]:
+    """The pieces of a person for a motion's skeleton; none for a skeleton without bones."""
+    step = max(1, len(motion) // MAX_FRAMES)
+    short = Motion(
+        motion.skeleton,
+        motion.fps,
+        motion.root[::step],
+        motion.rotations[::step],
+        None if motion.translations is None else motion.translations[::step],
+    )
+    shape = figure(short)
+    world = short.world_rotations()
+    pieces = [_bone(motion, shape, world, i) for i in range(len(shape.bones)) if shape.bones[i][1] not in shape.trunk]
+    pieces += [
+        _trunk(shape, world, joints, wide) for joints, wide in ((shape.chest, 0.042), (shape.hips, 0.05)) if joints
+    ]
+    if shape.chest and shape.hips:
+        pieces.append(_between(shape, world))
+    pieces.append(_head(shape, world))
+    return [p for p in pieces if p is not None]
+
+
+def _local(shape: Figure, world: Array, joint: int, target: Array) -> Array:
+    """A moving point or direction (frames, 3) as it usually lies in a joint's frame."""
+    return np.median(rot.rotate(rot.inverse(world[:, joint]), target), axis=0)
+
+
+def _seen(shape: Figure, world: Array, joint: int, point: Array) -> Array:
+    return _local(shape, world, joint, point - shape.places[:, joint])
+
+
+def _bone(motion: Motion, shape: Figure, world: Array, i: int) -> Piece | None:
+    parent, child = shape.bones[i]
+    tip = _seen(shape, world, parent, shape.places[:, child])
+    return _loft(parent, shape.sides[child], np.stack([np.zeros(3), tip]), np.repeat(shape.radii[i], 2).reshape(2, 2))
+
+
+def _trunk(shape: Figure, world: Array, joints: tuple[int, ...], wide: float) -> Piece | None:
+    """Chest or pelvis: from the joint that carries it to the line between its two limbs."""
+    base, height = joints[-1], shape.height
+    left = [j for j in joints if shape.sides[j] > 0]
+    right = [j for j in joints if shape.sides[j] < 0]
+    if not left or not right:
+        return None
+    a, b = (_seen(shape, world, base, shape.places[:, j[0]]) for j in (left, right))
+    across, middle = a - b, (a + b) / 2
+    up = _local(shape, world, base, np.broadcast_to([0.0, 1.0, 0.0], (len(world), 3)))
+    half = float(np.linalg.norm(across)) / 2
+    if half < 1e-4 * height:
+        return None
+    chest = joints is shape.chest
+    low = -0.03 * height * up if chest else middle - 0.02 * height * up
+    top = middle if chest else np.maximum(0.03 * height, 0.0) * up
+    wides = [0.62 * half + wide * height, 0.92 * half + 0.5 * wide * height]
+    wides = wides if chest else [half + 0.75 * wide * height, 0.6 * half + 0.9 * wide * height]
+    rings = np.array([[wides[0], 1.2 * wide * height], [wides[1], wide * height]])
+    return _loft(base, 0, np.stack([low, top]), rings, across=across)
+
+
+def _between(shape: Figure, world: Array) -> Piece | None:
+    """The belly, carried by the pelvis."""
+    tip = _seen(shape, world, shape.centre, shape.places[:, shape.chest[-1]])
+    a, b = (shape.places[:, next(j for j in shape.hips if shape.sides[j] == s)] for s in (1, -1))
+    across = _local(shape, world, shape.centre, a - b)
+    rings = shape.height * np.array([[0.075, 0.055], [0.078, 0.055]])
+    return _loft(shape.centre, 0, np.stack([np.zeros(3), tip]), rings, across=across)
+
+
+def _head(shape: Figure, world: Array) -> Piece | None:
+    if shape.head is None:
+        return None
+    below, joint = shape.head
+    carrier = below if shape.head_is_tip else joint
+    direction = shape.places[:, joint] - shape.places[:, below]
+    up = _local(shape, world, carrier, direction)
+    up = up / max(float(np.linalg.norm(up)), 1e-9)
+    tip = _seen(shape, world, carrier, shape.places[:, joint])
+    radius = 0.055 * shape.height
+    middle = tip - 0.75 * radius * up if shape.head_is_tip else tip + 0.85 * radius * up
+    ends = np.stack([middle - 0.3 * radius * up, middle + 0.3 * radius * up])
+    front = _local(shape, world, carrier, shape.gaze)
+    across = np.cross(up, front)
+    return _loft(carrier, 2, ends, radius * np.array([[0.8, 0.95], [0.95, 1.1]]), across=across)
+
+
+def _loft(joint: int, side: int, ends: Array, radii: Array, *, across: Array | None = None) -> Piece | None:
+    """A rounded tube between two centres: radii [[width, depth] at the first, [width, depth] at the second end]."""
+    axis = ends[1] - ends[0]
+    length = float(np.linalg.norm(axis))
+    if length < 1e-6 or not np.isfinite(length):
+        return None
+    axis = axis / length
+    hint = np.eye(3)[np.argmin(np.abs(axis))] if across is None else across
+    wide = hint - axis * (hint @ axis)
+    if np.linalg.norm(wide) < 1e-6:
+        wide = np.eye(3)[np.argmin(np.abs(axis))]
+        wide = wide - axis * (wide @ axis)
+    wide = wide / np.linalg.norm(wide)
+    deep = np.cross(axis, wide)
+    turn = np.linspace(0, 2 * np.pi, SIDES, endpoint=False)
+    points: list[Array] = []
+    for k, lift in enumerate(_LIFT):
+        end = 0 if k < len(_LIFT) // 2 else 1
+        width, depth = radii[end]
+        middle = ends[end] + np.sin(lift) * min(width, depth) * axis
+        ring = np.cos(lift) * (np.outer(width * np.cos(turn), wide) + np.outer(depth * np.sin(turn), deep))
+        points.append(middle[None] if abs(lift) > 1.5 else middle + ring)
+    vertices = np.concatenate(points)
+    triangles = _stitch(len(_LIFT) - 2)
+    return Piece(joint, side, vertices, _normals(vertices, triangles), triangles)
+
+
+def _stitch(rings: int) -> NDArray[np.int64]:
+    """Triangles of a pole, rings of `SIDES` vertices, and a pole."""
+    around = np.arange(SIDES)
+    after = (around + 1) % SIDES
+    last = 1 + rings * SIDES
+    faces = [np.stack([np.zeros_like(around), 1 + after, 1 + around], axis=-1)]
+    for ring in range(rings - 1):
+        a, b = 1 + ring * SIDES, 1 + (ring + 1) * SIDES
+        faces.append(np.stack([a + around, a + after, b + after], axis=-1))
+        faces.append(np.stack([a + around, b + after, b + around], axis=-1))
+    top = last - SIDES
+    faces.append(np.stack([top + around, top + after, np.full_like(around, last)], axis=-1))
+    return np.concatenate(faces)
+
+
+def _normals(points: Array, triangles: NDArray[np.int64]) -> Array:
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    faces = np.cross(b - a, c - a)
+    normals = np.zeros_like(points)
+    for k in range(3):
+        np.add.at(normals, triangles[:, k], faces)
+    length = np.linalg.norm(normals, axis=-1, keepdims=True)
+    return np.where(length > 0, normals / np.where(length > 0, length, 1.0), [0.0, 1.0, 0.0])

@@ -1,0 +1,179 @@
+"""The container of a glTF file: chunks, JSON, buffers and accessors. Whatever it declares is checked before use."""
+
+import base64
+import binascii
+import json
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom.errors import MotionloomError
+from motionloom.io.text import read_bytes, shown
+
+Array = NDArray[np.float64]
+MAX_NUMBERS = 400_000_000
+"""Numbers that one accessor may hold."""
+MAX_JSON = 256 * 1024**2
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+_KINDS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_SCALES = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
+
+
+@dataclass(frozen=True)
+class Document:
+    """A parsed file: its JSON and the bytes of its buffers."""
+
+    name: str
+    """For messages."""
+    json: dict[str, Any]
+    buffers: tuple[bytes, ...]
+
+    def bad(self, what: str) -> MotionloomError:
+        """The error for this file."""
+        return MotionloomError(f"{self.name} is not a usable glTF file: {what}")
+
+    def items(self, key: str, owner: dict[str, Any] | None = None) -> list[dict[str, Any]]:
+        """A list of objects, such as all nodes; empty where there is none."""
+        found = (self.json if owner is None else owner).get(key, [])
+        if not isinstance(found, list) or not all(isinstance(item, dict) for item in found):
+            raise self.bad(f"its {key} are not a list of objects")
+        return found
+
+    def index(self, value: Any, count: int, what: str) -> int:
+        """A number that names one of ``count`` things."""
+        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < count:
+            raise self.bad(f"{shown(str(value))} names none of its {count} {what}")
+        return value
+
+    def numbers(self, value: Any, count: int, what: str) -> Array:
+        """A JSON list of exactly ``count`` finite numbers of sane size."""
+        right = isinstance(value, list) and len(value) == count
+        if not right or not all(isinstance(v, int | float) and not isinstance(v, bool) and abs(v) < 1e9 for v in value):
+            raise self.bad(f"{what} must be {count} finite numbers, got {shown(str(value))}")
+        return np.array(value, dtype=np.float64)
+
+    def accessor(self, number: Any, kind: str, what: str) -> Array:
+        """The values (count, width) of an accessor of the given type, as floating point numbers."""
+        accessors = self.items("accessors")
+        accessor = accessors[self.index(number, len(accessors), "accessors")]
+        if accessor.get("type") != kind:
+            raise self.bad(f"{what} must be {kind}, got {shown(str(accessor.get('type')))}")
+        if accessor.get("sparse") is not None:
+            raise self.bad(f"{what} is stored sparsely, which is not supported; export it without sparse accessors")
+        component = accessor.get("componentType")
+        if not isinstance(component, int) or component not in _KINDS:
+            raise self.bad(f"{what} has the unknown component type {shown(str(component))}")
+        width, dtype = _WIDTHS[kind], np.dtype(_KINDS[component])
+        count = self._size(accessor, "count", what)
+        if not 1 <= count <= MAX_NUMBERS // width:
+            raise self.bad(f"{what} claims {count} entries")
+        values = self._view(accessor, dtype, (count, width), what).astype(np.float64)
+        if accessor.get("normalized") is True and component in _SCALES:
+            values = np.maximum(values / _SCALES[component], -1.0)
+        if not np.isfinite(values).all():
+            raise self.bad(f"{what} holds numbers that are not finite")
+        return values
+
+    def _view(self, accessor: dict[str, Any], dtype: np.dtype, shape: tuple[int, int], what: str) -> np.ndarray:
+        """The raw entries of an accessor, checked against the bytes that are really there."""
+        views = self.items("bufferViews")
+        view = views[self.index(accessor.get("bufferView"), len(views), f"buffer views ({what})")]
+        data = self.buffers[self.index(view.get("buffer"), len(self.buffers), "buffers")]
+        start, length = self._size(view, "byteOffset", what), self._size(view, "byteLength", what)
+        row = dtype.itemsize * shape[1]
+        stride = self._size(view, "byteStride", what) or row
+        offset = self._size(accessor, "byteOffset", what)
+        if stride < row or (stride > 252 and stride != row):
+            raise self.bad(f"{what} has a byte stride of {stride}")
+        if start + length > len(data) or offset + stride * (shape[0] - 1) + row > length:
+            raise self.bad(f"{what} reaches beyond the end of its data")
+        flat = np.frombuffer(data, np.uint8, stride * (shape[0] - 1) + row, start + offset)
+        rows = np.lib.stride_tricks.as_strided(flat, (shape[0], row), (stride, 1))
+        return np.ascontiguousarray(rows).view(dtype).reshape(shape)
+
+    def _size(self, owner: dict[str, Any], key: str, what: str) -> int:
+        value = owner.get(key, 0)
+        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**53:
+            raise self.bad(f"{what} has the {key} {shown(str(value))}")
+        return value
+
+
+def read_document(path: str | Path) -> Document:
+    """Read a .glb, or a .gltf whose buffers are embedded; raises `MotionloomError` for anything else."""
+    data, name = read_bytes(path), str(path)
+    binary: bytes | None = None
+    if data[:4] == b"glTF":
+        data, binary = _chunks(data, name)
+    if len(data) > MAX_JSON:
+        raise MotionloomError(f"{name} has {len(data) / 1e6:.0f} MB of JSON; at most {MAX_JSON / 1e6:.0f} MB are read")
+    try:
+        content = json.loads(data.decode("utf-8-sig"), parse_constant=_no_constant)
+    except (ValueError, RecursionError):  # ValueError: not UTF-8, not JSON, NaN, endless digits
+        raise MotionloomError(f"{name} is not a glTF file: its JSON part cannot be read") from None
+    if not isinstance(content, dict):
+        raise MotionloomError(f"{name} is not a glTF file: its JSON part is not an object")
+    document = Document(name, content, ())
+    asset = content.get("asset")
+    version = asset.get("version") if isinstance(asset, dict) else None
+    if not isinstance(version, str) or not version.startswith("2."):
+        raise document.bad(f"it declares version {shown(str(version))}; only glTF 2.x is read")
+    required = content.get("extensionsRequired") or []
+    if isinstance(required, list) and "EXT_meshopt_compression" in required:
+        raise document.bad("its data are compressed; export it without compression")
+    buffers = [_buffer(document, i, entry, binary) for i, entry in enumerate(document.items("buffers"))]
+    return Document(name, content, tuple(buffers))
+
+
+def _no_constant(word: str) -> float:
+    raise ValueError(word)
+
+
+def _chunks(data: bytes, name: str) -> tuple[bytes, bytes | None]:
+    """JSON and binary chunk of a GLB."""
+    if len(data) < 20:
+        raise MotionloomError(f"{name} is cut short: a GLB has at least 20 bytes, it has {len(data)}")
+    version, total = struct.unpack_from("<II", data, 4)
+    if version != 2:
+        raise MotionloomError(f"{name} is GLB version {version}; only version 2 is read")
+    if total > len(data):
+        raise MotionloomError(f"{name} is cut short: it declares {total} bytes and has {len(data)}")
+    chunks: dict[bytes, bytes] = {}
+    at = 12
+    while at + 8 <= total:
+        length = struct.unpack_from("<I", data, at)[0]
+        kind = data[at + 4 : at + 8]
+        if at + 8 + length > total:
+            raise MotionloomError(f"{name} is damaged: a part of {length} bytes reaches beyond the file's end")
+        chunks.setdefault(kind, data[at + 8 : at + 8 + length])
+        at += 8 + length
+        if len(chunks) > 16:
+            break
+    if b"JSON" not in chunks:
+        raise MotionloomError(f"{name} is damaged: it has no JSON part")
+    return chunks[b"JSON"], chunks.get(b"BIN\0")
+
+
+def _buffer(document: Document, number: int, entry: dict[str, Any], binary: bytes | None) -> bytes:
+    uri = entry.get("uri")
+    if uri is None:
+        if number != 0 or binary is None:
+            raise document.bad(f"buffer {number} has no data")
+        data = binary
+    elif isinstance(uri, str) and uri.startswith("data:"):
+        head, comma, body = uri.partition(",")
+        try:
+            data = base64.b64decode(body, validate=True) if comma and head.endswith(";base64") else None
+        except (binascii.Error, ValueError):
+            data = None
+        if data is None:
+            raise document.bad(f"buffer {number} is not valid base64")
+    else:
+        raise document.bad(f"it refers to the outside file {shown(str(uri))}, which is not followed; export a .glb")
+    declared = entry.get("byteLength")
+    if isinstance(declared, bool) or not isinstance(declared, int) or declared > len(data) or declared < 0:
+        raise document.bad(f"buffer {number} declares {shown(str(declared))} bytes and has {len(data)}")
+    return data

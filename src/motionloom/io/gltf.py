@@ -1,0 +1,174 @@
+"""glTF 2.0 binary files (GLB), in and out.
+
+A file holds the skeleton as a tree of named nodes in rest pose, a skinned body that follows them, and one
+animation in which everybody moves. glTF's conventions are ours: metres, +Y up, a person faces +Z; only
+quaternions are (x, y, z, w) there.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pygltflib
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.io.atomic import atomic_path
+from motionloom.io.body import Piece, body
+from motionloom.io.gltf_read import load_glb
+from motionloom.motion import Motion
+from motionloom.skeleton import Skeleton
+
+__all__ = ["load_glb", "save_glb"]
+
+Array = NDArray[np.float64]
+_FLOAT, _U8, _U16, _U32 = 5126, 5121, 5123, 5125
+_NUMPY = {_FLOAT: "<f4", _U8: "<u1", _U16: "<u2", _U32: "<u4"}
+_TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+_VERTICES, _INDICES = 34962, 34963  # what a buffer view is for
+_MATERIALS = {1: ("left", (0.82, 0.17, 0.05)), -1: ("right", (0.03, 0.17, 0.60)), 0: ("middle", (0.16, 0.19, 0.24)),
+              2: ("skin", (0.76, 0.51, 0.35))}  # fmt: skip
+
+
+@dataclass
+class _File:
+    """A glTF document under construction, with its binary data."""
+
+    document: pygltflib.GLTF2
+    data: bytearray = field(default_factory=bytearray)
+
+    def add(self, values: np.ndarray, kind: int, *, target: int | None = None, bounds: bool = False) -> int:
+        """Append an array (count, width) and describe it; gives the accessor's number."""
+        array = np.ascontiguousarray(values, dtype=_NUMPY[kind]).reshape(len(values), -1)
+        self.data.extend(b"\0" * (-len(self.data) % 4))
+        document = self.document
+        view = pygltflib.BufferView(buffer=0, byteOffset=len(self.data), byteLength=array.nbytes, target=target)
+        document.bufferViews.append(view)
+        self.data.extend(array.tobytes())
+        accessor = pygltflib.Accessor(
+            bufferView=len(document.bufferViews) - 1, componentType=kind, count=len(array), type=_TYPES[array.shape[1]]
+        )
+        if bounds:
+            accessor.min, accessor.max = array.min(axis=0).tolist(), array.max(axis=0).tolist()
+        document.accessors.append(accessor)
+        return len(document.accessors) - 1
+
+
+def save_glb(motions: Sequence[Motion], path: str | Path, *, body: bool = True) -> Path:
+    """Write motions as one GLB: one tree of joints per person, one animation for all, a skinned mesh if ``body``.
+
+    Nodes stand in rest pose (every rotation the identity); rotations are keyed for every joint but bone tips, places
+    for the root and, where a motion has `Motion.translations`, for every joint.
+    Errors: no motions, or a path that cannot be written.
+    """
+    if not motions:
+        raise MotionloomError("there is no motion to save; give at least one")
+    with atomic_path(path) as temp:
+        temp.write_bytes(_assemble(motions, body))
+    return Path(path)
+
+
+def _assemble(motions: Sequence[Motion], with_body: bool) -> bytes:
+    asset = pygltflib.Asset(version="2.0", generator="motionloom")
+    animation = pygltflib.Animation(name="motion", extras={"fps": motions[0].fps})
+    tops: list[int] = []
+    scene = pygltflib.Scene(nodes=tops)
+    document = pygltflib.GLTF2(asset=asset, scene=0, scenes=[scene], animations=[animation])
+    file = _File(document)
+    clocks: dict[tuple[float, int], int] = {}
+    for number, motion in enumerate(motions):
+        first = len(document.nodes)
+        document.nodes.extend(_nodes(motion.skeleton, first))
+        tops.append(first)
+        clock = (motion.fps, len(motion))
+        if clock not in clocks:
+            clocks[clock] = file.add(np.arange(len(motion))[:, None] / motion.fps, _FLOAT, bounds=True)
+        _animate(file, animation, motion, first=first, clock=clocks[clock])
+        if with_body:
+            tops += _dress(file, motion, first, name="body" if len(motions) == 1 else f"body_{number + 1}")
+    file.data.extend(b"\0" * (-len(file.data) % 4))
+    document.buffers = [pygltflib.Buffer(byteLength=len(file.data))]
+    document.set_binary_blob(bytes(file.data))
+    return b"".join(document.save_to_bytes())
+
+
+def _nodes(skeleton: Skeleton, first: int) -> list[pygltflib.Node]:
+    return [
+        pygltflib.Node(
+            name=name,
+            translation=skeleton.offsets[j].astype("f4").astype(float).tolist(),
+            children=[first + c for c in skeleton.children(j)],
+        )
+        for j, name in enumerate(skeleton.names)
+    ]
+
+
+def _animate(file: _File, animation: pygltflib.Animation, motion: Motion, *, first: int, clock: int) -> None:
+    turns = np.roll(rot.unroll(rot.normalize(motion.rotations)), -1, axis=-1)
+    for j in range(len(motion.skeleton)):
+        if j not in motion.skeleton.ends:
+            _channel(animation, first + j, "rotation", clock, file.add(turns[:, j], _FLOAT))
+        if j == 0:
+            _channel(animation, first, "translation", clock, file.add(motion.root, _FLOAT))
+        elif motion.translations is not None:
+            _channel(animation, first + j, "translation", clock, file.add(motion.translations[:, j], _FLOAT))
+
+
+def _channel(animation: pygltflib.Animation, node: int, path: str, clock: int, values: int) -> None:
+    sampler = pygltflib.AnimationSampler(input=clock, output=values, interpolation="LINEAR")
+    animation.samplers.append(sampler)
+    target = pygltflib.AnimationChannelTarget(node=node, path=path)
+    animation.channels.append(pygltflib.AnimationChannel(sampler=len(animation.samplers) - 1, target=target))
+
+
+def _dress(file: _File, motion: Motion, first: int, name: str) -> list[int]:
+    """Add a skin and a skinned mesh; gives its node, which belongs at the top of the scene (glTF 2.0, 3.7.3.3)."""
+    pieces = body(motion)
+    if not pieces:
+        return []
+    document, skeleton = file.document, motion.skeleton
+    rest = skeleton.rest_positions()
+    binds = np.tile(np.eye(4), (len(skeleton), 1, 1))
+    binds[:, 3, :3] = -rest  # column-major: the last column lies in the last row
+    skin = pygltflib.Skin(
+        name=name,
+        joints=list(range(first, first + len(skeleton))),
+        skeleton=first,
+        inverseBindMatrices=file.add(binds.reshape(-1, 16), _FLOAT),
+    )
+    document.skins.append(skin)
+    sides = sorted({p.side for p in pieces})
+    primitives = [_primitive(file, [p for p in pieces if p.side == side], rest, side) for side in sides]
+    document.meshes.append(pygltflib.Mesh(name=name, primitives=primitives))
+    document.nodes.append(pygltflib.Node(name=name, mesh=len(document.meshes) - 1, skin=len(document.skins) - 1))
+    return [len(document.nodes) - 1]
+
+
+def _primitive(file: _File, pieces: list[Piece], rest: Array, side: int) -> pygltflib.Primitive:
+    points = np.concatenate([p.points + rest[p.joint] for p in pieces])
+    starts = np.cumsum([0, *(len(p.points) for p in pieces)])
+    indices = np.concatenate([p.triangles.ravel() + start for p, start in zip(pieces, starts)])
+    joints = np.zeros((len(points), 4), dtype=int)
+    joints[:, 0] = np.repeat([p.joint for p in pieces], [len(p.points) for p in pieces])
+    weights = np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))
+    attributes = pygltflib.Attributes(
+        POSITION=file.add(points, _FLOAT, target=_VERTICES, bounds=True),
+        NORMAL=file.add(np.concatenate([p.normals for p in pieces]), _FLOAT, target=_VERTICES),
+        JOINTS_0=file.add(joints, _U8 if len(rest) <= 256 else _U16, target=_VERTICES),
+        WEIGHTS_0=file.add(weights, _FLOAT, target=_VERTICES),
+    )
+    kind = _U16 if len(points) < 65535 else _U32
+    faces = file.add(indices[:, None], kind, target=_INDICES)
+    return pygltflib.Primitive(attributes=attributes, indices=faces, material=_material(file.document, side))
+
+
+def _material(document: pygltflib.GLTF2, side: int) -> int:
+    name, colour = _MATERIALS[side]
+    for number, material in enumerate(document.materials):
+        if material.name == name:
+            return number
+    surface = pygltflib.PbrMetallicRoughness(baseColorFactor=[*colour, 1.0], metallicFactor=0.0, roughnessFactor=0.75)
+    document.materials.append(pygltflib.Material(name=name, pbrMetallicRoughness=surface))
+    return len(document.materials) - 1
