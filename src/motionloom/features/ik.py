@@ -189,8 +189,7 @@ def two_bones(
 
     ``seen`` (frames, 3, 3) are the wanted places of start, middle and end, ``axis`` (frames, 3) the hinge. The end
     reaches its place; near full reach the observed bend decides how far it gets instead (exactly the same for bones of
-    the right length), since there a millimetre of distance is many degrees of bend. The middle lies on the side where
-    it is seen; as far as it must leave the straight line more than seen, it does so about the hinge.
+    the right length), since there a millimetre of distance is many degrees of bend.
     """
     first, second = lengths
     upper, lower = _unit(seen[:, 1] - seen[:, 0]), _unit(seen[:, 2] - seen[:, 1])
@@ -199,13 +198,24 @@ def two_bones(
     wanted = seen[:, 2] - start
     distance = np.linalg.norm(wanted, axis=-1)
     near = _smoothstep(distance / (first + second), *_NEARLY_STRAIGHT)
-    reach = np.clip(distance + near * (by_bend - distance), abs(first - second) + 1e-6, first + second)
-    line = _unit(wanted)
-    along = (first**2 + reach**2 - second**2) / (2 * reach)
+    return reach(start, start + _unit(wanted) * (distance + near * (by_bend - distance))[:, None], seen, axis, lengths)
+
+
+def reach(
+    start: np.ndarray, target: np.ndarray, seen: np.ndarray, axis: np.ndarray, lengths: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Places of middle and end of a limb from ``start`` to ``target``, or as near as the bones allow.
+
+    The middle lies on the side of the line where it is ``seen``, in the limb's seen plane; as far as it must leave the
+    line more than seen, it does so about the hinge ``axis``.
+    """
+    first, second = lengths
+    line = _unit(target - start)
+    distance = np.linalg.norm(target - start, axis=-1).clip(abs(first - second) + 1e-6, first + second)
+    along = (first**2 + distance**2 - second**2) / (2 * distance)
     off = np.sqrt((first**2 - along**2).clip(0))
-    side = _side(seen, line, axis, off)
-    middle = start + along[:, None] * line + off[:, None] * side
-    return middle, start + reach[:, None] * line
+    middle = start + along[:, None] * line + off[:, None] * _side(seen, line, axis, off)
+    return middle, start + distance[:, None] * line
 
 
 def _side(seen: Array, line: Array, axis: Array, off: Array) -> Array:
