@@ -19,7 +19,8 @@ motion = Motion(SMPL22, fps, np.tile(SMPL22.offsets[0], (frames, 1)), rotvec_to_
 
 save(motion, "turn.bvh")
 again = load("turn.bvh")
-apart = np.abs(again.positions()[:, : len(SMPL22)] - motion.positions()).max()
+order = [again.skeleton.index(name) for name in SMPL22.names]  # a BVH lists joints depth first
+apart = np.abs(again.positions()[:, order] - motion.positions()).max()
 print(f"turn.bvh: {len(again)} frames at {again.fps:g} fps, {apart:.6f} m from what was saved")
 
 save(motion.crop(0.5, 1.5).resample(20).mirror(), "mirrored.npz")

@@ -4,15 +4,14 @@ In README.md a code block under ``<!-- run -->`` is executed, block after block 
 ``motionloom ...`` line of any document only has to be accepted by the parser, and every ``make`` line to be a target.
 """
 
-import importlib.util
 import os
 import re
+import runpy
 import shlex
 import subprocess
 import sys
 import textwrap
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -48,15 +47,6 @@ def commands(text: str, program: str) -> list[str]:
     return [line for line in lines if line.split("#")[0].split()[:1] == [program]]
 
 
-def tool(name: str) -> Any:
-    """A script of tools/ as a module."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / "tools" / f"{name}.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def execute(command: list[str], folder: Path) -> None:
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
     environment = {**os.environ, "PATH": path, "OMP_NUM_THREADS": "1"}
@@ -72,6 +62,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("readme")
 
 
+FILLER = runpy.run_path(str(ROOT / "tools" / "fill_readme.py"))
+fill, places = FILLER["fill"], FILLER["places"]
 RUN = [(language, code) for run, language, code in blocks(README) if run]
 
 
@@ -135,20 +127,18 @@ def test_named_files_exist(document: Path) -> None:
 @needs_weights
 def test_the_readmes_tables_are_the_measured_ones() -> None:
     """Each marked table is filled, with exactly what the benchmark wrote: `make tables`."""
-    filler = tool("fill_readme")
-    assert filler.places(README)
-    assert all(filler.places(README).values()), "a table of the README is empty"
-    assert filler.fill(README) == README
+    assert places(README)
+    assert all(places(README).values()), "a table of the README is empty"
+    assert fill(README) == README
 
 
 def test_tables_are_filled_from_files(tmp_path: Path) -> None:
     """A marked place takes its file's text once, however often it is filled; one without a file stays."""
-    filler = tool("fill_readme")
     (tmp_path / "a.md").write_text("| 1 |\n")
     text = "x\n<!-- filled from a.md -->\nold\n<!-- end -->\n<!-- filled from b.md -->\nkept\n<!-- end -->\n"
-    once = filler.fill(text, tmp_path)
-    assert filler.places(once) == {"a.md": "| 1 |", "b.md": "kept"}
-    assert filler.fill(once, tmp_path) == once
+    once = fill(text, tmp_path)
+    assert places(once) == {"a.md": "| 1 |", "b.md": "kept"}
+    assert fill(once, tmp_path) == once
 
 
 def test_contributing_fits_one_screen() -> None:

@@ -31,8 +31,5 @@ def fill(text: str, root: Path = ROOT) -> str:
 if __name__ == "__main__":
     readme = ROOT / "README.md"
     readme.write_text(fill(readme.read_text()))
-    print(
-        "\n".join(
-            f"{name}: {'filled' if (ROOT / name).is_file() else 'missing'}" for name in places(readme.read_text())
-        )
-    )
+    for name in places(readme.read_text()):
+        print(name, "filled" if (ROOT / name).is_file() else "missing")
