@@ -5,7 +5,19 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionloom.diffusion import SOLVERS, chain, cosine, handshake, inpaint, levels, observe, row_draw, run
+from motionloom.diffusion import (
+    DDPM,
+    SOLVERS,
+    chain,
+    cosine,
+    handshake,
+    inpaint,
+    levels,
+    masked_draw,
+    observe,
+    row_draw,
+    run,
+)
 from tests.diffusion.exact import shared_draw, wavy
 
 SCHEDULE = cosine(40)
@@ -25,17 +37,15 @@ def test_observed_numbers_carry_the_levels_share_of_signal_and_noise(level):
     assert torch.equal(held[..., ~mask], x[..., ~mask])
 
 
-def test_observing_without_noise_from_a_noiseless_start_is_what_inpainting_alone_would_do_without_noise():
+def test_observing_without_noise_is_ancestral_sampling_whose_noise_is_masked():
     known, mask = some(1, 4, 3), torch.tensor([True, False, False])
+    start, walk, denoise = some(1, 4, 3, seed=1), range(40, -1, -1), inpaint(wavy, known, mask)
     hold = observe(known, mask, SCHEDULE, torch.zeros_like)
-    denoise = inpaint(wavy, known, mask)
-    x = hold(some(1, 4, 3, seed=1), 40)
-    walk = levels(SCHEDULE, 40)
-    plain, held = (
-        run(denoise, x, levels=walk[:20], solver=SOLVERS["ddim"], schedule=SCHEDULE, draw=torch.zeros_like, constrain=c)
-        for c in (None, hold)
+    held, filtered = (
+        run(denoise, hold(start, 40), levels=walk, solver=DDPM, schedule=SCHEDULE, draw=draw, constrain=constrain)
+        for draw, constrain in [(row_draw([1]), hold), (masked_draw(row_draw([1]), mask), None)]
     )
-    torch.testing.assert_close(plain, held, atol=1e-5, rtol=1e-5)
+    torch.testing.assert_close(held, filtered, atol=1e-5, rtol=1e-5)
 
 
 @pytest.mark.parametrize("name", SOLVERS)

@@ -47,7 +47,7 @@ def test_guidance_is_one_call_on_a_doubled_batch_and_one_plain_call_at_0_and_1()
     for scale, expected in [
         (2.5, [6]),
         (0.0, [3]),
-        (1, [3]),
+        (1.0, [3]),
         (torch.ones(3), [3]),
         (torch.tensor([1.0, 0.0, 1.0]), [6]),
     ]:
@@ -64,6 +64,14 @@ def test_a_row_gets_its_own_answer_whatever_the_scales_of_the_others():
     for row in range(3):
         one = slice(row, row + 1)
         assert torch.equal(guide(net, COND[one], NULL[one], scales[one])(x[one], 3), mixed[one])
+
+
+@pytest.mark.parametrize("scale", [0.0, 1.0])
+def test_scales_0_and_1_are_exact_beside_other_rows_even_where_the_two_passes_differ_a_lot(scale):
+    far, x = 1e5 * NULL, some()
+    mixed = guide(lambda x, level, cond: x * cond[:, None, None], COND, far, torch.tensor([scale, scale, 3.0]))(x, 3)
+    plain = x * (COND if scale else far)[:, None, None]
+    assert torch.equal(mixed[:2], plain[:2])
 
 
 class Words(NamedTuple):

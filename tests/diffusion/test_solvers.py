@@ -8,7 +8,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionloom.diffusion import DDPM, SOLVERS, Ddim, DpmSolver2M, cosine, levels, linear, run
+from motionloom.diffusion import DDPM, SOLVERS, SPACINGS, Ddim, DpmSolver2M, cosine, levels, linear, run
 from tests.diffusion.exact import TILTED, Gaussian, points, shared_draw, wavy
 
 
@@ -73,7 +73,7 @@ def test_ancestral_sampling_agrees_with_diffusers(schedule):
 
 
 @pytest.mark.parametrize("eta", [0.0, 1.0])
-@pytest.mark.parametrize("spacing", ["index", "quadratic", "snr"])
+@pytest.mark.parametrize("spacing", SPACINGS)
 def test_dpm_solver_agrees_with_diffusers(schedule, eta, spacing):
     diffusers = pytest.importorskip("diffusers")
     scheduler = diffusers.DPMSolverMultistepScheduler(

@@ -6,12 +6,13 @@ Nothing here knows about motion. Read `schedule`, `solvers`, `sampling`, then `d
 from .constraints import Constraint, chain, handshake, observe
 from .denoisers import Denoiser, Weight, blend, from_noise, guide, inpaint, join_rows, mix
 from .sampling import Snapshot, masked_draw, restart, row_draw, run, sample
-from .schedule import Draw, Schedule, State, cosine, from_betas, levels, linear
+from .schedule import SPACINGS, Draw, Schedule, State, cosine, from_betas, levels, linear
 from .solvers import DDPM, SOLVERS, Ddim, DpmSolver2M, Solver, Step
 
 __all__ = [
     "DDPM",
     "SOLVERS",
+    "SPACINGS",
     "Constraint",
     "Ddim",
     "Denoiser",

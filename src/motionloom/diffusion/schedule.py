@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 import torch
 from torch import Tensor
@@ -25,7 +25,8 @@ State: TypeAlias = Tensor
 Draw: TypeAlias = Callable[[Tensor], Tensor]
 """Standard normal noise of the shape, type and device of its argument."""
 
-Spacing: TypeAlias = Literal["index", "quadratic", "snr"]
+SPACINGS = ("index", "quadratic", "snr")
+"""Ways to choose the levels of a short walk, see `levels`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +120,7 @@ def linear(steps: int) -> Schedule:
     return from_betas("linear", torch.linspace(scale * 1e-4, scale * 0.02, steps, dtype=torch.float64).clamp(max=0.999))
 
 
-def levels(schedule: Schedule, steps: int, *, spacing: Spacing = "index") -> list[int]:
+def levels(schedule: Schedule, steps: int, *, spacing: str = "index") -> list[int]:
     """A walk of `steps` moves from the noisiest level T down to 0: `steps + 1` strictly falling levels.
 
     "index": evenly spaced levels ("trailing" in diffusers; it starts at T, as Lin et al. 2024 recommend).
@@ -137,7 +138,7 @@ def levels(schedule: Schedule, steps: int, *, spacing: Spacing = "index") -> lis
     elif spacing == "snr":
         wanted = _even_in_log_snr(schedule, steps)
     else:
-        raise ValueError(f"no spacing {spacing!r}; there are 'index', 'quadratic' and 'snr'")
+        raise ValueError(f"no spacing {spacing!r}; there are {', '.join(SPACINGS)}")
     result = [top]
     for i, level in enumerate(wanted[1:], start=1):
         # stay below the last level, and leave one level for every step that is still to come

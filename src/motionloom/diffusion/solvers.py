@@ -30,7 +30,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 from torch import Tensor
 
@@ -40,6 +40,7 @@ Step: TypeAlias = Callable[[State, State, int, int, Draw], State]
 """(state, guess of the clean data, its level t, cleaner level s, draw) -> state at s."""
 
 
+@runtime_checkable
 class Solver(Protocol):
     """A way to move between levels."""
 
