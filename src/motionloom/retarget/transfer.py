@@ -127,6 +127,8 @@ class _Goals:
     """(frames, 2, 3) left and right toe joint: the target's toes go there."""
     flat: NDArray[np.bool_]
     """(frames, 2) whether the foot stands flat."""
+    low: Array
+    """(frames, 2, 1) 1 where the toe is near the ground and leads the foot, 0 where it is high and the ankle does."""
     forward: Array
     """(frames, 3) where the pelvis faces, level; shorter where it faces up or down."""
     poles: Array
@@ -145,9 +147,16 @@ def _scale(pose: _Pose, stance: Stance, *, ratio: float, toe_height: float) -> _
         ankles=(ankles - under) * ratio + lift,
         toes=(toes - under) * ratio + lift,
         flat=stance.flat,
+        low=_near_ground(toes[..., 1:2] - under[..., 1:2]),
         forward=facing * np.array([1.0, 0.0, 1.0]),
         poles=_knee_poles(pose),
     )
+
+
+def _near_ground(height: Array) -> Array:
+    """1 up to 5 cm, 0 from 12 cm, smooth between."""
+    x = np.clip((0.12 - height) / 0.07, 0.0, 1.0)
+    return x * x * (3.0 - 2.0 * x)
 
 
 def _knee_poles(pose: _Pose) -> Array:
@@ -199,8 +208,10 @@ def _bone_end(body: Body, joint: int) -> int | None:
 def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
     places = np.einsum("sj,fjc->fsc", body.points, _positions(body.skeleton, world))
     ankles = goals.toes - (places[:, TOES] - places[:, FEET])
-    root = goals.hips + _make_up(goals, ankles) - places[:, [1, 2]].mean(axis=1)
+    shift = _make_up(goals, ankles)
+    root = goals.hips + shift - places[:, [1, 2]].mean(axis=1)
     places = places + root[:, None]
+    ankles = ankles + (1.0 - goals.low) * (goals.ankles + shift[:, None] - ankles)
     drop = _drop(places, ankles, body)
     root, places = root - drop, places - drop[:, None]
     for side, (hip, knee, ankle) in enumerate(((1, 4, 7), (2, 5, 8))):
