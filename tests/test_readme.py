@@ -80,11 +80,12 @@ def test_the_readme_has_marked_blocks_of_both_kinds() -> None:
     assert {"sh", "python"} == {language for language, _ in RUN}
 
 
-@needs_weights
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.stem)
 def test_the_examples_run(example: Path, tmp_path: Path) -> None:
     """Each numbered example runs from an empty folder."""
+    if not WEIGHTS and "Prior" in example.read_text():
+        pytest.skip("no shipped weights in src/motionloom/weights")
     execute([sys.executable, str(example)], tmp_path)
 
 
