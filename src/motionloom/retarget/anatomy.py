@@ -183,10 +183,15 @@ def _odd_frames(rest: Array) -> Array:
             continue
         second = {3: hips, 6: shoulders, 9: shoulders, 12: shoulders}.get(j, np.eye(3)[np.argmin(np.abs(bone))])
         frames[j] = frame(bone, second)
-    turn = rot.inverse(frame(np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])))
-    swap = frame(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
-    frames[0] = rot.multiply(rot.multiply(frame(hips, rest[3] - rest[0]), swap), turn)
+    person = SMPL22.rest_positions()  # how far a spine leans on a standing pelvis is taken from the uniform person
+    lean = rot.multiply(rot.inverse(_pelvis(person)), frame(np.eye(3)[1], np.eye(3)[0]))
+    frames[0] = rot.multiply(_pelvis(rest), lean)
     return frames
+
+
+def _pelvis(rest: Array) -> Array:
+    """A frame of hip line and lower spine, whatever the pose."""
+    return frame(rest[1] - rest[2], rest[3] - rest[0])
 
 
 # Bandai Namco's skeleton has its bones along the local X axis (against it on the right) and a zero pose that is no

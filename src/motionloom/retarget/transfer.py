@@ -188,7 +188,8 @@ def _orient(pose: _Pose, body: Body) -> Array:
         j = first[k]
         world[:, k] = rot.multiply(pose.frames[:, j], rot.inverse(body.frames[j]))
         end = _bone_end(body, j)
-        if end is not None and j not in (0, HEAD, *FEET):
+        by_sole = body.upright and j in FEET  # two flat feet agree in the sole, whatever their ankles' height
+        if end is not None and j not in (0, HEAD) and not by_sole:
             along = rot.rotate(world[:, k], body.rest[end] - body.rest[j])
             world[:, k] = rot.multiply(_turn(along, pose.places[:, end] - pose.places[:, j]), world[:, k])
     return world

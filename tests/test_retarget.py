@@ -1,0 +1,239 @@
+"""A motion keeps its meaning on another body: directions, planted feet, sides, and the target's own bones."""
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.motion import Motion
+from motionloom.retarget import from_smpl22, joints22, retarget, to_smpl22
+from motionloom.retarget.anatomy import CHILD
+from motionloom.skeleton import SMPL22, Skeleton
+from tests.shared import shared
+
+BONES = [(j, c) for j, c in enumerate(CHILD) if c is not None]
+ARMS = [(j, c) for j, c in BONES if j in (13, 14, 16, 17, 18, 19)]
+LEGS = [(j, c) for j, c in BONES if j in (1, 2, 4, 5)]
+
+
+def stroll(frames: int = 60) -> Motion:
+    """The uniform person walks and waves: pelvis on a path, knees bent, every joint moving smoothly."""
+    time = np.linspace(0, 4 * np.pi, frames)
+    turns = np.zeros((frames, 22, 3))
+    for side, leg, sign in ((0, (1, 4, 7), 1.0), (1, (2, 5, 8), -1.0)):
+        swing = 0.4 * np.sin(time) * sign
+        turns[:, leg[0], 0] = -swing - 0.25
+        turns[:, leg[1], 0] = 0.5 + 0.3 * np.cos(time) * sign
+        turns[:, leg[2], 0] = -0.2
+        turns[:, 16 + side, 2] = -sign * (0.9 + 0.3 * np.sin(time))
+        turns[:, 18 + side, 1] = -sign * (0.6 + 0.3 * np.cos(time))
+    turns[:, 3] = 0.1 * np.sin(time)[:, None] * [1.0, 0.5, 0.2]
+    turns[:, 15, 1] = 0.4 * np.sin(time / 2)
+    turns[:, 0, 1] = 0.3 * np.sin(time / 3)
+    root = np.stack([0.1 * np.sin(time / 2), 0.86 + 0.01 * np.cos(2 * time), 0.15 * time], axis=-1)
+    return Motion(SMPL22, 30.0, root, rot.rotvec_to_quat(turns))
+
+
+def refitted(motion: Motion, frames: np.ndarray) -> Motion:
+    """The same places on a skeleton whose joint axes are turned by constants (joints, 4): another zero pose."""
+    parents = list(motion.skeleton.parents[1:])
+    offsets = motion.skeleton.offsets.copy()
+    offsets[1:] = rot.rotate(rot.inverse(frames[parents]), offsets[1:])
+    world = rot.multiply(motion.world_rotations(), frames)
+    local = world.copy()
+    local[:, 1:] = rot.multiply(rot.inverse(world[:, parents]), world[:, 1:])
+    skeleton = Skeleton(motion.skeleton.names, motion.skeleton.parents, offsets, motion.skeleton.ends)
+    return replace(motion, skeleton=skeleton, rotations=local)
+
+
+def errors(a: np.ndarray, b: np.ndarray, bones: list[tuple[int, int]]) -> np.ndarray:
+    """Degrees between bone directions, (frames, bones)."""
+    result = []
+    for j, c in bones:
+        u, v = a[:, c] - a[:, j], b[:, c] - b[:, j]
+        sine, cosine = np.linalg.norm(np.cross(u, v), axis=-1), (u * v).sum(-1)
+        result.append(np.degrees(np.arctan2(sine, cosine)))
+    return np.stack(result, axis=1)
+
+
+def centred(places: np.ndarray) -> np.ndarray:
+    return places - places[:, :1]
+
+
+def bone_error(motion: Motion) -> float:
+    places, parents = motion.positions(), list(motion.skeleton.parents[1:])
+    lengths = np.linalg.norm(places[:, 1:] - places[:, parents], axis=-1)
+    return float(np.abs(lengths - motion.skeleton.bone_lengths()[1:]).max())
+
+
+def test_the_uniform_person_on_itself_is_unchanged_but_for_the_floor() -> None:
+    motion = stroll()
+    again = to_smpl22(motion)
+    assert np.allclose(centred(again.positions()), centred(motion.positions()), atol=1e-6)
+    assert np.abs((again.rotations * motion.rotations).sum(-1)).min() > 1 - 1e-9
+    path, path_again = motion.root - motion.root[0], again.root - again.root[0]
+    assert np.allclose(path_again, path, atol=0.04)
+
+
+def test_a_bigger_body_strikes_the_same_poses_and_walks_further() -> None:
+    motion = stroll()
+    giant = Skeleton(SMPL22.names, SMPL22.parents, SMPL22.offsets * 1.5)
+    grown = from_smpl22(motion, giant)
+    assert np.allclose(centred(grown.positions()), 1.5 * centred(motion.positions()), atol=1e-6)
+    assert np.linalg.norm(grown.root[-1] - grown.root[0]) == pytest.approx(
+        1.5 * np.linalg.norm(motion.root[-1] - motion.root[0]), rel=0.02
+    )
+    back = to_smpl22(grown)
+    assert np.allclose(centred(back.positions()), centred(motion.positions()), atol=1e-6)
+
+
+def a_pose() -> np.ndarray:
+    """Joint frames that put the arms 45 degrees down at rest."""
+    frames = np.tile(rot.IDENTITY, (22, 1))
+    for side, sign in ((0, 1.0), (1, -1.0)):
+        for j in (16 + side, 18 + side, 20 + side):
+            frames[j] = rot.rotvec_to_quat(np.array([0.0, 0.0, sign * np.pi / 4]))
+    return frames
+
+
+def test_an_a_pose_rig_gets_the_same_pose() -> None:
+    motion = stroll()
+    target = refitted(motion, a_pose()).skeleton
+    rest = target.rest_positions()
+    assert rest[20, 1] < rest[16, 1] - 0.3
+    assert np.allclose(centred(from_smpl22(motion, target).positions()), centred(motion.positions()), atol=1e-6)
+
+
+def test_an_a_pose_source_gives_back_the_t_pose_rotations() -> None:
+    motion = stroll()
+    again = to_smpl22(refitted(motion, a_pose()))
+    assert np.degrees(2 * np.arccos(np.abs((again.rotations * motion.rotations).sum(-1)).clip(0, 1))).max() < 1e-3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_rig_whose_zero_pose_is_nonsense_gets_the_same_places(seed: int) -> None:
+    motion = stroll()
+    frames = rot.normalize(np.random.default_rng(seed).normal(size=(22, 4)))
+    target = refitted(motion, frames).skeleton
+    out = from_smpl22(motion, target)
+    assert np.percentile(errors(out.positions(), motion.positions(), BONES), 99) < 3.0
+    assert bone_error(out) < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_source_whose_zero_pose_is_nonsense_gives_the_same_places(seed: int) -> None:
+    motion = stroll()
+    frames = rot.normalize(np.random.default_rng(seed).normal(size=(22, 4)))
+    out = to_smpl22(refitted(motion, frames))
+    limbs = [(j, c) for j, c in BONES if j in (1, 2, 4, 5, 16, 17, 18, 19)]
+    assert errors(out.positions(), motion.positions(), limbs).mean() < 3.0
+
+
+def test_extra_joints_stay_at_rest_and_a_root_above_the_hips_is_kept() -> None:
+    names = ("world", *SMPL22.names, "finger", "tail")
+    parents = (-1, 0, *(p + 1 for p in SMPL22.parents[1:]), 21, 1)
+    offsets = np.concatenate([[[0.3, 0.2, -5.0]], SMPL22.offsets, [[0.1, 0.0, 0.0], [0.0, 0.0, -0.2]]])
+    target = Skeleton(names, parents, offsets)
+    motion = stroll()
+    out = from_smpl22(motion, target)
+    assert out.skeleton == target
+    assert np.allclose(out.rotations[:, [0, 23, 24]], rot.IDENTITY)
+    assert np.allclose(centred(out.positions()[:, 1:23]), centred(motion.positions()), atol=1e-6)
+
+
+def test_left_stays_left() -> None:
+    motion = stroll()
+    wave = motion.rotations.copy()
+    wave[:, 16] = rot.rotvec_to_quat(np.array([0.0, 0.0, 1.2]))  # left arm up
+    motion = replace(motion, rotations=wave)
+    mirrored = to_smpl22(motion.mirror()).positions()
+    assert (to_smpl22(motion).positions()[:, 20, 1] > mirrored[:, 20, 1] + 0.5).all()
+
+
+def test_one_frame_is_enough() -> None:
+    assert len(to_smpl22(stroll().frames(7, 8))) == 1
+
+
+def test_a_skeleton_that_is_no_person_is_refused() -> None:
+    rope = Skeleton(("a", "b", "c"), (-1, 0, 1), np.ones((3, 3)))
+    with pytest.raises(MotionloomError, match="not a humanoid"):
+        from_smpl22(stroll(), rope)
+
+
+# Real clips ----------------------------------------------------------------------------------------------------------
+
+WALKS = (
+    "cmu/asf_amc/02/02_01.amc",
+    "cmu/asf_amc/07/07_01.amc",
+    "cmu/asf_amc/16/16_15.amc",
+    "cmu/asf_amc/35/35_01.amc",
+    "cmu/bvh/07_04.bvh",
+    "cmu/bvh/10_04.bvh",
+    "cmu/bvh/12_01.bvh",
+    "bandai/dataset-1/dataset-1_walk_normal_001.bvh",
+)
+
+
+def clip(path: str) -> Motion:
+    from motionloom.io.asf import load_asf_amc  # late: only these tests need the readers
+    from motionloom.io.bvh import load_bvh
+
+    place: Path = shared(f"data/{path}")
+    if place.suffix == ".amc":
+        return load_asf_amc(next(place.parent.glob("*.asf")), place, fps=30)
+    return load_bvh(place, unit=0.01)
+
+
+def skate(places: np.ndarray, fps: float, planted: np.ndarray) -> float:
+    """Mean horizontal speed of toes over the given (frames, 2) planted moments, metres per second."""
+    speed = np.linalg.norm(np.diff(places[:, [10, 11]][..., [0, 2]], axis=0), axis=-1) * fps
+    return float(speed[planted[1:] & planted[:-1]].mean())
+
+
+@pytest.mark.parametrize("path", WALKS)
+def test_feet_of_real_walks_stay_on_the_floor_and_do_not_slide(path: str) -> None:
+    motion = clip(path)
+    source, out = joints22(motion), to_smpl22(motion)
+    places = out.positions()
+    lowest = places[:, [7, 8, 10, 11], 1].min(axis=1)
+    assert np.maximum(-lowest, 0).mean() < 0.008
+    assert np.maximum(lowest, 0).mean() < 0.008
+    toes = source[:, [10, 11]]
+    speed = np.linalg.norm(np.gradient(toes, axis=0), axis=-1) * motion.fps
+    planted = (speed < 0.4) & (toes[..., 1] < np.percentile(toes[..., 1], 10) + 0.06)
+    assert skate(places, 30.0, planted) <= 1.1 * skate(source, 30.0, planted)
+    assert bone_error(out) < 1e-9
+
+
+@pytest.mark.parametrize("path", [*WALKS, "cmu/asf_amc/49/49_07.amc"])
+def test_real_clips_keep_directions_there_and_back(path: str) -> None:
+    motion = clip(path)
+    source, person = joints22(motion), to_smpl22(motion)
+    assert errors(source, person.positions(), ARMS).mean() < 1.0
+    assert errors(source, person.positions(), LEGS).mean() < 6.5
+    back = from_smpl22(person, motion.skeleton)
+    assert errors(source, joints22(back), ARMS).mean() < 1.0
+    assert errors(source, joints22(back), LEGS).mean() < 5.0
+    assert bone_error(back) < 1e-9
+
+
+def test_any_family_goes_onto_any_other() -> None:
+    clips = [clip(path) for path in (WALKS[1], WALKS[4], WALKS[7])]
+    for motion in clips:
+        for target in clips:
+            out = retarget(motion, target.skeleton)
+            assert errors(joints22(motion), joints22(out), ARMS).mean() < 2.0
+            assert bone_error(out) < 1e-9
+
+
+def test_a_sample_of_the_whole_pack_goes_through_without_pops() -> None:
+    with shared("data/manifest.csv").open() as file:
+        paths = [row["path"] for row in csv.DictReader(file) if not row["notes"]][::97]
+    for path in paths:
+        person = to_smpl22(clip(path))
+        turn = np.abs((person.rotations[1:] * person.rotations[:-1]).sum(-1)).clip(0, 1)
+        assert np.degrees(2 * np.arccos(turn)).max() < 75.0, path
