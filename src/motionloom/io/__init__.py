@@ -1,10 +1,10 @@
 """Motion files, in and out: the suffix picks the format."""
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
 from motionloom.errors import MotionloomError
+from motionloom.io.atomic import check_place
 from motionloom.motion import Motion
 
 READS = (".bvh", ".amc", ".glb", ".npz")
@@ -65,17 +65,11 @@ def check_output(path: Path | str) -> Path:
     """The path, if `save` could write there; ask before long work. Raises `MotionloomError` otherwise."""
     path = Path(path)
     suffix = path.suffix.lower()
-    if path.is_dir():
-        raise MotionloomError(f"cannot write {path}: it is a folder; add a file name")
-    if suffix not in WRITES:
+    if suffix not in WRITES and not path.is_dir():
         raise MotionloomError(
             f"cannot write {path}: its name must end in {', '.join(WRITES)}; it ends in {suffix or 'none'}"
         )
-    folder = path.absolute().parent
-    if not folder.is_dir():
-        raise MotionloomError(f"cannot write {path}: the folder {folder} does not exist; make it first")
-    if not os.access(folder, os.W_OK):
-        raise MotionloomError(f"cannot write {path}: the folder {folder} may not be written to")
+    check_place(path)
     return path
 
 

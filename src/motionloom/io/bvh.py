@@ -60,7 +60,7 @@ def load_bvh(path: Path | str, *, fps: float | None = None, unit: float | None =
 def read_bvh(path: Path | str, *, fps: float | None = None, unit: float | None = None) -> Bvh:
     """Like `load_bvh`, with the unit and the channel orders."""
     data = text.read_text(path)
-    split = re.search(rb"^[ \t]*MOTION\b[ \t]*", data, re.MULTILINE | re.IGNORECASE)
+    split = re.search(rb"(?:^|(?<=\}))[ \t]*+MOTION\b", data, re.MULTILINE | re.IGNORECASE)
     if not re.match(rb"\s*HIERARCHY\b", data, re.IGNORECASE):
         raise MotionloomError(f"{path} is not a BVH file: it does not begin with HIERARCHY")
     if split is None:
@@ -215,31 +215,12 @@ def _describe(words: _Words, key: str, joint: _Joint) -> None:
 
 # Frames --------------------------------------------------------------------------------------------------------------
 
-_HEAD = re.compile(
-    rb"\s*Frames?[ \t]*:?[ \t]*(\S*)[ \t]*\n\s*Frame[ \t_]*Time[ \t]*:?[ \t]*(\S*)[ \t]*(?:\n|\Z)", re.IGNORECASE
+_HEAD = re.compile(  # possessive, so that a long run of blanks costs no time
+    rb"\s*+Frames?[ \t]*+:?[ \t]*+(\S*+)[ \t]*+\n\s*+Frame[ \t_]*+Time[ \t]*+:?[ \t]*+(\S*+)[ \t]*+(?:\n|\Z)",
+    re.IGNORECASE,
 )
-_RATES = (
-    10,
-    12,
-    12.5,
-    15,
-    20,
-    24000 / 1001,
-    24,
-    25,
-    30000 / 1001,
-    30,
-    48,
-    50,
-    60000 / 1001,
-    60,
-    72,
-    90,
-    100,
-    120,
-    200,
-    240,
-)
+_RATES = (10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 200, 240)
+_BROADCAST = (12.5, 24000 / 1001, 30000 / 1001, 60000 / 1001)
 
 
 def _frames(data: bytes, start: int, columns: int, path: Path | str) -> tuple[float, Array]:
@@ -267,16 +248,19 @@ def _frames(data: bytes, start: int, columns: int, path: Path | str) -> tuple[fl
 def frame_rate(seconds: str) -> float | None:
     """Frames per second for a frame time as printed: ``0.033`` and ``0.0333333`` are both 30.
 
-    The usual rate is taken whose frame time, cut or rounded to the printed digits, is what the file says and
-    differs by at most 1.2 %; otherwise the exact reciprocal. None if it is not a positive number.
+    A usual rate is taken if its frame time, cut or rounded to the printed digits, is what the file says and differs
+    by at most 1.2 %; otherwise the exact reciprocal. None if it is not a positive number.
     """
     value = text.number(seconds)
     if value is None or not 1e-6 <= value <= 1e4:
         return None
     mantissa, _, exponent = seconds.lower().partition("e")
     digit = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
-    near = [r for r in (*_RATES, max(round(1 / value), 1)) if abs(1 / r - value) < digit and abs(r * value - 1) < 0.012]
-    return float(min(near, key=lambda r: abs(r * value - 1))) if near else 1 / value
+    for rates, apart in ((_RATES, 0.012), (_BROADCAST, 0.012), ((max(round(1 / value), 1),), 1e-4)):
+        near = [r for r in rates if abs(1 / r - value) < digit and abs(r * value - 1) < apart]
+        if near:
+            return float(min(near, key=lambda r: abs(r * value - 1)))
+    return 1 / value
 
 
 def _complain(data: bytes, count: int, columns: int, *, path: Path | str, first: int) -> None:

@@ -1,0 +1,125 @@
+"""NPZ: exact round trips, plain positions, and archives that lie."""
+
+import io as stdio
+import zipfile
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from motionloom import io
+from motionloom.errors import MotionloomError
+from motionloom.io.npz import load_npz, save_npz
+from motionloom.motion import Motion
+from motionloom.rotations import IDENTITY
+from motionloom.skeleton import SMPL22
+from tests.io.motions import motions
+
+
+def still(frames: int = 3) -> Motion:
+    return Motion(SMPL22, 30, np.zeros((frames, 3)), np.tile(IDENTITY, (frames, 22, 1)))
+
+
+@settings(deadline=None, max_examples=50)
+@given(motion=motions())
+def test_random_motions_come_back_exactly(tmp_path_factory, motion):
+    path = tmp_path_factory.mktemp("npz") / "a.npz"
+    again = load_npz(save_npz(motion, path))
+    assert again.skeleton == motion.skeleton
+    assert again.fps == motion.fps
+    np.testing.assert_array_equal(again.root, motion.root)
+    np.testing.assert_array_equal(again.rotations, motion.rotations)
+    if motion.translations is None:
+        assert again.translations is None
+    else:
+        np.testing.assert_array_equal(again.translations, motion.translations)
+
+
+def test_the_groups_of_our_own_skeleton_come_back(tmp_path):
+    assert io.load(io.save(still(), tmp_path / "a.npz")).skeleton.groups == SMPL22.groups
+
+
+def test_numpy_reads_the_documented_arrays_without_pickle(tmp_path):
+    motion = still()
+    with np.load(io.save(motion, tmp_path / "a.npz"), allow_pickle=False) as arrays:
+        assert int(arrays["version"]) == 1
+        assert tuple(arrays["names"]) == SMPL22.names
+        np.testing.assert_allclose(arrays["positions"], motion.positions(), atol=1e-6)
+        assert set(arrays) == {
+            "version", "names", "parents", "offsets", "ends", "fps", "root", "rotations", "positions"
+        }  # fmt: skip
+
+
+def test_plain_positions_are_read_where_they_say_their_rate(tmp_path):
+    pytest.importorskip("motionloom.features.ik")
+    motion = still(8)
+    np.savez(tmp_path / "a.npz", positions=motion.positions(), fps=20)
+    again = io.load(tmp_path / "a.npz")
+    assert again.fps == 20
+    assert np.abs(again.positions() - motion.positions()).max() < 0.02
+    np.savez(tmp_path / "b.npz", positions=motion.positions())
+    with pytest.raises(MotionloomError, match="give the frame rate"):
+        io.load(tmp_path / "b.npz")
+    assert io.load(tmp_path / "b.npz", fps=25).fps == 25
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"root": np.full((3, 3), np.nan)}, "'root' has numbers that are not finite"),
+        ({"rotations": np.full((3, 22, 4), np.inf)}, "'rotations' has numbers that are not finite"),
+        ({"rotations": np.zeros((3, 22, 4))}, "unit quaternions"),
+        ({"rotations": np.zeros((4, 22, 4))}, "'rotations' must have the shape"),
+        ({"rotations": None}, "no array 'rotations'|'positions' but|positions"),
+        ({"root": np.zeros((0, 3)), "rotations": np.zeros((0, 22, 4))}, "at least one"),
+        ({"parents": np.arange(22)}, "only root"),
+        ({"parents": np.zeros(22)}, "'parents' must have the shape"),
+        ({"names": np.array(["a"] * 22)}, "unique"),
+        ({"names": np.arange(22)}, "'names' must have the shape"),
+        ({"ends": np.array([99])}, "joints that do not exist"),
+        ({"fps": np.array(0.0)}, "frame rate"),
+        ({"fps": np.array(-30)}, "frame rate"),
+        ({"fps": np.array("thirty")}, "'fps' must have the shape"),
+        ({"version": np.array(7)}, "version 7"),
+        ({"offsets": np.zeros((21, 3))}, "'offsets' must have the shape"),
+        ({"offsets": np.array([{"a": 1}], dtype=object)}, "pickled objects are never read"),
+    ],
+)
+def test_archives_that_make_no_sense_are_refused(tmp_path, change, message):
+    with np.load(io.save(still(), tmp_path / "a.npz")) as arrays:
+        changed = {k: v for k, v in ({**arrays, **change}).items() if v is not None}
+    if "rotations" in change and change["rotations"] is None:
+        del changed["positions"]
+    np.savez(tmp_path / "b.npz", **changed)
+    with pytest.raises(MotionloomError, match=message) as caught:
+        io.load(tmp_path / "b.npz")
+    assert "b.npz" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_pickle_is_never_run(tmp_path):
+    class Bomb:
+        def __reduce__(self):
+            return (print, ("boom",))
+
+    np.savez(tmp_path / "a.npz", rotations=np.array([Bomb()], dtype=object), allow_pickle=True)
+    with pytest.raises(MotionloomError, match="pickled objects are never read"):
+        io.load(tmp_path / "a.npz")
+
+
+def test_a_shape_that_promises_more_than_is_there_is_refused_at_once(tmp_path):
+    header = stdio.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (10**12, 22, 4)})
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("rotations.npy", header.getvalue())
+    with pytest.raises(MotionloomError, match="the archive is damaged"):
+        io.load(tmp_path / "a.npz")
+
+
+def test_an_archive_that_unpacks_to_gigabytes_is_refused_before_unpacking(tmp_path):
+    from motionloom.io.npz import read_arrays
+
+    with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("rotations.npy", bytes(20_000_000))
+    with pytest.raises(MotionloomError, match="unpacks to more"):
+        read_arrays(tmp_path / "a.npz", max_bytes=10_000_000)
