@@ -76,6 +76,15 @@ def test_a_straight_arm_does_not_twist(noise: float) -> None:
     assert speeds[:, 16].max() < 1.5 * bone_speeds(positions).max()
 
 
+@pytest.mark.parametrize("degrees", [-30, 0, 40])
+def test_a_straight_leg_turns_with_its_foot(degrees: float) -> None:
+    turns = np.tile(rot.IDENTITY, (30, 22, 1))
+    turns[:, 1] = rot.rotvec_to_quat(np.radians(degrees) * np.array([0, 1.0, 0]))
+    positions = Motion(SMPL22, FPS, np.tile([0, 0.9, 0], (30, 1)), turns).positions()
+    left = rot.rotate(motion_from_positions(positions, FPS).world_rotations()[:, 4], np.array([1.0, 0, 0]))
+    np.testing.assert_allclose(np.degrees(np.arctan2(-left[:, 2], left[:, 0])), degrees, atol=8)
+
+
 def test_a_knee_seen_bent_backwards_by_noise_keeps_its_axis() -> None:
     positions = np.tile(SMPL22.rest_positions(), (40, 1, 1))
     positions[:, 4, 2] += 0.01 * np.sin(np.arange(40) * 2.5)
