@@ -19,7 +19,7 @@ from motionloom.skeleton import Skeleton
 Array = NDArray[np.float64]
 MAX_NODES = 20_000
 MAX_JOINTS = 10_000
-MAX_SKINS = 256
+MAX_SKINS = 64
 FREE_POSES = 2_000_000
 """Frames times joints that any file may ask for; more only as far as the file itself holds as many keys."""
 FPS_LIMIT = 1000.0
@@ -107,7 +107,12 @@ def _node(document: Document, number: int, entry: dict[str, Any], count: int) ->
         if entry.get("scale") is not None:
             scale = document.numbers(entry["scale"], 3, f"the scale of {what}")
     below = tuple(document.index(c, count, "nodes") for c in children)
-    return _Node(name if isinstance(name, str) and name else f"node_{number}", below, place, turn, scale)
+    return _Node(_printable(name) or f"node_{number}", below, place, turn, scale)
+
+
+def _printable(name: Any) -> str:
+    """A name that can be shown and written anywhere."""
+    return "".join(c if c.isprintable() else "_" for c in name[:200]).strip() if isinstance(name, str) else ""
 
 
 def _unit(document: Document, xyzw: Array, what: str) -> Array:
