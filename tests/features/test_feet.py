@@ -103,7 +103,7 @@ def test_real_walks_slide_less_and_move_as_smoothly(clip: str) -> None:
     motion = motion_from_positions(real(clip), FPS)
     clean, planted = clean_feet(motion), planted_feet(motion.positions(), FPS)
     assert skate(clean, planted) < 0.2 * skate(motion, planted)
-    assert depth(clean) <= depth(motion)
+    assert depth(clean) <= depth(motion) + 1e-9
     assert jerk(clean) < 1.1 * jerk(motion)
     assert knee_speed(clean) < 1.3 * knee_speed(motion)
     assert np.linalg.norm(clean.positions() - motion.positions(), axis=-1).mean() < 0.02

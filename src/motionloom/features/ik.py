@@ -269,8 +269,16 @@ def _usual_axes(seen: Array, upper: Array, lower: Array, local: Array) -> Array:
         axes[:, i] *= (1.1 + (_unit(rest) * upper[:, i]).sum(-1, keepdims=True)).clip(0, 1)
         if limb.tip is not None:
             foot = rot.rotate(local[:, i], _unit(seen[:, limb.tip] - seen[:, limb.end]))
-            axes[:, i] = 0.3 * axes[:, i] + np.cross(foot, lower[:, i])
+            along, aside = _across(_unit(_REST[limb.tip]), _unit(_REST[limb.end]))
+            hinge = np.array(limb.hinge, dtype=np.float64)
+            forward, lateral = _across(foot, lower[:, i])
+            axes[:, i] = 0.15 * axes[:, i] + (hinge @ along) * forward + (hinge @ aside) * lateral
     return axes
+
+
+def _across(foot: Array, shin: Array) -> tuple[Array, Array]:
+    """The part of unit vectors ``foot`` across the shin, and the same a right angle further round the shin."""
+    return foot - (foot * shin).sum(-1, keepdims=True) * shin, np.cross(foot, shin)
 
 
 def transport(directions: np.ndarray) -> Array:
