@@ -283,7 +283,7 @@ def test_frames_missing_in_the_middle_are_noticed(tmp_path):
 
 def test_two_files_that_do_not_belong_together_are_told_apart(tmp_path):
     asf, amc = write(tmp_path)
-    with pytest.raises(MotionloomError, match="is not an ASF file|no :root"):
+    with pytest.raises(MotionloomError, match=r"is not an ASF file|no :root"):
         load_asf_amc(amc, amc)
     with pytest.raises(MotionloomError, match="is this an AMC file"):
         load_asf_amc(asf, asf)

@@ -87,7 +87,7 @@ def _names(skeleton: Skeleton) -> list[str]:
     taken: set[str] = set()
     for joint, raw in enumerate(skeleton.names):
         name = " ".join(raw.replace("{", "(").replace("}", ")").split()) or f"joint_{joint}"
-        name = name.encode("utf-8", "replace").decode()
+        name = "".join(c if c.isprintable() else "?" for c in name)
         name = name if name not in taken else f"{name}_{joint}"
         taken.add(name)
         names.append(name)

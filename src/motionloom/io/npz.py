@@ -22,6 +22,7 @@ import io
 import math
 import struct
 import tokenize
+import warnings
 import zipfile
 import zlib
 from pathlib import Path
@@ -83,7 +84,8 @@ def read_arrays(path: Path | str, *, max_bytes: int = text.MAX_BYTES) -> dict[st
     if not data.startswith(b"PK"):
         raise MotionloomError(f"{path} is not an NPZ archive")
     try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        with warnings.catch_warnings(), zipfile.ZipFile(io.BytesIO(data)) as archive:
+            warnings.simplefilter("ignore")
             members = archive.infolist()
             if len(members) > 1000 or sum(m.file_size for m in members) > max_bytes:
                 raise MotionloomError(
@@ -111,6 +113,12 @@ def _unpack(archive: zipfile.ZipFile, member: zipfile.ZipInfo, path: Path | str)
     if any(n < 0 for n in shape) or math.prod(shape) * dtype.itemsize != left:
         raise MotionloomError(f"{path}: the array {name} says {shape} but holds {left} bytes; the archive is damaged")
     flat = np.frombuffer(file.getbuffer()[file.tell() :], dtype=dtype) if left else np.empty(0, dtype)
+    if dtype.kind == "U" and left:
+        codes = flat.view(np.dtype(np.uint32).newbyteorder(dtype.byteorder))
+        if ((codes > 0x10FFFF) | ((codes >= 0xD800) & (codes < 0xE000))).any():
+            raise MotionloomError(
+                f"{path}: the array {name} holds characters that do not exist; the archive is damaged"
+            )
     return flat.reshape(shape[::-1]).T if fortran else flat.reshape(shape)
 
 
