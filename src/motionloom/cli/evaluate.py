@@ -1,5 +1,140 @@
-"""Not filled yet."""
+"""`motionloom evaluate`: does it do what the words say, and does it look real."""
+
+import argparse
+from pathlib import Path
 
 
 def add(subparsers) -> None:
-    """Register nothing."""
+    """Register `evaluate obedience`, `evaluate realism` and `evaluate reference`."""
+    family = subparsers.add_parser("evaluate", help="measure weights by physics: obedience to words, realism of motion")
+    commands = family.add_subparsers(metavar="COMMAND", required=True)
+
+    obedience = commands.add_parser(
+        "obedience", help="20 everyday prompts, each with a physical check, on several seeds"
+    )
+    _sampling(obedience)
+    obedience.add_argument("--seeds", type=int, default=10, help="seeds per prompt (default 10)")
+    obedience.add_argument("--paraphrases", action="store_true", help="also try the same wishes in other words")
+    obedience.add_argument(
+        "--only", action="append", metavar="CHECK", help="only this check, such as 'walk forward' (repeatable)"
+    )
+    obedience.set_defaults(run=_obedience)
+
+    realism = commands.add_parser("realism", help="foot skate, penetration, jerk, bones and speed against real clips")
+    _sampling(realism)
+    realism.add_argument(
+        "--data", type=Path, help="built set or recordings with held-out clips (default: shipped numbers)"
+    )
+    realism.add_argument("--count", type=int, default=64, help="motions to compare (default 64)")
+    realism.set_defaults(run=_realism)
+
+    reference = commands.add_parser("reference", help="judge real clips: pass rates, false alarms, realism numbers")
+    reference.add_argument("--data", type=Path, required=True, help="built set or recordings")
+    reference.add_argument("--out", type=Path, help="write the numbers to this JSON file")
+    reference.set_defaults(run=_reference)
+
+
+def _sampling(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--weights", default="default", help="shipped name or file (default: default)")
+    parser.add_argument("--seed", type=int, default=0, help="first seed (default 0)")
+    parser.add_argument("--steps", type=int, help="sampler steps (default: as generate)")
+    parser.add_argument("--guidance", type=float, help="strength of the text (default: as generate)")
+    parser.add_argument("--solver", help="solver name (default: as generate)")
+    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
+    parser.add_argument(
+        "--out", type=Path, help="folder for the JSON results and report.md; a run that stopped goes on"
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+
+
+def _generator(arguments: argparse.Namespace):
+    """The prior behind a plain function of prompts, length and seed."""
+    from motionloom.checkpoint import Prior
+    from motionloom.evaluation.generator import generator
+
+    prior = Prior.load(arguments.weights, device=arguments.device)
+    return generator(prior, steps=arguments.steps, guidance=arguments.guidance, solver=arguments.solver)
+
+
+def _settings(arguments: argparse.Namespace) -> dict:
+    return {name: getattr(arguments, name) for name in ("weights", "steps", "guidance", "solver")}
+
+
+def _say(line: str) -> None:
+    import sys
+
+    print(line, file=sys.stderr, flush=True)
+
+
+def _obedience(arguments: argparse.Namespace) -> None:
+    import json
+
+    from motionloom.evaluation import obey
+    from motionloom.evaluation.reference import known
+    from motionloom.metrics.obedience import CHECKS, check
+
+    checks = [check(name) for name in arguments.only] if arguments.only else list(CHECKS)
+    settings = _settings(arguments)
+    results = obey.run(
+        _generator(arguments), checks, seeds=arguments.seeds, first_seed=arguments.seed,
+        paraphrases=arguments.paraphrases, settings=settings, folder=arguments.out, progress=_say,
+    )  # fmt: skip
+    rows = obey.table(results, checks, real=known()["checks"])
+    found = obey.totals(results, checks)
+    said = (
+        f"{found['prompts_obeyed']} of {found['prompts']} prompts obeyed on at least {obey.ENOUGH:.0%} of the seeds; "
+        f"{found['seeds_obeyed_share']:.1%} of all seeds"
+    )
+    if "paraphrases_obeyed_share" in found:
+        said += f"; {found['paraphrases_obeyed_share']:.1%} in other words"
+    if arguments.out:
+        obey.write_text(
+            arguments.out / "report.md", f"# Obedience of {arguments.weights}\n\n{said}.\n\n{obey.markdown(rows)}\n"
+        )
+    if arguments.json:
+        print(json.dumps(obey.summary(results, checks, settings=settings), indent=1))
+    else:
+        print(f"{obey.plain(rows)}\n\n{said}")
+
+
+def _realism(arguments: argparse.Namespace) -> None:
+    import json
+
+    from motionloom.errors import MotionloomError
+    from motionloom.evaluation import obey, realism
+    from motionloom.evaluation.clips import real_clips
+    from motionloom.evaluation.reference import known
+
+    if not 1 <= arguments.count <= 100_000:
+        raise MotionloomError(f"the count must be from 1 to 100000; got {arguments.count}")
+    if arguments.data:
+        chosen = realism.choose(list(real_clips(arguments.data)), arguments.count)
+        if not chosen:
+            raise MotionloomError(f"{arguments.data} has no held-out captioned clips of 2 to 10 s; leave --data out")
+        wanted, real = realism.orders(chosen), [clip.positions for clip in chosen]
+    else:
+        wanted, real = realism.everyday(arguments.count), known()["realism"]["held_out"]
+    made, fps = realism.run(_generator(arguments), wanted, seed=arguments.seed, progress=_say)
+    found = {"settings": _settings(arguments), **realism.judge(made, fps, real)}
+    rows = realism.table(found)
+    said = f"{found['passed']} of {len(rows) - 1} numbers within 1.5 times of real (or too small to see)"
+    if not arguments.data:
+        said += "; the real numbers are of other actions: name recordings with --data to compare like with like"
+    if arguments.out:
+        obey.write_json(arguments.out / "realism.json", found)
+        obey.write_text(
+            arguments.out / "realism.md", f"# Realism of {arguments.weights}\n\n{said}.\n\n{obey.markdown(rows)}\n"
+        )
+    print(json.dumps(found, indent=1) if arguments.json else f"{obey.plain(rows)}\n\n{said}")
+
+
+def _reference(arguments: argparse.Namespace) -> None:
+    from motionloom.evaluation import obey, reference
+    from motionloom.evaluation.clips import real_clips
+
+    found = reference.reference(real_clips(arguments.data), progress=_say)
+    if arguments.out:
+        obey.write_json(arguments.out, found)
+    print(obey.plain(reference.rates(found)))
+    print("\nper cent of real clips of an action (rows) that pass each check (columns)\n")
+    print(obey.plain(reference.confusion_table(found)))

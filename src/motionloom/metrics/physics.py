@@ -63,8 +63,8 @@ def velocity(values: np.ndarray, fps: float) -> Array:
 
 def speed(positions: np.ndarray, fps: float) -> Array:
     """(frames,) m/s: horizontal speed of the pelvis, averaged over a quarter of a second."""
-    path = smooth(np.asarray(positions)[:, 0, [0, 2]], odd(fps / 4))
-    return np.linalg.norm(velocity(path, fps), axis=-1)
+    # velocities are averaged, not places: an average of places lags behind at both ends
+    return np.linalg.norm(smooth(velocity(np.asarray(positions)[:, 0, [0, 2]], fps), odd(fps / 4)), axis=-1)
 
 
 def odd(frames: float) -> int:
@@ -97,8 +97,7 @@ def displacement(positions: np.ndarray, fps: float) -> Displacement:
 
 def travel(positions: np.ndarray, fps: float) -> float:
     """Metres of horizontal path walked by the pelvis, sway smoothed over a quarter of a second."""
-    path = smooth(np.asarray(positions)[:, 0, [0, 2]], odd(fps / 4))
-    return float(np.linalg.norm(np.diff(path, axis=0), axis=-1).sum())
+    return float(np.trapezoid(speed(positions, fps)) / fps) if len(positions) > 1 else 0.0
 
 
 def turn(positions: np.ndarray) -> float:
