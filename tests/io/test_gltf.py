@@ -547,7 +547,7 @@ def test_changed_declarations_give_a_motion_or_a_sentence(tmp_path: Path, edits:
         place = content
         for key in way:
             place = place[key]
-        place[last] = value
+        place[last] = copy.deepcopy(value)
     path.write_text(json.dumps(content))
     loads_or_complains(path)
 

@@ -79,15 +79,18 @@ def _assemble(motions: Sequence[Motion], with_body: bool) -> bytes:
     file = _File(document)
     clocks: dict[tuple[float, int], int] = {}
     for number, motion in enumerate(motions):
-        first = len(document.nodes)
+        tail = "" if len(motions) == 1 else f"_{number + 1}"
+        tops.append(len(document.nodes))
+        first = tops[-1] + 1
+        # A node of one's own over each tree: Blender makes one armature of all trees that stand side by side.
+        document.nodes.append(pygltflib.Node(name=f"person{tail}", children=[first]))
         document.nodes.extend(_nodes(motion.skeleton, first))
-        tops.append(first)
         clock = (motion.fps, len(motion))
         if clock not in clocks:
             clocks[clock] = file.add(np.arange(len(motion))[:, None] / motion.fps, _FLOAT, bounds=True)
         _animate(file, animation, motion, first=first, clock=clocks[clock])
         if with_body:
-            tops += _dress(file, motion, first, name="body" if len(motions) == 1 else f"body_{number + 1}")
+            tops += _dress(file, motion, first, name=f"body{tail}")
     file.data.extend(b"\0" * (-len(file.data) % 4))
     document.buffers = [pygltflib.Buffer(byteLength=len(file.data))]
     document.set_binary_blob(bytes(file.data))

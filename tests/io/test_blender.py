@@ -1,0 +1,126 @@
+"""Blender as a stranger: what it sees in our GLB and BVH files. Needs bpy, here or in another Python.
+
+``MOTIONLOOM_BLENDER_PYTHON`` names a Python interpreter that can import bpy; without it bpy is looked for in this one.
+"""
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from motionloom import rotations as rot
+from motionloom.io import save
+from motionloom.motion import Motion
+from motionloom.skeleton import SMPL22
+
+pytestmark = pytest.mark.blender
+
+# Runs inside Blender: import a file the way a user does, then write down every joint on every asked frame.
+SCRIPT = """
+import json, sys
+import bpy
+file, out, fps, frames = sys.argv[1], sys.argv[2], int(sys.argv[3]), json.loads(sys.argv[4])
+bpy.ops.wm.read_factory_settings(use_empty=True)
+scene = bpy.context.scene
+scene.render.fps = fps
+if file.endswith(".glb"):
+    bpy.ops.import_scene.gltf(filepath=file)
+else:
+    bpy.ops.import_anim.bvh(filepath=file, update_scene_fps=True, update_scene_duration=True)
+people = []
+for armature in (o for o in bpy.data.objects if o.type == "ARMATURE"):
+    joints = []
+    for frame in frames:
+        scene.frame_set(frame)
+        bpy.context.view_layer.update()
+        joints.append({b.name: list(armature.matrix_world @ b.head) for b in armature.pose.bones})
+    rest = {b.name: list(armature.matrix_world @ b.head_local) for b in armature.data.bones}
+    people.append({"joints": joints, "rest": rest})
+meshes = []
+for mesh in (o for o in bpy.data.objects if o.type == "MESH" and o.find_armature()):
+    scene.frame_set(frames[0])
+    solid = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    points = [list(solid.matrix_world @ v.co) for v in solid.data.vertices]
+    meshes.append([[min(p[k] for p in points) for k in range(3)], [max(p[k] for p in points) for k in range(3)]])
+ranges = [list(a.frame_range) for a in bpy.data.actions]
+result = {"fps": scene.render.fps / scene.render.fps_base, "people": people, "meshes": meshes, "ranges": ranges}
+with open(out, "w") as stream:
+    json.dump(result, stream)
+"""
+
+
+def blender(file: Path, frames: list[int], fps: int = 30) -> dict[str, Any]:
+    python = os.environ.get("MOTIONLOOM_BLENDER_PYTHON", sys.executable)
+    if python == sys.executable and importlib.util.find_spec("bpy") is None:
+        pytest.skip("needs bpy, here or in the Python named by MOTIONLOOM_BLENDER_PYTHON")
+    out = file.with_suffix(".json")
+    command = [python, "-c", SCRIPT, str(file), str(out), str(fps), json.dumps(frames)]
+    subprocess.run(command, check=True, capture_output=True, timeout=180)
+    return json.loads(out.read_text())
+
+
+def walker(frames: int = 61, fps: float = 30.0) -> Motion:
+    """Somebody who glides along an arc, turning left from +Z towards +X, and lifts the left arm."""
+    time = np.arange(frames) / fps
+    turned = np.zeros((frames, 22, 3))
+    turned[:, 0, 1] = 0.5 * time
+    turned[:, SMPL22.index("left_shoulder"), 2] = 0.6 * time
+    height = np.full(frames, SMPL22.offsets[0, 1])
+    root = np.stack([2 - 2 * np.cos(0.5 * time), height, 2 * np.sin(0.5 * time)], axis=-1)
+    return Motion(SMPL22, fps, root, rot.rotvec_to_quat(turned))
+
+
+def ours(blenders: dict[str, list[float]]) -> np.ndarray:
+    """(22, 3): Blender's Z up and front at -Y to ours, joints in order."""
+    places = np.array([blenders[name] for name in SMPL22.names])
+    return np.stack([places[:, 0], places[:, 2], -places[:, 1]], axis=-1)
+
+
+def test_blender_sees_the_glb_where_and_when_we_put_it(tmp_path: Path) -> None:
+    motion = walker()
+    seen = blender(save(motion, tmp_path / "walk.glb"), [0, 15, 30, 60])
+    assert len(seen["people"]) == 1
+    assert seen["ranges"] == [[0.0, 60.0]]
+    for frame, joints in zip((0, 15, 30, 60), seen["people"][0]["joints"]):
+        np.testing.assert_allclose(ours(joints), motion.positions()[frame], atol=1e-4)
+    np.testing.assert_allclose(ours(seen["people"][0]["rest"]), SMPL22.rest_positions(), atol=1e-4)
+
+
+def test_blender_sees_a_glb_of_another_rate_in_real_time(tmp_path: Path) -> None:
+    motion = walker(41, 20.0)
+    seen = blender(save(motion, tmp_path / "walk.glb"), [60], fps=30)
+    np.testing.assert_allclose(ours(seen["people"][0]["joints"][0]), motion.positions()[40], atol=1e-4)
+
+
+def test_blender_sees_a_body_of_human_size_that_faces_its_front(tmp_path: Path) -> None:
+    seen = blender(save(walker(), tmp_path / "walk.glb"), [0])
+    low, high = (np.array(corner) for corner in seen["meshes"][0])
+    assert 1.5 < high[2] - low[2] < 1.9
+    assert abs(low[2]) < 0.08
+    joints = seen["people"][0]["joints"][0]
+    assert joints["left_foot"][1] < joints["left_ankle"][1]  # toes point to -Y, Blender's front
+    assert joints["left_wrist"][0] > 0.5
+
+
+def test_blender_sees_two_people(tmp_path: Path) -> None:
+    one = walker()
+    two = Motion(SMPL22, 30.0, one.root + np.array([1.0, 0, 0]), one.rotations)
+    seen = blender(save([one, two], tmp_path / "pair.glb"), [30])
+    roots = sorted(ours(p["joints"][0])[0].tolist() for p in seen["people"])
+    np.testing.assert_allclose(roots, sorted([one.root[30].tolist(), two.root[30].tolist()]), atol=1e-4)
+
+
+def test_blender_sees_the_bvh_with_its_rate_height_facing_and_path(tmp_path: Path) -> None:
+    motion = walker()
+    seen = blender(save(motion, tmp_path / "walk.bvh"), [1, 31, 61], fps=24)
+    assert seen["fps"] == pytest.approx(30, rel=1e-3)
+    for frame, joints in zip((0, 30, 60), seen["people"][0]["joints"]):
+        np.testing.assert_allclose(ours(joints), motion.positions()[frame], atol=1e-3)
+    rest = ours(seen["people"][0]["rest"])
+    assert 1.5 < np.ptp(rest[:, 1]) < 1.9
