@@ -100,9 +100,14 @@ def _other_side(name: str, names: tuple[str, ...]) -> str | None:
         if name.startswith(a):
             candidates.append(b + name[1:])
         for glue in ("_", ".", "-", " "):
-            candidates += [name.replace(glue + a, glue + b, 1)] if glue + a in name else []
-            candidates += [name.replace(a + glue, b + glue, 1)] if a + glue in name else []
+            candidates += _swaps(name, glue + a, glue + b) + _swaps(name, a + glue, b + glue)
     return next((c for c in candidates if c != name and c in names), None)
+
+
+def _swaps(name: str, old: str, new: str) -> list[str]:
+    """The name with one ``old`` replaced, for each place where it stands: ``upper_leg_l`` has two ``_l``."""
+    at = [i for i in range(len(name)) if name.startswith(old, i)]
+    return [name[:i] + new + name[i + len(old) :] for i in at]
 
 
 _SMPL22 = """pelvis - | left_hip pelvis | right_hip pelvis | spine1 pelvis | left_knee left_hip | right_knee right_hip
