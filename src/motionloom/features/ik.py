@@ -104,8 +104,18 @@ def _solve_trunk(seen: Array, places: Array, world: Array) -> None:
     for joint, child in ((12, 15), (13, 16), (14, 17)):
         world[:, joint] = aim(world[:, 9], _REST[child], seen[:, child] - places[:, joint])
         places[:, child] = _end_of(child, places, world)
-    # The neck's bone says where the head is, and only roughly where it looks.
-    world[:, 15] = rot.slerp(world[:, 9], world[:, 12], np.full(len(seen), 0.5))
+    world[:, 15] = rot.multiply(world[:, 12], _level_head(world[:, 9], world[:, 12]))
+
+
+def _level_head(chest: Array, neck: Array) -> Array:
+    """(4,) turn of the head on the neck, the same for all frames.
+
+    The head nods with the neck's bone, but how steep that bone is in a person who looks ahead depends on where a body
+    model puts its joints: a bone that leans back all the time (up to 50 degrees) means a level head.
+    """
+    up = rot.rotate(rot.multiply(rot.inverse(chest), neck), np.array([0.0, 1.0, 0.0]))
+    lean = float(np.clip(np.median(np.arctan2(up[:, 2], up[:, 1])), -np.radians(50), 0))
+    return rot.rotvec_to_quat(np.array([-lean, 0, 0]))
 
 
 def _steadied(bone: Array, guess: Array, child: int) -> Array:
