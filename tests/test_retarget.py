@@ -154,6 +154,33 @@ def test_left_stays_left() -> None:
     assert (to_smpl22(motion).positions()[:, 20, 1] > mirrored[:, 20, 1] + 0.5).all()
 
 
+def test_a_z_up_recording_is_stood_up() -> None:
+    motion = stroll()
+    fall = rot.rotvec_to_quat(np.array([np.pi / 2, 0.0, 0.0]))  # +Y to +Z
+    offsets = rot.rotate(fall, SMPL22.offsets)
+    skeleton = Skeleton(SMPL22.names, SMPL22.parents, offsets)
+    local = rot.multiply(rot.multiply(fall, motion.rotations), rot.inverse(fall))
+    fallen = Motion(skeleton, 30.0, rot.rotate(fall, motion.root), local)
+    assert np.allclose(fallen.positions(), rot.rotate(fall, motion.positions()))
+    assert np.allclose(to_smpl22(fallen).positions(), to_smpl22(motion).positions(), atol=1e-6)
+
+
+def test_a_foot_whose_end_site_points_straight_down_still_faces_forward() -> None:
+    offsets = SMPL22.offsets.copy()
+    offsets[[10, 11]] = [0.0, -0.07, 0.0]
+    target = Skeleton(SMPL22.names, SMPL22.parents, offsets)
+    motion = stroll()
+    out = from_smpl22(motion, target)
+    assert errors(out.positions(), motion.positions(), LEGS).mean() < 10.0
+    turned = rot.multiply(out.world_rotations(), rot.inverse(motion.world_rotations()))[:, [7, 8]]
+    assert np.degrees(np.linalg.norm(rot.quat_to_rotvec(turned), axis=-1)).max() < 10.0
+
+
+def test_a_map_that_leaves_a_leg_without_a_knee_is_refused() -> None:
+    with pytest.raises(MotionloomError, match="left_knee"):
+        to_smpl22(stroll(), {"left_knee": "left_ankle"})
+
+
 def test_one_frame_is_enough() -> None:
     assert len(to_smpl22(stroll().frames(7, 8))) == 1
 
@@ -232,7 +259,7 @@ def test_any_family_goes_onto_any_other() -> None:
 
 def test_a_sample_of_the_whole_pack_goes_through_without_pops() -> None:
     with shared("data/manifest.csv").open() as file:
-        paths = [row["path"] for row in csv.DictReader(file) if not row["notes"]][::97]
+        paths = [row["path"] for row in csv.DictReader(file) if not row["notes"]][::131]
     for path in paths:
         person = to_smpl22(clip(path))
         turn = np.abs((person.rotations[1:] * person.rotations[:-1]).sum(-1)).clip(0, 1)

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
 from motionloom.retarget.joint_map import JointMap, Override, joint_map
 from motionloom.skeleton import SMPL22, Skeleton
 
@@ -71,6 +72,8 @@ class Body:
     """(22, 4) joint_from_anatomy."""
     upright: bool
     """Whether the frames are known; else the rest pose is no standing person and limbs have an arbitrary twist."""
+    up: Array
+    """(3,) up in rest pose; +Y where the rest pose is no standing person."""
     toe_height: float
     """Metres from the ground up to the toe joint on a flat foot."""
 
@@ -90,13 +93,27 @@ def read_body(skeleton: Skeleton, override: Override | None = None) -> Body:
     found = joint_map(skeleton, override)
     points = found.matrix(skeleton)
     rest = points @ skeleton.rest_positions()
+    _check_legs(skeleton, found, rest)
     axes = _rest_axes(rest)
     if axes is not None:
         height = _toe_height(skeleton, found, rest, axes[1])
-        return Body(skeleton, points, found.drivers(skeleton), rest, _rest_frames(rest, axes), True, height)
+        return Body(skeleton, points, found.drivers(skeleton), rest, _rest_frames(rest, axes), True, axes[1], height)
     known = _is_bandai(skeleton)
     frames = _bandai_frames(rest) if known else _odd_frames(rest)
-    return Body(skeleton, points, found.drivers(skeleton), rest, frames, known, 0.0)
+    return Body(skeleton, points, found.drivers(skeleton), rest, frames, known, np.eye(3)[1], 0.0)
+
+
+def _check_legs(skeleton: Skeleton, found: JointMap, rest: Array) -> None:
+    drivers = found.drivers(skeleton)
+    for j in LEGS:
+        child = CHILD[j]
+        assert child is not None
+        if drivers[j] is None or drivers[j] == drivers[child] or drivers[j] == drivers[0]:
+            raise MotionloomError(
+                f"the joint map puts {SMPL22.names[j]} where no joint of its own bends the leg; name one joint for it"
+            )
+        if np.linalg.norm(rest[child] - rest[j]) < 1e-6:
+            raise MotionloomError(f"the skeleton cannot be retargeted: the bone below {SMPL22.names[j]} has no length")
 
 
 def frame(first: Array, second: Array) -> Array:
@@ -128,7 +145,7 @@ def _rest_axes(rest: Array) -> tuple[Array, Array, Array] | None:
     sane = (
         (_unit(thighs) @ up < -0.3).all()
         and (_unit(shins) @ up < -0.3).all()
-        and (_unit(toes) @ forward > 0.1).all()
+        and (_unit(toes) @ forward > -0.3).all()
         and float(_unit(rest[16] - rest[17]) @ left) > 0.7
         and float(_unit(rest[15] - rest[0]) @ up) > 0.8
     )
@@ -149,6 +166,8 @@ def _rest_frames(rest: Array, axes: tuple[Array, Array, Array]) -> Array:
     for foot, toe in zip(FEET, TOES):
         heading = rest[toe] - rest[foot]
         heading = heading - float(heading @ up) * up
+        if float(heading @ forward) < 0.2 * np.linalg.norm(rest[toe] - rest[foot]):
+            heading = forward  # an End Site straight below the ankle says nothing
         frames[foot] = frames[toe] = frame(heading, left)
     for elbow, wrist in ((18, 20), (19, 21)):
         frames[wrist] = frames[elbow]

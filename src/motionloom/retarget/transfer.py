@@ -6,7 +6,7 @@
 4. *Legs*: two-bone IK puts the feet where the scaled source has them, so that a planted foot stays planted.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,12 +50,13 @@ def retarget(
 ) -> Motion:
     """The motion on another humanoid skeleton.
 
-    The world keeps its axes, the path shrinks or grows with the length of the legs, and the floor (where the
-    source's planted toes are) becomes y = 0. Bones keep the target's lengths exactly; bones of the source that
-    change length count by where they end. Raises `MotionloomError` if either skeleton is no humanoid.
+    The world keeps its axes (one that is Z-up is turned to Y-up), the path shrinks or grows with the length of the
+    legs, and the floor (where the source's planted toes are) becomes y = 0. Bones keep the target's lengths exactly;
+    bones of the source that change length count by where they end. Raises `MotionloomError` if either skeleton is no
+    humanoid.
     """
     source, body = read_body(motion.skeleton, source_map), read_body(target, target_map)
-    pose = _read_pose(motion, source)
+    pose = _read_pose(_y_up(motion, source), source)
     goals = _scale(pose, read_stance(pose.places, motion.fps), ratio=body.leg / source.leg, toe_height=body.toe_height)
     return _place(_orient(pose, body), goals, body, motion.fps)
 
@@ -88,6 +89,20 @@ def _read_pose(motion: Motion, source: Body) -> _Pose:
             bone = places[:, CHILD[j]] - places[:, j]
             frames[:, j] = rot.multiply(_turn(rot.rotate(frames[:, j], np.eye(3)[0]), bone), frames[:, j])
     return _Pose(places, frames)
+
+
+def _y_up(motion: Motion, source: Body) -> Motion:
+    """The motion turned so that +Y is up, where rest pose and poses agree that another axis was."""
+    if source.up[1] > 0.9:
+        return motion
+    places = np.einsum("sj,fjc->fsc", source.points, motion.positions())
+    tall = (places[:, HEAD] - places[:, FEET].mean(axis=1)).mean(axis=0)
+    if float(tall @ source.up) < 2 * abs(float(tall[1])):
+        return motion
+    turn = rot.shortest_arc(source.up, np.eye(3)[1])
+    rotations = motion.rotations.copy()
+    rotations[:, 0] = rot.multiply(turn, rotations[:, 0])
+    return replace(motion, root=rot.rotate(turn, motion.root), rotations=rotations)
 
 
 def _side_axis(above: Array, joint: int) -> Array:
