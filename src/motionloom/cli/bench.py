@@ -1,5 +1,34 @@
-"""Not filled yet."""
+"""`motionloom bench`: speed and memory, as ratios within one run."""
+
+import argparse
+from pathlib import Path
 
 
 def add(subparsers) -> None:
-    """Register nothing."""
+    """Register `bench`."""
+    parser = subparsers.add_parser("bench", help="measure speed and memory on this machine")
+    parser.add_argument("--weights", default="default", help="shipped name or file (default: default)")
+    parser.add_argument("--quick", action="store_true", help="fewer repeats and sizes")
+    parser.add_argument("--device", default="cpu", help="cpu or cuda for the network's part (default cpu)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to this file as well")
+    parser.set_defaults(run=_bench)
+
+
+def _bench(arguments: argparse.Namespace) -> None:
+    import sys
+
+    from motionloom.bench import bench, defaults, table
+    from motionloom.checkpoint import Prior
+    from motionloom.evaluation.obey import plain, write_json
+    from motionloom.tasks.text import generate
+
+    prior = Prior.load(arguments.weights, device=arguments.device)
+    found = bench(
+        prior, defaults(generate), quick=arguments.quick, weights=arguments.weights,
+        progress=lambda line: print(line, file=sys.stderr, flush=True),
+    )  # fmt: skip
+    if arguments.json:
+        write_json(arguments.json, found)
+    on = found["machine"]
+    print(f"{on['device']}, {on['cores']} cores, {on['threads']} threads, torch {on['torch']}, {on['type']}")
+    print(plain(table(found)))
