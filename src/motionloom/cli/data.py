@@ -1,5 +1,27 @@
-"""Not filled yet."""
+"""`motionloom data`: recordings to training sets."""
+
+import argparse
+from pathlib import Path
 
 
 def add(subparsers) -> None:
-    """Register nothing."""
+    """Register `data build`."""
+    data = subparsers.add_parser("data", help="turn recordings into a training set")
+    commands = data.add_subparsers(metavar="COMMAND", required=True)
+    build = commands.add_parser(
+        "build", help="features, captions, splits, mirrored copies, mean and std from folders of recordings"
+    )
+    build.add_argument("folders", nargs="+", type=Path, help="the mocap pack, a CMU download, a HumanML3D folder")
+    build.add_argument("--out", type=Path, required=True, help="folder of the built set; a build that stopped goes on")
+    build.add_argument("--captions", type=Path, help="humanml3d.jsonl(.gz) with captions for a CMU download")
+    build.add_argument("--workers", type=int, default=2, help="processes (default 2)")
+    build.add_argument("--mixed", type=int, default=300, help="clips with one take's arms on another's walk (default 300)")
+    build.set_defaults(run=_build)
+
+
+def _build(arguments: argparse.Namespace) -> None:
+    from motionloom.data.build import build
+
+    build(
+        arguments.folders, arguments.out, captions=arguments.captions, workers=arguments.workers, mixed=arguments.mixed
+    )

@@ -1,0 +1,193 @@
+"""`Prior`: everything one weight file holds, and the file itself.
+
+One safetensors file: tensors ``net.*`` (float16 or float32), ``mean``, ``std``, optionally ``text.*`` (the embedded text
+encoder), and JSON metadata under ``motionloom``: version, network sizes, schedule, features, text encoder, licence,
+provenance. Nothing in it is ever executed.
+"""
+
+import json
+import math
+from dataclasses import asdict, dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor
+
+from motionloom.diffusion import Schedule, cosine, linear
+from motionloom.errors import MotionloomError
+from motionloom.io.atomic import atomic_path
+from motionloom.nets.prior import Condition, NetConfig, PriorNet, condition
+from motionloom.nets.text import MiniLM, TextEncoder
+
+FORMAT = 1
+MAX_BYTES = 2 << 30
+SCHEDULES = {"cosine": cosine, "linear": linear}
+
+
+@dataclass(frozen=True)
+class Card:
+    """What a weight file says about itself."""
+
+    name: str
+    licence: str = "unknown: ask whoever gave you this file"
+    """What one may do with the weights."""
+    data: str = "unknown"
+    """What they were trained on, with the acknowledgements that asks for."""
+    notes: dict[str, Any] = field(default_factory=dict)
+    """How they were made: steps, seed, recipe, measured numbers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """A diffusion model of motion, ready to sample."""
+
+    net: PriorNet
+    schedule: Schedule
+    mean: Tensor
+    """(263,) of the training features."""
+    std: Tensor
+    text: TextEncoder
+    card: Card
+    fps: float = 20.0
+
+    @staticmethod
+    def load(weights: str | Path = "default", *, device: str | torch.device = "cpu") -> "Prior":
+        """Read a weight file: a path, or the name of one that ships with the package (``default``)."""
+        return load_prior(find_weights(weights), device)
+
+    def to(self, device: str | torch.device) -> "Prior":
+        """The same prior with its network and statistics on another device."""
+        return replace(self, net=self.net.to(device), mean=self.mean.to(device), std=self.std.to(device))
+
+    def condition(self, prompts: list[str], lengths: list[int] | None = None) -> Condition:
+        """Encode prompts, one row each; an empty prompt asks for nothing in particular."""
+        said = self.text.encode(prompts).to(self.mean.device)
+        if self.net.modulated:
+            cond = condition(said.pooled, tokens=said.tokens, words=said.mask, lengths=lengths)
+        else:
+            cond = condition(said.pooled, lengths=lengths)
+        keep = torch.tensor([bool(p.strip()) for p in prompts], device=self.mean.device)
+        return cond if bool(keep.all()) else cond.choose(keep)
+
+
+def shipped() -> dict[str, Path]:
+    """Names and places of the weight files inside the package."""
+    folder = Path(str(resources.files("motionloom"))) / "weights"
+    return {path.stem: path for path in sorted(folder.glob("*.safetensors"))} if folder.is_dir() else {}
+
+
+def find_weights(weights: str | Path) -> Path:
+    """The file for a shipped name or a path."""
+    names = shipped()
+    if str(weights) in names:
+        return names[str(weights)]
+    path = Path(weights)
+    if not path.is_file():
+        listed = ", ".join(names) or "none"
+        raise MotionloomError(f"no weights {str(weights)!r}: there is no such file, and the shipped names are {listed}")
+    return path
+
+
+def save_prior(prior: Prior, path: Path | str, *, half: bool = True) -> Path:
+    """Write a prior; matrices as float16 unless ``half`` is False, the text encoder inside if it is the embedded one."""
+    path = Path(path)
+    if path.suffix != ".safetensors":
+        raise MotionloomError(f"weights are written as .safetensors; {path.name} has another suffix")
+    kind = torch.float16 if half else torch.float32
+    tensors = {f"net.{k}": v.detach().cpu().to(kind).contiguous() for k, v in prior.net.state_dict().items()}
+    tensors |= {"mean": prior.mean.cpu().float().clone(), "std": prior.std.cpu().float().clone()}
+    if isinstance(prior.text, MiniLM):
+        tensors |= {f"text.{k}": v.contiguous() for k, v in prior.text.to_tensors().items()}
+    about = {
+        "format": FORMAT,
+        "net": asdict(prior.net.config),
+        "schedule": {"name": prior.schedule.name, "steps": prior.schedule.steps},
+        "text": prior.text.name,
+        "fps": prior.fps,
+        "card": asdict(prior.card),
+    }
+    with atomic_path(path) as temp:
+        save_file(tensors, temp, metadata={"motionloom": json.dumps(about)})
+    return path
+
+
+def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
+    """Tensors and metadata of a safetensors file, sizes checked; pickles are refused by what they are."""
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise MotionloomError(f"{path} is {size / 2**30:.1f} GiB large; weight files of at most 2 GiB are read")
+        with safe_open(path, framework="pt") as file:
+            return {key: file.get_tensor(key) for key in file.keys()}, dict(file.metadata() or {})  # noqa: SIM118
+    except SafetensorError as error:
+        raise MotionloomError(
+            f"{path} is not a whole safetensors file ({error}); published .pt files come in through 'motionloom import'"
+        ) from None
+
+
+def load_prior(path: Path, device: str | torch.device = "cpu") -> Prior:
+    """Read a prior; raises MotionloomError where the file is damaged, of another kind or of a newer format."""
+    tensors, metadata = read_tensors(path)
+    about = _about(path, metadata)
+    config = NetConfig.parse(about["net"])
+    with torch.device("meta"):
+        net = PriorNet(config)
+    weights = {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}
+    _check(path, {k: tuple(v.shape) for k, v in net.state_dict().items()}, weights)
+    net.load_state_dict(weights, assign=True)
+    for name in ("mean", "std"):
+        if name not in tensors or tensors[name].shape != (config.features,) or not bool(tensors[name].isfinite().all()):
+            raise MotionloomError(f"{path} lacks a usable {name} of {config.features} numbers; fetch the weights again")
+    schedule = SCHEDULES[about["schedule"]["name"]](about["schedule"]["steps"])
+    prior = Prior(
+        net.eval().requires_grad_(False), schedule, tensors["mean"].float(), tensors["std"].float(),
+        _text(path, about["text"], tensors), Card(**about["card"]), float(about["fps"]),
+    )  # fmt: skip
+    return prior if str(device) == "cpu" else prior.to(device)
+
+
+def _about(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
+    try:
+        about = json.loads(metadata["motionloom"])
+        if about["format"] != FORMAT:
+            raise MotionloomError(f"{path} has format {about['format']}; this motionloom reads format {FORMAT}: update it")
+        steps = about["schedule"]["steps"]
+        known = about["schedule"]["name"] in SCHEDULES and isinstance(steps, int) and 1 <= steps <= 100_000
+        good_card = isinstance(about["card"], dict) and isinstance(about["card"]["name"], str)
+        good_rate = isinstance(about["fps"], int | float) and math.isfinite(about["fps"]) and about["fps"] > 0
+        if not (known and good_card and good_rate and isinstance(about["net"], dict) and isinstance(about["text"], str)):
+            raise ValueError("values of the wrong kind")
+        about["card"] = {k: about["card"][k] for k in ("name", "licence", "data", "notes") if k in about["card"]}
+        return about
+    except MotionloomError:
+        raise
+    except (KeyError, TypeError, ValueError) as error:
+        raise MotionloomError(f"{path} does not describe a motionloom prior ({error!r}); name a file that does") from None
+
+
+def _check(path: Path, wanted: dict[str, tuple[int, ...]], found: dict[str, Tensor]) -> None:
+    missing, extra = sorted(wanted.keys() - found.keys()), sorted(found.keys() - wanted.keys())
+    if missing or extra:
+        raise MotionloomError(
+            f"{path} does not fit its own description: {len(missing)} weights are missing and {len(extra)} are unknown "
+            f"(such as {(missing + extra)[0]}); fetch the weights again"
+        )
+    for key, shape in wanted.items():
+        if tuple(found[key].shape) != shape:
+            raise MotionloomError(f"{path}: {key} is {tuple(found[key].shape)} and should be {shape}; fetch the weights again")
+        if not bool(found[key].isfinite().all()):
+            raise MotionloomError(f"{path}: {key} has numbers that are not finite; fetch the weights again")
+
+
+def _text(path: Path, name: str, tensors: dict[str, Tensor]) -> TextEncoder:
+    if name == "minilm":
+        return MiniLM.from_tensors({k[5:]: v for k, v in tensors.items() if k.startswith("text.")})
+    if name == "clip":
+        from motionloom.nets.text import ClipText
+
+        return ClipText.open()
+    raise MotionloomError(f"{path} wants the text encoder {name!r}, which this motionloom does not have")

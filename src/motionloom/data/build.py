@@ -1,0 +1,273 @@
+"""`motionloom data build`: folders of recordings to one training set of features, captions and splits.
+
+A built set is a folder: ``clips/NAME.safetensors`` (features (frames, 263) float32; the metadata holds captions, split,
+source and licence as JSON) and ``set.json`` (counts, mean, std, what was dropped and why). Every clip is written whole
+or not at all, so a build that was stopped goes on where it was.
+"""
+
+import json
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save_file
+
+from motionloom.data import augment
+from motionloom.data.sources import Take, find_takes
+from motionloom.data.windows import label_clip
+from motionloom.data.words import mirror_text
+from motionloom.errors import MotionloomError
+from motionloom.features import humanml as hml
+from motionloom.features.layout import FPS, LAYOUT
+from motionloom.io.atomic import atomic_path
+from motionloom.metrics.physics import Array
+from motionloom.skeleton import SMPL22
+
+SHORTEST = 20
+LOOPED = 200
+BENDS = (0.35, 0.75)
+"""Radians per second: a wide turn, and a circle in 8.4 seconds."""
+_MIRROR = list(SMPL22.mirror_pairs())
+_STATES = ("walk", "walk slow", "walk fast", "jog", "run", "walk backward", "jog backward", "stand", "dance", "circle left",
+           "circle right", "run circle", "climb", "sit", "balance", "sidestep left", "sidestep right")  # fmt: skip
+"""Labels that stay true however long a window of them is: neighbouring windows join."""
+
+
+@dataclass(frozen=True)
+class Note:
+    """Frames ``first`` to ``last`` (half-open) of a clip and the words for them."""
+
+    first: int
+    last: int
+    kind: str
+    """``human``, ``index``, or the measured label."""
+    texts: tuple[str, ...] = ()
+    """Sentences or verb phrases; empty for measured labels, whose wordings stand in `data.words`."""
+
+
+@dataclass(frozen=True)
+class Clip:
+    """One entry of a built set."""
+
+    name: str
+    source: str
+    licence: str
+    split: str
+    way: str
+    """``plain``, ``looped``, ``bent``, ``reversed`` or ``mixed``; mirrored copies begin with M in their name."""
+    notes: tuple[Note, ...]
+    features: np.ndarray
+    """(frames, 263) float32, not standardised."""
+
+
+def stand_on_floor(positions: Array) -> Array:
+    """The published canonical form, with the floor at the first percentile of the lowest joint: outliers do not lift it."""
+    positions = hml.canonical(positions)
+    return positions - np.array([0.0, np.percentile(positions[..., 1].min(axis=1), 1), 0.0])
+
+
+def clips_of(take: Take) -> Iterator[Clip]:
+    """A take as clips: itself, its mirrored copy, and in training loops and curves of gaits, and walks run backwards."""
+    read = take.read()
+    if not isinstance(read, tuple):  # finished HumanML3D features
+        yield from _with_mirror(_clip(take, np.asarray(read, dtype=np.float32), "plain"))
+        return
+    positions, fps = read
+    positions = stand_on_floor(hml.uniform(hml.resample_positions(positions, fps)))
+    if len(positions) <= SHORTEST:
+        raise MotionloomError(f"only {len(positions) / FPS:.2f} s long; at least {SHORTEST / FPS:.0f} s are needed")
+    clip = _clip(take, hml.encode(positions, heading="corrected"), "plain")
+    yield from _with_mirror(clip)
+    if take.split == "train":
+        yield from _more(take, clip, positions)
+
+
+def _more(take: Take, clip: Clip, positions: Array) -> Iterator[Clip]:
+    gait = {"walk", "walk slow", "walk fast", "jog", "run", "circle left", "circle right", "walk left turn",
+            "walk right turn", "sidestep left", "sidestep right"}  # fmt: skip
+    moves = [note.kind for note in clip.notes if note.kind in gait]
+    if not moves:
+        return
+    longer = augment.loop(clip.features, LOOPED) if len(clip.features) < 160 else clip.features
+    if len(clip.features) < 160 and longer is not None:
+        yield from _with_mirror(_clip(take, longer, "looped", spans=False))
+    if longer is not None and moves[0] in ("walk", "walk slow", "walk fast", "jog", "run"):
+        for number, rate in enumerate(BENDS):
+            bent = augment.bend(longer[:LOOPED], rate / FPS)
+            yield from _with_mirror(replace(_clip(take, bent, "bent", spans=False), name=f"{take.name}_bent{number}"))
+    back = hml.encode(augment.reversed_in_time(positions), heading="corrected")
+    back = augment.loop(back, LOOPED) if len(back) < 160 else back
+    if back is not None:
+        yield from _with_mirror(_clip(take, back, "reversed", spans=False))
+
+
+def _clip(take: Take, features: np.ndarray, way: str, *, spans: bool = True) -> Clip:
+    notes = []
+    for span in take.spans if spans else ():
+        first, last = round(span.start_s * FPS), min(round(min(span.end_s, 1e6) * FPS), len(features))
+        if last - first >= SHORTEST and span.texts:
+            notes.append(Note(first, last, span.kind, span.texts))
+    said = " | ".join(text for span in take.spans for text in span.texts)
+    found = label_clip(hml.decode_positions(features.astype(np.float64)), FPS, said)
+    notes += [Note(a, b, label) for a, b, label in join_spans(found)]
+    suffix = "" if way == "plain" else f"_{way}"
+    return Clip(take.name + suffix, take.source, take.licence, take.split, way, tuple(notes), features)
+
+
+def join_spans(spans: Sequence[tuple[int, int, str]]) -> list[tuple[int, int, str]]:
+    """Overlapping windows of a label that is a state become one span; single events keep their windows."""
+    result = [s for s in spans if s[2] not in _STATES]
+    for label in dict.fromkeys(s[2] for s in spans if s[2] in _STATES):
+        ordered = sorted((a, b) for a, b, name in spans if name == label)
+        joined: list[tuple[int, int]] = []
+        for a, b in ordered:
+            if joined and a <= joined[-1][1] - 10:
+                joined[-1] = (joined[-1][0], max(b, joined[-1][1]))
+            else:
+                joined.append((a, b))
+        result += [(a, b, label) for a, b in joined]
+    return result
+
+
+_OTHER_LABEL = {"sidestep left": "sidestep right", "turn left": "turn right", "walk left turn": "walk right turn",
+                "circle left": "circle right"}  # fmt: skip
+_OTHER_LABEL |= {b: a for a, b in _OTHER_LABEL.items()}
+
+
+def _with_mirror(clip: Clip) -> Iterator[Clip]:
+    yield clip
+    notes = tuple(
+        replace(n, kind=_OTHER_LABEL.get(n.kind, n.kind), texts=tuple(mirror_text(t) for t in n.texts)) for n in clip.notes
+    )
+    yield replace(clip, name="M" + clip.name, notes=notes, features=hml.mirror(clip.features))
+
+
+def mixed_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
+    """Arms of a gesture on the body of a gait, both from training clips of one licence."""
+    rng = np.random.default_rng(seed)
+    bodies = _labelled(clips, ("walk", "walk slow", "jog", "walk backward", "circle left", "circle right", "sidestep left", "sidestep right"))
+    arms = _labelled(clips, ("wave", "arms up", "punch"))
+    for number in range(count if bodies and arms else 0):
+        body_label, gesture = rng.choice(sorted(bodies)), rng.choice(sorted(arms))
+        below, note = bodies[body_label][rng.integers(len(bodies[body_label]))]
+        above, gesture_note = arms[gesture][rng.integers(len(arms[gesture]))]
+        if below.licence != above.licence:
+            continue
+        worn = augment.wear_arms(_positions(below, note), _positions(above, gesture_note))
+        features = hml.encode(worn, heading="corrected")
+        features[:, LAYOUT["root_height"]] = below.features[note.first : note.first + len(features), LAYOUT["root_height"]]
+        yield Clip(
+            f"mixed_{seed}_{number:04d}", below.source, below.licence, "train", "mixed",
+            (Note(0, len(features), f"{body_label}+{gesture}"),), features,
+        )  # fmt: skip
+
+
+def _labelled(clips: Sequence[Clip], labels: Sequence[str]) -> dict[str, list[tuple[Clip, Note]]]:
+    found: dict[str, list[tuple[Clip, Note]]] = {}
+    for clip in clips:
+        for note in clip.notes:
+            if note.kind in labels and clip.split == "train" and note.last - note.first >= 50:
+                found.setdefault(note.kind, []).append((clip, note))
+    return found
+
+
+def _positions(clip: Clip, note: Note) -> Array:
+    return hml.decode_positions(clip.features[note.first : note.last].astype(np.float64))
+
+
+def write_clip(folder: Path, clip: Clip) -> None:
+    """One file ``folder/NAME.safetensors``, whole or not at all."""
+    about = {k: v for k, v in asdict(clip).items() if k != "features"}
+    with atomic_path(folder / f"{clip.name}.safetensors") as temp:
+        save_file({"features": np.ascontiguousarray(clip.features)}, temp, metadata={"clip": json.dumps(about)})
+
+
+def read_clip(path: Path) -> Clip:
+    """The inverse of `write_clip`; raises MotionloomError for a damaged file."""
+    try:
+        with safe_open(path, framework="numpy") as file:
+            about = json.loads(file.metadata()["clip"])
+            features = file.get_tensor("features")
+        notes = tuple(Note(n["first"], n["last"], n["kind"], tuple(n["texts"])) for n in about.pop("notes"))
+        return Clip(**about, notes=notes, features=features)
+    except (SafetensorError, KeyError, TypeError, ValueError) as error:
+        raise MotionloomError(f"{path} is not a clip of a built set ({error}); delete it and build again") from error
+
+
+_takes: dict[tuple[str, str], dict[str, Take]] = {}
+
+
+def _prepare(job: tuple[str, str, str, str]) -> tuple[str, str]:
+    """In a worker: write the clips of one take. Returns its name and why it was dropped ('' if it was not)."""
+    folder, captions, name, out = job
+    key = (folder, captions)
+    if key not in _takes:
+        _takes[key] = {take.name: take for take in find_takes(folder, captions=captions or None)}
+    done = Path(out) / "done" / name
+    try:
+        for clip in clips_of(_takes[key][name]):
+            write_clip(Path(out) / "clips", clip)
+    except MotionloomError as error:
+        done.write_text(str(error), encoding="utf-8")
+        return name, str(error)
+    done.write_text("", encoding="utf-8")
+    return name, ""
+
+
+def build(
+    folders: Sequence[Path | str],
+    out: Path | str,
+    *,
+    captions: Path | str | None = None,
+    workers: int = 2,
+    mixed: int = 300,
+    progress: Callable[[str], None] = print,
+) -> Path:
+    """Build a training set from folders of recordings; returns the path of ``set.json``. Takes already done are kept."""
+    out = Path(out)
+    for part in ("clips", "done"):
+        (out / part).mkdir(parents=True, exist_ok=True)
+    jobs = [
+        (str(folder), str(captions or ""), take.name, str(out))
+        for folder in folders
+        for take in find_takes(folder, captions=captions)
+        if not (out / "done" / take.name).exists()
+    ]
+    kept = len(list((out / "done").iterdir()))
+    progress(f"{len(jobs)} takes to do, {kept} already done")
+    with ProcessPoolExecutor(max_workers=workers) as pool:
+        for number, (name, reason) in enumerate(pool.map(_prepare, jobs, chunksize=4), start=1):
+            if reason:
+                progress(f"dropped {name}: {reason}")
+            if number % 100 == 0:
+                progress(f"{number} of {len(jobs)} takes done")
+    return _finish(out, mixed, progress)
+
+
+def _finish(out: Path, mixed: int, progress: Callable[[str], None]) -> Path:
+    clips = [read_clip(path) for path in sorted((out / "clips").glob("*.safetensors")) if not path.name.startswith("mixed_")]
+    for seed, licence in enumerate(sorted({clip.licence for clip in clips})):
+        for clip in mixed_clips([c for c in clips if c.licence == licence], mixed, seed):
+            write_clip(out / "clips", clip)
+            clips.append(clip)
+    dropped = {p.name: text for p in sorted((out / "done").iterdir()) if (text := p.read_text(encoding="utf-8"))}
+    frames = np.concatenate([c.features for c in clips if c.split == "train"] or [np.zeros((1, 263), np.float32)])
+    counts = Counter(f"{c.source}/{c.split}/{c.way}" for c in clips)
+    labels = Counter(n.kind for c in clips for n in c.notes if c.split == "train")
+    about = {
+        "clips": dict(sorted(counts.items())),
+        "minutes": round(sum(len(c.features) for c in clips) / FPS / 60, 1),
+        "notes": dict(labels.most_common()),
+        "licences": sorted({c.licence for c in clips}),
+        "dropped": dropped,
+        "mean": [round(float(v), 6) for v in frames.mean(0, dtype=np.float64)],
+        "std": [round(float(v), 6) for v in frames.std(0, dtype=np.float64)],
+    }
+    with atomic_path(out / "set.json") as temp:
+        Path(temp).write_text(json.dumps(about, indent=1), encoding="utf-8")
+    progress(f"{len(clips)} clips, {about['minutes']} minutes, {len(dropped)} takes dropped: {out / 'set.json'}")
+    return out / "set.json"

@@ -1,0 +1,167 @@
+"""A built set in memory, and the training batches drawn from it."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from motionloom.data.build import Clip, read_clip
+from motionloom.data.words import phrases, sentence
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import LAYOUT
+
+WORDINGS = 48
+"""Sentences made per measured label."""
+SHARE = {"human": 0.35, "index": 0.12, "label": 0.53}
+"""How often a training sample shows a written caption, an index description, a measured label."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """A described stretch of one clip."""
+
+    start: int
+    """First frame in `MotionSet.features`."""
+    frames: int
+    group: str
+    """``human``, ``index`` or the measured label."""
+    texts: tuple[int, ...]
+    """Numbers of its sentences in `MotionSet.texts`."""
+
+
+@dataclass(frozen=True)
+class MotionSet:
+    """Clips laid end to end, with what they show."""
+
+    features: Tensor
+    """(frames of all clips, 263) float32, standardised."""
+    mean: Tensor
+    std: Tensor
+    items: tuple[Item, ...]
+    texts: tuple[str, ...]
+    licences: tuple[str, ...]
+    minutes: float
+    """Minutes of motion as recorded, without mirrored and made-up copies."""
+
+
+def read_clips(folder: Path | str, *, sources: Sequence[str] = (), splits: Sequence[str] = ("train",)) -> list[Clip]:
+    """The clips of a built set; ``sources`` keeps those whose source begins with one of the words."""
+    folder = Path(folder)
+    if not (folder / "set.json").is_file():
+        raise MotionloomError(f"{folder} is not a built set (it has no set.json); make one with 'motionloom data build'")
+    clips = (read_clip(path) for path in sorted((folder / "clips").glob("*.safetensors")))
+    kept = [c for c in clips if c.split in splits and (not sources or c.source.startswith(tuple(sources)))]
+    if not kept:
+        raise MotionloomError(f"{folder} holds no clips of source {', '.join(sources) or 'any'} in {', '.join(splits)}")
+    return kept
+
+
+def statistics(clips: Sequence[Clip]) -> tuple[np.ndarray, np.ndarray]:
+    """Mean per number and standard deviation averaged within the blocks of the layout, as published (263,) each."""
+    frames = np.concatenate([c.features for c in clips]).astype(np.float64)
+    mean, std = frames.mean(0), frames.std(0)
+    for block in LAYOUT.values():
+        std[block] = max(std[block].mean(), 1e-4)
+    return mean.astype(np.float32), std.astype(np.float32)
+
+
+def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, cache: Path | None = None) -> MotionSet:
+    """Read the training split of a built set. ``seed`` fixes the wordings of measured labels."""
+    clips = read_clips(folder, sources=sources)
+    mean, std = statistics(clips)
+    rng = np.random.default_rng(seed)
+    texts: dict[str, int] = {}
+    wordings: dict[str, tuple[int, ...]] = {}
+    items, start = [], 0
+    for clip in clips:
+        for note in clip.notes:
+            if note.kind == "human":
+                said = tuple(_number(texts, t) for t in note.texts)
+            elif note.kind == "index":
+                said = tuple(dict.fromkeys(_number(texts, sentence(p, rng)) for p in note.texts for _ in range(3)))
+            else:
+                if note.kind not in wordings:
+                    made = {sentence(p, rng) for _ in range(WORDINGS) for p in [rng.choice(list(phrases(note.kind)))]}
+                    wordings[note.kind] = tuple(_number(texts, t) for t in sorted(made))
+                said = wordings[note.kind]
+            items.append(Item(start + note.first, note.last - note.first, note.kind, said))
+        start += len(clip.features)
+    features = torch.from_numpy(np.concatenate([c.features for c in clips]))
+    features = (features - torch.from_numpy(mean)) / torch.from_numpy(std)
+    recorded = sum(len(c.features) for c in clips if c.way == "plain" and not c.name.startswith("M")) / 20 / 60
+    return MotionSet(
+        features, torch.from_numpy(mean), torch.from_numpy(std), tuple(items), tuple(texts),
+        tuple(sorted({c.licence for c in clips})), recorded,
+    )  # fmt: skip
+
+
+def _number(texts: dict[str, int], text: str) -> int:
+    return texts.setdefault(text.strip(), len(texts))
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Windows of motion with their sentences."""
+
+    features: Tensor
+    """(rows, frames, 263) standardised; zeros behind each row's length."""
+    lengths: Tensor
+    """(rows,) valid frames."""
+    texts: Tensor
+    """(rows,) numbers of sentences."""
+
+
+class Batches:
+    """Draws batches; the draw of a step depends on the seed and the step alone, so that training resumes exactly.
+
+    All rows of a batch share a window (one of ``windows`` frames, drawn by ``shares``); items shorter than the window
+    but at least 60 % of it are taken whole and padded. First the kind of text is drawn (`SHARE`), then for measured
+    labels the label, evenly over labels, then the item: rare actions are seen as often as walks.
+    """
+
+    def __init__(
+        self, data: MotionSet, *, windows: Sequence[int] = (48, 80, 120, 196), shares: Sequence[float] = (0.2, 0.3, 0.35, 0.15)
+    ) -> None:
+        self.data, self.windows = data, tuple(windows)
+        self.shares = np.array(shares) / np.sum(shares)
+        self._pools = {w: self._pool(w) for w in self.windows}
+
+    def _pool(self, window: int) -> dict[str, dict[str, np.ndarray]]:
+        fitting: dict[str, dict[str, list[int]]] = {}
+        for number, item in enumerate(self.data.items):
+            if item.frames >= 0.6 * window:
+                kind = item.group if item.group in SHARE else "label"
+                fitting.setdefault(kind, {}).setdefault(item.group, []).append(number)
+        return {kind: {g: np.array(numbers) for g, numbers in groups.items()} for kind, groups in fitting.items()}
+
+    def draw(self, seed: int, step: int, rows: int) -> Batch:
+        """The batch of one step."""
+        rng = np.random.default_rng((seed, step))
+        window = int(rng.choice(self.windows, p=self.shares))
+        pools = self._pools[window]
+        kinds = [k for k in SHARE if k in pools]
+        share = np.array([SHARE[k] for k in kinds])
+        picked = rng.choice(len(kinds), size=rows, p=share / share.sum())
+        features = torch.zeros(rows, window, self.data.features.shape[1])
+        lengths, texts = [], []
+        for row, kind in enumerate(picked):
+            groups = pools[kinds[kind]]
+            names = list(groups)
+            weights = np.array([1.0 if "+" not in n else 0.15 for n in names])
+            numbers = groups[names[rng.choice(len(names), p=weights / weights.sum())]]
+            item = self.data.items[numbers[rng.integers(len(numbers))]]
+            length = min(item.frames, window)
+            start = item.start + int(rng.integers(item.frames - length + 1))
+            features[row, :length] = self.data.features[start : start + length]
+            lengths.append(length)
+            texts.append(item.texts[rng.integers(len(item.texts))])
+        return Batch(features, torch.tensor(lengths), torch.tensor(texts))
+
+
+def summary(folder: Path | str) -> dict:
+    """What ``set.json`` says."""
+    return json.loads((Path(folder) / "set.json").read_text(encoding="utf-8"))

@@ -1,0 +1,173 @@
+"""Where takes come from: the mocap pack, a CMU download, an official HumanML3D folder. One reader per layout."""
+
+import csv
+import gzip
+import json
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from motionloom.data.words import describe_index
+from motionloom.errors import MotionloomError
+from motionloom.io import load
+from motionloom.metrics.physics import Array
+from motionloom.retarget import joints22
+
+CMU_LICENCE = "CMU mocap: free for research and commercial use; acknowledge mocap.cs.cmu.edu, NSF EIA-0196217"
+BANDAI_LICENCE = "Bandai-Namco-Research-Motiondataset, CC BY-NC 4.0: non-commercial use only"
+HUMANML3D_LICENCE = "HumanML3D / AMASS: research use under the licences of AMASS and its subsets"
+
+
+@dataclass(frozen=True)
+class Span:
+    """A part of a take and what people say it shows."""
+
+    start_s: float
+    end_s: float
+    texts: tuple[str, ...]
+    kind: str
+    """``human`` (a caption somebody wrote) or ``index`` (the collection's own description)."""
+
+
+@dataclass(frozen=True)
+class Take:
+    """One recorded clip before it is turned into features."""
+
+    name: str
+    source: str
+    licence: str
+    split: str
+    spans: tuple[Span, ...]
+    read: Callable[[], tuple[Array, float] | np.ndarray]
+    """Joint positions (frames, 22, 3) in metres with their frame rate, or finished features (frames, 263)."""
+
+
+def find_takes(folder: Path | str, *, captions: Path | str | None = None) -> list[Take]:
+    """The takes of a folder, whose layout is recognised by the files in it."""
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise MotionloomError(f"{folder} is not a folder; name the mocap pack, a CMU download or a HumanML3D folder")
+    if (folder / "manifest.csv").is_file():
+        return list(_pack(folder))
+    if (folder / "new_joint_vecs").is_dir():
+        return list(_humanml3d(folder))
+    takes = list(_cmu(folder, Path(captions) if captions else None))
+    if not takes:
+        raise MotionloomError(
+            f"{folder} has no manifest.csv, no new_joint_vecs and no .amc or .bvh files; "
+            "name the mocap pack, a HumanML3D folder or a CMU download"
+        )
+    return takes
+
+
+def _pack(folder: Path) -> Iterator[Take]:
+    written: dict[str, list[Span]] = {}
+    for row in _json_lines(folder / "captions" / "cmu.jsonl"):
+        span = Span(float(row["start_s"]), float(row["end_s"]), tuple(row["captions"]), "human")
+        written.setdefault(row["clip"], []).append(span)
+    with open(folder / "manifest.csv", newline="", encoding="utf-8") as lines:
+        for row in csv.DictReader(lines):
+            path = _inside(folder, row["path"])
+            bandai = row["source"].startswith("bandai")
+            spans = [] if bandai else written.get(row["clip"], [])
+            index = describe_index(row["description"])
+            if index:
+                spans = [*spans, Span(0.0, float(row["seconds"]), index, "index")]
+            yield Take(
+                name=row["clip"],
+                source=row["source"],
+                licence=BANDAI_LICENCE if bandai else CMU_LICENCE,
+                split=row["split"],
+                spans=tuple(spans),
+                read=_reader(path, fps=float(row["fps"]), unit=None if path.suffix == ".amc" else float(row["metres_per_unit"])),
+            )
+
+
+def _cmu(folder: Path, captions: Path | None) -> Iterator[Take]:
+    """A CMU download: NN/NN_MM.amc beside NN/NN.asf (120 frames/s), or BVH files; index text and captions if there."""
+    index: dict[str, str] = {}
+    for path in sorted(folder.rglob("*index*.txt")):
+        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+            if match := re.match(r"\s*(\d+_\d+)\s+(.+)", line):
+                index[match.group(1)] = match.group(2).strip()
+    rows: dict[str, list[dict]] = {}
+    for row in _json_lines(captions) if captions else ():
+        if (match := re.search(r"CMU/\d+/(\d+_\d+)_poses", row["amass_path"])) and not row["mirrored"]:
+            rows.setdefault(match.group(1), []).append(row)
+    for path in sorted([*folder.rglob("*.amc"), *folder.rglob("*.bvh")]):
+        number = "_".join(part.zfill(2) for part in path.stem.split("_"))
+        spans = [_amass_span(row) for row in rows.get(number, [])]
+        phrases = describe_index(index.get(number, index.get(path.stem, "")))
+        if phrases:
+            spans.append(Span(0.0, float("inf"), phrases, "index"))
+        splits = {row["split"] for row in rows.get(number, [])}
+        split = next((s for s in ("test", "val") if s in splits), "train")
+        yield Take(path.stem, "cmu", CMU_LICENCE, split, tuple(spans), _reader(path, fps=None, unit=None))
+
+
+def _amass_span(row: dict) -> Span:
+    end = float("inf") if row["end_s"] is None else float(row["end_s"])
+    texts = tuple(c["text"] for c in row["captions"] if not c["from_s"] and not c["to_s"])
+    return Span(float(row["start_s"] or 0.0), end, texts, "human")
+
+
+def _humanml3d(folder: Path) -> Iterator[Take]:
+    """HumanML3D as its authors lay it out: new_joint_vecs/*.npy, texts/*.txt, train.txt, val.txt, test.txt."""
+    for split in ("train", "val", "test"):
+        listed = folder / f"{split}.txt"
+        if not listed.is_file():
+            raise MotionloomError(f"{listed} is missing; a HumanML3D folder has train.txt, val.txt and test.txt")
+        for name in listed.read_text(encoding="utf-8").split():
+            if name.startswith("M"):
+                continue  # mirrored copies are made here
+            path = _inside(folder, f"new_joint_vecs/{name}.npy")
+            yield Take(name, "humanml3d", HUMANML3D_LICENCE, split, tuple(_texts(folder / "texts" / f"{name}.txt")), _features(path))
+
+
+def _texts(path: Path) -> Iterator[Span]:
+    if not path.is_file():
+        return
+    for line in path.read_text(encoding="utf-8").splitlines():
+        parts = line.split("#")
+        if len(parts) != 4:
+            continue
+        start, end = (float(p) if p not in ("", "nan") else 0.0 for p in parts[2:])
+        yield Span(start, end if end > start else float("inf"), (parts[0].strip(),), "human")
+
+
+def _reader(path: Path, *, fps: float | None, unit: float | None) -> Callable[[], tuple[Array, float]]:
+    def read() -> tuple[Array, float]:
+        motion = load(path, fps=fps, unit=unit)
+        return joints22(motion), motion.fps
+
+    return read
+
+
+def _features(path: Path) -> Callable[[], np.ndarray]:
+    def read() -> np.ndarray:
+        try:
+            return np.load(path, allow_pickle=False)
+        except (OSError, ValueError) as error:
+            raise MotionloomError(f"{path} is not an array of features ({error})") from error
+
+    return read
+
+
+def _inside(folder: Path, relative: str) -> Path:
+    path = (folder / relative).resolve()
+    if not path.is_relative_to(folder.resolve()):
+        raise MotionloomError(f"{relative!r} leads out of {folder}; paths must stay inside the data folder")
+    return path
+
+
+def _json_lines(path: Path) -> Iterator[dict]:
+    opened = gzip.open(path, "rt", encoding="utf-8") if path.suffix == ".gz" else open(path, encoding="utf-8")
+    with opened as lines:
+        for number, line in enumerate(lines, start=1):
+            try:
+                yield json.loads(line)
+            except json.JSONDecodeError as error:
+                raise MotionloomError(f"{path}, line {number} is not JSON ({error})") from error

@@ -1,0 +1,217 @@
+"""The one training loop: mixed precision, averaged weights, exact resume, several processes.
+
+Everything random in a step follows from (seed, step, rank), and the state file is replaced whole, so a run that was
+killed at any moment goes on with the losses it would have had.
+"""
+
+import json
+import math
+import os
+import time
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+import torch.distributed as dist
+from safetensors.torch import save_file
+from torch import Tensor, nn
+from torch.nn.attention import SDPBackend, sdpa_kernel
+
+from motionloom.checkpoint import read_tensors
+from motionloom.errors import MotionloomError
+from motionloom.io.atomic import atomic_path
+from motionloom.train.objectives import Objective
+from motionloom.train.recipe import Recipe
+
+STATE = "state.safetensors"
+
+
+@dataclass(frozen=True)
+class World:
+    """This process among those of ``torchrun``; alone by default."""
+
+    rank: int = 0
+    size: int = 1
+    device: str = "cpu"
+
+    @staticmethod
+    def join(device: str | None = None) -> "World":
+        """Join the process group that torchrun's environment describes, if there is one."""
+        size = int(os.environ.get("WORLD_SIZE", "1"))
+        local = int(os.environ.get("LOCAL_RANK", "0"))
+        device = device or (f"cuda:{local}" if torch.cuda.is_available() else "cpu")
+        if size > 1 and not dist.is_initialized():
+            dist.init_process_group("nccl" if device.startswith("cuda") else "gloo")
+        if device.startswith("cuda"):
+            torch.cuda.set_device(device)
+        return World(int(os.environ.get("RANK", "0")), size, device)
+
+
+def rate_at(recipe: Recipe, step: int) -> float:
+    """Learning rate of a step: linear warm-up, constant, linear to zero in the cool-down."""
+    warm = min(1.0, (step + 1) / max(recipe.warmup, 1))
+    left = (recipe.steps - step) / max(recipe.cooldown * recipe.steps, 1e-9)
+    return recipe.rate * min(warm, left, 1.0)
+
+
+class Average:
+    """Exponential moving average of a module's weights; early on it forgets faster, so that it starts useful."""
+
+    def __init__(self, net: nn.Module, decay: float) -> None:
+        self.decay = decay
+        self.weights = {k: v.detach().clone() for k, v in net.state_dict().items()}
+
+    @torch.no_grad()
+    def update(self, net: nn.Module, step: int) -> None:
+        """Take in the weights after ``step``."""
+        decay = min(self.decay, (step + 1) / (step + 10))
+        for key, value in net.state_dict().items():
+            if value.is_floating_point():
+                self.weights[key].lerp_(value, 1 - decay)
+            else:
+                self.weights[key].copy_(value)
+
+
+def make_optimizer(net: nn.Module, recipe: Recipe) -> torch.optim.AdamW:
+    """AdamW; weight decay on matrices only."""
+    trained = [p for p in net.parameters() if p.requires_grad]
+    groups = [
+        {"params": [p for p in trained if p.ndim >= 2], "weight_decay": recipe.decay},
+        {"params": [p for p in trained if p.ndim < 2], "weight_decay": 0.0},
+    ]
+    return torch.optim.AdamW(groups, lr=recipe.rate, betas=(0.9, 0.99))
+
+
+def save_state(folder: Path, net: nn.Module, average: Average, optimizer: torch.optim.Optimizer, *, step: int, recipe: Recipe) -> None:
+    """Everything a run needs to go on, in one file without pickle."""
+    tensors = {f"net.{k}": v for k, v in net.state_dict().items()}
+    tensors |= {f"average.{k}": v for k, v in average.weights.items()}
+    for number, state in optimizer.state_dict()["state"].items():
+        tensors |= {f"optimizer.{number}.{k}": torch.as_tensor(v) for k, v in state.items()}
+    tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
+    with atomic_path(folder / STATE) as temp:
+        save_file(tensors, temp, metadata={"step": str(step), "recipe": json.dumps(asdict(recipe))})
+
+
+def load_state(path: Path, net: nn.Module, average: Average, optimizer: torch.optim.Optimizer) -> int:
+    """Fill the run's parts from a state file; returns the number of steps done."""
+    tensors, metadata = read_tensors(path)
+    try:
+        net.load_state_dict({k[4:]: v for k, v in tensors.items() if k.startswith("net.")})
+        for key, value in average.weights.items():
+            value.copy_(tensors[f"average.{key}"])
+        state: dict[int, dict[str, Tensor]] = {}
+        for key, value in tensors.items():
+            if key.startswith("optimizer."):
+                _, number, name = key.split(".", 2)
+                state.setdefault(int(number), {})[name] = value
+        optimizer.load_state_dict({"state": state, "param_groups": optimizer.state_dict()["param_groups"]})
+        return int(metadata["step"])
+    except (KeyError, RuntimeError, ValueError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise MotionloomError(f"{path} does not belong to this recipe ({reason}); train into another folder") from None
+
+
+def train(
+    objective: Objective,
+    recipe: Recipe,
+    folder: Path | str,
+    *,
+    world: World | None = None,
+    wrap: Callable[[nn.Module], nn.Module] = lambda net: net,
+    on_save: Callable[[nn.Module, Average, int], None] | None = None,
+    on_step: Callable[[int, float, float], None] | None = None,
+    stop: int | None = None,
+) -> Average:
+    """Run a recipe in ``folder``, going on from the state found there; returns the averaged weights.
+
+    ``wrap`` turns the trained module into what is called in a step (binding, compiling). ``on_save(net, average,
+    step)`` and ``on_step(step, loss, seconds)`` run in the first process. ``stop``: end early after so many steps.
+    """
+    world, folder = world or World(), Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    net = objective.net.to(world.device)
+    average = Average(net, recipe.ema)
+    optimizer = make_optimizer(net, recipe)
+    done = load_state(folder / STATE, net, average, optimizer) if (folder / STATE).is_file() else 0
+    called = wrap(net)
+    if world.size > 1:
+        places = [world.device] if world.device.startswith("cuda") else None
+        called = nn.parallel.DistributedDataParallel(called, device_ids=places)
+    net.train()
+    last = min(recipe.steps, stop or recipe.steps)
+    for step in range(done, last):
+        began = time.perf_counter()
+        loss = _step(objective, called, optimizer, recipe, step=step, world=world)
+        average.update(net, step)
+        if world.rank == 0:
+            if on_step:
+                on_step(step, loss, time.perf_counter() - began)
+            if (step + 1) % recipe.save_every == 0 or step + 1 == last:
+                save_state(folder, net, average, optimizer, step=step + 1, recipe=recipe)
+                if on_save:
+                    on_save(net, average, step + 1)
+    return average
+
+
+def _step(
+    objective: Objective, net: nn.Module, optimizer: torch.optim.Optimizer, recipe: Recipe, *, step: int, world: World
+) -> float:
+    for group in optimizer.param_groups:
+        group["lr"] = rate_at(recipe, step)
+    seed = recipe.seed * 1_000_003 + world.rank
+    torch.manual_seed(seed * 7919 + step)  # dropout
+    kind = world.device.split(":")[0]
+    # on a CPU the plain attention is faster backward than the fused kernel for sequences this short (benchmarks/)
+    with (
+        torch.autocast(kind, torch.bfloat16) if recipe.amp == "bf16" else nullcontext(),
+        sdpa_kernel(SDPBackend.MATH) if kind == "cpu" else nullcontext(),
+    ):
+        loss = objective.loss(net, seed, step, recipe.batch)
+    value = float(loss.detach())
+    if not math.isfinite(value):
+        raise MotionloomError(f"the loss of step {step} is not finite; lower the rate and go on from the saved state")
+    optimizer.zero_grad(set_to_none=True)
+    loss.backward()
+    nn.utils.clip_grad_norm_(net.parameters(), recipe.clip)
+    optimizer.step()
+    return value
+
+
+class Log:
+    """A progress line with loss, throughput and remaining time; TensorBoard files where that is installed."""
+
+    def __init__(self, folder: Path, recipe: Recipe, *, every: int = 50, say: Callable[[str], None] = print) -> None:
+        self.recipe, self.every, self.say = recipe, every, say
+        self.losses: list[float] = []
+        self.seconds = 0.0
+        self.writer: Any = None
+        try:
+            from torch.utils.tensorboard import SummaryWriter
+
+            self.writer = SummaryWriter(str(folder / "tensorboard"))
+        except ImportError:
+            pass
+
+    def __call__(self, step: int, loss: float, seconds: float) -> None:
+        """Take in one step; see `train`."""
+        self.losses.append(loss)
+        self.seconds += seconds
+        if (step + 1) % self.every and step + 1 != self.recipe.steps:
+            return
+        count, mean = len(self.losses), sum(self.losses) / len(self.losses)
+        pace = count / self.seconds
+        left = (self.recipe.steps - step - 1) / pace
+        self.say(
+            f"step {step + 1}/{self.recipe.steps}  loss {mean:.4f}  {pace * self.recipe.batch:.0f} windows/s  "
+            f"{int(left // 3600)}:{int(left % 3600 // 60):02d}:{int(left % 60):02d} left"
+        )
+        if self.writer:
+            self.writer.add_scalar("loss", mean, step + 1)
+            self.writer.add_scalar("rate", rate_at(self.recipe, step), step + 1)
+            self.writer.add_scalar("windows_per_second", pace * self.recipe.batch, step + 1)
+            self.writer.flush()
+        self.losses, self.seconds = [], 0.0

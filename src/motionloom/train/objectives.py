@@ -1,0 +1,107 @@
+"""What a step of training minimises. An objective owns the modules and turns a batch into one number."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from motionloom.data.sets import Batch, Batches
+from motionloom.diffusion import Schedule
+from motionloom.features.layout import LAYOUT
+from motionloom.nets.prior import Condition, PriorNet, condition
+from motionloom.nets.text import TextEncoder
+
+WEIGHTS = {"yaw_velocity": 6.0, "root_velocity": 6.0, "root_height": 6.0, "ric": 1.5, "rot6d": 0.4, "joint_velocity": 1.0, "contacts": 0.5}
+"""Weights of the feature blocks in the loss: the few numbers of the root decide where a person goes, the 126 of the
+rotations are read by nobody when motions are exported. 1 everywhere is the published loss."""
+
+
+class Objective(Protocol):
+    """One kind of training for `train.loop.train`."""
+
+    net: nn.Module
+    """The trained weights."""
+
+    def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
+        """The loss of one step, drawn from ``(seed, step)`` alone; ``net`` may be a wrapped `self.net`."""
+        ...
+
+
+class WordBank:
+    """Token states of all sentences of a set, encoded once, float16."""
+
+    def __init__(self, encoder: TextEncoder, texts: tuple[str, ...], *, room: int = 40, progress: Callable[[str], None] = print) -> None:
+        self.starts = [0]
+        tokens, pooled = [], []
+        progress(f"encoding {len(texts)} sentences")
+        for first in range(0, len(texts), 256):
+            said = encoder.encode(texts[first : first + 256])
+            pooled.append(said.pooled)
+            for row, mask in zip(said.tokens, said.mask, strict=True):
+                count = min(int(mask.sum()), room)
+                tokens.append(row[:count].half())
+                self.starts.append(self.starts[-1] + count)
+        self.tokens, self.pooled = torch.cat(tokens), torch.cat(pooled)
+
+    def condition(self, texts: Tensor, lengths: Tensor) -> Condition:
+        """The condition of a batch."""
+        spans = [(self.starts[i], self.starts[i + 1]) for i in texts.tolist()]
+        count = max(b - a for a, b in spans)
+        tokens = self.tokens.new_zeros(len(spans), count, self.tokens.shape[1])
+        words = torch.zeros(len(spans), count, dtype=torch.bool)
+        for row, (a, b) in enumerate(spans):
+            tokens[row, : b - a] = self.tokens[a:b]
+            words[row, : b - a] = True
+        return condition(self.pooled[texts], tokens=tokens.float(), words=words, lengths=lengths)
+
+
+class CleanGuess:
+    """Mean squared error of the clean guess at a uniformly drawn level (Tevet et al. 2023, eq. 2), blocks weighted.
+
+    The mean is over valid frames and numbers of each row, then over rows, as published (specification of MDM's loss).
+    """
+
+    def __init__(
+        self, net: PriorNet, schedule: Schedule, batches: Batches, words: WordBank, *, drop_text: float = 0.1,
+        weights: dict[str, float] = WEIGHTS, device: str = "cpu",
+    ) -> None:  # fmt: skip
+        self.net, self.schedule, self.batches, self.words = net, schedule, batches, words
+        self.drop_text, self.device = drop_text, device
+        scale = torch.ones(net.config.features)
+        for name, block in LAYOUT.items():
+            scale[block] = weights[name]
+        self.scale = (scale / scale.mean()).to(device)
+
+    def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
+        """See `Objective.loss`."""
+        batch: Batch = self.batches.draw(seed, step, rows)
+        generator = torch.Generator().manual_seed(int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0]))
+        level = torch.randint(1, self.schedule.steps + 1, (rows,), generator=generator)
+        noise = torch.randn(batch.features.shape, generator=generator)
+        keep = torch.rand(rows, generator=generator) >= self.drop_text
+        cond = self.words.condition(batch.texts, batch.lengths).choose(keep)
+        clean, level = batch.features.to(self.device), level.to(self.device)
+        cond = Condition(*(part.to(self.device) for part in cond))
+        noised = self.schedule.noised(clean, level, noise.to(self.device))
+        guess = net(noised, level, cond)
+        return masked_error(guess, clean, cond.lengths, self.scale)
+
+
+class Conditioned(nn.Module):
+    """A prior network that binds its condition in the same call, so that wrappers (DDP, compile) see one forward."""
+
+    def __init__(self, net: PriorNet) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, x: Tensor, level: Tensor, cond: Condition) -> Tensor:
+        return self.net(x, level, self.net.bind(cond))
+
+
+def masked_error(guess: Tensor, clean: Tensor, lengths: Tensor, scale: Tensor) -> Tensor:
+    """Weighted squared error over valid frames: (rows, frames, features) twice, (rows,), (features,) to one number."""
+    valid = torch.arange(clean.shape[1], device=clean.device) < lengths[:, None]
+    error = ((guess.float() - clean) ** 2 * scale).mean(-1)
+    return ((error * valid).sum(1) / lengths.clamp(min=1)).mean()

@@ -1,0 +1,87 @@
+"""Training a prior from a recipe: the data, the network, the text encoder, and the weight file that comes out."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+from torch import nn
+
+from motionloom.checkpoint import SCHEDULES, Card, Prior, find_weights, load_prior, read_tensors, save_prior
+from motionloom.data.sets import Batches, MotionSet, load_set
+from motionloom.nets.prior import NetConfig, PriorNet
+from motionloom.nets.text import MiniLM, TextEncoder
+from motionloom.train.loop import Average, Log, World, train
+from motionloom.train.objectives import CleanGuess, Conditioned, WordBank
+from motionloom.train.recipe import Recipe
+
+
+def train_prior(
+    recipe: Recipe,
+    data: Path | str,
+    folder: Path | str,
+    *,
+    text: TextEncoder,
+    device: str | None = None,
+    stop: int | None = None,
+    say: Callable[[str], None] = print,
+) -> Path:
+    """Train (or go on training) a prior on a built set; returns the weight file ``folder/NAME.safetensors``."""
+    world, folder = World.join(device), Path(folder)
+    motions = load_set(data, sources=recipe.sources, seed=recipe.seed)
+    torch.manual_seed(recipe.seed)
+    net = PriorNet(NetConfig.parse(recipe.net))
+    if recipe.start:
+        start = Prior.load(recipe.start)
+        net.load_state_dict(start.net.state_dict())
+        mean, std = start.mean, start.std
+        restandardised = (motions.features * motions.std + motions.mean - mean) / std
+        motions = replace(motions, features=restandardised, mean=mean, std=std)
+    schedule = SCHEDULES[recipe.schedule](recipe.levels)
+    batches = Batches(motions, windows=recipe.windows, shares=recipe.shares)
+    words = WordBank(text, motions.texts, progress=say if world.rank == 0 else lambda line: None)
+    objective = CleanGuess(net, schedule, batches, words, drop_text=recipe.drop_text, device=world.device)
+    say(f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(motions.items):,} described stretches, "
+        f"{len(motions.texts):,} sentences, {motions.minutes:.0f} minutes recorded")  # fmt: skip
+    place = folder / f"{recipe.name}.safetensors"
+
+    def export(_: nn.Module, average: Average, step: int) -> None:
+        prior = _prior(recipe, motions, average, step, text)
+        save_prior(prior, place)
+        if recipe.show_every and step % recipe.show_every == 0:
+            _show(prior, recipe, folder / f"step_{step:07d}.png")
+
+    def wrap(module: nn.Module) -> nn.Module:
+        assert isinstance(module, PriorNet)
+        called: nn.Module = Conditioned(module)
+        return torch.compile(called, dynamic=True) if recipe.compile else called  # type: ignore[return-value]
+
+    log = Log(folder, recipe, say=say) if world.rank == 0 else None
+    train(objective, recipe, folder, world=world, wrap=wrap, on_save=export, on_step=log, stop=stop)
+    return place
+
+
+def text_encoder(weights: str) -> TextEncoder:
+    """The text encoder inside a prior's weight file, or of a file that holds nothing but an encoder."""
+    path = find_weights(weights)
+    tensors, _ = read_tensors(path)
+    if "vocabulary" in tensors:
+        return MiniLM.from_tensors(tensors)
+    return load_prior(path).text
+
+
+def _prior(recipe: Recipe, motions: MotionSet, average: Average, step: int, text: TextEncoder) -> Prior:
+    config = NetConfig.parse(recipe.net)
+    net = PriorNet(config)
+    net.load_state_dict({k: v.cpu() for k, v in average.weights.items()})
+    notes = {"steps": step, "recipe": recipe.name, "seed": recipe.seed, "minutes": round(motions.minutes, 1)}
+    card = Card(recipe.name, recipe.licence or "; ".join(motions.licences), "; ".join(motions.licences), notes)
+    schedule = SCHEDULES[recipe.schedule](recipe.levels)
+    return Prior(net.eval().requires_grad_(False), schedule, motions.mean, motions.std, text, card)
+
+
+def _show(prior: Prior, recipe: Recipe, path: Path) -> None:
+    from motionloom.io.video import draw_sheet
+    from motionloom.tasks.text import generate
+
+    draw_sheet(generate(prior, recipe.prompts, seconds=4.0), path, captions=recipe.prompts)

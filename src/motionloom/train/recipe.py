@@ -1,0 +1,108 @@
+"""Recipes: what to train, on what, how. A recipe is a small TOML file; unknown keys are errors."""
+
+import tomllib
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from motionloom.errors import MotionloomError
+from motionloom.nets.prior import NetConfig
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """One training run."""
+
+    name: str = "prior"
+    licence: str = ""
+    """What one may do with the weights; empty: the licences of the training data, listed."""
+    sources: list[str] = field(default_factory=list)
+    """Sources of the built set to use, by the beginning of their names; empty: all."""
+    steps: int = 20_000
+    """Steps of the whole run."""
+    batch: int = 64
+    """Windows per step and process."""
+    windows: list[int] = field(default_factory=lambda: [48, 80, 120, 196])
+    """Lengths of windows in frames, one drawn per step."""
+    shares: list[float] = field(default_factory=lambda: [0.2, 0.3, 0.35, 0.15])
+    """How often each length is drawn."""
+    rate: float = 8e-4
+    """Learning rate after the warm-up."""
+    warmup: int = 300
+    cooldown: float = 0.3
+    """Last share of the run in which the rate falls linearly to zero."""
+    decay: float = 0.01
+    """Weight decay of matrices."""
+    clip: float = 1.0
+    """Largest norm of the gradient."""
+    ema: float = 0.999
+    """Decay of the averaged weights that are sampled from."""
+    amp: str = "bf16"
+    """``bf16`` or ``none``."""
+    compile: bool = False
+    """Compile the network with torch.compile: pays on a GPU and on long runs."""
+    drop_text: float = 0.1
+    """Share of samples trained without their text."""
+    schedule: str = "cosine"
+    levels: int = 1000
+    seed: int = 0
+    save_every: int = 500
+    """Steps between checkpoints."""
+    show_every: int = 0
+    """Steps between sample pictures; 0: none."""
+    prompts: list[str] = field(default_factory=lambda: ["a person walks forward", "a person jumps", "someone waves"])
+    """What the sample pictures show."""
+    start: str = ""
+    """Weights to go on from: a shipped name or a path; empty: random ones."""
+    net: dict[str, Any] = field(default_factory=dict)
+    """Sizes of the network, see `motionloom.nets.prior.NetConfig`."""
+
+
+def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Recipe:
+    """Read a recipe; ``changes`` replace entries. Raises MotionloomError for unknown keys and unusable values."""
+    path = Path(path)
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise MotionloomError(f"there is no recipe {path}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise MotionloomError(f"{path} is not TOML: {error}") from None
+    values |= changes or {}
+    hints = get_type_hints(Recipe)
+    for key, value in values.items():
+        if key not in hints:
+            raise MotionloomError(f"{path}: no setting {key!r}; the settings are {', '.join(f.name for f in fields(Recipe))}")
+        kind = getattr(hints[key], "__origin__", hints[key])
+        if kind is float and isinstance(value, int) and not isinstance(value, bool):
+            values[key] = float(value)
+        elif not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+            raise MotionloomError(f"{path}: {key} must be of kind {kind.__name__}; got {value!r}")
+    recipe = Recipe(**values)
+    _check(path, recipe)
+    return recipe
+
+
+def _check(path: Path, recipe: Recipe) -> None:
+    good = (
+        recipe.steps > 0 < recipe.batch and recipe.rate > 0 and 0 <= recipe.ema < 1 and 0 <= recipe.drop_text < 1
+        and recipe.levels > 1 and 0 <= recipe.cooldown <= 1 and recipe.clip > 0 and recipe.save_every > 0
+        and len(recipe.windows) == len(recipe.shares) > 0 and min(recipe.windows) > 0 and min(recipe.shares) >= 0 < sum(recipe.shares)
+        and recipe.amp in ("bf16", "none") and recipe.schedule in ("cosine", "linear")
+    )  # fmt: skip
+    if not good:
+        raise MotionloomError(f"{path}: a number or a choice is out of its range; see the comments of recipes/default.toml")
+    NetConfig.parse(recipe.net)
+
+
+def changes(pairs: list[str]) -> dict[str, Any]:
+    """``KEY=VALUE`` words as recipe entries, the values written as in TOML (text needs no quotes)."""
+    result: dict[str, Any] = {}
+    for pair in pairs:
+        key, found, value = pair.partition("=")
+        if not found:
+            raise MotionloomError(f"{pair!r} is not of the form KEY=VALUE, such as steps=20000")
+        try:
+            result |= tomllib.loads(f"{key} = {value}")
+        except tomllib.TOMLDecodeError:
+            result[key] = value
+    return result
