@@ -9,7 +9,7 @@ SUFFIXES := bvh glb npz mp4 png
 # One thread per test process: JOBS processes times torch's own threads would fight for the same cores.
 ONE_THREAD := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help demo test check lint format types imports install dev pictures tables wheel clean
+.PHONY: help demo test check lint format types imports install dev pictures measure tables wheel clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -44,6 +44,13 @@ dev: $(VENV)/.dev  ## the same with what tests and checks need
 
 pictures: $(VENV)/.runtime  ## draw the README's pictures anew, with the shipped weights
 	$(BIN)/python tools/make_pictures.py
+
+measure: $(VENV)/.runtime  ## measure the shipped weights anew (DATA=recordings for realism); fills the README
+	rm -rf benchmarks/obedience benchmarks/realism
+	$(BIN)/motionloom evaluate obedience --out benchmarks/obedience
+	$(BIN)/motionloom evaluate realism $(if $(DATA),--data $(DATA)) --out benchmarks/realism
+	$(BIN)/motionloom bench --json benchmarks/speed.json > benchmarks/speed.txt
+	$(BIN)/python tools/fill_readme.py
 
 tables: $(VENV)/.runtime  ## copy the tables of benchmarks/ into the README
 	$(BIN)/python tools/fill_readme.py

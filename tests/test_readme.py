@@ -135,10 +135,11 @@ def test_the_readmes_tables_are_the_measured_ones() -> None:
 
 def test_tables_are_filled_from_files(tmp_path: Path) -> None:
     """A marked place takes its file's text once, however often it is filled; one without a file stays."""
-    (tmp_path / "a.md").write_text("| 1 |\n")
-    text = "x\n<!-- filled from a.md -->\nold\n<!-- end -->\n<!-- filled from b.md -->\nkept\n<!-- end -->\n"
+    (tmp_path / "a.md").write_text("# Title\n\n| 1 |\n")
+    (tmp_path / "b.txt").write_text("x  y\n")
+    text = "".join(f"<!-- filled from {name} -->\nold\n<!-- end -->\n" for name in ("a.md", "b.txt", "c.md"))
     once = fill(text, tmp_path)
-    assert places(once) == {"a.md": "| 1 |", "b.md": "kept"}
+    assert places(once) == {"a.md": "| 1 |", "b.txt": "```text\nx  y\n```", "c.md": "old"}
     assert fill(once, tmp_path) == once
 
 
