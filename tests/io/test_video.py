@@ -141,7 +141,9 @@ def test_a_sheet_has_a_row_per_motion_and_shows_both_sides_and_contact(tmp_path:
 
 
 def test_left_is_drawn_where_left_is(tmp_path: Path) -> None:
-    """From the right front a T-pose shows its left hand to the right of its right hand."""
+    """From the right front a T-pose shows its left hand, orange, to the right of its blue right hand."""
+    assert draw.LEFT[0] > 2 * draw.LEFT[2]
+    assert draw.RIGHT[2] > 2 * draw.RIGHT[0]
     sheet = np.asarray(Image.open(draw_sheet([standing(2)], tmp_path / "t.png", columns=2)))[50:, :170].astype(int)
     columns = [np.nonzero(np.abs(sheet - c).max(axis=-1) <= 4)[1].mean() for c in (draw.LEFT, draw.RIGHT)]
     assert columns[0] > columns[1]

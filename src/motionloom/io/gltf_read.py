@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.glb import Document, read_document
-from motionloom.io.text import shown
+from motionloom.io.gltf_curves import Curves, channels_of, clock, read_curves, sample, unit_quaternions
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
 
@@ -20,10 +20,6 @@ Array = NDArray[np.float64]
 MAX_NODES = 20_000
 MAX_JOINTS = 10_000
 MAX_SKINS = 64
-FREE_POSES = 2_000_000
-"""Frames times joints that any file may ask for; more only as far as the file itself holds as many keys."""
-FPS_LIMIT = 1000.0
-FALLBACK_FPS = 30.0
 FAR = 1e6  # metres; nobody is further away
 
 
@@ -38,20 +34,6 @@ class _Node:
     """(3,)"""
 
 
-@dataclass(frozen=True)
-class _Curve:
-    """One channel: key times (keys,) and values (keys, width), with tangents around them where cubic."""
-
-    times: Array
-    values: Array
-    mode: str
-    arriving: Array | None = None
-    leaving: Array | None = None
-
-
-Curves = dict[tuple[int, str], _Curve]
-
-
 def load_glb(path: str | Path, *, person: int = 0) -> Motion:
     """Read the skeleton and animation of one person from a .glb, or a .gltf with embedded buffers.
 
@@ -64,7 +46,7 @@ def load_glb(path: str | Path, *, person: int = 0) -> Motion:
     document = read_document(path)
     nodes = _nodes(document)
     parents = _parents(document, nodes)
-    channels = _channels(document, len(nodes))
+    channels = channels_of(document, len(nodes))
     people = _people(document, nodes, parents, channels)
     if not 0 <= person < len(people):
         raise MotionloomError(f"{document.name} holds {len(people)} people; there is no number {person}")
@@ -72,10 +54,10 @@ def load_glb(path: str | Path, *, person: int = 0) -> Motion:
     if len(joints) > MAX_JOINTS:
         raise document.bad(f"its skeleton has {len(joints)} joints; at most {MAX_JOINTS} can be read")
     moved = next((a for a in channels if any(node in joints for node, _ in a)), {})
-    curves = _curves(document, {key: sampler for key, sampler in moved.items() if key[0] in joints})
+    curves = read_curves(document, {key: sampler for key, sampler in moved.items() if key[0] in joints})
     kept = {j for skin in _skins(document, len(nodes)) for j in skin} or joints
     nodes, joints, curves = _settle(nodes, joints, curves, parents=parents, kept=kept)
-    fps, times = _clock(document, curves, len(joints))
+    fps, times = clock(document, curves, len(joints))
     return _assemble(document, nodes, parents, joints=joints, curves=curves, fps=fps, times=times)
 
 
@@ -103,7 +85,7 @@ def _node(document: Document, number: int, entry: dict[str, Any], count: int) ->
             place = document.numbers(entry["translation"], 3, f"the translation of {what}")
         if entry.get("rotation") is not None:
             xyzw = document.numbers(entry["rotation"], 4, f"the rotation of {what}")
-            turn = _unit(document, xyzw[None], f"the rotation of {what}")[0]
+            turn = unit_quaternions(document, xyzw[None], f"the rotation of {what}")[0]
         if entry.get("scale") is not None:
             scale = document.numbers(entry["scale"], 3, f"the scale of {what}")
     below = tuple(document.index(c, count, "nodes") for c in children)
@@ -113,14 +95,6 @@ def _node(document: Document, number: int, entry: dict[str, Any], count: int) ->
 def _printable(name: Any) -> str:
     """A name that can be shown and written anywhere."""
     return "".join(c if c.isprintable() else "_" for c in name[:200]).strip() if isinstance(name, str) else ""
-
-
-def _unit(document: Document, xyzw: Array, what: str) -> Array:
-    """(..., 4) x, y, z, w of about unit length to w, x, y, z."""
-    length = np.linalg.norm(xyzw, axis=-1)
-    if not ((length > 0.1) & (length < 10)).all():
-        raise document.bad(f"{what} is not a unit quaternion")
-    return rot.normalize(np.roll(xyzw, 1, axis=-1))
 
 
 def _decompose(document: Document, values: Array, what: str) -> tuple[Array, Array, Array]:
@@ -261,140 +235,6 @@ def _body(root: int, wanted: set[int], nodes: list[_Node], *, whole: bool) -> fr
     return frozenset(kept)
 
 
-# --- channels -----------------------------------------------------------------------------------------------------
-
-
-def _channels(document: Document, nodes: int) -> list[dict[tuple[int, str], dict[str, Any]]]:
-    """For each animation its samplers by (node, path)."""
-    result = []
-    for animation in document.items("animations"):
-        samplers = document.items("samplers", animation)
-        found: dict[tuple[int, str], dict[str, Any]] = {}
-        for channel in document.items("channels", animation):
-            target = channel.get("target")
-            if not isinstance(target, dict) or target.get("path") not in ("translation", "rotation", "scale"):
-                continue
-            if target.get("node") is None:
-                continue
-            node = document.index(target["node"], nodes, "nodes")
-            number = document.index(channel.get("sampler"), len(samplers), "animation samplers")
-            found[node, target["path"]] = samplers[number]
-        result.append(found)
-    return result
-
-
-def _curves(document: Document, samplers: dict[tuple[int, str], dict[str, Any]]) -> Curves:
-    clocks: dict[int, Array] = {}  # channels share their key times
-    curves: Curves = {}
-    held, most = 0, 1_000_000 + sum(len(b) for b in document.buffers)  # entries may share bytes, within reason
-    for (node, path), sampler in samplers.items():
-        key = document.index(sampler.get("input"), len(document.items("accessors")), "accessors")
-        if key not in clocks:
-            clocks[key] = _times(document, key)
-            held += clocks[key].size
-        curve = curves[node, path] = _curve(document, sampler, clocks[key], f"the {path} of node {node}")
-        held += curve.values.size
-        if held > most:
-            raise document.bad("its animation claims more numbers than the file holds")
-    return curves
-
-
-def _times(document: Document, key: Any) -> Array:
-    times = document.accessor(key, "SCALAR", "an animation's key times")[:, 0]
-    if not (np.diff(times) > 0).all() or np.abs(times).max() > 1e7:
-        raise document.bad("an animation's key times do not rise")
-    return times
-
-
-def _curve(document: Document, sampler: dict[str, Any], times: Array, what: str) -> _Curve:
-    mode = sampler.get("interpolation", "LINEAR")
-    if mode not in ("LINEAR", "STEP", "CUBICSPLINE"):
-        raise document.bad(f"{what} has the unknown interpolation {shown(str(mode))}")
-    turn = what.startswith("the rotation")
-    values = document.accessor(sampler.get("output"), "VEC4" if turn else "VEC3", what)
-    each = 3 if mode == "CUBICSPLINE" else 1
-    if len(values) != each * len(times):
-        raise document.bad(f"{what} has {len(values)} values for {len(times)} key times")
-    if np.abs(values).max() > 1e9:
-        raise document.bad(f"{what} holds absurdly large numbers")
-    if each == 1:
-        return _Curve(times, _unit(document, values, what) if turn else values, mode)
-    arriving, values, leaving = (values[k::3] for k in range(3))
-    if turn:
-        _unit(document, values, what)
-        arriving, values, leaving = (np.roll(v, 1, axis=-1) for v in (arriving, values, leaving))
-    return _Curve(times, values, mode, arriving, leaving)
-
-
-def _clock(document: Document, curves: Curves, joints: int) -> tuple[float, Array]:
-    """Frame rate and times (frames,) of the samples, from the channel with the most keys."""
-    if not curves:
-        return FALLBACK_FPS, np.zeros(1)
-    start = min(float(c.times[0]) for c in curves.values())
-    end = max(float(c.times[-1]) for c in curves.values())
-    fps = _rate(max((c.times for c in curves.values()), key=len), _declared_fps(document))
-    frames = (end - start) * fps
-    if frames * joints > FREE_POSES + 4 * sum(c.values.size for c in curves.values()):
-        raise document.bad(f"its animation of {end - start:.6g} s with {joints} joints at {fps:.6g} fps is too large")
-    return fps, start + np.arange(int(np.floor(frames + 0.1)) + 1) / fps
-
-
-def _declared_fps(document: Document) -> float | None:
-    """The frame rate that our own files state."""
-    for animation in document.items("animations"):
-        extras = animation.get("extras")
-        fps = extras.get("fps") if isinstance(extras, dict) else None
-        if isinstance(fps, int | float) and not isinstance(fps, bool) and 0 < fps <= 1e5:
-            return float(fps)
-    return None
-
-
-def _rate(times: Array, declared: float | None) -> float:
-    """Frames per second of evenly spaced keys; `FALLBACK_FPS` for keys placed by hand or very far apart."""
-    if len(times) < 2:
-        return declared or FALLBACK_FPS
-    steps = np.diff(times)
-    step = float(times[-1] - times[0]) / len(steps)
-    slack = 2e-7 * float(np.abs(times).max()) + 1e-3 * step  # times are stored in single precision
-    if declared is not None:
-        ticks = (times - times[0]) * declared
-        if np.abs(ticks - np.round(ticks)).max() < 0.02 + slack * declared:
-            return declared
-    if np.abs(steps - step).max() > 2 * slack:
-        step = float(np.median(steps))  # a few keys were dropped, or it is hand work
-        whole = np.round(steps / step)
-        if np.abs(steps - whole * step).max() > 0.05 * step or (whole < 1).any():
-            return FALLBACK_FPS
-    fps = 1 / step
-    if not 10 * 0.99 < fps < FPS_LIMIT * 1.01:
-        return FALLBACK_FPS
-    common = [c for c in (24000 / 1001, 30000 / 1001, 60000 / 1001, round(fps)) if abs(fps / c - 1) < 3e-4]
-    return float(min(common, key=lambda c: abs(fps - c))) if common else fps
-
-
-def _sample(curve: _Curve, times: Array, fps: float, *, turn: bool) -> Array:
-    """Values (frames, width) at the given times; the ends are held."""
-    keys, values = curve.times, curve.values
-    near = 1e-3 / fps + 2e-7 * float(np.abs(times).max())
-    if curve.mode != "CUBICSPLINE" and len(keys) == len(times) and np.abs(keys - times).max() < near:
-        return values
-    low = np.clip(np.searchsorted(keys, times + near, side="right") - 1, 0, len(keys) - 1)
-    high = np.minimum(low + 1, len(keys) - 1)
-    gap = keys[high] - keys[low]
-    amount = np.clip((times - keys[low]) / np.where(gap > 0, gap, 1.0), 0.0, 1.0) * (gap > 0)
-    a, b, s = values[low], values[high], amount[:, None]
-    if curve.mode == "STEP":
-        return a
-    if curve.mode == "LINEAR":
-        return rot.slerp(a, b, amount) if turn else a * (1 - s) + b * s
-    assert curve.arriving is not None
-    assert curve.leaving is not None
-    wide = gap[:, None]
-    result = (2 * s**3 - 3 * s**2 + 1) * a + (s**3 - 2 * s**2 + s) * wide * curve.leaving[low]
-    result += (3 * s**2 - 2 * s**3) * b + (s**3 - s**2) * wide * curve.arriving[high]
-    return rot.normalize(result) if turn else result
-
-
 # --- the motion ---------------------------------------------------------------------------------------------------
 
 
@@ -417,9 +257,9 @@ def _assemble(
     turns = np.repeat(np.array([nodes[n].turn for n in order])[None], len(times), axis=0)
     for (node, path), curve in curves.items():
         if path == "translation":
-            places[:, slots[node]] = _sample(curve, times, fps, turn=False) * sizes[slots[node]]
+            places[:, slots[node]] = sample(curve, times, fps, turn=False) * sizes[slots[node]]
         elif path == "rotation":
-            turns[:, slots[node]] = _sample(curve, times, fps, turn=True)
+            turns[:, slots[node]] = sample(curve, times, fps, turn=True)
     stretched = np.abs(places[:, 1:] - offsets[1:]).max(initial=0.0) > 1e-5
     offsets[0] = above[0] + rot.rotate(above[1], offsets[0])
     places[:, 0] = above[0] + rot.rotate(above[1], places[:, 0])
@@ -475,7 +315,6 @@ def _sizes(
     document: Document, nodes: list[_Node], order: list[int], *, curves: Curves, parents: list[int], first: float
 ) -> Array:
     """(joints,) factor of each joint's translation: the product of the scales above it."""
-    inner = {parents[n] for n in order[1:]}
     sizes = np.full(len(order), first)
     slots = {node: k for k, node in enumerate(order)}
     for k, node in enumerate(order):
@@ -487,7 +326,6 @@ def _sizes(
                 if np.ptp(values, axis=0).max() > 1e-3 * np.abs(values).max():
                     raise document.bad(f"the scale of node {parent} changes through time, which is not supported")
                 scale = values[0]
-            assert parent in inner
             sizes[k] = sizes[slots[parent]] * _uniform(document, scale, parent)
     if not (np.isfinite(sizes).all() and (sizes < 1e9).all()):
         raise document.bad("its scales are absurdly large")
