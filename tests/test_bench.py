@@ -33,6 +33,15 @@ def prior(request: pytest.FixtureRequest) -> Prior:
     return Prior(net, cosine(50), torch.zeros(12), torch.ones(12), Words(), Card("tiny"))
 
 
+@pytest.fixture(autouse=True)
+def _one_thread():
+    """Two threads that wait for each other on a busy machine take a hundred times longer on networks this small."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
 def fake_process(arguments: Sequence[str]) -> bench.Process:
     return bench.Process(0.25 if arguments[0] == "--help" else 3.0, 800.0)
 

@@ -154,6 +154,6 @@ def test_climbing_stays_up_and_jumping_comes_down() -> None:
     up = np.repeat(np.clip(np.linspace(-0.5, 1.5, 80), 0, 1)[:, None], 3, axis=1) * [0, 1.0, 0]
     p = moved(standing(), up)
     assert gestures.stance_rise(p, FPS) == pytest.approx(1, abs=0.1)
-    assert gestures.stance_rise(p[::-1], FPS) == pytest.approx(1, abs=0.1)
+    assert gestures.stance_rise(p[::-1], FPS) < 0.01
     assert gestures.stance_rise(jumping(0.4), FPS) < 0.1
     assert gestures.stance_rise(standing()[:3], FPS) == 0

@@ -219,11 +219,11 @@ def wrist_thrust(positions: np.ndarray, fps: float) -> Array:
 
 
 def stance_rise(positions: np.ndarray, fps: float) -> float:
-    """Metres between the lowest and the highest place at which the lower foot stayed for three quarters of a second.
+    """Metres by which the lower foot rose from one place to a later one, having stayed at both for 3/4 of a second.
 
-    Somebody on stairs or a ladder stays up; a jump comes down again.
+    Somebody on stairs or a ladder stays up; a jump comes down again; going down is no rise.
     """
     window = odd(0.75 * fps)
     lower = smooth(np.asarray(positions)[:, TOES, 1].min(axis=1), 3)
-    kept = [lower[start : start + window].min() for start in range(max(1, len(lower) - window))]
-    return float(max(kept) - min(kept))
+    kept = np.array([lower[start : start + window].min() for start in range(max(1, len(lower) - window))])
+    return float((kept - np.minimum.accumulate(kept)).max())
