@@ -268,7 +268,7 @@ def test_a_failing_ffmpeg_leaves_nothing_and_says_why(tmp_path: Path, monkeypatc
 
 
 def test_a_failing_scene_stops_ffmpeg_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise RuntimeError("brush lost")
 
     monkeypatch.setattr(draw, "paint_body", broken)

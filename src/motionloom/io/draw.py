@@ -23,6 +23,7 @@ QUIET: Colour = (120, 128, 142)
 LEFT: Colour = (233, 116, 64)
 RIGHT: Colour = (52, 116, 205)
 MIDDLE: Colour = (112, 119, 134)
+TRUNKS: tuple[Colour, ...] = (MIDDLE, (156, 128, 92), (92, 132, 108), (138, 104, 136))  # tell people apart
 SKIN: Colour = (226, 190, 160)
 CONTACT: Colour = (24, 178, 107)
 PATH: Colour = (150, 92, 190)
@@ -168,11 +169,11 @@ def paint_shadow(picture: Image.Image, camera: Camera, shape: Figure, frame: int
     picture.paste(SHADOW, (int(low[0]), int(low[1])), mask)
 
 
-def paint_body(pen: ImageDraw.ImageDraw, camera: Camera, shape: Figure, frame: int) -> None:
+def paint_body(pen: ImageDraw.ImageDraw, camera: Camera, shape: Figure, frame: int, *, trunk: Colour = MIDDLE) -> None:
     """The person, far parts first; a body without bones is a ball."""
     if not shape.bones:
         at, _, scale = camera.see(shape.places[frame, :1])
-        pen.polygon(hull(at, 0.06 * shape.height * scale), fill=MIDDLE)
+        pen.polygon(hull(at, 0.06 * shape.height * scale), fill=trunk)
         return
     places = shape.places[frame]
     seen, depth, scale = camera.see(places)
@@ -186,14 +187,14 @@ def paint_body(pen: ImageDraw.ImageDraw, camera: Camera, shape: Figure, frame: i
     middles = ((depth[a] + depth[b]) / 2 + 0.08 * shape.height * inside).tolist()
     for i, (parent, child) in enumerate(shape.bones):
         if child not in shape.trunk:
-            parts.append((middles[i], outer[i], inner[i], _bone_colour(shape, frame, parent, child)))
+            parts.append((middles[i], outer[i], inner[i], _bone_colour(shape, frame, parent, child) or trunk))
     for joints, radius in ((shape.chest, 0.047), (shape.hips, 0.056)):
         if joints:
             at, r = seen[list(joints)], radius * shape.height * scale[list(joints)]
             mean = float(depth[list(joints)].mean())
-            parts.append((mean, _flat(hull(at, r + edge)), _flat(hull(at, r)), MIDDLE))
+            parts.append((mean, _flat(hull(at, r + edge)), _flat(hull(at, r)), trunk))
     if shape.chest and shape.hips:
-        parts.append(_waist(seen, depth, scale, shape, edge))
+        parts.append((*_waist(seen, depth, scale, shape, edge), trunk))
     parts += _head_parts(camera, shape, frame, edge)
     for _, outside, inside, colour in sorted(parts, key=lambda part: -part[0]):
         pen.polygon(outside, fill=mix(colour, INK, 0.55))
@@ -205,22 +206,23 @@ def _flat(points: list[tuple[float, float]]) -> list[float]:
     return [v for p in points for v in p]
 
 
-def _bone_colour(shape: Figure, frame: int, parent: int, child: int) -> Colour:
+def _bone_colour(shape: Figure, frame: int, parent: int, child: int) -> Colour | None:
+    """Contact or side; none for the trunk."""
     low = shape.places[frame, parent, 1] < shape.floor + 0.09 * shape.height
     if low and shape.contacts[frame, child]:
         return CONTACT
-    return {1: LEFT, -1: RIGHT}.get(shape.sides[child], MIDDLE)
+    return {1: LEFT, -1: RIGHT}.get(shape.sides[child])
 
 
 def _waist(
     seen: Array, depth: Array, scale: Array, shape: Figure, edge: float
-) -> tuple[float, list[float], list[float], Colour]:
+) -> tuple[float, list[float], list[float]]:
     """The belly between pelvis and chest."""
     a, b = [shape.centre], [shape.chest[-1]]
     radii = [0.062 * shape.height * scale[j] for j in (a, b)]
     outer = capsules(seen[a], seen[b], radii[0] + edge, radii[1] + edge)[0].ravel().tolist()
     inner = capsules(seen[a], seen[b], *radii)[0].ravel().tolist()
-    return float(depth[a[0]] + depth[b[0]]) / 2 + 1e-3, outer, inner, MIDDLE
+    return float(depth[a[0]] + depth[b[0]]) / 2 + 1e-3, outer, inner
 
 
 def _head_parts(

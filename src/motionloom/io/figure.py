@@ -86,7 +86,11 @@ def figure(motion: Motion) -> Figure:
     head = _head(skeleton, places, body, sides)
     # Eyes and jaw would litter the ball that is the head.
     face = () if head is None else head if head[1] in skeleton.ends else head[1:]
-    bones = tuple((p, j) for j in body if j != centre and ((p := skeleton.parents[j]) not in face or j in face))
+    bones = tuple(
+        (skeleton.parents[j], j)
+        for j in body
+        if j != centre and (j in face or not set(_line(skeleton, j)[1:]) & set(face))
+    )
     limbs = _limbs(skeleton, places, bones, sides)
     floor = _floor(places[:, body], height)
     forward = _forward(places, limbs, sides)

@@ -247,7 +247,7 @@ def _scene(people: Sequence[Figure], frames: Sequence[int], camera: Camera) -> I
         draw.paint_path(pen, camera, path[: now + 1], draw.PATH, 0.02)
         draw.paint_shadow(picture, camera, people[i], now)
     for i in order:
-        draw.paint_body(pen, camera, people[i], frames[i])
+        draw.paint_body(pen, camera, people[i], frames[i], trunk=draw.TRUNKS[i % len(draw.TRUNKS)])
     return picture.reduce(draw.SMOOTH)
 
 
