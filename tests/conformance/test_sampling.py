@@ -61,7 +61,8 @@ def dummy(recorded: Case) -> tuple[Net, Tensor, Tensor]:
 def published_network(recorded: Case) -> tuple[Net, Any, Any]:
     """The published encoder with weights by rule, bound to the text features of the case and to none."""
     try:
-        from motionloom.nets.prior import condition, from_published
+        from motionloom.nets.prior import condition
+        from motionloom.nets.published import from_published
     except ImportError as error:
         pytest.skip(f"the published network cannot be built yet: {error}")
     seed, rows = recorded.config["seed"], recorded.config["shape"][0]

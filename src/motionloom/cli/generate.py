@@ -1,5 +1,119 @@
-"""Not filled yet."""
+"""`motionloom generate`: words to motion files."""
+
+import argparse
+from pathlib import Path
+
+MAX_PROMPTS = 1000
+MAX_CHARACTERS = 20_000
 
 
 def add(subparsers) -> None:
-    """Register nothing."""
+    """Register `generate`."""
+    parser = subparsers.add_parser("generate", help="make motions from words")
+    parser.add_argument("prompts", nargs="*", metavar="PROMPT", help="what the person does, such as 'a person walks'")
+    parser.add_argument("--from", dest="file", type=Path, metavar="FILE", help="a text file with one prompt per line")
+    parser.add_argument("--out", type=Path, action="append", metavar="NAME", help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default motion.bvh)")  # fmt: skip
+    parser.add_argument("--seconds", type=float, default=5.0, help="length of each motion (default 5)")
+    parser.add_argument("--seed", type=int, default=0, help="the first motion's seed, the next have the next (default 0)")
+    parser.add_argument("--count", type=int, default=1, help="motions per prompt (default 1)")
+    parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
+    parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 20)")
+    parser.add_argument("--solver", help="ddim, ddpm, dpm2m or dpm2m-sde (default dpm2m)")
+    parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)")
+    parser.add_argument("--fps", type=float, help="frame rate of the files (default: the model's 20)")
+    parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
+    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
+    parser.add_argument("--json", action="store_true", help="print what was made as JSON")
+    parser.set_defaults(run=_generate)
+
+
+def _generate(arguments: argparse.Namespace) -> None:
+    from motionloom.io import check_output
+
+    prompts = _prompts(arguments)
+    outs = arguments.out or [Path("motion.bvh")]
+    for out in outs:
+        check_output(out)
+    if len({str(out) for out in outs}) != len(outs):
+        _fail("the same --out is given twice; give each file its own name")
+    if not 1 <= arguments.count <= 10_000 or not 0 <= arguments.seed < 2**62:
+        _fail(f"--count must be 1 to 10000 and --seed 0 or more; got {arguments.count} and {arguments.seed}")
+    motions, seconds = _make(arguments, prompts)
+    captions = [prompt for prompt in prompts for _ in range(arguments.count)]
+    written = [path for out in outs for path in _write(motions, out, captions)]
+    _report(arguments, captions, written, seconds)
+
+
+def _fail(message: str) -> None:
+    from motionloom.errors import MotionloomError
+
+    raise MotionloomError(message)
+
+
+def _prompts(arguments: argparse.Namespace) -> list[str]:
+    prompts = list(arguments.prompts)
+    if arguments.file:
+        from motionloom.io.text import read_bytes
+
+        text = read_bytes(arguments.file, max_bytes=16 << 20).decode("utf-8", "replace")
+        prompts += [line.strip() for line in text.splitlines() if line.strip()]
+    if not prompts:
+        _fail("no prompt; say what the person does, such as: motionloom generate 'a person walks forward'")
+    if len(prompts) > MAX_PROMPTS:
+        _fail(f"{len(prompts)} prompts are too many for one call; give at most {MAX_PROMPTS}")
+    for prompt in prompts:
+        if not prompt.strip():
+            _fail("a prompt is empty; say in words what the person does")
+        if len(prompt) > MAX_CHARACTERS:
+            _fail(f"a prompt has {len(prompt):,} characters; say it in fewer than {MAX_CHARACTERS:,}")
+    return prompts
+
+
+def _make(arguments: argparse.Namespace, prompts: list[str]):
+    import time
+
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from motionloom.checkpoint import Prior
+    from motionloom.tasks.text import generate
+
+    prior = Prior.load(arguments.weights, device=arguments.device)
+    given = {"steps": arguments.steps, "solver": arguments.solver}
+    options = {name: value for name, value in given.items() if value is not None}
+    began = time.perf_counter()
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("generating", total=None)
+        motions = generate(
+            prior, prompts, seconds=arguments.seconds, count=arguments.count, seed=arguments.seed,
+            guidance=arguments.guidance, clean=not arguments.raw,
+            progress=lambda done, total: bar.update(task, completed=done, total=total), **options,
+        )  # fmt: skip
+    if arguments.fps is not None:
+        motions = [motion.resample(arguments.fps) for motion in motions]
+    return motions, time.perf_counter() - began
+
+
+def _write(motions, out: Path, captions: list[str]) -> list[Path]:
+    """One file for one motion, or for pictures of all of them; else numbered files."""
+    from motionloom.io import save
+
+    if len(motions) == 1 or out.suffix.lower() == ".png":
+        return [save(motions, out, captions=captions)]
+    width = len(str(len(motions) - 1))
+    return [
+        save([motion], out.with_name(f"{out.stem}_{i:0{width}d}{out.suffix}"), captions=[caption])
+        for i, (motion, caption) in enumerate(zip(motions, captions, strict=True))
+    ]
+
+
+def _report(arguments: argparse.Namespace, captions: list[str], written: list[Path], seconds: float) -> None:
+    if arguments.json:
+        import json
+
+        made = [{"prompt": caption, "seed": arguments.seed + i} for i, caption in enumerate(captions)]
+        about = {"motions": made, "seconds": arguments.seconds, "weights": str(arguments.weights), "files": [str(p) for p in written]}
+        print(json.dumps(about | {"sampling_seconds": round(seconds, 3)}, indent=1))
+        return
+    for path in written:
+        print(f"wrote {path}")

@@ -19,7 +19,7 @@ def generator(
     options = {name: value for name, value in given.items() if value is not None}
 
     def make(prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[Array], float]:
-        motions = generate(prior, list(prompts), seconds=seconds, seed=seed, **options)
+        motions = generate(prior, list(prompts), seconds=seconds, seed=seed, clean=False, **options)
         return [motion.positions() for motion in motions], motions[0].fps
 
     return make

@@ -1,0 +1,55 @@
+"""motionloom: human motion from words, with a diffusion model as the prior.
+
+    from motionloom import Prior, generate, save
+    motions = generate(Prior.load(), ["a person walks forward"], seconds=5.0, seed=1)
+    save(motions[0], "walk.bvh")
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from motionloom.checkpoint import Prior, save_prior
+    from motionloom.errors import MotionloomError
+    from motionloom.io import load, save
+    from motionloom.motion import Motion
+    from motionloom.retarget import from_smpl22, retarget, to_smpl22
+    from motionloom.skeleton import SMPL22, Skeleton
+    from motionloom.tasks.text import generate
+
+_PLACES = {
+    "Prior": "checkpoint",
+    "save_prior": "checkpoint",
+    "MotionloomError": "errors",
+    "load": "io",
+    "save": "io",
+    "Motion": "motion",
+    "from_smpl22": "retarget",
+    "retarget": "retarget",
+    "to_smpl22": "retarget",
+    "SMPL22": "skeleton",
+    "Skeleton": "skeleton",
+    "generate": "tasks.text",
+}
+
+__all__ = [
+    "SMPL22",
+    "Motion",
+    "MotionloomError",
+    "Prior",
+    "Skeleton",
+    "from_smpl22",
+    "generate",
+    "load",
+    "retarget",
+    "save",
+    "save_prior",
+    "to_smpl22",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the public names when they are asked for: `motionloom --help` needs none of the libraries behind them."""
+    if name not in _PLACES:
+        raise AttributeError(f"module 'motionloom' has no attribute {name!r}")
+    return getattr(import_module(f"motionloom.{_PLACES[name]}"), name)

@@ -1,0 +1,133 @@
+"""Text to motion: prompts in, motions out.
+
+A prompt becomes word vectors once; noise is drawn per motion from its own seed; the solver walks the noise to clean
+features with the guided network as its denoiser; features become positions, positions a person with constant bones.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from motionloom.checkpoint import Prior
+from motionloom.diffusion import SOLVERS, guide, levels, row_draw, sample
+from motionloom.errors import MotionloomError
+from motionloom.features import humanml
+from motionloom.features.feet import clean_feet
+from motionloom.features.ik import motion_from_positions
+from motionloom.features.layout import LAYOUT
+from motionloom.motion import Motion
+
+STEPS = 20
+SPACING = "quadratic"
+LONGEST = 60.0
+"""Seconds: beyond this one prompt is no longer one action."""
+ROWS = 8
+"""Motions denoised at once."""
+
+Progress = Callable[[int, int], None]
+"""(network calls done, network calls in all)."""
+
+
+@torch.inference_mode()
+def sample_features(
+    prior: Prior,
+    prompts: Sequence[str],
+    frames: Sequence[int],
+    *,
+    seeds: Sequence[int],
+    guidance: float = 2.5,
+    steps: int = STEPS,
+    solver: str = "dpm2m",
+    spacing: str = SPACING,
+    progress: Progress | None = None,
+) -> list[Tensor]:
+    """Features (frames, 263), not standardised, one per prompt; row i has its own length and its own seed.
+
+    The network sees at most `ROWS` motions at once, of equal length, so that memory does not grow with their number.
+    """
+    _check(prior, prompts, steps=steps, guidance=guidance, solver=solver)
+    way = levels(prior.schedule, steps, spacing=spacing)  # type: ignore[arg-type]
+    groups = _groups(frames)
+    result: dict[int, Tensor] = {}
+    for number, rows in enumerate(groups):
+        cond = prior.condition([prompts[row] for row in rows])
+        denoise = guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), guidance)
+        draw = row_draw([seeds[row] for row in rows])
+        state = draw(torch.empty(len(rows), frames[rows[0]], len(prior.mean), device=prior.mean.device))
+        walk = sample(denoise, state, levels=way, solver=SOLVERS[solver], schedule=prior.schedule, draw=draw)
+        for done, snapshot in enumerate(walk, start=1):
+            state = snapshot.state
+            if progress:
+                progress(number * steps + done, len(groups) * steps)
+        for row, features in zip(rows, (state * prior.std + prior.mean).cpu(), strict=True):
+            result[row] = features
+    return [result[row] for row in range(len(prompts))]
+
+
+def generate(
+    prior: Prior,
+    prompts: Sequence[str] | str,
+    *,
+    seconds: float | Sequence[float] = 5.0,
+    count: int = 1,
+    seed: int = 0,
+    guidance: float = 2.5,
+    steps: int = STEPS,
+    solver: str = "dpm2m",
+    clean: bool = True,
+    progress: Progress | None = None,
+) -> list[Motion]:
+    """Make ``count`` motions for each prompt, in order; motion i of the answer is drawn from ``seed + i`` alone.
+
+    seconds: length, one for all or one per prompt; at the prior's frame rate (20 per second). guidance: strength of
+    the text, 0 ignores it. steps, solver: network calls, and how they are joined (`diffusion.SOLVERS`). clean: lock
+    planted feet and keep feet above the floor. The person starts near the origin facing +Z, on the 22-joint skeleton.
+    Raises `MotionloomError` for what cannot be asked. (Tevet et al. 2023; guidance: Ho & Salimans 2022.)
+    """
+    said = [prompts] if isinstance(prompts, str) else list(prompts)
+    lengths = [float(seconds)] * len(said) if isinstance(seconds, int | float) else [float(s) for s in seconds]
+    if len(lengths) != len(said):
+        raise MotionloomError(f"there are {len(lengths)} lengths for {len(said)} prompts; give one, or one per prompt")
+    if not said or count < 1:
+        raise MotionloomError(f"nothing to make: {len(said)} prompts, {count} of each; give at least one prompt and count 1")
+    said = [prompt for prompt in said for _ in range(count)]
+    frames = [_frames(length, prior.fps) for length in lengths for _ in range(count)]
+    made = sample_features(
+        prior, said, frames, seeds=[seed + i for i in range(len(said))],
+        guidance=guidance, steps=steps, solver=solver, progress=progress,
+    )  # fmt: skip
+    return [to_motion(features.numpy().astype(np.float64), prior.fps, clean=clean) for features in made]
+
+
+def to_motion(features: np.ndarray, fps: float, *, clean: bool = True) -> Motion:
+    """Features (frames, 263) to a person with constant bones; with ``clean`` the planted feet hold still."""
+    motion = motion_from_positions(humanml.decode_positions(features), fps)
+    return clean_feet(motion, contacts=features[:, LAYOUT["contacts"]]) if clean else motion
+
+
+def _frames(seconds: float, fps: float) -> int:
+    if not (np.isfinite(seconds) and 0 < seconds <= LONGEST):
+        raise MotionloomError(f"a motion of {seconds:g} seconds cannot be made; ask for more than 0 and at most {LONGEST:g}")
+    return max(round(seconds * fps), 4)
+
+
+def _groups(frames: Sequence[int]) -> list[list[int]]:
+    """Rows of equal length, at most `ROWS` together."""
+    by_length: dict[int, list[int]] = {}
+    for row, count in enumerate(frames):
+        by_length.setdefault(count, []).append(row)
+    return [rows[i : i + ROWS] for rows in by_length.values() for i in range(0, len(rows), ROWS)]
+
+
+def _check(prior: Prior, prompts: Sequence[str], *, steps: int, guidance: float, solver: str) -> None:
+    if solver not in SOLVERS:
+        raise MotionloomError(f"no solver {solver!r}; there are {', '.join(SOLVERS)}")
+    if not 1 <= steps <= prior.schedule.steps:
+        raise MotionloomError(f"{steps} steps cannot be taken; these weights take 1 to {prior.schedule.steps}")
+    if not np.isfinite(guidance) or abs(guidance) > 100:
+        raise MotionloomError(f"a guidance of {guidance:g} makes no motion; usual values are 1 to 7")
+    for prompt in prompts:
+        if not prompt.strip():
+            raise MotionloomError("a prompt is empty; say in words what the person does")
