@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from motionloom.errors import MotionloomError
 from motionloom.evaluation import obey
@@ -76,6 +78,33 @@ def test_a_damaged_result_file_is_one_clear_sentence(tmp_path: Path, damage: str
     (tmp_path / "obedience.json").write_text(damage)
     with pytest.raises(MotionloomError, match=r"obedience\.json"):
         obey.run(Walker(), [FORWARD], seeds=1, folder=tmp_path)
+
+
+_JSON = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.text(max_size=5),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(
+            st.sampled_from(["name", "attempts", "prompt", "seed", "obeyed", "measured", "x"]), inner, max_size=4
+        )
+    ),
+    max_leaves=12,
+)
+
+
+@given(checks=_JSON)
+@settings(max_examples=150, deadline=None)
+def test_any_json_in_place_of_results_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, checks: object
+) -> None:
+    path = tmp_path_factory.mktemp("found") / "obedience.json"
+    path.write_text(json.dumps({"settings": {"a": 1}, "checks": checks}))
+    try:
+        found = obey._read(path, {"a": 1})
+    except MotionloomError as error:
+        assert str(path) in str(error)
+    else:
+        assert all(isinstance(a, obey.Attempt) for attempts in found.values() for a in attempts)
 
 
 def test_a_changed_bound_changes_the_fingerprint() -> None:

@@ -113,17 +113,16 @@ def _read(path: Path, settings: dict[str, Any]) -> dict[str, list[Attempt]]:
         kept = json.loads(path.read_text(encoding="utf-8"))
         if kept["settings"] != settings:
             raise MotionloomError(f"{path} was made with other settings; name another --out folder or delete it")
-        return {
-            check["name"]: [
-                Attempt(str(a["prompt"]), int(a["seed"]), bool(a["obeyed"]), dict(a["measured"]))
-                for a in check["attempts"]
-            ]
-            for check in kept["checks"]
-        }
-    except (ValueError, KeyError, TypeError) as error:
+        return {str(check["name"]): [_attempt(a) for a in check["attempts"]] for check in kept["checks"]}
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         if isinstance(error, MotionloomError):
             raise
         raise MotionloomError(f"{path} is not a result of this command ({error!r}); delete it to begin again") from None
+
+
+def _attempt(found: dict[str, Any]) -> Attempt:
+    measured = {str(name): float(value) for name, value in found["measured"].items()}
+    return Attempt(str(found["prompt"]), int(found["seed"]), bool(found["obeyed"]), measured)
 
 
 def summary(results: Sequence[Result], checks: Sequence[Check] = CHECKS, *, settings: dict[str, Any]) -> dict[str, Any]:
@@ -174,7 +173,9 @@ def table(
         check = by_name[result.name]
         own = result.of(check.prompt)
         other = [a for a in result.attempts if a.prompt != check.prompt]
-        seen = "; ".join(f"{_median([a.measured[b.measure] for a in own]):g} of {b.wanted()}" for b in check.bounds)
+        seen = "; ".join(
+            f"{_median([a.measured.get(b.measure, float('nan')) for a in own]):g} of {b.wanted()}" for b in check.bounds
+        )
         known = (real or {}).get(check.name, {})
         rows.append(
             [
