@@ -181,6 +181,40 @@ def test_a_map_that_leaves_a_leg_without_a_knee_is_refused() -> None:
         to_smpl22(stroll(), {"left_knee": "left_ankle"})
 
 
+def straight_legs() -> Motion:
+    """Standing with straight knees, swaying over planted feet."""
+    motion = stroll()
+    rotations = np.tile(rot.IDENTITY, (60, 22, 1))
+    sway = 0.03 * np.sin(np.linspace(0, 6, 60))
+    lean = rot.rotvec_to_quat(sway[:, None] * np.array([0.0, 0.0, 1.0]))
+    rotations[:, 0] = lean
+    rotations[:, [1, 2]] = rot.inverse(lean)[:, None]
+    root = np.tile(SMPL22.offsets[0], (60, 1))
+    return Motion(SMPL22, motion.fps, root, rotations)
+
+
+def test_straight_knees_stay_nearly_straight_and_never_bend_backwards() -> None:
+    offsets = SMPL22.offsets.copy()
+    offsets[[10, 11]] *= 1.4
+    offsets[[1, 2], 0] *= 1.5
+    out = from_smpl22(straight_legs(), Skeleton(SMPL22.names, SMPL22.parents, offsets)).positions()
+    for hip, knee, ankle in ((1, 4, 7), (2, 5, 8)):
+        between = (out[:, hip] + out[:, ankle]) / 2
+        ahead = (out[:, knee] - between)[:, 2]
+        assert ahead.min() > -0.005
+        assert np.linalg.norm(out[:, hip] - out[:, ankle], axis=-1).min() > 0.97 * (0.3936 + 0.4256)
+
+
+def test_feet_out_of_reach_bring_the_hips_down_instead_of_leaving_their_place() -> None:
+    offsets = SMPL22.offsets.copy()
+    offsets[[1, 2], 0] *= 3.0  # hips so wide that straight legs cannot reach the narrow stance from full height
+    motion = straight_legs()
+    out = from_smpl22(motion, Skeleton(SMPL22.names, SMPL22.parents, offsets)).positions()
+    toes, wanted = out[:, [10, 11]], motion.positions()[:, [10, 11]]
+    assert np.abs(toes - wanted)[..., [0, 2]].max() < 0.01
+    assert np.abs(toes[..., 1]).max() < 0.01
+
+
 def test_one_frame_is_enough() -> None:
     assert len(to_smpl22(stroll().frames(7, 8))) == 1
 

@@ -185,6 +185,52 @@ def test_joints22_of_the_uniform_person_are_its_own_positions() -> None:
     assert np.allclose(joints22(motion), motion.positions(), atol=1e-12)
 
 
+def test_the_tables_put_points_on_the_lines_the_data_says() -> None:
+    """Points of the pack's own table, by family: part, first joint, second joint, how far along."""
+    for table, wanted in (
+        (
+            joint_map_of(
+                "hip abdomen chest neck head",
+                "{l}Collar {l}Shldr {l}ForeArm {l}Hand",
+                "{l}Thigh {l}Shin {l}Foot {l}Foot~End~Site",
+            ),
+            {
+                "pelvis": {"hip": 0.5, "abdomen": 0.5},
+                "spine3": {"chest": 0.8, "neck": 0.2},
+                "left_collar": {"lCollar": 0.6, "lShldr": 0.4},
+                "right_foot": {"rFoot End Site": 1.0},
+            },
+        ),
+        (
+            joint_map_of(
+                "Hips Spine Chest Neck Head",
+                "Shoulder_{L} UpperArm_{L} LowerArm_{L} Hand_{L}",
+                "UpperLeg_{L} LowerLeg_{L} Foot_{L} Toes_{L}",
+            ),
+            {
+                "pelvis": {"Hips": 0.75, "Spine": 0.25},
+                "spine3": {"Chest": 0.8, "Neck": 0.2},
+                "left_collar": {"Shoulder_L": 1.0},
+            },
+        ),
+    ):
+        for part, point in wanted.items():
+            assert table[part] == pytest.approx(point), part
+
+
+def joint_map_of(middle: str, arm: str, leg: str) -> dict[str, dict[str, float]]:
+    """The map of a skeleton with these names: four bones in the trunk, the uniform person otherwise."""
+    pelvis, *trunk = middle.split()
+    names = [n.replace("~", " ") for n in rig(f"{pelvis} {trunk[0]} {trunk[1]} unused {trunk[2]} {trunk[3]}", arm, leg)]
+    names.pop(9)
+    kept = [j for j in range(22) if j != 9]
+    parents = tuple(-1 if j == 0 else kept.index(6 if SMPL22.parents[j] == 9 else SMPL22.parents[j]) for j in kept)
+    offsets = SMPL22.offsets.copy()
+    offsets[[12, 13, 14]] += offsets[9]
+    ends = frozenset(j for j, name in enumerate(names) if name.endswith("End Site"))
+    return joint_map(Skeleton(tuple(names), parents, offsets[kept], ends)).names()
+
+
 @pytest.mark.parametrize(
     "path", ["cmu/asf_amc/07/07_01.amc", "cmu/bvh/07_04.bvh", "bandai/dataset-1/dataset-1_walk_normal_001.bvh"]
 )
