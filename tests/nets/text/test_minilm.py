@@ -224,19 +224,19 @@ def test_the_shipped_encoder_gives_the_teachers_numbers() -> None:
 
 
 def test_the_shipped_encoder_loads_and_encodes_fast() -> None:
-    """Limits three times what one slow core takes (0.1 s and 11 ms), so that a busy machine passes."""
+    """Three times what one slow core takes (0.1 s and 11 ms), in this thread's own time: a busy machine passes."""
     tensors = shipped()
-    MiniLM.from_tensors(tensors)
-    start = time.perf_counter()
-    encoder = MiniLM.from_tensors(tensors)
-    assert time.perf_counter() - start < 0.3
-    encoder.encode("warm up")
-    times = []
+    loads, encodes = [], []
     for count in range(5):
-        start = time.perf_counter()
+        start = time.thread_time()
+        encoder = MiniLM.from_tensors(tensors)
+        loads.append(time.thread_time() - start)
+        encoder.encode("warm up")
+        start = time.thread_time()
         encoder.encode(f"a person walks forward {count} steps and turns left")
-        times.append(time.perf_counter() - start)
-    assert min(times) < 0.03
+        encodes.append(time.thread_time() - start)
+    assert min(loads) < 0.3
+    assert min(encodes) < 0.033
 
 
 RECORDED = [
