@@ -158,3 +158,9 @@ def test_very_short_clips_give_numbers(frames: int) -> None:
     assert values == [0, 0, 0, 0]
     assert physics.foot_skate(p, FPS).ratio == 0
     assert np.isfinite(physics.speed(p, FPS)).all()
+
+
+def test_a_toe_that_stops_for_a_frame_does_not_skate_in_that_frame() -> None:
+    p = standing()
+    way = np.cumsum(np.where(np.arange(80) % 5, 1.5 / FPS, 0.0))  # four frames of five at 1.5 m/s
+    assert physics.foot_skate(moved(p, way[:, None] * [1.0, 0, 0]), FPS).ratio == pytest.approx(0.8, abs=0.02)

@@ -40,6 +40,9 @@ def _sampling(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--steps", type=int, help="sampler steps (default: as generate)")
     parser.add_argument("--guidance", type=float, help="strength of the text (default: as generate)")
     parser.add_argument("--solver", help="solver name (default: as generate)")
+    parser.add_argument(
+        "--finished", action="store_true", help="measure what is exported: bones constant, feet cleaned up"
+    )
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument(
         "--out", type=Path, help="folder for the JSON results and report.md; a run that stopped goes on"
@@ -53,11 +56,13 @@ def _generator(arguments: argparse.Namespace):
     from motionloom.evaluation.generator import generator
 
     prior = Prior.load(arguments.weights, device=arguments.device)
-    return generator(prior, steps=arguments.steps, guidance=arguments.guidance, solver=arguments.solver)
+    return generator(
+        prior, steps=arguments.steps, guidance=arguments.guidance, solver=arguments.solver, finished=arguments.finished
+    )
 
 
 def _settings(arguments: argparse.Namespace) -> dict:
-    return {name: getattr(arguments, name) for name in ("weights", "steps", "guidance", "solver")}
+    return {name: getattr(arguments, name) for name in ("weights", "steps", "guidance", "solver", "finished")}
 
 
 def _say(line: str) -> None:

@@ -2,24 +2,38 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from motionloom.checkpoint import Prior
 from motionloom.evaluation.obey import Generate
+from motionloom.features import humanml
 from motionloom.metrics.physics import Array
-from motionloom.tasks.text import generate
+from motionloom.tasks.text import STEPS, sample_features, to_motion
 
 
 def generator(
-    prior: Prior, *, steps: int | None = None, guidance: float | None = None, solver: str | None = None
+    prior: Prior,
+    *,
+    steps: int | None = None,
+    guidance: float | None = None,
+    solver: str | None = None,
+    finished: bool = False,
 ) -> Generate:
-    """Text to motion with `tasks.text.generate`; what is None keeps its default there.
+    """Text to joint positions with `tasks.text`; what is None keeps the default of `generate`.
 
-    Feet are not cleaned up: that would hide skating.
+    Positions are measured as the network draws them, whose bones may breathe and whose feet may slide; ``finished``
+    measures what is exported: constant bones, planted feet held still.
     """
-    given = {"steps": steps, "guidance": guidance, "solver": solver}
-    options = {name: value for name, value in given.items() if value is not None}
+    strength, kind = 2.5 if guidance is None else guidance, solver or "dpm2m"
 
     def make(prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[Array], float]:
-        motions = generate(prior, list(prompts), seconds=seconds, seed=seed, clean=False, **options)
-        return [motion.positions() for motion in motions], motions[0].fps
+        frames, seeds = [round(seconds * prior.fps)] * len(prompts), range(seed, seed + len(prompts))
+        drawn = sample_features(
+            prior, prompts, frames, seeds=list(seeds), guidance=strength, steps=steps or STEPS, solver=kind
+        )
+        features = [one.numpy().astype(np.float64) for one in drawn]
+        if finished:
+            return [to_motion(one, prior.fps).positions() for one in features], prior.fps
+        return [humanml.decode_positions(one) for one in features], prior.fps
 
     return make

@@ -114,7 +114,7 @@ def _read(path: Path, settings: dict[str, Any]) -> dict[str, list[Attempt]]:
         if kept["settings"] != settings:
             raise MotionloomError(f"{path} was made with other settings; name another --out folder or delete it")
         return {str(check["name"]): [_attempt(a) for a in check["attempts"]] for check in kept["checks"]}
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         if isinstance(error, MotionloomError):
             raise
         raise MotionloomError(f"{path} is not a result of this command ({error!r}); delete it to begin again") from None
