@@ -1,6 +1,6 @@
 """A sentence becomes a motion, then a file: the main job from Python.
 
-    python examples/01_text_to_motion.py
+python examples/01_text_to_motion.py
 """
 
 from motionloom import Prior, generate, save
