@@ -1,6 +1,7 @@
 """Commands about motion files: export, view, info."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,6 +9,7 @@ if TYPE_CHECKING:
     from motionloom.motion import Motion
     from motionloom.skeleton import Skeleton
 
+_RATE_ASSUMED = "an AMC file does not state its rate; 120 frames per second are assumed (--source-fps says otherwise)"
 _UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "in": 0.0254, "ft": 0.3048}
 
 
@@ -22,7 +24,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     export.add_argument("input", metavar="IN", type=Path)
     export.add_argument("output", metavar="OUT", type=Path)
     _add_reading(export)
-    export.add_argument("--fps", type=_positive, metavar="N", help="resample to this frame rate")
+    export.add_argument("--fps", type=_rate, metavar="N", help="resample to this frame rate")
     export.add_argument("--skeleton", metavar="FILE|smpl22", help="put the motion on this skeleton")
     export.add_argument("--mirror", action="store_true", help="exchange left and right")
     export.add_argument("--out-unit", type=_unit, metavar="UNIT", help="unit of a BVH written (as read, else m)")
@@ -52,7 +54,7 @@ def _add_reading(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--asf", type=Path, metavar="FILE", help="skeleton of an AMC file (default: the one beside it)"
     )
-    command.add_argument("--source-fps", type=_positive, metavar="N", help="take this rate for the file's (AMC: 120)")
+    command.add_argument("--source-fps", type=_rate, metavar="N", help="take this rate for the file's (AMC: 120)")
     command.add_argument("--start", type=_seconds, metavar="S", help="begin at this second")
     command.add_argument("--end", type=_seconds, metavar="S", help="end at this second")
 
@@ -64,13 +66,13 @@ def _number(text: str) -> float:
     return value
 
 
-def _positive(text: str) -> float:
+def _rate(text: str) -> float:
     try:
         value = _number(text)
     except ValueError:
         value = 0.0
-    if value <= 0:
-        raise argparse.ArgumentTypeError(f"a number above 0 is needed; got {text!r}")
+    if not 0.1 <= value <= 1000:
+        raise argparse.ArgumentTypeError(f"a number of 0.1 to 1000 frames per second is needed; got {text!r}")
     return value
 
 
@@ -86,10 +88,13 @@ def _seconds(text: str) -> float:
 
 def _unit(text: str) -> float:
     try:
-        return _UNITS[text.lower()] if text.lower() in _UNITS else _positive(text)
-    except argparse.ArgumentTypeError:
+        value = _UNITS[text.lower()] if text.lower() in _UNITS else _number(text)
+    except ValueError:
+        value = 0.0
+    if not 1e-6 <= value <= 1e6:
         units = ", ".join(_UNITS)
-        raise argparse.ArgumentTypeError(f"a unit is {units} or a number of metres; got {text!r}") from None
+        raise argparse.ArgumentTypeError(f"a unit is {units} or a number of metres above 0; got {text!r}")
+    return value
 
 
 def run_export(arguments: argparse.Namespace) -> None:
@@ -114,6 +119,7 @@ def run_export(arguments: argparse.Namespace) -> None:
         _only_bvh(arguments)
         io.save(motion, target)
     print(f"wrote {target}: {_summary(motion)}")
+    _note_rate(arguments, [arguments.input])
 
 
 def run_view(arguments: argparse.Namespace) -> None:
@@ -128,6 +134,7 @@ def run_view(arguments: argparse.Namespace) -> None:
     motions = [_crop(_read(arguments, path)[0], arguments) for path in arguments.inputs]
     io.save(motions, target, captions=[path.stem for path in arguments.inputs])
     print(f"wrote {target}")
+    _note_rate(arguments, arguments.inputs)
 
 
 def run_info(arguments: argparse.Namespace) -> None:
@@ -139,9 +146,7 @@ def run_info(arguments: argparse.Namespace) -> None:
 
     motion, unit, _ = _read(arguments, arguments.input)
     info = describe(_crop(motion, arguments))
-    problems = list(info.problems)
-    if arguments.input.suffix.lower() == ".amc" and arguments.source_fps is None:
-        problems.append("an AMC file does not state its rate; 120 frames per second are assumed (--source-fps)")
+    problems = [*info.problems, *([_RATE_ASSUMED] if _rate_assumed(arguments, [arguments.input]) else [])]
     if arguments.json:
         print(json.dumps({"file": str(arguments.input), "unit": unit, **asdict(info), "problems": problems}, indent=2))
         return
@@ -154,9 +159,18 @@ def run_info(arguments: argparse.Namespace) -> None:
     print(f"  way       {info.path:.2f} m along the floor, ends {info.travel:.2f} m from the start")
     print(f"  space     {box} m (x, y up, z)")
     if unit is not None:
-        print(f"  unit      {unit:g} m in the file")
+        print(f"  unit      {unit:g} m in the file{'' if arguments.unit else ', by the length of its bones'}")
     for problem in problems:
         print(f"  problem   {problem}")
+
+
+def _rate_assumed(arguments: argparse.Namespace, paths: list[Path]) -> bool:
+    return arguments.source_fps is None and any(path.suffix.lower() == ".amc" for path in paths)
+
+
+def _note_rate(arguments: argparse.Namespace, paths: list[Path]) -> None:
+    if _rate_assumed(arguments, paths):
+        print(f"note: {_RATE_ASSUMED}", file=sys.stderr)
 
 
 def _summary(motion: "Motion") -> str:
@@ -202,6 +216,7 @@ def _crop(motion: "Motion", arguments: argparse.Namespace) -> "Motion":
 def _skeleton(name: str) -> "tuple[Skeleton, float, dict[str, str]]":
     """A skeleton to put motions on, with the unit and orders of its file."""
     from motionloom import io
+    from motionloom.errors import MotionloomError
     from motionloom.skeleton import SMPL22
 
     path = Path(name)
@@ -216,6 +231,8 @@ def _skeleton(name: str) -> "tuple[Skeleton, float, dict[str, str]]":
         from motionloom.io.asf import load_skeleton
 
         return load_skeleton(path), 1.0, {}
+    if path.suffix.lower() not in io.READS:
+        raise MotionloomError(f"--skeleton needs smpl22 or a file (.asf, {', '.join(io.READS)}); got {name!r}")
     return io.load(path).skeleton, 1.0, {}
 
 
