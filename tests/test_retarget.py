@@ -298,3 +298,48 @@ def test_a_sample_of_the_whole_pack_goes_through_without_pops() -> None:
         person = to_smpl22(clip(path))
         turn = np.abs((person.rotations[1:] * person.rotations[:-1]).sum(-1)).clip(0, 1)
         assert np.degrees(2 * np.arccos(turn)).max() < 75.0, path
+
+
+# Rigs of other shapes ------------------------------------------------------------------------------------------------
+
+# Name, parent, offset in metres (left side; the right is its mirror image): the tree of CMU's MotionBuilder-friendly
+# BVH (hip and shoulder joints on the middle line, two neck joints) and a small rig without collar bones.
+CGSPEED = """Hips - 0 0.93 0 | LHipJoint Hips 0 0 0 | LeftUpLeg LHipJoint .1 -.1 .05 | LeftLeg LeftUpLeg .14 -.37 0
+| LeftFoot LeftLeg .14 -.4 0 | LeftToeBase LeftFoot .01 -.03 .13 | LowerBack Hips 0 0 0 | Spine LowerBack 0 .12 -.01
+| Spine1 Spine 0 .12 0 | Neck Spine1 0 0 0 | Neck1 Neck 0 .1 .02 | Head Neck1 0 .08 0 | LeftShoulder Spine1 0 0 0
+| LeftArm LeftShoulder .18 .09 0 | LeftForeArm LeftArm .28 0 0 | LeftHand LeftForeArm .19 0 0
+| LeftThumb LeftHand 0 0 .05"""
+SMALL = """Root - 0 0 0 | Hip Root 0 .95 0 | LThigh Hip .09 -.03 0 | LShin LThigh 0 -.43 .01 | LFoot LShin 0 -.42 -.02
+| LFootEnd LFoot 0 -.06 .14 | Torso Hip 0 .2 0 | Head Torso 0 .4 .02 | LUpperArm Torso .19 .28 0
+| LForearm LUpperArm .18 -.2 0 | LHand LForearm .17 -.19 .02"""
+
+
+def built(text: str) -> Skeleton:
+    """A skeleton from one side's joints."""
+    rows: list[tuple[str, str, np.ndarray]] = []
+    for entry in text.split("|"):
+        name, parent, *offset = entry.split()
+        rows.append((name, parent, np.array([float(x) for x in offset])))
+        if name.startswith("L") and name != "LowerBack":
+            word = "Left" if name.startswith("Left") else "L"
+            other = parent.replace(word, "Right" if word == "Left" else "R", 1) if parent.startswith("L") else parent
+            other = other.replace("LHip", "RHip")
+            mirrored = name.replace(word, "Right" if word == "Left" else "R", 1)
+            rows.append((mirrored, other, rows[-1][2] * [-1, 1, 1]))
+    names = [name for name, _, _ in rows]
+    parents = tuple(-1 if parent == "-" else names.index(parent) for _, parent, _ in rows)
+    return Skeleton(tuple(names), parents, np.stack([offset for _, _, offset in rows]))
+
+
+@pytest.mark.parametrize("rig", [CGSPEED, SMALL], ids=["cgspeed", "no collars"])
+def test_rigs_of_other_trees_take_the_pose_and_give_it_back(rig: str) -> None:
+    target, motion = built(rig), stroll()
+    out = from_smpl22(motion, target)
+    limbs = [(j, c) for j, c in BONES if j in (4, 5, 16, 17, 18, 19)]
+    assert errors(joints22(out), motion.positions(), limbs).mean() < 5.0
+    assert errors(joints22(out), motion.positions(), [(16, 18), (17, 19), (18, 20), (19, 21)]).max() < 1e-3
+    assert bone_error(out) < 1e-9
+    back = to_smpl22(out)
+    assert errors(back.positions(), motion.positions(), limbs).mean() < 3.0
+    turn = np.degrees(2 * np.arccos(np.abs((back.rotations * motion.rotations).sum(-1)).clip(0, 1)))
+    assert turn[:, [0, 16, 17, 18, 19]].max() < 12.0

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.limbs import bend
 from motionloom.motion import Motion
-from motionloom.retarget.anatomy import ARMS, CHILD, FEET, HEAD, TOES, Body, frame, read_body
+from motionloom.retarget.anatomy import CHILD, FEET, HEAD, TOES, Body, read_body
 from motionloom.retarget.floor import Stance, read_stance
 from motionloom.retarget.joint_map import Override, joint_map
 from motionloom.retarget.measured import frames_of_positions, mean_rotation
@@ -83,8 +83,9 @@ def _read_pose(motion: Motion, source: Body) -> _Pose:
             frames[:, j] = rot.multiply(world[:, driver], axes[j])
         elif CHILD[j] is None:
             frames[:, j] = frames[:, above]
-        else:
-            frames[:, j] = frame(places[:, CHILD[j]] - places[:, j], _side_axis(frames[:, above], j))
+        else:  # no such bone, such as a collar bone: it moves with the one above as on the uniform person
+            frames[:, j], bone = _borrowed(frames[:, above], j)
+            places[:, j] = places[:, CHILD[j]] - bone
         if CHILD[j] is not None and j not in (0, *FEET):  # the places have the last word on where a bone points
             bone = places[:, CHILD[j]] - places[:, j]
             frames[:, j] = rot.multiply(_turn(rot.rotate(frames[:, j], np.eye(3)[0]), bone), frames[:, j])
@@ -105,10 +106,12 @@ def _y_up(motion: Motion, source: Body) -> Motion:
     return replace(motion, root=rot.rotate(turn, motion.root), rotations=rotations)
 
 
-def _side_axis(above: Array, joint: int) -> Array:
-    """Second axis for a joint that nothing turns, from the frame above it: forward for arms, left elsewhere."""
-    first, second = rot.rotate(above, np.eye(3)[0]), rot.rotate(above, np.eye(3)[1])
-    return np.cross(second, first) if joint in ARMS and SMPL22.parents[joint] not in ARMS else second
+def _borrowed(above: Array, joint: int) -> tuple[Array, Array]:
+    """World frame and bone (frames, 3) of a joint that keeps its rest on the uniform person, from the frame above."""
+    person, child = read_body(SMPL22), CHILD[joint]
+    turned = rot.multiply(above, rot.inverse(person.frames[SMPL22.parents[joint]]))
+    bone = rot.rotate(turned, SMPL22.offsets[child if child is not None else joint])
+    return rot.multiply(turned, person.frames[joint]), bone
 
 
 def _turn(a: Array, b: Array) -> Array:
