@@ -12,5 +12,7 @@ def shared(path: str) -> Path:
     """``SHARED / path``; skips the test with a reason where it is absent."""
     place = SHARED / path
     if not place.exists():
-        pytest.skip(f"{place} is not there: this test needs the material that lies beside the repository (MOTIONLOOM_SHARED)")
+        pytest.skip(
+            f"{place} is not there: this test needs the material that lies beside the repository (MOTIONLOOM_SHARED)"
+        )
     return place

@@ -1,8 +1,8 @@
 """motionloom: human motion from words, with a diffusion model as the prior.
 
-    from motionloom import Prior, generate, save
-    motions = generate(Prior.load(), ["a person walks forward"], seconds=5.0, seed=1)
-    save(motions[0], "walk.bvh")
+from motionloom import Prior, generate, save
+motions = generate(Prior.load(), ["a person walks forward"], seconds=5.0, seed=1)
+save(motions[0], "walk.bvh")
 """
 
 from importlib import import_module

@@ -1,8 +1,8 @@
 """`Prior`: everything one weight file holds, and the file itself.
 
-One safetensors file: tensors ``net.*`` (float16 or float32), ``mean``, ``std``, optionally ``text.*`` (the embedded text
-encoder), and JSON metadata under ``motionloom``: version, network sizes, schedule, features, text encoder, licence,
-provenance. Nothing in it is ever executed.
+One safetensors file: tensors ``net.*`` (float16 or float32), ``mean``, ``std``, optionally ``text.*`` (the embedded
+text encoder), and JSON metadata under ``motionloom``: version, network sizes, schedule, features, text encoder,
+licence, provenance. Nothing in it is ever executed.
 """
 
 import json
@@ -93,7 +93,7 @@ def find_weights(weights: str | Path) -> Path:
 
 
 def save_prior(prior: Prior, path: Path | str, *, half: bool = True) -> Path:
-    """Write a prior; matrices as float16 unless ``half`` is False, the text encoder inside if it is the embedded one."""
+    """Write a prior; as float16 unless ``half`` is False; the embedded text encoder goes inside."""
     path = Path(path)
     if path.suffix != ".safetensors":
         raise MotionloomError(f"weights are written as .safetensors; {path.name} has another suffix")
@@ -154,19 +154,25 @@ def _about(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
     try:
         about = json.loads(metadata["motionloom"])
         if about["format"] != FORMAT:
-            raise MotionloomError(f"{path} has format {about['format']}; this motionloom reads format {FORMAT}: update it")
+            raise MotionloomError(
+                f"{path} has format {about['format']}; this motionloom reads format {FORMAT}: update it"
+            )
         steps = about["schedule"]["steps"]
         known = about["schedule"]["name"] in SCHEDULES and isinstance(steps, int) and 1 <= steps <= 100_000
         good_card = isinstance(about["card"], dict) and isinstance(about["card"]["name"], str)
         good_rate = isinstance(about["fps"], int | float) and math.isfinite(about["fps"]) and about["fps"] > 0
-        if not (known and good_card and good_rate and isinstance(about["net"], dict) and isinstance(about["text"], str)):
+        if not (
+            known and good_card and good_rate and isinstance(about["net"], dict) and isinstance(about["text"], str)
+        ):
             raise ValueError("values of the wrong kind")
         about["card"] = {k: about["card"][k] for k in ("name", "licence", "data", "notes") if k in about["card"]}
         return about
     except MotionloomError:
         raise
     except (KeyError, TypeError, ValueError) as error:
-        raise MotionloomError(f"{path} does not describe a motionloom prior ({error!r}); name a file that does") from None
+        raise MotionloomError(
+            f"{path} does not describe a motionloom prior ({error!r}); name a file that does"
+        ) from None
 
 
 def _check(path: Path, wanted: dict[str, tuple[int, ...]], found: dict[str, Tensor]) -> None:
@@ -178,7 +184,9 @@ def _check(path: Path, wanted: dict[str, tuple[int, ...]], found: dict[str, Tens
         )
     for key, shape in wanted.items():
         if tuple(found[key].shape) != shape:
-            raise MotionloomError(f"{path}: {key} is {tuple(found[key].shape)} and should be {shape}; fetch the weights again")
+            raise MotionloomError(
+                f"{path}: {key} is {tuple(found[key].shape)} and should be {shape}; fetch the weights again"
+            )
         if not bool(found[key].isfinite().all()):
             raise MotionloomError(f"{path}: {key} has numbers that are not finite; fetch the weights again")
 

@@ -107,7 +107,9 @@ class Motion:
             a = amount.reshape(-1, *[1] * (x.ndim - 1))
             return x[low] * (1 - a) + x[high] * a
 
-        turned = rot.slerp(self.rotations[low], self.rotations[high], np.broadcast_to(amount[:, None], self.rotations[low].shape[:2]))
+        turned = rot.slerp(
+            self.rotations[low], self.rotations[high], np.broadcast_to(amount[:, None], self.rotations[low].shape[:2])
+        )
         moved = None if self.translations is None else lerp(self.translations)
         return replace(self, fps=float(fps), root=lerp(self.root), rotations=turned, translations=moved)
 

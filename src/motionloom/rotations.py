@@ -117,8 +117,8 @@ def slerp(a: np.ndarray, b: np.ndarray, amount: np.ndarray) -> Array:
 def unroll(q: np.ndarray) -> Array:
     """Flip signs along axis 0 so that neighbouring frames lie in the same half of the sphere."""
     q = np.asarray(q, dtype=np.float64)
-    flips = np.where((q[1:] * q[:-1]).sum(-1) < 0, -1.0, 1.0)
-    signs = np.concatenate([np.ones_like(flips[:1]), np.cumprod(flips, axis=0)]) if len(q) > 1 else np.ones(q.shape[:-1])
+    signs = np.ones(q.shape[:-1])
+    signs[1:] = np.cumprod(np.where((q[1:] * q[:-1]).sum(-1) < 0, -1.0, 1.0), axis=0)
     return q * signs[..., None]
 
 

@@ -16,7 +16,9 @@ class _Parser(argparse.ArgumentParser):
 
 def parser() -> argparse.ArgumentParser:
     """The whole command line as one parser."""
-    top = _Parser(prog="motionloom", description="Human motion from words: generate, export, look at, train and measure it.")
+    top = _Parser(
+        prog="motionloom", description="Human motion from words: generate, export, look at, train and measure it."
+    )
     top.add_argument("--version", action="store_true", help="print the version and end")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", parser_class=_Parser)
     for family in FAMILIES:

@@ -15,7 +15,9 @@ def add(subparsers) -> None:
     build.add_argument("--out", type=Path, required=True, help="folder of the built set; a build that stopped goes on")
     build.add_argument("--captions", type=Path, help="humanml3d.jsonl(.gz) with captions for a CMU download")
     build.add_argument("--workers", type=int, default=2, help="processes (default 2)")
-    build.add_argument("--mixed", type=int, default=300, help="clips with one take's arms on another's walk (default 300)")
+    build.add_argument(
+        "--mixed", type=int, default=300, help="clips with one take's arms on another's walk (default 300)"
+    )
     build.set_defaults(run=_build)
 
 

@@ -12,14 +12,21 @@ def add(subparsers) -> None:
     parser = subparsers.add_parser("generate", help="make motions from words")
     parser.add_argument("prompts", nargs="*", metavar="PROMPT", help="what the person does, such as 'a person walks'")
     parser.add_argument("--from", dest="file", type=Path, metavar="FILE", help="a text file with one prompt per line")
-    parser.add_argument("--out", type=Path, action="append", metavar="NAME", help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default motion.bvh)")  # fmt: skip
+    parser.add_argument(
+        "--out", type=Path, action="append", metavar="NAME",
+        help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default motion.bvh)",
+    )  # fmt: skip
     parser.add_argument("--seconds", type=float, default=5.0, help="length of each motion (default 5)")
-    parser.add_argument("--seed", type=int, default=0, help="the first motion's seed, the next have the next (default 0)")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="the first motion's seed, the next have the next (default 0)"
+    )
     parser.add_argument("--count", type=int, default=1, help="motions per prompt (default 1)")
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
     parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 20)")
     parser.add_argument("--solver", help="ddim, ddpm, dpm2m or dpm2m-sde (default dpm2m)")
-    parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)")
+    parser.add_argument(
+        "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
+    )
     parser.add_argument("--fps", type=float, help="frame rate of the files (default: the model's 20)")
     parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
@@ -112,7 +119,12 @@ def _report(arguments: argparse.Namespace, captions: list[str], written: list[Pa
         import json
 
         made = [{"prompt": caption, "seed": arguments.seed + i} for i, caption in enumerate(captions)]
-        about = {"motions": made, "seconds": arguments.seconds, "weights": str(arguments.weights), "files": [str(p) for p in written]}
+        about = {
+            "motions": made,
+            "seconds": arguments.seconds,
+            "weights": str(arguments.weights),
+            "files": [str(p) for p in written],
+        }
         print(json.dumps(about | {"sampling_seconds": round(seconds, 3)}, indent=1))
         return
     for path in written:

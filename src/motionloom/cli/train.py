@@ -12,11 +12,15 @@ def add(subparsers) -> None:
     prior.add_argument("--recipe", type=Path, required=True, help="a TOML file such as recipes/default.toml")
     prior.add_argument("--data", type=Path, required=True, help="folder made by 'motionloom data build'")
     prior.add_argument("--out", type=Path, required=True, help="folder of the run: state, weights, logs, pictures")
-    prior.add_argument("--text", default="default", help="weights whose text encoder is used (default: the shipped ones)")
+    prior.add_argument(
+        "--text", default="default", help="weights whose text encoder is used (default: the shipped ones)"
+    )
     prior.add_argument("--device", help="cpu, cuda, cuda:1 ... (default: cuda where there is one)")
     prior.add_argument("--threads", type=int, help="CPU threads")
     prior.add_argument("--stop", type=int, help="end early after this many steps")
-    prior.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="replace entries of the recipe (TOML values)")
+    prior.add_argument(
+        "--set", nargs="+", default=[], metavar="KEY=VALUE", help="replace entries of the recipe (TOML values)"
+    )
     prior.set_defaults(run=_prior)
 
 

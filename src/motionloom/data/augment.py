@@ -44,7 +44,7 @@ def loop(features: np.ndarray, frames: int, *, blend: int = 5, limit: float = 0.
 
 
 def bend(features: np.ndarray, rate: float) -> np.ndarray:
-    """The same steps along a curve: ``rate`` radians per frame added to the heading (+: to the left); (n, 263) to (n, 263).
+    """The same steps along a curve: ``rate`` radians per frame added to the heading (+: to the left), (n, 263).
 
     The root is stored as velocities in the heading frame, so the path turns with it. A planted foot pivots a little.
     """

@@ -32,7 +32,8 @@ LOOPED = 200
 BENDS = (0.35, 0.75)
 """Radians per second: a wide turn, and a circle in 8.4 seconds."""
 _MIRROR = list(SMPL22.mirror_pairs())
-_STATES = ("walk", "walk slow", "walk fast", "jog", "run", "walk backward", "jog backward", "stand", "dance", "circle left",
+_STATES = ("walk", "walk slow", "walk fast", "jog", "run", "walk backward", "jog backward", "stand", "dance",
+           "circle left",
            "circle right", "run circle", "climb", "sit", "balance", "sidestep left", "sidestep right")  # fmt: skip
 """Labels that stay true however long a window of them is: neighbouring windows join."""
 
@@ -65,13 +66,13 @@ class Clip:
 
 
 def stand_on_floor(positions: Array) -> Array:
-    """The published canonical form, with the floor at the first percentile of the lowest joint: outliers do not lift it."""
+    """The published canonical form, but with the floor at the first percentile of the lowest joint."""
     positions = hml.canonical(positions)
     return positions - np.array([0.0, np.percentile(positions[..., 1].min(axis=1), 1), 0.0])
 
 
 def clips_of(take: Take) -> Iterator[Clip]:
-    """A take as clips: itself, its mirrored copy, and in training loops and curves of gaits, and walks run backwards."""
+    """A take as clips: itself, its mirror image, and in training loops and curves of gaits and walks run backwards."""
     read = take.read()
     if not isinstance(read, tuple):  # finished HumanML3D features
         yield from _with_mirror(_clip(take, np.asarray(read, dtype=np.float32), "plain"))
@@ -141,7 +142,8 @@ _OTHER_LABEL |= {b: a for a, b in _OTHER_LABEL.items()}
 def _with_mirror(clip: Clip) -> Iterator[Clip]:
     yield clip
     notes = tuple(
-        replace(n, kind=_OTHER_LABEL.get(n.kind, n.kind), texts=tuple(mirror_text(t) for t in n.texts)) for n in clip.notes
+        replace(n, kind=_OTHER_LABEL.get(n.kind, n.kind), texts=tuple(mirror_text(t) for t in n.texts))
+        for n in clip.notes
     )
     yield replace(clip, name="M" + clip.name, notes=notes, features=hml.mirror(clip.features))
 
@@ -149,7 +151,10 @@ def _with_mirror(clip: Clip) -> Iterator[Clip]:
 def mixed_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
     """Arms of a gesture on the body of a gait, both from training clips of one licence."""
     rng = np.random.default_rng(seed)
-    bodies = _labelled(clips, ("walk", "walk slow", "jog", "walk backward", "circle left", "circle right", "sidestep left", "sidestep right"))
+    bodies = _labelled(
+        clips,
+        ("walk", "walk slow", "jog", "walk backward", "circle left", "circle right", "sidestep left", "sidestep right"),
+    )
     arms = _labelled(clips, ("wave", "arms up", "punch"))
     for number in range(count if bodies and arms else 0):
         body_label, gesture = rng.choice(sorted(bodies)), rng.choice(sorted(arms))
@@ -159,7 +164,9 @@ def mixed_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Cl
             continue
         worn = augment.wear_arms(_positions(below, note), _positions(above, gesture_note))
         features = hml.encode(worn, heading="corrected")
-        features[:, LAYOUT["root_height"]] = below.features[note.first : note.first + len(features), LAYOUT["root_height"]]
+        features[:, LAYOUT["root_height"]] = below.features[
+            note.first : note.first + len(features), LAYOUT["root_height"]
+        ]
         yield Clip(
             f"mixed_{seed}_{number:04d}", below.source, below.licence, "train", "mixed",
             (Note(0, len(features), f"{body_label}+{gesture}"),), features,
@@ -227,7 +234,7 @@ def build(
     mixed: int = 300,
     progress: Callable[[str], None] = print,
 ) -> Path:
-    """Build a training set from folders of recordings; returns the path of ``set.json``. Takes already done are kept."""
+    """Build a training set from folders of recordings; returns ``set.json``. Takes already done are kept."""
     out = Path(out)
     for part in ("clips", "done"):
         (out / part).mkdir(parents=True, exist_ok=True)
@@ -249,7 +256,9 @@ def build(
 
 
 def _finish(out: Path, mixed: int, progress: Callable[[str], None]) -> Path:
-    clips = [read_clip(path) for path in sorted((out / "clips").glob("*.safetensors")) if not path.name.startswith("mixed_")]
+    clips = [
+        read_clip(path) for path in sorted((out / "clips").glob("*.safetensors")) if not path.name.startswith("mixed_")
+    ]
     for seed, licence in enumerate(sorted({clip.licence for clip in clips})):
         for clip in mixed_clips([c for c in clips if c.licence == licence], mixed, seed):
             write_clip(out / "clips", clip)

@@ -52,7 +52,9 @@ def read_clips(folder: Path | str, *, sources: Sequence[str] = (), splits: Seque
     """The clips of a built set; ``sources`` keeps those whose source begins with one of the words."""
     folder = Path(folder)
     if not (folder / "set.json").is_file():
-        raise MotionloomError(f"{folder} is not a built set (it has no set.json); make one with 'motionloom data build'")
+        raise MotionloomError(
+            f"{folder} is not a built set (it has no set.json); make one with 'motionloom data build'"
+        )
     clips = (read_clip(path) for path in sorted((folder / "clips").glob("*.safetensors")))
     kept = [c for c in clips if c.split in splits and (not sources or c.source.startswith(tuple(sources)))]
     if not kept:
@@ -124,7 +126,11 @@ class Batches:
     """
 
     def __init__(
-        self, data: MotionSet, *, windows: Sequence[int] = (48, 80, 120, 196), shares: Sequence[float] = (0.2, 0.3, 0.35, 0.15)
+        self,
+        data: MotionSet,
+        *,
+        windows: Sequence[int] = (48, 80, 120, 196),
+        shares: Sequence[float] = (0.2, 0.3, 0.35, 0.15),
     ) -> None:
         self.data, self.windows = data, tuple(windows)
         self.shares = np.array(shares) / np.sum(shares)

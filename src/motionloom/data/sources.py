@@ -82,7 +82,9 @@ def _pack(folder: Path) -> Iterator[Take]:
                 licence=BANDAI_LICENCE if bandai else CMU_LICENCE,
                 split=row["split"],
                 spans=tuple(spans),
-                read=_reader(path, fps=float(row["fps"]), unit=None if path.suffix == ".amc" else float(row["metres_per_unit"])),
+                read=_reader(
+                    path, fps=float(row["fps"]), unit=None if path.suffix == ".amc" else float(row["metres_per_unit"])
+                ),
             )
 
 
@@ -124,7 +126,14 @@ def _humanml3d(folder: Path) -> Iterator[Take]:
             if name.startswith("M"):
                 continue  # mirrored copies are made here
             path = _inside(folder, f"new_joint_vecs/{name}.npy")
-            yield Take(name, "humanml3d", HUMANML3D_LICENCE, split, tuple(_texts(folder / "texts" / f"{name}.txt")), _features(path))
+            yield Take(
+                name,
+                "humanml3d",
+                HUMANML3D_LICENCE,
+                split,
+                tuple(_texts(folder / "texts" / f"{name}.txt")),
+                _features(path),
+            )
 
 
 def _texts(path: Path) -> Iterator[Span]:
@@ -164,8 +173,9 @@ def _inside(folder: Path, relative: str) -> Path:
 
 
 def _json_lines(path: Path) -> Iterator[dict]:
-    opened = gzip.open(path, "rt", encoding="utf-8") if path.suffix == ".gz" else open(path, encoding="utf-8")
-    with opened as lines:
+    if not path.is_file():
+        raise MotionloomError(f"there is no caption file {path}")
+    with gzip.open(path, "rt", encoding="utf-8") if path.suffix == ".gz" else path.open(encoding="utf-8") as lines:
         for number, line in enumerate(lines, start=1):
             try:
                 yield json.loads(line)

@@ -21,7 +21,11 @@ def _measure(p: Array, fps: float) -> Measures:
     smooth = ph.smooth(p, 3)
     velocity = ph.velocity(smooth, fps)
     body = ph.in_body(smooth)
-    return _path_measures(smooth, velocity, fps) | _limb_measures(smooth, velocity, body, fps) | _posture_measures(smooth, body, fps)
+    return (
+        _path_measures(smooth, velocity, fps)
+        | _limb_measures(smooth, velocity, body, fps)
+        | _posture_measures(smooth, body, fps)
+    )
 
 
 def _path_measures(p: Array, velocity: Array, fps: float) -> Measures:
@@ -60,7 +64,7 @@ def _limb_measures(p: Array, velocity: Array, body: Array, fps: float) -> Measur
         "jump_clearance": float(lift.max()),
         "jump_rise": float(p[:, 0, 1].max() - np.median(p[:, 0, 1])),
         "hops": float(sum(abs(apart[max(a - 1, 0)]) > 0.1 for a in air)),
-        "one_leg": _longest(np.abs(apart) > 0.12) / fps,
+        "one_leg": _longest(np.asarray(np.abs(apart) > 0.12)) / fps,
         "rise": float(lower.max() - lower.min()),
         "kick_height": float(np.abs(apart).max() / leg.max()),
         "kick_snap": float(ph.velocity(leg, fps).max()),

@@ -1,11 +1,12 @@
 """The prior's network: a transformer over frames that guesses the clean motion. One code, two manners.
 
-`published`: the MDM encoder (Tevet et al. 2023, "Human Motion Diffusion Model"; also the network of Shafir et al. 2024):
-one condition token (noise level + pooled text) before one token per frame, post-norm blocks. Published checkpoints load.
+`published`: the MDM encoder (Tevet et al. 2023, "Human Motion Diffusion Model"; also the network of Shafir et al.
+2024): one condition token (noise level + pooled text) before one token per frame, post-norm blocks. Published
+checkpoints load.
 
 `modulated`: the default. Several frames make one token; text is attended word by word, because pooled sentence vectors
-of "turn left" and "turn right" nearly coincide; the noise level and the pooled text shift and scale every block (adaptive
-layer norm in the manner of Peebles & Xie 2023, with one shared projection as in Chen et al. 2024).
+of "turn left" and "turn right" nearly coincide; the noise level and the pooled text shift and scale every block
+(adaptive layer norm in the manner of Peebles & Xie 2023, with one shared projection as in Chen et al. 2024).
 
 Both: ``net(state, level, bound)`` with ``bound = net.bind(condition)`` made once per sample, before the loop, so that
 everything that depends on the text alone (projections, keys, values) is computed once.
@@ -47,7 +48,11 @@ class NetConfig:
         numbers = (self.features, self.width, self.layers, self.heads, self.hidden, self.text, self.patch)
         if self.manner not in ("published", "modulated"):
             raise MotionloomError(f"no network manner {self.manner!r}; there are published and modulated")
-        if any(not isinstance(n, int) or not 0 < n <= 65536 for n in numbers) or self.layers > 256 or self.width % self.heads:
+        if (
+            any(not isinstance(n, int) or not 0 < n <= 65536 for n in numbers)
+            or self.layers > 256
+            or self.width % self.heads
+        ):
             raise MotionloomError(f"the network's sizes are not usable: {asdict(self)}")
         if (self.width // self.heads) % 2 or not 0 <= self.dropout < 1:
             raise MotionloomError(f"the network's sizes are not usable: {asdict(self)}")
@@ -180,7 +185,9 @@ class ModulatedBlock(nn.Module):
         self.table = nn.Parameter(torch.zeros(6, width))
         self.drop = nn.Dropout(config.dropout)
 
-    def forward(self, x: Tensor, mask: Tensor | None, change: Tensor, *, keys: Tensor, values: Tensor, words: Tensor) -> Tensor:
+    def forward(
+        self, x: Tensor, mask: Tensor | None, change: Tensor, *, keys: Tensor, values: Tensor, words: Tensor
+    ) -> Tensor:
         rows, tokens, width = x.shape
         shift1, scale1, gate1, shift2, scale2, gate2 = (change + self.table).unsqueeze(2).unbind(1)
         y = F.layer_norm(x, (width,)) * (1 + scale1) + shift1
@@ -220,10 +227,14 @@ class PriorNet(nn.Module):
     def bind(self, cond: Condition) -> Bound:
         """Everything that depends on the condition alone."""
         rows, words = cond.words.shape
-        keys = values = cond.pooled.new_zeros(rows, self.config.layers, self.config.heads, 0, self.config.width // self.config.heads)
+        keys = values = cond.pooled.new_zeros(
+            rows, self.config.layers, self.config.heads, 0, self.config.width // self.config.heads
+        )
         if self.modulated:
             if not words:
-                raise MotionloomError("this network attends to word vectors and the condition has none; use its own text encoder")
+                raise MotionloomError(
+                    "this network attends to word vectors and the condition has none; use its own text encoder"
+                )
             both = self.words(cond.tokens).view(rows, words, self.config.layers, 2, self.config.heads, -1)
             keys, values = both.permute(3, 0, 2, 4, 1, 5)
         return Bound(self.text(cond.pooled), keys, values, cond.words[:, None, None], cond.lengths, cond.flags)
@@ -232,14 +243,20 @@ class PriorNet(nn.Module):
         """(rows, frames, features) standardised, at ``level`` (one, or one per row; 1..T) to the clean guess."""
         rows, frames, _ = x.shape
         if self.flag is not None:
-            flags = bound.flags if bound.flags.shape[1] else torch.zeros(rows, frames, dtype=torch.long, device=x.device)
+            flags = (
+                bound.flags if bound.flags.shape[1] else torch.zeros(rows, frames, dtype=torch.long, device=x.device)
+            )
             x = torch.cat([x, self.flag(flags)], dim=-1)
         valid = _valid(bound.lengths, frames)
         tokens = self.embed(self._patches(x, valid))
         # published noise index t is level - 1
         time = torch.as_tensor(level, device=x.device).expand(rows) - 1
         time = self.time2(F.silu(self.time1(sinusoids(time, self.config.width).to(tokens.dtype))))
-        y = self._modulated(tokens, time, valid, bound) if self.modulated else self._published(tokens, time, valid, bound)
+        y = (
+            self._modulated(tokens, time, valid, bound)
+            if self.modulated
+            else self._published(tokens, time, valid, bound)
+        )
         return self.out(y).reshape(rows, -1, self.config.features)[:, :frames]
 
     def _patches(self, x: Tensor, valid: Tensor | None) -> Tensor:
@@ -260,10 +277,16 @@ class PriorNet(nn.Module):
         return x[:, 1:]
 
     def _modulated(self, x: Tensor, time: Tensor, valid: Tensor | None, bound: Bound) -> Tensor:
-        x = self.drop(x + sinusoids(torch.arange(x.shape[1], device=x.device) * self.config.patch, self.config.width).to(x.dtype))
+        x = self.drop(
+            x + sinusoids(torch.arange(x.shape[1], device=x.device) * self.config.patch, self.config.width).to(x.dtype)
+        )
         mask = None
         if valid is not None:
-            mask = F.pad(valid, (0, -valid.shape[1] % self.config.patch)).view(len(x), -1, self.config.patch).any(-1)[:, None, None]
+            mask = (
+                F.pad(valid, (0, -valid.shape[1] % self.config.patch))
+                .view(len(x), -1, self.config.patch)
+                .any(-1)[:, None, None]
+            )
         cond = F.silu(time + bound.text)
         change = self.change(cond).view(len(x), 6, -1)
         for i, block in enumerate(self.blocks):

@@ -59,7 +59,7 @@ def own_name(key: str) -> str | None:
     stem, _, leaf = key.rpartition(".")
     if stem in _NAMES:
         return f"{_NAMES[stem]}.{leaf}"
-    raise MotionloomError(f"the checkpoint has a weight {key!r} that MDM's trans_enc does not; other architectures are not read")
+    raise MotionloomError(f"the checkpoint has a weight {key!r} that MDM's trans_enc does not; name one of those")
 
 
 def from_published(state: dict[str, Tensor]) -> PriorNet:
@@ -67,7 +67,9 @@ def from_published(state: dict[str, Tensor]) -> PriorNet:
     renamed = {name: value.float() for key, value in state.items() if (name := own_name(key)) is not None}
     for needed in ("embed.weight", "out.weight", "text.weight", "blocks.0.linear1.weight"):
         if needed not in renamed or renamed[needed].ndim != 2:
-            raise MotionloomError(f"the checkpoint lacks {needed} (in its own words); it is not an MDM trans_enc checkpoint")
+            raise MotionloomError(
+                f"the checkpoint lacks {needed} (in its own words); it is not an MDM trans_enc checkpoint"
+            )
     layers = len({key.split(".")[1] for key in renamed if key.startswith("blocks.")})
     config = NetConfig(
         manner="published",
@@ -87,7 +89,7 @@ def from_published(state: dict[str, Tensor]) -> PriorNet:
     if wrong:
         key = wrong[0]
         raise MotionloomError(
-            f"the checkpoint does not fit: {key} is {found.get(key, 'missing')} and should be {wanted.get(key, 'absent')}"
+            f"the checkpoint does not fit: {key} is {found.get(key, 'missing')}, not {wanted.get(key, 'absent')}"
         )
     if not all(bool(value.isfinite().all()) for value in renamed.values()):
         raise MotionloomError("the checkpoint has numbers that are not finite")
@@ -104,7 +106,16 @@ def read_published(path: Path | str) -> Published:
         raise MotionloomError(f"{path} is larger than 2 GiB; published checkpoints are far smaller")
     try:
         loaded = torch.load(path, map_location="cpu", weights_only=True)
-    except (pickle.UnpicklingError, RuntimeError, EOFError, OSError, ValueError, zipfile.BadZipFile, KeyError, TypeError) as error:
+    except (
+        pickle.UnpicklingError,
+        RuntimeError,
+        EOFError,
+        OSError,
+        ValueError,
+        zipfile.BadZipFile,
+        KeyError,
+        TypeError,
+    ) as error:
         reason = " ".join(str(error).split())[:120]
         raise MotionloomError(f"{path} holds more than tensors or is damaged, and is not opened ({reason})") from None
     averaged = isinstance(loaded, dict) and "model_avg" in loaded

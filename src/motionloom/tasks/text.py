@@ -91,7 +91,9 @@ def generate(
     if len(lengths) != len(said):
         raise MotionloomError(f"there are {len(lengths)} lengths for {len(said)} prompts; give one, or one per prompt")
     if not said or count < 1:
-        raise MotionloomError(f"nothing to make: {len(said)} prompts, {count} of each; give at least one prompt and count 1")
+        raise MotionloomError(
+            f"nothing to make: {len(said)} prompts, {count} of each; give at least one prompt and count 1"
+        )
     said = [prompt for prompt in said for _ in range(count)]
     frames = [_frames(length, prior.fps) for length in lengths for _ in range(count)]
     made = sample_features(
@@ -109,7 +111,9 @@ def to_motion(features: np.ndarray, fps: float, *, clean: bool = True) -> Motion
 
 def _frames(seconds: float, fps: float) -> int:
     if not (np.isfinite(seconds) and 0 < seconds <= LONGEST):
-        raise MotionloomError(f"a motion of {seconds:g} seconds cannot be made; ask for more than 0 and at most {LONGEST:g}")
+        raise MotionloomError(
+            f"a motion of {seconds:g} seconds cannot be made; ask for more than 0 and at most {LONGEST:g}"
+        )
     return max(round(seconds * fps), 4)
 
 

@@ -85,7 +85,9 @@ def make_optimizer(net: nn.Module, recipe: Recipe) -> torch.optim.AdamW:
     return torch.optim.AdamW(groups, lr=recipe.rate, betas=(0.9, 0.99))
 
 
-def save_state(folder: Path, net: nn.Module, average: Average, optimizer: torch.optim.Optimizer, *, step: int, recipe: Recipe) -> None:
+def save_state(
+    folder: Path, net: nn.Module, average: Average, optimizer: torch.optim.Optimizer, *, step: int, recipe: Recipe
+) -> None:
     """Everything a run needs to go on, in one file without pickle."""
     tensors = {f"net.{k}": v for k, v in net.state_dict().items()}
     tensors |= {f"average.{k}": v for k, v in average.weights.items()}

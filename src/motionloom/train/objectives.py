@@ -13,7 +13,15 @@ from motionloom.features.layout import LAYOUT
 from motionloom.nets.prior import Condition, PriorNet, condition
 from motionloom.nets.text import TextEncoder
 
-WEIGHTS = {"yaw_velocity": 6.0, "root_velocity": 6.0, "root_height": 6.0, "ric": 1.5, "rot6d": 0.4, "joint_velocity": 1.0, "contacts": 0.5}
+WEIGHTS = {
+    "yaw_velocity": 6.0,
+    "root_velocity": 6.0,
+    "root_height": 6.0,
+    "ric": 1.5,
+    "rot6d": 0.4,
+    "joint_velocity": 1.0,
+    "contacts": 0.5,
+}
 """Weights of the feature blocks in the loss: the few numbers of the root decide where a person goes, the 126 of the
 rotations are read by nobody when motions are exported. 1 everywhere is the published loss."""
 
@@ -21,8 +29,10 @@ rotations are read by nobody when motions are exported. 1 everywhere is the publ
 class Objective(Protocol):
     """One kind of training for `train.loop.train`."""
 
-    net: nn.Module
-    """The trained weights."""
+    @property
+    def net(self) -> nn.Module:
+        """The trained weights."""
+        ...
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """The loss of one step, drawn from ``(seed, step)`` alone; ``net`` may be a wrapped `self.net`."""
@@ -32,7 +42,9 @@ class Objective(Protocol):
 class WordBank:
     """Token states of all sentences of a set, encoded once, float16."""
 
-    def __init__(self, encoder: TextEncoder, texts: tuple[str, ...], *, room: int = 40, progress: Callable[[str], None] = print) -> None:
+    def __init__(
+        self, encoder: TextEncoder, texts: tuple[str, ...], *, room: int = 40, progress: Callable[[str], None] = print
+    ) -> None:
         self.starts = [0]
         tokens, pooled = [], []
         progress(f"encoding {len(texts)} sentences")

@@ -71,7 +71,9 @@ def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Reci
     hints = get_type_hints(Recipe)
     for key, value in values.items():
         if key not in hints:
-            raise MotionloomError(f"{path}: no setting {key!r}; the settings are {', '.join(f.name for f in fields(Recipe))}")
+            raise MotionloomError(
+                f"{path}: no setting {key!r}; the settings are {', '.join(f.name for f in fields(Recipe))}"
+            )
         kind = getattr(hints[key], "__origin__", hints[key])
         if kind is float and isinstance(value, int) and not isinstance(value, bool):
             values[key] = float(value)
@@ -86,11 +88,14 @@ def _check(path: Path, recipe: Recipe) -> None:
     good = (
         recipe.steps > 0 < recipe.batch and recipe.rate > 0 and 0 <= recipe.ema < 1 and 0 <= recipe.drop_text < 1
         and recipe.levels > 1 and 0 <= recipe.cooldown <= 1 and recipe.clip > 0 and recipe.save_every > 0
-        and len(recipe.windows) == len(recipe.shares) > 0 and min(recipe.windows) > 0 and min(recipe.shares) >= 0 < sum(recipe.shares)
+        and len(recipe.windows) == len(recipe.shares) > 0 and min(recipe.windows) > 0
+        and min(recipe.shares) >= 0 < sum(recipe.shares)
         and recipe.amp in ("bf16", "none") and recipe.schedule in ("cosine", "linear")
     )  # fmt: skip
     if not good:
-        raise MotionloomError(f"{path}: a number or a choice is out of its range; see the comments of recipes/default.toml")
+        raise MotionloomError(
+            f"{path}: a number or a choice is out of its range; see the comments of recipes/default.toml"
+        )
     NetConfig.parse(recipe.net)
 
 
