@@ -45,6 +45,14 @@ def test_hops_count_for_the_foot_that_lands() -> None:
     assert gestures.single_foot_hops(p[:, [0, 2, 1, 3, 5, 4, 6, 8, 7, 9, 11, 10, *range(12, 22)]]) == (0, 3)
 
 
+def test_a_leap_from_one_foot_to_the_other_is_no_hop() -> None:
+    p = np.concatenate([standing(0.5), jumping(0.2, 2.0), standing(0.5)])
+    p[:30, [5, 8, 11], 1] += 0.3  # the right foot is up until the top of the flight, then the left one
+    p[30:, [4, 7, 10], 1] += 0.3
+    assert len(gestures.airborne(p, clearance=0.04)) == 1
+    assert gestures.single_foot_hops(p) == (0, 0)
+
+
 def test_a_walk_of_four_seconds_lifts_each_foot_four_times() -> None:
     left, right = gestures.foot_height_peaks(walking(1.0))
     assert abs(left - 4) <= 1
