@@ -308,3 +308,16 @@ def test_clips_of_the_pack_are_read_in_metres_and_survive_a_round_trip(tmp_path,
     again = load_bvh(save_bvh(file.motion, tmp_path / "a.bvh", order=file.orders, unit=file.unit))
     assert again.skeleton.names == file.motion.skeleton.names
     assert largest_distance(file.motion, again) < 1e-6
+
+
+def test_a_long_block_read_in_pieces_is_the_same_and_faults_keep_their_lines(tmp_path, monkeypatch):
+    rows = [f"{i} {i / 7:.6f} -{i}e-2 0 0 0 0 0 {i % 360}" for i in range(500)]
+    text = ARM.partition("0 0 0 0 0 0 0 0 0")[0].replace("Frames: 2", "Frames: 500")
+    whole = load_bvh(write(tmp_path, text + "\n".join(rows)), unit=1)
+    monkeypatch.setattr("motionloom.io.text._CHUNK", 100)
+    pieces = load_bvh(write(tmp_path, text + "\n".join(rows)), unit=1)
+    np.testing.assert_array_equal(pieces.root[:, 0], np.arange(500))
+    np.testing.assert_array_equal(pieces.rotations, whole.rotations)
+    rows[321] = rows[321].replace("e-2", "e-2?")
+    with pytest.raises(MotionloomError, match=r"line 340: '-321e-2\?' is not"):
+        load_bvh(write(tmp_path, text + "\n".join(rows)), unit=1)
