@@ -2,10 +2,10 @@
 
 import ast
 import re
+import resource
 import shutil
 import subprocess
 import sys
-import time
 import zipfile
 from importlib.metadata import version
 from pathlib import Path
@@ -40,16 +40,15 @@ def test_help_imports_neither_torch_nor_numpy() -> None:
 
 
 def test_help_is_quick() -> None:
-    """The best of five starts of `motionloom --help` takes under half a second."""
+    """The best of three starts of `motionloom --help` takes under half a second of a processor's time."""
     times = []
-    for _ in range(5):
-        start = time.perf_counter()
+    for _ in range(3):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
         done = run("-c", "import sys; from motionloom.cli import main; sys.exit(main(['--help']))")
-        times.append(time.perf_counter() - start)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
         assert done.returncode == 0, done.stderr
-        if times[-1] < 0.5:
-            break
-    assert min(times) < 0.5
+        times.append(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
+    assert min(times) < 0.5  # not wall time: other tests share the machine
 
 
 def test_version_is_that_of_the_installed_package() -> None:
