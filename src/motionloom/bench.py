@@ -256,6 +256,7 @@ def bench(
     progress: Callable[[str], None] = lambda line: None,
 ) -> dict[str, Any]:
     """Everything, as plain data. ``sizes``: square matrices whose product is the measure of the machine."""
+    about = machine(prior)  # before this run itself is load
     repeats, counts = (1, (1, 2, 4)) if quick else (5, (1, 2, 4, 8, 16))
     parts: list[Callable[[], list[Entry]]] = [
         lambda: [speed_of_default(prior, how, seconds=6.0, repeats=min(repeats, 3))],
@@ -270,7 +271,7 @@ def bench(
         for entry in part():
             entries.append(entry)
             progress(f"{entry.name}: {entry.value:.3g} {entry.unit}")
-    return {"machine": machine(prior), "quick": quick, "entries": [asdict(entry) for entry in entries]}
+    return {"machine": about, "quick": quick, "entries": [asdict(entry) for entry in entries]}
 
 
 def machine(prior: Prior) -> dict[str, Any]:
@@ -281,6 +282,7 @@ def machine(prior: Prior) -> dict[str, Any]:
         if device.type == "cuda"
         else platform.processor() or platform.machine(),
         "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "load": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else 0.0,
         "threads": torch.get_num_threads(),
         "torch": torch.__version__,
         "python": platform.python_version(),

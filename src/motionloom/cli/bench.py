@@ -32,3 +32,5 @@ def _bench(arguments: argparse.Namespace) -> None:
     on = found["machine"]
     print(f"{on['device']}, {on['cores']} cores, {on['threads']} threads, torch {on['torch']}, {on['type']}")
     print(plain(table(found)))
+    if on["load"] > 0.5:
+        print(f"\nthe machine was busy when this began (load {on['load']}): run it again when nothing else does")
