@@ -65,10 +65,9 @@ class Clip:
     """(frames, 263) float32, not standardised."""
 
 
-def stand_on_floor(positions: Array) -> Array:
-    """The published canonical form, but with the floor at the first percentile of the lowest joint."""
-    positions = hml.canonical(positions)
-    return positions - np.array([0.0, np.percentile(positions[..., 1].min(axis=1), 1), 0.0])
+def at_origin(positions: Array) -> Array:
+    """The published canonical start (origin, facing +Z), with the floor left where planted feet say it is."""
+    return hml.canonical(positions) + np.array([0.0, positions[..., 1].min(), 0.0])
 
 
 def clips_of(take: Take) -> Iterator[Clip]:
@@ -78,7 +77,7 @@ def clips_of(take: Take) -> Iterator[Clip]:
         yield from _with_mirror(_clip(take, np.asarray(read, dtype=np.float32), "plain"))
         return
     positions, fps = read
-    positions = stand_on_floor(hml.uniform(hml.resample_positions(positions, fps)))
+    positions = at_origin(hml.uniform(hml.resample_positions(positions, fps)))
     if len(positions) <= SHORTEST:
         raise MotionloomError(f"only {len(positions) / FPS:.2f} s long; at least {SHORTEST / FPS:.0f} s are needed")
     clip = _clip(take, hml.encode(positions, heading="corrected"), "plain")

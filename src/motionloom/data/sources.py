@@ -14,7 +14,7 @@ from motionloom.data.words import describe_index
 from motionloom.errors import MotionloomError
 from motionloom.io import load
 from motionloom.metrics.physics import Array
-from motionloom.retarget import joints22
+from motionloom.retarget import to_smpl22
 
 CMU_LICENCE = "CMU mocap: free for research and commercial use; acknowledge mocap.cs.cmu.edu, NSF EIA-0196217"
 BANDAI_LICENCE = "Bandai-Namco-Research-Motiondataset, CC BY-NC 4.0: non-commercial use only"
@@ -42,7 +42,8 @@ class Take:
     split: str
     spans: tuple[Span, ...]
     read: Callable[[], tuple[Array, float] | np.ndarray]
-    """Joint positions (frames, 22, 3) in metres with their frame rate, or finished features (frames, 263)."""
+    """Joints of the uniform person (frames, 22, 3) in metres, the floor at y = 0, with their frame rate; or finished
+    features (frames, 263)."""
 
 
 def find_takes(folder: Path | str, *, captions: Path | str | None = None) -> list[Take]:
@@ -149,8 +150,8 @@ def _texts(path: Path) -> Iterator[Span]:
 
 def _reader(path: Path, *, fps: float | None, unit: float | None) -> Callable[[], tuple[Array, float]]:
     def read() -> tuple[Array, float]:
-        motion = load(path, fps=fps, unit=unit)
-        return joints22(motion), motion.fps
+        motion = to_smpl22(load(path, fps=fps, unit=unit))
+        return motion.positions(), motion.fps
 
     return read
 

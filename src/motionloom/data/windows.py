@@ -72,7 +72,7 @@ def _limb_measures(p: Array, velocity: Array, body: Array, fps: float) -> Measur
         "punch_speed": float(np.where(level, ph.velocity(reach, fps), 0).max()),
         "both_over_head": float((p[:, _WRISTS, 1].min(axis=1) - p[:, 15, 1]).max()),
         "hand_over_neck": float((p[:, _WRISTS, 1] - p[:, 12:13, 1]).max()),
-        "hands_up": _longest((p[:, _WRISTS, 1] > p[:, 12:13, 1]).all(axis=1)) / fps,
+        "hands_up": _longest((p[:, _WRISTS, 1].min(axis=1) > p[:, 12, 1])) / fps,
         "wave_swings": float(max(_swings(body[:, w, 0][raised[:, k] > 0], 0.07) for k, w in enumerate(_WRISTS))),
         "stir": float(np.percentile(np.linalg.norm(velocity, axis=-1).max(axis=1), 90)),
         "mean_stir": float(np.linalg.norm(velocity, axis=-1).mean()),
