@@ -7,11 +7,13 @@ licence, provenance. Nothing in it is ever executed.
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
@@ -21,6 +23,7 @@ from motionloom.diffusion import Schedule, cosine, linear
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.nets.prior import Condition, NetConfig, PriorNet, condition
+from motionloom.nets.published import FRAME_RATES, TEXTS, PublishedText, describe, from_published, read_published
 from motionloom.nets.text import MiniLM, TextEncoder
 
 FORMAT = 1
@@ -48,7 +51,7 @@ class Prior:
     net: PriorNet
     schedule: Schedule
     mean: Tensor
-    """(263,) of the training features."""
+    """(features,) of the training data; 263 for HumanML3D."""
     std: Tensor
     text: TextEncoder
     card: Card
@@ -57,7 +60,8 @@ class Prior:
     @staticmethod
     def load(weights: str | Path = "default", *, device: str | torch.device = "cpu") -> "Prior":
         """Read a weight file: a path, or the name of one that ships with the package (``default``)."""
-        return load_prior(find_weights(weights), device)
+        place = find_device(device)
+        return load_prior(find_weights(weights), place)
 
     def to(self, device: str | torch.device) -> "Prior":
         """The same prior with its network and statistics on another device."""
@@ -72,6 +76,17 @@ class Prior:
             cond = condition(said.pooled, lengths=lengths)
         keep = torch.tensor([bool(p.strip()) for p in prompts], device=self.mean.device)
         return cond if bool(keep.all()) else cond.choose(keep)
+
+
+def find_device(name: str | torch.device) -> torch.device:
+    """The device of that name; raises MotionloomError where this machine or this PyTorch has none."""
+    try:
+        device = torch.device(name)
+        torch.empty(1, device=device).cpu()
+        return device
+    except (RuntimeError, AssertionError, NotImplementedError) as error:
+        reason = " ".join(str(error).split())[:80]
+        raise MotionloomError(f"the device {str(name)!r} cannot be used ({reason}); cpu always can") from None
 
 
 def shipped() -> dict[str, Path]:
@@ -140,13 +155,19 @@ def load_prior(path: Path, device: str | torch.device = "cpu") -> Prior:
     _check(path, {k: tuple(v.shape) for k, v in net.state_dict().items()}, weights)
     net.load_state_dict(weights, assign=True)
     for name in ("mean", "std"):
-        if name not in tensors or tensors[name].shape != (config.features,) or not bool(tensors[name].isfinite().all()):
+        values = tensors.get(name, torch.empty(0)).float()
+        usable = values.shape == (config.features,) and bool(values.isfinite().all())
+        if not usable or (name == "std" and values.min() < 0):
             raise MotionloomError(f"{path} lacks a usable {name} of {config.features} numbers; fetch the weights again")
     schedule = SCHEDULES[about["schedule"]["name"]](about["schedule"]["steps"])
     prior = Prior(
         net.eval().requires_grad_(False), schedule, tensors["mean"].float(), tensors["std"].float(),
         _text(path, about["text"], tensors), Card(**about["card"]), float(about["fps"]),
     )  # fmt: skip
+    if prior.text.width != config.text:
+        raise MotionloomError(
+            f"{path} reads texts of width {config.text} and its text encoder gives {prior.text.width}; fetch it again"
+        )
     return prior if str(device) == "cpu" else prior.to(device)
 
 
@@ -159,8 +180,10 @@ def _about(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
             )
         steps = about["schedule"]["steps"]
         known = about["schedule"]["name"] in SCHEDULES and isinstance(steps, int) and 1 <= steps <= 100_000
-        good_card = isinstance(about["card"], dict) and isinstance(about["card"]["name"], str)
-        good_rate = isinstance(about["fps"], int | float) and math.isfinite(about["fps"]) and about["fps"] > 0
+        kinds = {"name": str, "licence": str, "data": str, "notes": dict}
+        card = about["card"]
+        good_card = "name" in card and all(isinstance(card.get(k, kind()), kind) for k, kind in kinds.items())
+        good_rate = isinstance(about["fps"], int | float) and math.isfinite(about["fps"]) and 1 <= about["fps"] <= 1000
         if not (
             known and good_card and good_rate and isinstance(about["net"], dict) and isinstance(about["text"], str)
         ):
@@ -194,8 +217,44 @@ def _check(path: Path, wanted: dict[str, tuple[int, ...]], found: dict[str, Tens
 def _text(path: Path, name: str, tensors: dict[str, Tensor]) -> TextEncoder:
     if name == "minilm":
         return MiniLM.from_tensors({k[5:]: v for k, v in tensors.items() if k.startswith("text.")})
-    if name == "clip":
-        from motionloom.nets.text import ClipText
-
-        return ClipText.open()
+    if name in TEXTS:
+        return PublishedText(name)
     raise MotionloomError(f"{path} wants the text encoder {name!r}, which this motionloom does not have")
+
+
+def import_published(
+    path: Path | str, *, mean: np.ndarray, std: np.ndarray, name: str | None = None, licence: str | None = None,
+    warn: Callable[[str], None] = lambda line: None,
+) -> Prior:  # fmt: skip
+    """A published MDM or PriorMDM checkpoint (``model*.pt``, with ``args.json`` beside it) as a `Prior`.
+
+    mean, std: (features,) statistics published with the data set. warn: told what was missing and is assumed.
+    Raises MotionloomError for anything but plain weights of MDM's ``trans_enc``.
+    """
+    path = Path(path)
+    published = read_published(path)
+    net = from_published(published.state)
+    said = describe(published, net)
+    for line in said.warnings:
+        warn(line)
+    features = net.config.features
+    for label, values in (("mean", mean), ("std", std)):
+        if np.shape(values) != (features,) or np.asarray(values).dtype.kind != "f" or not np.isfinite(values).all():
+            raise MotionloomError(
+                f"the {label} for these weights must be {features} finite numbers; got shape {np.shape(values)}"
+            )
+    if not (np.asarray(std) >= 0).all():
+        raise MotionloomError("the std has negative numbers; name the data set's Std.npy")
+    options = _plain_options(published.options)
+    notes = {"imported_from": path.name, "averaged_weights": published.averaged, "options": options}
+    card = Card(name or path.stem, licence or Card.licence, f"as published: {said.data}", notes)
+    text = PublishedText("clip-77" if features == 135 else "clip")
+    centre, spread = (torch.from_numpy(np.asarray(values, dtype=np.float32).copy()) for values in (mean, std))
+    schedule = SCHEDULES[said.schedule](said.steps)
+    return Prior(net, schedule, centre, spread, text, card, FRAME_RATES.get(features, 20.0))
+
+
+def _plain_options(options: dict[str, Any]) -> dict[str, Any]:
+    """The options that are single values, without the paths and devices of somebody's machine."""
+    dropped = {"data_dir", "save_dir", "resume_checkpoint", "pretrained_path", "device", "cuda"}
+    return {k: v for k, v in options.items() if k not in dropped and isinstance(v, str | int | float | bool) and v == v}

@@ -43,6 +43,8 @@ def _generate(arguments: argparse.Namespace) -> None:
         check_output(out)
     if len({str(out) for out in outs}) != len(outs):
         _fail("the same --out is given twice; give each file its own name")
+    if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
+        _fail(f"--fps must be 1 to 1000; got {arguments.fps:g}")
     if not 1 <= arguments.count <= 10_000 or not 0 <= arguments.seed < 2**62:
         _fail(f"--count must be 1 to 10000 and --seed 0 or more; got {arguments.count} and {arguments.seed}")
     motions, seconds = _make(arguments, prompts)

@@ -27,9 +27,13 @@ def add(subparsers) -> None:
 def _prior(arguments: argparse.Namespace) -> None:
     import torch
 
+    from motionloom.errors import MotionloomError
     from motionloom.train.prior import text_encoder, train_prior
     from motionloom.train.recipe import changes, load_recipe
 
+    for option in ("threads", "stop"):
+        if getattr(arguments, option) is not None and getattr(arguments, option) < 1:
+            raise MotionloomError(f"--{option} must be 1 or more; got {getattr(arguments, option)}")
     if arguments.threads:
         torch.set_num_threads(arguments.threads)
     recipe = load_recipe(arguments.recipe, changes(arguments.set))

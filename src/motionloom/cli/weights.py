@@ -1,5 +1,128 @@
-"""Not filled yet."""
+"""`motionloom weights` and `motionloom import`: what a weight file is, and published checkpoints as one."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 def add(subparsers) -> None:
-    """Register nothing."""
+    """Register `import` and `weights`."""
+    parser = subparsers.add_parser("import", help="published MDM or PriorMDM weights to a weight file")
+    parser.add_argument("checkpoint", type=Path, metavar="MODEL.pt", help="model000200000.pt, args.json beside it")
+    parser.add_argument("--out", type=Path, required=True, help="file to write, .safetensors")
+    parser.add_argument("--mean", type=Path, help="Mean.npy of the data set, as its authors publish it")
+    parser.add_argument("--std", type=Path, help="Std.npy of the data set")
+    parser.add_argument("--name", help="name on the card (default: the checkpoint's)")
+    parser.add_argument("--licence", help="what one may do with these weights, as whoever gave them says")
+    parser.add_argument("--half", action="store_true", help="write float16: half the size, nearly the same numbers")
+    parser.set_defaults(run=_import)
+    parser = subparsers.add_parser("weights", help="what a weight file holds, or which ones ship with motionloom")
+    parser.add_argument(
+        "weights", nargs="?", metavar="NAME|FILE", help="a shipped name or a file (default: list the shipped)"
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.set_defaults(run=_weights)
+
+
+def _import(arguments: argparse.Namespace) -> None:
+    from motionloom.checkpoint import import_published, save_prior
+    from motionloom.errors import MotionloomError
+    from motionloom.io.atomic import check_place
+
+    if arguments.out.suffix != ".safetensors":
+        raise MotionloomError(f"weights are written as .safetensors; {arguments.out.name} has another suffix")
+    check_place(arguments.out)
+    if not arguments.checkpoint.is_file():
+        raise MotionloomError(f"there is no checkpoint {arguments.checkpoint}")
+    if arguments.mean is None or arguments.std is None:
+        raise MotionloomError(
+            "the weights work on standardised features and do not hold the statistics: "
+            "add --mean Mean.npy --std Std.npy of the data set they were trained on"
+        )
+    prior = import_published(
+        arguments.checkpoint, mean=_numbers(arguments.mean), std=_numbers(arguments.std),
+        name=arguments.name, licence=arguments.licence, warn=lambda line: print(f"motionloom: {line}", file=sys.stderr),
+    )  # fmt: skip
+    print(f"wrote {save_prior(prior, arguments.out, half=arguments.half)}")
+
+
+def _numbers(path: Path) -> "np.ndarray":
+    """A small .npy array of numbers, without pickle."""
+    import numpy as np
+
+    from motionloom.errors import MotionloomError
+
+    if not path.is_file():
+        raise MotionloomError(f"there is no file {path}; name the Mean.npy and Std.npy published with the data set")
+    try:
+        if path.stat().st_size > 1 << 20:
+            raise ValueError("it is larger than 1 MiB")
+        values = np.load(path, allow_pickle=False, mmap_mode="r")  # a declared size beyond the file's is refused
+        if not isinstance(values, np.ndarray):
+            raise ValueError("it is an archive")
+        return np.array(values)
+    except (OSError, ValueError, EOFError, SyntaxError) as error:
+        reason = " ".join(str(error).split())[:120]
+        raise MotionloomError(f"{path} is not a .npy array of numbers ({reason})") from None
+
+
+def _weights(arguments: argparse.Namespace) -> None:
+    from motionloom.checkpoint import find_weights, shipped
+
+    if arguments.weights is None:
+        described = [describe(path, name) for name, path in shipped().items()]
+        if arguments.json:
+            print(json.dumps(described, indent=1))
+            return
+        for about in described:
+            print(f"{about['name']:<12} {about['megabytes']:6.1f} MB  {about['licence']}")
+        if not described:
+            print("no weights ship with this installation; name a file")
+        return
+    path = find_weights(arguments.weights)
+    about = describe(path, str(arguments.weights) if str(arguments.weights) in shipped() else None)
+    print(json.dumps(about, indent=1) if arguments.json else _card(about))
+
+
+def describe(path: Path, name: str | None = None) -> dict[str, Any]:
+    """What a weight file says and holds; the whole file is read and checked. ``name``: the shipped one."""
+    from motionloom.checkpoint import load_prior
+
+    prior = load_prior(path)
+    config = prior.net.config
+    return {
+        "name": name or prior.card.name,
+        "file": str(path),
+        "megabytes": round(path.stat().st_size / 1e6, 1),
+        "licence": prior.card.licence,
+        "data": prior.card.data,
+        "manner": config.manner,
+        "parameters": sum(p.numel() for p in prior.net.parameters()),
+        "sizes": {"layers": config.layers, "width": config.width, "heads": config.heads, "patch": config.patch},
+        "features": config.features,
+        "frames_per_second": prior.fps,
+        "schedule": {"name": prior.schedule.name, "steps": prior.schedule.steps},
+        "text": prior.text.name,
+        "notes": prior.card.notes,
+    }
+
+
+def _card(about: dict[str, Any]) -> str:
+    sizes = ", ".join(f"{key} {value}" for key, value in about["sizes"].items())
+    rows = {
+        "name": about["name"],
+        "file": f"{about['file']} ({about['megabytes']} MB)",
+        "licence": about["licence"],
+        "data": about["data"],
+        "network": f"{about['manner']}, {about['parameters']:,} parameters ({sizes})",
+        "motion": f"{about['features']} numbers per frame, {about['frames_per_second']:g} frames per second",
+        "schedule": f"{about['schedule']['name']}, {about['schedule']['steps']} levels",
+        "text": about["text"],
+        "notes": json.dumps(about["notes"], ensure_ascii=False) if about["notes"] else "none",
+    }
+    return "\n".join(f"{key:<9} {value}" for key, value in rows.items())

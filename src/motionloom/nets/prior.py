@@ -52,6 +52,7 @@ class NetConfig:
             any(not isinstance(n, int) or not 0 < n <= 65536 for n in numbers)
             or self.layers > 256
             or self.width % self.heads
+            or not isinstance(self.flags, bool)
         ):
             raise MotionloomError(f"the network's sizes are not usable: {asdict(self)}")
         if (self.width // self.heads) % 2 or not 0 <= self.dropout < 1:

@@ -4,8 +4,8 @@ Keys and shapes: MDM's ``trans_enc`` (HumanML3D 263, KIT 251, BABEL 135 with or 
 """
 
 import json
-import pickle
 import zipfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,8 @@ from torch import Tensor
 
 from motionloom.errors import MotionloomError
 from motionloom.nets.prior import NetConfig, PriorNet
+from motionloom.nets.text import ClipText, TextEmbedding
+from motionloom.nets.text.clip import FULL_LENGTH, HUMANML_LENGTH
 
 MAX_BYTES = 2 << 30
 _IGNORED = ("clip_model.", "sequence_pos_encoder.pe", "embed_timestep.sequence_pos_encoder.pe", "t_pos_encoder.pe")
@@ -34,6 +36,12 @@ _LAYER = {
     "self_attn.out_proj.bias": "attention.out.bias",
 }
 _STACK = "seqTransEncoder.layers."
+_NEEDED = (
+    "input_process.poseEmbedding.weight",
+    "output_process.poseFinal.weight",
+    "embed_text.weight",
+    f"{_STACK}0.linear1.weight",
+)
 
 
 @dataclass(frozen=True)
@@ -52,7 +60,7 @@ def own_name(key: str) -> str | None:
     if key.startswith(_IGNORED):
         return None
     if key.startswith(_STACK):
-        number, rest = key[len(_STACK) :].split(".", 1)
+        number, _, rest = key[len(_STACK) :].partition(".")
         return f"blocks.{number}.{_LAYER.get(rest, rest)}"
     if key == "emb_trans_or_not.weight":
         return "flag.weight"
@@ -91,9 +99,10 @@ def from_published(state: dict[str, Tensor]) -> PriorNet:
         raise MotionloomError(
             f"the checkpoint does not fit: {key} is {found.get(key, 'missing')}, not {wanted.get(key, 'absent')}"
         )
-    if not all(bool(value.isfinite().all()) for value in renamed.values()):
+    weights = {key: value.float() for key, value in renamed.items()}
+    if not all(bool(value.isfinite().all()) for value in weights.values()):
         raise MotionloomError("the checkpoint has numbers that are not finite")
-    net.load_state_dict(renamed, assign=True)
+    net.load_state_dict(weights, assign=True)
     return net.eval().requires_grad_(False)
 
 
@@ -105,24 +114,30 @@ def read_published(path: Path | str) -> Published:
     if path.stat().st_size > MAX_BYTES:
         raise MotionloomError(f"{path} is larger than 2 GiB; published checkpoints are far smaller")
     try:
+        if zipfile.is_zipfile(path):
+            with zipfile.ZipFile(path) as archive:  # a small file may unfold to a huge one
+                unfolded = sum(entry.file_size for entry in archive.infolist())
+            if unfolded > MAX_BYTES:
+                raise ValueError(f"it unfolds to {unfolded / 2**30:.1f} GiB")
         loaded = torch.load(path, map_location="cpu", weights_only=True)
-    except (
-        pickle.UnpicklingError,
-        RuntimeError,
-        EOFError,
-        OSError,
-        ValueError,
-        zipfile.BadZipFile,
-        KeyError,
-        TypeError,
-    ) as error:
+    except Exception as error:  # whatever torch meets in a file from outside
         reason = " ".join(str(error).split())[:120]
         raise MotionloomError(f"{path} holds more than tensors or is damaged, and is not opened ({reason})") from None
     averaged = isinstance(loaded, dict) and "model_avg" in loaded
     state = loaded["model_avg"] if averaged else loaded.get("model", loaded) if isinstance(loaded, dict) else None
     if not isinstance(state, dict) or not all(isinstance(k, str) and isinstance(v, Tensor) for k, v in state.items()):
         raise MotionloomError(f"{path} is not a state dict of tensors; name a published model*.pt file")
+    if not all(_plain(value) for value in state.values()):
+        raise MotionloomError(
+            f"{path} holds tensors that are sparse, overlap or are not floating point; they are not read"
+        )
     return Published(state, _options(path.parent / "args.json"), averaged)
+
+
+def _plain(value: Tensor) -> bool:
+    """Ordinary floating-point numbers, each stored once: nothing that grows when it is touched."""
+    usual = value.layout == torch.strided and value.device.type == "cpu" and value.is_floating_point()
+    return usual and value.is_contiguous() and value.nbytes <= value.untyped_storage().nbytes()
 
 
 def _options(path: Path) -> dict[str, Any]:
@@ -130,8 +145,75 @@ def _options(path: Path) -> dict[str, Any]:
         return {}
     try:
         options = json.loads(path.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise MotionloomError(f"{path} is not JSON ({error}); mend it or move it away") from None
     if not isinstance(options, dict):
         raise MotionloomError(f"{path} must hold an object with the training options")
     return options
+
+
+@dataclass(frozen=True)
+class Described:
+    """What `args.json` says that sampling needs."""
+
+    schedule: str
+    steps: int
+    data: str
+    warnings: tuple[str, ...]
+    """One sentence for each field that is missing and was assumed."""
+
+
+_ASSUMED: dict[str, Any] = {"arch": "trans_enc", "noise_schedule": "cosine", "diffusion_steps": 1000}
+_DATA = {263: "humanml", 251: "kit", 135: "babel"}
+FRAME_RATES = {263: 20.0, 251: 12.5, 135: 30.0}
+"""Frames per second by the count of features: HumanML3D, KIT-ML, BABEL."""
+
+
+def describe(published: Published, net: PriorNet) -> Described:
+    """Read the options that matter; unknown ones are ignored, missing ones assumed with a warning.
+
+    Raises MotionloomError where an option contradicts the weights or is not usable.
+    """
+    given, warnings = published.options, []
+    for key, value in _ASSUMED.items():
+        if key not in given:
+            warnings.append(f"args.json does not say {key}; {value} is assumed")
+    said = _ASSUMED | {key: given[key] for key in _ASSUMED if key in given}
+    if said["arch"] != "trans_enc":
+        raise MotionloomError(f"args.json says arch {said['arch']!r}; only trans_enc checkpoints are read")
+    if said["noise_schedule"] not in ("cosine", "linear"):
+        raise MotionloomError(f"args.json says noise_schedule {said['noise_schedule']!r}; there are cosine and linear")
+    steps = said["diffusion_steps"]
+    if not isinstance(steps, int) or not 1 <= steps <= 100_000:
+        raise MotionloomError(f"args.json says diffusion_steps {steps!r}; it must be a whole number from 1 to 100000")
+    for key, size in (("layers", net.config.layers), ("latent_dim", net.config.width)):
+        if given.get(key, size) != size:
+            raise MotionloomError(
+                f"args.json says {key} {given[key]!r} where the weights have {size}: it is another file's"
+            )
+    data = str(given.get("dataset") or _DATA.get(net.config.features, "unknown"))
+    return Described(said["noise_schedule"], steps, data, tuple(warnings))
+
+
+class PublishedText:
+    """CLIP's text tower as the published weights were trained with it, opened when the first prompt is encoded.
+
+    So published weights can be imported, saved, looked at and moved where CLIP is not installed. ``clip`` cuts
+    prompts at 22 word pieces (HumanML3D, KIT), ``clip-77`` at 77 (BABEL).
+    """
+
+    width = 512
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._clip: ClipText | None = None
+
+    def encode(self, texts: Sequence[str] | str) -> TextEmbedding:
+        """See `TextEncoder.encode`; raises MotionloomError where the extra `clip` or its files are missing."""
+        if self._clip is None:
+            self._clip = ClipText.open(length=TEXTS[self.name])
+        return self._clip.encode(texts)
+
+
+TEXTS = {"clip": HUMANML_LENGTH, "clip-77": FULL_LENGTH}
+"""Names of the published text encoders, with the word pieces they read."""

@@ -16,7 +16,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.feet import clean_feet
 from motionloom.features.ik import motion_from_positions
-from motionloom.features.layout import LAYOUT
+from motionloom.features.layout import LAYOUT, WIDTH
 from motionloom.motion import Motion
 
 STEPS = 20
@@ -25,6 +25,8 @@ LONGEST = 60.0
 """Seconds: beyond this one prompt is no longer one action."""
 ROWS = 8
 """Motions denoised at once."""
+
+LARGEST_SEED = 2**62
 
 Progress = Callable[[int, int], None]
 """(network calls done, network calls in all)."""
@@ -86,8 +88,15 @@ def generate(
     planted feet and keep feet above the floor. The person starts near the origin facing +Z, on the 22-joint skeleton.
     Raises `MotionloomError` for what cannot be asked. (Tevet et al. 2023; guidance: Ho & Salimans 2022.)
     """
+    if len(prior.mean) != WIDTH:
+        raise MotionloomError(
+            f"these weights make {len(prior.mean)} numbers per frame, and so far only HumanML3D's {WIDTH} "
+            "can be turned into a motion; use other weights"
+        )
     said = [prompts] if isinstance(prompts, str) else list(prompts)
-    lengths = [float(seconds)] * len(said) if isinstance(seconds, int | float) else [float(s) for s in seconds]
+    lengths = [float(s) for s in np.atleast_1d(np.asarray(seconds, dtype=np.float64))]
+    if np.ndim(seconds) == 0:
+        lengths *= len(said)
     if len(lengths) != len(said):
         raise MotionloomError(f"there are {len(lengths)} lengths for {len(said)} prompts; give one, or one per prompt")
     if not said or count < 1:
@@ -96,6 +105,8 @@ def generate(
         )
     said = [prompt for prompt in said for _ in range(count)]
     frames = [_frames(length, prior.fps) for length in lengths for _ in range(count)]
+    if not 0 <= seed < LARGEST_SEED:
+        raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {seed}")
     made = sample_features(
         prior, said, frames, seeds=[seed + i for i in range(len(said))],
         guidance=guidance, steps=steps, solver=solver, progress=progress,
@@ -128,7 +139,7 @@ def _groups(frames: Sequence[int]) -> list[list[int]]:
 def _check(prior: Prior, prompts: Sequence[str], *, steps: int, guidance: float, solver: str) -> None:
     if solver not in SOLVERS:
         raise MotionloomError(f"no solver {solver!r}; there are {', '.join(SOLVERS)}")
-    if not 1 <= steps <= prior.schedule.steps:
+    if not isinstance(steps, int) or not 1 <= steps <= prior.schedule.steps:
         raise MotionloomError(f"{steps} steps cannot be taken; these weights take 1 to {prior.schedule.steps}")
     if not np.isfinite(guidance) or abs(guidance) > 100:
         raise MotionloomError(f"a guidance of {guidance:g} makes no motion; usual values are 1 to 7")

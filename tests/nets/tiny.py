@@ -1,0 +1,38 @@
+"""Priors small enough for tests: random weights, an embedded text encoder one can read."""
+
+import torch
+
+from motionloom.checkpoint import Card, Prior
+from motionloom.diffusion import cosine
+from motionloom.nets.prior import NetConfig, PriorNet
+from motionloom.nets.text import MiniLM
+from motionloom.nets.text.minilm import pack
+from tests.nets.text import tiny
+
+MODULATED = NetConfig(manner="modulated", width=32, layers=2, heads=2, hidden=48, text=tiny.WIDTH, patch=4, dropout=0.0)
+PUBLISHED = NetConfig(width=32, layers=2, heads=4, hidden=48, text=tiny.WIDTH, dropout=0.0)
+
+
+def text() -> MiniLM:
+    """A MiniLM with random weights and the vocabulary of `tests.nets.text.tiny`."""
+    return MiniLM.from_tensors(pack(tiny.weights(), tiny.VOCABULARY))
+
+
+def net(config: NetConfig = MODULATED, seed: int = 0) -> PriorNet:
+    """A network whose every weight matters: none is left at zero."""
+    made = PriorNet(config)
+    generator = torch.Generator().manual_seed(seed)
+    with torch.no_grad():
+        for value in made.parameters():
+            scale = 0.5 / value.shape[-1] ** 0.5 if value.ndim > 1 else 0.1
+            value.add_(torch.randn(value.shape, generator=generator) * scale)
+    return made.eval().requires_grad_(False)
+
+
+def prior(config: NetConfig = MODULATED, *, seed: int = 0, levels: int = 50) -> Prior:
+    """A prior of 263 features with statistics that keep a made-up person near a human size."""
+    generator = torch.Generator().manual_seed(seed)
+    mean = torch.randn(config.features, generator=generator) * 0.1
+    std = torch.rand(config.features, generator=generator) * 0.1 + 0.01
+    card = Card("tiny", "do what you like", "random numbers", {"steps": 3})
+    return Prior(net(config, seed), cosine(levels), mean, std, text(), card)
