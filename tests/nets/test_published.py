@@ -197,7 +197,8 @@ def test_a_small_file_that_unfolds_to_a_huge_one_is_not_unfolded(
 
 
 @pytest.mark.parametrize(
-    "value", [torch.zeros(1).expand(1 << 20, 1 << 20), torch.zeros(4, 4, dtype=torch.long), torch.zeros(4, 4).to_sparse()],
+    "value",
+    [torch.zeros(1).expand(1 << 20, 1 << 20), torch.zeros(4, 4, dtype=torch.long), torch.zeros(4, 4).to_sparse()],
     ids=["one number spread over a tebibyte", "integers", "sparse"],
 )  # fmt: skip
 def test_tensors_that_are_not_plain_are_refused(tmp_path: Path, value: Tensor) -> None:

@@ -20,7 +20,9 @@ def text() -> MiniLM:
 
 def net(config: NetConfig = MODULATED, seed: int = 0) -> PriorNet:
     """A network whose every weight matters: none is left at zero."""
-    made = PriorNet(config)
+    with torch.random.fork_rng():
+        torch.manual_seed(seed)
+        made = PriorNet(config)
     generator = torch.Generator().manual_seed(seed)
     with torch.no_grad():
         for value in made.parameters():
