@@ -145,6 +145,8 @@ def train(
         called = nn.parallel.DistributedDataParallel(called, device_ids=places)
     net.train()
     last = min(recipe.steps, stop or recipe.steps)
+    if done >= last and world.rank == 0 and on_save:  # stopped between the last state and its weights
+        on_save(net, average, done)
     for step in range(done, last):
         began = time.perf_counter()
         loss = _step(objective, called, optimizer, recipe, step=step, world=world)

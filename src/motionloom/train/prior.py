@@ -9,6 +9,7 @@ from torch import nn
 
 from motionloom.checkpoint import SCHEDULES, Card, Prior, find_weights, load_prior, read_tensors, save_prior
 from motionloom.data.sets import Batches, MotionSet, load_set
+from motionloom.errors import MotionloomError
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.nets.text import MiniLM, TextEncoder
 from motionloom.train.loop import Average, Log, World, train
@@ -33,6 +34,10 @@ def train_prior(
     net = PriorNet(NetConfig.parse(recipe.net))
     if recipe.start:
         start = Prior.load(recipe.start)
+        if replace(start.net.config, dropout=net.config.dropout) != net.config:
+            raise MotionloomError(
+                f"the recipe's network {net.config} is not that of {recipe.start!r}, {start.net.config}; copy its [net]"
+            )
         net.load_state_dict(start.net.state_dict())
         mean, std = start.mean, start.std
         restandardised = (motions.features * motions.std + motions.mean - mean) / std

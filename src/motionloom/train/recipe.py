@@ -1,5 +1,6 @@
 """Recipes: what to train, on what, how. A recipe is a small TOML file; unknown keys are errors."""
 
+import re
 import tomllib
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -65,9 +66,9 @@ def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Reci
         values = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise MotionloomError(f"there is no recipe {path}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise MotionloomError(f"{path} is not TOML: {error}") from None
-    values |= changes or {}
+    values = _merged(values, changes or {})
     hints = get_type_hints(Recipe)
     for key, value in values.items():
         if key not in hints:
@@ -85,10 +86,28 @@ def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Reci
 
 
 def _check(path: Path, recipe: Recipe) -> None:
+    lists = {"sources": str, "prompts": str, "windows": int, "shares": int | float}
+    for key, kind in lists.items():
+        if not all(isinstance(value, kind) and not isinstance(value, bool) for value in getattr(recipe, key)):
+            raise MotionloomError(f"{path}: an entry of {key} is of the wrong kind: {getattr(recipe, key)!r}")
+    if not re.fullmatch(r"\w[\w.-]{0,63}", recipe.name):
+        raise MotionloomError(f"{path}: the name {recipe.name!r} becomes a file's; use letters, digits, _ - .")
+    limits = {
+        "steps": 10**9,
+        "batch": 65536,
+        "levels": 100_000,
+        "seed": 2**31,
+        "rate": 10.0,
+        "decay": 10.0,
+        "save_every": 10**9,
+    }
+    for key, limit in limits.items():
+        if not 0 <= getattr(recipe, key) <= limit:
+            raise MotionloomError(f"{path}: {key} must be from 0 to {limit:g}; got {getattr(recipe, key)!r}")
     good = (
         recipe.steps > 0 < recipe.batch and recipe.rate > 0 and 0 <= recipe.ema < 1 and 0 <= recipe.drop_text < 1
         and recipe.levels > 1 and 0 <= recipe.cooldown <= 1 and recipe.clip > 0 and recipe.save_every > 0
-        and len(recipe.windows) == len(recipe.shares) > 0 and min(recipe.windows) > 0
+        and len(recipe.windows) == len(recipe.shares) > 0 and 0 < min(recipe.windows) <= max(recipe.windows) <= 10_000
         and min(recipe.shares) >= 0 < sum(recipe.shares)
         and recipe.amp in ("bf16", "none") and recipe.schedule in ("cosine", "linear")
     )  # fmt: skip
@@ -107,7 +126,16 @@ def changes(pairs: list[str]) -> dict[str, Any]:
         if not found:
             raise MotionloomError(f"{pair!r} is not of the form KEY=VALUE, such as steps=20000")
         try:
-            result |= tomllib.loads(f"{key} = {value}")
-        except tomllib.TOMLDecodeError:
+            result = _merged(result, tomllib.loads(f"{key} = {value}"))
+        except (tomllib.TOMLDecodeError, RecursionError):
             result[key] = value
+    return result
+
+
+def _merged(values: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """``changes`` over ``values``; tables entry by entry, so that net.width=64 leaves the other sizes alone."""
+    result = dict(values)
+    for key, value in changes.items():
+        old = result.get(key)
+        result[key] = old | value if isinstance(old, dict) and isinstance(value, dict) else value
     return result
