@@ -192,7 +192,7 @@ def _about(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
         return about
     except MotionloomError:
         raise
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         raise MotionloomError(
             f"{path} does not describe a motionloom prior ({error!r}); name a file that does"
         ) from None

@@ -17,8 +17,8 @@ def glide(x: float = 0.0, z: float = 0.0, seconds: float = 4.0) -> np.ndarray:
 
 
 def turning(degrees: float, seconds: float = 4.0) -> np.ndarray:
-    """On the spot, + to the left."""
-    p = people.standing(seconds)
+    """Stepping on the spot, + to the left."""
+    p = people.walking(0.0, seconds)
     return people.spun(p, np.radians(degrees) * np.linspace(0, 1, len(p)))
 
 

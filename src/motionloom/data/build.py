@@ -6,9 +6,11 @@ or not at all, so a build that was stopped goes on where it was.
 """
 
 import json
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -19,14 +21,15 @@ from safetensors.numpy import save_file
 from motionloom.data import augment
 from motionloom.data.sources import Take, find_takes
 from motionloom.data.windows import label_clip
-from motionloom.data.words import mirror_text
+from motionloom.data.words import LABELS, mirror_text
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
-from motionloom.features.layout import FPS, LAYOUT
+from motionloom.features.layout import FPS, LAYOUT, WIDTH
 from motionloom.io.atomic import atomic_path
 from motionloom.metrics.physics import Array
 from motionloom.skeleton import SMPL22
 
+_NAME = re.compile(r"\w[\w.+ -]{0,120}")
 SHORTEST = 20
 LOOPED = 200
 BENDS = (0.35, 0.75)
@@ -106,6 +109,8 @@ def _more(take: Take, clip: Clip, positions: Array) -> Iterator[Clip]:
 
 
 def _clip(take: Take, features: np.ndarray, way: str, *, spans: bool = True) -> Clip:
+    if not np.isfinite(features).all():
+        raise MotionloomError("its features are not finite numbers: the recording is degenerate")
     notes = []
     for span in take.spans if spans else ():
         first, last = round(span.start_s * FPS), min(round(min(span.end_s, 1e6) * FPS), len(features))
@@ -199,29 +204,57 @@ def read_clip(path: Path) -> Clip:
             about = json.loads(file.metadata()["clip"])
             features = file.get_tensor("features")
         notes = tuple(Note(n["first"], n["last"], n["kind"], tuple(n["texts"])) for n in about.pop("notes"))
-        return Clip(**about, notes=notes, features=features)
-    except (SafetensorError, KeyError, TypeError, ValueError) as error:
-        raise MotionloomError(f"{path} is not a clip of a built set ({error}); delete it and build again") from error
+        clip = Clip(**about, notes=notes, features=features)
+        _check_clip(clip)
+        return clip
+    except (SafetensorError, KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        raise MotionloomError(
+            f"{path} is not a clip of a built set ({error}); delete it and its name in done/, and build again"
+        ) from error
 
+
+def _check_clip(clip: Clip) -> None:
+    features = clip.features
+    if (
+        features.dtype != np.float32
+        or features.ndim != 2
+        or features.shape[1] != WIDTH
+        or not np.isfinite(features).all()
+    ):
+        raise ValueError(f"its features are not finite float32 numbers of shape (frames, {WIDTH})")
+    if not all(isinstance(v, str) for v in (clip.name, clip.source, clip.licence, clip.split, clip.way)):
+        raise ValueError("its name, source, licence, split or way is not text")
+    for note in clip.notes:
+        if not 0 <= note.first < note.last <= len(features):
+            raise ValueError(f"a note spans frames {note.first} to {note.last} of {len(features)}")
+        written = note.kind in ("human", "index")
+        if not all(isinstance(t, str) for t in note.texts) or (written and not note.texts):
+            raise ValueError(f"a note of kind {note.kind} lacks its texts")
+        if not written and not all(label in LABELS for label in note.kind.split("+", 1)):
+            raise ValueError(f"there is no label {note.kind!r}")
+
+
+Job = tuple[str, str, str, str]
+"""Folder, captions, name of the take, folder of the built set."""
 
 _takes: dict[tuple[str, str], dict[str, Take]] = {}
 
 
-def _prepare(job: tuple[str, str, str, str]) -> tuple[str, str]:
+def _prepare(job: Job) -> tuple[str, str]:
     """In a worker: write the clips of one take. Returns its name and why it was dropped ('' if it was not)."""
     folder, captions, name, out = job
     key = (folder, captions)
     if key not in _takes:
-        _takes[key] = {take.name: take for take in find_takes(folder, captions=captions or None)}
-    done = Path(out) / "done" / name
+        _takes[key] = {take.name: take for take in reversed(list(find_takes(folder, captions=captions or None)))}
+    reason = ""
     try:
         for clip in clips_of(_takes[key][name]):
             write_clip(Path(out) / "clips", clip)
     except MotionloomError as error:
-        done.write_text(str(error), encoding="utf-8")
-        return name, str(error)
-    done.write_text("", encoding="utf-8")
-    return name, ""
+        reason = str(error)
+    with atomic_path(Path(out) / "done" / name) as temp:
+        temp.write_text(reason, encoding="utf-8")
+    return name, reason
 
 
 def build(
@@ -235,23 +268,50 @@ def build(
 ) -> Path:
     """Build a training set from folders of recordings; returns ``set.json``. Takes already done are kept."""
     out = Path(out)
+    if workers < 1 or mixed < 0:
+        raise MotionloomError(f"at least 1 worker and 0 mixed clips are needed; got {workers} and {mixed}")
+    jobs = list(_jobs(folders, captions, out, progress=progress))
     for part in ("clips", "done"):
         (out / part).mkdir(parents=True, exist_ok=True)
-    jobs = [
-        (str(folder), str(captions or ""), take.name, str(out))
-        for folder in folders
-        for take in find_takes(folder, captions=captions)
-        if not (out / "done" / take.name).exists()
-    ]
-    kept = len(list((out / "done").iterdir()))
-    progress(f"{len(jobs)} takes to do, {kept} already done")
-    with ProcessPoolExecutor(max_workers=workers) as pool:
-        for number, (name, reason) in enumerate(pool.map(_prepare, jobs, chunksize=4), start=1):
-            if reason:
-                progress(f"dropped {name}: {reason}")
-            if number % 100 == 0:
-                progress(f"{number} of {len(jobs)} takes done")
+    left = [job for job in jobs if not (out / "done" / job[2]).exists()]
+    progress(f"{len(left)} takes to do, {len(jobs) - len(left)} already done")
+    for number, (name, reason) in enumerate(_run(left, workers), start=1):
+        if reason:
+            progress(f"dropped {name}: {reason}")
+        if number % 100 == 0:
+            progress(f"{number} of {len(left)} takes done")
     return _finish(out, mixed, progress)
+
+
+def _jobs(
+    folders: Sequence[Path | str], captions: Path | str | None, out: Path, *, progress: Callable[[str], None]
+) -> Iterator[Job]:
+    seen: dict[str, str] = {}
+    for folder in folders:
+        for take in find_takes(folder, captions=captions):
+            if not _NAME.fullmatch(take.name):
+                raise MotionloomError(
+                    f"{folder}: {take.name!r} cannot be the name of a clip; use letters, digits, _ - ."
+                )
+            if take.name in seen:
+                progress(f"dropped a second {take.name} in {folder}: the one in {seen[take.name]} is used")
+                continue
+            seen[take.name] = str(folder)
+            yield str(folder), str(captions or ""), take.name, str(out)
+
+
+def _run(jobs: Sequence[Job], workers: int) -> Iterator[tuple[str, str]]:
+    if workers == 1 or len(jobs) < 2:
+        yield from map(_prepare, jobs)
+        return
+    try:
+        with ProcessPoolExecutor(max_workers=workers) as pool:
+            yield from pool.map(_prepare, jobs, chunksize=4)
+    except BrokenProcessPool:
+        raise MotionloomError(
+            "a worker process died, perhaps for lack of memory; give the same command again with fewer --workers: "
+            "finished takes are kept"
+        ) from None
 
 
 def _finish(out: Path, mixed: int, progress: Callable[[str], None]) -> Path:
@@ -262,6 +322,10 @@ def _finish(out: Path, mixed: int, progress: Callable[[str], None]) -> Path:
         for clip in mixed_clips([c for c in clips if c.licence == licence], mixed, seed):
             write_clip(out / "clips", clip)
             clips.append(clip)
+    for old in {p.stem for p in (out / "clips").glob("mixed_*.safetensors")} - {clip.name for clip in clips}:
+        (out / "clips" / f"{old}.safetensors").unlink()  # of a build that was asked for more of them
+    if not clips:
+        raise MotionloomError(f"no take could be used; the reasons stand in {out / 'done'}")
     dropped = {p.name: text for p in sorted((out / "done").iterdir()) if (text := p.read_text(encoding="utf-8"))}
     frames = np.concatenate([c.features for c in clips if c.split == "train"] or [np.zeros((1, 263), np.float32)])
     counts = Counter(f"{c.source}/{c.split}/{c.way}" for c in clips)

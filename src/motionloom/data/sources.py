@@ -12,12 +12,14 @@ import numpy as np
 
 from motionloom.data.words import describe_index
 from motionloom.errors import MotionloomError
+from motionloom.features.layout import WIDTH
 from motionloom.io import load
 from motionloom.metrics.physics import Array
 from motionloom.retarget import to_smpl22
 
 CMU_LICENCE = "CMU mocap: free for research and commercial use; acknowledge mocap.cs.cmu.edu, NSF EIA-0196217"
 BANDAI_LICENCE = "Bandai-Namco-Research-Motiondataset, CC BY-NC 4.0: non-commercial use only"
+UNKNOWN_LICENCE = "not stated: as the owner of the recordings allows"
 HUMANML3D_LICENCE = "HumanML3D / AMASS: research use under the licences of AMASS and its subsets"
 
 
@@ -65,28 +67,41 @@ def find_takes(folder: Path | str, *, captions: Path | str | None = None) -> lis
 
 
 def _pack(folder: Path) -> Iterator[Take]:
+    """A manifest.csv with one row per clip; captions/cmu.jsonl holds what people wrote about them, if it is there."""
     written: dict[str, list[Span]] = {}
-    for row in _json_lines(folder / "captions" / "cmu.jsonl"):
-        span = Span(float(row["start_s"]), float(row["end_s"]), tuple(row["captions"]), "human")
-        written.setdefault(row["clip"], []).append(span)
-    with open(folder / "manifest.csv", newline="", encoding="utf-8") as lines:
-        for row in csv.DictReader(lines):
-            path = _inside(folder, row["path"])
-            bandai = row["source"].startswith("bandai")
-            spans = [] if bandai else written.get(row["clip"], [])
-            index = describe_index(row["description"])
-            if index:
-                spans = [*spans, Span(0.0, float(row["seconds"]), index, "index")]
-            yield Take(
-                name=row["clip"],
-                source=row["source"],
-                licence=BANDAI_LICENCE if bandai else CMU_LICENCE,
-                split=row["split"],
-                spans=tuple(spans),
-                read=_reader(
-                    path, fps=float(row["fps"]), unit=None if path.suffix == ".amc" else float(row["metres_per_unit"])
-                ),
-            )
+    captions = folder / "captions" / "cmu.jsonl"
+    manifest = folder / "manifest.csv"
+    try:
+        for row in _json_lines(captions) if captions.is_file() else ():
+            span = Span(float(row["start_s"]), float(row["end_s"]), tuple(map(str, row["captions"])), "human")
+            written.setdefault(row["clip"], []).append(span)
+    except (KeyError, TypeError, ValueError) as error:
+        raise MotionloomError(f"{captions} has a row that cannot be used ({error!r}); mend it") from None
+    with open(manifest, newline="", encoding="utf-8") as lines:
+        try:
+            yield from (_pack_take(folder, row, written) for row in csv.DictReader(lines))
+        except (KeyError, TypeError, ValueError, AttributeError, csv.Error) as error:
+            if isinstance(error, MotionloomError):
+                raise
+            raise MotionloomError(f"{manifest} has a row that cannot be used ({error!r}); mend it") from None
+
+
+def _pack_take(folder: Path, row: dict[str, str], written: dict[str, list[Span]]) -> Take:
+    path, source = _inside(folder, row["path"]), row["source"]
+    if row["split"] not in ("train", "val", "test"):
+        raise ValueError(f"split {row['split']!r} of {row['clip']} is not train, val or test")
+    spans = [] if source.startswith("bandai") else written.get(row["clip"], [])
+    index = describe_index(row["description"])
+    if index:
+        spans = [*spans, Span(0.0, float(row["seconds"]), index, "index")]
+    unit = None if path.suffix == ".amc" else float(row["metres_per_unit"])
+    read = _reader(path, fps=float(row["fps"]), unit=unit)
+    return Take(row["clip"], source, row.get("licence") or _licence(source), row["split"], tuple(spans), read)
+
+
+def _licence(source: str) -> str:
+    known = {"cmu": CMU_LICENCE, "bandai": BANDAI_LICENCE}
+    return next((text for start, text in known.items() if source.startswith(start)), UNKNOWN_LICENCE)
 
 
 def _cmu(folder: Path, captions: Path | None) -> Iterator[Take]:
@@ -97,18 +112,26 @@ def _cmu(folder: Path, captions: Path | None) -> Iterator[Take]:
             if match := re.match(r"\s*(\d+_\d+)\s+(.+)", line):
                 index[match.group(1)] = match.group(2).strip()
     rows: dict[str, list[dict]] = {}
-    for row in _json_lines(captions) if captions else ():
-        if (match := re.search(r"CMU/\d+/(\d+_\d+)_poses", row["amass_path"])) and not row["mirrored"]:
-            rows.setdefault(match.group(1), []).append(row)
+    try:
+        for row in _json_lines(captions) if captions else ():
+            if (match := re.search(r"CMU/\d+/(\d+_\d+)_poses", row["amass_path"])) and not row["mirrored"]:
+                rows.setdefault(match.group(1), []).append(row)
+        spoken = {number: [_amass_span(row) for row in several] for number, several in rows.items()}
+        kinds = {number: {row["split"] for row in several} for number, several in rows.items()}
+    except (KeyError, TypeError, ValueError) as error:
+        raise MotionloomError(
+            f"{captions} has a row that cannot be used ({error!r}); name HumanML3D's captions"
+        ) from None
     for path in sorted([*folder.rglob("*.amc"), *folder.rglob("*.bvh")]):
         number = "_".join(part.zfill(2) for part in path.stem.split("_"))
-        spans = [_amass_span(row) for row in rows.get(number, [])]
+        spans = [span for span in spoken.get(number, []) if span.texts]
         phrases = describe_index(index.get(number, index.get(path.stem, "")))
         if phrases:
             spans.append(Span(0.0, float("inf"), phrases, "index"))
-        splits = {row["split"] for row in rows.get(number, [])}
+        splits = kinds.get(number, set())
         split = next((s for s in ("test", "val") if s in splits), "train")
-        yield Take(path.stem, "cmu", CMU_LICENCE, split, tuple(spans), _reader(path, fps=None, unit=None))
+        source = "cmu" if re.fullmatch(r"\d+_\d+", path.stem) else "own"  # a CMU take is called 02_01
+        yield Take(path.stem, source, _licence(source), split, tuple(spans), _reader(path, fps=None, unit=None))
 
 
 def _amass_span(row: dict) -> Span:
@@ -144,7 +167,10 @@ def _texts(path: Path) -> Iterator[Span]:
         parts = line.split("#")
         if len(parts) != 4:
             continue
-        start, end = (float(p) if p not in ("", "nan") else 0.0 for p in parts[2:])
+        try:
+            start, end = (float(p) if p not in ("", "nan") else 0.0 for p in parts[2:])
+        except ValueError:
+            raise MotionloomError(f"{path} has a line whose times are not numbers: {line[:60]!r}") from None
         yield Span(start, end if end > start else float("inf"), (parts[0].strip(),), "human")
 
 
@@ -159,8 +185,11 @@ def _reader(path: Path, *, fps: float | None, unit: float | None) -> Callable[[]
 def _features(path: Path) -> Callable[[], np.ndarray]:
     def read() -> np.ndarray:
         try:
-            return np.load(path, allow_pickle=False)
-        except (OSError, ValueError) as error:
+            features = np.load(path, allow_pickle=False, mmap_mode="r")  # a size beyond the file's is refused
+            if not isinstance(features, np.ndarray) or features.ndim != 2 or features.shape[1] != WIDTH:
+                raise ValueError(f"its shape is {np.shape(features)} and not (frames, {WIDTH})")
+            return np.array(features, dtype=np.float32)
+        except (OSError, ValueError, TypeError, EOFError, SyntaxError) as error:
             raise MotionloomError(f"{path} is not an array of features ({error})") from error
 
     return read

@@ -14,7 +14,10 @@ _SWAPS = {
     "counterclockwise": "clockwise",
     "anticlockwise": "clockwise",
 }
-_SIDE = re.compile(r"\b(left|right|counter[- ]?clockwise|anti[- ]?clockwise|clockwise)\b", re.IGNORECASE)
+_SIDE = re.compile(
+    r"\b(?:(?:left|right)(?=(?:wards?|most|y|ies)?\b)|counter[- ]?clockwise\b|anti[- ]?clockwise\b|clockwise\b)",
+    re.IGNORECASE,
+)
 
 
 def mirror_text(text: str) -> str:
