@@ -20,7 +20,7 @@ SHARE = {"human": 0.35, "index": 0.12, "label": 0.53}
 """How often a training sample shows a written caption, an index description, a measured label."""
 
 FAVOUR = dict.fromkeys(("circle left", "circle right", "sit", "jump", "kick", "punch"), 2.0)
-"""Labels drawn more often than the others: they came out last. Each mixture of two labels is drawn 0.4 times as often."""
+"""Labels drawn more often than the others: they came out last. A mixture of two labels is drawn 0.4 times as often."""
 
 
 @dataclass(frozen=True)
@@ -138,6 +138,12 @@ class Batches:
         self.data, self.windows = data, tuple(windows)
         self.shares = np.array(shares) / np.sum(shares)
         self._pools = {w: self._pool(w) for w in self.windows}
+        for window, share in zip(self.windows, self.shares, strict=True):
+            if share > 0 and not self._pools[window]:
+                raise MotionloomError(
+                    f"no described stretch of the set is long enough for windows of {window} frames (60 % is needed); "
+                    "give the recipe shorter windows"
+                )
 
     def _pool(self, window: int) -> dict[str, dict[str, np.ndarray]]:
         fitting: dict[str, dict[str, list[int]]] = {}
