@@ -91,7 +91,9 @@ def _make(arguments: argparse.Namespace, prompts: list[str]):
     given = {"steps": arguments.steps, "solver": arguments.solver}
     options = {name: value for name, value in given.items() if value is not None}
     began = time.perf_counter()
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    screen = Console(stderr=True)
+    shown = screen.is_terminal  # elsewhere the bar would leave an empty line
+    with Progress(console=screen, transient=True, disable=not shown) as bar:
         task = bar.add_task("generating", total=None)
         motions = generate(
             prior, prompts, seconds=arguments.seconds, count=arguments.count, seed=arguments.seed,

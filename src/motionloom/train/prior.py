@@ -7,7 +7,16 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from motionloom.checkpoint import SCHEDULES, Card, Prior, find_weights, load_prior, read_tensors, save_prior
+from motionloom.checkpoint import (
+    SCHEDULES,
+    Card,
+    Prior,
+    find_device,
+    find_weights,
+    load_prior,
+    read_tensors,
+    save_prior,
+)
 from motionloom.data.sets import Batches, MotionSet, load_set
 from motionloom.errors import MotionloomError
 from motionloom.nets.prior import NetConfig, PriorNet
@@ -28,6 +37,8 @@ def train_prior(
     say: Callable[[str], None] = print,
 ) -> Path:
     """Train (or go on training) a prior on a built set; returns the weight file ``folder/NAME.safetensors``."""
+    if device:
+        find_device(device)
     world, folder = World.join(device), Path(folder)
     motions = load_set(data, sources=recipe.sources, seed=recipe.seed)
     torch.manual_seed(recipe.seed)
