@@ -27,7 +27,7 @@ def test_a_row_is_the_same_in_any_company(prior: Prior) -> None:
     prompts = [f"a person {verb}" for verb in ("walks", "turns", "walks left", "jumps", "turns right")] * 2
     frames = [9, 9, 9, 13, 9, 9, 9, 9, 9, 9]
     together = features(prior, prompts, frames, list(range(10)))
-    for row in (0, 3, 9):
+    for row in (1, 3, 8, 9):
         alone = features(prior, [prompts[row]], [frames[row]], [row])[0]
         assert alone.shape == (frames[row], 263)
         torch.testing.assert_close(together[row], alone, rtol=0, atol=1e-5)
