@@ -1,6 +1,7 @@
 """Whatever bytes a stranger sends: a motion or one sentence, soon, and never another exception."""
 
 import io as stdio
+import os
 import time
 import zipfile
 from pathlib import Path
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 from motionloom import io
 from motionloom.errors import MotionloomError
+from motionloom.io.text import read_bytes
 from motionloom.motion import Motion
 from motionloom.rotations import IDENTITY
 from motionloom.skeleton import SMPL22
@@ -209,3 +211,16 @@ def test_unknown_suffixes_are_refused_with_the_known_ones(tmp_path):
     with pytest.raises(MotionloomError, match="does not exist"):
         io.save(motion, tmp_path / "no" / "a.bvh")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_device_without_an_end_is_left_at_the_limit():
+    with pytest.raises(MotionloomError, match=r"gives more than 3\.0 MB"):
+        read_bytes("/dev/zero", max_bytes=3_000_000)
+
+
+def test_a_pipe_is_read_to_its_end():
+    reading, writing = os.pipe()
+    os.write(writing, b"a person walks")
+    os.close(writing)
+    assert read_bytes(f"/dev/fd/{reading}", max_bytes=100) == b"a person walks"
+    os.close(reading)

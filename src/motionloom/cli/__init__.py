@@ -4,6 +4,7 @@ import argparse
 import importlib
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 
 FAMILIES = ("generate", "files", "data", "train", "evaluate", "bench", "weights")
@@ -13,6 +14,13 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> None:  # type: ignore[override]
         """One sentence and exit code 2, without the page of usage."""
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+    def parse_known_args(self, args=None, namespace=None):  # type: ignore[override]
+        """What a command does not know is its own mistake, not the whole program's: its --help is the one to read."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
 
 
 def parser() -> argparse.ArgumentParser:
@@ -39,10 +47,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"motionloom {version('motionloom')}")
         return 0
     if not hasattr(arguments, "run"):
-        top.print_help()
+        top.print_help(sys.stderr)
         return 2
     try:
-        return arguments.run(arguments) or 0
+        with warnings.catch_warnings():
+            warnings.showwarning = _warn
+            return arguments.run(arguments) or 0
     except MotionloomError as error:
         print(f"motionloom: {error}", file=sys.stderr)
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
@@ -54,3 +64,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("motionloom: interrupted", file=sys.stderr)
         return 130
     return 2
+
+
+def _warn(message: Warning | str, *_: object) -> None:
+    """A warning as one sentence, without the place in the source that Python would add."""
+    print(f"motionloom: {' '.join(str(message).split())}", file=sys.stderr)

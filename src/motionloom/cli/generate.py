@@ -2,8 +2,10 @@
 
 import argparse
 from pathlib import Path
+from typing import NoReturn
 
 MAX_PROMPTS = 1000
+MAX_MOTIONS = 10_000
 MAX_CHARACTERS = 20_000
 
 
@@ -41,31 +43,31 @@ def _generate(arguments: argparse.Namespace) -> None:
     outs = arguments.out or [Path("motion.bvh")]
     for out in outs:
         check_output(out)
-    if len({str(out) for out in outs}) != len(outs):
+    if len({out.resolve() for out in outs}) != len(outs):
         _fail("the same --out is given twice; give each file its own name")
     if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
         _fail(f"--fps must be 1 to 1000; got {arguments.fps:g}")
-    if not 1 <= arguments.count <= 10_000 or not 0 <= arguments.seed < 2**62:
+    if not 1 <= arguments.count <= MAX_MOTIONS or not 0 <= arguments.seed < 2**62:
         _fail(f"--count must be 1 to 10000 and --seed 0 or more; got {arguments.count} and {arguments.seed}")
-    motions, seconds = _make(arguments, prompts)
+    if len(prompts) * arguments.count > MAX_MOTIONS:
+        _fail(f"{len(prompts)} prompts, {arguments.count} of each, are too many; at most {MAX_MOTIONS:,} in one call")
     captions = [prompt for prompt in prompts for _ in range(arguments.count)]
-    written = [path for out in outs for path in _write(motions, out, captions)]
+    places = [_places(out, len(captions)) for out in outs]
+    for place in (place for several in places for place in several):
+        check_output(place)
+    motions, seconds = _make(arguments, prompts)
+    written = [path for several in places for path in _write(motions, several, captions)]
     _report(arguments, captions, written, seconds)
 
 
-def _fail(message: str) -> None:
+def _fail(message: str) -> NoReturn:
     from motionloom.errors import MotionloomError
 
     raise MotionloomError(message)
 
 
 def _prompts(arguments: argparse.Namespace) -> list[str]:
-    prompts = list(arguments.prompts)
-    if arguments.file:
-        from motionloom.io.text import read_bytes
-
-        text = read_bytes(arguments.file, max_bytes=16 << 20).decode("utf-8", "replace")
-        prompts += [line.strip() for line in text.splitlines() if line.strip()]
+    prompts = [*arguments.prompts, *(_lines(arguments.file) if arguments.file else ())]
     if not prompts:
         _fail("no prompt; say what the person does, such as: motionloom generate 'a person walks forward'")
     if len(prompts) > MAX_PROMPTS:
@@ -76,6 +78,16 @@ def _prompts(arguments: argparse.Namespace) -> list[str]:
         if len(prompt) > MAX_CHARACTERS:
             _fail(f"a prompt has {len(prompt):,} characters; say it in fewer than {MAX_CHARACTERS:,}")
     return prompts
+
+
+def _lines(file: Path) -> list[str]:
+    from motionloom.io.text import read_text
+
+    try:
+        text = read_text(file, max_bytes=16_000_000).decode("utf-8")
+    except UnicodeDecodeError:
+        _fail(f"{file} is not UTF-8 text; save it as UTF-8 with one prompt per line")
+    return [line.strip() for line in text.splitlines() if line.strip()]
 
 
 def _make(arguments: argparse.Namespace, prompts: list[str]):
@@ -105,17 +117,20 @@ def _make(arguments: argparse.Namespace, prompts: list[str]):
     return motions, time.perf_counter() - began
 
 
-def _write(motions, out: Path, captions: list[str]) -> list[Path]:
-    """One file for one motion, or for pictures of all of them; else numbered files."""
+def _places(out: Path, count: int) -> list[Path]:
+    """One file for one motion, or for a picture of all of them; else numbered files."""
+    if count == 1 or out.suffix.lower() == ".png":
+        return [out]
+    width = len(str(count - 1))
+    return [out.with_name(f"{out.stem}_{i:0{width}d}{out.suffix}") for i in range(count)]
+
+
+def _write(motions, places: list[Path], captions: list[str]) -> list[Path]:
     from motionloom.io import save
 
-    if len(motions) == 1 or out.suffix.lower() == ".png":
-        return [save(motions, out, captions=captions)]
-    width = len(str(len(motions) - 1))
-    return [
-        save([motion], out.with_name(f"{out.stem}_{i:0{width}d}{out.suffix}"), captions=[caption])
-        for i, (motion, caption) in enumerate(zip(motions, captions, strict=True))
-    ]
+    if len(places) == 1:
+        return [save(motions, places[0], captions=captions)]
+    return [save(one, place, captions=[said]) for one, place, said in zip(motions, places, captions, strict=True)]
 
 
 def _report(arguments: argparse.Namespace, captions: list[str], written: list[Path], seconds: float) -> None:

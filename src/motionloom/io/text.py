@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
+from motionloom.motion import MAX_POSES
 
 MAX_BYTES = 2 * 1024**3
 """Files above this size (2 GB) are refused."""
 LIMIT = 1e9
 """Numbers beyond this are no lengths or angles of anybody, and are refused with NaN and infinity."""
-MAX_POSES = 100_000_000
-"""Frames times joints that are read at most: a small file may claim very many of both."""
 _CHUNK = 16 * 1024**2
 
 
@@ -25,8 +24,8 @@ def read_bytes(path: Path | str, *, max_bytes: int = MAX_BYTES) -> bytes:
     try:
         size = path.stat().st_size
         if size > max_bytes:
-            raise MotionloomError(f"{path} has {size / 1e9:.1f} GB; files above {max_bytes / 1e9:.1f} GB are not read")
-        data = path.read_bytes()
+            raise MotionloomError(f"{path} has {_sized(size)}; files above {_sized(max_bytes)} are not read")
+        data = path.read_bytes() if path.is_file() else _read_stream(path, max_bytes)
     except (OSError, ValueError) as error:
         if isinstance(error, MotionloomError):
             raise
@@ -34,6 +33,21 @@ def read_bytes(path: Path | str, *, max_bytes: int = MAX_BYTES) -> bytes:
     if not data.strip():
         raise MotionloomError(f"{path} is empty")
     return data
+
+
+def _read_stream(path: Path, max_bytes: int) -> bytes:
+    """All that comes out of a pipe or a device, which do not say their size and need not end."""
+    data = bytearray()
+    with path.open("rb") as stream:
+        while piece := stream.read(1 << 20):
+            data += piece
+            if len(data) > max_bytes:
+                raise MotionloomError(f"{path} gives more than {_sized(max_bytes)}, which is not read")
+    return bytes(data)
+
+
+def _sized(size: int) -> str:
+    return f"{size / 1e9:.1f} GB" if size >= 1e8 else f"{size / 1e6:.1f} MB"
 
 
 def read_text(path: Path | str, *, max_bytes: int = MAX_BYTES) -> bytes:
@@ -73,7 +87,7 @@ def number(raw: bytes | str) -> float | None:
 
 
 def check_poses(frames: int, joints: int, path: Path | str) -> None:
-    """Refuse what would not fit into memory."""
+    """Refuse what would not fit into memory: a small file may claim very many of both."""
     if frames * joints > MAX_POSES:
         raise MotionloomError(f"{path} has {frames} frames of {joints} joints; at most {MAX_POSES:,} together are read")
 
