@@ -81,8 +81,13 @@ def test_a_crop_is_by_seconds_and_half_open() -> None:
 
 @pytest.mark.parametrize(("start", "end"), [(1.0, 1.0), (-0.1, 1.0), (0.0, 2.1), (1.0, 0.5)])
 def test_a_crop_outside_is_refused(start: float, end: float) -> None:
-    with pytest.raises(MotionloomError, match="cannot crop"):
+    with pytest.raises(MotionloomError, match=r"cannot crop .* both from 0 to 2\.000"):
         wild(60).crop(start, end)
+
+
+def test_a_rate_that_asks_for_more_than_memory_holds_is_refused() -> None:
+    with pytest.raises(MotionloomError, match="ask for a lower rate"):
+        spin(2, 1e-4, speed=0.0).resample(1000.0)
 
 
 @pytest.mark.parametrize("fps", [10.0, 20.0, 24.0, 30.0, 60.0, 120.0])

@@ -90,4 +90,7 @@ def test_equal_skeletons_are_equal_by_value() -> None:
 
 def test_children_and_rest_positions_follow_the_tree() -> None:
     assert SMPL22.children(9) == (12, 13, 14)
+    assert [SMPL22.children(j) for j in range(22)] == [
+        tuple(k for k in range(22) if SMPL22.parents[k] == j) for j in range(22)
+    ]
     assert np.allclose(chain("a", "b", "c").rest_positions(), [[1, 1, 1], [2, 2, 2], [3, 3, 3]])

@@ -14,6 +14,8 @@ from motionloom.errors import MotionloomError
 from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
+MAX_POSES = 100_000_000
+"""Frames times joints of the longest motion that is made or read; some 10 GB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,19 +87,31 @@ class Motion:
         )
 
     def crop(self, start_s: float, end_s: float) -> "Motion":
-        """The part from ``start_s`` to ``end_s`` seconds, at least one frame."""
+        """The part from ``start_s`` to ``end_s`` seconds; raises `MotionloomError` where that is no frame."""
         start, stop = round(start_s * self.fps), round(end_s * self.fps)
         if not 0 <= start < stop <= len(self):
-            raise MotionloomError(f"cannot crop {start_s} to {end_s} s from a motion of {self.seconds:.3f} s")
+            raise MotionloomError(
+                f"cannot crop {start_s:g} to {end_s:g} s from a motion of {self.seconds:.3f} s; give a start below the "
+                f"end, both from 0 to {self.seconds:.3f}, at least a frame ({1 / self.fps:.3g} s) apart"
+            )
         return self.frames(start, stop)
 
     def resample(self, fps: float) -> "Motion":
-        """The same motion at another frame rate: places linearly, rotations spherically interpolated by time."""
+        """The same motion at another frame rate: places linearly, rotations spherically interpolated by time.
+
+        Raises `MotionloomError` for a rate that is no positive number, or that makes more than `MAX_POSES`.
+        """
         if not (np.isfinite(fps) and fps > 0):
             raise MotionloomError(f"the frame rate must be a positive number; got {fps}")
         if fps == self.fps:
             return self
-        count = int(np.floor((len(self) - 1) / self.fps * fps + 1e-6)) + 1
+        frames = (len(self) - 1) / self.fps * fps
+        if frames * len(self.skeleton) > MAX_POSES:
+            raise MotionloomError(
+                f"{self.seconds:g} s at {fps:g} fps make {frames:.0f} frames of {len(self.skeleton)} joints "
+                f"and at most {MAX_POSES:,} of both together are made; ask for a lower rate or crop the motion first"
+            )
+        count = int(np.floor(frames + 1e-6)) + 1
         at = np.arange(count) * (self.fps / fps)
         low = np.minimum(at.astype(int), len(self) - 1)
         high = np.minimum(low + 1, len(self) - 1)

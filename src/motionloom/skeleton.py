@@ -6,6 +6,7 @@ The *rest pose* is what forward kinematics gives when every rotation is the iden
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +65,14 @@ class Skeleton:
 
     def children(self, joint: int) -> tuple[int, ...]:
         """Direct children of a joint."""
-        return tuple(j for j, p in enumerate(self.parents) if p == joint)
+        return self._children[joint]
+
+    @cached_property
+    def _children(self) -> tuple[tuple[int, ...], ...]:
+        below: list[list[int]] = [[] for _ in self.names]
+        for j, p in enumerate(self.parents[1:], start=1):
+            below[p].append(j)
+        return tuple(map(tuple, below))
 
     def resolve(self, names: Iterable[str]) -> tuple[int, ...]:
         """Joint numbers for a mix of joint and group names, in skeleton order."""

@@ -165,6 +165,13 @@ def test_the_unit_of_a_person_between_children_and_giants_is_guessed(unit, size)
     assert guess_unit(SMPL22.parents, SMPL22.offsets * size / unit) == unit
 
 
+def test_a_reference_joint_far_from_the_body_says_nothing_about_the_unit():
+    parents = (-1, *(parent + 1 for parent in SMPL22.parents))
+    offsets = np.concatenate([np.zeros((1, 3)), SMPL22.offsets * 100])
+    offsets[1] = 0.8, 94, -452
+    assert guess_unit(parents, offsets) == 0.01
+
+
 @settings(deadline=None, max_examples=60)
 @given(
     motion=motions(), order=st.permutations("XYZ").map("".join), unit=st.sampled_from([1.0, 0.01, 0.0254, 0.0564444])

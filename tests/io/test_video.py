@@ -13,7 +13,7 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io import draw
 from motionloom.io.draw import Camera, capsules, hull
-from motionloom.io.figure import figure, joint_sides
+from motionloom.io.figure import body_height, figure, joint_sides
 from motionloom.io.video import draw_sheet, draw_video
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22, Skeleton
@@ -275,3 +275,20 @@ def test_a_failing_scene_stops_ffmpeg_and_leaves_nothing(tmp_path: Path, monkeyp
     with pytest.raises(RuntimeError, match="brush lost"):
         draw_video([standing(5)], tmp_path / "x.mp4", size=(96, 64))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_reference_joint_far_from_the_body_makes_nobody_taller() -> None:
+    motion = standing()
+    old = motion.skeleton
+    far = np.array([0.0, 0.0, -5.0])
+    place = motion.root - far
+    skeleton = Skeleton(
+        ("reference", *old.names),
+        (-1, *(p + 1 for p in old.parents)),
+        np.concatenate([far[None], old.offsets]),
+    )
+    rotations = np.insert(motion.rotations, 0, rot.IDENTITY, axis=1)
+    moved = np.repeat(skeleton.offsets[None], len(motion), axis=0)
+    moved[:, 1] = place + np.linspace(0, 1, len(motion))[:, None] * [1, 0, 0]
+    walked = Motion(skeleton, motion.fps, np.tile(far, (len(motion), 1)), rotations, moved)
+    assert body_height(skeleton, walked.positions()) == pytest.approx(body_height(old, motion.positions()))

@@ -336,10 +336,14 @@ def guess_unit(parents: tuple[int, ...], offsets: Array) -> float:
     On an adult that way (toe to fingertip or skull) is 1.6 to 2.6 m in any pose. Below 4.2 units it is taken
     for metres, 25 to 55 for the unit of the CMU skeleton files (0.0564 m), 55 to 110 for inches, 450 and
     more for millimetres, and anything else for centimetres. Wrong for a doll, a giant or a lone hand: say the unit.
+    Bones above the first joint that branches (a reference joint, metres from the body) do not count.
     """
+    only_child = np.bincount(np.array(parents[1:], dtype=int), minlength=len(parents)) == 1
+    first = int(np.argmin(only_child)) if only_child[0] else 0  # children follow at once as long as nothing branches
+    first = first if first in parents else 0
     reach = np.zeros(len(parents))
     longest = 0.0
-    for j in range(len(parents) - 1, 0, -1):
+    for j in range(len(parents) - 1, first, -1):
         way = reach[j] + float(np.linalg.norm(offsets[j]))
         longest = max(longest, reach[parents[j]] + way)
         reach[parents[j]] = max(reach[parents[j]], way)

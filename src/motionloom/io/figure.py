@@ -80,7 +80,7 @@ def figure(motion: Motion) -> Figure:
     skeleton = motion.skeleton
     places = motion.positions()
     height = body_height(skeleton, places)
-    centre = _centre(skeleton, places, height)
+    centre = body_start(skeleton, places)
     body = [j for j in range(len(skeleton)) if centre in _line(skeleton, j)]
     sides = joint_sides(skeleton)
     head = _head(skeleton, places, body, sides)
@@ -154,20 +154,28 @@ def _lengths(skeleton: Skeleton, places: Array) -> Array:
 
 def body_height(skeleton: Skeleton, places: Array) -> float:
     """Metres a body stands tall: of its upright poses, or judged by its bones where it never stands."""
-    tall = float(np.percentile(np.ptp(places[..., 1], axis=1), 90))
+    first = body_start(skeleton, places)
     lengths = _lengths(skeleton, places)
     down = np.zeros(len(skeleton))  # longest way from a joint down to a tip
     widest = 0.0
-    for j in range(len(skeleton) - 1, 0, -1):
+    for j in range(len(skeleton) - 1, first, -1):
         p, reach = skeleton.parents[j], down[j] + lengths[j]
         widest = max(widest, down[p] + reach)
         down[p] = max(down[p], reach)
-    return max(tall, 0.65 * widest) or 1.0
+    return max(_tall(places[:, first:]), 0.65 * widest) or 1.0
 
 
-def _centre(skeleton: Skeleton, places: Array, height: float) -> int:
-    """The joint where the body begins: a lone reference joint before it (at the world's origin) is no part of it."""
-    joint = 0
+def _tall(places: Array) -> float:
+    """Metres from lowest to highest joint in upright poses."""
+    return float(np.percentile(np.ptp(places[..., 1], axis=1), 90))
+
+
+def body_start(skeleton: Skeleton, places: Array) -> int:
+    """The joint where the body begins: a lone reference joint before it (at the world's origin) is no part of it.
+
+    All joints from this one on hang on it, since each of those before has one child only.
+    """
+    joint, height = 0, _tall(places)
     while len(children := skeleton.children(joint)) == 1:
         length = np.linalg.norm(places[:, children[0]] - places[:, joint], axis=-1)
         if length.max() < 0.3 * height and np.ptp(length) < 0.03 * height and length.max() > 1e-6:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom.io.figure import body_height
+from motionloom.io.figure import body_height, body_start
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22, Skeleton
 
@@ -54,10 +54,9 @@ class Info:
 def describe(motion: Motion) -> Info:
     """Measure a motion and look for common faults."""
     places = motion.positions()
-    first = _first_of_body(motion.skeleton, places)
-    body = places[:, first:]
+    body = places[:, body_start(motion.skeleton, places) :]
     ground = body[:, 0, [0, 2]]
-    height = body_height(_from(motion.skeleton, first), body) if body.shape[1] > 1 else 0.0
+    height = body_height(motion.skeleton, places) if body.shape[1] > 1 else 0.0
     floor = float(np.percentile(body[..., 1].min(axis=1), 2))
     low, high = (tuple(float(v) for v in f(body, axis=(0, 1))) for f in (np.min, np.max))
     return Info(
@@ -81,24 +80,6 @@ def describe(motion: Motion) -> Info:
 def family(skeleton: Skeleton) -> str:
     """The family of skeletons these joint names belong to, or ``unknown``."""
     return next((name for name, some in _FAMILIES if some <= set(skeleton.names)), "unknown")
-
-
-def _first_of_body(skeleton: Skeleton, places: Array) -> int:
-    """The joint where the body begins, below reference joints: still ones with one child that does the travelling."""
-    first = 0
-    while (
-        len(children := skeleton.children(first)) == 1
-        and np.ptp(places[:, first], axis=0).max() < 1e-4
-        and np.ptp(places[:, children[0]], axis=0).max() > 1e-4
-    ):
-        first = children[0]
-    return first
-
-
-def _from(skeleton: Skeleton, first: int) -> Skeleton:
-    """The skeleton without its first joints, each of which has one child, the next."""
-    parents = (-1, *(p - first for p in skeleton.parents[first + 1 :]))
-    return Skeleton(skeleton.names[first:], parents, skeleton.offsets[first:])
 
 
 def _problems(motion: Motion, body: Array, height: float, floor: float) -> list[str]:

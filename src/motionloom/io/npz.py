@@ -71,6 +71,8 @@ def load_npz(path: Path | str, *, fps: float | None = None) -> Motion:
     rate = fps
     if rate is None and "fps" in arrays:
         rate = float(_array(arrays, "fps", (), path=path))
+    if rate is not None and not 1e-4 <= rate <= 1e6:
+        raise MotionloomError(f"{path} is said to have {rate:g} frames per second; give the true frame rate")
     if "rotations" in arrays:
         if rate is None:
             raise MotionloomError(f"{path} has no 'fps'; give the frame rate")
