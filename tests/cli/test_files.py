@@ -100,6 +100,18 @@ def test_a_retargeted_motion_has_the_joints_unit_and_order_of_the_skeleton_file(
     assert len(file.motion) == 60
 
 
+def test_joints_without_telling_names_are_found_by_a_map(walk, capsys):
+    blank = Skeleton(tuple(f"b{j}" for j in range(22)), SMPL22.parents, np.ones((22, 3)))
+    save_bvh(Motion(blank, 30, walk.root[:1], walk.rotations[:1]), "blank.bvh")
+    words = ["export", "walk.bvh", "a.bvh", "--skeleton", "blank.bvh"]
+    assert main(words) == 2
+    assert "walk.bvh onto blank.bvh" in capsys.readouterr().err
+    Path("map.json").write_text(json.dumps({name: f"b{j}" for j, name in enumerate(SMPL22.names)}))
+    assert main([*words, "--target-map", "map.json"]) == 0
+    assert set(io.load("a.bvh").skeleton.names) >= set(blank.names)
+    assert main(["export", "walk.bvh", "a.npz", "--target-map", "map.json"]) == 2
+
+
 def test_acclaim_files_are_exported_with_their_skeleton_beside_them(capsys):
     Path("a.asf").write_text(ASF)
     Path("a_01.amc").write_text(AMC)

@@ -26,6 +26,8 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     _add_reading(export)
     export.add_argument("--fps", type=_rate, metavar="N", help="resample to this frame rate")
     export.add_argument("--skeleton", metavar="FILE|smpl22", help="put the motion on this skeleton")
+    for side, whose in (("source", "of IN"), ("target", "of the --skeleton")):
+        export.add_argument(f"--{side}-map", type=Path, metavar="JSON", help=f"which joints are which, {whose}")
     export.add_argument("--mirror", action="store_true", help="exchange left and right")
     export.add_argument("--out-unit", type=_unit, metavar="UNIT", help="unit of a BVH written (as read, else m)")
     export.add_argument("--order", metavar="XYZ", help="order of rotations of a BVH written (as read, else ZXY)")
@@ -100,15 +102,18 @@ def _unit(text: str) -> float:
 def run_export(arguments: argparse.Namespace) -> None:
     """``motionloom export IN OUT``."""
     from motionloom import io
+    from motionloom.errors import MotionloomError
 
     target = io.check_output(arguments.output)
     motion, unit, orders = _read(arguments, arguments.input)
     motion = _crop(motion, arguments)
     if arguments.mirror:
         motion = motion.mirror()
+    if (arguments.source_map or arguments.target_map) and not arguments.skeleton:
+        raise MotionloomError("--source-map and --target-map say which joints are which for a --skeleton; name one")
     if arguments.skeleton:
         skeleton, unit, orders = _skeleton(arguments.skeleton)
-        motion = _put_on(motion, skeleton)
+        motion = _put_on(motion, skeleton, arguments)
     if arguments.fps:
         motion = motion.resample(arguments.fps)
     if target.suffix.lower() == ".bvh":
@@ -236,11 +241,15 @@ def _skeleton(name: str) -> "tuple[Skeleton, float, dict[str, str]]":
     return io.load(path).skeleton, 1.0, {}
 
 
-def _put_on(motion: "Motion", skeleton: "Skeleton") -> "Motion":
-    from motionloom.retarget import retarget, to_smpl22
-    from motionloom.skeleton import SMPL22
+def _put_on(motion: "Motion", skeleton: "Skeleton", arguments: argparse.Namespace) -> "Motion":
+    from motionloom.errors import MotionloomError
+    from motionloom.retarget import retarget
 
-    return to_smpl22(motion) if skeleton is SMPL22 else retarget(motion, skeleton)
+    try:
+        return retarget(motion, skeleton, source_map=arguments.source_map, target_map=arguments.target_map)
+    except MotionloomError as error:
+        hint = "--source-map or --target-map"
+        raise MotionloomError(f"{arguments.input} onto {arguments.skeleton}: {error} ({hint})") from None
 
 
 def _only_bvh(arguments: argparse.Namespace) -> None:
