@@ -19,9 +19,11 @@ def _bench(arguments: argparse.Namespace) -> None:
 
     from motionloom.bench import bench, defaults, table
     from motionloom.checkpoint import Prior
-    from motionloom.evaluation.obey import plain, write_json
+    from motionloom.evaluation.obey import check_report, plain, write_json
     from motionloom.tasks.text import generate
 
+    if arguments.json:
+        check_report(arguments.json)
     prior = Prior.load(arguments.weights, device=arguments.device)
     found = bench(
         prior, defaults(generate), quick=arguments.quick, weights=arguments.weights,

@@ -112,6 +112,8 @@ def _realism(arguments: argparse.Namespace) -> None:
 
     if not 1 <= arguments.count <= 100_000:
         raise MotionloomError(f"the count must be from 1 to 100000; got {arguments.count}")
+    if arguments.out:
+        obey.check_report(arguments.out / "realism.json")
     if arguments.data:
         chosen = realism.choose(list(real_clips(arguments.data)), arguments.count)
         if not chosen:
@@ -137,6 +139,8 @@ def _reference(arguments: argparse.Namespace) -> None:
     from motionloom.evaluation import obey, reference
     from motionloom.evaluation.clips import real_clips
 
+    if arguments.out:
+        obey.check_report(arguments.out)
     found = reference.reference(real_clips(arguments.data), progress=_say)
     if arguments.out:
         obey.write_json(arguments.out, found)

@@ -8,7 +8,7 @@ from motionloom.checkpoint import Prior
 from motionloom.evaluation.obey import Generate
 from motionloom.features import humanml
 from motionloom.metrics.physics import Array
-from motionloom.tasks.text import STEPS, sample_features, to_motion
+from motionloom.tasks.text import sample_features, to_motion
 
 
 def generator(
@@ -24,13 +24,12 @@ def generator(
     Positions are measured as the network draws them, whose bones may breathe and whose feet may slide; ``finished``
     measures what is exported: constant bones, planted feet held still.
     """
-    strength, kind = 2.5 if guidance is None else guidance, solver or "dpm2m"
+    said = {"steps": steps, "guidance": guidance, "solver": solver}
+    how = {name: value for name, value in said.items() if value is not None}
 
     def make(prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[Array], float]:
         frames, seeds = [round(seconds * prior.fps)] * len(prompts), range(seed, seed + len(prompts))
-        drawn = sample_features(
-            prior, prompts, frames, seeds=list(seeds), guidance=strength, steps=steps or STEPS, solver=kind
-        )
+        drawn = sample_features(prior, prompts, frames, seeds=list(seeds), **how)  # type: ignore[arg-type]
         features = [one.numpy().astype(np.float64) for one in drawn]
         if finished:
             return [to_motion(one, prior.fps).positions() for one in features], prior.fps

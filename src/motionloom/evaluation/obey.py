@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
+from motionloom.io.atomic import atomic_path, check_place
 from motionloom.metrics.actions import measure
 from motionloom.metrics.obedience import CHECKS, Check
 from motionloom.metrics.physics import Array
@@ -83,7 +83,7 @@ def run(
     if not 1 <= seeds <= 10_000:
         raise MotionloomError(f"the number of seeds must be from 1 to 10000; got {seeds}")
     asked = {**(settings or {}), "seeds": seeds, "first_seed": first_seed, "checks": fingerprint(checks)}
-    done = _read(folder / "obedience.json", asked) if folder else {}
+    done = _read(check_report(folder / "obedience.json"), asked) if folder else {}
     for check in checks:
         for prompt in (check.prompt, *(check.paraphrases if paraphrases else ())):
             if any(a.prompt == prompt for a in done.get(check.name, ())):
@@ -209,17 +209,25 @@ def plain(rows: Sequence[Sequence[str]]) -> str:
     )
 
 
-def write_json(path: Path, value: Any) -> Path:
-    """Whole or not at all."""
-    os.makedirs(path.parent, exist_ok=True)
-    with atomic_path(path) as temp:
-        Path(temp).write_text(json.dumps(value, indent=1) + "\n", encoding="utf-8")
+def check_report(path: Path) -> Path:
+    """The path, its folders made, if a report can be written there: ask before long work."""
+    try:
+        os.makedirs(path.parent, exist_ok=True)
+    except OSError as error:
+        raise MotionloomError(
+            f"cannot write {path}: the folder {path.parent} cannot be made ({error.strerror or error}); name another"
+        ) from None
+    check_place(path)
     return path
 
 
+def write_json(path: Path, value: Any) -> Path:
+    """Whole or not at all, the folders made."""
+    return write_text(path, json.dumps(value, indent=1) + "\n")
+
+
 def write_text(path: Path, value: str) -> Path:
-    """Whole or not at all."""
-    os.makedirs(path.parent, exist_ok=True)
-    with atomic_path(path) as temp:
-        Path(temp).write_text(value, encoding="utf-8")
+    """Whole or not at all, the folders made."""
+    with atomic_path(check_report(path)) as temp:
+        temp.write_text(value, encoding="utf-8")
     return path
