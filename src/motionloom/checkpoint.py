@@ -59,7 +59,10 @@ class Prior:
 
     @staticmethod
     def load(weights: str | Path = "default", *, device: str | torch.device = "cpu") -> "Prior":
-        """Read a weight file: a path, or the name of one that ships with the package (``default``)."""
+        """Read a weight file: a path, or the name of one that ships with the package (``default``).
+
+        Raises `MotionloomError` for a file that is missing, damaged or of another kind, and for a device there is not.
+        """
         place = find_device(device)
         return load_prior(find_weights(weights), place)
 
@@ -108,7 +111,10 @@ def find_weights(weights: str | Path) -> Path:
 
 
 def save_prior(prior: Prior, path: Path | str, *, half: bool = True) -> Path:
-    """Write a prior; as float16 unless ``half`` is False; the embedded text encoder goes inside."""
+    """Write a prior as a .safetensors file and give the path back; as float16 unless ``half`` is False.
+
+    The embedded text encoder goes inside. Raises `MotionloomError` for another suffix or a place not to be written.
+    """
     path = Path(path)
     if path.suffix != ".safetensors":
         raise MotionloomError(f"weights are written as .safetensors; {path.name} has another suffix")

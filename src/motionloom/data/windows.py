@@ -11,6 +11,7 @@ import re
 import numpy as np
 
 from motionloom.metrics import physics as ph
+from motionloom.metrics.gestures import longest
 from motionloom.metrics.physics import Array
 
 Measures = dict[str, float]
@@ -64,7 +65,7 @@ def _limb_measures(p: Array, velocity: Array, body: Array, fps: float) -> Measur
         "jump_clearance": float(lift.max()),
         "jump_rise": float(p[:, 0, 1].max() - np.median(p[:, 0, 1])),
         "hops": float(sum(abs(apart[max(a - 1, 0)]) > 0.1 for a in air)),
-        "one_leg": _longest(np.asarray(np.abs(apart) > 0.12)) / fps,
+        "one_leg": longest(np.asarray(np.abs(apart) > 0.12)) / fps,
         "rise": float(lower.max() - lower.min()),
         "kick_height": float(np.abs(apart).max() / leg.max()),
         "kick_snap": float(ph.velocity(leg, fps).max()),
@@ -72,7 +73,7 @@ def _limb_measures(p: Array, velocity: Array, body: Array, fps: float) -> Measur
         "punch_speed": float(np.where(level, ph.velocity(reach, fps), 0).max()),
         "both_over_head": float((p[:, _WRISTS, 1].min(axis=1) - p[:, 15, 1]).max()),
         "hand_over_neck": float((p[:, _WRISTS, 1] - p[:, 12:13, 1]).max()),
-        "hands_up": _longest((p[:, _WRISTS, 1].min(axis=1) > p[:, 12, 1])) / fps,
+        "hands_up": longest(p[:, _WRISTS, 1].min(axis=1) > p[:, 12, 1]) / fps,
         "wave_swings": float(max(_swings(body[:, w, 0][raised[:, k] > 0], 0.07) for k, w in enumerate(_WRISTS))),
         "stir": float(np.percentile(np.linalg.norm(velocity, axis=-1).max(axis=1), 90)),
         "mean_stir": float(np.linalg.norm(velocity, axis=-1).mean()),
@@ -87,15 +88,10 @@ def _posture_measures(p: Array, body: Array, fps: float) -> Measures:
     knees = np.arctan2(np.linalg.norm(np.cross(upper, lower), axis=-1), (upper * lower).sum(-1)).min(axis=1)
     return {
         "pelvis_low": float(np.percentile(height, 2)),
-        "low_seconds": _longest(height < 0.8) / fps,
+        "low_seconds": longest(height < 0.8) / fps,
         "bend": float(np.degrees(np.percentile(np.arctan2(spine[:, 2], spine[:, 1]), 98))),
         "knees": float(np.degrees(np.percentile(knees, 98))),
     }
-
-
-def _longest(mask: np.ndarray) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 def _swings(signal: Array, amplitude: float) -> int:
