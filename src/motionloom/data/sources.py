@@ -76,14 +76,12 @@ def _pack(folder: Path) -> Iterator[Take]:
             span = Span(float(row["start_s"]), float(row["end_s"]), tuple(map(str, row["captions"])), "human")
             written.setdefault(row["clip"], []).append(span)
     except (KeyError, TypeError, ValueError) as error:
-        raise MotionloomError(f"{captions} has a row that cannot be used ({error!r}); mend it") from None
+        raise _unusable(captions, error, "mend it") from None
     with open(manifest, newline="", encoding="utf-8") as lines:
         try:
             yield from (_pack_take(folder, row, written) for row in csv.DictReader(lines))
         except (KeyError, TypeError, ValueError, AttributeError, csv.Error) as error:
-            if isinstance(error, MotionloomError):
-                raise
-            raise MotionloomError(f"{manifest} has a row that cannot be used ({error!r}); mend it") from None
+            raise _unusable(manifest, error, "mend it") from None
 
 
 def _pack_take(folder: Path, row: dict[str, str], written: dict[str, list[Span]]) -> Take:
@@ -119,9 +117,7 @@ def _cmu(folder: Path, captions: Path | None) -> Iterator[Take]:
         spoken = {number: [_amass_span(row) for row in several] for number, several in rows.items()}
         kinds = {number: {row["split"] for row in several} for number, several in rows.items()}
     except (KeyError, TypeError, ValueError) as error:
-        raise MotionloomError(
-            f"{captions} has a row that cannot be used ({error!r}); name HumanML3D's captions"
-        ) from None
+        raise _unusable(captions, error, "name HumanML3D's captions") from None
     for path in sorted([*folder.rglob("*.amc"), *folder.rglob("*.bvh")]):
         number = "_".join(part.zfill(2) for part in path.stem.split("_"))
         spans = [span for span in spoken.get(number, []) if span.texts]
@@ -211,3 +207,11 @@ def _json_lines(path: Path) -> Iterator[dict]:
                 yield json.loads(line)
             except json.JSONDecodeError as error:
                 raise MotionloomError(f"{path}, line {number} is not JSON ({error})") from error
+
+
+def _unusable(path: Path | None, error: Exception, advice: str) -> MotionloomError:
+    """What is wrong with a row, in one short sentence; an error that says so already stays what it is."""
+    if isinstance(error, MotionloomError):
+        return error
+    reason = " ".join(str(error).split())  # of bytes that are no text the repr would hold them all
+    return MotionloomError(f"{path} has a row that cannot be used ({type(error).__name__}: {reason[:120]}); {advice}")

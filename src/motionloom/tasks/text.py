@@ -50,6 +50,8 @@ def sample_features(
     The network sees at most `ROWS` motions at once, of equal length, so that memory does not grow with their number.
     """
     _check(prior, prompts, steps=steps, guidance=guidance, solver=solver)
+    if not all(0 <= seed < 2 * LARGEST_SEED for seed in seeds):
+        raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {min(seeds)}")
     way = levels(prior.schedule, steps, spacing=spacing)  # type: ignore[arg-type]
     groups = _groups(frames)
     result: dict[int, Tensor] = {}
