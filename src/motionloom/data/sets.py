@@ -1,7 +1,7 @@
 """A built set in memory, and the training batches drawn from it."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -134,7 +134,9 @@ class Batches:
         *,
         windows: Sequence[int] = (48, 80, 120, 196),
         shares: Sequence[float] = (0.2, 0.3, 0.35, 0.15),
+        favour: Mapping[str, float] = FAVOUR,
     ) -> None:
+        self.favour = dict(favour)
         self.data, self.windows = data, tuple(windows)
         self.shares = np.array(shares) / np.sum(shares)
         self._pools = {w: self._pool(w) for w in self.windows}
@@ -166,7 +168,7 @@ class Batches:
         for row, kind in enumerate(picked):
             groups = pools[kinds[kind]]
             names = list(groups)
-            weights = np.array([FAVOUR.get(n, 0.4 if "+" in n else 1.0) for n in names])
+            weights = np.array([self.favour.get(n, 0.4 if "+" in n else 1.0) for n in names])
             numbers = groups[names[rng.choice(len(names), p=weights / weights.sum())]]
             item = self.data.items[numbers[rng.integers(len(numbers))]]
             length = min(item.frames, window)

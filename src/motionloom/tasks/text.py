@@ -19,8 +19,8 @@ from motionloom.features.ik import motion_from_positions
 from motionloom.features.layout import LAYOUT, WIDTH
 from motionloom.motion import Motion
 
-STEPS = 20
-SPACING = "quadratic"
+STEPS, SOLVER, SPACING, GUIDANCE = 20, "dpm2m-sde", "index", 2.5
+"""How motions are sampled unless asked otherwise (docs/decisions/0008)."""
 LONGEST = 60.0
 """Seconds: beyond this one prompt is no longer one action."""
 ROWS = 8
@@ -39,9 +39,9 @@ def sample_features(
     frames: Sequence[int],
     *,
     seeds: Sequence[int],
-    guidance: float = 2.5,
+    guidance: float = GUIDANCE,
     steps: int = STEPS,
-    solver: str = "dpm2m",
+    solver: str = SOLVER,
     spacing: str = SPACING,
     progress: Progress | None = None,
 ) -> list[Tensor]:
@@ -65,7 +65,10 @@ def sample_features(
             state = snapshot.state
             if progress:
                 progress(number * steps + done, len(groups) * steps)
-        for row, features in zip(rows, (state * prior.std + prior.mean).cpu(), strict=True):
+        finished = state * prior.std + prior.mean
+        if prior.net.config.patch > 1:
+            finished = smooth(finished)
+        for row, features in zip(rows, finished.cpu(), strict=True):
             result[row] = features
     return [result[row] for row in range(len(prompts))]
 
@@ -77,9 +80,9 @@ def generate(
     seconds: float | Sequence[float] = 5.0,
     count: int = 1,
     seed: int = 0,
-    guidance: float = 2.5,
+    guidance: float = GUIDANCE,
     steps: int = STEPS,
-    solver: str = "dpm2m",
+    solver: str = SOLVER,
     clean: bool = True,
     progress: Progress | None = None,
 ) -> list[Motion]:
@@ -114,6 +117,16 @@ def generate(
         guidance=guidance, steps=steps, solver=solver, progress=progress,
     )  # fmt: skip
     return [to_motion(features.numpy().astype(np.float64), prior.fps, clean=clean) for features in made]
+
+
+def smooth(features: Tensor) -> Tensor:
+    """(..., frames, numbers) weighted 1/4, 1/2, 1/4 along time, ends repeated.
+
+    A network whose tokens hold several frames draws each token smoothly and leaves small steps between them.
+    """
+    before = torch.cat([features[..., :1, :], features[..., :-1, :]], dim=-2)
+    after = torch.cat([features[..., 1:, :], features[..., -1:, :]], dim=-2)
+    return 0.25 * before + 0.5 * features + 0.25 * after
 
 
 def to_motion(features: np.ndarray, fps: float, *, clean: bool = True) -> Motion:

@@ -17,7 +17,7 @@ from motionloom.checkpoint import (
     read_tensors,
     save_prior,
 )
-from motionloom.data.sets import Batches, MotionSet, load_set
+from motionloom.data.sets import FAVOUR, Batches, MotionSet, load_set
 from motionloom.errors import MotionloomError
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.nets.text import MiniLM, TextEncoder
@@ -54,7 +54,7 @@ def train_prior(
         restandardised = (motions.features * motions.std + motions.mean - mean) / std
         motions = replace(motions, features=restandardised, mean=mean, std=std)
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
-    batches = Batches(motions, windows=recipe.windows, shares=recipe.shares)
+    batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
     words = WordBank(text, motions.texts, progress=say if world.rank == 0 else lambda line: None)
     objective = CleanGuess(net, schedule, batches, words, drop_text=recipe.drop_text, device=world.device)
     say(f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(motions.items):,} described stretches, "

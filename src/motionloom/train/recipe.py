@@ -27,6 +27,8 @@ class Recipe:
     """Lengths of windows in frames, one drawn per step."""
     shares: list[float] = field(default_factory=lambda: [0.2, 0.3, 0.35, 0.15])
     """How often each length is drawn."""
+    favour: dict[str, Any] = field(default_factory=dict)
+    """How often measured labels are drawn, 1 being usual; empty: `motionloom.data.sets.FAVOUR`."""
     rate: float = 8e-4
     """Learning rate after the warm-up."""
     warmup: int = 300
