@@ -35,7 +35,7 @@ LOOPED = 200
 BENDS = (0.35, 0.75)
 """Radians per second: a wide turn, and a circle in 8.4 seconds."""
 _MIRROR = list(SMPL22.mirror_pairs())
-_STATES = ("walk", "walk slow", "walk fast", "jog", "run", "walk backward", "jog backward", "stand", "dance",
+STATES = ("walk", "walk slow", "walk fast", "jog", "run", "walk backward", "jog backward", "stand", "dance",
            "circle left",
            "circle right", "run circle", "climb", "sit", "balance", "sidestep left", "sidestep right")  # fmt: skip
 """Labels that stay true however long a window of them is: neighbouring windows join."""
@@ -125,8 +125,8 @@ def _clip(take: Take, features: np.ndarray, way: str, *, spans: bool = True) -> 
 
 def join_spans(spans: Sequence[tuple[int, int, str]]) -> list[tuple[int, int, str]]:
     """Overlapping windows of a label that is a state become one span; single events keep their windows."""
-    result = [s for s in spans if s[2] not in _STATES]
-    for label in dict.fromkeys(s[2] for s in spans if s[2] in _STATES):
+    result = [s for s in spans if s[2] not in STATES]
+    for label in dict.fromkeys(s[2] for s in spans if s[2] in STATES):
         ordered = sorted((a, b) for a, b, name in spans if name == label)
         joined: list[tuple[int, int]] = []
         for a, b in ordered:

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom.data.build import Clip, read_clip
+from motionloom.data.build import STATES, Clip, read_clip
 from motionloom.data.words import phrases, sentence
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import LAYOUT
@@ -125,7 +125,8 @@ class Batches:
 
     All rows of a batch share a window (one of ``windows`` frames, drawn by ``shares``); items shorter than the window
     but at least 60 % of it are taken whole and padded. First the kind of text is drawn (`SHARE`), then for measured
-    labels the label, evenly over labels, then the item: rare actions are seen as often as walks.
+    labels the label, evenly over labels, then the item: rare actions are seen as often as walks. Windows labelled for
+    an event are never cropped.
     """
 
     def __init__(
@@ -150,8 +151,10 @@ class Batches:
     def _pool(self, window: int) -> dict[str, dict[str, np.ndarray]]:
         fitting: dict[str, dict[str, list[int]]] = {}
         for number, item in enumerate(self.data.items):
-            if item.frames >= 0.6 * window:
-                kind = item.group if item.group in SHARE else "label"
+            kind = item.group if item.group in SHARE else "label"
+            # a part of a window that is labelled for one event, such as a jump, may not show it
+            whole = kind != "label" or item.group in STATES or "+" in item.group or item.frames <= 1.05 * window
+            if item.frames >= 0.6 * window and whole:
                 fitting.setdefault(kind, {}).setdefault(item.group, []).append(number)
         return {kind: {g: np.array(numbers) for g, numbers in groups.items()} for kind, groups in fitting.items()}
 
