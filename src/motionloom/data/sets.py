@@ -19,7 +19,7 @@ WORDINGS = 48
 SHARE = {"human": 0.35, "index": 0.12, "label": 0.53}
 """How often a training sample shows a written caption, an index description, a measured label."""
 
-FAVOUR = dict.fromkeys(("circle left", "circle right", "sit", "jump", "kick", "punch"), 2.0)
+FAVOUR: dict[str, float] = dict.fromkeys(("circle left", "circle right", "sit", "jump", "kick", "punch"), 2.0)
 """Labels drawn more often than the others: they came out last. A mixture of two labels is drawn 0.4 times as often."""
 
 
