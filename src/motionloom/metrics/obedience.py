@@ -234,7 +234,7 @@ CHECKS: tuple[Check, ...] = (
         "bend down", "a person bends down", 4.0,
         ("someone bends over", "a man bows forward"),
         (
-            Bound("bend", "the back leans forward by a third of a right angle or more", low=28.0),
+            Bound("bend", "the back leans forward by more than a quarter of a right angle", low=26.0),
             _STAYS,
         ),
         words=r"\bbow\b|bends? (over|down|forward)|picks? .* up from|picks up something",
@@ -249,7 +249,7 @@ CHECKS: tuple[Check, ...] = (
             Bound("low_seconds", "somebody who sits stays down for a second", low=1.0),
             Bound("low_still", "who sits does not move about", high=0.15),
             Bound("bend_when_low", "the back is upright on a seat", high=45.0),
-            Bound("feet_ahead_when_low", "the feet are in front of the hips, not under them", low=0.12),
+            Bound("feet_ahead_when_low", "the feet are in front of the hips, not under them", low=0.1),
         ),
         words=r"\bsits?\b|\bsitting|seat",
         unless=r"climb|playground|danc|hang|roof|ladder",
