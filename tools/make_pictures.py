@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PICTURES: dict[str, list[str]] = {
     "walk": ["a person walks forward and waves"],
     "jump": ["a person jumps up and down"],
-    "turn": ["a person walks in a circle"],
+    "run": ["a person runs forward"],
     "punch": ["a person throws punches with both fists"],
     "seeds": ["a person dances", "--count", "3"],
 }
