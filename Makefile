@@ -46,9 +46,10 @@ pictures: $(VENV)/.runtime  ## draw the README's pictures anew, with the shipped
 	$(BIN)/python tools/make_pictures.py
 
 measure: $(VENV)/.runtime  ## measure the shipped weights anew (DATA=recordings for realism); fills the README
-	rm -rf benchmarks/obedience benchmarks/realism
+	rm -rf benchmarks/obedience benchmarks/realism benchmarks/realism_finished
 	$(BIN)/motionloom evaluate obedience --out benchmarks/obedience
 	$(BIN)/motionloom evaluate realism $(if $(DATA),--data $(DATA)) --out benchmarks/realism
+	$(BIN)/motionloom evaluate realism $(if $(DATA),--data $(DATA)) --finished --out benchmarks/realism_finished
 	$(BIN)/motionloom bench --json benchmarks/speed.json > benchmarks/speed.txt
 	$(BIN)/python tools/fill_readme.py
 

@@ -25,6 +25,8 @@ from motionloom.diffusion import (
     restart,
     run,
 )
+from motionloom.nets.prior import condition
+from motionloom.nets.published import from_published
 from tests.conformance.runner import KNOWN, MASK, NOISE, TEXT, Case, case, cases, compare, normal, stream, weights
 
 Net = Callable[[Tensor, int, Any], Tensor]
@@ -60,11 +62,6 @@ def dummy(recorded: Case) -> tuple[Net, Tensor, Tensor]:
 
 def published_network(recorded: Case) -> tuple[Net, Any, Any]:
     """The published encoder with weights by rule, bound to the text features of the case and to none."""
-    try:
-        from motionloom.nets.prior import condition
-        from motionloom.nets.published import from_published
-    except ImportError as error:
-        pytest.skip(f"the published network cannot be built yet: {error}")
     seed, rows = recorded.config["seed"], recorded.config["shape"][0]
     filled = weights(case("mdm_forward", "state_dict_humanml263").lists["keys"], seed)
     net = from_published({name: torch.from_numpy(array) for name, array in filled.items()}).eval()
