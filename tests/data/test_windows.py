@@ -67,3 +67,11 @@ def test_windows_cover_a_clip_and_lie_inside_it() -> None:
 def test_a_clip_shorter_than_a_window_is_one_window_and_shorter_than_a_second_none() -> None:
     assert label_clip(people.walking(1.2, 2.0), FPS, "") == [(0, 40, "walk")]
     assert label_clip(people.walking(1.2, 0.9), FPS, "") == []
+
+
+@pytest.mark.parametrize(("way", "label"), [(1, "climb"), (-1, "descend"), (0, None)])
+def test_who_ends_up_higher_climbs_and_who_ends_up_lower_climbs_down(way: int, label: str | None) -> None:
+    up = np.linspace(0, 1.2, 80)
+    heights = {1: up, -1: up[::-1], 0: 0.3 - 0.3 * np.cos(up * np.pi / 0.3)}[way]
+    stairs = people.standing(4.0) + heights[:, None, None] * [0, 1, 0]
+    assert [name for name in label_window(stairs, 20, "climb stairs") if name != "stand"] == ([label] if label else [])

@@ -41,6 +41,13 @@ def test_corrected_heading_loses_only_the_facing_of_frame_0(seed: int) -> None:
     np.testing.assert_allclose(decoded, rot.rotate(q, positions)[:-1], atol=2e-5)
 
 
+@pytest.mark.parametrize("heading", ["compatible", "corrected"])
+def test_displacements_of_decoded_places_are_the_stored_ones(heading: humanml.Heading) -> None:
+    features = humanml.encode(person(5), heading=heading).astype(np.float64)
+    stored = features[:-1, LAYOUT["joint_velocity"]].reshape(-1, 22, 3)
+    np.testing.assert_allclose(humanml.displacements(torch.from_numpy(features)).numpy(), stored, atol=2e-6)
+
+
 @settings(max_examples=5, deadline=None)
 @given(SEEDS, st.floats(-3, 3))
 def test_features_do_not_see_place_and_facing(seed: int, yaw: float) -> None:

@@ -32,12 +32,11 @@ from motionloom.skeleton import SMPL22
 _NAME = re.compile(r"\w[\w.+ -]{0,120}")
 SHORTEST = 20
 LOOPED = 200
-BENDS = (0.35, 0.75)
-"""Radians per second: a wide turn, and a circle in 8.4 seconds."""
+BENDS = (0.35, 0.75, 1.0)
+"""Radians per second: a wide turn, and circles in 8.4 and 6.3 seconds."""
 _MIRROR = list(SMPL22.mirror_pairs())
 STATES = ("walk", "walk slow", "walk fast", "jog", "run", "walk backward", "jog backward", "stand", "dance",
-           "circle left",
-           "circle right", "run circle", "climb", "sit", "balance", "sidestep left", "sidestep right")  # fmt: skip
+           "circle left", "circle right", "run circle", "balance", "sidestep left", "sidestep right")  # fmt: skip
 """Labels that stay true however long a window of them is: neighbouring windows join."""
 
 

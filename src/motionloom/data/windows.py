@@ -60,13 +60,14 @@ def _limb_measures(p: Array, velocity: Array, body: Array, fps: float) -> Measur
     level = np.abs(p[:, _WRISTS, 1] - p[:, _SHOULDERS, 1]) < 0.4
     raised = p[:, _WRISTS, 1] - p[:, 9:10, 1]
     lower = ph.smooth(p[:, [10, 11], 1].min(axis=1), ph.odd(fps / 2))
+    fifth = max(1, len(p) // 5)
     return {
         "flights": float(len(air)),
         "jump_clearance": float(lift.max()),
         "jump_rise": float(p[:, 0, 1].max() - np.median(p[:, 0, 1])),
         "hops": float(sum(abs(apart[max(a - 1, 0)]) > 0.1 for a in air)),
         "one_leg": longest(np.asarray(np.abs(apart) > 0.12)) / fps,
-        "rise": float(lower.max() - lower.min()),
+        "rise": float(lower[-fifth:].mean() - lower[:fifth].mean()),
         "kick_height": float(np.abs(apart).max() / leg.max()),
         "kick_snap": float(ph.velocity(leg, fps).max()),
         "foot_speed": float(np.percentile(np.linalg.norm(ph.velocity(body[:, _ANKLES], fps), axis=-1).max(axis=1), 98)),
@@ -131,20 +132,20 @@ def _gestures(m: Measures, words: str, seconds: float) -> list[str]:
         return ["jumping jacks"]
     if _says(words, r"punch|strike|boxing|oiduki") and m["punch_speed"] > 1.4:
         found.append("punch")
-    if _says(words, r"kick|geri|karate|martial") and m["kick_height"] > 0.45 and m["kick_snap"] > 1.5:
+    if _says(words, r"kick|geri|karate|martial") and m["kick_height"] > 0.5 and m["foot_speed"] > 4.4:
         found.append("kick ball" if _says(words, r"soccer|ball") else "kick")
-    elif _says(words, r"soccer") and m["kick_height"] > 0.2 and m["foot_speed"] > 4.0:
+    elif _says(words, r"soccer") and m["kick_height"] > 0.3 and m["foot_speed"] > 5.0:
         found.append("kick ball")
     jumpy = _says(words, r"jump|hop|leap|exercise")
-    if jumpy and m["hops"] >= 2 and m["flights"] >= 3 and _says(words, r"hop|one foot|one leg"):
+    if jumpy and m["hops"] >= 3 and m["flights"] >= 3 and _says(words, r"hop|one foot|one leg"):
         found.append("hop")
-    elif jumpy and m["jump_rise"] > 0.12 and m["jump_clearance"] > 0.12:
+    elif jumpy and m["jump_rise"] > 0.2 and m["jump_clearance"] > 0.16:
         several = m["flights"] >= 3 and abs(m["advance"]) < 0.15 * seconds
         found.append("jump repeatedly" if several else "jump forward" if m["advance"] > 0.8 else "jump")
     if _says(words, r"wav|traffic|bye") and m["wave_swings"] >= 4 and m["hand_over_neck"] > -0.1 and m["travel"] < 2:
         found.append("wave")
-    if _says(words, r"climb|stair|steps|ladder") and m["rise"] > 0.25:
-        found.append("climb")
+    if _says(words, r"climb|stair|steps|ladder") and abs(m["rise"]) > 0.35:
+        found.append("climb" if m["rise"] > 0 else "descend")
     if _says(words, r"danc|salsa|ballet|pirouette") and m["mean_stir"] > 0.45:
         found.append("dance")
     if _says(words, r"balance|one leg") and m["one_leg"] > 1.5 and m["travel"] < 1.0:
@@ -161,7 +162,8 @@ def _gestures(m: Measures, words: str, seconds: float) -> list[str]:
 
 
 def _path(m: Measures, seconds: float, words: str) -> list[str]:
-    if m["stir"] < 0.35 and m["travel"] < 0.15 and m["pelvis_low"] > 0.9 and m["hand_over_neck"] < -0.2:
+    stays = m["travel"] < 0.15 and abs(m["turn"]) < 25
+    if m["stir"] < 0.28 and stays and m["pelvis_low"] > 0.9 and m["hand_over_neck"] < -0.2:
         return ["stand"]
     if _says(words, r"danc|salsa|climb|playground|acrobat|karate|cartwheel"):
         return []
@@ -175,9 +177,9 @@ def _path(m: Measures, seconds: float, words: str) -> list[str]:
     if m["winding"] > 250 and m["gap"] < 0.5 and m["facing_share"] > 0.6:
         return ["run circle"] if m["pace"] > 2 else ["circle left" if m["turn"] > 0 else "circle right"]
     if m["facing_share"] > 0.75 and straight:
-        if m["pace"] > 2.6:
+        if m["pace"] > 2.7:
             return ["run"]
-        if m["pace"] > 1.75:
+        if m["pace"] > 2.0:
             return ["jog"]
         return ["walk", "walk slow"] if m["pace"] < 0.85 else ["walk", "walk fast"] if m["pace"] > 1.5 else ["walk"]
     if m["facing_share"] < -0.75 and straight:

@@ -236,6 +236,24 @@ def decode_positions(features: Tensor | np.ndarray):
     return torch.cat([root[..., None, :], joints], dim=-2)
 
 
+def displacements(features: Tensor) -> Tensor:
+    """How far joints go to the next frame, (..., frames, 263) to (..., frames - 1, 22, 3) metres; differentiable.
+
+    In the heading frame, read from the root and the places (the first 67 numbers): of a real motion it equals the
+    ``joint_velocity`` block, of a generated one it is what `decode_positions` shows.
+    """
+    _check_width(features)
+    places = torch.cat([torch.zeros_like(features[..., :3]), features[..., LAYOUT["ric"]]], dim=-1)
+    places = places.unflatten(-1, (22, 3))
+    height = torch.zeros_like(places)
+    height[..., 0, 1] = features[..., 3]
+    places = places + height
+    now, following = places[..., :-1, :, :], places[..., 1:, :, :]
+    half, x, z = (features[..., :-1, None, n] for n in range(3))
+    x, z = _turn_back(half, following[..., 0] + x, following[..., 2] + z)
+    return torch.stack([x, following[..., 1], z], dim=-1) - now
+
+
 @overload
 def positions_from_rot6d(features: Tensor, offsets: np.ndarray = OFFSETS) -> Tensor: ...
 @overload

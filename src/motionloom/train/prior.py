@@ -56,7 +56,10 @@ def train_prior(
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
     words = WordBank(text, motions.texts, progress=say if world.rank == 0 else lambda line: None)
-    objective = CleanGuess(net, schedule, batches, words, drop_text=recipe.drop_text, device=world.device)
+    objective = CleanGuess(
+        net, schedule, batches, words,
+        drop_text=recipe.drop_text, displacement=recipe.displacement, device=world.device,
+    )  # fmt: skip
     say(f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(motions.items):,} described stretches, "
         f"{len(motions.texts):,} sentences, {motions.minutes:.0f} minutes recorded")  # fmt: skip
     place = folder / f"{recipe.name}.safetensors"

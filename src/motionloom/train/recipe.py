@@ -44,6 +44,8 @@ class Recipe:
     """``bf16`` or ``none``."""
     compile: bool = False
     """Compile the network with torch.compile: pays on a GPU and on long runs."""
+    displacement: float = 0.0
+    """Weight of `objectives.displacement_error` in the loss; 0: the published loss alone."""
     drop_text: float = 0.1
     """Share of samples trained without their text."""
     schedule: str = "cosine"
@@ -101,6 +103,7 @@ def _check(path: Path, recipe: Recipe) -> None:
         "seed": 2**31,
         "rate": 10.0,
         "decay": 10.0,
+        "displacement": 1000.0,
         "save_every": 10**9,
     }
     for key, limit in limits.items():
