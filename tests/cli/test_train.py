@@ -50,6 +50,7 @@ def test_a_model_is_trained_continued_and_used(capsys: pytest.CaptureFixture[str
     assert prior.card.licence == "mine alone"
     assert prior.card.notes["steps"] == 3
     assert main([*BASE, "--out", "run", "--set", "steps=5"]) == 0
+    assert "another recipe than before: steps is now 5 and was 3" in capsys.readouterr().out
     assert load_prior(Path("run/mine.safetensors")).card.notes["steps"] == 5
     assert main([*BASE, "--out", "more", "--set", "start=run/mine.safetensors", "steps=1"]) == 0
     assert load_prior(Path("more/mine.safetensors")).mean.equal(prior.mean)

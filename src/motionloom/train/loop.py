@@ -117,6 +117,18 @@ def load_state(path: Path, net: nn.Module, average: Average, optimizer: torch.op
         raise MotionloomError(f"{path} does not belong to this recipe ({reason}); train into another folder") from None
 
 
+def changed(folder: Path, recipe: Recipe) -> list[str]:
+    """What of the recipe differs from the one that the run in ``folder`` was last saved under, one line each."""
+    if not (folder / STATE).is_file():
+        return []
+    try:
+        before = json.loads(read_tensors(folder / STATE)[1]["recipe"])
+        now = asdict(recipe)
+        return [f"{key} is now {now[key]!r} and was {before.get(key)!r}" for key in now if before.get(key) != now[key]]
+    except (KeyError, ValueError, AttributeError):
+        return []
+
+
 def train(
     objective: Objective,
     recipe: Recipe,

@@ -21,7 +21,7 @@ from motionloom.data.sets import FAVOUR, Batches, MotionSet, load_set
 from motionloom.errors import MotionloomError
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.nets.text import MiniLM, TextEncoder
-from motionloom.train.loop import Average, Log, World, train
+from motionloom.train.loop import Average, Log, World, changed, train
 from motionloom.train.objectives import CleanGuess, Conditioned, WordBank
 from motionloom.train.recipe import Recipe
 
@@ -62,6 +62,8 @@ def train_prior(
     )  # fmt: skip
     say(f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(motions.items):,} described stretches, "
         f"{len(motions.texts):,} sentences, {motions.minutes:.0f} minutes recorded")  # fmt: skip
+    for line in changed(folder, recipe) if world.rank == 0 else ():
+        say(f"going on with another recipe than before: {line}")
     place = folder / f"{recipe.name}.safetensors"
 
     def export(_: nn.Module, average: Average, step: int) -> None:
