@@ -1,7 +1,7 @@
 """A report: what one suite measured, under which protocol, and the command that measures it again.
 
-Every suite ends in the same value, so that one writer, one table, one plot and one comparison serve all of them. On disk
-a report is a folder: ``report.json`` (everything), ``report.md`` (to be read) and PNG plots.
+Every suite ends in the same value, so that one writer, one table, one plot and one comparison serve all of them. On
+disk a report is a folder: ``report.json`` (everything), ``report.md`` (to be read) and PNG plots.
 """
 
 import json
@@ -65,6 +65,8 @@ class Column:
     """Larger (up), smaller (down), or as near as possible to the row named `REAL` (real); empty: neither."""
     meaning: str
     digits: int = 3
+    share: bool = False
+    """Each value is a share of ``count`` tries: compared as a count, by Wilson's interval."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ class Row:
     values: Mapping[str, Value]
     """By the name of the column; a column may be missing."""
     measured_on: str = ""
-    """The data a published row was measured on, which is not the data of this report; empty for what was measured here."""
+    """Of a published row, the data it was measured on, which is not the data here; empty for what was measured here."""
 
 
 @dataclass(frozen=True)
@@ -307,7 +309,7 @@ def _column(found: dict[str, Any]) -> Column:
     if better not in ARROWS or isinstance(digits, bool) or not isinstance(digits, int) or not 0 <= digits <= 12:
         raise MotionloomError("a column says what does not exist")
     name, title, meaning = (_text(found[key]) for key in ("name", "title", "meaning"))
-    return Column(name, title, cast(Better, better), meaning, digits)
+    return Column(name, title, cast(Better, better), meaning, digits, bool(found.get("share", False)))
 
 
 def _row(found: dict[str, Any], columns: set[str]) -> Row:
