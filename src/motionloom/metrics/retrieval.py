@@ -1,0 +1,149 @@
+"""How well motions go with texts, and how much they differ among themselves, on embeddings.
+
+Rows are embeddings of a text-motion evaluator (512 numbers in the published one), distances are Euclidean and have no
+unit; text i belongs to motion i. Definitions: Guo et al., Generating Diverse and Natural 3D Human Motions from Text,
+CVPR 2022, section 5. Everything is computed in float64; what cannot be measured raises `MotionloomError`.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from motionloom.errors import MotionloomError
+
+Array = NDArray[np.float64]
+_CELLS = 4_000_000
+"""Distances held at once (32 MB each way): 50,000 texts against 50,000 motions would be 20 GB."""
+_ROUNDING = 1e-12
+"""Squared distances nearer to one another than this share of the squared lengths are the same number."""
+_LARGEST = 1e100
+"""Beyond this squares overflow."""
+
+
+def embeddings(values: ArrayLike, name: str, *, rows: int = 1) -> Array:
+    """``values`` as (n, d) float64 with at least ``rows`` rows of usable numbers; ``name`` is for the complaint."""
+    found = np.asarray(values)
+    if found.ndim != 2 or found.shape[1] == 0 or found.dtype.kind not in "fiu":
+        raise MotionloomError(f"{name} must be numbers (rows, dimensions), not {found.dtype} {found.shape}.")
+    if len(found) < rows:
+        raise MotionloomError(f"{name} has {len(found)} rows where at least {rows} are needed: measure more motions.")
+    found = found.astype(np.float64)
+    if not (np.abs(found) < _LARGEST).all():
+        raise MotionloomError(f"{name} holds numbers that are not finite or beyond {_LARGEST:g}: check the evaluator.")
+    return found
+
+
+def r_precision(texts: ArrayLike, motions: ArrayLike, *, top: int = 3, batch: int | None = 32) -> Array:
+    """(top,) shares of texts whose own motion is among the 1, 2, .. ``top`` nearest motions of its batch; up is better.
+
+    ``texts`` and ``motions`` are (n, d). Batches are consecutive rows, the last partial one is dropped; ``batch=None``
+    takes the whole set as one. The number depends on the batch size: chance is k / batch.
+    Motions exactly as near as the own one (within rounding) count as in random order among themselves: of s nearer
+    ones and e as near, the own one is in the first k with chance (k - s) / (e + 1). Without ties that is the published
+    count; with equal embeddings it is chance, where sorting alone could say anything up to 100 %.
+    """
+    t, m = _pairs(texts, motions, batch)
+    size = len(t) if batch is None else batch
+    if not 1 <= top <= size:
+        raise MotionloomError(f"R-precision counts the top {top} of {size} motions: choose 1 to {size}.")
+    shares = [_found(t[i : i + size], m[i : i + size], top) for i in range(0, len(t), size)]
+    return np.concatenate(shares).mean(axis=0)
+
+
+def matching_distance(texts: ArrayLike, motions: ArrayLike, *, batch: int | None = None) -> float:
+    """Mean distance of a text to its own motion (MM-Dist, matching score); down is better.
+
+    ``texts`` and ``motions`` are (n, d); with ``batch`` the rows of a last partial batch are dropped, as `r_precision`
+    drops them.
+    """
+    t, m = _pairs(texts, motions, batch)
+    return float(np.linalg.norm(t - m, axis=1).mean())
+
+
+def diversity(motions: ArrayLike, *, pairs: int = 300, seed: int = 0) -> float:
+    """Mean distance of ``pairs`` random pairs of (n, d) motions; good where it is near that of real motions.
+
+    Both members are drawn without repetition, each for itself, so that a motion may meet itself (as published).
+    """
+    m = embeddings(motions, "the motions", rows=max(2, pairs))
+    return diversity_of(m, *_draws(len(m), pairs, seed))
+
+
+def diversity_of(motions: ArrayLike, first: Sequence[int] | NDArray, second: Sequence[int] | NDArray) -> float:
+    """Mean distance between rows ``first[i]`` and ``second[i]`` of (n, d) motions."""
+    m = embeddings(motions, "the motions")
+    a, b = _indices(first, second, len(m))
+    return float(np.linalg.norm(m[a] - m[b], axis=1).mean())
+
+
+def multimodality(motions: ArrayLike, *, pairs: int = 10, seed: int = 0) -> float:
+    """Mean distance of ``pairs`` random pairs of motions of the same caption; up is better, after everything else.
+
+    ``motions`` is (captions, samples, d); the drawn samples are the same for every caption (as published).
+    """
+    samples = _captions(motions).shape[1]
+    if samples < max(2, pairs):
+        raise MotionloomError(f"multimodality draws {pairs} pairs of {samples} samples a caption: take more samples.")
+    return multimodality_of(motions, *_draws(samples, pairs, seed))
+
+
+def multimodality_of(motions: ArrayLike, first: Sequence[int] | NDArray, second: Sequence[int] | NDArray) -> float:
+    """Mean distance between samples ``first[i]`` and ``second[i]`` over all captions of (captions, samples, d)."""
+    m = _captions(motions)
+    a, b = _indices(first, second, m.shape[1])
+    return float(np.linalg.norm(m[:, a] - m[:, b], axis=2).mean())
+
+
+def _pairs(texts: ArrayLike, motions: ArrayLike, batch: int | None) -> tuple[Array, Array]:
+    if batch is not None and batch < 1:
+        raise MotionloomError(f"a batch has at least one row, not {batch}: the published size is 32.")
+    t, m = (embeddings(v, name, rows=batch or 1) for v, name in ((texts, "the texts"), (motions, "the motions")))
+    if t.shape != m.shape:
+        raise MotionloomError(f"texts {t.shape} and motions {m.shape} must have one row each of the same dimensions.")
+    used = len(t) if batch is None else len(t) // batch * batch
+    return t[:used], m[:used]
+
+
+def _found(texts: Array, motions: Array, top: int) -> Array:
+    """(n, top) chance that the own motion is among the k nearest, rows in chunks of `_CELLS` distances."""
+    centre = motions.mean(axis=0)  # distances stay, and cancellation goes
+    t, m = texts - centre, motions - centre
+    lengths, widths = (t**2).sum(axis=1), (m**2).sum(axis=1)
+    rows = max(1, _CELLS // len(m))
+    result = np.empty((len(t), top))
+    for start in range(0, len(t), rows):
+        part = slice(start, start + rows)
+        scale = lengths[part, None] + widths
+        # less its own entry: negative where a motion is nearer than the own one
+        lead = scale - 2 * t[part] @ m.T
+        own = np.arange(start, start + len(lead))
+        lead -= lead[np.arange(len(lead)), own][:, None]
+        nearer = (lead < -_ROUNDING * scale).sum(axis=1)
+        alike = (np.abs(lead) <= _ROUNDING * scale).sum(axis=1)  # the own one among them
+        result[part] = np.clip((np.arange(1, top + 1) - nearer[:, None]) / alike[:, None], 0.0, 1.0)
+    return result
+
+
+def _captions(motions: ArrayLike) -> Array:
+    m = np.asarray(motions)
+    if m.ndim != 3 or 0 in m.shape:
+        raise MotionloomError(f"multimodality needs motions (captions, samples, dimensions), not {m.shape}.")
+    return embeddings(m.reshape(-1, m.shape[2]), "the motions").reshape(m.shape)
+
+
+def _draws(count: int, pairs: int, seed: int) -> tuple[NDArray, NDArray]:
+    if pairs < 1:
+        raise MotionloomError(f"at least one pair must be drawn, not {pairs}.")
+    rng = np.random.default_rng(seed)
+    return rng.choice(count, pairs, replace=False), rng.choice(count, pairs, replace=False)
+
+
+def _indices(first: Sequence[int] | NDArray, second: Sequence[int] | NDArray, count: int) -> tuple[NDArray, NDArray]:
+    a, b = np.asarray(first), np.asarray(second)
+    both = np.concatenate([a.ravel(), b.ravel()])
+    if a.ndim != 1 or a.shape != b.shape or a.size == 0 or both.dtype.kind not in "iu":
+        raise MotionloomError(f"pairs are two equally long lists of row numbers, not {a.shape} and {b.shape}.")
+    if both.min() < 0 or both.max() >= count:
+        raise MotionloomError(f"pairs name rows {both.min()} to {both.max()} where there are 0 to {count - 1}.")
+    return a, b
