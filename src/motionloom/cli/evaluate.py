@@ -1,14 +1,24 @@
-"""`motionloom evaluate`: does it do what the words say, and does it look real."""
+"""`motionloom evaluate`: does it do what the words say, does it look real, and did it get better."""
 
 import argparse
+from importlib import import_module, util
 from pathlib import Path
+
+PARTS = ("evaluate_text", "evaluate_evaluator", "evaluate_all")
+"""Modules beside this one that register further commands."""
 
 
 def add(subparsers) -> None:
-    """Register `evaluate obedience`, `evaluate realism` and `evaluate reference`."""
-    family = subparsers.add_parser("evaluate", help="measure weights by physics: obedience to words, realism of motion")
+    """Register the commands of `evaluate`, those of `PARTS` included."""
+    family = subparsers.add_parser("evaluate", help="measure weights: obedience, realism, text metrics; compare runs")
     commands = family.add_subparsers(metavar="COMMAND", required=True)
+    _physical(commands)
+    for part in PARTS:
+        if util.find_spec(f"motionloom.cli.{part}"):
+            import_module(f"motionloom.cli.{part}").add(commands)
 
+
+def _physical(commands) -> None:
     obedience = commands.add_parser(
         "obedience", help="20 everyday prompts, each with a physical check, on several seeds"
     )

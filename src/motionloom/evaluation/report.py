@@ -211,16 +211,25 @@ def _split(report: Report) -> tuple[list[Row], list[Row]]:
 def _cells(report: Report, rows: Sequence[Row], *, bold: bool = False) -> list[list[str]]:
     """Rows of text, the heading first; a last column counts replications where any number has more than one."""
     shown = [c for c in report.columns if any(c.name in row.values for row in rows)]
-    repeated = any(v.count > 1 for row in rows for v in row.values.values())
+    counted = {c.name for c in shown if not c.share}  # a share shows its own count
+    repeated = any(v.count > 1 for row in rows for name, v in row.values.items() if name in counted)
     best = {c.name: _best(report, c) for c in shown} if bold else {}
     found = [["", *(_line(c.title) + ARROWS[c.better] for c in shown), *(["count"] if repeated else [])]]
     for row in rows:
         cells = [_line(row.name)]
         for c in shown:
-            text = row.values[c.name].text(c.digits) if c.name in row.values else ""
+            text = cell(c, row.values[c.name]) if c.name in row.values else ""
             cells.append(f"**{text}**" if text and best.get(c.name) == row.name else text)
-        found.append(cells + ([_counts(row)] if repeated else []))
+        counts = [v.count for name, v in row.values.items() if name in counted]
+        found.append(cells + ([_counts(counts)] if repeated else []))
     return found
+
+
+def cell(column: Column, value: Value) -> str:
+    """A number as its table shows it; a share with what was counted: ``0.90 (9/10)``."""
+    if not column.share or not math.isfinite(value.mean):
+        return value.text(column.digits)
+    return f"{value.mean:.{column.digits}f} ({round(value.mean * value.count)}/{value.count})"
 
 
 def _best(report: Report, column: Column) -> str:
@@ -239,9 +248,9 @@ def _best(report: Report, column: Column) -> str:
     return min(rows, key=keys[column.better]).name
 
 
-def _counts(row: Row) -> str:
-    counts = sorted({v.count for v in row.values.values()})
-    return "" if not counts else str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+def _counts(counts: Sequence[int]) -> str:
+    least, most = min(counts, default=0), max(counts, default=0)
+    return "" if not most else str(most) if least == most else f"{least} to {most}"
 
 
 def _said(value: Any) -> str:
