@@ -6,9 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from motionloom.checkpoint import load_prior, save_prior
 from motionloom.cli import main
+from motionloom.evaluation.guo import load_guo
+from tests.evaluation import test_guo
 from tests.nets import tiny
 from tests.nets.test_published import Bomb, state, write
 
@@ -123,3 +126,63 @@ def test_a_card_is_printed_and_shipped_weights_are_listed(capsys: pytest.Capture
     assert all(word in said for word in ("tiny", "do what you like", "random numbers", "minilm", "263", "cosine"))
     assert main(["weights", "--json"]) == 0
     assert isinstance(json.loads(capsys.readouterr().out), list)
+
+
+EVALUATOR = ["import", "finest.tar", "--out", "guo.safetensors"]
+
+
+def test_an_imported_evaluator_is_one_file_that_says_what_it_is(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The user's files from anywhere, by name."""
+    (folder / "elsewhere").mkdir()
+    test_guo.files(folder / "elsewhere").rename("finest.tar")
+    statistics = ["--mean", "elsewhere/t2m_mean.npy", "--std", "elsewhere/t2m_std.npy"]
+    words = ["--glove", "elsewhere", "--vip", "elsewhere/word_vectorizer.py"]
+    assert main([*EVALUATOR, *statistics, *words, "--licence", "research only"]) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert all(word in said.out for word in ("research only", "weighs 25 times", "6 vectors", "true, with sos"))
+    found = load_guo("guo.safetensors")
+    assert found.motions([test_guo.motion(40)]).shape == (1, 9)
+    assert found.texts(test_guo.CAPTIONS).shape == (3, 9)
+
+
+def test_an_evaluator_without_its_files_says_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    test_guo.files(folder).rename("alone.tar")
+    for name in ("t2m_mean.npy", "our_vab_data.npy", "word_vectorizer.py"):
+        Path(name).unlink()
+    Path("t2m_std.npy").rename("std.npy")
+    assert main(["import", "alone.tar", "--out", "guo.safetensors"]) == 0
+    assert capsys.readouterr().out.count("none: ") == 2
+
+
+def test_wrong_files_of_an_evaluator_are_one_sentence(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    test_guo.files(folder)
+    torch.save({"movement_encoder": {}}, "parts.tar")
+    Path("code.tar").write_bytes(pickle.dumps(Bomb(folder / "was run"), protocol=2))
+    (folder / "bomb").mkdir()
+    Path("bomb/our_vab_data.npy").write_bytes(Path("our_vab_data.npy").read_bytes())
+    Path("bomb/our_vab_idx.pkl").write_bytes(Path("our_vab_idx.pkl").read_bytes())
+    Path("bomb/our_vab_words.pkl").write_bytes(pickle.dumps(Bomb(folder / "was run")))
+    np.save("short.npy", np.ones(9))
+    assert "no checkpoint" in refused(capsys, "import", "absent.tar", "--out", "guo.safetensors")
+    assert "text_encoder" in refused(capsys, "import", "parts.tar", "--out", "guo.safetensors")
+    assert "not opened" in refused(capsys, "import", "code.tar", "--out", "guo.safetensors")
+    assert "not opened" in refused(capsys, *EVALUATOR, "--glove", "bomb")
+    assert "no lists" in refused(capsys, *EVALUATOR, "--vip", "short.npy")
+    assert "there is no" in refused(capsys, *EVALUATOR, "--glove", "absent")
+    assert "259 or 263" in refused(capsys, *EVALUATOR, "--mean", "short.npy", "--std", "short.npy")
+    assert "absent.npy" in refused(capsys, *EVALUATOR, "--mean", "absent.npy")
+    assert "float32" in refused(capsys, *EVALUATOR, "--half")
+    assert "suffix" in refused(capsys, "import", "finest.tar", "--out", "guo.tar")
+    assert not (folder / "was run").exists()
+    Path("t2m_mean.npy").unlink()
+    assert "together" in refused(capsys, *EVALUATOR)
+
+
+def test_word_files_with_another_checkpoint_are_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(folder, state())
+    start = ["import", "model000200000.pt", "--out", "a.safetensors", *STATISTICS]
+    assert "finest.tar" in refused(capsys, *start, "--glove", ".")
+    assert "finest.tar" in refused(capsys, *start, "--vip", "a.py")

@@ -12,11 +12,19 @@ if TYPE_CHECKING:
 
 def add(subparsers) -> None:
     """Register `import` and `weights`."""
-    parser = subparsers.add_parser("import", help="published MDM or PriorMDM weights to a weight file")
-    parser.add_argument("checkpoint", type=Path, metavar="MODEL.pt", help="model000200000.pt, args.json beside it")
+    parser = subparsers.add_parser(
+        "import", help="published weights to one file: an MDM or PriorMDM network, or Guo's evaluator (finest.tar)"
+    )
+    parser.add_argument(
+        "checkpoint", type=Path, metavar="MODEL.pt|finest.tar", help="model000200000.pt, args.json beside it; or Guo's"
+    )
     parser.add_argument("--out", type=Path, required=True, help="file to write, .safetensors")
-    parser.add_argument("--mean", type=Path, help="Mean.npy of the data set, as its authors publish it")
-    parser.add_argument("--std", type=Path, help="Std.npy of the data set")
+    parser.add_argument("--mean", type=Path, help="Mean.npy of the data set, as its authors publish it; t2m_mean.npy")
+    parser.add_argument("--std", type=Path, help="Std.npy of the data set; of an evaluator t2m_std.npy")
+    parser.add_argument(
+        "--glove", type=Path, metavar="FOLDER|FILE", help="an evaluator's words: our_vab_* files, or GloVe text"
+    )
+    parser.add_argument("--vip", type=Path, metavar="FILE", help="its special words: word_vectorizer.py, or JSON")
     parser.add_argument("--name", help="name on the card (default: the checkpoint's)")
     parser.add_argument("--licence", help="what one may do with these weights, as whoever gave them says")
     parser.add_argument("--half", action="store_true", help="write float16: half the size, nearly the same numbers")
@@ -39,6 +47,11 @@ def _import(arguments: argparse.Namespace) -> None:
     check_place(arguments.out)
     if not arguments.checkpoint.is_file():
         raise MotionloomError(f"there is no checkpoint {arguments.checkpoint}")
+    if arguments.checkpoint.suffix == ".tar":
+        _import_evaluator(arguments)
+        return
+    if arguments.glove or arguments.vip:
+        raise MotionloomError("--glove and --vip belong to an evaluator, which is published as finest.tar")
     if arguments.mean is None or arguments.std is None:
         raise MotionloomError(
             "the weights work on standardised features and do not hold the statistics: "
@@ -49,6 +62,22 @@ def _import(arguments: argparse.Namespace) -> None:
         name=arguments.name, licence=arguments.licence, warn=lambda line: print(f"motionloom: {line}", file=sys.stderr),
     )  # fmt: skip
     print(f"wrote {save_prior(prior, arguments.out, half=arguments.half)}")
+
+
+def _import_evaluator(arguments: argparse.Namespace) -> None:
+    from motionloom.errors import MotionloomError
+    from motionloom.evaluation.guo import read_published, save_guo
+
+    if arguments.half:
+        raise MotionloomError("an evaluator is kept as float32, so that its numbers are the published ones: no --half")
+    card = {"name": arguments.name, "licence": arguments.licence}
+    made = read_published(
+        arguments.checkpoint, mean=arguments.mean, std=arguments.std, glove=arguments.glove, lists=arguments.vip,
+        card={key: value for key, value in card.items() if value},
+    )  # fmt: skip
+    print(f"wrote {save_guo(made, arguments.out)}")
+    for key, value in made.about.items():
+        print(f"  {key:<14} {value}")
 
 
 def _numbers(path: Path) -> "np.ndarray":

@@ -140,7 +140,8 @@ def from_state_dict(state: Mapping[str, Tensor]) -> GuoNets:
         raise MotionloomError(
             f"the evaluator's weights do not fit: {key} is {found.get(key, 'missing')}, not {wanted.get(key, 'absent')}"
         )
-    weights = {key: value.detach().float() for key, value in state.items()}
+    # Copied: sums over memory of another alignment, such as a mapped file's, differ in the last bit.
+    weights = {key: value.detach().to(torch.float32, copy=True) for key, value in state.items()}
     for key, value in weights.items():
         if not bool(value.isfinite().all()):
             raise MotionloomError(f"the evaluator's {key} has numbers that are not finite; fetch the file again")
