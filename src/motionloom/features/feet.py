@@ -31,6 +31,8 @@ _SLOW, _STILL_SLOW, _TOLD_SLOW = 0.35, 0.5, 0.6
 """Metres per second: what starts a contact, what keeps it, and what a foot said to be planted may have."""
 _DRIFT = 0.12
 """Metres: a planted foot that strays further from the middle of its stance means to move; the stance is split."""
+_SUNK = 0.002
+"""Metres under the floor that are left: as much as in recordings; lifting every millimetre would leave people afloat."""
 _LENGTHS = SMPL22.bone_lengths()
 
 
@@ -59,7 +61,7 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
         tip = directions[:, i] * np.linalg.norm(foot, axis=-1, keepdims=True)
         targets[:, i] += _correction(places[:, ankle], places[:, ankle] + tip, flags, motion.fps)
         below = floor - targets[:, i, 1] - np.minimum(tip[:, 1], 0)
-        targets[:, i, 1] += _envelope(below.clip(0), round(0.1 * motion.fps))
+        targets[:, i, 1] += _envelope((below - _SUNK).clip(0), round(0.1 * motion.fps))
     down = _root_drop(places, targets, motion.fps)
     return _with_legs(motion, places - down[:, None, None] * [0, 1, 0], targets, directions)
 
