@@ -1,0 +1,177 @@
+"""`motionloom evaluate text`: the field's text-to-motion metrics beside real motion, baselines and published rows."""
+
+import argparse
+import sys
+from pathlib import Path
+
+PROMPT = "a person walks forward and waves"
+
+
+def add(commands) -> None:
+    """Register `evaluate text`."""
+    text = commands.add_parser("text", help="R-precision, FID, MM-Dist, Diversity, MultiModality, realism, speed")
+    text.add_argument("--weights", default="default", help="shipped name or file (default: default)")
+    text.add_argument(
+        "--data", type=Path, metavar="SET",
+        help="built set, recordings or HumanML3D folder (default: the shipped numbers of held-out CMU recordings)",
+    )  # fmt: skip
+    text.add_argument("--evaluator", default="own", metavar="own|FILE", help="who judges (default: the shipped one)")
+    text.add_argument("--steps", type=_steps, metavar="5,20,50", help="sampler steps, one row each (default 5,20,50)")
+    text.add_argument("--replications", type=int, help="(default 10)")
+    text.add_argument("--count", type=int, help="real items, spread evenly (default: all)")
+    text.add_argument("--batch", type=_batch, metavar="32|all", help="motions a caption is matched with (default 32)")
+    text.add_argument("--lengths", choices=("exact", "padded"), help="generate the real lengths (default), or 196 cut")
+    text.add_argument(
+        "--cap-len", choices=("true", "published"), help="captions as long as they are (default), or read as 22 tokens"
+    )
+    text.add_argument("--multimodality", type=_times, metavar="10x10", help="captions x motions of each; 0: none")
+    text.add_argument("--guidance", type=float, help="strength of the text (default: as generate)")
+    text.add_argument("--solver", help="solver name (default: as generate)")
+    text.add_argument("--seed", type=int, help="first seed (default 0)")
+    text.add_argument("--split", type=_words, metavar="val,test", help="splits of --data (default val,test)")
+    text.add_argument("--sources", type=_words, metavar="cmu", help="sources of --data (default cmu; all: every one)")
+    text.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
+    text.add_argument(
+        "--out", type=Path, help="folder for report.md, report.json and plots; a run that stopped goes on"
+    )
+    text.add_argument("--quick", action="store_true", help="one batch, two replications, few steps: about a minute")
+    text.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    text.add_argument(
+        "--make-reference", type=Path, metavar="FILE", help="only write what runs without --data compare with"
+    )
+    text.set_defaults(run=_text)
+
+
+def _steps(said: str) -> tuple[int, ...]:
+    try:
+        return tuple(int(word) for word in said.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{said!r} are not whole numbers with commas, such as 5,20,50") from None
+
+
+def _words(said: str) -> tuple[str, ...]:
+    return tuple(word.strip() for word in said.split(",") if word.strip())
+
+
+def _batch(said: str) -> int | str:
+    try:
+        return said if said == "all" else int(said)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{said!r} is no number of motions and not all") from None
+
+
+def _times(said: str) -> tuple[int, int]:
+    try:
+        captions, motions = (int(word) for word in ("0x0" if said == "0" else said).split("x"))
+        return captions, motions
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{said!r} is not captions x motions of each, such as 10x10, or 0") from None
+
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
+
+
+def _text(arguments: argparse.Namespace) -> None:
+    import json
+
+    from motionloom.evaluation import obey, report, text
+
+    if arguments.make_reference:
+        return _make_reference(arguments)
+    protocol, selection = _protocol(arguments), _selection(arguments)
+    if arguments.out:
+        obey.check_report(arguments.out / "report.json")
+    found = text.run(
+        arguments.weights, evaluator=arguments.evaluator, data=arguments.data, selection=selection, protocol=protocol,
+        folder=arguments.out, device=arguments.device, memory=lambda steps: _memory(arguments, steps),
+        command=_command(arguments), progress=_say,
+    )  # fmt: skip
+    if arguments.out:
+        report.write(found, arguments.out)
+    print(json.dumps(report.encode(found), indent=1) if arguments.json else report.plain(found))
+
+
+def _make_reference(arguments: argparse.Namespace) -> None:
+    from motionloom.errors import MotionloomError
+    from motionloom.evaluation import text_reference
+    from motionloom.evaluation.evaluators import load_evaluator
+    from motionloom.evaluation.text import reference
+
+    if arguments.data is None:
+        raise MotionloomError("a reference is made of real motions; name them with --data")
+    text_reference.check_reference(arguments.make_reference)
+    found = reference(load_evaluator(arguments.evaluator), arguments.data, _selection(arguments), _say)
+    path = text_reference.save(found, arguments.make_reference)
+    print(f"{path}: {len(found.names)} items, {path.stat().st_size / 1e6:.2f} MB")
+
+
+def _protocol(arguments: argparse.Namespace):
+    """The defaults with what was said."""
+    from motionloom.evaluation.protocol import Protocol, quick
+
+    said = {
+        "steps": arguments.steps,
+        "replications": arguments.replications,
+        "count": arguments.count,
+        "lengths": arguments.lengths,
+        "caption_length": arguments.cap_len,
+        "multimodality": arguments.multimodality,
+        "guidance": arguments.guidance,
+        "solver": arguments.solver,
+        "seed": arguments.seed,
+    }
+    how = {name: value for name, value in said.items() if value is not None}
+    if arguments.batch is not None:
+        how["batch"] = None if arguments.batch == "all" else arguments.batch
+    protocol = Protocol(**how)
+    return quick(protocol) if arguments.quick else protocol
+
+
+def _selection(arguments: argparse.Namespace):
+    """None where nothing was said: the defaults, or those of the shipped numbers."""
+    from motionloom.evaluation.protocol import Selection
+
+    if arguments.split is None and arguments.sources is None:
+        return None
+    sources = arguments.sources if arguments.sources is not None else Selection.sources
+    return Selection(arguments.split or Selection.splits, () if sources == ("all",) else sources)
+
+
+def _memory(arguments: argparse.Namespace, steps: int) -> float:
+    """Peak MB of a fresh process that generates eight motions of 9.8 s, as files."""
+    import tempfile
+
+    from motionloom.bench import process
+
+    with tempfile.TemporaryDirectory() as folder:
+        return process(
+            ["generate", PROMPT, "--weights", arguments.weights, "--steps", str(steps), "--seconds", "9.8",
+             "--count", "8", "--device", arguments.device, "--out", str(Path(folder) / "motion.npz")]
+        ).peak_mb  # fmt: skip
+
+
+def _command(arguments: argparse.Namespace) -> str:
+    """What to type to measure the same again; where data lie differs between machines, so they are called SET."""
+    import shlex
+
+    words = ["motionloom", "evaluate", "text", "--weights", arguments.weights]
+    words += ["--data", "SET"] if arguments.data else []
+    words += ["--evaluator", Path(arguments.evaluator).name] if arguments.evaluator != "own" else []
+    said = {
+        "--steps": arguments.steps and ",".join(map(str, arguments.steps)),
+        "--replications": arguments.replications,
+        "--count": arguments.count,
+        "--batch": arguments.batch,
+        "--lengths": arguments.lengths,
+        "--cap-len": arguments.cap_len,
+        "--multimodality": arguments.multimodality and "x".join(map(str, arguments.multimodality)),
+        "--guidance": arguments.guidance,
+        "--solver": arguments.solver,
+        "--seed": arguments.seed,
+        "--split": arguments.split and ",".join(arguments.split),
+        "--sources": arguments.sources and ",".join(arguments.sources),
+    }
+    for name, value in said.items():
+        words += [name, str(value)] if value is not None else []
+    return shlex.join([*words, *(["--quick"] if arguments.quick else [])])

@@ -1,0 +1,203 @@
+"""How a prior is measured: every setting that changes a number, in values that are printed into the report.
+
+The published protocol (Guo et al. 2022, as MDM and PriorMDM ran it) in its own words: lengths from the ground truth,
+batches of 32, replications with a 95 % interval of 1.96 sigma / sqrt(replications).
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from motionloom.diffusion import SOLVERS
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import FPS
+from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING
+
+SPLITS = ("train", "val", "test")
+PUBLISHED_CAPTION = 22
+"""Tokens: the caption length that MDM before January 2024 and PriorMDM gave their evaluator for generated motions."""
+STRIDE = 1 << 32
+"""Between the first seeds of two replications; what a replication draws stays below it."""
+MOST_STEPS, MOST_REPLICATIONS, MOST_ITEMS = 12, 1000, 100_000
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which stretches of which recordings are the real motions."""
+
+    splits: tuple[str, ...] = ("val", "test")
+    sources: tuple[str, ...] = ("cmu",)
+    """Beginnings of the names of sources; empty: all."""
+    mirrored: bool = True
+    """With their mirror images, whose captions have left and right exchanged, as in HumanML3D's own test set."""
+    shortest: int = 40
+    """Frames."""
+    longest: int = 196
+    """Frames; up to four more are cut off, and what is longer is left out: its caption says too little of a part."""
+    unit: int = 4
+    """Lengths are cropped to multiples of it; 1 keeps them."""
+    shorter_third: bool = False
+    """A third of the lengths is one unit shorter, as the published loader draws them."""
+
+    def __post_init__(self) -> None:
+        if not self.splits or not set(self.splits) <= set(SPLITS):
+            raise MotionloomError(f"the splits are train, val and test; got {', '.join(self.splits) or 'none'}")
+        if not (1 <= self.unit <= self.shortest <= self.longest <= 10_000):
+            raise MotionloomError(
+                f"lengths of {self.shortest} to {self.longest} frames in multiples of {self.unit} cannot be taken"
+            )
+
+    def described(self) -> dict[str, Any]:
+        """For a report."""
+        third = ", a third of them one unit shorter" if self.shorter_third else ""
+        return {
+            "split": list(self.splits),
+            "sources": list(self.sources) or "all",
+            "mirrored copies": "with" if self.mirrored else "without",
+            "real lengths": f"{self.shortest} to {self.longest} frames, cropped to multiples of {self.unit}{third}",
+        }
+
+
+@dataclass(frozen=True)
+class Transitions:
+    """Long motions out of several captions, and the stretches around their seams (PriorMDM's protocol)."""
+
+    handshake: int = 20
+    """Frames that two neighbours share: 20 for HumanML3D, 30 for BABEL."""
+    margin: int = 40
+    """Frames around the handshake that belong to the transition, half on either side."""
+    unfoldings: int = 2
+    blend: int = 10
+    """Frames over which neighbours are blended."""
+    intervals: int = 32
+    """Captions of one long motion."""
+
+    def __post_init__(self) -> None:
+        if min(self.handshake, self.unfoldings, self.intervals) < 1 or min(self.margin, self.blend) < 0:
+            raise MotionloomError(
+                "a handshake, unfoldings and intervals are at least 1, a margin and a blend at least 0"
+            )
+
+    @property
+    def window(self) -> int:
+        """Frames of a transition: 60 for HumanML3D."""
+        return self.handshake + self.margin
+
+    def described(self) -> dict[str, Any]:
+        """For a report."""
+        said = f"{self.handshake} frames of handshake, {self.margin} of margin, {self.blend} blended"
+        return {"transitions": said, "unfoldings": self.unfoldings, "intervals": self.intervals}
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """How motions are generated and judged."""
+
+    count: int | None = None
+    """Real items, spread evenly over the set; None: all of them."""
+    lengths: Literal["exact", "padded"] = "exact"
+    """Generated at the real length, or at 196 frames and cut to it, as published."""
+    caption_length: Literal["true", "published"] = "true"
+    """``published``: generated motions are matched with captions read as if 22 tokens long (`PUBLISHED_CAPTION`)."""
+    batch: int | None = 32
+    """Motions that a caption's own one is looked for among; None: the whole set."""
+    replications: int = 10
+    multimodality: tuple[int, int] = (10, 10)
+    """Captions, and motions of each; (0, 0) leaves it out."""
+    multimodal_replications: int = 5
+    """Only the first so many replications measure it, as published."""
+    steps: tuple[int, ...] = (5, 20, 50)
+    solver: str = SOLVER
+    spacing: str = SPACING
+    guidance: float = GUIDANCE
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        _need(self.lengths in ("exact", "padded"), f"lengths are exact or padded; got {self.lengths!r}")
+        _need(
+            self.caption_length in ("true", "published"),
+            f"the caption length is true or published; got {self.caption_length!r}",
+        )
+        steps = self.steps
+        _need(
+            0 < len(steps) <= MOST_STEPS and len(set(steps)) == len(steps) and min(steps) >= 1,
+            f"steps are 1 to {MOST_STEPS} different numbers of 1 or more; got {', '.join(map(str, steps)) or 'none'}",
+        )
+        _need(
+            1 <= self.replications <= MOST_REPLICATIONS,
+            f"replications must be 1 to {MOST_REPLICATIONS}; got {self.replications}",
+        )
+        _need(self.batch is None or 4 <= self.batch <= 4096, f"a batch is 4 to 4096 motions, or all; got {self.batch}")
+        least = self.batch or 4
+        _need(
+            self.count is None or least <= self.count <= MOST_ITEMS,
+            f"a count of {self.count} does not fill a batch of {least}, or is too large; take {least} to {MOST_ITEMS}",
+        )
+        captions, samples = self.multimodality
+        _need(
+            (captions, samples) == (0, 0) or (1 <= captions <= 1000 and 2 <= samples <= 1000),
+            f"multimodality is captions x motions of each, such as 10x10, or 0; got {captions}x{samples}",
+        )
+        _need(self.solver in SOLVERS, f"no solver {self.solver!r}; there are {', '.join(SOLVERS)}")
+        _need(
+            math.isfinite(self.guidance) and abs(self.guidance) <= 100,
+            f"a guidance of {self.guidance:g} makes no motion; usual values are 1 to 7",
+        )
+        last = self.seed + (self.replications + 1) * STRIDE
+        _need(
+            self.seed >= 0 and last < LARGEST_SEED, f"a seed is a whole number from 0 to below 2**61; got {self.seed}"
+        )
+
+    def seeds(self, replication: int, rows: int, *, after: int = 0) -> list[int]:
+        """One seed per motion of a replication; no two replications share one. ``after``: so many were drawn before."""
+        if after + rows > STRIDE:
+            raise ValueError(f"{after + rows} motions in one replication")
+        first = self.seed + replication * STRIDE + after
+        return list(range(first, first + rows))
+
+    def drawn(self) -> dict[str, Any]:
+        """Everything that changes the motions of one replication or their numbers: what a resumed run must agree in."""
+        kept = ("lengths", "caption_length", "batch", "multimodality", "solver", "spacing", "guidance", "seed", "count",
+                "multimodal_replications")  # fmt: skip
+        return {name: getattr(self, name) for name in kept}
+
+    def described(self, selection: Selection, *, data: str, items: int, evaluator: str) -> dict[str, Any]:
+        """Everything that a reader needs to judge the numbers, as plain data; no place on anybody's disk."""
+        captions, samples = self.multimodality
+        several = f"{captions} captions x {samples} motions, in the first {self.multimodal_replications} replications"
+        exact = "exact, from the ground truth" if self.lengths == "exact" else "196 frames, cut to the ground truth's"
+        told = "true" if self.caption_length == "true" else f"{PUBLISHED_CAPTION} for generated motions, as published"
+        return {
+            "data": data,
+            **selection.described(),
+            "items": items,
+            "frames per second": FPS,
+            "representation": "HumanML3D, 263 numbers per frame, as the network draws them (not finished)",
+            "statistics": "those of the evaluator",
+            "evaluator": evaluator,
+            "generated lengths": exact,
+            "caption length": told,
+            "captions": "one per item and replication, drawn by seed",
+            "batch": self.batch or "the whole set",
+            "last partial batch": "dropped" if self.batch else "none",
+            "sampler": f"{self.solver}, {self.spacing} spacing",
+            "steps": list(self.steps),
+            "guidance": float(self.guidance),
+            "seed": self.seed,
+            "replications": self.replications,
+            "interval": "1.96 sigma / sqrt(replications)",
+            "multimodality": several if captions else "not measured",
+        }
+
+
+def quick(protocol: Protocol) -> Protocol:
+    """The same in about a minute: one batch, two replications, and at most two step counts that are not large."""
+    few = tuple(s for s in protocol.steps if s <= 20)[:2] or protocol.steps[:1]
+    return replace(
+        protocol, count=protocol.batch or 32, replications=2, multimodality=(4, 6), multimodal_replications=1, steps=few
+    )
+
+
+def _need(fine: bool, message: str) -> None:
+    if not fine:
+        raise MotionloomError(message)
