@@ -336,10 +336,11 @@ def run(
     ``folder`` keeps what is done, so that the same call goes on after a stop. The report is not written here.
     """
     protocol = protocol or Protocol()
+    draw = drawer(Prior.load(weights, device=device), protocol)  # what is quickly seen to be wrong goes first
     judge = load_evaluator(evaluator)
-    real = reference(judge, data, selection, progress)
-    prior = Prior.load(weights, device=device)
-    trial = prepare(drawer(prior, protocol), judge, real, protocol)
+    if protocol.caption_length == "published":
+        _as_published(judge, [text_reference.SENTENCE])
+    trial = prepare(draw, judge, reference(judge, data, selection, progress), protocol)
     settings = {**protocol.drawn(), "weights": _digest(find_weights(weights)), "evaluator": [judge.name, judge.about],
                 "real": _identity(trial.real), "device": device}  # fmt: skip
     label = weights if find_weights(weights) != Path(weights) else Path(weights).stem

@@ -32,6 +32,7 @@ PHYSICAL = ("skate_share", "skate_speed", "skate_slide", "penetration", "jerk", 
 """Physical numbers of a clip, in the order of the columns of `TextReference.physical`."""
 SOURCE = "derived from mocap.cs.cmu.edu (free for any use) and HumanML3D's captions (MIT, Copyright (c) 2022 Chuan Guo)"
 _KINDS = {"motions": np.float16, "frames": np.int32, "physical": np.float32, "probe": np.float32}
+SENTENCE = Caption("a person walks forward.", ("a/DET", "person/NOUN", "walk/VERB", "forward/ADV"))
 CHUNK = 64
 """Motions embedded at once."""
 
@@ -121,9 +122,8 @@ def averaged(numbers: np.ndarray, frames: Sequence[int]) -> dict[str, float]:
 
 def probe(evaluator: Evaluator) -> Array:
     """(2, width): a caption and a motion that nobody ever recorded, as the evaluator sees them."""
-    tokens = ("a/DET", "person/NOUN", "walk/VERB", "forward/ADV")
     wave = np.sin(np.arange(48)[:, None] * 0.1 + np.arange(WIDTH)[None])
-    texts = evaluator.texts([Caption("a person walks forward.", tokens)])
+    texts = evaluator.texts([SENTENCE])
     return np.concatenate([texts, evaluator.motions([0.1 * wave])]).astype(np.float64)
 
 
