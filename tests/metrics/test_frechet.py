@@ -100,6 +100,14 @@ def test_a_larger_other_side_costs_less_and_draws_are_apart() -> None:
     assert fid_bias(real, 50, repeats=40) == pytest.approx(np.mean(many), rel=0.1)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_no_row_is_on_both_sides(seed: int) -> None:
+    """Four rows in two pairs: the answer is that of one of the three ways to pair them."""
+    rows = np.array([[0.0], [1.0], [10.0], [100.0]])
+    ways = [fid(rows[[0, k]], rows[[j for j in (1, 2, 3) if j != k]]) for k in (1, 2, 3)]
+    assert np.isclose(fid_bias(rows, 2, repeats=1, seed=seed), ways).any()
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
