@@ -100,7 +100,7 @@ def test_noise_that_makes_bones_breathe_stays_bounded(seed: int, noise: float) -
     positions = clean + np.random.default_rng(seed).normal(size=clean.shape) * noise
     motion = motion_from_positions(positions, FPS)
     error = np.linalg.norm(motion.positions() - positions, axis=-1)
-    assert error.mean() < 2 * noise + 1e-3
+    assert error.mean() < 2.5 * noise + 1e-3  # doubtful limbs are steadied, which costs some of the places
     assert turning_speeds(motion).max() < 1.5 * bone_speeds(positions).max()
     dots = (motion.rotations[1:] * motion.rotations[:-1]).sum(-1)
     assert (dots > 0).all()

@@ -32,7 +32,7 @@ _SLOW, _STILL_SLOW, _TOLD_SLOW = 0.35, 0.5, 0.6
 _DRIFT = 0.12
 """Metres: a planted foot that strays further from the middle of its stance means to move; the stance is split."""
 _SUNK = 0.002
-"""Metres under the floor that are left: as much as in recordings; lifting every millimetre would leave people afloat."""
+"""Metres under the floor that are left, as in recordings: lifting every millimetre would leave people afloat."""
 _LENGTHS = SMPL22.bone_lengths()
 
 

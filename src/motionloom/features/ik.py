@@ -49,6 +49,9 @@ _STIFFNESS = 1.0
 _NEARLY_STRAIGHT = (0.95, 0.995)
 """Shares of full reach between which the observed bend takes over from the observed distance."""
 
+_DOUBTFUL = 0.12
+"""Relative error of a limb's drawn lengths at which its rotation counts as much as its change from frame to frame."""
+
 
 def motion_from_positions(positions: np.ndarray, fps: float) -> Motion:
     """The 22-joint person who takes the given places as well as constant bones can.
@@ -69,7 +72,7 @@ def motion_from_positions(positions: np.ndarray, fps: float) -> Motion:
     solve_limbs(positions, places, world, fps)
     for ankle, toe in ((7, 10), (8, 11)):
         places[:, toe] = places[:, ankle] + rot.rotate(world[:, ankle], _REST[toe])
-    return Motion(SMPL22, fps, places[:, 0], local_rotations(world))
+    return Motion(SMPL22, fps, places[:, 0], _steadied_limbs(positions, local_rotations(world)))
 
 
 def local_rotations(world: np.ndarray) -> Array:
@@ -178,6 +181,23 @@ def solve_limbs(seen: np.ndarray, places: np.ndarray, world: np.ndarray, fps: fl
         world[:, c] = world[:, b]
         if limb.tip is not None:
             world[:, c] = aim(world[:, b], _REST[limb.tip], seen[:, limb.tip] - seen[:, c])
+
+
+def _steadied_limbs(seen: Array, local: Array) -> Array:
+    """Local rotations (frames, 22, 4), steadied in time at hips, knees, shoulders and elbows drawn doubtfully.
+
+    A limb drawn short would have to fold up, or open, within a frame to reach its end: what is drawn then says little.
+    Squared distance to each rotation, weighted by the inverse square of the relative error of the limb's lengths,
+    plus the squared change per frame: limbs of the right lengths stay exactly as they are.
+    """
+    result = local.copy()
+    for limb in LIMBS:
+        drawn = np.linalg.norm(np.diff(seen[:, [limb.start, limb.middle, limb.end]], axis=1), axis=-1)
+        error = np.abs(1 - drawn / _LENGTHS[[limb.middle, limb.end]]).mean(-1)
+        weight = (_DOUBTFUL / error.clip(1e-6))[:, None] ** 2
+        for joint in (limb.start, limb.middle):
+            result[:, joint] = _tridiagonal(weight, 1.0, weight * local[:, joint])
+    return rot.normalize(result)
 
 
 def hinge_frame(limb: Limb, child: int, bone: np.ndarray, axis: np.ndarray) -> Array:
