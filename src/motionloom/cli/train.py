@@ -1,34 +1,54 @@
 """`motionloom train`: models from recipes."""
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 
 
 def add(subparsers) -> None:
-    """Register `train prior`."""
+    """Register `train prior` and `train evaluator`."""
     train = subparsers.add_parser("train", help="train a model from a recipe; goes on where it was stopped")
     commands = train.add_subparsers(metavar="MODEL", required=True)
     prior = commands.add_parser("prior", help="a text-to-motion prior on a built set")
-    prior.add_argument("--recipe", type=Path, required=True, help="a TOML file such as recipes/default.toml")
-    prior.add_argument("--data", type=Path, required=True, help="folder made by 'motionloom data build'")
-    prior.add_argument("--out", type=Path, required=True, help="folder of the run: state, weights, logs, pictures")
-    prior.add_argument(
+    _options(prior, "default.toml")
+    prior.set_defaults(run=_prior)
+    evaluator = commands.add_parser("evaluator", help="a text-motion evaluator on a built set, by contrast")
+    _options(evaluator, "evaluator.toml")
+    evaluator.set_defaults(run=_evaluator)
+
+
+def _options(parser: argparse.ArgumentParser, recipe: str) -> None:
+    parser.add_argument("--recipe", type=Path, required=True, help=f"a TOML file such as recipes/{recipe}")
+    parser.add_argument("--data", type=Path, required=True, help="folder made by 'motionloom data build'")
+    parser.add_argument("--out", type=Path, required=True, help="folder of the run: state, weights, logs, pictures")
+    parser.add_argument(
         "--text", default="default", help="weights whose text encoder is used (default: the shipped ones)"
     )
-    prior.add_argument("--device", help="cpu, cuda, cuda:1 ... (default: cuda where there is one)")
-    prior.add_argument("--threads", type=int, help="CPU threads")
-    prior.add_argument("--stop", type=int, help="end early after this many steps")
-    prior.add_argument(
+    parser.add_argument("--device", help="cpu, cuda, cuda:1 ... (default: cuda where there is one)")
+    parser.add_argument("--threads", type=int, help="CPU threads")
+    parser.add_argument("--stop", type=int, help="end early after this many steps")
+    parser.add_argument(
         "--set", nargs="+", default=[], metavar="KEY=VALUE", help="replace entries of the recipe (TOML values)"
     )
-    prior.set_defaults(run=_prior)
 
 
 def _prior(arguments: argparse.Namespace) -> None:
+    from motionloom.train.prior import train_prior
+
+    _train(arguments, train_prior)
+
+
+def _evaluator(arguments: argparse.Namespace) -> None:
+    from motionloom.train.evaluator import train_evaluator
+
+    _train(arguments, train_evaluator)
+
+
+def _train(arguments: argparse.Namespace, make: Callable[..., Path]) -> None:
     import torch
 
     from motionloom.errors import MotionloomError
-    from motionloom.train.prior import text_encoder, train_prior
+    from motionloom.train.prior import text_encoder
     from motionloom.train.recipe import changes, load_recipe
 
     for option in ("threads", "stop"):
@@ -37,7 +57,7 @@ def _prior(arguments: argparse.Namespace) -> None:
     if arguments.threads:
         torch.set_num_threads(arguments.threads)
     recipe = load_recipe(arguments.recipe, changes(arguments.set))
-    place = train_prior(
+    place = make(
         recipe, arguments.data, arguments.out,
         text=text_encoder(arguments.text), device=arguments.device, stop=arguments.stop,
     )  # fmt: skip

@@ -4,7 +4,7 @@ FID, R-precision and the other numbers of `metrics.retrieval` and `metrics.frech
 mean something only within one evaluator: a value from one is never compared with a value from another.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -46,23 +46,21 @@ class Evaluator(Protocol):
         ...
 
 
-Reader = Callable[[Path], Evaluator]
-
-
 def load_evaluator(name_or_path: str) -> Evaluator:
     """``own`` (the shipped one) or a file: one of `motionloom train evaluator`, or Guo's, published or imported.
 
     Raises MotionloomError for a file that is missing, damaged or of another kind.
     """
-    from motionloom.evaluation.own import is_own, load_own  # late: own.py is written in terms of this module
+    from motionloom.evaluation.guo import is_guo, load_guo  # late: both are written in terms of this module
+    from motionloom.evaluation.own import is_own, load_own
 
     if name_or_path == "own":
         return load_own()
     path = Path(name_or_path)
     if not path.is_file():
         raise MotionloomError(f"no evaluator {name_or_path!r}: it is not a file, and the shipped one is called 'own'")
-    return load_own(path) if is_own(path) else _guo(path)
-
-
-def _guo(path: Path) -> Evaluator:
+    if is_own(path):
+        return load_own(path)
+    if is_guo(path):
+        return load_guo(path)
     raise MotionloomError(f"{path} is not an evaluator that this motionloom reads; name one, or 'own'")
