@@ -4,12 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 PIP := $(BIN)/python -m pip install --no-input -qq --disable-pip-version-check -c constraints.txt
+RELEASE = benchmarks/releases/$(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
 PROMPT ?= a person walks forward and waves
 SUFFIXES := bvh glb npz mp4 png
 # One thread per test process: JOBS processes times torch's own threads would fight for the same cores.
 ONE_THREAD := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help demo test check lint format types imports install dev pictures measure tables wheel clean
+.PHONY: help demo test check lint format types imports install dev pictures measure compare tables wheel clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -45,13 +46,17 @@ dev: $(VENV)/.dev  ## the same with what tests and checks need
 pictures: $(VENV)/.runtime  ## draw the README's pictures anew, with the shipped weights
 	$(BIN)/python tools/make_pictures.py
 
-measure: $(VENV)/.runtime  ## measure the shipped weights anew (DATA=recordings for realism); fills the README
+measure: $(VENV)/.runtime  ## measure the shipped weights anew (DATA=built set); fills README, docs/results.md, benchmarks/
 	rm -rf benchmarks/obedience benchmarks/realism benchmarks/realism_finished
 	$(BIN)/motionloom evaluate obedience --out benchmarks/obedience
 	$(BIN)/motionloom evaluate realism $(if $(DATA),--data $(DATA)) --out benchmarks/realism
 	$(BIN)/motionloom evaluate realism $(if $(DATA),--data $(DATA)) --finished --out benchmarks/realism_finished
 	$(BIN)/motionloom bench --json benchmarks/speed.json > benchmarks/speed.txt
 	$(BIN)/python tools/fill_readme.py
+	$(BIN)/motionloom evaluate all $(if $(DATA),--data $(DATA)) --keep $(RELEASE) --results docs/results.md
+
+compare: $(VENV)/.runtime  ## which numbers of this release differ from those of an earlier one (BEFORE=benchmarks/releases/...)
+	$(BIN)/motionloom evaluate compare $(BEFORE) $(RELEASE)
 
 tables: $(VENV)/.runtime  ## copy the tables of benchmarks/ into the README
 	$(BIN)/python tools/fill_readme.py

@@ -1,14 +1,19 @@
 """`motionloom evaluate` from the outside, with a made-up generator in place of weights."""
 
+import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from motionloom.cli import main
 from motionloom.data.build import Clip, Note, write_clip
+from motionloom.errors import MotionloomError
+from motionloom.evaluation.report import Column, Report, Row, Value, encode, read
+from motionloom.evaluation.suites import Suite, Tools, chosen
 from motionloom.features import humanml
 from tests.metrics.people import FPS, standing, walking
 
@@ -82,6 +87,11 @@ def test_reference_of_a_built_set(built: Path, tmp_path: Path, capsys: pytest.Ca
         ["realism", "--data", "nowhere"],
         ["reference"],
         ["reference", "--data", "nowhere"],
+        ["all", "--only", "fly"],
+        ["all", "--weights", "nowhere.safetensors"],
+        ["all", "--results", "nowhere.md"],
+        ["compare", "nowhere", "nowhere"],
+        ["compare", "nowhere"],
     ],
 )
 def test_mistakes_are_one_sentence_and_exit_code_2(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
@@ -93,3 +103,93 @@ def test_mistakes_are_one_sentence_and_exit_code_2(words: list[str], capsys: pyt
     assert code == 2
     assert captured.err.count("\n") == 1
     assert captured.out == ""
+
+
+def _fakes(arguments: argparse.Namespace) -> Tools:
+    def speed(quick: bool) -> dict[str, Any]:
+        entry = {"name": "help", "value": 0.1, "unit": "s", "target": "< 1", "passes": True, "note": ""}
+        return {"machine": {"device": "x", "load": 0.0}, "quick": quick, "entries": [entry]}
+
+    def never(*_: object) -> Any:
+        raise AssertionError("not asked for")
+
+    return Tools(lambda finished: walks_or_stands, prior=never, speed=speed, memory=never)
+
+
+PHYSICAL = ["--only", "obedience", "--only", "realism", "--only", "speed"]
+
+
+@pytest.fixture
+def fakes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("motionloom.cli.evaluate_all._tools", _fakes)
+
+
+@pytest.mark.usefixtures("fakes")
+def test_all_writes_reports_fills_the_page_and_keeps_a_release(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page, out, kept = tmp_path / "results.md", tmp_path / "out", tmp_path / "releases" / "1"
+    page.write_text("# Results\n\n<!-- suite obedience -->\nnothing\n<!-- end -->\n")
+    words = ["evaluate", "all", *PHYSICAL, "--quick", "--out", str(out), "--results", str(page), "--keep", str(kept)]
+    assert main(words) == 0
+    assert "obedience: measured" in capsys.readouterr().out
+    for suite in ("obedience", "realism", "speed"):
+        assert read(out / suite).suite == suite
+        assert read(kept / f"{suite}.json").protocol["quick"] is True
+        assert f"--only {suite} --weights default --quick" in page.read_text()
+    filled = page.read_text()
+    assert main(words) == 0
+    assert "obedience: kept" in capsys.readouterr().out
+    assert page.read_text() == filled
+    assert main(["evaluate", "compare", str(kept), str(out)]) == 0
+    assert "0 worse and 0 better" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("fakes")
+def test_a_suite_that_fails_ends_with_2_and_the_others_stand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(job: object, settings: object) -> Report:
+        raise MotionloomError("no motion")
+
+    bad = Suite("bad", "nothing", fails, {"n": 1}, {"n": 0})
+    monkeypatch.setattr("motionloom.evaluation.suites.chosen", lambda names: [bad, *chosen(["speed"])])
+    assert main(["evaluate", "all", "--out", str(tmp_path)]) == 2
+    assert read(tmp_path / "speed").suite == "speed"
+
+
+def _reports(folder: Path, *means: float, interval: float = 0.1, batch: int = 32) -> list[str]:
+    column = Column("fid", "FID", "down", "")
+    paths = []
+    for k, mean in enumerate(means):
+        rows = (Row("ours", {"fid": Value(mean, interval, 10)}),)
+        one = Report("text", "T", "", {"batch": batch * (k + 1) if batch < 0 else batch}, (column,), rows)
+        (folder / str(k)).mkdir()
+        (folder / str(k) / "report.json").write_text(json.dumps(encode(one)))
+        paths.append(str(folder / str(k)))
+    return paths
+
+
+@pytest.mark.parametrize(("after", "code"), [(2.0, 1), (0.5, 0), (1.1, 0)])
+def test_compare_exits_with_1_only_when_something_got_worse(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], after: float, code: int
+) -> None:
+    assert main(["evaluate", "compare", *_reports(tmp_path, 1.0, after)]) == code
+    said = capsys.readouterr().out
+    assert ("1 worse" in said) == (code == 1)
+    assert ("ours" in said) == (after != 1.1)
+
+
+def test_compare_as_json_lists_every_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["evaluate", "compare", *_reports(tmp_path, 1.0, 1.1), "--every", "--json"]) == 0
+    (one,) = json.loads(capsys.readouterr().out)
+    assert (one["verdict"], one["before"]["mean"]) == ("same", 1.0)
+
+
+def test_compare_of_other_protocols_is_2_and_anyway_compares(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    paths = _reports(tmp_path, 1.0, 2.0, batch=-32)
+    assert main(["evaluate", "compare", *paths]) == 2
+    told = capsys.readouterr().err
+    assert "batch -32 -> -64" in told
+    assert told.count("\n") == 1
+    assert main(["evaluate", "compare", *paths, "--anyway"]) == 1

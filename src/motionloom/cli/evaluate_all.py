@@ -38,6 +38,7 @@ def _tools(arguments: argparse.Namespace):
 
     from motionloom.bench import bench, defaults
     from motionloom.checkpoint import Prior
+    from motionloom.cli.evaluate_text import _memory
     from motionloom.evaluation.generator import generator
     from motionloom.evaluation.suites import Tools
     from motionloom.tasks.text import generate
@@ -48,20 +49,22 @@ def _tools(arguments: argparse.Namespace):
 
     return Tools(
         generator=lambda finished: generator(prior(), finished=finished),
+        prior=prior,
+        memory=lambda steps: _memory(arguments, steps),
         speed=lambda quick: bench(prior(), defaults(generate), quick=quick, weights=arguments.weights, progress=_say),
         progress=_say,
     )
 
 
 def _all(arguments: argparse.Namespace) -> int:
-    from motionloom.evaluation import report, results, suites
+    from motionloom.evaluation import everything, report, results, suites
 
     wanted = suites.chosen(arguments.only or ())
     out = arguments.out or Path("out") / ("quick" if arguments.quick else "results")
     if arguments.results:
         results.check_page(arguments.results)
     job = suites.Job(arguments.weights, _tools(arguments), arguments.data, arguments.quick, arguments.device)
-    outcomes = suites.run_all(job, out, wanted, keep=arguments.keep, again=arguments.again)
+    outcomes = everything.run_all(job, out, wanted, keep=arguments.keep, again=arguments.again)
     made = [outcome.report for outcome in outcomes if outcome.report]
     for one in made:
         print(report.plain(one), end="\n\n")

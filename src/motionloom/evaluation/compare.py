@@ -56,15 +56,14 @@ def compare(before: Report, after: Report, *, anyway: bool = False) -> list[Diff
         for column in after.columns:
             if column.name in columns and column.name in row.values and column.name in old.values:
                 a, b = old.values[column.name], row.values[column.name]
-                blind = is_control(row.name) or column.name in CLOCKED
-                judged = replace(column, better="") if blind else column
+                judged = column if is_judged(after.suite, row.name, column) else replace(column, better="")
                 verdict = judge(judged, a, b, reals=(_real(before, column), _real(after, column)))
                 found.append(Difference(after.suite, row.name, column, a, b, verdict))
     return found
 
 
 def counterpart(row: Row, before: Report, after: Report) -> Row | None:
-    """The row of the same name, or of the same name but for the weights: ``mine, 20 steps`` for ``default, 20 steps``."""
+    """The row of the same name, or but for the weights' name: ``mine, 20 steps`` for ``default, 20 steps``."""
     if (same := before.row(row.name)) or is_control(row.name):
         return same
 
@@ -76,6 +75,11 @@ def counterpart(row: Row, before: Report, after: Report) -> Row | None:
         for report in (before, after)
     )
     return old[0] if tail(row.name) and len(old) == len(new) == 1 else None
+
+
+def is_judged(suite: str, row: str, column: Column) -> bool:
+    """Whether more or less of it can be worse: not of a control, nor of a damage that an evaluator should notice."""
+    return column.name not in CLOCKED and (row == REAL if suite == "evaluator" else not is_control(row))
 
 
 def is_control(name: str) -> bool:

@@ -304,6 +304,7 @@ def _list(value: Any, most: int) -> list[Any]:
 def _text(value: Any) -> str:
     if not isinstance(value, str) or len(value) > MOST_TEXT:
         raise MotionloomError("it has something else where text belongs")
+    value.encode()  # half of a pair of surrogates could be neither shown nor written: UnicodeEncodeError
     return value
 
 

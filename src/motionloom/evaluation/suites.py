@@ -1,24 +1,19 @@
-"""Every suite the project has, in one place, and the run over all of them that goes on after a kill.
+"""Every suite the project has, in one place.
 
-A suite is a name and a function from a job to a report; a further one is one more line in `SUITES`.
+A suite is a name and a function from a job to a report; a further one is one more entry in `SUITES`. What only one
+suite needs is imported by its function.
 """
 
-import hashlib
-import json
 import shlex
-import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from motionloom.checkpoint import find_weights, shipped
+from motionloom.checkpoint import Prior, shipped
 from motionloom.errors import MotionloomError
 from motionloom.evaluation import obey, physical, realism
-from motionloom.evaluation import report as reports
 from motionloom.evaluation.report import Report
-
-QUICK = "Quick run: few seeds and clips, to see that everything works; these are no numbers to quote."
 
 
 def _silent(line: str) -> None:
@@ -31,8 +26,12 @@ class Tools:
 
     generator: Callable[[bool], obey.Generate]
     """Motions of the weights under test, as drawn (False) or as exported (True)."""
+    prior: Callable[[], Prior]
+    """The weights under test, loaded once."""
     speed: Callable[[bool], Mapping[str, Any]]
     """`motionloom.bench.bench` as plain data, quick or not."""
+    memory: Callable[[int], float]
+    """Peak MB of a process that generates with so many steps."""
     progress: Callable[[str], None] = _silent
 
 
@@ -61,8 +60,10 @@ class Suite:
     """Settings of a run whose numbers are kept."""
     quick: Mapping[str, Any]
     """Settings of a run that only shows that everything works."""
-    needs_data: bool = False
-    uses_data: bool = True
+    data: Literal["needed", "used", ""] = ""
+    """Whether it cannot do without a set, compares with one where there is one, or reads none."""
+    files: Callable[[], Sequence[Path]] = tuple
+    """Shipped files whose content changes the numbers, the weights under test aside."""
 
     def settings(self, quick: bool) -> Mapping[str, Any]:
         """Those of a quick or of a full run."""
@@ -76,12 +77,19 @@ def command(name: str, job: Job) -> str:
     return " ".join([*words, *(["--data", "SET"] if job.data else []), *(["--quick"] if job.quick else [])])
 
 
+def _judge() -> list[Path]:
+    """The shipped evaluator and the real motions that it has seen, where they are."""
+    from motionloom.evaluation import own, text_reference
+
+    return [path for path in (own.evaluators().get(own.SHIPPED), text_reference.shipped()) if path and path.is_file()]
+
+
 def _obedience(job: Job, settings: Mapping[str, Any]) -> Report:
     results = obey.run(
         job.tools.generator(False), seeds=settings["seeds"], paraphrases=settings["paraphrases"],
         folder=job.folder, progress=job.tools.progress,
     )  # fmt: skip
-    return physical.obedience_report(results, command=command("obedience", job), settings=settings)
+    return physical.obedience_report(results, command=command("obedience", job), settings={"seeds": settings["seeds"]})
 
 
 def _realism(job: Job, settings: Mapping[str, Any]) -> Report:
@@ -99,14 +107,48 @@ def _speed(job: Job, settings: Mapping[str, Any]) -> Report:
     return physical.speed_report(job.tools.speed(settings["quick"]), command=command("speed", job))
 
 
+def _text(job: Job, settings: Mapping[str, Any]) -> Report:
+    from motionloom.evaluation import protocol, text
+
+    how = protocol.quick(protocol.Protocol()) if settings["quick"] else protocol.Protocol()
+    return text.run(
+        job.weights, data=job.data, protocol=how, folder=job.folder, device=job.device, memory=job.tools.memory,
+        command=command("text", job), progress=job.tools.progress,
+    )  # fmt: skip
+
+
+def _evaluator(job: Job, settings: Mapping[str, Any]) -> Report:
+    from motionloom.evaluation.evaluators import load_evaluator
+    from motionloom.evaluation.own import validate
+
+    assert job.data is not None  # `data="needed"`
+    found = validate(load_evaluator("own"), job.data, repeats=settings["repeats"], progress=job.tools.progress)
+    return replace(found, command=command("evaluator", job))
+
+
+def _agreement(job: Job, settings: Mapping[str, Any]) -> Report:
+    from motionloom.evaluation.agreement import agreement
+    from motionloom.evaluation.evaluators import load_evaluator
+
+    judge, prior = load_evaluator("own"), job.tools.prior()
+    found = agreement(judge, prior, seeds=settings["seeds"], progress=job.tools.progress)
+    return replace(found, command=command("agreement", job))
+
+
 SUITES: tuple[Suite, ...] = (
+    Suite("text", "R-precision, FID and the field's other metrics beside real motion and published rows", _text,
+          {"quick": False}, {"quick": True}, "used", _judge),
     Suite("obedience", "20 everyday prompts, each with a physical check", _obedience,
-          {"seeds": 10, "paraphrases": True}, {"seeds": 2, "paraphrases": False}, uses_data=False),
+          {"seeds": 10, "paraphrases": True}, {"seeds": 2, "paraphrases": False}),
     Suite("realism", "skate, penetration, jerk, bones and speeds beside real clips", _realism,
-          {"count": 64}, {"count": 16}),
-    Suite("speed", "time and memory as ratios within one run", _speed,
-          {"quick": False}, {"quick": True}, uses_data=False),
+          {"count": 64}, {"count": 16}, "used"),
+    Suite("evaluator", "what the shipped evaluator notices on held-out real motions", _evaluator,
+          {"repeats": 20}, {"repeats": 2}, "needed", _judge),
+    Suite("agreement", "whether the evaluator's ranking agrees with physical obedience", _agreement,
+          {"seeds": 4}, {"seeds": 1}, "", _judge),
+    Suite("speed", "time and memory as ratios within one run", _speed, {"quick": False}, {"quick": True}),
 )  # fmt: skip
+"""In the order of the page of results; text first, which takes longest."""
 
 
 def chosen(names: Sequence[str], suites: Sequence[Suite] = SUITES) -> list[Suite]:
@@ -116,98 +158,3 @@ def chosen(names: Sequence[str], suites: Sequence[Suite] = SUITES) -> list[Suite
         if name not in known:
             raise MotionloomError(f"there is no suite {name!r}; the suites are {', '.join(sorted(known))}")
     return [suite for suite in suites if not names or suite.name in names]
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of one suite."""
-
-    suite: Suite
-    report: Report | None
-    said: str
-    """measured, kept, skipped or failed, and why."""
-    failed: bool = field(default=False)
-
-
-def run_all(
-    job: Job, out: Path, suites: Sequence[Suite] = SUITES, *, keep: Path | None = None, again: bool = False
-) -> list[Outcome]:
-    """Run every suite into ``out/NAME``; one that was finished there with the same settings is not run again.
-
-    ``keep``: also write each report as ``keep/NAME.json``, the form of a release. ``again``: forget what stands there.
-    A suite that cannot run is told in its outcome and stops no other. Raises `MotionloomError` if a quick run would
-    replace a full one.
-    """
-    find_weights(job.weights)
-    for suite in suites:
-        obey.check_report(out / suite.name / "report.json")
-        for path in (out / suite.name / "report.json", *([keep / f"{suite.name}.json"] if keep else [])):
-            if job.quick and not again and _is_full(path):
-                raise MotionloomError(f"{path} holds a full run; name another --out or say --again to replace it")
-    outcomes = []
-    for suite in suites:
-        outcome = _one(suite, job, out / suite.name, again=again)
-        if keep and outcome.report:
-            obey.write_json(keep / f"{suite.name}.json", reports.encode(outcome.report))
-        job.tools.progress(f"{suite.name}: {outcome.said}")
-        outcomes.append(outcome)
-    return outcomes
-
-
-def _one(suite: Suite, job: Job, folder: Path, *, again: bool) -> Outcome:
-    if suite.needs_data and job.data is None:
-        return Outcome(suite, None, "skipped: it needs --data SET, made by 'motionloom data build'")
-    settings = suite.settings(job.quick)
-    try:
-        mark = fingerprint(suite, job)
-        if not again and (found := _finished(folder, mark)):
-            return Outcome(suite, found, "kept: it was finished before with the same settings")
-        parts = folder / f"parts-{mark[:12]}"  # other settings never meet in one folder
-        if again and parts.is_dir():
-            shutil.rmtree(parts)
-        job.tools.progress(f"{suite.name}: {suite.measures}")
-        made = suite.run(replace(job, folder=parts), settings)
-        if job.quick:
-            made = replace(made, protocol={**made.protocol, "quick": True}, notes=(QUICK, *made.notes))
-        (folder / "done.json").unlink(missing_ok=True)  # a kill before the next line must not pair it with this report
-        reports.write(made, folder)
-        obey.write_json(folder / "done.json", {"fingerprint": mark, "settings": dict(settings), "quick": job.quick})
-    except MotionloomError as error:
-        return Outcome(suite, None, f"failed: {error}", failed=True)
-    return Outcome(suite, made, "measured")
-
-
-def fingerprint(suite: Suite, job: Job) -> str:
-    """Changes with the weights, the settings, and the files of the data, where a suite reads data."""
-    weights = hashlib.sha256(find_weights(job.weights).read_bytes()).hexdigest()
-    said: dict[str, Any] = {"suite": suite.name, "weights": weights, "settings": dict(suite.settings(job.quick))}
-    if suite.uses_data and job.data is not None:
-        said["data"] = _files(job.data)
-    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
-
-
-def _files(folder: Path) -> str:
-    """Names and sizes of the files of a set: a changed set changes it, moving it does not."""
-    if not folder.is_dir():
-        raise MotionloomError(f"{folder} is no folder of clips; make a set with 'motionloom data build'")
-    listed = sorted((str(p.relative_to(folder)), p.stat().st_size) for p in folder.rglob("*") if p.is_file())
-    return hashlib.sha256(json.dumps(listed).encode()).hexdigest()
-
-
-def _finished(folder: Path, mark: str) -> Report | None:
-    """The report of a finished run of these settings; anything else, damaged files too, is measured anew."""
-    try:
-        done = json.loads((folder / "done.json").read_text(encoding="utf-8"))
-        if isinstance(done, dict) and done.get("fingerprint") == mark:
-            return reports.read(folder / "report.json")
-    except (OSError, ValueError, RecursionError):
-        pass
-    return None
-
-
-def _is_full(path: Path) -> bool:
-    """Whether a report of a run that was not quick stands there."""
-    try:
-        return path.is_file() and not reports.read(path).protocol.get("quick", False)
-    except MotionloomError:
-        return False
