@@ -93,6 +93,13 @@ def test_a_motion_alone_is_that_motion_in_any_company(tmp_path_factory, lengths:
     np.testing.assert_allclose(guo.motions([some[i] for i in order]), found[order], atol=1e-5)
 
 
+def test_long_motions_of_other_lengths_put_nothing_after_each_other(guo: GuoEvaluator) -> None:
+    some = [motion(length) for length in (240, 196, 192, 236, 240)]
+    found = guo.motions(some)
+    for row, one in enumerate(some):
+        np.testing.assert_allclose(guo.motions([one])[0], found[row], atol=1e-5)
+
+
 def test_more_motions_than_one_batch_come_back_in_order(guo: GuoEvaluator) -> None:
     some = [motion(4 + 3 * (i % 30), i) for i in range(150)]
     found = guo.motions(some)

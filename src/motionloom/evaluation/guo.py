@@ -98,14 +98,14 @@ class GuoEvaluator:
         A prior's output is de-normalised with the prior's own statistics first. A row's embedding does not depend on
         the rows beside it. Raises MotionloomError for another width, fewer than 4 frames or values that are not finite.
         """
-        ready = [self._prepared(one) for one in features]
-        result = np.zeros((len(ready), self.nets.sizes.width))
-        for rows in _chunks([len(one) for one in ready]):
-            lengths = [len(ready[row]) for row in rows]
+        frames = [self._length(one) for one in features]
+        result = np.zeros((len(frames), self.nets.sizes.width))
+        for rows in _chunks(frames):
+            lengths = [frames[row] for row in rows]
             after = UNIT if max(lengths) < WINDOW else 0  # the last snippet sees three frames beyond the end
             batch = torch.zeros(len(rows), max(lengths) + after, self.nets.sizes.channels)
             for place, row in enumerate(rows):
-                batch[place, : lengths[place]] = torch.from_numpy(ready[row])
+                batch[place, : lengths[place]] = torch.from_numpy(self._prepared(features[row]))
             with torch.inference_mode():
                 result[rows] = self.nets.motions(batch, lengths).double().numpy()
         return result
@@ -128,9 +128,9 @@ class GuoEvaluator:
                 result[first : first + _ROWS] = self.nets.texts(words, tags, lengths).double().numpy()
         return result
 
-    def _prepared(self, features: np.ndarray) -> np.ndarray:
-        """Standardised for the evaluator, without contacts, a whole number of snippets; float32."""
-        if self.mean is None or self.std is None:
+    def _length(self, features: np.ndarray) -> int:
+        """The frames that are read, a multiple of 4; MotionloomError where the motion is not of the right form."""
+        if self.mean is None:
             raise MotionloomError("this evaluator has no statistics; import it again with --mean and --std")
         given = np.asarray(features)
         if given.ndim != 2 or given.shape[1] != len(self.mean) or len(given) < UNIT:
@@ -139,7 +139,13 @@ class GuoEvaluator:
             )
         if given.dtype.kind != "f" or not np.isfinite(given).all():
             raise MotionloomError("a motion has values that are no finite numbers; it cannot be judged")
-        whole = given[: len(given) // UNIT * UNIT].astype(np.float64)
+        return len(given) // UNIT * UNIT
+
+    def _prepared(self, features: np.ndarray) -> np.ndarray:
+        """Standardised for the evaluator, without contacts, a whole number of snippets; float32."""
+        assert self.mean is not None
+        assert self.std is not None
+        whole = np.asarray(features)[: len(features) // UNIT * UNIT].astype(np.float64)
         return ((whole - self.mean) / self.std)[:, : self.nets.sizes.channels].astype(np.float32)
 
     @staticmethod

@@ -116,7 +116,7 @@ def _glove(path: Path) -> tuple[tuple[str, ...], np.ndarray]:
         with path.open(encoding="utf-8") as lines:
             while line := lines.readline(1 << 16):
                 word, *numbers = line.rstrip("\n").split(" ")
-                if len(rows) == MAX_WORDS or not word or len(numbers) > 1024:
+                if len(rows) == MAX_WORDS or not word or len(numbers) > 512:
                     raise ValueError(f"line {len(rows) + 1} is no word with its numbers")
                 rows.setdefault(word, np.array(numbers, dtype=np.float32))
         vectors = np.stack(list(rows.values()))
