@@ -116,7 +116,7 @@ def test_a_batch_follows_from_seed_and_step(data: Path) -> None:
     assert torch.equal(first.texts, again.texts)
     assert first.features.shape != other.features.shape or not torch.equal(first.features, other.features)
     assert len(first.features) == 8 + len(first.hard_motion)
-    assert len(first.hard_motion) == 2  # a quarter: every sentence here walks
+    assert len(first.hard_motion) == 3  # a third: every sentence here walks
     for row, number in enumerate(first.hard_motion.tolist()):
         length = int(first.lengths[8 + row])
         shown = first.features[8 + row, :length].numpy()

@@ -4,6 +4,7 @@ Whether its numbers can be trusted is a measurement like any other: motions are 
 distances must grow with the amount.
 """
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +15,7 @@ import numpy as np
 
 from motionloom.data.build import Clip
 from motionloom.data.sets import read_clips
-from motionloom.data.words import mirror_text
+from motionloom.data.words import mirror_text, phrases
 from motionloom.errors import MotionloomError
 from motionloom.evaluation.evaluators import Caption, Evaluator
 from motionloom.evaluation.report import Column, Report, Row, Value
@@ -104,20 +105,31 @@ class Held:
     captioned: tuple[np.ndarray, ...]
     captions: tuple[tuple[str, ...], ...]
     windows: tuple[np.ndarray, ...]
+    turns: tuple[tuple[np.ndarray, str], ...] = ()
+    """Windows that measurably turn, step or circle to one side, and words for it that name the side."""
+
+
+TURNS = 200
+"""At most so many of `Held.turns`."""
 
 
 def held_out(clips: Sequence[Clip]) -> Held:
     """The stretches that people described, and consecutive windows of all clips; mirrored copies included."""
-    captioned, captions, windows = [], [], []
+    captioned, captions, windows, turns = [], [], [], []
     for clip in clips:
         for note in clip.notes:
-            if note.kind == "human" and note.last - note.first >= SHORTEST:
-                captioned.append(clip.features[note.first : note.last])
+            shown = clip.features[note.first : note.last]
+            if note.kind == "human" and len(shown) >= SHORTEST:
+                captioned.append(shown)
                 captions.append(note.texts)
+            elif re.search(r"left|right", note.kind) and "+" not in note.kind:
+                named = [said for said in phrases(note.kind) if mirror_text(said) != said]
+                turns.append((shown[: 2 * WINDOW], f"a person {named[len(turns) % len(named)]}"))
         for start in range(0, len(clip.features), WINDOW):
             if len(part := clip.features[start : start + WINDOW]) >= 2 * SHORTEST:
                 windows.append(part)
-    return Held(tuple(captioned), tuple(captions), tuple(windows))
+    few = np.linspace(0, len(turns) - 1, min(TURNS, len(turns))).astype(int)
+    return Held(tuple(captioned), tuple(captions), tuple(windows), tuple(turns[i] for i in few))
 
 
 Damage = Callable[[np.ndarray, np.random.Generator], np.ndarray]
@@ -234,6 +246,16 @@ class Judge:
         before, after = (np.linalg.norm(texts - shown[own], axis=1) for shown in (self.motions, damaged))
         return Value(float((before < after).mean()), count=len(kept))
 
+    def sides(self) -> Value:
+        """Share of `Held.turns` whose words are nearer to them than to their mirror image."""
+        texts = self.evaluator.texts([Caption(text) for _, text in self.held.turns])
+        shown = [motion for motion, _ in self.held.turns]
+        before, after = (
+            np.linalg.norm(texts - self.evaluator.motions(motions), axis=1)
+            for motions in (shown, [humanml.mirror(motion) for motion in shown])
+        )
+        return Value(float((before < after).mean()), count=len(shown))
+
     def row(self, name: str, damage: Damage, *, kept: np.ndarray | None = None) -> Row:
         """Everything about one damage."""
         rng = np.random.default_rng((self.seed, 11))
@@ -293,6 +315,8 @@ def validate(
     for name, damage, kept in damages:
         rows.append(judge.row(name, damage, kept=kept))
         progress(name)
+    if held.turns:
+        rows.append(Row("mirrored, measured turns to a side", {"noticed": judge.sides()}))
     about = {
         "evaluator": evaluator.name, "splits": list(SPLITS), "sources": list(sources), "repeats": repeats, "seed": seed,
         "captioned motions": len(held.captioned), "captions": len(judge.said), "windows": len(held.windows),
@@ -314,14 +338,15 @@ def _chance(judge: Judge) -> Row:
     return Row("chance", {**values, "rank": Value((len(judge.motions) + 1) / 2)})
 
 
-SERIES = {
-    "noise": [f"noise {100 * m:g} cm" for m in NOISE],
-    "frozen frames": [f"last {s:.0%} frozen" for s in SHARES],
-    "slower": [f"played {f:g} times as fast" for f in SPEEDS if f < 1][::-1],
-    "faster": [f"played {f:g} times as fast" for f in SPEEDS if f > 1],
-    "shuffled captions": [f"captions shuffled, {s:.0%}" for s in SHARES],
-}
-"""Rows by growing amount of one damage."""
+def series() -> dict[str, list[str]]:
+    """Names of rows by growing amount of one damage."""
+    return {
+        "noise": [f"noise {100 * m:g} cm" for m in NOISE],
+        "frozen frames": [f"last {s:.0%} frozen" for s in SHARES],
+        "slower": [f"played {f:g} times as fast" for f in SPEEDS if f < 1][::-1],
+        "faster": [f"played {f:g} times as fast" for f in SPEEDS if f > 1],
+        "shuffled captions": [f"captions shuffled, {s:.0%}" for s in SHARES],
+    }
 
 
 def notes(rows: Sequence[Row], judge: Judge) -> list[str]:
@@ -332,16 +357,17 @@ def notes(rows: Sequence[Row], judge: Judge) -> list[str]:
         "row compares the same windows before and after, so that no damage gives 0.",
         "Mirrored copies of the held-out clips are among them, so FID cannot see mirroring; captions can.",
     ]
-    for name, series in SERIES.items():
+    for name, amounts in series().items():
         for column, way in (("fid", 1), ("top3", -1), ("distance", 1)):
-            chain = [by_name[row][column].mean for row in series if column in by_name[row]]
-            if len(chain) == len(series) and (column == "fid" or "real" in by_name):
-                begin = 0.0 if column == "fid" else by_name["real"][column].mean
+            chain = [by_name[row][column] for row in amounts if column in by_name[row]]
+            begin = Value(0.0) if column == "fid" else by_name["real"].get(column)
+            if begin and chain and len(chain) == len(amounts):
                 right = monotone([begin, *chain], way)
-                said.append(f"{name}: {column} is {'' if right else 'NOT '}monotone in the amount.")
+                said.append(f"{name}: {column} is {'' if right else 'NOT '}monotone in the amount, within intervals.")
     return said
 
 
-def monotone(values: Sequence[float], way: int) -> bool:
-    """True where every step goes up (``way`` 1) or down (-1)."""
-    return all(way * (b - a) > 0 for a, b in pairwise(values))
+def monotone(values: Sequence[Value], way: int) -> bool:
+    """True where no step goes against ``way`` (1 up, -1 down) by more than both intervals, and the ends agree."""
+    steps = [(way * (b.mean - a.mean), np.nansum([a.interval, b.interval])) for a, b in pairwise(values)]
+    return all(step >= -doubt for step, doubt in steps) and way * (values[-1].mean - values[0].mean) > 0

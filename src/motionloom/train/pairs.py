@@ -25,6 +25,8 @@ LONGEST = 200
 SHORTEST = 20
 ALIKE = 0.7
 """Cosine of two pooled sentence vectors above which they say the same and are no negatives of each other."""
+HARD = 0.33
+"""Most rows of a batch that get a contrary motion or sentence."""
 _ONWARD = {"forward": "backward", "forwards": "backwards", "backward": "forward", "backwards": "forwards"}
 _ONWARD_WORD = re.compile(r"\b(forwards?|backwards?)\b", re.IGNORECASE)
 _SENSES = tuple(
@@ -90,7 +92,7 @@ class PairBatch:
 class Pairs:
     """Draws `PairBatch`es from the training split of a built set."""
 
-    def __init__(self, data: MotionSet, takes: Sequence[int], *, hard: float = 0.25) -> None:
+    def __init__(self, data: MotionSet, takes: Sequence[int], *, hard: float = HARD) -> None:
         self.data, self.takes, self.hard = data, tuple(takes), hard
         known = {text: number for number, text in enumerate(data.texts)}
         said = list(data.texts)
@@ -108,7 +110,7 @@ class Pairs:
         self._pools = self._pool()
 
     @staticmethod
-    def load(folder: Path | str, *, sources: Sequence[str], seed: int, hard: float = 0.25) -> "Pairs":
+    def load(folder: Path | str, *, sources: Sequence[str], seed: int, hard: float = HARD) -> "Pairs":
         """From the training split of a built set; ``sources`` as in a recipe."""
         data = load_set(folder, sources=sources, seed=seed)
         clips = read_clips(folder, sources=sources)
@@ -174,7 +176,7 @@ class Pairs:
             sided, timed = mirror_text(text) != text, TIMED.search(text) is not None
             if not (sided or timed):
                 continue
-            mirrored = sided and (not timed or rng.random() < 0.5)
+            mirrored = sided and (not timed or rng.random() < 0.7)  # sides are learned last
             motions.append(humanml.mirror(motion) if mirrored else backwards(motion))
             rows.append(row)
         return motions, rows
