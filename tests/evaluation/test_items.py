@@ -23,7 +23,7 @@ from tests.metrics.people import moved, standing, walking
 LINES = (
     "a man walks.#a/DET man/NOUN walk/VERB#0.0#0.0\n"
     "he steps forward#he/PRON step/VERB#0.0#0.0\n"
-    "only its middle#only/ADV#1.0#3.5\n"
+    "only its middle#only/ADV#1.04#3.59\n"
     "too short#short/ADJ#0.0#1.9\n"
     "not a caption\n"
 )
@@ -49,8 +49,8 @@ def official(tmp_path: Path) -> Path:
 def test_a_humanml3d_folder_gives_tokens_spans_and_published_lengths(official: Path) -> None:
     """40 frames or more, at most 200, cropped to multiples of 4; parts at floor(20 s) as published."""
     found = {i.name: i for i in items.read_items(official, items.fitting(official, None))}
-    assert list(found) == ["000001@0-5.15", "000001@1-3.5", "M000001@0-5.15", "M000001@1-3.5", "edge@0-9.95"]
-    whole, part = found["000001@0-5.15"], found["000001@1-3.5"]
+    assert list(found) == ["000001@0-5.15", "000001@1-3.55", "M000001@0-5.15", "M000001@1-3.55", "edge@0-9.95"]
+    whole, part = found["000001@0-5.15"], found["000001@1-3.55"]
     assert [c.text for c in whole.captions] == ["a man walks.", "he steps forward"]
     assert whole.captions[0].tokens == ("a/DET", "man/NOUN", "walk/VERB")
     assert (len(whole.features), len(part.features), len(found["edge@0-9.95"].features)) == (100, 48, 196)
@@ -258,6 +258,8 @@ def test_physical_numbers_of_a_slide_are_its_speed() -> None:
     found = text_reference.physical(humanml.encode(moved(standing(4.0), push), heading="corrected"))
     wanted = {"skate_share": 100, "skate_speed": 100, "skate_slide": 50, "penetration": 0, "bone_error": 0, "jerk": 0}
     assert found == pytest.approx(wanted, abs=0.1)
+    sunk = text_reference.physical(humanml.encode(standing(4.0) - [0, 0.03, 0], heading="corrected"))
+    assert sunk["penetration"] == pytest.approx(3, abs=0.01)
 
 
 def test_averages_are_weighted_by_length() -> None:

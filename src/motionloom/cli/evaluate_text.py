@@ -74,6 +74,7 @@ def _say(line: str) -> None:
 
 def _text(arguments: argparse.Namespace) -> None:
     import json
+    from dataclasses import replace
 
     from motionloom.evaluation import obey, report, text
 
@@ -89,7 +90,11 @@ def _text(arguments: argparse.Namespace) -> None:
     )  # fmt: skip
     if arguments.out:
         report.write(found, arguments.out)
-    print(json.dumps(report.encode(found), indent=1) if arguments.json else report.plain(found))
+    if arguments.json:
+        print(json.dumps(report.encode(found), indent=1))
+    else:  # the published rows are wide, and of other data: they stand in the files
+        here = tuple(row for row in found.rows if not row.measured_on)
+        print(report.plain(replace(found, rows=here)))
 
 
 def _make_reference(arguments: argparse.Namespace) -> None:

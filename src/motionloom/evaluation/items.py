@@ -32,7 +32,7 @@ class Item:
     split: str
     captions: tuple[Caption, ...]
     features: np.ndarray
-    """(frames, 263) float64, not standardised, 20 frames per second."""
+    """(frames, 263) float32, not standardised, 20 frames per second."""
 
 
 def fitting(folder: Path | str, selection: Selection | None) -> Selection:
@@ -130,7 +130,7 @@ def _described(clip: Clip) -> Iterator[Item]:
     for note in clip.notes:
         captions = tuple(Caption(text.strip()) for text in note.texts if text.strip())
         if note.kind == "human" and captions:
-            part = clip.features[note.first : note.last].astype(np.float64)
+            part = clip.features[note.first : note.last].astype(np.float32)
             name = f"{clip.name}@{note.first / FPS:g}-{note.last / FPS:g}"
             yield Item(name, clip.source, clip.split, captions, part)
 
@@ -176,7 +176,7 @@ def _features(path: Path) -> np.ndarray:
         found = np.load(path, allow_pickle=False, mmap_mode="r")  # a size beyond the file's is refused
         if not isinstance(found, np.ndarray) or found.ndim != 2 or found.shape[1] != WIDTH or found.dtype.kind != "f":
             raise ValueError(f"its shape is {np.shape(found)} and not (frames, {WIDTH})")
-        features = np.array(found, dtype=np.float64)
+        features = np.array(found, dtype=np.float32)
         if not np.isfinite(features).all():
             raise ValueError("it holds numbers that are not finite")
         return features
