@@ -126,6 +126,14 @@ def test_rows_of_other_weights_are_matched_by_what_follows_their_name() -> None:
     assert cmp.compare(before, report(Value(2.0, 0.1, 5), row="mine, 50 steps")) == []
 
 
+def test_a_published_row_is_never_taken_for_ours() -> None:
+    """Its name ends as ours does, but it was measured on other data."""
+    before = report(Value(1.0, 0.1, 5), row="default, 20 steps")
+    theirs = Row("MDM, 20 steps", {"fid": Value(9.0, 0.1, 5)}, "HumanML3D")
+    after = replace(report(Value(1.0, 0.1, 5), row="mine, 20 steps"), rows=(*before.rows, theirs))
+    assert [one.row for one in cmp.compare(before, after)] == ["default, 20 steps"]
+
+
 @pytest.mark.parametrize("row", ["real", "real, captions shuffled", "shuffled captions", "chance"])
 def test_controls_change_but_get_neither_better_nor_worse(row: str) -> None:
     (one,) = cmp.compare(report(Value(1.0, 0.1, 5), row=row), report(Value(2.0, 0.1, 5), row=row))

@@ -66,6 +66,12 @@ def test_the_table_sets_the_best_and_the_published_rows_apart() -> None:
     assert "- batch: 32" in elsewhere
 
 
+def test_one_row_of_many_numbers_is_turned() -> None:
+    columns = tuple(Column(f"c{k}", f"metric {k}", "up", f"meaning {k}") for k in range(5))
+    shown = markdown(report(Row("machine", {c.name: Value(1.0) for c in columns}), columns=columns))
+    assert "| metric 3 ↑ | 1.000 | meaning 3 |" in shown
+
+
 def test_a_share_shows_what_was_counted() -> None:
     shown = markdown(report(Row("walk", {"obeyed": Value(0.9, count=10)}), columns=(OBEYED,)))
     assert "| walk | 0.90 (9/10) |" in shown

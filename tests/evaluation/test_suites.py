@@ -195,6 +195,8 @@ def test_obedience_as_shares_of_seeds() -> None:
     assert rows["a person walks forward"]["real"] == Value(111 / 113, count=113)
     assert rows["a person walks forward"]["reworded"] == Value(0.5, count=4 * len(checks[0].paraphrases))
     assert (rows["all prompts"]["obeyed"].mean, rows["all prompts"]["obeyed"].count) == (0.5, 8)
+    other = sum(len(one.paraphrases) for one in checks)
+    assert rows["all prompts"]["reworded"] == Value(0.5, count=4 * other)
     assert made.protocol["checks"] == obey.fingerprint(checks)
     assert "| a person walks forward | 0.50 (2/4) |" in markdown(made)
 
@@ -215,6 +217,12 @@ def test_the_interval_of_a_plain_mean_is_the_textbooks() -> None:
     found = physical.realism_value(clips, FPS)["speed_median"]
     assert found.mean == pytest.approx(speeds.mean(), rel=0.01)
     assert found.interval == pytest.approx(1.96 * speeds.std(ddof=1) / np.sqrt(24), rel=0.15)
+
+
+def test_clips_of_other_lengths_that_move_alike_have_no_spread() -> None:
+    """The weights of a draw are those of its own clips."""
+    clips = [moved(standing(s), np.arange(round(s * FPS))[:, None] / FPS * np.array([0, 0, 1.0])) for s in (2, 3, 6)]
+    assert physical.realism_value(clips, FPS)["speed_median"].interval == pytest.approx(0.0, abs=1e-6)
 
 
 def test_realism_beside_real_clips_and_beside_shipped_numbers() -> None:

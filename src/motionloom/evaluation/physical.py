@@ -119,13 +119,14 @@ def realism_orders(data: Path | None, count: int) -> tuple[list[realism.Order], 
 
 
 def speed_report(found: Mapping[str, Any], *, command: str) -> Report:
-    """`motionloom bench`'s numbers as a report: one row per number, its target beside it."""
+    """`motionloom bench`'s numbers as a report of one row, each number with its target."""
     machine = {name: value for name, value in found["machine"].items() if name != "load"}
     columns, values = [], {}
     for k, entry in enumerate(found["entries"]):
         name = "".join(c if c.isalnum() else "_" for c in entry["name"]).strip("_") or f"entry_{k}"
         better = "down" if "<" in entry["target"] else "up"
-        columns.append(Column(name, f"{entry['name']}, {entry['unit']}", better, f"target {entry['target']}"))
+        digits = 0 if abs(entry["value"]) >= 100 else 1 if abs(entry["value"]) >= 10 else 3
+        columns.append(Column(name, f"{entry['name']}, {entry['unit']}", better, f"target {entry['target']}", digits))
         values[name] = Value(entry["value"])
     notes = [f"{entry['name']}: {entry['note']}" for entry in found["entries"] if entry["note"]]
     if found["machine"]["load"] > 0.5:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionloom.evaluation.compare import wilson
 from motionloom.evaluation.report import ARROWS, REAL, Column, Report, Row, Value
 from motionloom.io.atomic import atomic_path
 
@@ -97,7 +98,7 @@ def _points(report: Report, columns: Sequence[Column], rows: Sequence[Row], path
                     place - 0.42, place + 0.42, facecolor="#f1f2f4", edgecolor="#d9dce1", hatch="////", zorder=0
                 )
             if column.name in row.values:
-                _point(axis, place, row, row.values[column.name])
+                _point(axis, place, row, row.values[column.name], share=column.share)
         axis.set_title(_plain(column.title, 34) + ARROWS[column.better], fontsize=9, color=INK)
         axis.set_ylim(0.4, len(rows) + 0.6)
         axis.set_yticks(list(places), names if k % across == 0 else [""] * len(names))
@@ -110,15 +111,24 @@ def _points(report: Report, columns: Sequence[Column], rows: Sequence[Row], path
     return _save(figure, report, path)
 
 
-def _point(axis: "Axes", place: float, row: Row, value: Value) -> None:
+def _point(axis: "Axes", place: float, row: Row, value: Value, *, share: bool = False) -> None:
     if not math.isfinite(value.mean):
         return
     colour, mark = (OTHERS, "D") if row.measured_on else (REALITY, "s") if row.name == REAL else (OURS, "o")
-    spread = value.interval if math.isfinite(value.interval) else None
     axis.errorbar(
-        value.mean, place, xerr=spread, fmt=mark, color=colour, markersize=5, capsize=3, elinewidth=1.2, zorder=3,
-        markerfacecolor="white" if row.measured_on else colour,
+        value.mean, place, xerr=_spread(value, share=share), fmt=mark, color=colour, markersize=5, capsize=3,
+        elinewidth=1.2, zorder=3, markerfacecolor="white" if row.measured_on else colour,
     )  # fmt: skip
+    if share:
+        axis.set_xlim(-0.04, 1.04)
+
+
+def _spread(value: Value, *, share: bool) -> list[list[float]] | float | None:
+    """What matplotlib takes as an error: of a share Wilson's interval, which is wider on the side of a half."""
+    if share and value.count > 0 and 0 <= value.mean <= 1:
+        low, high = wilson(value.mean, value.count)
+        return [[max(0.0, value.mean - low)], [max(0.0, high - value.mean)]]
+    return value.interval if math.isfinite(value.interval) else None
 
 
 def _lines(report: Report, columns: Sequence[Column], lines: dict[str, list[tuple[int, Row]]], path: Path) -> Path:

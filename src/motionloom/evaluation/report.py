@@ -21,6 +21,7 @@ Better = Literal["up", "down", "real", ""]
 REAL = "real"
 """Name of the row of real motions that columns with ``better="real"`` are held against."""
 ARROWS: dict[str, str] = {"up": " ↑", "down": " ↓", "real": " →", "": ""}
+WIDE = 4
 FORMAT = 1
 LARGEST_FILE = 16 << 20
 MOST_ROWS, MOST_COLUMNS, MOST_TEXT, DEEPEST = 10_000, 1_000, 20_000, 8
@@ -211,6 +212,10 @@ def _split(report: Report) -> tuple[list[Row], list[Row]]:
 def _cells(report: Report, rows: Sequence[Row], *, bold: bool = False) -> list[list[str]]:
     """Rows of text, the heading first; a last column counts replications where any number has more than one."""
     shown = [c for c in report.columns if any(c.name in row.values for row in rows)]
+    if len(rows) == 1 and len(shown) > WIDE:  # turned: one long line would be read by nobody
+        (row,) = rows
+        names = [[_line(c.title) + ARROWS[c.better], cell(c, row.values[c.name]), _line(c.meaning)] for c in shown]
+        return [["", _line(row.name), ""], *names]
     counted = {c.name for c in shown if not c.share}  # a share shows its own count
     repeated = any(v.count > 1 for row in rows for name, v in row.values.items() if name in counted)
     best = {c.name: _best(report, c) for c in shown} if bold else {}
