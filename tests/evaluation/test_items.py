@@ -248,8 +248,13 @@ def test_any_bytes_in_place_of_a_reference_are_read_or_refused(
     data = bytearray(text_reference.save(whole, folder / "r.safetensors").read_bytes()[: cut + 200])
     data[min(flip, len(data) - 1)] ^= 0x15
     (folder / "r.safetensors").write_bytes(data)
-    with pytest.raises(MotionloomError):
-        text_reference.load(folder / "r.safetensors", Judge())
+    try:
+        found = text_reference.load(folder / "r.safetensors", Judge())
+    except MotionloomError:
+        return
+    assert len(found.names) == len(found.captions) == len(found.frames) == len(found.motions) == len(found.physical)
+    assert np.isfinite(found.motions).all()
+    assert np.isfinite(found.physical).all()
 
 
 def test_physical_numbers_of_a_slide_are_its_speed() -> None:
