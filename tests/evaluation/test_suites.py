@@ -109,7 +109,7 @@ def test_whatever_changed_is_measured_again(job: Job, tmp_path: Path, change: st
     shipped = tmp_path / "evaluator"
     shipped.write_bytes(b"1")
     job, one, out = replace(job, data=tmp_path / "set"), Counted("one"), tmp_path / "out"
-    suite = replace(one.suite("used"), files=lambda: [shipped])
+    suite = replace(one.suite("used"), files=lambda job: [shipped])
     run_all(job, out, [suite])
     run_all(job, out, [suite])
     assert one.runs == 1
@@ -176,6 +176,42 @@ def test_commands_name_no_place_on_anybodys_disk(weights: Path) -> None:
     assert command("text", job) == (
         "motionloom evaluate all --only text --weights weights.safetensors --data SET --quick"
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "place"),
+    [
+        ("text", "motionloom.evaluation.text.run"),
+        ("evaluator", "motionloom.evaluation.own.validate"),
+        ("agreement", "motionloom.evaluation.agreement.agreement"),
+    ],
+)
+def test_suites_with_a_judge_ask_for_what_was_said(
+    monkeypatch: pytest.MonkeyPatch, name: str, place: str, tmp_path: Path
+) -> None:
+    """The real function would take these arguments; its report comes back under the command of the whole run."""
+    import importlib
+    import inspect
+
+    module, function = place.rsplit(".", 1)
+    signature = inspect.signature(getattr(importlib.import_module(module), function))
+    asked: dict[str, Any] = {}
+
+    def fake(*args: Any, **named: Any) -> Report:
+        asked.update(signature.bind(*args, **named).arguments)
+        return replace(made(name), command=named.get("command", "another"))
+
+    monkeypatch.setattr(place, fake)
+    monkeypatch.setattr("motionloom.evaluation.evaluators.load_evaluator", lambda said: f"judge {said}")
+    tools = replace(TOOLS, prior=lambda: "the prior")  # type: ignore[arg-type, return-value]
+    job = Job("default", tools, data=tmp_path, evaluator="a/mine.tar", quick=True)
+    (suite,) = chosen([name])
+    found = suite.run(job, suite.settings(True))
+    words = f"motionloom evaluate all --only {name} --weights default --data SET --evaluator mine.tar --quick"
+    assert (found.suite, found.command) == (name, words)
+    assert asked["evaluator"] == ("a/mine.tar" if name == "text" else "judge a/mine.tar")
+    if name == "text":
+        assert (asked["weights"], asked["data"], asked["protocol"].replications) == ("default", tmp_path, 2)
 
 
 # ---- obedience, realism and speed as reports ------------------------------------------------------------------------

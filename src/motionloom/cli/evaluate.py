@@ -1,7 +1,7 @@
 """`motionloom evaluate`: does it do what the words say, does it look real, and did it get better."""
 
 import argparse
-from importlib import import_module, util
+from importlib import import_module
 from pathlib import Path
 
 PARTS = ("evaluate_text", "evaluate_evaluator", "evaluate_all")
@@ -14,8 +14,7 @@ def add(subparsers) -> None:
     commands = family.add_subparsers(metavar="COMMAND", required=True)
     _physical(commands)
     for part in PARTS:
-        if util.find_spec(f"motionloom.cli.{part}"):
-            import_module(f"motionloom.cli.{part}").add(commands)
+        import_module(f"motionloom.cli.{part}").add(commands)
 
 
 def _physical(commands) -> None:

@@ -10,6 +10,9 @@ def add(commands) -> None:
     every = commands.add_parser("all", help="run every suite; goes on after a kill; fills a page of results")
     every.add_argument("--weights", default="default", help="shipped name or file (default: default)")
     every.add_argument("--data", type=Path, metavar="SET", help="built set whose held-out clips are compared with")
+    every.add_argument(
+        "--evaluator", default="own", metavar="own|FILE", help="who judges text (default: the shipped one)"
+    )
     every.add_argument("--quick", action="store_true", help="few seeds and clips: does everything work?")
     every.add_argument("--only", action="append", metavar="SUITE", help="only this suite (repeatable)")
     every.add_argument("--out", type=Path, help="folder of the reports (default out/results, quick: out/quick)")
@@ -63,7 +66,10 @@ def _all(arguments: argparse.Namespace) -> int:
     out = arguments.out or Path("out") / ("quick" if arguments.quick else "results")
     if arguments.results:
         results.check_page(arguments.results)
-    job = suites.Job(arguments.weights, _tools(arguments), arguments.data, arguments.quick, arguments.device)
+    job = suites.Job(
+        arguments.weights, _tools(arguments), data=arguments.data, evaluator=arguments.evaluator, quick=arguments.quick,
+        device=arguments.device,
+    )  # fmt: skip
     outcomes = everything.run_all(job, out, wanted, keep=arguments.keep, again=arguments.again)
     made = [outcome.report for outcome in outcomes if outcome.report]
     for one in made:

@@ -87,7 +87,7 @@ def fingerprint(suite: Suite, job: Job) -> str:
         "weights": weights,
         "settings": dict(suite.settings(job.quick)),
     }
-    said["files"] = [hashlib.sha256(path.read_bytes()).hexdigest() for path in suite.files()]
+    said["files"] = [hashlib.sha256(path.read_bytes()).hexdigest() for path in suite.files(job)]
     if suite.data and job.data is not None:
         said["data"] = _files(job.data)
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()

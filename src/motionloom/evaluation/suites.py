@@ -42,6 +42,8 @@ class Job:
     weights: str
     tools: Tools
     data: Path | None = None
+    evaluator: str = "own"
+    """Who judges text: the shipped evaluator or a file."""
     quick: bool = False
     device: str = "cpu"
     folder: Path = Path()
@@ -62,8 +64,8 @@ class Suite:
     """Settings of a run that only shows that everything works."""
     data: Literal["needed", "used", ""] = ""
     """Whether it cannot do without a set, compares with one where there is one, or reads none."""
-    files: Callable[[], Sequence[Path]] = tuple
-    """Shipped files whose content changes the numbers, the weights under test aside."""
+    files: Callable[[Job], Sequence[Path]] = lambda job: ()
+    """Further files whose content changes the numbers, the weights under test aside."""
 
     def settings(self, quick: bool) -> Mapping[str, Any]:
         """Those of a quick or of a full run."""
@@ -73,15 +75,18 @@ class Suite:
 def command(name: str, job: Job) -> str:
     """The command line that measures a suite again; a set is called SET, since its place differs between machines."""
     weights = job.weights if job.weights in shipped() else Path(job.weights).name
-    words = ["motionloom", "evaluate", "all", "--only", name, "--weights", shlex.quote(weights)]
-    return " ".join([*words, *(["--data", "SET"] if job.data else []), *(["--quick"] if job.quick else [])])
+    words = ["motionloom", "evaluate", "all", "--only", name, "--weights", weights]
+    words += ["--data", "SET"] if job.data else []
+    words += ["--evaluator", Path(job.evaluator).name] if job.evaluator != "own" else []
+    return shlex.join([*words, *(["--quick"] if job.quick else [])])
 
 
-def _judge() -> list[Path]:
-    """The shipped evaluator and the real motions that it has seen, where they are."""
+def _judge(job: Job) -> list[Path]:
+    """The evaluator and the real motions that are shipped with it, where they are."""
     from motionloom.evaluation import own, text_reference
 
-    return [path for path in (own.evaluators().get(own.SHIPPED), text_reference.shipped()) if path and path.is_file()]
+    judge = own.evaluators().get(own.SHIPPED) if job.evaluator == "own" else Path(job.evaluator)
+    return [path for path in (judge, text_reference.shipped()) if path and path.is_file()]
 
 
 def _obedience(job: Job, settings: Mapping[str, Any]) -> Report:
@@ -112,8 +117,8 @@ def _text(job: Job, settings: Mapping[str, Any]) -> Report:
 
     how = protocol.quick(protocol.Protocol()) if settings["quick"] else protocol.Protocol()
     return text.run(
-        job.weights, data=job.data, protocol=how, folder=job.folder, device=job.device, memory=job.tools.memory,
-        command=command("text", job), progress=job.tools.progress,
+        job.weights, evaluator=job.evaluator, data=job.data, protocol=how, folder=job.folder, device=job.device,
+        memory=job.tools.memory, command=command("text", job), progress=job.tools.progress,
     )  # fmt: skip
 
 
@@ -122,7 +127,7 @@ def _evaluator(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.evaluation.own import validate
 
     assert job.data is not None  # `data="needed"`
-    found = validate(load_evaluator("own"), job.data, repeats=settings["repeats"], progress=job.tools.progress)
+    found = validate(load_evaluator(job.evaluator), job.data, repeats=settings["repeats"], progress=job.tools.progress)
     return replace(found, command=command("evaluator", job))
 
 
@@ -130,7 +135,7 @@ def _agreement(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.evaluation.agreement import agreement
     from motionloom.evaluation.evaluators import load_evaluator
 
-    judge, prior = load_evaluator("own"), job.tools.prior()
+    judge, prior = load_evaluator(job.evaluator), job.tools.prior()
     found = agreement(judge, prior, seeds=settings["seeds"], progress=job.tools.progress)
     return replace(found, command=command("agreement", job))
 
