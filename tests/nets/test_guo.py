@@ -1,5 +1,6 @@
 """Guo's evaluator networks: against a plain loop, by what padding and order must not change, and as files."""
 
+import math
 import pickle
 import zipfile
 from pathlib import Path
@@ -51,9 +52,15 @@ def table(sizes: GuoSizes = SMALL) -> dict[str, tuple[int, ...]]:
 
 
 def state(sizes: GuoSizes = SMALL, seed: int = 0) -> dict[str, Tensor]:
-    """Weights of the published form; every one matters."""
+    """Weights of the published form; every one matters, and each sum stays near one, so that rounding stays small."""
     generator = torch.Generator().manual_seed(seed)
-    return {key: torch.randn(shape, generator=generator) * 0.5 for key, shape in table(sizes).items()}
+    made = {}
+    for key, shape in table(sizes).items():
+        summed = math.prod(shape[1:]) if key.endswith("weight") and len(shape) > 1 else 4
+        made[key] = torch.randn(shape, generator=generator) / summed**0.5
+        if key.endswith("output_net.1.weight"):
+            made[key] += 1
+    return made
 
 
 class Naive:
