@@ -18,7 +18,7 @@ import numpy as np
 
 from motionloom.checkpoint import Prior, find_weights
 from motionloom.errors import MotionloomError
-from motionloom.evaluation import published_rows, text_reference
+from motionloom.evaluation import own, published_rows, text_reference
 from motionloom.evaluation.evaluators import Caption, Evaluator, load_evaluator
 from motionloom.evaluation.items import fitting, pick, read_items, spread
 from motionloom.evaluation.parts import Parts, fingerprint
@@ -341,8 +341,13 @@ def run(
     if protocol.caption_length == "published":
         _as_published(judge, [text_reference.SENTENCE])
     trial = prepare(draw, judge, reference(judge, data, selection, progress), protocol)
-    settings = {**protocol.drawn(), "weights": _digest(find_weights(weights)), "evaluator": [judge.name, judge.about],
-                "real": _identity(trial.real), "device": device}  # fmt: skip
+    settings = {
+        **protocol.drawn(),
+        "weights": _digest(find_weights(weights)),
+        "evaluator": [judge.name, dict(judge.about), _judge_file(evaluator)],
+        "real": _identity(trial.real),
+        "device": device,
+    }
     label = weights if find_weights(weights) != Path(weights) else Path(weights).stem
     return measure(
         trial, label=label, parts=Parts(folder, fingerprint(settings)), memory=memory, command=command,
@@ -391,7 +396,13 @@ def _digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()[:16]
 
 
+def _judge_file(evaluator: str) -> str:
+    """Digest of the evaluator's file; empty where it has none."""
+    path = own.evaluators().get(own.SHIPPED) if evaluator == "own" else Path(evaluator)
+    return _digest(path) if path and path.is_file() else ""
+
+
 def _identity(real: TextReference) -> str:
-    """Changes with the items and with the evaluator."""
+    """Changes with the items; not with the embeddings, whose last digits depend on the number of threads."""
     said = json.dumps([real.names, [[c.text for c in several] for several in real.captions], real.frames])
-    return hashlib.sha256(said.encode() + real.motions.astype(np.float16).tobytes()).hexdigest()[:16]
+    return hashlib.sha256(said.encode() + real.physical.astype(np.float32).tobytes()).hexdigest()[:16]
