@@ -75,6 +75,13 @@ def test_damages_are_of_the_amount_they_say() -> None:
     assert np.abs(own.frozen(1.0)(walk, rng)[:, 193:259]).max() < 1e-5
 
 
+def test_the_rank_is_that_of_a_text_among_motions() -> None:
+    """Five equal texts at 0 and motions at 0, 1, 2, 3, 4: the places are 1 to 5, their median 3."""
+    line = np.arange(5.0)[:, None]
+    assert own.median_rank(np.zeros((5, 1)), line) == 3.0
+    assert own.median_rank(line, np.zeros((5, 1))) == 1.0
+
+
 def test_captions_are_handed_on_for_the_share_that_is_asked() -> None:
     """None at 0, each at 1, ten of forty at a quarter; the captions stay the same ones."""
     rng = np.random.default_rng(0)
@@ -124,13 +131,13 @@ def test_too_few_motions_are_refused(data: Path, tmp_path: Path) -> None:
 
 
 def test_the_chance_of_a_right_order_is_counted_within_prompts() -> None:
-    """By hand: prompt 0 has pairs won 1 of 2, prompt 1 a tie (half), prompt 2 no pair; AUC (1 + 0.5) / 3."""
-    own_distance = [0.5, 0.4, 0.9, 0.7, 0.7, 0.1]
+    """By hand: prompt 0 wins both of its pairs, prompt 1 ties (half), prompt 2 has no pair; AUC (2 + 0.5) / 3."""
+    own_distance = [0.5, 0.6, 0.9, 0.7, 0.7, 0.1]
     prompts, obeyed = np.array([0, 0, 0, 1, 1, 2]), np.array([True, False, False, True, False, True])
     far = np.full((6, 3), 5.0)
     far[np.arange(6), prompts] = own_distance
     found = within_prompts([Scored(prompts, obeyed, far)])
-    assert found.mean == pytest.approx(0.5)
+    assert found.mean == pytest.approx(2.5 / 3)
     assert found.count == 2
     assert np.isnan(within_prompts([Scored(prompts[:1], obeyed[:1], far[:1])]).mean)
 

@@ -235,8 +235,7 @@ class Judge:
             texts, shown = self.texts[_handed_on(drawn, shuffled, rng)], motions[self.owner[drawn]]
             for name, value in zip(("top1", "top2", "top3"), r_precision(texts, shown, batch=BATCH), strict=True):
                 found[name].append(float(value))
-            far = np.linalg.norm(texts[:, None] - shown[None], axis=-1)
-            found["rank"].append(float(np.median((far < np.diag(far)[:, None]).sum(1)) + 1))
+            found["rank"].append(median_rank(texts, shown))
             found["distance"].append(matching_distance(texts, shown))
         return {name: Value.of(values) for name, values in found.items()}
 
@@ -268,6 +267,12 @@ class Judge:
             windows = self.evaluator.motions([damage(one, rng) for one in self.held.windows])
             values["fid"] = Value(fid(windows, self.windows))
         return Row(name, values)
+
+
+def median_rank(texts: Array, motions: Array) -> float:
+    """Median place, 1 is best, of each text's own motion (same row) among all by distance; (n, width) twice."""
+    far = np.linalg.norm(texts[:, None] - motions[None], axis=-1)
+    return float(np.median((far < np.diag(far)[:, None]).sum(1)) + 1)
 
 
 def _handed_on(drawn: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
