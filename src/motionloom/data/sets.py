@@ -1,6 +1,7 @@
 """A built set in memory, and the training batches drawn from it."""
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom.data.build import STATES, Clip, read_clip
+from motionloom.data.build import STATES, Clip, Note, read_clip
 from motionloom.data.words import phrases, sentence
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import LAYOUT
@@ -20,11 +21,21 @@ SHARE = {"human": 0.35, "index": 0.12, "label": 0.53}
 """How often a training sample shows a written caption, an index description, a measured label."""
 
 FAVOUR: dict[str, float] = {
-    **dict.fromkeys(("circle left", "climb", "kick", "jump"), 2.5),
+    **dict.fromkeys(("climb", "kick"), 4.0),
+    **dict.fromkeys(("circle left", "jump"), 2.5),
     **dict.fromkeys(("sit", "punch", "jog", "hop", "turn left", "turn right"), 1.5),
     **dict.fromkeys(("jog backward", "jumping jacks", "cartwheel", "kick ball"), 0.5),
 }
 """Labels drawn more often than the others: they came out last. A mixture of two labels is drawn 0.4 times as often."""
+
+EVENTS = {
+    "kick": "kick", "kick ball": "kick", "punch": "punch|box", "jump": "jump|leap", "jump forward": "jump|leap",
+    "jump repeatedly": "jump|leap", "hop": r"\bhop", "climb": "climb|stairs|ladder", "wave": r"\bwav", "sit": r"\bsit",
+    "cartwheel": "cartwheel",
+}  # fmt: skip
+"""Measured labels of something that happens at one moment, and how captions speak of it."""
+MOMENTS = 3
+"""Windows shown for a caption that names an event."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +49,8 @@ class Item:
     """``human``, ``index`` or the measured label."""
     texts: tuple[int, ...]
     """Numbers of its sentences in `MotionSet.texts`."""
+    whole: bool = False
+    """True where a part of it may not show what is said, such as a jump: it is never cropped."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +110,10 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, 
                     made = {sentence(p, rng) for _ in range(WORDINGS) for p in [rng.choice(list(phrases(note.kind)))]}
                     wordings[note.kind] = tuple(_number(texts, t) for t in sorted(made))
                 said = wordings[note.kind]
-            items.append(Item(start + note.first, note.last - note.first, note.kind, said))
+            moments = _moments(clip, note)
+            whole = bool(moments) or _is_event(note)
+            for first, last in ((note.first, note.last), *moments):
+                items.append(Item(start + first, last - first, note.kind, said, whole))
         start += len(clip.features)
     features = torch.from_numpy(np.concatenate([c.features for c in clips]))
     features = (features - torch.from_numpy(mean)) / torch.from_numpy(std)
@@ -106,6 +122,27 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, 
         features, torch.from_numpy(mean), torch.from_numpy(std), tuple(items), tuple(texts),
         tuple(sorted({c.licence for c in clips})), recorded,
     )  # fmt: skip
+
+
+def _is_event(note: Note) -> bool:
+    return note.kind not in ("human", "index", *STATES) and "+" not in note.kind
+
+
+def _moments(clip: Clip, note: Note) -> list[tuple[int, int]]:
+    """At most `MOMENTS` windows within a captioned stretch that measurably show the event its caption names.
+
+    A caption for ten seconds says "kicks"; most crops of two or four seconds of it show somebody who stands there.
+    """
+    if note.kind not in ("human", "index"):
+        return []
+    said = " ".join(note.texts).lower()
+    named = {label for label, words in EVENTS.items() if re.search(words, said)}
+    spans = sorted({
+        (n.first, n.last) for n in clip.notes
+        if n.kind in named and _is_event(n) and note.first <= n.first and n.last <= note.last
+        and (n.first, n.last) != (note.first, note.last)
+    })  # fmt: skip
+    return [spans[round(k)] for k in np.linspace(0, len(spans) - 1, min(MOMENTS, len(spans)))]
 
 
 def _number(texts: dict[str, int], text: str) -> int:
@@ -129,7 +166,7 @@ class Batches:
 
     All rows of a batch share a window (one of ``windows`` frames, drawn by ``shares``); items shorter than the window
     but at least 60 % of it are taken whole and padded. First the kind of text is drawn (`SHARE`), then for measured
-    labels the label, evenly over labels, then the item: rare actions are seen as often as walks. Windows labelled for
+    labels the label, evenly over labels, then the item: rare actions are seen as often as walks. Stretches said to show
     an event are never cropped.
     """
 
@@ -156,9 +193,7 @@ class Batches:
         fitting: dict[str, dict[str, list[int]]] = {}
         for number, item in enumerate(self.data.items):
             kind = item.group if item.group in SHARE else "label"
-            # a part of a window that is labelled for one event, such as a jump, may not show it
-            whole = kind != "label" or item.group in STATES or "+" in item.group or item.frames <= 1.05 * window
-            if item.frames >= 0.6 * window and whole:
+            if item.frames >= 0.6 * window and (not item.whole or item.frames <= 1.05 * window):
                 fitting.setdefault(kind, {}).setdefault(item.group, []).append(number)
         return {kind: {g: np.array(numbers) for g, numbers in groups.items()} for kind, groups in fitting.items()}
 
