@@ -38,6 +38,13 @@ def test_published_rows_make_no_line() -> None:
     assert by_steps(published) == {}
 
 
+def test_published_rows_stand_in_a_picture_of_their_own(tmp_path: Path) -> None:
+    """Their numbers may be of another scale and would flatten ours."""
+    theirs = Row("MDM", {"fid": Value(100.0)}, "HumanML3D, " + "a long source " * 20)
+    assert [path.name for path in draw(report(*rows("a", "b"), theirs), tmp_path)] == ["report.png", "published.png"]
+    assert [path.name for path in draw(report(*rows("a"), theirs), tmp_path)] == ["published.png"]
+
+
 def test_one_row_is_not_drawn(tmp_path: Path) -> None:
     assert draw(report(*rows("alone")), tmp_path) == []
     assert not list(tmp_path.iterdir())

@@ -85,7 +85,8 @@ def test_a_terminal_gets_no_control_characters() -> None:
 def test_a_report_is_read_as_it_was_written(tmp_path: Path) -> None:
     path = write(WHOLE, tmp_path / "new" / "folder")
     assert encode(read(path)) == encode(read(path.parent)) == encode(WHOLE)
-    assert {p.name for p in path.parent.iterdir()} == {"report.json", "report.md", "report.png", "steps.png"}
+    names = sorted(p.name for p in path.parent.iterdir())
+    assert names == ["published.png", "report.json", "report.md", "report.png", "steps.png"]
     assert "](report.png)" in (path.parent / "report.md").read_text()
 
 

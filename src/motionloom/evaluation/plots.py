@@ -12,37 +12,43 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.evaluation.compare import wilson
+from motionloom.evaluation.compare import is_control, wilson
 from motionloom.evaluation.report import ARROWS, REAL, Column, Report, Row, Value
 from motionloom.io.atomic import atomic_path
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-INK, OURS, REALITY, OTHERS = "#28303a", "#3474cd", "#18885a", "#9aa1ad"
+INK, OURS, REALITY, OTHERS, CONTROL = "#28303a", "#3474cd", "#18885a", "#9aa1ad", "#5a6270"
 MOST_ROWS = 60
 PANELS = 12
 STEPS = re.compile(r"(?P<what>.*?)[\s,(]*\b(?P<steps>\d{1,5}) steps?\b\)?(?P<rest>.*)")
 
 
 def draw(report: Report, folder: Path) -> list[Path]:
-    """Write ``report.png`` (``report-2.png`` and so on for many metrics) and ``steps.png`` where rows differ in steps.
+    """Write ``report.png`` (``report-2.png`` and so on for many metrics) with what was measured here, ``steps.png``
+    where rows differ in steps, and ``published.png`` beside what others measured on other data, often of another scale.
 
     Nothing is drawn of fewer than two rows. The folder must exist.
     """
-    rows = report.rows[:MOST_ROWS]
-    if len(rows) < 2:
-        return []
-    columns = [c for c in report.columns if sum(c.name in row.values for row in rows) > 1]
-    written = []
+    here = [row for row in report.rows if not row.measured_on][:MOST_ROWS]
+    elsewhere = [row for row in report.rows if row.measured_on][:MOST_ROWS]
+    written, columns = [], _drawable(report, here)
     for page, first in enumerate(range(0, len(columns), PANELS), start=1):
         name = f"report-{page}.png" if page > 1 else "report.png"
-        written.append(_points(report, columns[first : first + PANELS], rows, folder / name))
-    if lines := by_steps(rows):
-        shown = [c for c in columns if any(c.name in row.values for points in lines.values() for _, row in points)]
-        if shown:
-            written.append(_lines(report, shown[:PANELS], lines, folder / "steps.png"))
+        written.append(_points(report, columns[first : first + PANELS], here, folder / name))
+    lines = by_steps(here)
+    if lines and (shown := _drawable(report, [row for points in lines.values() for _, row in points])):
+        written.append(_lines(report, shown[:PANELS], lines, folder / "steps.png"))
+    beside = {name for row in elsewhere for name in row.values}
+    if shown := [c for c in _drawable(report, [*here, *elsewhere]) if c.name in beside]:
+        written.append(_points(report, shown[:PANELS], [*here, *elsewhere], folder / "published.png"))
     return written
+
+
+def _drawable(report: Report, rows: Sequence[Row]) -> list[Column]:
+    """Metrics that two rows or more have a number of."""
+    return [c for c in report.columns if sum(c.name in row.values for row in rows) > 1]
 
 
 def by_steps(rows: Sequence[Row]) -> dict[str, list[tuple[int, Row]]]:
@@ -87,7 +93,10 @@ def _points(report: Report, columns: Sequence[Column], rows: Sequence[Row], path
     """A panel per metric, a line per row, the first on top."""
     figure, axes, across = _grid(len(columns), width=2.5, height=0.55 + 0.24 * len(rows))
     places = range(len(rows), 0, -1)
-    names = [_plain(f"{row.name} [{row.measured_on}]" if row.measured_on else row.name, 48) for row in rows]
+    sources = list(dict.fromkeys(row.measured_on for row in rows if row.measured_on))
+    names = [
+        _plain(row.name, 48) + (f" [{sources.index(row.measured_on) + 1}]" if row.measured_on else "") for row in rows
+    ]
     for k, (axis, column) in enumerate(zip(axes, columns, strict=True)):
         real = report.row(REAL)
         if real and column.name in real.values and math.isfinite(real.values[column.name].mean):
@@ -106,8 +115,9 @@ def _points(report: Report, columns: Sequence[Column], rows: Sequence[Row], path
         axis.set_axisbelow(True)
         axis.margins(x=0.08)
         axis.locator_params(axis="x", nbins=4)
-    if any(row.measured_on for row in rows):
-        figure.supxlabel("hatched and grey: published, measured on other data", fontsize=8, color="#5a6270")
+    if sources:
+        told = [f"[{k}] {_plain(source, 120)}" for k, source in enumerate(sources, start=1)]
+        figure.supxlabel("\n".join(["hatched: published, on other data", *told]), fontsize=8, color="#5a6270")
     return _save(figure, report, path)
 
 
@@ -115,6 +125,7 @@ def _point(axis: "Axes", place: float, row: Row, value: Value, *, share: bool = 
     if not math.isfinite(value.mean):
         return
     colour, mark = (OTHERS, "D") if row.measured_on else (REALITY, "s") if row.name == REAL else (OURS, "o")
+    colour = CONTROL if colour == OURS and is_control(row.name) else colour
     axis.errorbar(
         value.mean, place, xerr=_spread(value, share=share), fmt=mark, color=colour, markersize=5, capsize=3,
         elinewidth=1.2, zorder=3, markerfacecolor="white" if row.measured_on else colour,
