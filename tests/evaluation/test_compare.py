@@ -171,6 +171,12 @@ def test_other_weights_are_what_is_compared() -> None:
     assert cmp.compare(report(Value(1.0, 0.1, 2), weights="a"), report(Value(1.0, 0.1, 2), weights="b"))
 
 
+def test_two_evaluators_are_compared_in_their_own_suite_and_nowhere_else() -> None:
+    for suite, fine in (("evaluator", True), ("text", False)):
+        a, b = (report(Value(1.0, 0.1, 2), row="real", suite=suite, evaluator=name) for name in ("one", "two"))
+        assert (cmp.differences_of_protocol(a, b) == []) == fine
+
+
 def test_folders_of_releases_and_of_runs_are_read_alike(tmp_path: Path) -> None:
     (tmp_path / "0.1.0").mkdir()
     (tmp_path / "run" / "text").mkdir(parents=True)

@@ -204,12 +204,15 @@ def test_suites_with_a_judge_ask_for_what_was_said(
     monkeypatch.setattr(place, fake)
     monkeypatch.setattr("motionloom.evaluation.evaluators.load_evaluator", lambda said: f"judge {said}")
     tools = replace(TOOLS, prior=lambda: "the prior")  # type: ignore[arg-type, return-value]
-    job = Job("default", tools, data=tmp_path, evaluator="a/mine.tar", quick=True)
+    job = Job("default", tools, data=tmp_path, evaluator=str(tmp_path / "mine.tar"), quick=True)
+    (tmp_path / "mine.tar").write_bytes(b"abc")
     (suite,) = chosen([name])
     found = suite.run(job, suite.settings(True))
     words = f"motionloom evaluate all --only {name} --weights default --data SET --evaluator mine.tar --quick"
     assert (found.suite, found.command) == (name, words)
-    assert asked["evaluator"] == ("a/mine.tar" if name == "text" else "judge a/mine.tar")
+    assert asked["evaluator"] == (job.evaluator if name == "text" else f"judge {job.evaluator}")
+    if name != "evaluator":  # sha256 of abc, FIPS 180-2
+        assert found.protocol["evaluator file"] == "ba7816bf8f01"
     if name == "text":
         assert (asked["weights"], asked["data"], asked["protocol"].replications) == ("default", tmp_path, 2)
 

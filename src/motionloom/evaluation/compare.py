@@ -21,7 +21,7 @@ CONTROLS = (REAL, "shuffled", "chance")
 CLOCKED = ("ms", "per_second", "memory")
 """Columns of suites about quality that a busier or another machine changes; the suite of speed is for these."""
 SUBJECT = ("weights",)
-"""Keys of a protocol that say what was measured rather than how: they may differ."""
+"""Keys of a protocol that say what was measured rather than how; in the suite of the evaluator, itself as well."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,9 @@ def _real(report: Report, column: Column) -> Value | None:
 def differences_of_protocol(before: Report, after: Report) -> list[str]:
     """What differs in how two reports were measured, as ``name before -> after``."""
     found = [] if before.suite == after.suite else [f"suite {before.suite} -> {after.suite}"]
-    return found + _differing(before.protocol, after.protocol, "")
+    subject = (*SUBJECT, "evaluator") if before.suite == "evaluator" else SUBJECT
+    kept = [{k: v for k, v in report.protocol.items() if k not in subject} for report in (before, after)]
+    return found + _differing(kept[0], kept[1], "")
 
 
 def _differing(a: Mapping[str, Any], b: Mapping[str, Any], where: str) -> list[str]:
@@ -103,7 +105,7 @@ def _differing(a: Mapping[str, Any], b: Mapping[str, Any], where: str) -> list[s
     for name in dict.fromkeys([*a, *b]):
         said = f"{where}{name}"
         x, y = a.get(name), b.get(name)
-        if said in SUBJECT or x == y:
+        if x == y:
             continue
         if isinstance(x, Mapping) and isinstance(y, Mapping):
             found += _differing(x, y, f"{said}.")

@@ -4,6 +4,7 @@ A suite is a name and a function from a job to a report; a further one is one mo
 suite needs is imported by its function.
 """
 
+import hashlib
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -81,12 +82,19 @@ def command(name: str, job: Job) -> str:
     return shlex.join([*words, *(["--quick"] if job.quick else [])])
 
 
+def _evaluator_file(job: Job) -> Path | None:
+    """Where the evaluator lies, if it is there."""
+    from motionloom.evaluation import own
+
+    path = own.evaluators().get(own.SHIPPED) if job.evaluator == "own" else Path(job.evaluator)
+    return path if path and path.is_file() else None
+
+
 def _judge(job: Job) -> list[Path]:
     """The evaluator and the real motions that are shipped with it, where they are."""
-    from motionloom.evaluation import own, text_reference
+    from motionloom.evaluation import text_reference
 
-    judge = own.evaluators().get(own.SHIPPED) if job.evaluator == "own" else Path(job.evaluator)
-    return [path for path in (judge, text_reference.shipped()) if path and path.is_file()]
+    return [path for path in (_evaluator_file(job), text_reference.shipped()) if path and path.is_file()]
 
 
 def _obedience(job: Job, settings: Mapping[str, Any]) -> Report:
@@ -112,14 +120,22 @@ def _speed(job: Job, settings: Mapping[str, Any]) -> Report:
     return physical.speed_report(job.tools.speed(settings["quick"]), command=command("speed", job))
 
 
+def _sealed(report: Report, job: Job) -> Report:
+    """With the evaluator's content in the protocol: one trained anew under the same name is another measure."""
+    path = _evaluator_file(job)
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()[:12] if path else "unknown"
+    return replace(report, protocol={**report.protocol, "evaluator file": digest})
+
+
 def _text(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.evaluation import protocol, text
 
     how = protocol.quick(protocol.Protocol()) if settings["quick"] else protocol.Protocol()
-    return text.run(
+    found = text.run(
         job.weights, evaluator=job.evaluator, data=job.data, protocol=how, folder=job.folder, device=job.device,
         memory=job.tools.memory, command=command("text", job), progress=job.tools.progress,
     )  # fmt: skip
+    return _sealed(found, job)
 
 
 def _evaluator(job: Job, settings: Mapping[str, Any]) -> Report:
@@ -137,7 +153,7 @@ def _agreement(job: Job, settings: Mapping[str, Any]) -> Report:
 
     judge, prior = load_evaluator(job.evaluator), job.tools.prior()
     found = agreement(judge, prior, seeds=settings["seeds"], progress=job.tools.progress)
-    return replace(found, command=command("agreement", job))
+    return _sealed(replace(found, command=command("agreement", job)), job)
 
 
 SUITES: tuple[Suite, ...] = (
