@@ -17,7 +17,7 @@ def add(commands) -> None:
     )  # fmt: skip
     text.add_argument("--evaluator", default="own", metavar="own|FILE", help="who judges (default: the shipped one)")
     text.add_argument("--steps", type=_steps, metavar="5,20,50", help="sampler steps, one row each (default 5,20,50)")
-    text.add_argument("--replications", type=int, help="(default 10)")
+    text.add_argument("--replications", type=int, help="(default 5)")
     text.add_argument("--count", type=int, help="real items, spread evenly (default: all)")
     text.add_argument("--batch", type=_batch, metavar="32|all", help="motions a caption is matched with (default 32)")
     text.add_argument("--lengths", choices=("exact", "padded"), help="generate the real lengths (default), or 196 cut")

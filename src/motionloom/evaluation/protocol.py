@@ -101,10 +101,10 @@ class Protocol:
     """``published``: generated motions are matched with captions read as if 22 tokens long (`PUBLISHED_CAPTION`)."""
     batch: int | None = 32
     """Motions that a caption's own one is looked for among; None: the whole set."""
-    replications: int = 10
+    replications: int = 5
     multimodality: tuple[int, int] = (10, 10)
     """Captions, and motions of each; (0, 0) leaves it out."""
-    multimodal_replications: int = 5
+    multimodal_replications: int = 3
     """Only the first so many replications measure it, as published."""
     steps: tuple[int, ...] = (5, 20, 50)
     solver: str = SOLVER
