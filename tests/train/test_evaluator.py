@@ -7,6 +7,8 @@ import pytest
 import torch
 from torch.nn import functional as F
 
+from motionloom.checkpoint import save_prior
+from motionloom.cli import main
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from motionloom.features.layout import WIDTH
@@ -141,3 +143,34 @@ def test_a_network_that_cannot_be_is_refused(net: dict) -> None:
     """Unknown settings, another text width, a width that heads do not divide."""
     with pytest.raises(MotionloomError):
         config_of(recipe(net=net), tiny.text())
+
+
+RECIPE = """
+name = "mine"
+steps = 2
+batch = 3
+save_every = 1
+[net]
+width = 32
+layers = 1
+heads = 2
+hidden = 32
+text = 64
+"""
+
+
+def test_the_commands_train_an_evaluator_and_refuse_what_they_cannot_measure(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As a stranger types them: one file comes out; a set without captioned held-out clips is one sentence and 2."""
+    monkeypatch.chdir(tmp_path)
+    Path("recipe.toml").write_text(RECIPE)
+    save_prior(tiny.prior(), "tiny.safetensors")
+    said = ["--recipe", "recipe.toml", "--data", str(data), "--out", "run", "--text", "tiny.safetensors"]
+    assert main(["train", "evaluator", *said, "--device", "cpu"]) == 0
+    assert load_embedder(Path("run/mine.safetensors"), tiny.text()).card["name"] == "mine"
+    capsys.readouterr()
+    assert main(["evaluate", "evaluator", "--data", str(data), "--evaluator", "run/mine.safetensors"]) == 2
+    assert "another text encoder" in capsys.readouterr().err
+    assert main(["evaluate", "evaluator", "--data", str(data), "--seeds", "0"]) == 2
+    assert "no clips of source cmu in val, test" in capsys.readouterr().err
