@@ -93,9 +93,18 @@ def find_device(name: str | torch.device) -> torch.device:
 
 
 def shipped() -> dict[str, Path]:
-    """Names and places of the weight files inside the package."""
+    """Names and places of the priors inside the package."""
     folder = Path(str(resources.files("motionloom"))) / "weights"
-    return {path.stem: path for path in sorted(folder.glob("*.safetensors"))} if folder.is_dir() else {}
+    return {path.stem: path for path in sorted(folder.glob("*.safetensors")) if _is_prior(path)}
+
+
+def _is_prior(path: Path) -> bool:
+    """True for a file of `save_prior`, damaged or not, by what its head says."""
+    try:
+        with safe_open(path, framework="pt") as file:
+            return "motionloom" in (file.metadata() or {})
+    except (SafetensorError, OSError):
+        return False
 
 
 def find_weights(weights: str | Path) -> Path:
