@@ -24,7 +24,7 @@ from torch.utils.flop_counter import FlopCounterMode
 from motionloom.checkpoint import Prior
 from motionloom.diffusion import DDPM, SOLVERS, Denoiser, Solver, guide, levels, row_draw, sample
 from motionloom.errors import MotionloomError
-from motionloom.tasks.text import SPACING
+from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS
 
 LONG = 1000
 """Steps of the sampler that the default is compared with."""
@@ -49,9 +49,9 @@ class Entry:
 class Sampling:
     """How `generate` samples when nothing is said."""
 
-    steps: int = 20
-    guidance: float = 2.5
-    solver: Solver = DDPM
+    steps: int = STEPS
+    guidance: float = GUIDANCE
+    solver: Solver = SOLVERS[SOLVER]
 
 
 def defaults(function: Callable[..., Any]) -> Sampling:

@@ -58,6 +58,7 @@ def test_a_walk_goes_from_the_top_to_0_in_as_many_strictly_falling_moves_as_aske
 
 def test_spacings_are_even_in_the_level_in_its_root_and_in_log_snr():
     assert levels(cosine(1000), 5) == [1000, 800, 600, 400, 200, 0]
+    assert levels(cosine(1000), 5, spacing="early") == [1000, 960, 840, 640, 360, 0]
     assert levels(cosine(1000), 5, spacing="quadratic") == [1000, 640, 360, 160, 40, 0]
     schedule = linear(10_000)
     ratios = [schedule.log_snr(level) for level in levels(schedule, 9, spacing="snr")[:-1]]
@@ -80,7 +81,7 @@ def test_a_schedule_that_ends_without_signal_can_be_walked(spacing):
         (lambda: from_betas("empty", []), "empty"),
         (lambda: levels(cosine(10), 11), "1 to 10"),
         (lambda: levels(cosine(10), 0), "1 to 10"),
-        (lambda: levels(cosine(10), 5, spacing="even"), "index, quadratic, snr"),
+        (lambda: levels(cosine(10), 5, spacing="even"), "index, early, quadratic, snr"),
         (lambda: cosine(10).at(11), "no level 11"),
         (lambda: cosine(10).at(-1), "no level -1"),
         (lambda: cosine(10).noised(torch.zeros(2, 1, 1), torch.tensor([3, -1]), torch.zeros(2, 1, 1)), "no level -1"),

@@ -24,8 +24,8 @@ def add(subparsers) -> None:
     )
     parser.add_argument("--count", type=int, default=1, help="motions per prompt (default 1)")
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
-    parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 20)")
-    parser.add_argument("--solver", help="ddim, ddpm, dpm2m or dpm2m-sde (the default)")
+    parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 24)")
+    parser.add_argument("--solver", help="ddim, ddpm (the default), dpm2m or dpm2m-sde")
     parser.add_argument(
         "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
     )

@@ -25,7 +25,7 @@ State: TypeAlias = Tensor
 Draw: TypeAlias = Callable[[Tensor], Tensor]
 """Standard normal noise of the shape, type and device of its argument."""
 
-SPACINGS = ("index", "quadratic", "snr")
+SPACINGS = ("index", "early", "quadratic", "snr")
 """Ways to choose the levels of a short walk, see `levels`."""
 
 
@@ -124,6 +124,7 @@ def levels(schedule: Schedule, steps: int, *, spacing: str = "index") -> list[in
     """A walk of `steps` moves from the noisiest level T down to 0: `steps + 1` strictly falling levels.
 
     "index": evenly spaced levels ("trailing" in diffusers; it starts at T, as Lin et al. 2024 recommend).
+    "early": levels T (1 - (i / steps)²), denser near pure noise, where it is decided what will be shown.
     "quadratic": evenly spaced roots of the level (Song et al. 2021, D.3), denser near clean data. On normal data of
     narrow and wide spread alike it keeps the spread best in 10 to 50 moves of DPM-Solver++(2M) on the cosine schedule.
     "snr": evenly spaced in log(signal / noise) from T to 1, then 0 (the spacing of the DPM-Solver paper).
@@ -133,6 +134,8 @@ def levels(schedule: Schedule, steps: int, *, spacing: str = "index") -> list[in
         raise ValueError(f"cannot take {steps} steps over {top} levels: ask for 1 to {top}")
     if spacing == "index":
         wanted = [top * (steps - i) / steps for i in range(steps)]
+    elif spacing == "early":
+        wanted = [top * (1 - (i / steps) ** 2) for i in range(steps)]
     elif spacing == "quadratic":
         wanted = [top * ((steps - i) / steps) ** 2 for i in range(steps)]
     elif spacing == "snr":

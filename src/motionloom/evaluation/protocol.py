@@ -11,7 +11,7 @@ from typing import Any, Literal
 from motionloom.diffusion import SOLVERS
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS
-from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING
+from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, STEPS
 
 SPLITS = ("train", "val", "test")
 PUBLISHED_CAPTION = 22
@@ -106,7 +106,7 @@ class Protocol:
     """Captions, and motions of each; (0, 0) leaves it out."""
     multimodal_replications: int = 3
     """Only the first so many replications measure it, as published."""
-    steps: tuple[int, ...] = (5, 20, 50)
+    steps: tuple[int, ...] = (5, STEPS, 50)
     solver: str = SOLVER
     spacing: str = SPACING
     guidance: float = GUIDANCE
@@ -192,7 +192,7 @@ class Protocol:
 
 def quick(protocol: Protocol) -> Protocol:
     """The same in about a minute: one batch, two replications, and at most two step counts that are not large."""
-    few = tuple(s for s in protocol.steps if s <= 20)[:2] or protocol.steps[:1]
+    few = tuple(s for s in protocol.steps if s <= STEPS)[:2] or protocol.steps[:1]
     return replace(
         protocol, count=protocol.batch or 32, replications=2, multimodality=(4, 6), multimodal_replications=1, steps=few
     )

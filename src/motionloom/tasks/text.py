@@ -19,7 +19,7 @@ from motionloom.features.ik import motion_from_positions
 from motionloom.features.layout import LAYOUT, WIDTH
 from motionloom.motion import Motion
 
-STEPS, SOLVER, SPACING, GUIDANCE = 20, "dpm2m-sde", "index", 2.5
+STEPS, SOLVER, SPACING, GUIDANCE = 24, "ddpm", "early", 2.5
 """How motions are sampled unless asked otherwise (docs/decisions/0008)."""
 LONGEST = 60.0
 """Seconds: beyond this one prompt is no longer one action."""
@@ -120,13 +120,13 @@ def generate(
 
 
 def smooth(features: Tensor) -> Tensor:
-    """(..., frames, numbers) weighted 1/4, 1/2, 1/4 along time, ends repeated.
+    """(..., frames, numbers) weighted 1/6, 2/3, 1/6 along time, ends repeated.
 
     A network whose tokens hold several frames draws each token smoothly and leaves small steps between them.
     """
     before = torch.cat([features[..., :1, :], features[..., :-1, :]], dim=-2)
     after = torch.cat([features[..., 1:, :], features[..., -1:, :]], dim=-2)
-    return 0.25 * before + 0.5 * features + 0.25 * after
+    return (before + 4 * features + after) / 6
 
 
 def to_motion(features: np.ndarray, fps: float, *, clean: bool = True) -> Motion:
