@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from motionloom.errors import MotionloomError
 from motionloom.evaluation.protocol import Protocol, Selection, Transitions, quick
-from motionloom.tasks.text import STEPS
 
 
 @pytest.mark.parametrize(
@@ -77,7 +76,7 @@ def test_what_a_resumed_run_must_agree_in_leaves_out_only_how_long_it_runs() -> 
 
 def test_a_quick_run_is_one_batch_twice() -> None:
     short = quick(Protocol())
-    assert (short.count, short.replications, short.steps) == (32, 2, (5, STEPS))
+    assert (short.count, short.replications, short.steps) == (32, 2, (5, 12))
     assert quick(Protocol(steps=(50,))).steps == (50,)
     assert quick(Protocol(batch=None)).count == 32
 

@@ -16,7 +16,7 @@ def add(commands) -> None:
         help="built set, recordings or HumanML3D folder (default: the shipped numbers of held-out CMU recordings)",
     )  # fmt: skip
     text.add_argument("--evaluator", default="own", metavar="own|FILE", help="who judges (default: the shipped one)")
-    text.add_argument("--steps", type=_steps, metavar="5,24,50", help="sampler steps, one row each (default 5,24,50)")
+    text.add_argument("--steps", type=_steps, metavar="5,24,50", help="sampler steps, one row each (default 5,12,24)")
     text.add_argument("--replications", type=int, help="(default 5)")
     text.add_argument("--count", type=int, help="real items, spread evenly (default: all)")
     text.add_argument("--batch", type=_batch, metavar="32|all", help="motions a caption is matched with (default 32)")

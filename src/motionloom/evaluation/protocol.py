@@ -106,7 +106,7 @@ class Protocol:
     """Captions, and motions of each; (0, 0) leaves it out."""
     multimodal_replications: int = 3
     """Only the first so many replications measure it, as published."""
-    steps: tuple[int, ...] = (5, STEPS, 50)
+    steps: tuple[int, ...] = (5, 12, STEPS)
     solver: str = SOLVER
     spacing: str = SPACING
     guidance: float = GUIDANCE
