@@ -206,7 +206,7 @@ def itself() -> list:
     "value",
     [Bomb(Path("was run")), [Bomb(Path("was run"))], {"a": Bomb(Path("was run"))}, print, [["a"]], {"a": ["b"]},
      itself(), collections.OrderedDict(a=1), {1, 2}, ("a",), [1.5], [b"a"], [None], "a", 7, np.int64(3), [np.int64(3)]],
-    ids=str,
+    ids=lambda value: type(value).__name__,
 )  # fmt: skip
 @pytest.mark.parametrize("protocol", [2, 4])
 def test_anything_that_is_not_plain_is_refused_and_not_run(
