@@ -1,0 +1,129 @@
+"""`Goal`: what control asks of a motion, in the world: places of joints, and where the person faces.
+
+Metres, +Y up, radians about +Y (0 faces +Z, a quarter turn +X); 20 frames per second like everything that is drawn.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom.errors import MotionloomError
+from motionloom.skeleton import SMPL22
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+AGREE = 0.01
+"""Metres: two goals that ask the same joint to be at the same time further apart than this contradict each other."""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A place and direction on the ground: the world seen from where somebody stands."""
+
+    x: float = 0.0
+    z: float = 0.0
+    facing: float = 0.0
+
+    def to_world(self, points: np.ndarray) -> Array:
+        """(..., 3) from here (origin, facing +Z) into the world."""
+        return _turned(np.asarray(points, dtype=np.float64), self.facing) + np.array([self.x, 0, self.z])
+
+    def from_world(self, points: np.ndarray) -> Array:
+        """(..., 3) from the world to here."""
+        return _turned(np.asarray(points, dtype=np.float64) - [self.x, 0, self.z], -self.facing)
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """Wishes for each frame. What is not asked may hold any finite number."""
+
+    positions: Array
+    """(frames, 22, 3) metres in the world."""
+    asked: Flags
+    """(frames, 22, 3): which coordinates are asked; a path on the ground asks x and z of the pelvis (joint 0)."""
+    facing: Array
+    """(frames,) radians."""
+    facing_asked: Flags
+    """(frames,)"""
+
+    def __post_init__(self) -> None:
+        frames = len(self.positions)
+        shapes = (frames, len(SMPL22), 3), (frames, len(SMPL22), 3), (frames,), (frames,)
+        parts = (self.positions, self.asked, self.facing, self.facing_asked)
+        if frames < 1 or any(part.shape != shape for part, shape in zip(parts, shapes, strict=True)):
+            raise MotionloomError(f"a goal's parts do not fit each other: {[part.shape for part in parts]}")
+        if not (np.isfinite(self.positions[self.asked]).all() and np.isfinite(self.facing[self.facing_asked]).all()):
+            raise MotionloomError("a goal asks for a place that is not finite (NaN or infinity)")
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    @property
+    def empty(self) -> bool:
+        """Whether nothing at all is asked."""
+        return not (self.asked.any() or self.facing_asked.any())
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints that are asked anywhere, in the skeleton's order."""
+        return tuple(SMPL22.names[joint] for joint in np.flatnonzero(self.asked.any(axis=(0, 2))))
+
+    @staticmethod
+    def nothing(frames: int) -> "Goal":
+        """No wishes for so many frames."""
+        shape = (frames, len(SMPL22), 3)
+        return Goal(np.zeros(shape), np.zeros(shape, bool), np.zeros(frames), np.zeros(frames, bool))
+
+    def crop(self, first: int, last: int) -> "Goal":
+        """The frames from ``first`` to before ``last``."""
+        part = slice(first, last)
+        return Goal(self.positions[part], self.asked[part], self.facing[part], self.facing_asked[part])
+
+    def padded(self, before: int, after: int) -> "Goal":
+        """With so many frames without wishes around it."""
+        ends = Goal.nothing(before + len(self) + after)
+        part = slice(before, before + len(self))
+        for whole, own in zip(_parts(ends), _parts(self), strict=True):
+            whole[part] = own
+        return ends
+
+    def seen_from(self, place: Placement) -> "Goal":
+        """The same wishes in coordinates in which ``place`` is the origin and faces +Z.
+
+        Single horizontal coordinates cannot be turned: both or none of x and z must be asked unless nothing turns.
+        """
+        if place.facing and (self.asked[..., 0] != self.asked[..., 2]).any():
+            raise MotionloomError("a goal that asks for only one of x and z cannot be seen from another direction")
+        return replace(self, positions=place.from_world(self.positions), facing=self.facing - place.facing)
+
+
+def merged(first: Goal, second: Goal) -> Goal:
+    """The wishes of both; MotionloomError where they ask for different places (`AGREE`), naming joint and time."""
+    if len(first) != len(second):
+        raise MotionloomError(f"goals of {len(first)} and {len(second)} frames cannot be put together")
+    both = first.asked & second.asked
+    apart = np.where(both, np.abs(first.positions - second.positions), 0.0)
+    if apart.max(initial=0.0) > AGREE:
+        frame, joint, _ = np.unravel_index(int(apart.argmax()), apart.shape)
+        raise MotionloomError(
+            f"two goals contradict each other: {SMPL22.names[joint]} at {frame / 20:.2f} s is asked to be in two "
+            f"places {apart.max():.2f} m apart; drop one of them"
+        )
+    return Goal(
+        np.where(first.asked, first.positions, second.positions),
+        first.asked | second.asked,
+        np.where(first.facing_asked, first.facing, second.facing),
+        first.facing_asked | second.facing_asked,
+    )
+
+
+def _parts(goal: Goal) -> tuple[np.ndarray, ...]:
+    return goal.positions, goal.asked, goal.facing, goal.facing_asked
+
+
+def _turned(points: Array, angle: float) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    x, z = points[..., 0], points[..., 2]
+    return np.stack([c * x + s * z, points[..., 1], c * z - s * x], axis=-1)
