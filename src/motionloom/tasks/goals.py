@@ -16,6 +16,11 @@ Flags = NDArray[np.bool_]
 
 AGREE = 0.01
 """Metres: two goals that ask the same joint to be at the same time further apart than this contradict each other."""
+AGREE_TURN = np.radians(5.0)
+"""Radians: the same for directions."""
+SET_OUT = 0.05
+"""Metres from its beginning at which a path shows its first direction."""
+_ACROSS = list(SMPL22.resolve(["left_hip", "right_hip", "left_shoulder", "right_shoulder"]))
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,11 @@ class Placement:
         """(..., 3) from the world to here."""
         return _turned(np.asarray(points, dtype=np.float64) - [self.x, 0, self.z], -self.facing)
 
+    def seen_from(self, place: "Placement") -> "Placement":
+        """This place in coordinates in which ``place`` is the origin and faces +Z."""
+        x, _, z = place.from_world(np.array([self.x, 0.0, self.z]))
+        return Placement(float(x), float(z), self.facing - place.facing)
+
 
 @dataclass(frozen=True, eq=False)
 class Goal:
@@ -47,6 +57,8 @@ class Goal:
     """(frames,) radians."""
     facing_asked: Flags
     """(frames,)"""
+    start: Placement | None = None
+    """Where the person stands at frame 0, where that is known; no wish, and `placement_of` falls back on the wishes."""
 
     def __post_init__(self) -> None:
         frames = len(self.positions)
@@ -79,7 +91,8 @@ class Goal:
     def crop(self, first: int, last: int) -> "Goal":
         """The frames from ``first`` to before ``last``."""
         part = slice(first, last)
-        return Goal(self.positions[part], self.asked[part], self.facing[part], self.facing_asked[part])
+        start = self.start if first == 0 else None
+        return Goal(self.positions[part], self.asked[part], self.facing[part], self.facing_asked[part], start)
 
     def padded(self, before: int, after: int) -> "Goal":
         """With so many frames without wishes around it."""
@@ -87,7 +100,7 @@ class Goal:
         part = slice(before, before + len(self))
         for whole, own in zip(_parts(ends), _parts(self), strict=True):
             whole[part] = own
-        return ends
+        return ends if before else replace(ends, start=self.start)
 
     def seen_from(self, place: Placement) -> "Goal":
         """The same wishes in coordinates in which ``place`` is the origin and faces +Z.
@@ -96,7 +109,44 @@ class Goal:
         """
         if place.facing and (self.asked[..., 0] != self.asked[..., 2]).any():
             raise MotionloomError("a goal that asks for only one of x and z cannot be seen from another direction")
-        return replace(self, positions=place.from_world(self.positions), facing=self.facing - place.facing)
+        return replace(
+            self,
+            positions=place.from_world(self.positions),
+            facing=self.facing - place.facing,
+            start=None if self.start is None else self.start.seen_from(place),
+        )
+
+
+def placement_of(goal: Goal) -> Placement:
+    """Where the person stands at frame 0: `Goal.start` or, without it, what the wishes say.
+
+    The place is the pelvis's, the direction that of the facing asked at frame 0, else of the hips and shoulders asked
+    there, else the way that the pelvis's path sets out. What nobody asks is 0: the origin, facing +Z.
+    """
+    if goal.start is not None:
+        return goal.start
+    x, z = np.where(goal.asked[0, 0, [0, 2]], goal.positions[0, 0, [0, 2]], 0.0)
+    return Placement(float(x), float(z), _first_facing(goal))
+
+
+def _first_facing(goal: Goal) -> float:
+    if goal.facing_asked[0]:
+        return float(goal.facing[0])
+    if goal.asked[0, _ACROSS][:, [0, 2]].all():
+        return body_facing(goal.positions[0])
+    on_path = np.flatnonzero(goal.asked[:, 0][:, [0, 2]].all(axis=-1))
+    if len(on_path) == 0 or on_path[0] != 0:
+        return 0.0
+    way = goal.positions[on_path, 0][:, [0, 2]] - goal.positions[0, 0, [0, 2]]
+    away = np.flatnonzero(np.linalg.norm(way, axis=-1) > SET_OUT)
+    return float(np.arctan2(*way[away[0]])) if len(away) else 0.0
+
+
+def body_facing(positions: np.ndarray) -> float:
+    """Radians: where a person of places (22, 3) faces, square to hips and shoulders together (HumanML3D's rule)."""
+    left_hip, right_hip, left_shoulder, right_shoulder = positions[_ACROSS]
+    across = left_hip - right_hip + left_shoulder - right_shoulder
+    return float(np.arctan2(-across[2], across[0]))
 
 
 def merged(first: Goal, second: Goal) -> Goal:
@@ -111,12 +161,43 @@ def merged(first: Goal, second: Goal) -> Goal:
             f"two goals contradict each other: {SMPL22.names[joint]} at {frame / 20:.2f} s is asked to be in two "
             f"places {apart.max():.2f} m apart; drop one of them"
         )
+    _check_turns(first, second)
+    _check_starts(first.start, second.start)
     return Goal(
         np.where(first.asked, first.positions, second.positions),
         first.asked | second.asked,
         np.where(first.facing_asked, first.facing, second.facing),
         first.facing_asked | second.facing_asked,
+        second.start if first.start is None else first.start,
     )
+
+
+def _check_turns(first: Goal, second: Goal) -> None:
+    both = first.facing_asked & second.facing_asked
+    apart = np.where(both, np.abs(turn_between(first.facing, second.facing)), 0.0)
+    if apart.max(initial=0.0) > AGREE_TURN:
+        frame = int(apart.argmax())
+        raise MotionloomError(
+            f"two goals contradict each other: at {frame / 20:.2f} s the person is asked to face two directions "
+            f"{np.degrees(apart.max()):.0f} degrees apart; drop one of them"
+        )
+
+
+def _check_starts(first: Placement | None, second: Placement | None) -> None:
+    if first is None or second is None:
+        return
+    apart = float(np.hypot(first.x - second.x, first.z - second.z))
+    turn = abs(float(turn_between(first.facing, second.facing)))
+    if apart > AGREE or turn > AGREE_TURN:
+        raise MotionloomError(
+            f"two goals contradict each other: the person is asked to start in two places {apart:.2f} m and "
+            f"{np.degrees(turn):.0f} degrees apart; drop one of them"
+        )
+
+
+def turn_between(a: np.ndarray | float, b: np.ndarray | float) -> Array:
+    """Radians from direction ``b`` to ``a`` the short way, -pi to pi."""
+    return (np.asarray(a, dtype=np.float64) - b + np.pi) % (2 * np.pi) - np.pi
 
 
 def _parts(goal: Goal) -> tuple[np.ndarray, ...]:
