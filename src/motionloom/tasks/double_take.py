@@ -153,8 +153,8 @@ class Plan:
 
     def middle(self, row: int) -> slice:
         """The frames of a row without its handshakes (the first and the last row lose theirs at both ends too)."""
-        last = len(self.handshakes) - 1
-        return slice(self.handshakes[max(row - 1, 0)], self.lengths[row] - self.handshakes[min(row, last)])
+        shared = self.handshakes or (0,)
+        return slice(shared[max(row - 1, 0)], self.lengths[row] - shared[min(row, len(shared) - 1)])
 
     def size(self, row: int) -> int:
         """Frames of `middle`."""
@@ -169,7 +169,7 @@ class Plan:
     @property
     def width(self) -> int:
         """Frames of the padded sandwiches: 2 (Lmax - 2h) + h for one handshake h, as published."""
-        return 2 * max(map(self.size, range(len(self.lengths)))) + max(self.handshakes)
+        return 2 * max(map(self.size, range(len(self.lengths)))) + max(self.handshakes, default=0)
 
     @property
     def ends(self) -> list[int]:
