@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def add(subparsers) -> None:
-    """Register `train prior` and `train evaluator`."""
+    """Register `train prior`, `train evaluator` and `train control`."""
     train = subparsers.add_parser("train", help="train a model from a recipe; goes on where it was stopped")
     commands = train.add_subparsers(metavar="MODEL", required=True)
     prior = commands.add_parser("prior", help="a text-to-motion prior on a built set")
@@ -15,6 +15,9 @@ def add(subparsers) -> None:
     evaluator = commands.add_parser("evaluator", help="a text-motion evaluator on a built set, by contrast")
     _options(evaluator, "evaluator.toml")
     evaluator.set_defaults(run=_evaluator)
+    control = commands.add_parser("control", help="an adapter (or a whole prior) that obeys what is given")
+    _options(control, "control.toml")
+    control.set_defaults(run=_control)
 
 
 def _options(parser: argparse.ArgumentParser, recipe: str) -> None:
@@ -42,6 +45,12 @@ def _evaluator(arguments: argparse.Namespace) -> None:
     from motionloom.train.evaluator import train_evaluator
 
     _train(arguments, train_evaluator)
+
+
+def _control(arguments: argparse.Namespace) -> None:
+    from motionloom.train.control import train_control
+
+    _train(arguments, train_control)
 
 
 def _train(arguments: argparse.Namespace, make: Callable[..., Path]) -> None:

@@ -1,7 +1,7 @@
 """What a step of training minimises. An objective owns the modules and turns a batch into one number."""
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import torch
@@ -70,6 +70,17 @@ class WordBank:
         return condition(self.pooled[texts], tokens=tokens.float(), words=words, lengths=lengths)
 
 
+class Drawn(NamedTuple):
+    """One step's samples."""
+
+    clean: Tensor
+    """(rows, frames, features) standardised."""
+    level: Tensor
+    """(rows,)"""
+    noise: Tensor
+    cond: Condition
+
+
 class CleanGuess:
     """Mean squared error of the clean guess at a uniformly drawn level (Tevet et al. 2023, eq. 2), blocks weighted.
 
@@ -79,32 +90,40 @@ class CleanGuess:
     """
 
     def __init__(
-        self, net: PriorNet, schedule: Schedule, batches: Batches, words: WordBank, *, drop_text: float = 0.1,
+        self, net: nn.Module, schedule: Schedule, batches: Batches, words: WordBank, *, drop_text: float = 0.1,
         weights: dict[str, float] = WEIGHTS, displacement: float = 0.0, device: str = "cpu",
     ) -> None:  # fmt: skip
         self.net, self.schedule, self.batches, self.words = net, schedule, batches, words
         self.drop_text, self.displacement, self.device = drop_text, displacement, device
         self.mean, self.std = batches.data.mean.to(device), batches.data.std.to(device)
-        scale = torch.ones(net.config.features)
+        scale = torch.ones(len(self.mean))
         for name, block in LAYOUT.items():
             scale[block] = weights[name]
         self.scale = (scale / scale.mean()).to(device)
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `Objective.loss`."""
+        drawn = self.drawn(seed, step, rows)
+        noised = self.schedule.noised(drawn.clean, drawn.level, drawn.noise)
+        return self.error(net(noised, drawn.level, drawn.cond), drawn)
+
+    def drawn(self, seed: int, step: int, rows: int) -> Drawn:
+        """What a step looks at, from ``(seed, step)`` alone, on the objective's device."""
         batch: Batch = self.batches.draw(seed, step, rows)
         generator = torch.Generator().manual_seed(int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0]))
         level = torch.randint(1, self.schedule.steps + 1, (rows,), generator=generator)
         noise = torch.randn(batch.features.shape, generator=generator)
         keep = torch.rand(rows, generator=generator) >= self.drop_text
         cond = self.words.condition(batch.texts, batch.lengths).choose(keep)
-        clean, level = batch.features.to(self.device), level.to(self.device)
         cond = Condition(*(part.to(self.device) for part in cond))
-        noised = self.schedule.noised(clean, level, noise.to(self.device))
-        guess = net(noised, level, cond)
-        error = masked_error(guess, clean, cond.lengths, self.scale)
+        return Drawn(batch.features.to(self.device), level.to(self.device), noise.to(self.device), cond)
+
+    def error(self, guess: Tensor, drawn: Drawn) -> Tensor:
+        """What a guess of the clean data costs."""
+        error = masked_error(guess, drawn.clean, drawn.cond.lengths, self.scale)
         if self.displacement:
-            error = error + self.displacement * displacement_error(guess, clean, cond.lengths, self.mean, self.std)
+            moved = displacement_error(guess, drawn.clean, drawn.cond.lengths, self.mean, self.std)
+            error = error + self.displacement * moved
         return error
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from motionloom.checkpoint import (
     SCHEDULES,
@@ -50,9 +50,7 @@ def train_prior(
                 f"the recipe's network {net.config} is not that of {recipe.start!r}, {start.net.config}; copy its [net]"
             )
         net.load_state_dict(start.net.state_dict())
-        mean, std = start.mean, start.std
-        restandardised = (motions.features * motions.std + motions.mean - mean) / std
-        motions = replace(motions, features=restandardised, mean=mean, std=std)
+        motions = restandardised(motions, start.mean, start.std)
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
     words = WordBank(text, motions.texts, progress=say if world.rank == 0 else lambda line: None)
@@ -80,6 +78,12 @@ def train_prior(
     log = Log(folder, recipe, say=say) if world.rank == 0 else None
     train(objective, recipe, folder, world=world, wrap=wrap, on_save=export, on_step=log, stop=stop)
     return place
+
+
+def restandardised(motions: MotionSet, mean: Tensor, std: Tensor) -> MotionSet:
+    """The same motions under other statistics, (features,) each."""
+    features = (motions.features * motions.std + motions.mean - mean) / std
+    return replace(motions, features=features, mean=mean, std=std)
 
 
 def text_encoder(weights: str) -> TextEncoder:

@@ -59,6 +59,16 @@ class Recipe:
     """What the sample pictures show."""
     start: str = ""
     """Weights to go on from: a shipped name or a path; empty: random ones."""
+    control: str = ""
+    """Control training: what is given, see `motionloom.train.control.CONTROLS`."""
+    full: bool = False
+    """Control training: change all weights, as published, instead of making an adapter."""
+    rank: int = 12
+    """Rank of an adapter."""
+    mask_rank: int = 32
+    """Rank of an adapter's mask input; 0: the network is not told what is given."""
+    adapter: str = ""
+    """Adapter to go on from: a shipped name or a path; empty: none."""
     net: dict[str, Any] = field(default_factory=dict)
     """Sizes of the network, see `motionloom.nets.prior.NetConfig`."""
 
@@ -104,13 +114,15 @@ def _check(path: Path, recipe: Recipe) -> None:
         "rate": 10.0,
         "decay": 10.0,
         "displacement": 1000.0,
+        "rank": 512,
+        "mask_rank": 512,
         "save_every": 10**9,
     }
     for key, limit in limits.items():
         if not 0 <= getattr(recipe, key) <= limit:
             raise MotionloomError(f"{path}: {key} must be from 0 to {limit:g}; got {getattr(recipe, key)!r}")
     good = (
-        recipe.steps > 0 < recipe.batch and recipe.rate > 0 and 0 <= recipe.ema < 1 and 0 <= recipe.drop_text < 1
+        recipe.steps > 0 < recipe.batch and recipe.rank > 0 and recipe.rate > 0 and 0 <= recipe.ema < 1 and 0 <= recipe.drop_text < 1
         and recipe.levels > 1 and 0 <= recipe.cooldown <= 1 and recipe.clip > 0 and recipe.save_every > 0
         and len(recipe.windows) == len(recipe.shares) > 0 and 0 < min(recipe.windows) <= max(recipe.windows) <= 10_000
         and min(recipe.shares) >= 0 < sum(recipe.shares)
