@@ -5,6 +5,7 @@ it (chapter 7). Styles, percentages and units other than the drawing's own are n
 """
 
 import re
+from itertools import pairwise
 from pathlib import Path
 from xml.parsers import expat
 
@@ -261,7 +262,7 @@ class _Pen:
         u = np.linspace(0, 1, 2 if kind == "L" else _FINE + 1)[1:]
         curve = [self.at, *p]
         while len(curve) > 1:  # de Casteljau
-            curve = [a * (1 - u) + b * u for a, b in zip(curve[:-1], curve[1:], strict=True)]
+            curve = [a * (1 - u) + b * u for a, b in pairwise(curve)]
         self._to([*curve[0]], kind, p[-2] if len(p) > 1 else p[-1])
 
     def _to(self, points: list[complex], kind: str, handle: complex | None = None) -> None:

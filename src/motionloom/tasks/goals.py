@@ -14,6 +14,8 @@ from motionloom.skeleton import SMPL22
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+FPS = 20.0
+"""Frames per second of every goal."""
 AGREE = 0.01
 """Metres: two goals that ask the same joint to be at the same time further apart than this contradict each other."""
 AGREE_TURN = np.radians(5.0)
@@ -158,7 +160,7 @@ def merged(first: Goal, second: Goal) -> Goal:
     if apart.max(initial=0.0) > AGREE:
         frame, joint, _ = np.unravel_index(int(apart.argmax()), apart.shape)
         raise MotionloomError(
-            f"two goals contradict each other: {SMPL22.names[joint]} at {frame / 20:.2f} s is asked to be in two "
+            f"two goals contradict each other: {SMPL22.names[joint]} at {frame / FPS:.2f} s is asked to be in two "
             f"places {apart.max():.2f} m apart; drop one of them"
         )
     _check_turns(first, second)
@@ -178,7 +180,7 @@ def _check_turns(first: Goal, second: Goal) -> None:
     if apart.max(initial=0.0) > AGREE_TURN:
         frame = int(apart.argmax())
         raise MotionloomError(
-            f"two goals contradict each other: at {frame / 20:.2f} s the person is asked to face two directions "
+            f"two goals contradict each other: at {frame / FPS:.2f} s the person is asked to face two directions "
             f"{np.degrees(apart.max()):.0f} degrees apart; drop one of them"
         )
 

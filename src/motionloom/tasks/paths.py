@@ -4,12 +4,13 @@ Points on the ground are (x, z) in metres; directions are radians about +Y, 0 al
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
-from motionloom.tasks.goals import turn_between
+from motionloom.tasks.goals import FPS, Goal, turn_between
 
 Array = NDArray[np.float64]
 
@@ -64,20 +65,24 @@ def _tangents(velocity: Array, span: Array, *, closed: bool) -> Array:
     return mean * np.minimum(1, limit / np.maximum(size, 1e-300))[:, None]
 
 
-def even(points: np.ndarray, count: int, *, smooth: bool = True) -> Array:
-    """(n, d) points to ``count`` places along the way through them, equally far apart; the ends are the ends."""
+def even(points: np.ndarray, shares: np.ndarray, *, smooth: bool = True) -> Array:
+    """(n, d) points to the places at ``shares`` (0 to 1) of the length of the way through them."""
     points = np.asarray(points, dtype=np.float64)
     moved = np.linalg.norm(np.diff(points, axis=0), axis=-1)
     points = points[np.concatenate([[True], moved > 0])]
     if len(points) == 1:
-        return np.repeat(points, count, axis=0)
+        return np.repeat(points, len(shares), axis=0)
     if smooth and len(points) > 2:
-        chord = np.concatenate([[0.0], np.linalg.norm(np.diff(points, axis=0), axis=-1).cumsum()])
-        parts = [np.linspace(a, b, _FINE, endpoint=False) for a, b in zip(chord[:-1], chord[1:], strict=True)]
+        chord = _lengths(points)
+        parts = [np.linspace(a, b, _FINE, endpoint=False) for a, b in pairwise(chord)]
         points = through(points, chord, np.concatenate([*parts, chord[-1:]]))
-    length = np.concatenate([[0.0], np.linalg.norm(np.diff(points, axis=0), axis=-1).cumsum()])
-    at = np.linspace(0, length[-1], count)
-    return np.stack([np.interp(at, length, column) for column in points.T], axis=-1)
+    length = _lengths(points)
+    return np.stack([np.interp(np.asarray(shares) * length[-1], length, column) for column in points.T], axis=-1)
+
+
+def _lengths(points: np.ndarray) -> Array:
+    """(n,) metres from the first point along straight lines."""
+    return np.concatenate([[0.0], np.linalg.norm(np.diff(points, axis=0), axis=-1).cumsum()])
 
 
 def along(path: np.ndarray, fps: float) -> Array:
@@ -124,29 +129,78 @@ def curve(name: str, size: float, *, turn: str = "left") -> Array:
     return points if turn == "left" else points * [-1.0, 1.0]
 
 
-def check_speed(path: np.ndarray, times: np.ndarray) -> None:
-    """MotionloomError where (n, 2 or 3) places at ``times`` (n,) are further apart than anybody runs (`FASTEST`)."""
-    if len(path) < 2:
-        return
-    lengths, spans = np.linalg.norm(np.diff(path, axis=0), axis=-1), np.diff(times)
+def root_path(
+    points: np.ndarray | Sequence[Sequence[float]],
+    times: Sequence[float] | None = None,
+    *,
+    frames: int,
+    facing: str | float | Sequence[float] = "along",
+    smooth: bool = True,
+    span: tuple[float, float] | None = None,
+    fps: float = FPS,
+) -> Goal:
+    """A path of the pelvis on the ground as a goal of so many frames.
+
+    points: (n, 2) metres, x and z in the world. times: seconds at the points, rising; None: walked at even speed from
+    ``span[0]`` to ``span[1]`` seconds (None: the whole motion). smooth: a curve through the points (`through`) instead
+    of straight lines. facing: "along" the path (`along`), "free", or degrees: one number, or one per point in between
+    which it turns evenly as written (0 to 360 is a whole turn). Frames before the first and after the last time are
+    free. Raises `MotionloomError` for points that nobody can reach in time (`FASTEST`).
+    """
+    points = np.asarray(points, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2 or len(points) == 0 or not np.isfinite(points).all():
+        raise MotionloomError(f"a path needs (n, 2) finite places x, z, at least one; got an array {points.shape}")
+    if times is not None and (len(times) != len(points) or not (np.diff(times) > 0).all()):
+        raise MotionloomError(f"a path of {len(points)} points needs as many times, rising; got {list(times)[:20]}")
+    begin, end = span or ((0.0, (frames - 1) / fps) if times is None else (times[0], times[-1]))
+    first, last = int(np.ceil(begin * fps - 1e-6)), min(frames - 1, int(np.floor(end * fps + 1e-6)))
+    if last < first:
+        raise MotionloomError(f"a path from {begin:g} to {end:g} s has no frame in a motion of {frames / fps:g} s")
+    at = np.arange(first, last + 1) / fps
+    if times is None:
+        way = even(points, ((at - begin) / max(end - begin, 1e-9)).clip(0, 1), smooth=smooth)
+        # chords are no longer than the curve: a path that they cannot keep to is told as a whole
+        lengths = _lengths(points)
+        check_speed(lengths[[0, -1], None], np.array([begin, end]))
+        times = begin + (end - begin) * lengths / max(lengths[-1], 1e-9)
+    else:
+        check_speed(points, np.asarray(times, dtype=np.float64))
+        way = through(points, np.asarray(times), at, smooth=smooth)
+    goal = Goal.nothing(frames)
+    goal.positions[first : last + 1, 0, 0], goal.positions[first : last + 1, 0, 2] = way.T
+    goal.asked[first : last + 1, 0, 0] = goal.asked[first : last + 1, 0, 2] = True
+    if facing != "free" and not (facing == "along" and np.ptp(way, axis=0).max() < 1e-3):
+        goal.facing[first : last + 1] = _facing(facing, way, times, at, fps)
+        goal.facing_asked[first : last + 1] = True
+    return goal
+
+
+def _facing(facing: str | float | Sequence[float], way: Array, times: Sequence[float], at: Array, fps: float) -> Array:
+    if isinstance(facing, str):
+        if facing != "along":
+            raise MotionloomError(f"a path's facing is 'along', 'free' or degrees; got {facing!r}")
+        return along(way, fps)
+    degrees = np.atleast_1d(np.asarray(facing, dtype=np.float64))
+    if len(degrees) == 1:
+        return np.full(len(at), np.radians(degrees[0]))
+    if len(degrees) != len(times):
+        raise MotionloomError(f"a path of {len(times)} points needs as many facings; got {len(degrees)}")
+    return np.radians(np.interp(at, times, degrees))
+
+
+def check_speed(places: np.ndarray, times: np.ndarray) -> None:
+    """MotionloomError where (n, d) places at ``times`` (n,) are further apart than anybody runs (`FASTEST`)."""
+    spans = np.maximum(np.diff(times), 1e-9)
+    lengths = np.linalg.norm(np.diff(places, axis=0), axis=-1)
     speed = lengths / spans
-    if speed.max() <= FASTEST:
+    if speed.max(initial=0.0) <= FASTEST:
         return
     worst = int(speed.argmax())
-    if speed.max() <= 1.05 * np.median(speed):
-        piece, length, needs = "the path", lengths.sum(), lengths.sum() / FASTEST
-    else:
-        piece = f"the path from {times[worst]:.2f} to {times[worst + 1]:.2f} s"
-        length, needs = lengths[worst], lengths[worst] / FASTEST
     raise MotionloomError(
-        f"{piece} is {length:.1f} m long and asks for {speed.max():.1f} m/s, and nobody runs faster than "
-        f"{FASTEST:g} m/s; give it at least {needs:.1f} s"
+        f"from {times[worst]:.2f} to {times[worst + 1]:.2f} s the path is {lengths[worst]:.1f} m long and asks for "
+        f"{speed[worst]:.1f} m/s, and nobody runs faster than {FASTEST:g} m/s; give it at least "
+        f"{np.ceil(lengths[worst] / FASTEST * 100) / 100:.2f} s"
     )
-
-
-def facing_through(degrees: Sequence[float], times: np.ndarray, at: np.ndarray) -> Array:
-    """(n,) degrees at ``times`` to radians at ``at``, linearly and as written: 0 to 360 is a whole turn."""
-    return np.radians(np.interp(at, times, np.asarray(degrees, dtype=np.float64)))
 
 
 def turned_to(points: np.ndarray, facing: float) -> Array:

@@ -1,0 +1,131 @@
+"""Parsed JSON or YAML from strangers, taken apart so that every mistake is told with the name of its key."""
+
+import difflib
+import math
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path, PureWindowsPath
+from typing import Any, NoReturn
+
+from motionloom.errors import MotionloomError
+from motionloom.io.text import shown
+
+
+@dataclass(frozen=True)
+class Field:
+    """A value and how its keys name it, such as ``joints[1].points[3].time``; the outermost one's name is empty."""
+
+    value: Any
+    name: str = ""
+    source: str = ""
+    """The file, as messages begin; empty for a mapping from elsewhere."""
+
+    def fail(self, message: str) -> NoReturn:
+        """Raise a `MotionloomError` that names the file and the key."""
+        said = f"'{self.name}' {message}" if self.name else f"the goal {message}"
+        raise MotionloomError(f"{self.source}: {said}" if self.source else said)
+
+    def wrong(self, wanted: str) -> NoReturn:
+        """Say what was wanted and what is there."""
+        self.fail(f"must be {wanted}; got {_kind(self.value)}")
+
+    def mapping(self, known: Collection[str], needed: Collection[str] = ()) -> dict[str, "Field"]:
+        """The values by key; no key but ``known`` ones, and all that are ``needed``."""
+        if not isinstance(self.value, Mapping):
+            self.wrong(f"a mapping with {listed(known)}")
+        for key in self.value:
+            if key not in known:
+                near = difflib.get_close_matches(str(key)[:40], known, n=1)
+                meant = f" (did you mean '{near[0]}'?)" if near else ""
+                self.fail(f"has the unknown key {shown(str(key))}{meant}; it may have {listed(known)}")
+        for key in needed:
+            if key not in self.value:
+                self.fail(f"has no '{key}'; it needs {listed(needed)}")
+        return {key: self._inner(value, f".{key}") for key, value in self.value.items()}
+
+    def items(self, *, least: int = 1, most: int = 100_000) -> list["Field"]:
+        """The entries of a list."""
+        if not isinstance(self.value, list | tuple):
+            self.wrong("a list")
+        if not least <= len(self.value) <= most:
+            self.fail(f"has {len(self.value):,} entries; give {least} to {most:,}")
+        return list(self._numbered())
+
+    def _numbered(self) -> Iterator["Field"]:
+        for number, value in enumerate(self.value):
+            yield self._inner(value, f"[{number}]")
+
+    def _inner(self, value: Any, name: str) -> "Field":
+        return Field(value, f"{self.name}{name}".removeprefix("."), self.source)
+
+    def number(self, low: float, high: float) -> float:
+        """A finite number from ``low`` to ``high``."""
+        if isinstance(self.value, bool) or not isinstance(self.value, int | float):
+            self.wrong("a number")
+        if not low <= self.value <= high or not math.isfinite(self.value):
+            self.fail(f"must be {low:g} to {high:g}; got {_kind(self.value)}")
+        return float(self.value)
+
+    def numbers(self, low: float, high: float, *, least: int = 1, most: int = 100_000) -> list[float]:
+        """A list of finite numbers."""
+        return [item.number(low, high) for item in self.items(least=least, most=most)]
+
+    def flag(self) -> bool:
+        """True or false."""
+        if not isinstance(self.value, bool):
+            self.wrong("true or false")
+        return self.value
+
+    def word(self, known: Collection[str]) -> str:
+        """One of the words."""
+        if not isinstance(self.value, str):
+            self.wrong(f"one of {', '.join(known)}")
+        if self.value not in known:
+            near = difflib.get_close_matches(self.value[:40], known, n=1)
+            self.fail(
+                f"is {shown(self.value)}{f' (did you mean {near[0]!r}?)' if near else ''}; there are {', '.join(known)}"
+            )
+        return self.value
+
+    def file(self, folder: Path) -> Path:
+        """A file in ``folder`` or below it, named from there; a file from a stranger reads nothing else."""
+        said = self.value
+        if not isinstance(said, str) or not said.strip() or not said.isprintable():
+            self.wrong("the name of a file")
+        foreign = PureWindowsPath(said)
+        if foreign.drive or foreign.root or ".." in foreign.parts:
+            self.fail(
+                f"is {shown(said)}, which leads out of the folder {folder}; put the file there and name it without "
+                "'..' and without a leading '/'"
+            )
+        place = folder / said
+        try:
+            inside, there = place.resolve().is_relative_to(folder.resolve()), place.is_file()
+        except (OSError, ValueError, RuntimeError):
+            inside, there = True, False
+        if not inside:
+            self.fail(f"is {shown(said)}, a link that leads out of the folder {folder}; copy the file there")
+        if not there:
+            self.fail(f"names {shown(said, 200)}, and there is no such file in {folder}")
+        return place
+
+
+def listed(keys: Collection[str]) -> str:
+    """'a, b and c'"""
+    *first, last = keys
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def _kind(value: Any) -> str:
+    """A value for a message: what it is, and itself where that is short."""
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return "a number beyond all bounds" if isinstance(value, int) and abs(value) > 10**300 else f"{value:g}"
+    if isinstance(value, str):
+        return shown(value)
+    if isinstance(value, Mapping):
+        return "a mapping"
+    return f"a list of {len(value)}" if isinstance(value, list | tuple) else f"a {type(value).__name__}"
