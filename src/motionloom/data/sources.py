@@ -1,4 +1,4 @@
-"""Where takes come from: the mocap pack, a CMU download, an official HumanML3D folder. One reader per layout."""
+"""Where takes come from: the mocap pack, a CMU download, a HumanML3D or a BABEL folder. One reader per layout."""
 
 import csv
 import gzip
@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from motionloom.data import babel
+from motionloom.data.paths import inside
 from motionloom.data.words import describe_index
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import WIDTH
@@ -20,6 +22,7 @@ from motionloom.retarget import to_smpl22
 CMU_LICENCE = "CMU mocap: free for research and commercial use; acknowledge mocap.cs.cmu.edu, NSF EIA-0196217"
 BANDAI_LICENCE = "Bandai-Namco-Research-Motiondataset, CC BY-NC 4.0: non-commercial use only"
 UNKNOWN_LICENCE = "not stated: as the owner of the recordings allows"
+BABEL_LICENCE = "BABEL / AMASS: non-commercial research under the licences of BABEL, AMASS and its subsets"
 HUMANML3D_LICENCE = "HumanML3D / AMASS: research use under the licences of AMASS and its subsets"
 
 
@@ -52,16 +55,20 @@ def find_takes(folder: Path | str, *, captions: Path | str | None = None) -> lis
     """The takes of a folder, whose layout is recognised by the files in it."""
     folder = Path(folder)
     if not folder.is_dir():
-        raise MotionloomError(f"{folder} is not a folder; name the mocap pack, a CMU download or a HumanML3D folder")
+        raise MotionloomError(
+            f"{folder} is not a folder; name the mocap pack, a CMU download, a HumanML3D or a BABEL folder"
+        )
     if (folder / "manifest.csv").is_file():
         return list(_pack(folder))
     if (folder / "new_joint_vecs").is_dir():
         return list(_humanml3d(folder))
+    if babel.is_babel(folder):
+        return list(_babel(folder))
     takes = list(_cmu(folder, Path(captions) if captions else None))
     if not takes:
         raise MotionloomError(
-            f"{folder} has no manifest.csv, no new_joint_vecs and no .amc or .bvh files; "
-            "name the mocap pack, a HumanML3D folder or a CMU download"
+            f"{folder} has no manifest.csv, no new_joint_vecs, no train.json of BABEL and no .amc or .bvh files; "
+            "name the mocap pack, a HumanML3D folder, a BABEL folder or a CMU download"
         )
     return takes
 
@@ -85,7 +92,7 @@ def _pack(folder: Path) -> Iterator[Take]:
 
 
 def _pack_take(folder: Path, row: dict[str, str], written: dict[str, list[Span]]) -> Take:
-    path, source = _inside(folder, row["path"]), row["source"]
+    path, source = inside(folder, row["path"]), row["source"]
     if row["split"] not in ("train", "val", "test"):
         raise ValueError(f"split {row['split']!r} of {row['clip']} is not train, val or test")
     spans = [] if source.startswith("bandai") else written.get(row["clip"], [])
@@ -145,7 +152,7 @@ def _humanml3d(folder: Path) -> Iterator[Take]:
         for name in listed.read_text(encoding="utf-8").split():
             if name.startswith("M"):
                 continue  # mirrored copies are made here
-            path = _inside(folder, f"new_joint_vecs/{name}.npy")
+            path = inside(folder, f"new_joint_vecs/{name}.npy")
             yield Take(
                 name,
                 "humanml3d",
@@ -154,6 +161,24 @@ def _humanml3d(folder: Path) -> Iterator[Take]:
                 tuple(_texts(folder / "texts" / f"{name}.txt")),
                 _features(path),
             )
+
+
+def _babel(folder: Path) -> Iterator[Take]:
+    """BABEL beside AMASS: every labelled stretch keeps its label, in seconds of the recording."""
+    for recording in babel.find_recordings(folder):
+        spans = [Span(0.0, float("inf"), recording.whole, "human")] if recording.whole else []
+        spans += [Span(s.start, s.end, (s.text,), "human") for s in recording.segments if not s.is_transition]
+        yield Take(
+            recording.name, "babel", BABEL_LICENCE, recording.split, tuple(spans), _babel_reader(folder, recording)
+        )
+
+
+def _babel_reader(folder: Path, recording: babel.Recording) -> Callable[[], tuple[Array, float]]:
+    def read() -> tuple[Array, float]:
+        motion = to_smpl22(babel.read_amass(babel.find_motion(folder, recording)))
+        return motion.positions(), motion.fps
+
+    return read
 
 
 def _texts(path: Path) -> Iterator[Span]:
@@ -189,13 +214,6 @@ def _features(path: Path) -> Callable[[], np.ndarray]:
             raise MotionloomError(f"{path} is not an array of features ({error})") from error
 
     return read
-
-
-def _inside(folder: Path, relative: str) -> Path:
-    path = (folder / relative).resolve()
-    if not path.is_relative_to(folder.resolve()):
-        raise MotionloomError(f"{relative!r} leads out of {folder}; paths must stay inside the data folder")
-    return path
 
 
 def _json_lines(path: Path) -> Iterator[dict]:

@@ -25,6 +25,7 @@ import tokenize
 import warnings
 import zipfile
 import zlib
+from collections.abc import Container
 from pathlib import Path
 
 import numpy as np
@@ -80,8 +81,13 @@ def load_npz(path: Path | str, *, fps: float | None = None) -> Motion:
     return _from_positions(arrays, rate, path)
 
 
-def read_arrays(path: Path | str, *, max_bytes: int = text.MAX_BYTES) -> dict[str, np.ndarray]:
-    """All arrays of an archive, with sizes checked before anything is unpacked; objects (pickle) are refused."""
+def read_arrays(
+    path: Path | str, *, max_bytes: int = text.MAX_BYTES, only: Container[str] | None = None
+) -> dict[str, np.ndarray]:
+    """All arrays of an archive, with sizes checked before anything is unpacked; objects (pickle) are refused.
+
+    ``only``: names of the arrays that are wanted; the others are never looked at.
+    """
     data = text.read_bytes(path, max_bytes=max_bytes)
     if not data.startswith(b"PK"):
         raise MotionloomError(f"{path} is not an NPZ archive")
@@ -93,7 +99,8 @@ def read_arrays(path: Path | str, *, max_bytes: int = text.MAX_BYTES) -> dict[st
                 raise MotionloomError(
                     f"{path} unpacks to more than 1000 arrays or {max_bytes / 1e9:.1f} GB; it is not read"
                 )
-            return {m.filename.removesuffix(".npy"): _unpack(archive, m, path) for m in members}
+            named = {m.filename.removesuffix(".npy"): m for m in members}
+            return {n: _unpack(archive, m, path) for n, m in named.items() if only is None or n in only}
     except MotionloomError:
         raise
     except _BROKEN as error:
