@@ -2,11 +2,11 @@
 
 import argparse
 from pathlib import Path
-from typing import NoReturn
+
+from motionloom.cli.sampling import add_sampling, bar, check_outs, check_prompt, fail
 
 MAX_PROMPTS = 1000
 MAX_MOTIONS = 10_000
-MAX_CHARACTERS = 20_000
 
 
 def add(subparsers) -> None:
@@ -14,25 +14,14 @@ def add(subparsers) -> None:
     parser = subparsers.add_parser("generate", help="make motions from words")
     parser.add_argument("prompts", nargs="*", metavar="PROMPT", help="what the person does, such as 'a person walks'")
     parser.add_argument("--from", dest="file", type=Path, metavar="FILE", help="a text file with one prompt per line")
-    parser.add_argument(
-        "--out", type=Path, action="append", metavar="NAME",
-        help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default motion.bvh)",
-    )  # fmt: skip
     parser.add_argument("--seconds", type=float, default=5.0, help="length of each motion (default 5)")
     parser.add_argument(
         "--seed", type=int, default=0, help="the first motion's seed, the next have the next (default 0)"
     )
     parser.add_argument("--count", type=int, default=1, help="motions per prompt (default 1)")
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
-    parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 24)")
     parser.add_argument("--solver", help="ddim, ddpm (the default), dpm2m or dpm2m-sde")
-    parser.add_argument(
-        "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
-    )
-    parser.add_argument("--fps", type=float, help="frame rate of the files (default: the model's 20)")
-    parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
-    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
-    parser.add_argument("--json", action="store_true", help="print what was made as JSON")
+    add_sampling(parser)
     parser.set_defaults(run=_generate)
 
 
@@ -40,17 +29,11 @@ def _generate(arguments: argparse.Namespace) -> None:
     from motionloom.io import check_output
 
     prompts = _prompts(arguments)
-    outs = arguments.out or [Path("motion.bvh")]
-    for out in outs:
-        check_output(out)
-    if len({out.resolve() for out in outs}) != len(outs):
-        _fail("the same --out is given twice; give each file its own name")
-    if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
-        _fail(f"--fps must be 1 to 1000; got {arguments.fps:g}")
+    outs = check_outs(arguments)
     if not 1 <= arguments.count <= MAX_MOTIONS or not 0 <= arguments.seed < 2**62:
-        _fail(f"--count must be 1 to 10000 and --seed 0 or more; got {arguments.count} and {arguments.seed}")
+        fail(f"--count must be 1 to 10000 and --seed 0 or more; got {arguments.count} and {arguments.seed}")
     if len(prompts) * arguments.count > MAX_MOTIONS:
-        _fail(f"{len(prompts)} prompts, {arguments.count} of each, are too many; at most {MAX_MOTIONS:,} in one call")
+        fail(f"{len(prompts)} prompts, {arguments.count} of each, are too many; at most {MAX_MOTIONS:,} in one call")
     captions = [prompt for prompt in prompts for _ in range(arguments.count)]
     places = [_places(out, len(captions)) for out in outs]
     for place in (place for several in places for place in several):
@@ -60,23 +43,14 @@ def _generate(arguments: argparse.Namespace) -> None:
     _report(arguments, captions, written, seconds)
 
 
-def _fail(message: str) -> NoReturn:
-    from motionloom.errors import MotionloomError
-
-    raise MotionloomError(message)
-
-
 def _prompts(arguments: argparse.Namespace) -> list[str]:
     prompts = [*arguments.prompts, *(_lines(arguments.file) if arguments.file else ())]
     if not prompts:
-        _fail("no prompt; say what the person does, such as: motionloom generate 'a person walks forward'")
+        fail("no prompt; say what the person does, such as: motionloom generate 'a person walks forward'")
     if len(prompts) > MAX_PROMPTS:
-        _fail(f"{len(prompts)} prompts are too many for one call; give at most {MAX_PROMPTS}")
+        fail(f"{len(prompts)} prompts are too many for one call; give at most {MAX_PROMPTS}")
     for prompt in prompts:
-        if not prompt.strip():
-            _fail("a prompt is empty; say in words what the person does")
-        if len(prompt) > MAX_CHARACTERS:
-            _fail(f"a prompt has {len(prompt):,} characters; say it in fewer than {MAX_CHARACTERS:,}")
+        check_prompt(prompt)
     return prompts
 
 
@@ -86,15 +60,12 @@ def _lines(file: Path) -> list[str]:
     try:
         text = read_text(file, max_bytes=16_000_000).decode("utf-8")
     except UnicodeDecodeError:
-        _fail(f"{file} is not UTF-8 text; save it as UTF-8 with one prompt per line")
+        fail(f"{file} is not UTF-8 text; save it as UTF-8 with one prompt per line")
     return [line.strip() for line in text.splitlines() if line.strip()]
 
 
 def _make(arguments: argparse.Namespace, prompts: list[str]):
     import time
-
-    from rich.console import Console
-    from rich.progress import Progress
 
     from motionloom.checkpoint import Prior
     from motionloom.tasks.text import generate
@@ -103,14 +74,10 @@ def _make(arguments: argparse.Namespace, prompts: list[str]):
     given = {"steps": arguments.steps, "solver": arguments.solver}
     options = {name: value for name, value in given.items() if value is not None}
     began = time.perf_counter()
-    screen = Console(stderr=True)
-    shown = screen.is_terminal  # elsewhere the bar would leave an empty line
-    with Progress(console=screen, transient=True, disable=not shown) as bar:
-        task = bar.add_task("generating", total=None)
+    with bar("generating") as progress:
         motions = generate(
             prior, prompts, seconds=arguments.seconds, count=arguments.count, seed=arguments.seed,
-            guidance=arguments.guidance, clean=not arguments.raw,
-            progress=lambda done, total: bar.update(task, completed=done, total=total), **options,
+            guidance=arguments.guidance, clean=not arguments.raw, progress=progress, **options,
         )  # fmt: skip
     if arguments.fps is not None:
         motions = [motion.resample(arguments.fps) for motion in motions]

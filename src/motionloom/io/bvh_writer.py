@@ -1,6 +1,7 @@
 """Writing BVH files; `motionloom.io.bvh` reads them and says what the format is."""
 
 from collections.abc import Mapping
+from io import FileIO
 from pathlib import Path
 
 import numpy as np
@@ -32,30 +33,90 @@ def save_bvh(motion: Motion, path: Path | str, *, order: str | Mapping[str, str]
     take them for centimetres (MotionBuilder, Maya, Unreal). Joints whose bones change length get position channels.
     A joint at the tip of its branch that is no End Site itself gets one at zero distance, as some readers demand.
     """
-    skeleton = motion.skeleton
-    orders = [(order if isinstance(order, str) else order.get(n, "ZXY")).upper() for n in skeleton.names]
-    for word in orders:
-        if sorted(word) != ["X", "Y", "Z"]:
-            raise MotionloomError(f"an order of rotations is made of X, Y and Z, such as ZXY; got {word!r}")
-    if not 1e-9 < unit < 1e9:
-        raise MotionloomError(f"the unit must be a positive number of metres; got {unit}")
-    offsets, moving = _offsets(motion)
-    sequence = _depth_first(skeleton)
-    tips = set(skeleton.ends) - set(skeleton.parents) - moving - {0}
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(
-            "\n".join(_hierarchy(skeleton, sequence, tips, orders=orders, moving=moving, offsets=offsets / unit))
-        )
-        seconds = f"{1 / motion.fps:.8f}" if 0.01 < motion.fps < 1000 else f"{1 / motion.fps:.12g}"
-        file.write(f"\nMOTION\nFrames: {len(motion)}\nFrame Time: {seconds}\n")
-        turning = [j for j in sequence if j not in tips]
-        layout = "%.6f " * sum(6 if j == 0 or j in moving else 3 for j in turning)
-        row = layout[:-1] + "\n"
-        angles = {name: _angles(motion, [j for j in turning if orders[j] == name], name) for name in set(orders)}
-        for start in range(0, len(motion), _ROWS):
-            block = _block(motion, start, turning, angles=angles, orders=orders, moving=moving, unit=unit)
-            file.writelines(row % tuple(values) for values in block.tolist())
+    with atomic_path(path) as temporary, temporary.open("wb", buffering=0) as file:
+        growing = GrowingBvh(file, motion, order=order, unit=unit, frames=len(motion))
+        growing.write(motion)
+        growing.finish()
     return Path(path)
+
+
+class GrowingBvh:
+    """A BVH file that is written as the motion is made, in memory that does not grow with its length.
+
+    The hierarchy is written at once, frames as they come, and their number at the end, in the place kept for it.
+    Angles go on without jumps from one piece to the next. After an error or an interruption `finish` still leaves a
+    valid file with all pieces that were written whole.
+    """
+
+    def __init__(
+        self,
+        file: FileIO,
+        first: Motion,
+        *,
+        order: str | Mapping[str, str] = "ZXY",
+        unit: float = 1.0,
+        frames: int | None = None,
+    ) -> None:
+        """``file`` is open for writing without a buffer and empty; ``first`` is a motion whose skeleton, rate and
+        changing bones all pieces share; ``frames`` is how many are expected. ``order``, ``unit``: `save_bvh`."""
+        skeleton = first.skeleton
+        self.orders = [(order if isinstance(order, str) else order.get(n, "ZXY")).upper() for n in skeleton.names]
+        for word in self.orders:
+            if sorted(word) != ["X", "Y", "Z"]:
+                raise MotionloomError(f"an order of rotations is made of X, Y and Z, such as ZXY; got {word!r}")
+        if not 1e-9 < unit < 1e9:
+            raise MotionloomError(f"the unit must be a positive number of metres; got {unit}")
+        offsets, self.moving = _offsets(first)
+        sequence = _depth_first(skeleton)
+        tips = set(skeleton.ends) - set(skeleton.parents) - self.moving - {0}
+        self.turning = [j for j in sequence if j not in tips]
+        self.angles = {
+            name: _Angles([j for j in self.turning if self.orders[j] == name], name) for name in set(self.orders)
+        }
+        self.file, self.unit, self.frames = file, unit, 0
+        self.row = ("%.6f " * sum(6 if j == 0 or j in self.moving else 3 for j in self.turning))[:-1] + "\n"
+        self.places = len(str(frames)) if frames else 12
+        lines = _hierarchy(skeleton, sequence, tips, orders=self.orders, moving=self.moving, offsets=offsets / unit)
+        seconds = f"{1 / first.fps:.8f}" if 0.01 < first.fps < 1000 else f"{1 / first.fps:.12g}"
+        self.count_at = _put(file, "\n".join([*lines, "MOTION", "Frames: "]).encode())
+        self.end = self.count_at + _put(file, f"{0:>{self.places}}\nFrame Time: {seconds}\n".encode())
+
+    def write(self, piece: Motion) -> None:
+        """Add frames; each `_ROWS` of them count once they are on the disk."""
+        if len(str(self.frames + len(piece))) > self.places:
+            raise MotionloomError(f"more frames came than were announced; no number above {'9' * self.places} fits")
+        self.file.seek(self.end)  # what an earlier failure left half written is written over
+        for start in range(0, len(piece), _ROWS):
+            block = self._block(piece.frames(start, start + _ROWS))
+            self.end += _put(self.file, "".join(self.row % tuple(values) for values in block.tolist()).encode())
+            self.frames += len(block)
+
+    def finish(self) -> None:
+        """Drop what was not written whole, and say how many frames there are."""
+        self.file.truncate(self.end)
+        self.file.seek(self.count_at)
+        _put(self.file, f"{self.frames:>{self.places}}".encode())
+
+    def _block(self, motion: Motion) -> Array:
+        """(rows, channels): the numbers of some frames as they stand in the file."""
+        degrees = {name: angles.degrees(motion.rotations) for name, angles in self.angles.items()}
+        columns: list[Array] = []
+        for joint in self.turning:
+            if joint == 0:
+                columns.append(motion.root / self.unit)
+            elif joint in self.moving and motion.translations is not None:
+                columns.append(motion.translations[:, joint] / self.unit)
+            name = self.orders[joint]
+            columns.append(degrees[name][:, self.angles[name].at[joint]])
+        return np.round(np.concatenate(columns, axis=1), 6) + 0.0  # + 0.0: no minus zero
+
+
+def _put(file: FileIO, data: bytes) -> int:
+    """Write all of it, however little the system takes at once; gives how much that was."""
+    left = memoryview(data)
+    while left:
+        left = left[file.write(left) :]
+    return len(data)
 
 
 def _offsets(motion: Motion) -> tuple[Array, set[int]]:
@@ -125,42 +186,34 @@ def _tab(depth: int) -> str:
     return "\t" * min(depth, _INDENT)
 
 
-def _angles(motion: Motion, joints: list[int], order: str) -> tuple[dict[int, int], Array]:
-    """Where each joint stands in the (frames, joints, 3) degrees; continuous over time, no jumps by 180 or 360."""
-    if not joints:
-        return {}, np.empty((len(motion), 0, 3))
-    first = rot.quat_to_euler(order, motion.rotations[:, joints])
-    second = first + np.pi
-    second[..., 1] = np.pi - first[..., 1]  # the other triple of angles of the same rotation
-    stay = _distance(first[1:], first[:-1])
-    change = _distance(first[1:], second[:-1])
-    flipped = np.concatenate([np.zeros((1, len(joints)), bool), np.cumsum(change < stay - 1e-9, axis=0) % 2 == 1])
-    chosen = np.where(flipped[..., None], second, first)
-    return {j: at for at, j in enumerate(joints)}, np.degrees(np.unwrap(chosen, axis=0))
+class _Angles:
+    """Angles of some joints that do not jump by 180 or 360 degrees, neither in a piece nor from one to the next."""
+
+    def __init__(self, joints: list[int], order: str) -> None:
+        self.joints, self.order = joints, order
+        self.at = {joint: column for column, joint in enumerate(joints)}
+        self.last = np.empty((0, len(joints), 3))  # the last frame's radians: as they come from its rotation,
+        self.written = self.last  # and as they were written
+        self.flipped = np.zeros(len(joints), bool)  # whether the other triple of angles was taken
+
+    def degrees(self, rotations: Array) -> Array:
+        """(frames, joints, 3) of the next piece, whose ``rotations`` are (frames, all joints, 4)."""
+        if not self.joints:
+            return np.empty((len(rotations), 0, 3))
+        fresh = rot.quat_to_euler(self.order, rotations[:, self.joints])
+        first = np.concatenate([self.last, fresh])
+        second = first + np.pi
+        second[..., 1] = np.pi - first[..., 1]  # the other triple of angles of the same rotation
+        stay = _distance(first[1:], first[:-1])
+        change = _distance(first[1:], second[:-1])
+        turns = np.cumsum(np.concatenate([self.flipped[None], change < stay - 1e-9]), axis=0) % 2 == 1
+        known = len(self.last)
+        flipped = turns[known:] if known else turns
+        chosen = np.where(flipped[..., None], second[known:], fresh)
+        radians = np.unwrap(np.concatenate([self.written, chosen]), axis=0)[known:]
+        self.last, self.written, self.flipped = fresh[-1:], radians[-1:], flipped[-1]
+        return np.degrees(radians)
 
 
 def _distance(a: Array, b: Array) -> Array:
     return np.abs((a - b + np.pi) % (2 * np.pi) - np.pi).sum(-1)
-
-
-def _block(
-    motion: Motion,
-    start: int,
-    turning: list[int],
-    *,
-    angles: Mapping[str, tuple[dict[int, int], Array]],
-    orders: list[str],
-    moving: set[int],
-    unit: float,
-) -> Array:
-    """(rows, channels): the numbers of some frames as they stand in the file."""
-    rows = slice(start, start + _ROWS)
-    columns: list[Array] = []
-    for joint in turning:
-        if joint == 0:
-            columns.append(motion.root[rows] / unit)
-        elif joint in moving and motion.translations is not None:
-            columns.append(motion.translations[rows, joint] / unit)
-        at, degrees = angles[orders[joint]]
-        columns.append(degrees[rows, at[joint]])
-    return np.round(np.concatenate(columns, axis=1), 6) + 0.0  # + 0.0: no minus zero

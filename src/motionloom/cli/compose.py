@@ -1,0 +1,198 @@
+"""`motionloom compose`: a long motion from a timeline file or from several prompts."""
+
+import argparse
+import sys
+from collections.abc import Generator, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from motionloom.cli.sampling import add_sampling, bar, check_outs, fail
+
+if TYPE_CHECKING:
+    from motionloom.io.stream import Stream
+    from motionloom.motion import Motion
+    from motionloom.tasks.timeline import Timeline
+
+SHOWN = 40
+"""Segments listed at the end; --json lists all."""
+
+
+def add(subparsers) -> None:
+    """Register `compose`."""
+    parser = subparsers.add_parser(
+        "compose",
+        help="make one long motion from several prompts",
+        description="One long motion from a timeline file, or from prompts that follow each other.",
+    )
+    parser.add_argument(
+        "segments", nargs="*", metavar="PROMPT|TIMELINE", help="what happens, one after the other; or one .yaml file"
+    )
+    parser.add_argument("--seconds", type=float, help="length of each segment, with prompts (default 5)")
+    parser.add_argument(
+        "--transition", type=float, help="seconds that two neighbours share, with prompts (default 1, or what fits)"
+    )
+    parser.add_argument("--seed", type=int, help="the same seed makes the same motion (default 0, or the timeline's)")
+    parser.add_argument(
+        "--guidance", type=float, help="strength of the text where a segment has none of its own (default 2.5)"
+    )
+    add_sampling(parser)
+    parser.add_argument("--check", action="store_true", help="only say what would be made")
+    parser.add_argument("--schema", action="store_true", help="print the JSON Schema of timeline files")
+    parser.set_defaults(run=_compose)
+
+
+def _compose(arguments: argparse.Namespace) -> int:
+    if arguments.schema:
+        from motionloom.tasks.timeline import SCHEMA
+
+        print(SCHEMA.read_text(encoding="utf-8"), end="")
+        return 0
+    outs = [] if arguments.check else check_outs(arguments)
+    timeline = _timeline(arguments)
+    if arguments.check:
+        _report(arguments, timeline, seconds=timeline.seconds, streams=[])
+        return 0
+    streams = _open(outs, timeline, arguments.fps)
+    interrupted = _make(arguments, timeline, streams)
+    seconds = max(stream.seconds for stream in streams) if interrupted else timeline.seconds
+    _report(arguments, timeline, seconds=seconds, streams=_saved(streams))
+    if interrupted:
+        print(f"motionloom: interrupted; {_kept(streams)} of {timeline.seconds:.2f} s", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _timeline(arguments: argparse.Namespace) -> "Timeline":
+    """What is asked, whether in a file or on the command line."""
+    from motionloom.tasks import timeline
+
+    given: list[str] = arguments.segments
+    if arguments.seed is not None and not 0 <= arguments.seed < timeline.MAX_SEED:
+        fail(f"--seed must be 0 or more and below 2**62; got {arguments.seed}")
+    if arguments.guidance is not None and not abs(arguments.guidance) <= timeline.MAX_GUIDANCE:
+        fail(f"--guidance must be -100 to 100, usually 1 to 7; got {arguments.guidance:g}")
+    files = [word for word in given if word.lower().endswith((".yaml", ".yml"))]
+    if not files:
+        seconds = timeline.SECONDS if arguments.seconds is None else arguments.seconds
+        return timeline.plain_timeline(given, seconds=seconds, transition=arguments.transition)
+    if len(given) > 1:
+        fail(f"give either one timeline file or prompts; got {files[0]} and {len(given) - 1} more")
+    if arguments.seconds is not None or arguments.transition is not None:
+        fail(f"--seconds and --transition go with prompts; write them into {files[0]}")
+    return timeline.read_timeline(files[0])
+
+
+def _open(outs: Sequence[Path], timeline: "Timeline", fps: float | None) -> list["Stream"]:
+    """The files, those that grow on the disk last: they are closed first, and that is quick."""
+    from motionloom.io.stream import open_stream
+
+    rate = fps or 20.0
+    total = int((timeline.frames - 1) / 20 * rate + 1e-6) + 1
+    said = "; ".join(" ".join(segment.text.split()) for segment in timeline.segments[:20])
+    streams = [open_stream(out, total=total, fps=rate, caption=said) for out in outs]
+    return sorted(streams, key=lambda stream: stream.path.suffix.lower() == ".bvh")
+
+
+def _make(arguments: argparse.Namespace, timeline: "Timeline", streams: Sequence["Stream"]) -> bool:
+    """Write the motion; true if it was interrupted after something was finished."""
+    from contextlib import closing
+
+    from motionloom.errors import MotionloomError
+
+    try:
+        with closing(_pieces(arguments, timeline)) as pieces:  # the bar is gone before anything is said
+            _write(pieces, streams, arguments.fps)
+    except KeyboardInterrupt:
+        if not _saved(streams):
+            raise
+        return True
+    except MotionloomError as error:
+        if not _saved(streams):
+            raise
+        raise MotionloomError(f"{error} ({_kept(streams)})") from error
+    if not _saved(streams):
+        fail("no motion was made; this is a fault of the program")
+    return False
+
+
+def _write(pieces: Iterable["Motion"], streams: Sequence["Stream"], fps: float | None) -> None:
+    from contextlib import ExitStack
+
+    from motionloom.io.stream import resampled
+
+    with ExitStack() as stack:
+        for stream in streams:
+            stack.enter_context(stream)
+        for piece in pieces if fps is None else resampled(pieces, fps):
+            for stream in streams:
+                stream.write(piece)
+
+
+def _pieces(arguments: argparse.Namespace, timeline: "Timeline") -> Generator["Motion", None, None]:
+    from motionloom.checkpoint import Prior
+    from motionloom.io import load
+    from motionloom.tasks import long
+    from motionloom.tasks.text import GUIDANCE, STEPS
+
+    start = None if timeline.start is None else load(timeline.start)
+    prior = Prior.load(arguments.weights, device=arguments.device)
+    steps = STEPS if arguments.steps is None else arguments.steps
+    done = 0
+    with bar("composing") as move:
+
+        def progress(more: int) -> None:
+            nonlocal done
+            done += more
+            move(done, steps * len(timeline.segments))
+
+        yield from long.compose(
+            prior, timeline.segments, seed=_first(arguments.seed, timeline.seed, 0),
+            guidance=_first(arguments.guidance, timeline.guidance, GUIDANCE),
+            steps=steps, start=start, path=timeline.path, clean=not arguments.raw, progress=progress,
+        )  # fmt: skip
+
+
+def _first(*choices: Any) -> Any:
+    """The line's, else the file's, else the default."""
+    return next(choice for choice in choices if choice is not None)
+
+
+def _saved(streams: Sequence["Stream"]) -> list["Stream"]:
+    return [stream for stream in streams if stream.saved]
+
+
+def _kept(streams: Sequence["Stream"]) -> str:
+    return "what was finished is in " + ", ".join(f"{s.path}, {s.seconds:.2f} s" for s in _saved(streams))
+
+
+def _report(
+    arguments: argparse.Namespace, timeline: "Timeline", *, seconds: float, streams: Sequence["Stream"]
+) -> None:
+    """Print what was made and where each segment lies in it, as far as it was made."""
+    begins = [frame / 20 for frame in timeline.begins]
+    rows = [
+        {"begin": begin, "end": min(end, seconds), "text": segment.text}
+        for begin, end, segment in zip(begins, begins[1:], timeline.segments, strict=False)
+        if begin < seconds
+    ]
+    if arguments.json:
+        import json
+
+        files = [str(stream.path) for stream in streams]
+        about = {"seconds": seconds, "of": timeline.seconds, "files": files, "segments": rows}
+        print(json.dumps(about, indent=1))
+        return
+    for stream in streams:
+        print(f"wrote {stream.path}: {seconds:.2f} s, {stream.frames} frames")
+    if not streams:
+        print(f"{len(rows):,} segments, {seconds:.2f} s in all; nothing was made")
+    for row in rows[:SHOWN]:
+        print(f"{row['begin']:9.2f}  {_printable(row['text'])}")
+    if len(rows) > SHOWN:
+        print(f"           ... and {len(rows) - SHOWN:,} more; --json lists all")
+
+
+def _printable(text: str) -> str:
+    """A prompt as one line of the terminal, whatever stands in it."""
+    line = "".join(letter if letter.isprintable() else "?" for letter in " ".join(text.split())[:80])
+    return line if len(line) < 80 else line[:77] + "..."

@@ -1,0 +1,67 @@
+"""What the commands that make motions share: options, the checks of them, a progress bar."""
+
+import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NoReturn
+
+MAX_CHARACTERS = 20_000
+
+
+def add_sampling(parser: argparse.ArgumentParser) -> None:
+    """``--out``, and how and where motions are sampled."""
+    parser.add_argument(
+        "--out", type=Path, action="append", metavar="NAME",
+        help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default motion.bvh)",
+    )  # fmt: skip
+    parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 24)")
+    parser.add_argument(
+        "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
+    )
+    parser.add_argument("--fps", type=float, help="frame rate of the files (default: the model's 20)")
+    parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
+    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
+    parser.add_argument("--json", action="store_true", help="print what was made as JSON")
+
+
+def fail(message: str) -> NoReturn:
+    """Raise a `MotionloomError`."""
+    from motionloom.errors import MotionloomError
+
+    raise MotionloomError(message)
+
+
+def check_outs(arguments: argparse.Namespace) -> list[Path]:
+    """The files to write; refuses places, names and frame rates that cannot be, before any work."""
+    from motionloom.io import check_output
+
+    outs = arguments.out or [Path("motion.bvh")]
+    for out in outs:
+        check_output(out)
+    if len({out.resolve() for out in outs}) != len(outs):
+        fail("the same --out is given twice; give each file its own name")
+    if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
+        fail(f"--fps must be 1 to 1000; got {arguments.fps:g}")
+    return outs
+
+
+def check_prompt(prompt: str) -> None:
+    """Refuse a prompt without words, and one that is a book."""
+    if not prompt.strip():
+        fail("a prompt is empty; say in words what the person does")
+    if len(prompt) > MAX_CHARACTERS:
+        fail(f"a prompt has {len(prompt):,} characters; say it in fewer than {MAX_CHARACTERS:,}")
+
+
+@contextmanager
+def bar(label: str) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on a terminal's stderr, and a function that moves it: (done, of how many)."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    screen = Console(stderr=True)
+    shown = screen.is_terminal  # elsewhere the bar would leave an empty line
+    with Progress(console=screen, transient=True, disable=not shown) as progress:
+        task = progress.add_task(label, total=None)
+        yield lambda done, total: progress.update(task, completed=done, total=total)

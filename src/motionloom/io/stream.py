@@ -1,0 +1,201 @@
+"""Files that are written while the motion is being made, so that an hour needs no more memory than a minute.
+
+A BVH file grows on the disk. The other formats need the whole motion: their pieces are kept and saved at the end.
+Either way the file appears whole, at its place, when the stream is closed, also after an interruption.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.io import check_output, save
+from motionloom.io.atomic import atomic_path
+from motionloom.io.bvh_writer import GrowingBvh
+from motionloom.motion import MAX_POSES, Motion
+
+MAX_BVH_FRAMES = 2_500_000
+"""Of a person of 22 joints: a file of 1.8 GB, 34 hours; larger ones are read by nobody, not by this project either."""
+MAX_GIF_SECONDS = 60.0
+
+
+class Stream(ABC):
+    """A motion file to which pieces are added; all of one skeleton and rate, and of bones of constant lengths.
+
+    As a context manager it is closed at the end of the block. If the block ends with an error or an interruption,
+    what was written so far becomes a valid file; if that is nothing, nothing is left and an older file stays.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.frames = 0
+        """Frames that are safe: they will be in the file."""
+        self._like: Motion | None = None
+        self.saved = False
+        """Whether the file is in its place."""
+        self._closed = False
+
+    @property
+    def seconds(self) -> float:
+        """Length of what is safe."""
+        return self.frames / self._like.fps if self._like else 0.0
+
+    def write(self, piece: Motion) -> None:
+        """Add frames; raises `MotionloomError` if they do not go on from those before, or cannot be written."""
+        if self._closed:
+            raise MotionloomError(f"{self.path} is closed; nothing can be added to it")
+        if piece.translations is not None:
+            raise MotionloomError(f"{self.path}: a motion whose bones change length cannot be written piece by piece")
+        if self._like is None:
+            self._like = piece.frames(0, 1)
+        elif piece.skeleton != self._like.skeleton or piece.fps != self._like.fps:
+            raise MotionloomError(f"{self.path}: a piece has another skeleton or frame rate than those before it")
+        self._write(piece)
+
+    def close(self) -> Path | None:
+        """Put the file in its place and give its path; None, and no file, if nothing was written."""
+        if self._closed:
+            return self.path if self.saved else None
+        self._closed = True
+        if not self.frames:
+            self._drop()
+            return None
+        self._finish()
+        self.saved = True
+        return self.path
+
+    def __enter__(self) -> "Stream":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    @abstractmethod
+    def _write(self, piece: Motion) -> None: ...
+
+    @abstractmethod
+    def _finish(self) -> None: ...
+
+    @abstractmethod
+    def _drop(self) -> None: ...
+
+
+def open_stream(path: Path | str, *, total: int | None, fps: float = 20.0, caption: str = "") -> Stream:
+    """A file to be written piece by piece; the suffix picks the format as in `save`, and nothing is made yet.
+
+    ``total`` is the number of frames to come if that is known; with it what the format cannot hold is refused now
+    and not after hours of work. ``caption`` labels pictures and films. Raises `MotionloomError` like `check_output`.
+    """
+    path = check_output(path)
+    suffix = path.suffix.lower()
+    if total is not None:
+        _check_length(path, suffix, total, fps)
+    return _Growing(path, total) if suffix == ".bvh" else _Kept(path, caption)
+
+
+def _check_length(path: Path, suffix: str, total: int, fps: float) -> None:
+    most = MAX_BVH_FRAMES if suffix == ".bvh" else MAX_POSES // 22
+    most = min(most, int(MAX_GIF_SECONDS * fps)) if suffix == ".gif" else most
+    if total > most:
+        better = "write an .mp4 or .bvh, or" if suffix == ".gif" else "split it, or"
+        raise MotionloomError(
+            f"{path} would have {total:,} frames ({total / fps / 3600:.3g} h) and at most {most:,} fit into such a "
+            f"file; {better} make it shorter"
+        )
+
+
+class _Growing(Stream):
+    """BVH: on the disk, in a file beside the target, until it is closed."""
+
+    def __init__(self, path: Path, total: int | None) -> None:
+        super().__init__(path)
+        self._total = total
+        self._stack = ExitStack()
+        self._bvh: GrowingBvh | None = None
+
+    def _write(self, piece: Motion) -> None:
+        try:
+            if self._bvh is None:
+                temporary = self._stack.enter_context(atomic_path(self.path))
+                file = self._stack.enter_context(temporary.open("wb", buffering=0))
+                self._bvh = GrowingBvh(file, piece, frames=self._total)
+            self._bvh.write(piece)
+        except OSError as error:
+            raise MotionloomError(f"cannot write {self.path}: {error.strerror or error}") from error
+        finally:
+            self.frames = self._bvh.frames if self._bvh else 0
+
+    def _finish(self) -> None:
+        with self._stack:  # moves the file into place, or removes it if that fails
+            if self._bvh:
+                self._bvh.finish()
+
+    def _drop(self) -> None:
+        with suppress(_Dropped), self._stack:
+            raise _Dropped  # an error is what makes `atomic_path` remove its file
+
+
+class _Dropped(Exception):
+    """Nothing was written."""
+
+
+class _Kept(Stream):
+    """Formats that need the whole motion."""
+
+    def __init__(self, path: Path, caption: str) -> None:
+        super().__init__(path)
+        self._caption = caption
+        self._pieces: list[Motion] = []
+
+    def _write(self, piece: Motion) -> None:
+        self._pieces.append(piece)
+        self.frames += len(piece)
+
+    def _finish(self) -> None:
+        whole, self._pieces = joined(self._pieces), []
+        save(whole, self.path, captions=[self._caption])
+
+    def _drop(self) -> None:
+        self._pieces = []
+
+
+def joined(pieces: Sequence[Motion]) -> Motion:
+    """Consecutive pieces of one skeleton and rate as one motion; bones of constant lengths."""
+    root = np.concatenate([piece.root for piece in pieces])
+    return replace(pieces[0], root=root, rotations=np.concatenate([piece.rotations for piece in pieces]))
+
+
+def resampled(pieces: Iterable[Motion], fps: float) -> Iterator[Motion]:
+    """Pieces at another frame rate, without seams: together they are the joined motion's `Motion.resample`.
+
+    Each piece is held back by its last frame, between which and the next piece new frames may lie.
+    """
+    carried: Motion | None = None
+    first = made = 0  # the frame of the whole motion that the part in hand begins with; frames given so far
+    for piece in pieces:
+        if piece.fps == fps and carried is None:
+            yield piece
+            continue
+        part = piece if carried is None else joined([carried, piece])
+        last = first + len(part) - 1
+        count = int(np.floor(last / part.fps * fps + 1e-6)) + 1
+        if count > made:
+            yield _at(part, np.arange(made, count) * (part.fps / fps) - first, fps)
+        carried, first, made = part.frames(len(part) - 1, len(part)), last, count
+
+
+def _at(motion: Motion, at: np.ndarray, fps: float) -> Motion:
+    """The motion at fractional frames, places linearly and rotations spherically interpolated."""
+    low = np.clip(np.floor(at).astype(int), 0, len(motion) - 1)
+    high = np.minimum(low + 1, len(motion) - 1)
+    amount = (at - low)[:, None]
+    root = motion.root[low] * (1 - amount) + motion.root[high] * amount
+    shape = (len(at), len(motion.skeleton))
+    turned = rot.slerp(motion.rotations[low], motion.rotations[high], np.broadcast_to(amount, shape))
+    return replace(motion, fps=float(fps), root=root, rotations=turned)

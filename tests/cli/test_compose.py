@@ -1,0 +1,229 @@
+"""compose, as a stranger types it: with a quick maker of pieces in place of the network, and once with a tiny network."""
+
+import json
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionloom import io
+from motionloom.checkpoint import save_prior
+from motionloom.cli import main
+from motionloom.errors import MotionloomError
+from motionloom.io import stream
+from motionloom.motion import Motion
+from motionloom.rotations import IDENTITY
+from motionloom.skeleton import SMPL22
+from motionloom.tasks import long
+from tests.nets import tiny
+
+THREE = "seed: 4\nguidance: 3\nsegments:\n- walk\n- {text: jump, seconds: 2}\n- text: sit down\n  seconds: 1\n"
+
+
+@pytest.fixture(scope="module")
+def weights(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return str(save_prior(tiny.prior(), tmp_path_factory.mktemp("weights") / "tiny.safetensors"))
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Each test runs in an empty folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
+    """What the command asked of the maker of motion, which walks 1 m a second along +Z and stops where it is told."""
+    seen: dict = {"stop": None, "problem": KeyboardInterrupt}
+
+    def compose(prior, segments, *, seed, guidance, steps, start, path, clean, progress):
+        seen.update(segments=segments, seed=seed, guidance=guidance, steps=steps, start=start, path=path, clean=clean)
+        at = 0
+        for number, segment in enumerate(segments):
+            if number == seen["stop"]:
+                raise seen["problem"]
+            frames = round(segment.seconds * 20)
+            root = np.zeros((frames, 3))
+            root[:, 2] = np.arange(at, at + frames) / 20
+            at += frames
+            progress(steps)
+            yield Motion(SMPL22, 20.0, root, np.tile(IDENTITY, (frames, 22, 1)))
+
+    monkeypatch.setattr(long, "compose", compose, raising=False)
+    return seen
+
+
+def compose(weights: str, *words: str) -> int:
+    return main(["compose", *words, "--weights", weights])
+
+
+def written() -> set[str]:
+    return {path.name for path in Path().iterdir()}
+
+
+def test_prompts_become_segments_of_equal_length(weights, asked, capsys):
+    assert compose(weights, "walk", "jump over something", "sit down", "--seconds", "2", "--out", "long.bvh") == 0
+    assert [(s.text, s.seconds, s.transition, s.goal) for s in asked["segments"]] == [
+        (text, 2.0, 1.0, None) for text in ("walk", "jump over something", "sit down")
+    ]
+    assert (asked["seed"], asked["guidance"], asked["steps"], asked["clean"]) == (0, 2.5, 24, True)
+    assert (len(io.load("long.bvh")), written()) == (120, {"long.bvh"})
+    said = capsys.readouterr().out.splitlines()
+    assert said[0] == "wrote long.bvh: 6.00 s, 120 frames"
+    assert [line.split(maxsplit=1) for line in said[1:]] == [
+        ["0.00", "walk"], ["2.00", "jump over something"], ["4.00", "sit down"],
+    ]  # fmt: skip
+
+
+def test_a_timeline_says_everything_and_the_line_has_the_last_word(weights, asked, capsys):
+    Path("three.yaml").write_text(THREE)
+    assert compose(weights, "three.yaml", "--out", "a.npz", "--json") == 0
+    assert (asked["seed"], asked["guidance"], len(io.load("a.npz"))) == (4, 3, 160)
+    about = json.loads(capsys.readouterr().out)
+    assert about == {
+        "seconds": 8.0,
+        "of": 8.0,
+        "files": ["a.npz"],
+        "segments": [
+            {"begin": 0.0, "end": 5.0, "text": "walk"},
+            {"begin": 5.0, "end": 7.0, "text": "jump"},
+            {"begin": 7.0, "end": 8.0, "text": "sit down"},
+        ],
+    }
+    assert compose(weights, "three.yaml", "--seed", "0", "--guidance", "0", "--raw", "--steps", "3") == 0
+    assert [asked[key] for key in ("seed", "guidance", "clean", "steps")] == [0, 0, False, 3]
+
+
+def test_several_files_at_another_rate_hold_the_whole_motion(weights, asked):
+    Path("three.yaml").write_text(THREE)
+    names = ["a.bvh", "a.npz", "a.glb"]
+    assert compose(weights, "three.yaml", "--fps", "30", *[w for n in names for w in ("--out", n)]) == 0
+    for name in names:
+        motion = io.load(name)
+        assert (len(motion), round(motion.fps, 6)) == (239, 30)  # 159 gaps of 1/20 s hold 238 of 1/30 s
+        np.testing.assert_allclose(motion.root[:, 2], np.arange(239) / 30, atol=1e-5)
+
+
+def test_a_start_is_read_and_handed_on(weights, asked):
+    clip = Motion(SMPL22, 30.0, np.zeros((9, 3)), np.tile(IDENTITY, (9, 22, 1)))
+    io.save(clip, "clip.bvh")
+    Path("on.yml").write_text("start: clip.bvh\nsegments: [walk]\n")
+    assert compose(weights, "on.yml") == 0
+    assert (len(asked["start"]), asked["start"].fps) == (9, 30)
+
+
+@pytest.mark.parametrize("name", ["a.bvh", "a.npz"])
+def test_an_interruption_leaves_what_was_finished(weights, asked, name, capsys):
+    asked["stop"] = 2
+    Path("three.yaml").write_text(THREE)
+    assert compose(weights, "three.yaml", "--out", name, "--json") == 130
+    assert len(io.load(name)) == 140
+    assert written() == {name, "three.yaml"}
+    said = capsys.readouterr()
+    assert said.err == f"motionloom: interrupted; what was finished is in {name}, 7.00 s of 8.00 s\n"
+    assert [row["text"] for row in json.loads(said.out)["segments"]] == ["walk", "jump"]
+
+
+def test_a_real_ctrl_c_between_two_pieces_is_such_an_interruption(weights, asked, monkeypatch):
+    write = stream.Stream.write
+
+    def interrupted(self, piece):
+        write(self, piece)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(stream.Stream, "write", interrupted)
+    assert compose(weights, "walk", "jump", "--out", "a.bvh") == 130
+    assert len(io.load("a.bvh")) == 100
+
+
+def test_with_nothing_finished_nothing_is_left(weights, asked, capsys):
+    asked["stop"] = 0
+    assert compose(weights, "walk", "jump", "--out", "a.bvh", "--out", "a.npz") == 130
+    asked["problem"] = MotionloomError("the goal is out of reach")
+    assert compose(weights, "walk", "jump", "--out", "a.bvh") == 2
+    assert capsys.readouterr().err == "motionloom: interrupted\nmotionloom: the goal is out of reach\n"
+    assert written() == set()
+
+
+def test_a_failure_in_between_says_where_the_finished_part_is(weights, asked, capsys):
+    asked.update(stop=1, problem=MotionloomError("the goal is out of reach"))
+    assert compose(weights, "walk", "jump", "--out", "a.bvh") == 2
+    said = capsys.readouterr().err
+    assert said == "motionloom: the goal is out of reach (what was finished is in a.bvh, 5.00 s)\n"
+    assert len(io.load("a.bvh")) == 100
+
+
+def test_check_reads_and_makes_nothing(weights, asked, capsys):
+    Path("three.yaml").write_text(THREE)
+    assert main(["compose", "three.yaml", "--check", "--weights", "absent"]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == "3 segments, 8.00 s in all; nothing was made"
+    assert main(["compose", "three.yaml", "--check", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["files"] == []
+    assert written() == {"three.yaml"}
+    assert "segments" not in asked
+
+
+def test_the_schema_is_printed_as_json(capsys):
+    assert main(["compose", "--schema"]) == 0
+    assert set(json.loads(capsys.readouterr().out)["$defs"]) == {"text", "guidance", "transition", "goal", "segment"}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "there is no segment"),
+        (["walk", ""], "segment 2: the text is empty"),
+        (["x" * 20_001], "20,001 characters"),
+        (["walk", "--seconds", "0"], "0.2 to 60 seconds; got 0"),
+        (["walk", "--seconds", "nan"], "got nan"),
+        (["walk", "--seconds", "61"], "got 61"),
+        (["walk", "jump", "--transition", "2.6"], "half of a segment, 2.5 s; got 2.6"),
+        (["walk", "jump", "--transition", "0"], "got 0"),
+        (["walk", "jump", "--transition", "nan"], "got nan"),
+        (["three.yaml", "walk"], "either one timeline file or prompts"),
+        (["three.yaml", "--seconds", "5"], "write them into three.yaml"),
+        (["absent.yaml"], "cannot read absent.yaml"),
+        (["bad.yaml"], "bad.yaml, line 2: unknown key 'tekst' (did you mean 'text'?)"),
+        (["walk", "--seed", "-1"], "--seed"),
+        (["walk", "--guidance", "nan"], "--guidance"),
+        (["walk", "--fps", "0"], "--fps"),
+        (["walk", "--out", "a.txt"], "must end in"),
+        (["walk", "--out", "a.bvh", "--out", "./a.bvh"], "given twice"),
+        (["walk"] * 13 + ["--out", "a.gif"], "write an .mp4"),
+        (["long.yaml"], "at most 2,500,000 fit"),
+    ],
+    ids=lambda value: " ".join(value)[:25] if isinstance(value, list) else "",
+)
+def test_mistakes_are_one_sentence_and_nothing_is_written(weights, asked, words, message, capsys):
+    Path("three.yaml").write_text(THREE)
+    Path("bad.yaml").write_text("segments:\n- tekst: walk\n")
+    Path("long.yaml").write_text("segments:\n" + "- {text: walk, seconds: 60}\n" * 2100)
+    before = written()
+    assert compose(weights, *words) == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.startswith("motionloom: ")
+    assert said.count("\n") == 1
+    assert (written(), "segments" in asked) == (before, False)
+
+
+def test_a_prompt_with_anything_in_it_is_one_line_of_the_terminal(weights, asked, capsys):
+    assert compose(weights, "walk \udcff\x1b[31m\nand on", "y" * 100) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[1:] == ["     0.00  walk ??[31m and on", "     5.00  " + "y" * 77 + "..."]
+
+
+def test_a_long_list_is_cut_short(weights, asked, capsys):
+    assert compose(weights, *["walk"] * 50, "--seconds", "0.2") == 0
+    assert capsys.readouterr().out.splitlines()[-1].strip() == "... and 10 more; --json lists all"
+
+
+@pytest.mark.skipif(not hasattr(long, "compose"), reason="tasks.long has no compose yet")
+def test_a_tiny_network_makes_a_motion_of_exactly_the_length_asked_for(weights):
+    Path("t.yaml").write_text("segments:\n- walk\n- {text: jump, seconds: 1.3}\n- {text: sit, seconds: 0.6}\n")
+    assert compose(weights, "t.yaml", "--steps", "2", "--out", "a.bvh", "--out", "a.npz") == 0
+    assert len(io.load("a.bvh")) == len(io.load("a.npz")) == 100 + 26 + 12
+    assert compose(weights, "walk", "--seconds", "1", "--steps", "2", "--out", "one.npz") == 0
+    assert len(io.load("one.npz")) == 20
