@@ -21,7 +21,17 @@ from motionloom.tasks.fitting import fit
 from motionloom.tasks.goals import Goal, Placement, placement_of
 from motionloom.tasks.steering import Correction, corrected, toward
 from motionloom.tasks.text import (
-    GUIDANCE, LARGEST_SEED, LONGEST, ROWS, SOLVER, SPACING, STEPS, Progress, _check, smooth, to_motion,
+    GUIDANCE,
+    LARGEST_SEED,
+    LONGEST,
+    ROWS,
+    SOLVER,
+    SPACING,
+    STEPS,
+    Progress,
+    _check,
+    smooth,
+    to_motion,
 )  # fmt: skip
 
 MISSED = 0.05
