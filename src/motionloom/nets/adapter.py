@@ -61,7 +61,8 @@ class Adapter:
     """What it was trained for: ``trajectory``, a joint, ``any`` ..."""
     rank: int
     tensors: Mapping[str, Tensor]
-    """``LAYER.down`` (rank, in) and ``LAYER.up`` (out, rank); ``mask.down`` (its rank, patch * features), ``mask.up``."""
+    """``LAYER.down`` (rank, in) and ``LAYER.up`` (out, rank); ``mask.down`` (its rank, patch * features) and
+    ``mask.up``."""
     base: str
     """Name of the prior it changes."""
     fingerprint: str
@@ -187,7 +188,7 @@ def adapted(net: PriorNet, adapter: Adapter) -> AdaptedNet:
 
 
 def beside(embed: Tensor, mask: Tensor, config: NetConfig) -> Tensor:
-    """Weights for frames of [state, mask, flags]: those of the state and flags (width, patch * numbers) and of the mask."""
+    """Weights that read frames of [state, mask, flags], from those of state and flags and those of the mask."""
     state = embed.unflatten(1, (config.patch, -1))
     shown = mask.unflatten(1, (config.patch, config.features))
     return torch.cat([state[..., : config.features], shown, state[..., config.features :]], dim=-1).flatten(1)

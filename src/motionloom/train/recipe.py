@@ -122,7 +122,8 @@ def _check(path: Path, recipe: Recipe) -> None:
         if not 0 <= getattr(recipe, key) <= limit:
             raise MotionloomError(f"{path}: {key} must be from 0 to {limit:g}; got {getattr(recipe, key)!r}")
     good = (
-        recipe.steps > 0 < recipe.batch and recipe.rank > 0 and recipe.rate > 0 and 0 <= recipe.ema < 1 and 0 <= recipe.drop_text < 1
+        recipe.steps > 0 < recipe.batch and recipe.rank > 0 < recipe.rate
+        and 0 <= recipe.ema < 1 and 0 <= recipe.drop_text < 1
         and recipe.levels > 1 and 0 <= recipe.cooldown <= 1 and recipe.clip > 0 and recipe.save_every > 0
         and len(recipe.windows) == len(recipe.shares) > 0 and 0 < min(recipe.windows) <= max(recipe.windows) <= 10_000
         and min(recipe.shares) >= 0 < sum(recipe.shares)

@@ -1,0 +1,142 @@
+"""Published control on features: algorithm 2 of Shafir et al. 2024, DiffusionBlending, and MDM's inpainting.
+
+Given numbers M stay free of noise all the way, as in training (algorithm 1): at every level they are signal * known.
+
+    x_T = signal_T * known * M + noise_T * draw * (1 - M)
+    guess = sum of w_i (u_i + s (c_i - u_i))         each network guided by itself, then blended
+    guess = known on M;  x_s from x_t and guess;  x_s = signal_s * known on M
+
+As published, but for one thing: nothing of the motion that the given numbers come from is in the start beside them
+(the published code starts from all of it, noised). MDM's inpainting overwrites the guess alone and noises everything.
+"""
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import torch
+from torch import Tensor
+
+from motionloom.checkpoint import Prior
+from motionloom.diffusion import (
+    SOLVERS,
+    Denoiser,
+    Draw,
+    Schedule,
+    Solver,
+    Weight,
+    blend,
+    chain,
+    guide,
+    inpaint,
+    levels,
+    observe,
+    row_draw,
+    run,
+)
+from motionloom.errors import MotionloomError
+from motionloom.nets.adapter import AdaptedNet, show
+from motionloom.nets.prior import Condition, PriorNet
+from motionloom.tasks.steering import Correction, corrected
+from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS
+
+Net: TypeAlias = PriorNet | AdaptedNet
+
+
+@torch.no_grad()
+def control_features(
+    prior: Prior,
+    nets: Sequence[Net],
+    prompts: Sequence[str],
+    known: Tensor,
+    mask: Tensor,
+    *,
+    seeds: Sequence[int],
+    weights: Sequence[Weight] | None = None,
+    guidance: float = GUIDANCE,
+    steps: int = STEPS,
+    solver: str = SOLVER,
+    spacing: str = SPACING,
+    noise_free: bool = True,
+    corrections: Sequence[Correction | None] | None = None,
+) -> Tensor:
+    """Motions in which the given numbers are exactly those of ``known``; (rows, frames, features) standardised.
+
+    nets: networks of this prior: its own, fine-tuned ones, `nets.adapter.adapted` ones; each is guided by itself.
+    prompts: one per row, "" for none. known, mask: (rows, frames, features), the mask bool (with several controls
+    their union); what is not given may hold anything. weights: one per network, a number or what broadcasts to the
+    motions, or either by level (`diffusion.blend`); the mean by default. They are used as they are. seeds: one per
+    row; a row's motion depends on no other row. noise_free False is MDM's inpainting: noise everywhere, and no
+    network is told the mask. corrections: change each row's blended guess before the given numbers are put in.
+    Raises MotionloomError for what does not fit together. (Shafir et al. 2024, algorithm 2 and section 4.3.)
+    """
+    mask = torch.as_tensor(mask, device=prior.mean.device)
+    known = _given(prior, known, mask)
+    if not nets or not len(prompts) == len(seeds) == len(known):
+        raise MotionloomError(
+            f"{len(nets)} networks, {len(prompts)} prompts and {len(seeds)} seeds do not fit {len(known)} motions; "
+            "give at least one network, and a prompt and a seed for each motion"
+        )
+    weights = [1 / len(nets)] * len(nets) if weights is None else list(weights)
+    if len(weights) != len(nets):
+        raise MotionloomError(f"there are {len(weights)} weights for {len(nets)} networks; give one for each")
+    if solver not in SOLVERS or not 1 <= steps <= prior.schedule.steps:
+        raise MotionloomError(
+            f"{steps} steps of {solver!r} cannot be taken; there are 1 to {prior.schedule.steps} steps "
+            f"of {', '.join(SOLVERS)}"
+        )
+    shown = mask if noise_free else torch.zeros_like(mask)
+    denoise = blended(nets, prior.condition(list(prompts)), shown, weights=weights, guidance=guidance)
+    if corrections is not None:
+        denoise = corrected(denoise, corrections)
+    return controlled(
+        denoise, known, mask, levels=levels(prior.schedule, steps, spacing=spacing), solver=SOLVERS[solver],
+        schedule=prior.schedule, draw=row_draw(seeds), noise_free=noise_free,
+    )  # fmt: skip
+
+
+def blended(
+    nets: Sequence[Net], cond: Condition, mask: Tensor, *, weights: Sequence[Weight], guidance: float
+) -> Denoiser:
+    """DiffusionBlending: every network guided by itself, then their weighted sum; told the mask those that can be."""
+    null = cond.null()
+    guided = [guide(net, show(net, net.bind(cond), mask), show(net, net.bind(null), mask), guidance) for net in nets]
+    return guided[0] if len(nets) == 1 and weights[0] == 1.0 else blend(guided, weights)
+
+
+def controlled(
+    denoise: Denoiser,
+    known: Tensor,
+    mask: Tensor,
+    *,
+    levels: Sequence[int],
+    solver: Solver,
+    schedule: Schedule,
+    draw: Draw,
+    noise_free: bool = True,
+    start: Tensor | None = None,
+) -> Tensor:
+    """The walk of algorithm 2 on any denoiser; (rows, frames, features).
+
+    ``start`` is the clean motion that the free numbers are noised from: nothing (zeros) by default; the published code
+    starts from the motion that the given numbers were taken from. noise_free False: MDM's inpainting.
+    """
+    start = torch.zeros_like(known) if start is None else start
+    x = schedule.noised(start, levels[0], draw(known))
+    hold = observe(known, mask, schedule, torch.zeros_like) if noise_free else chain()
+    return run(
+        inpaint(denoise, known, mask), hold(x, levels[0]), levels=levels,
+        solver=solver, schedule=schedule, draw=draw, constrain=hold,
+    )  # fmt: skip
+
+
+def _given(prior: Prior, known: Tensor, mask: Tensor) -> Tensor:
+    """``known`` where it is given, zeros elsewhere."""
+    if mask.dtype != torch.bool or known.ndim != 3 or mask.shape != known.shape or known.shape[2] != len(prior.mean):
+        raise MotionloomError(
+            f"given numbers of shape {tuple(known.shape)} under a {mask.dtype} mask of shape {tuple(mask.shape)} are "
+            f"of no use; both must be (motions, frames, {len(prior.mean)}), the mask of booleans"
+        )
+    known = torch.where(mask, known.to(prior.mean), 0.0)
+    if not bool(known.isfinite().all()):
+        raise MotionloomError("a given number is not finite (NaN or infinity); correct it or take it out of the mask")
+    return known

@@ -1,0 +1,41 @@
+"""Group `diffusion_blending`: published networks, each guided by itself, blended, under the union of two controls."""
+
+import pytest
+import torch
+
+from motionloom.diffusion import DDPM, Denoiser, cosine
+from motionloom.features.layout import mask
+from motionloom.nets.prior import condition
+from motionloom.nets.published import from_published
+from motionloom.tasks.blending import blended, controlled
+from tests.conformance.runner import KNOWN, MOTION, NOISE, TEXT, Case, case, cases, compare, normal, stream, weights
+from tests.conformance.test_sampling import to_motion, to_state
+
+
+def recorded_denoiser(recorded: Case) -> Denoiser:
+    config, rows = recorded.config, recorded.config["shape"][0]
+    keys = case("mdm_forward", "state_dict_humanml263").lists["keys"]
+    nets = []
+    for m in range(config["models"]):
+        filled = weights(keys, config["seed"], m)
+        nets.append(from_published({name: torch.from_numpy(array) for name, array in filled.items()}).eval())
+    text = torch.from_numpy(normal(stream(config["seed"], TEXT), (rows, 512)))
+    given = torch.from_numpy(mask(config["mask"])).expand(rows, config["shape"][3], -1)
+    return blended(nets, condition(text), given, weights=config["weights"], guidance=config["guidance"])
+
+
+@pytest.mark.parametrize("recorded", cases("diffusion_blending", kind="blending"))
+@torch.no_grad()
+def test_blended_guesses_and_whole_runs_are_the_published_ones(recorded):
+    """The guess at one time, and a run of 50 steps from the known motion with its noise masked."""
+    config = recorded.config
+    denoise, shape = recorded_denoiser(recorded), config["shape"]
+    x = to_state(normal(stream(config["seed"], MOTION), shape))
+    compare(recorded, "forward", to_motion(denoise(x, config["timesteps"][0] + 1)))
+    known, rng = to_state(normal(stream(config["seed"], KNOWN), shape)), stream(config["seed"], NOISE)
+    sample = controlled(
+        denoise, known, torch.from_numpy(mask(config["mask"])).expand_as(known),
+        levels=range(config["steps"], -1, -1), solver=DDPM, schedule=cosine(config["steps"]),
+        draw=lambda like: to_state(normal(rng, shape)), start=known,
+    )  # fmt: skip
+    compare(recorded, "sample", to_motion(sample))
