@@ -7,6 +7,7 @@ it (chapter 7). Styles, percentages and units other than the drawing's own are n
 import re
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 from xml.parsers import expat
 
 import numpy as np
@@ -40,10 +41,10 @@ def read_drawing(path: Path | str) -> Array:
     """
     name, attributes, matrix = _first_shape(text.read_bytes(path, max_bytes=_MAX_BYTES), path)
     try:
-        drawn = np.array(_POINTS[name](attributes))
+        drawn = np.array([(point.real, point.imag) for point in _POINTS[name](attributes)])
     except _BadShape as error:
         raise MotionloomError(f"{path}: the <{name}> cannot be walked: {error}") from None
-    points = np.stack([drawn.real, drawn.imag], axis=-1) @ matrix[:, :2].T + matrix[:, 2]
+    points = drawn @ matrix[:, :2].T + matrix[:, 2]
     points = -(points - points[:1]) + 0.0
     if not (np.isfinite(points).all() and np.abs(points).max() <= text.LIMIT and np.abs(points).max() > 0):
         raise MotionloomError(f"{path}: the <{name}> has no length, or is larger than any drawing")
@@ -260,7 +261,7 @@ class _Pen:
             mirrored = 2 * self.at - self.handle[1] if self.handle[0] in {"S": "CS", "T": "QT"}[kind] else self.at
             p = [mirrored, *p]
         u = np.linspace(0, 1, 2 if kind == "L" else _FINE + 1)[1:]
-        curve = [self.at, *p]
+        curve: list[Any] = [self.at, *p]
         while len(curve) > 1:  # de Casteljau
             curve = [a * (1 - u) + b * u for a, b in pairwise(curve)]
         self._to([*curve[0]], kind, p[-2] if len(p) > 1 else p[-1])

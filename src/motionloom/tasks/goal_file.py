@@ -5,7 +5,7 @@
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,13 +16,14 @@ from motionloom.errors import MotionloomError
 from motionloom.features.humanml import resample_positions
 from motionloom.io import load
 from motionloom.io.text import read_text
-from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.drawing import read_drawing
 from motionloom.tasks.fields import Field, listed
-from motionloom.tasks.goals import FPS, Goal, Placement, body_facing, merged, placement_of, turn_between
-from motionloom.tasks.paths import CURVES, check_speed, curve, root_path, through, turned_to
+from motionloom.tasks.following import follow, stands, tracks
+from motionloom.tasks.goals import FPS, Goal, Placement, merged, placement_of, turn_between
+from motionloom.tasks.paths import CURVES, WALKING, curve, lengths_along, root_path, through, turned_to
+from motionloom.tasks.reach import check_reach
 
 __all__ = ["SCHEMA", "follow", "read_goal", "root_path"]
 
@@ -31,8 +32,6 @@ MAX_BYTES = 16_000_000
 MAX_FRAMES = 1_000_000
 FARTHEST = 1000.0
 """Metres from the origin."""
-HIGHEST, LONGEST_REACH = 3.0, 1.3
-"""Metres: no joint of a person gets higher above the floor, or further from the pelvis."""
 FULL_TURN = 36_000.0
 """Degrees: directions count on beyond a turn, so far."""
 KEYS = ("start", "path", "joints", "poses", "follow")
@@ -64,42 +63,6 @@ def read_goal(source: Path | str | Mapping[str, Any], *, frames: int, fps: float
         return _Reader(frames, fps, folder).goal(Field(source))
     path = Path(source)
     return _Reader(frames, fps, path.parent).goal(Field(_parsed(path), source=str(path)))
-
-
-def follow(motion: Motion, joints: Sequence[str], *, frames: int, at: Sequence[float] | None = None) -> Goal:
-    """The places of joints (or groups) of a motion of any humanoid, as a goal of so many frames at 20 fps.
-
-    The motion is put on the uniform person first; places are those in its world, and the goal starts where its person
-    stands. at: seconds, each within the motion; None: every frame that the motion has. Raises `MotionloomError` for
-    an unknown joint or a time that either of the two does not have.
-    """
-    chosen = list(SMPL22.resolve(joints))
-    positions = resample_positions(to_smpl22(motion).positions(), motion.fps)
-    return _tracks(positions, chosen, frames=frames, at=at)
-
-
-def _tracks(positions: np.ndarray, joints: list[int], *, frames: int, at: Sequence[float] | None) -> Goal:
-    """Wishes for joints of places (n, 22, 3) at 20 fps."""
-    known = min(len(positions), frames)
-    if at is None:
-        rows = np.arange(known)
-    else:
-        rows = np.array([round(time * FPS) for time in at], dtype=int)
-        if len(rows) == 0 or rows.min() < 0 or rows.max() > known:
-            raise MotionloomError(
-                f"a motion can be followed at 0 to {(known - 1) / FPS:g} s here; got {listed([f'{t:g}' for t in at])}"
-            )
-        rows = np.minimum(rows, known - 1)
-    goal = Goal.nothing(frames)
-    grid = np.ix_(rows, joints)
-    goal.positions[grid] = positions[grid]
-    goal.asked[grid] = True
-    return replace(goal, start=_stands(positions[0]))
-
-
-def _stands(places: np.ndarray) -> Placement:
-    """Where a person of places (22, 3) stands."""
-    return Placement(float(places[0, 0]), float(places[0, 2]), body_facing(places))
 
 
 def _parsed(path: Path) -> Any:
@@ -159,16 +122,19 @@ class _Reader:
         goal, start = self.path(given["path"], start) if "path" in given else (Goal.nothing(self.frames), start)
         told = start.position is not None or start.facing is not None
         x, z = start.position or (0.0, 0.0)
-        stands = Placement(x, z, start.facing or 0.0)
-        goal = replace(goal, start=stands if told else None)
+        origin = Placement(x, z, start.facing or 0.0)
+        goal = replace(goal, start=origin if told else None)
         for item in given["poses"].items() if "poses" in given else ():
-            goal = self.joined(goal, self.pose(item, goal, stands), item)
+            goal = self.joined(goal, self.pose(item, goal, origin), item)
         for item in given["joints"].items() if "joints" in given else ():
             goal = self.joined(goal, self.joint(item, goal), item)
         for item in _one_or_many(given.get("follow")):
             found = self.follow(item)
             goal = self.joined(goal, found if goal.start is None else replace(found, start=None), item)
-        self.check(goal, top)
+        try:
+            check_reach(goal)
+        except MotionloomError as error:
+            top.fail(str(error))
         return goal
 
     def joined(self, goal: Goal, other: Goal, item: Field) -> Goal:
@@ -256,13 +222,14 @@ class _Reader:
         return points, None, None if span is None else (span[0], span[1])
 
     def metres(self, found: Field, given: dict[str, Field], points: np.ndarray) -> float:
-        """Metres per unit of a drawing."""
-        if ("width" in given) == ("scale" in given):
-            found.fail(
-                "of a drawing needs one of 'width' (metres from its left to its right) and 'scale' (metres per unit)"
-            )
+        """Metres per unit of a drawing; as large as somebody walks in the time where the file does not say."""
+        if "width" in given and "scale" in given:
+            found.fail("of a drawing has 'width' or 'scale', not both")
         if "scale" in given:
             return given["scale"].number(1e-6, 1e6)
+        if "width" not in given:
+            begin, end = self.times(given.get("times"), 2) or (0.0, self.seconds)
+            return WALKING * (end - begin) / float(lengths_along(points)[-1])
         across = float(np.ptp(points[:, 0]))
         if across < 1e-6 * np.ptp(points[:, 1]):
             given["width"].fail("cannot be that of a drawing that goes straight up or down; give 'scale' instead")
@@ -321,8 +288,8 @@ class _Reader:
         if "frame" in given and given["frame"].word(("world", "root")) == "root":
             places = self.from_root(goal, frames, fields, places, asked)
         result = Goal.nothing(self.frames)
-        grid = np.ix_(frames, joints)
-        result.positions[grid], result.asked[grid] = places[:, None], asked[:, None]
+        for joint in joints:
+            result.positions[frames, joint], result.asked[frames, joint] = places, asked
         return result
 
     def timed(self, given: dict[str, Field]) -> list[tuple[int, Field, np.ndarray, np.ndarray]]:
@@ -388,17 +355,17 @@ class _Reader:
                 found.fail(f"cannot be used: {error}")
         return self.people[path]
 
-    def pose(self, item: Field, goal: Goal, stands: Placement) -> Goal:
+    def pose(self, item: Field, goal: Goal, origin: Placement) -> Goal:
         given = item.mapping(POSE_KEYS, ("time", "from"))
         frame = self.frame(given["time"].number(0.0, self.seconds))
         positions, fps = self.person(given["from"])
         length = len(positions) / fps
         at = given["at"].number(0.0, length) if "at" in given else 0.0
         body = positions[min(round(at * fps), len(positions) - 1)]
-        place = stands
+        place = origin
         if goal.asked[frame, 0, [0, 2]].all():
             x, _, z = goal.positions[frame, 0]
-            facing = goal.facing[frame] if goal.facing_asked[frame] else stands.facing
+            facing = goal.facing[frame] if goal.facing_asked[frame] else origin.facing
             place = Placement(float(x), float(z), float(facing))
         position, facing = self.ground(given.get("position")), self.direction(given.get("facing"))
         if position is not None:
@@ -406,7 +373,7 @@ class _Reader:
         if facing is not None:
             place = replace(place, facing=facing)
         result = Goal.nothing(self.frames)
-        result.positions[frame] = place.to_world(_stands(body).from_world(body))
+        result.positions[frame] = place.to_world(stands(body).from_world(body))
         result.asked[frame] = True
         return replace(result, start=place) if frame == 0 else result
 
@@ -418,40 +385,9 @@ class _Reader:
         since = given["from_time"].number(0.0, (len(positions) - 1) / FPS) if "from_time" in given else 0.0
         positions = positions[round(since * FPS) :]
         try:
-            return _tracks(positions, list(joints), frames=self.frames, at=self.times(given.get("times")))
+            return tracks(positions, list(joints), frames=self.frames, at=self.times(given.get("times")))
         except MotionloomError as error:
             item.fail(f"cannot be had: {error}")
-
-    # -- what nobody can do
-
-    def check(self, goal: Goal, top: Field) -> None:
-        places = goal.positions[:, 0][:, [0, 2]].copy()
-        known = goal.asked[:, 0][:, [0, 2]].all(axis=-1)
-        if goal.start is not None and not known[0]:
-            places[0], known[0] = (goal.start.x, goal.start.z), True
-        at = np.flatnonzero(known)
-        try:
-            check_speed(places[at], at / self.fps)
-        except MotionloomError as error:
-            top.fail(f"cannot be met: {error}")
-        tall = np.where(goal.asked[..., 1], goal.positions[..., 1], 0.0)
-        if tall.max() > HIGHEST:
-            frame, joint = np.unravel_index(int(tall.argmax()), tall.shape)
-            self.out_of_reach(top, frame, joint, f"{tall.max():.2f} m high", f"{HIGHEST:g} m above the floor")
-        both = goal.asked[..., 0] & goal.asked[..., 2] & known[:, None]
-        flat = np.hypot(*(goal.positions[..., [0, 2]] - places[:, None]).transpose(2, 0, 1))
-        upright = goal.asked[..., 1] & goal.asked[:, :1, 1]
-        far = np.where(both, np.hypot(flat, np.where(upright, goal.positions[..., 1] - goal.positions[:, :1, 1], 0)), 0)
-        if far.max() > LONGEST_REACH:
-            frame, joint = np.unravel_index(int(far.argmax()), far.shape)
-            limit = f"{LONGEST_REACH:g} m from the pelvis"
-            self.out_of_reach(top, frame, joint, f"{far.max():.2f} m away from where the pelvis is then", limit)
-
-    def out_of_reach(self, top: Field, frame: Any, joint: Any, where: str, limit: str) -> None:
-        top.fail(
-            f"asks for {SMPL22.names[joint]} at {frame / self.fps:.2f} s {where}, out of anybody's reach: keep joints "
-            f"within {limit}"
-        )
 
 
 def _one_or_many(found: Field | None) -> list[Field]:

@@ -14,6 +14,8 @@ from motionloom.tasks.goals import FPS, Goal, turn_between
 
 Array = NDArray[np.float64]
 
+WALKING = 1.2
+"""Metres per second of somebody who is not asked how fast."""
 FASTEST = 12.0
 """Metres per second: nobody runs faster."""
 STANDING = 0.02
@@ -73,14 +75,14 @@ def even(points: np.ndarray, shares: np.ndarray, *, smooth: bool = True) -> Arra
     if len(points) == 1:
         return np.repeat(points, len(shares), axis=0)
     if smooth and len(points) > 2:
-        chord = _lengths(points)
+        chord = lengths_along(points)
         parts = [np.linspace(a, b, _FINE, endpoint=False) for a, b in pairwise(chord)]
         points = through(points, chord, np.concatenate([*parts, chord[-1:]]))
-    length = _lengths(points)
+    length = lengths_along(points)
     return np.stack([np.interp(np.asarray(shares) * length[-1], length, column) for column in points.T], axis=-1)
 
 
-def _lengths(points: np.ndarray) -> Array:
+def lengths_along(points: np.ndarray) -> Array:
     """(n,) metres from the first point along straight lines."""
     return np.concatenate([[0.0], np.linalg.norm(np.diff(points, axis=0), axis=-1).cumsum()])
 
@@ -159,23 +161,23 @@ def root_path(
     at = np.arange(first, last + 1) / fps
     if times is None:
         way = even(points, ((at - begin) / max(end - begin, 1e-9)).clip(0, 1), smooth=smooth)
-        # chords are no longer than the curve: a path that they cannot keep to is told as a whole
-        lengths = _lengths(points)
+        lengths = lengths_along(points)  # of chords, no longer than the curve
         check_speed(lengths[[0, -1], None], np.array([begin, end]))
-        times = begin + (end - begin) * lengths / max(lengths[-1], 1e-9)
+        reached = begin + (end - begin) * lengths / max(lengths[-1], 1e-9)
     else:
-        check_speed(points, np.asarray(times, dtype=np.float64))
-        way = through(points, np.asarray(times), at, smooth=smooth)
+        reached = np.asarray(times, dtype=np.float64)
+        check_speed(points, reached)
+        way = through(points, reached, at, smooth=smooth)
     goal = Goal.nothing(frames)
     goal.positions[first : last + 1, 0, 0], goal.positions[first : last + 1, 0, 2] = way.T
     goal.asked[first : last + 1, 0, 0] = goal.asked[first : last + 1, 0, 2] = True
     if facing != "free" and not (facing == "along" and np.ptp(way, axis=0).max() < 1e-3):
-        goal.facing[first : last + 1] = _facing(facing, way, times, at, fps)
+        goal.facing[first : last + 1] = _facing(facing, way, reached, at, fps)
         goal.facing_asked[first : last + 1] = True
     return goal
 
 
-def _facing(facing: str | float | Sequence[float], way: Array, times: Sequence[float], at: Array, fps: float) -> Array:
+def _facing(facing: str | float | Sequence[float], way: Array, times: Array, at: Array, fps: float) -> Array:
     if isinstance(facing, str):
         if facing != "along":
             raise MotionloomError(f"a path's facing is 'along', 'free' or degrees; got {facing!r}")

@@ -1,0 +1,181 @@
+"""`motionloom control`: words and goals to motion files."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from motionloom.cli import generate
+from motionloom.cli.sampling import add_sampling, bar, check_outs, check_prompt, fail
+
+if TYPE_CHECKING:
+    from motionloom.tasks.control import Controlled
+    from motionloom.tasks.goals import Goal
+
+MAX_COUNT = 1000
+
+
+def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Register `control`."""
+    parser = subparsers.add_parser(
+        "control",
+        help="make motions from words that keep to a path, a hand, poses",
+        description="Make motions that do what PROMPT says and meet goals: see docs/control.md.",
+    )
+    parser.add_argument("prompt", nargs="?", metavar="PROMPT", help="what the person does, such as 'a person walks'")
+    parser.add_argument(
+        "--goal", type=Path, action="append", default=[], metavar="FILE",
+        help="a JSON file of paths, joints and poses, repeatable",
+    )  # fmt: skip
+    parser.add_argument(
+        "--follow", action="append", default=[], metavar="JOINT",
+        help="joint or group that goes where that of --from goes, repeatable",
+    )  # fmt: skip
+    parser.add_argument("--from", dest="clip", type=Path, metavar="CLIP", help="the motion file that --follow follows")
+    parser.add_argument("--path", type=Path, metavar="SVG", help="a drawn line to walk along, seen from above")
+    parser.add_argument(
+        "--width",
+        type=float,
+        metavar="METRES",
+        help="width of the drawing (default: as large as is walked in the time)",
+    )
+    parser.add_argument("--seconds", type=float, help="length of each motion (default: that of --from, else 5)")
+    parser.add_argument("--seed", type=int, default=0, help="the first motion's seed (default 0)")
+    parser.add_argument("--count", type=int, default=1, help="motions to make (default 1)")
+    parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
+    parser.add_argument("--loose", action="store_true", help="leave the motion as drawn, near the goals")
+    parser.add_argument(
+        "--adapters", action="append", default=[], metavar="NAME|FILE",
+        help="auto (the default), none, or adapters to use, repeatable",
+    )  # fmt: skip
+    parser.add_argument("--schema", action="store_true", help="print what a goal file may hold as JSON Schema and end")
+    add_sampling(parser)
+    parser.set_defaults(run=run_control)
+
+
+def run_control(arguments: argparse.Namespace) -> None:
+    """``motionloom control PROMPT --goal FILE``."""
+    from motionloom.io import check_output
+
+    if arguments.schema:
+        from motionloom.tasks.goal_file import SCHEMA
+
+        print(SCHEMA.read_text(encoding="utf-8"), end="")
+        return
+    outs = check_outs(arguments)
+    if not 1 <= arguments.count <= MAX_COUNT or not 0 <= arguments.seed < 2**62:
+        fail(f"--count must be 1 to {MAX_COUNT} and --seed 0 or more; got {arguments.count} and {arguments.seed}")
+    if arguments.prompt is None:
+        fail("no prompt; say what the person does, such as: motionloom control 'a person walks' --goal goal.json")
+    check_prompt(arguments.prompt)
+    places = [generate._places(out, arguments.count) for out in outs]
+    for place in (place for several in places for place in several):
+        check_output(place)
+    goal = _goal(arguments)
+    made, seconds = _make(arguments, goal)
+    motions = [one.motion for one in made]
+    if arguments.fps is not None:
+        motions = [motion.resample(arguments.fps) for motion in motions]
+    captions = [arguments.prompt] * arguments.count
+    written = [generate._write(motions, several, captions) for several in places]
+    _report(arguments, made, written, seconds)
+
+
+def _goal(arguments: argparse.Namespace) -> "Goal":
+    """All that is asked on the line as one goal."""
+    from dataclasses import replace
+
+    from motionloom.io import load
+    from motionloom.tasks.goal_file import follow, read_goal
+    from motionloom.tasks.goals import FPS, merged
+    from motionloom.tasks.reach import check_reach
+    from motionloom.tasks.text import _frames
+
+    if bool(arguments.follow) != (arguments.clip is not None):
+        fail("--follow names joints of the motion that --from names; give both or none")
+    if arguments.width is not None and arguments.path is None:
+        fail("--width is that of the drawing of --path; give both or none")
+    if not (arguments.goal or arguments.follow or arguments.path):
+        fail("nothing to keep to; give --goal FILE, --path SVG, or --follow JOINT --from CLIP")
+    clip = None if arguments.clip is None else load(arguments.clip)
+    seconds = arguments.seconds
+    if seconds is None:
+        seconds = 5.0 if clip is None else (len(clip) - 1) / clip.fps + 1 / FPS
+    frames = _frames(seconds, FPS)
+    goals = [read_goal(file, frames=frames, folder=file.parent) for file in arguments.goal]
+    if arguments.path is not None:
+        size = {} if arguments.width is None else {"width": arguments.width}
+        drawn = {"path": {"svg": arguments.path.name, **size}}
+        goals.append(read_goal(drawn, frames=frames, folder=arguments.path.parent))
+    if clip is not None:
+        goals.append(follow(clip, arguments.follow, frames=frames))
+    whole = goals[0]
+    for other in goals[1:]:
+        if clip is not None and other is goals[-1] and (whole.start is not None or whole.asked[0, 0].any()):
+            other = replace(other, start=None)  # the person starts where the goals say, not where the clip's does
+        whole = merged(whole, other)
+    try:
+        check_reach(whole)
+    except ValueError as error:
+        fail(f"the goals together {error}")
+    return whole
+
+
+def _make(arguments: argparse.Namespace, goal: "Goal") -> "tuple[list[Controlled], float]":
+    import time
+
+    from motionloom.checkpoint import Prior
+    from motionloom.tasks.control import control
+    from motionloom.tasks.text import STEPS
+
+    prior = Prior.load(arguments.weights, device=arguments.device)
+    began = time.perf_counter()
+    with bar("controlling") as progress:
+        made = control(
+            prior, arguments.prompt, goal, count=arguments.count, seed=arguments.seed, guidance=arguments.guidance,
+            steps=STEPS if arguments.steps is None else arguments.steps, adapters=_adapters(arguments.adapters, prior),
+            exact=not arguments.loose, clean=not arguments.raw, progress=progress,
+        )  # fmt: skip
+    return made, time.perf_counter() - began
+
+
+def _adapters(names: list[str], prior):
+    """'auto', 'none' or the adapters of these names."""
+    if not names or names in (["auto"], ["none"]):
+        return names[0] if names else "auto"
+    if {"auto", "none"} & set(names):
+        fail("--adapters is auto, none, or names of adapters; not a mix of them")
+    from motionloom.nets.adapter import Adapter
+
+    return [Adapter.load(name, prior) for name in names]
+
+
+def _report(arguments: argparse.Namespace, made: "list[Controlled]", written: list[list[Path]], seconds: float) -> None:
+    import sys
+
+    for number, one in enumerate(made):
+        which = f"motion {number} (seed {arguments.seed + number}): " if len(made) > 1 else ""
+        for sentence in one.missed:
+            print(f"motionloom: {which}{sentence}", file=sys.stderr)
+    if arguments.json:
+        import json
+
+        motions = [
+            {
+                "prompt": arguments.prompt, "seed": arguments.seed + number,
+                "error_cm": round(100 * one.error, 3), "worst_cm": round(100 * one.worst, 3), "missed": one.missed,
+            }
+            for number, one in enumerate(made)
+        ]  # fmt: skip
+        about = {
+            "motions": motions,
+            "seconds": len(made[0].motion) / made[0].motion.fps,
+            "weights": str(arguments.weights),
+            "files": [str(path) for several in written for path in several],
+        }
+        print(json.dumps(about | {"sampling_seconds": round(seconds, 3)}, indent=1))
+        return
+    for several in written:
+        for number, path in enumerate(several):
+            of = made if len(several) == 1 else [made[number]]
+            mean, worst = sum(one.error for one in of) / len(of), max(one.worst for one in of)
+            print(f"wrote {path}: {100 * mean:.1f} cm from its goals, at most {100 * worst:.1f} cm")
