@@ -1,0 +1,135 @@
+"""`motionloom edit`: a clip changed by words."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from motionloom.cli import files, generate
+from motionloom.cli.sampling import add_sampling, bar, check_outs, check_prompt, fail
+
+if TYPE_CHECKING:
+    from motionloom.motion import Motion
+
+MAX_COUNT = 1000
+
+
+def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Register `edit`."""
+    parser = subparsers.add_parser(
+        "edit",
+        help="change parts of a motion file by words",
+        description="Draw parts of a clip (.bvh, .amc with its .asf, .glb, .npz) anew; the rest stays as it is.",
+    )
+    parser.add_argument("clip", type=Path, metavar="CLIP")
+    parser.add_argument("text", nargs="?", metavar="TEXT", help="what the person is to do, such as 'waves'")
+    parser.add_argument(
+        "--keep", action="append", default=[], metavar="PART",
+        help="part that stays, repeatable: a joint, a group such as lower_body, root",
+    )  # fmt: skip
+    parser.add_argument(
+        "--between", nargs=2, type=float, action="append", default=[], metavar=("FROM", "TO"),
+        help="change only these seconds, repeatable",
+    )  # fmt: skip
+    parser.add_argument("--loop", action="store_true", help="make the end meet the beginning")
+    parser.add_argument("--blend", type=float, default=1.0, help="seconds drawn anew for --loop (default 1)")
+    parser.add_argument("--extend", type=float, default=0.0, metavar="SECONDS", help="go on behind the clip")
+    parser.add_argument(
+        "--strength", type=float, default=1.0, help="how far from the clip, above 0 to 1 (default 1: from noise alone)"
+    )
+    parser.add_argument("--skeleton", choices=("own", "smpl"), default="own", help="of the result (default own)")
+    parser.add_argument("--seed", type=int, default=0, help="the first version's seed (default 0)")
+    parser.add_argument("--count", type=int, default=1, help="versions to make (default 1)")
+    parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
+    add_sampling(parser)
+    files._add_reading(parser)
+    _take_text_anywhere(parser)
+    parser.set_defaults(run=run_edit)
+
+
+def _take_text_anywhere(parser: argparse.ArgumentParser) -> None:
+    """Let the text stand behind options too: argparse gives up on an optional word once it has passed its place."""
+
+    def parse(args=None, namespace=None):
+        found, unknown = argparse.ArgumentParser.parse_known_args(parser, args, namespace)
+        if found.text is None and len(unknown) == 1 and not unknown[0].startswith("-"):
+            found.text, unknown = unknown[0], []
+        if unknown:
+            parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
+
+    parser.parse_known_args = parse  # type: ignore[method-assign]
+
+
+def run_edit(arguments: argparse.Namespace) -> None:
+    """``motionloom edit CLIP TEXT``."""
+    from motionloom.io import check_output
+
+    outs = check_outs(arguments)
+    if not 1 <= arguments.count <= MAX_COUNT or not 0 <= arguments.seed < 2**62:
+        fail(f"--count must be 1 to {MAX_COUNT} and --seed 0 or more; got {arguments.count} and {arguments.seed}")
+    if arguments.text is not None:
+        check_prompt(arguments.text)
+    captions = [arguments.text or arguments.clip.stem] * arguments.count
+    places = [generate._places(out, arguments.count) for out in outs]
+    for place in (place for several in places for place in several):
+        check_output(place)
+    clip, unit, orders = files._read(arguments, arguments.clip)
+    motions, seconds = _make(arguments, files._crop(clip, arguments))
+    if arguments.skeleton == "smpl":
+        unit, orders = None, {}
+    written = []
+    for several in places:
+        if several[0].suffix.lower() == ".bvh":
+            written += [_write_bvh(motion, place, unit, orders) for motion, place in zip(motions, several, strict=True)]
+        else:
+            written += generate._write(motions, several, captions)
+    _report(arguments, written, seconds)
+    files._note_rate(arguments, [arguments.clip])
+
+
+def _make(arguments: argparse.Namespace, clip: "Motion") -> "tuple[list[Motion], float]":
+    import time
+
+    from motionloom.checkpoint import Prior
+    from motionloom.tasks.edit import edit
+    from motionloom.tasks.text import STEPS
+
+    prior = Prior.load(arguments.weights, device=arguments.device)
+    began = time.perf_counter()
+    with bar("editing") as progress:
+        motions = edit(
+            prior, clip, arguments.text or "", between=[tuple(span) for span in arguments.between],
+            keep=[name.strip() for part in arguments.keep for name in part.split(",")],
+            loop=arguments.loop, blend=arguments.blend, extend=arguments.extend, strength=arguments.strength,
+            count=arguments.count, seed=arguments.seed, guidance=arguments.guidance,
+            steps=STEPS if arguments.steps is None else arguments.steps, skeleton=arguments.skeleton,
+            clean=not arguments.raw, progress=progress,
+        )  # fmt: skip
+    if arguments.fps is not None:
+        motions = [motion.resample(arguments.fps) for motion in motions]
+    return motions, time.perf_counter() - began
+
+
+def _write_bvh(motion: "Motion", place: Path, unit: float | None, orders: dict[str, str]) -> Path:
+    """In the unit and the orders of rotations of the clip's own file."""
+    from motionloom.io.bvh_writer import save_bvh
+
+    return save_bvh(motion, place, order=orders, unit=unit or 1.0)
+
+
+def _report(arguments: argparse.Namespace, written: list[Path], seconds: float) -> None:
+    if arguments.json:
+        import json
+
+        about = {
+            "clip": str(arguments.clip),
+            "prompt": arguments.text,
+            "seeds": [arguments.seed + i for i in range(arguments.count)],
+            "weights": str(arguments.weights),
+            "files": [str(path) for path in written],
+            "sampling_seconds": round(seconds, 3),
+        }
+        print(json.dumps(about, indent=1))
+        return
+    for path in written:
+        print(f"wrote {path}")

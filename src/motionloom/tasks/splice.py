@@ -1,0 +1,220 @@
+"""Putting a drawn stretch into a user's own motion: their skeleton, their frame rate, no jump at the borders.
+
+What lies outside of the stretch is never touched. Inside, the drawn motion is moved by what it lacks at the borders, in
+place and in velocity; that fades over a few frames ("inertialization", Bollo, GDC 2018, with a cubic).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.features.feet import clean_feet
+from motionloom.features.humanml import resample_positions
+from motionloom.features.ik import motion_from_positions
+from motionloom.features.layout import FPS
+from motionloom.motion import Motion
+from motionloom.retarget import joints22, retarget, to_smpl22
+from motionloom.retarget.anatomy import read_body
+from motionloom.skeleton import Skeleton
+from motionloom.tasks.redraw import Drawn
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+EASE = 0.3
+"""Seconds over which a difference of pose at a border fades."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """Parts of a skeleton that stay inside of a stretch."""
+
+    joints: Flags
+    """(joints,) whose rotations stay."""
+    place: Flags
+    """(3,) which coordinates of the root stay."""
+
+
+def kept_parts(skeleton: Skeleton, joints: frozenset[int], place: Flags) -> Kept:
+    """The skeleton's own joints for some of the 22; joints that none of the 22 stands for (fingers) always stay."""
+    drivers = read_body(skeleton).drivers
+    first = {driver: j for j, driver in reversed(list(enumerate(drivers))) if driver is not None}
+    inner = set(first)
+    for k in range(len(skeleton) - 1, 0, -1):
+        if k in inner:
+            inner.add(skeleton.parents[k])
+    flags = np.ones(len(skeleton), dtype=bool)
+    for k in sorted(inner):
+        above = flags[skeleton.parents[k]] if k else 0 in joints
+        flags[k] = first[k] in joints if k in first else above
+    return Kept(flags, place | (0 in joints))
+
+
+def person_at_20(motion: Motion) -> Array:
+    """(frames + 1, 22, 3) metres: the uniform person at 20 fps for at least as long as the motion, and a frame more.
+
+    What lies behind the motion's end goes straight on.
+    """
+    places = to_smpl22(motion).positions()
+    frames = int(np.ceil((len(motion) - 1) / motion.fps * FPS - 1e-6)) + 1
+    more = int(np.ceil(frames / FPS * motion.fps)) + 1 - len(motion)
+    step = places[-1] - places[-2]
+    ahead = places[-1] + step * np.arange(1, max(more, 0) + 1)[:, None, None]
+    return resample_positions(np.concatenate([places, ahead]), motion.fps)[: frames + 1]
+
+
+def dressed(drawn: Drawn, old: Motion, *, clean: bool) -> Motion:
+    """What was drawn, on the old motion's skeleton, at its rate and length, over its floor; feet cleaned."""
+    places = resample_positions(drawn.positions, FPS, target=old.fps)[: len(old)]
+    person = motion_from_positions(places, old.fps)
+    if clean:
+        nearest = np.minimum((np.arange(len(old)) * FPS / old.fps).round().astype(int), len(drawn.contacts) - 1)
+        person = clean_feet(person, contacts=drawn.contacts[nearest])
+    made = in_manner_of(old, retarget(person, old.skeleton))
+    back = in_manner_of(old, retarget(to_smpl22(old), old.skeleton))
+    carrier = _carrier(old.skeleton)
+    apart = rot.multiply(old.world_rotations()[:, carrier], rot.inverse(back.world_rotations()[:, carrier]))
+    if np.median(np.abs(apart[:, 0])) < np.cos(np.radians(30)):
+        raise MotionloomError("the clip does not stand upright along +Y; say which axis of its file is up (--up z)")
+    return _moved(made, (_place(old) - _place(back)).mean(axis=0))
+
+
+def in_manner_of(old: Motion, made: Motion) -> Motion:
+    """The same poses told as in the old motion, of as many frames: which joint carries the way through the world.
+
+    Files may hold the root still and move the hips in it; then the bones' changing lengths stay the old ones.
+    """
+    if old.translations is None:
+        return made
+    carrier = _carrier(old.skeleton)
+    if carrier == 0:
+        return replace(made, translations=old.translations)
+    parent = old.skeleton.parents[carrier]
+    above, place = old.world_rotations()[:, parent], old.positions()[:, parent]
+    rotations, translations = made.rotations.copy(), old.translations.copy()
+    chain = parent
+    while chain >= 0:
+        rotations[:, chain] = old.rotations[:, chain]
+        chain = old.skeleton.parents[chain]
+    undo = rot.inverse(above)
+    rotations[:, carrier] = rot.multiply(undo, made.world_rotations()[:, carrier])
+    translations[:, carrier] = rot.rotate(undo, made.positions()[:, carrier] - place)
+    return Motion(old.skeleton, old.fps, old.root, rotations, translations)
+
+
+def splice(old: Motion, made: Motion, first: int, *, last: int, kept: Kept) -> Motion:
+    """``old`` with the frames ``first`` to before ``last`` of ``made`` (same skeleton, rate, length, manner) in it.
+
+    Frames outside are the old ones bit for bit, kept parts are the old ones inside too.
+    """
+    ease = max(2, round(min(EASE * old.fps, (last - first) / 2)))
+    inside = slice(first, last)
+    rotations = old.rotations.copy()
+    eased = _eased_turns(old.rotations, made.rotations, first, last, ease)
+    drawn = np.where(kept.joints[:, None], old.rotations, eased)
+    rotations[inside] = _same_half(drawn[inside], old.rotations[max(first - 1, 0)])
+    way = _eased_places(_place(old), _place(made), first, last, ease)
+    place = _place(old).copy()
+    place[inside] = np.where(kept.place, place, way)[inside]
+    return _with_place(replace(old, rotations=rotations), place)
+
+
+def carried(motion: Motion, turn: Array, about: Array, to: Array) -> Motion:
+    """The motion turned by a quaternion (4,) about a point and moved so that the point comes to another (3,)."""
+    rotations = motion.rotations.copy()
+    rotations[:, 0] = rot.multiply(turn, rotations[:, 0])
+    return replace(motion, root=rot.rotate(turn, motion.root - about) + to, rotations=rotations)
+
+
+def standing(motion: Motion, frame: int) -> tuple[Array, Array]:
+    """Place (3,) of the middle of the hips in a frame and the turn (4,) about +Y of the way they face."""
+    places = joints22(motion.frames(frame, frame + 1))[0]
+    across = places[1] - places[2]
+    turn = rot.rotvec_to_quat(np.array([0.0, np.arctan2(-across[2], across[0]), 0.0]))
+    return (places[1] + places[2]) / 2, turn
+
+
+def concatenated(*parts: Motion) -> Motion:
+    """One motion after the other; all on the first one's skeleton and at its rate."""
+    moved = None if parts[0].translations is None else [p.translations for p in parts if p.translations is not None]
+    return replace(
+        parts[0],
+        root=np.concatenate([p.root for p in parts]),
+        rotations=np.concatenate([p.rotations for p in parts]),
+        translations=None if moved is None else np.concatenate(moved),
+    )
+
+
+# Parts
+
+
+def _carrier(skeleton: Skeleton) -> int:
+    """The joint that turns the pelvis."""
+    return read_body(skeleton).drivers[0] or 0
+
+
+def _place(motion: Motion) -> Array:
+    """(frames, 3) what carries the way through the world."""
+    carrier = 0 if motion.translations is None else _carrier(motion.skeleton)
+    return motion.root if carrier == 0 or motion.translations is None else motion.translations[:, carrier]
+
+
+def _with_place(motion: Motion, place: Array) -> Motion:
+    carrier = 0 if motion.translations is None else _carrier(motion.skeleton)
+    if carrier == 0 or motion.translations is None:
+        return replace(motion, root=place)
+    translations = motion.translations.copy()
+    translations[:, carrier] = place
+    return replace(motion, translations=translations)
+
+
+def _moved(motion: Motion, by: Array) -> Motion:
+    return _with_place(motion, _place(motion) + by)
+
+
+def _fading(offset: Array, slope: Array, ease: int) -> Array:
+    """(ease, ...) from one frame behind the border on: a cubic from offset and slope per frame to nothing."""
+    u = (np.arange(1, ease + 1) / (ease + 1)).reshape(-1, *[1] * offset.ndim)
+    return (1 - u) ** 2 * ((1 + 2 * u) * offset + u * (ease + 1) * slope)
+
+
+def _eased_turns(old: Array, made: Array, first: int, last: int, ease: int) -> Array:
+    """``made`` (frames, joints, 4) with what it lacks at the borders, fading."""
+    result = made.copy()
+    for border, step in ((first - 1, 1), (last, -1)):
+        if not 0 <= border < len(old):
+            continue
+        lack = (
+            rot.quat_to_rotvec(rot.multiply(old, rot.inverse(made))[[border - step, border]])
+            if 0 <= border - step < len(old)
+            else None
+        )
+        now = lack[1] if lack is not None else rot.quat_to_rotvec(rot.multiply(old[border], rot.inverse(made[border])))
+        slope = np.zeros_like(now) if lack is None else lack[1] - lack[0]
+        frames = border + step * np.arange(1, ease + 1)
+        result[frames] = rot.multiply(rot.rotvec_to_quat(_fading(now, slope, ease)), result[frames])
+    return result
+
+
+def _eased_places(old: Array, made: Array, first: int, last: int, ease: int) -> Array:
+    """``made`` (frames, 3) with what it lacks at the borders; a way through the stretch spreads over all of it."""
+    lack, frames = old - made, len(old)
+    before, behind = first > 0, last < frames
+    level = np.array([1.0, 0.0, 1.0])  # with one border only, the other end is at the height that was drawn
+    left = lack[first - 1] if before else level * lack[last] if behind else np.zeros(3)
+    right = lack[last] if behind else level * left
+    u = ((np.arange(frames) - first + 1) / (last - first + 1)).clip(0, 1)[:, None]
+    result = made + left + u * u * (3 - 2 * u) * (right - left)
+    for border, step, there in ((first - 1, 1, before), (last, -1, behind)):
+        if there and 0 <= border - step < frames:
+            slope = lack[border] - lack[border - step]
+            result[border + step * np.arange(1, ease + 1)] += _fading(np.zeros(3), slope, ease)
+    return result
+
+
+def _same_half(turns: Array, before: Array) -> Array:
+    """Signs so that neighbouring frames, and the frame before, lie in the same half of the sphere."""
+    return rot.unroll(np.concatenate([before[None], turns]))[1:]

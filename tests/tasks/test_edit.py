@@ -1,0 +1,319 @@
+"""Editing with a random prior: what is kept stays to the bit, borders do not jump, and what cannot be asked is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from motionloom import rotations as rot
+from motionloom.checkpoint import Prior
+from motionloom.errors import MotionloomError
+from motionloom.features import humanml
+from motionloom.features.layout import WIDTH
+from motionloom.motion import Motion
+from motionloom.retarget import from_smpl22
+from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.tasks.edit import edit, kept_numbers
+from motionloom.tasks.redraw import Stretch, arrival, redraw
+from motionloom.tasks.splice import carried, in_manner_of, kept_parts, person_at_20, splice, standing
+from tests.nets import tiny
+
+FEW = {"steps": 2, "guidance": 1.0}
+
+
+@pytest.fixture(scope="module")
+def prior() -> Prior:
+    """Random weights around a standing person, so that what is drawn has human sizes."""
+    features = humanml.motion_to_features(person(2.0))
+    return replace(tiny.prior(), mean=torch.from_numpy(features.mean(0)), std=torch.full((WIDTH,), 0.02))
+
+
+def person(seconds: float, fps: float = 20.0) -> Motion:
+    """Strides along a curve with swinging arms, smooth in time."""
+    t = np.arange(round(seconds * fps)) / fps
+    turns = np.zeros((len(t), 22, 3))
+    swing = 0.5 * np.sin(2 * np.pi * t)
+    turns[:, 0, 1] = 0.3 * t + 0.4
+    for joint, sign in ((1, 1), (2, -1), (16, -1), (17, 1)):
+        turns[:, joint, 0] = sign * swing
+    turns[:, [4, 5], 0] = 0.3
+    turns[:, 16, 2], turns[:, 17, 2] = -1.2, 1.2
+    root = np.stack([3 + np.sin(0.5 * t), 0.9 + 0.02 * np.cos(4 * np.pi * t), -2 + 0.8 * t], axis=-1)
+    return Motion(SMPL22, fps, root, rot.rotvec_to_quat(turns))
+
+
+def rig() -> Skeleton:
+    """Another body: 20 % larger, other names, a finger, under a root that stands on the floor."""
+    names = ("world", *(n.replace("left_", "l_").replace("right_", "r_") for n in SMPL22.names), "r_finger")
+    offsets = np.concatenate([np.zeros((1, 3)), 1.2 * SMPL22.offsets, [[-0.1, 0, 0]]])
+    return Skeleton(names, (-1, *(p + 1 for p in SMPL22.parents), 22), offsets)
+
+
+def floating(motion: Motion) -> Motion:
+    """The same places told with a still root and moving hips, as some files do."""
+    rotations = np.array(motion.rotations)
+    translations = np.tile(motion.skeleton.offsets, (len(motion), 1, 1))
+    translations[:, 1] += motion.root
+    return Motion(motion.skeleton, motion.fps, np.zeros((len(motion), 3)), rotations, translations)
+
+
+def same(a: Motion, b: Motion, frames: slice) -> bool:
+    pairs = [(a.root, b.root), (a.rotations, b.rotations)]
+    if a.translations is not None and b.translations is not None:
+        pairs.append((a.translations, b.translations))
+    return all(np.array_equal(one[frames], other[frames]) for one, other in pairs)
+
+
+def clips() -> dict[str, Motion]:
+    large = from_smpl22(person(5.0, 30.0), rig())
+    return {"person at 20": person(5.0), "person at 120": person(5.0, 120.0), "rig": large, "floating": floating(large)}
+
+
+@pytest.mark.parametrize("kind", ["person at 20", "person at 120", "rig", "floating"])
+def test_outside_of_the_stretch_everything_stays_to_the_bit(prior: Prior, kind: str) -> None:
+    """And inside it does not; the length, rate and skeleton are the clip's."""
+    clip = clips()[kind]
+    made = edit(prior, clip, "a person turns", between=[(1.0, 2.0), (3.5, 4.0)], **FEW)[0]
+    f = round(clip.fps)
+    assert (len(made), made.fps, made.skeleton) == (len(clip), clip.fps, clip.skeleton)
+    assert all(same(made, clip, s) for s in (slice(0, f), slice(2 * f, round(3.5 * f)), slice(4 * f, None)))
+    moved = np.linalg.norm(made.positions() - clip.positions(), axis=-1).max(axis=1)
+    assert (moved[f + 5 : 2 * f - 5] > 1e-3).all()
+
+
+@pytest.mark.parametrize("kind", ["person at 20", "rig", "floating"])
+def test_kept_joints_keep_their_rotations_and_the_root_its_place(prior: Prior, kind: str) -> None:
+    clip = clips()[kind]
+    made = edit(prior, clip, "a person jumps", keep=["lower_body"], **FEW)[0]
+    shift = len(clip.skeleton) > 22
+    lower = [j + shift for j in SMPL22.groups["lower_body"]]
+    upper = [j + shift for j in (3, 9, 16, 17, 18)]
+    assert np.array_equal(made.rotations[:, lower], clip.rotations[:, lower])
+    np.testing.assert_array_equal(made.positions()[:, lower], clip.positions()[:, lower])
+    assert (np.abs(made.rotations[:, upper] - clip.rotations[:, upper]).max(axis=(0, 2)) > 1e-3).all()
+    if shift:
+        assert np.array_equal(made.rotations[:, -1], clip.rotations[:, -1]), "fingers are not drawn"
+
+
+def test_the_root_alone_can_be_kept(prior: Prior) -> None:
+    clip = person(3.0)
+    made = edit(prior, clip, "a person jumps", keep=["root"], between=[(1.0, 2.0)], **FEW)[0]
+    assert np.array_equal(made.root, clip.root)
+    assert not np.array_equal(made.rotations[:, 1], clip.rotations[:, 1])
+
+
+def test_the_numbers_of_kept_parts_are_the_published_masks() -> None:
+    """`lower_body` here is `lower_body` of the control models, and a wrist adds its rotation and displacement."""
+    np.testing.assert_array_equal(kept_numbers(["lower_body"]), humanml.mask("lower_body"))
+    assert kept_numbers(["left_wrist"]).sum() == 3 + 6 + 3
+    assert not kept_numbers([]).any()
+
+
+def test_a_stretch_arrives_where_the_clip_goes_on() -> None:
+    """Random features bent by `arrival` integrate to the known facing and place, by a loop over frames."""
+    known = torch.from_numpy(humanml.motion_to_features(person(5.0)))[None].double()
+    mask = torch.ones_like(known, dtype=torch.bool)
+    mask[:, 30:70] = False
+    wild = torch.where(mask, known, known + 0.05 * torch.randn(known.shape, generator=torch.Generator().manual_seed(1)))
+    stretch = Stretch(np.zeros((100, 22, 3)), 30, 70, np.zeros(WIDTH, bool))
+    bent = arrival(known, mask, stretch)(wild)
+
+    def walked(features: np.ndarray) -> tuple[float, complex]:
+        angle, place = 0.0, 0j
+        for frame in range(70):
+            angle += 2 * features[frame, 0]
+            place += complex(features[frame, 1], features[frame, 2]) * np.exp(1j * angle)
+        return angle, place
+
+    (a, p), (b, q), (_, far) = (walked(x[0].numpy()) for x in (known, bent, wild))
+    assert abs(np.exp(1j * a) - np.exp(1j * b)) < 1e-6
+    assert abs(p - q) < 1e-6 < 0.1 < abs(p - far)
+    assert torch.equal(bent[mask], wild[mask])
+
+
+def test_an_open_stretch_is_left_alone() -> None:
+    """At the clip's end, and where the root is known anyway, there is nothing to arrive at."""
+    known = torch.from_numpy(humanml.motion_to_features(person(3.0)))[None]
+    mask = torch.zeros_like(known, dtype=torch.bool)
+    at_end = Stretch(np.zeros((60, 22, 3)), 30, known.shape[1], np.zeros(WIDTH, bool))
+    assert arrival(known, mask, at_end)(2 * known) is not None
+    assert torch.equal(arrival(known, mask, at_end)(2 * known), 2 * known)
+    mask[..., :3] = True
+    assert torch.equal(arrival(known, mask, replace(at_end, last=50))(2 * known), 2 * known)
+
+
+@pytest.mark.parametrize(("first", "last"), [(15, 30), (0, 30), (15, 59)])
+def test_known_frames_come_back_in_the_world(prior: Prior, first: int, last: int) -> None:
+    """Of a clip far from the origin; also where the stretch is at either end."""
+    positions = person(3.0).positions()
+    drawn = redraw(prior, Stretch(positions, first, last, np.zeros(WIDTH, bool)), "a person jumps", **FEW)
+    outside = [*range(first), *range(last, 59)]
+    np.testing.assert_allclose(drawn.positions[outside], positions[:59][outside], atol=2e-4)
+    assert np.abs(drawn.positions[first + 3 : last - 3] - positions[first + 3 : last - 3]).max() > 1e-3
+
+
+def test_little_strength_stays_nearer_to_the_clip(prior: Prior) -> None:
+    clip = person(3.0)
+    near, far = (
+        np.abs(edit(prior, clip, "a person jumps", strength=s, seed=1, **FEW)[0].positions() - clip.positions()).mean()
+        for s in (0.02, 1.0)
+    )
+    assert near < 0.8 * far
+
+
+def speeds(motion: Motion) -> np.ndarray:
+    return np.linalg.norm(np.diff(motion.positions(), axis=0), axis=-1).max(axis=1)
+
+
+def test_a_splice_leaves_neither_a_jump_nor_a_kink() -> None:
+    """A pose 0.2 rad and 10 cm away, turning at another rate, is met within the fastest step of either motion."""
+    clip = person(4.0, 60.0)
+    other = carried(person(4.0, 60.0), rot.rotvec_to_quat(np.array([0, 0.2, 0])), clip.root[0], clip.root[0] + 0.1)
+    made = splice(clip, other, 90, last=160, kept=kept_parts(SMPL22, frozenset(), np.zeros(3, bool)))
+    steps = np.linalg.norm(np.diff(made.positions(), axis=0), axis=-1).max(axis=1)
+    bends = np.linalg.norm(np.diff(made.positions(), n=2, axis=0), axis=-1).max(axis=1)
+    usual = np.linalg.norm(np.diff(clip.positions(), n=2, axis=0), axis=-1).max()
+    assert steps[[89, 159]].max() < 1.1 * speeds(clip).max()
+    assert bends[[88, 89, 158, 159]].max() < 2 * usual
+    plain = np.diff(np.where(np.isin(np.arange(240), range(90, 160))[:, None], other.root, clip.root), n=2, axis=0)
+    assert np.linalg.norm(plain, axis=-1).max() > 20 * usual, "the plain splice would jump"
+
+
+def test_a_looped_clip_can_follow_itself(prior: Prior) -> None:
+    """Frame 0, moved behind the last frame, continues its motion: at the wrap no step is longer than in the stretch."""
+    clip = person(4.0, 30.0)
+    made = edit(prior, clip, loop=True, **FEW)[0]
+    assert (len(made), same(made, clip, slice(0, 90))) == (120, True)
+    inner = np.diff(made.rotations[-6:], axis=0)
+    wrap = made.rotations[0] - made.rotations[-1]
+    turn = rot.multiply(made.rotations[0], rot.inverse(made.rotations[-1]))[1:]
+    assert np.degrees(np.linalg.norm(rot.quat_to_rotvec(turn), axis=-1)).max() < 12
+    assert np.abs(wrap[1:]).max() < 3 * np.abs(inner[:, 1:]).max()
+
+
+def test_a_clip_that_ends_where_it_began_loops_in_the_world(prior: Prior) -> None:
+    still = person(3.0)
+    still = replace(still, root=np.tile([1.0, 0.9, 2.0], (60, 1)))
+    still = replace(still, rotations=still.rotations.copy() * 1.0)
+    still.rotations[:, 0] = rot.IDENTITY
+    made = edit(prior, still, loop=True, **FEW)[0]
+    assert np.linalg.norm(made.root[-1] - made.root[0]) < 0.1
+
+
+def test_an_extended_clip_is_the_clip_and_more(prior: Prior) -> None:
+    clip = clips()["rig"]
+    made = edit(prior, clip, "a person sits", extend=1.5, **FEW)[0]
+    assert len(made) == len(clip) + 45
+    assert same(made, clip, slice(0, len(clip)))
+    assert speeds(made)[len(clip) - 1] < 1.5 * speeds(clip).max()
+
+
+def test_versions_have_their_own_seeds(prior: Prior) -> None:
+    clip = person(3.0)
+    two = edit(prior, clip, "a person jumps", between=[(1, 2)], count=2, seed=4, **FEW)
+    alone = edit(prior, clip, "a person jumps", between=[(1, 2)], seed=5, **FEW)[0]
+    assert np.array_equal(two[1].rotations, alone.rotations)
+    assert not np.array_equal(two[0].rotations, two[1].rotations)
+
+
+def test_the_skeleton_can_be_the_persons(prior: Prior) -> None:
+    made = edit(prior, clips()["rig"], "a person jumps", between=[(1, 2)], skeleton="smpl", **FEW)[0]
+    assert made.skeleton == SMPL22
+    assert made.fps == 30
+
+
+def test_a_long_clip_costs_what_its_window_costs(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The network sees at most 8 seconds of a clip of half a minute."""
+    seen: list[int] = []
+    forward = type(prior.net).forward
+
+    def counted(net, x, *rest):
+        seen.append(x.shape[1])
+        return forward(net, x, *rest)
+
+    monkeypatch.setattr(type(prior.net), "forward", counted)
+    edit(prior, person(30.0), "a person jumps", between=[(14, 16)], **FEW)
+    assert 0 < max(seen) <= 160
+
+
+def test_manner_keeps_places() -> None:
+    """Hips that move under a still root are where the moving root had them."""
+    clip = from_smpl22(person(1.0), rig())
+    told = in_manner_of(floating(clip), clip)
+    np.testing.assert_allclose(told.positions()[:, 1:], clip.positions()[:, 1:], atol=1e-9)
+    assert np.array_equal(told.root, np.zeros((20, 3)))
+
+
+def test_the_person_at_20_goes_straight_on() -> None:
+    """One frame more than the clip needs, and the frames of the clip are the clip's."""
+    clip = person(2.0)
+    places = person_at_20(clip)
+    assert len(places) == 41
+    apart = places[:40] - clip.positions()
+    np.testing.assert_allclose(apart, apart.mean(axis=(0, 1)) * [0, 1, 0] + 0 * apart, atol=0.03)
+    np.testing.assert_allclose(places[40] - places[39], places[39] - places[38], atol=1e-9)
+
+
+def test_standing_tells_the_facing() -> None:
+    """A person who faces +X stands turned a quarter about +Y."""
+    clip = person(1.0)
+    clip.rotations[:, 0] = rot.rotvec_to_quat(np.array([0, np.pi / 2, 0]))
+    _, turn = standing(clip, 0)
+    np.testing.assert_allclose(rot.rotate(turn, np.array([0.0, 0, 1])), [1, 0, 0], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({}, "nothing to change"),
+        ({"text": " "}, "nothing to change"),
+        ({"text": "walk", "keep": ["tail"]}, "tail"),
+        ({"text": "walk", "keep": ["lower_body", "upper_body"]}, "all joints"),
+        ({"keep": ["head"], "loop": True}, "kept parts"),
+        ({"between": [(2.0, 6.0)]}, "3.00"),
+        ({"between": [(-1.0, 1.0)]}, "3.00"),
+        ({"between": [(2.0, 1.0)]}, "2 to 1"),
+        ({"between": [(1.0, 1.01)]}, "at least"),
+        ({"between": [(float("nan"), 1.0)]}, "nan"),
+        ({"between": [(0.5, 1.5), (1.0, 2.0)]}, "overlap"),
+        ({"extend": -1.0}, "extended"),
+        ({"extend": 1e9}, "extended"),
+        ({"extend": float("nan")}, "extended"),
+        ({"text": "walk", "strength": 0.0}, "strength"),
+        ({"text": "walk", "strength": 1.5}, "strength"),
+        ({"loop": True, "blend": 2.9}, "blends"),
+        ({"loop": True, "blend": 0.0}, "blends"),
+        ({"text": "walk", "count": 0}, "count"),
+        ({"text": "walk", "seed": -1}, "seed"),
+        ({"text": "walk", "steps": 0}, "steps"),
+        ({"text": "walk", "guidance": float("inf")}, "guidance"),
+        ({"text": "walk", "skeleton": "mine"}, "skeleton"),
+    ],
+    ids=str,
+)
+def test_what_cannot_be_asked_is_refused(prior: Prior, asked: dict, said: str) -> None:
+    with pytest.raises(MotionloomError, match=said) as caught:
+        edit(prior, person(3.0), **asked)
+    assert "\n" not in str(caught.value)
+
+
+def test_clips_that_cannot_be_edited_are_refused(prior: Prior) -> None:
+    """Too short, too long for a whole, and no person at all."""
+    with pytest.raises(MotionloomError, match="at least"):
+        edit(prior, person(0.3), "walk")
+    with pytest.raises(MotionloomError, match="at once"):
+        edit(prior, person(61.0), "walk")
+    chain = Skeleton(("a", "b"), (-1, 0), np.array([[0, 0, 0], [0, 1.0, 0]]))
+    with pytest.raises(MotionloomError):
+        edit(prior, Motion(chain, 30, np.zeros((60, 3)), np.tile(rot.IDENTITY, (60, 2, 1))), "walk")
+
+
+def test_a_clip_with_z_up_is_told(prior: Prior) -> None:
+    """A body whose bones and world both have +Z up."""
+    stand = rot.rotvec_to_quat(np.array([np.pi / 2, 0, 0]))
+    clip = person(2.0)
+    skeleton = Skeleton(SMPL22.names, SMPL22.parents, rot.rotate(stand, SMPL22.offsets))
+    turned = rot.multiply(rot.multiply(stand, clip.rotations), rot.inverse(stand))
+    with pytest.raises(MotionloomError, match="--up z"):
+        edit(prior, Motion(skeleton, 20, rot.rotate(stand, clip.root), turned), "walk")
