@@ -7,7 +7,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 
-FAMILIES = ("generate", "compose", "edit", "files", "data", "train", "evaluate", "bench", "weights")
+FAMILIES = ("generate", "compose", "control", "edit", "files", "data", "train", "evaluate", "bench", "weights")
 
 
 class _Parser(argparse.ArgumentParser):
