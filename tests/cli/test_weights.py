@@ -11,9 +11,11 @@ import torch
 from motionloom.checkpoint import load_prior, save_prior
 from motionloom.cli import main
 from motionloom.evaluation.guo import load_guo
+from motionloom.io import load
 from tests.evaluation import test_guo
 from tests.nets import tiny
 from tests.nets.test_published import Bomb, state, write
+from tests.tasks.test_text import Words
 
 
 @pytest.fixture(autouse=True)
@@ -65,9 +67,10 @@ def test_an_imported_checkpoint_is_a_prior_with_its_card(folder: Path, capsys: p
     assert "humanml" in said
 
 
-def test_missing_options_are_warned_of_and_babel_imports_but_is_not_decoded(
-    folder: Path, capsys: pytest.CaptureFixture[str]
+def test_missing_options_are_warned_of_and_babel_makes_motions(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """BABEL's weights, here with the flags of transitions: 135 numbers at 30 fps, prompts of 77 word pieces."""
     write(folder, state(135, flags=True))
     np.save("Mean.npy", np.zeros(135, np.float32))
     np.save("Std.npy", np.ones(135, np.float32))
@@ -84,7 +87,17 @@ def test_missing_options_are_warned_of_and_babel_imports_but_is_not_decoded(
         "clip-77",
     )
     assert "unknown" in about["licence"]
-    assert "135" in refused(capsys, "generate", "walk", "--weights", "b.safetensors", "--out", "a.bvh")
+    opened: list[int] = []
+
+    def clip(*, length: int) -> Words:
+        opened.append(length)
+        return Words()
+
+    monkeypatch.setattr("motionloom.nets.published.ClipText.open", clip)
+    asked = ["--weights", "b.safetensors", "--seconds", "0.5", "--steps", "2", "--out", "a.bvh"]
+    assert main(["generate", "walk", *asked]) == 0
+    motion = load("a.bvh")
+    assert (len(motion), round(motion.fps), opened) == (15, 30, [77])
 
 
 def test_statistics_are_asked_for_and_checked(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,7 +13,7 @@ from torch import Tensor
 from motionloom.checkpoint import Prior
 from motionloom.diffusion import SOLVERS, guide, levels, row_draw, sample
 from motionloom.errors import MotionloomError
-from motionloom.features import humanml
+from motionloom.features import babel, humanml
 from motionloom.features.feet import clean_feet
 from motionloom.features.ik import motion_from_positions
 from motionloom.features.layout import LAYOUT, WIDTH
@@ -45,7 +45,7 @@ def sample_features(
     spacing: str = SPACING,
     progress: Progress | None = None,
 ) -> list[Tensor]:
-    """Features (frames, 263), not standardised, one per prompt; row i has its own length and its own seed.
+    """Features (frames, 263 or the prior's), not standardised, one per prompt; row i has its own length and seed.
 
     The network sees at most `ROWS` motions at once, of equal length, so that memory does not grow with their number.
     """
@@ -88,16 +88,13 @@ def generate(
 ) -> list[Motion]:
     """Make ``count`` motions for each prompt, in order; motion i of the answer is drawn from ``seed + i`` alone.
 
-    seconds: length, one for all or one per prompt; at the prior's frame rate (20 per second). guidance: strength of
-    the text, 0 ignores it. steps, solver: network calls, and how they are joined (`diffusion.SOLVERS`). clean: lock
-    planted feet and keep feet above the floor. The person starts near the origin facing +Z, on the 22-joint skeleton.
+    seconds: length, one for all or one per prompt; at the prior's frame rate (20 per second; BABEL's 30). guidance:
+    strength of the text, 0 ignores it. steps, solver: network calls, and how they are joined (`diffusion.SOLVERS`).
+    clean: lock planted feet and keep feet above the floor. The person starts near the origin facing +Z, on the 22-joint
+    skeleton.
     Raises `MotionloomError` for what cannot be asked. (Tevet et al. 2023; guidance: Ho & Salimans 2022.)
     """
-    if len(prior.mean) != WIDTH:
-        raise MotionloomError(
-            f"these weights make {len(prior.mean)} numbers per frame, and so far only HumanML3D's {WIDTH} "
-            "can be turned into a motion; use other weights"
-        )
+    check_features(prior)
     said = [prompts] if isinstance(prompts, str) else list(prompts)
     lengths = [float(s) for s in np.atleast_1d(np.asarray(seconds, dtype=np.float64))]
     if np.ndim(seconds) == 0:
@@ -116,7 +113,7 @@ def generate(
         prior, said, frames, seeds=[seed + i for i in range(len(said))],
         guidance=guidance, steps=steps, solver=solver, progress=progress,
     )  # fmt: skip
-    return [to_motion(features.numpy().astype(np.float64), prior.fps, clean=clean) for features in made]
+    return [finish(prior, features, clean=clean) for features in made]
 
 
 def smooth(features: Tensor) -> Tensor:
@@ -133,6 +130,39 @@ def to_motion(features: np.ndarray, fps: float, *, clean: bool = True) -> Motion
     """Features (frames, 263) to a person with constant bones; with ``clean`` the planted feet hold still."""
     motion = motion_from_positions(humanml.decode_positions(features), fps)
     return clean_feet(motion, contacts=features[:, LAYOUT["contacts"]]) if clean else motion
+
+
+def check_features(prior: Prior) -> None:
+    """Raise MotionloomError where nothing here makes a motion of the numbers that these weights make (`finish`)."""
+    if len(prior.mean) not in _DECODED:
+        raise MotionloomError(
+            f"these weights make {len(prior.mean)} numbers per frame, and only HumanML3D's {WIDTH} and BABEL's "
+            f"{babel.WIDTH} can be turned into a motion; use other weights"
+        )
+
+
+def finish(prior: Prior, features: Tensor | np.ndarray, *, clean: bool = True) -> Motion:
+    """Features (frames, numbers) of this prior, not standardised, to a motion at its frame rate.
+
+    With ``clean`` the planted feet hold still: as the features say where they do (263), else by height and speed (135).
+    Frame 0 stands over the origin; the person starts facing +Z. Raises MotionloomError as `check_features` does.
+    """
+    check_features(prior)
+    numbers = features.cpu().numpy() if isinstance(features, Tensor) else features
+    return _DECODED[len(prior.mean)](numbers.astype(np.float64), prior.fps, clean)
+
+
+def _from_humanml(features: np.ndarray, fps: float, clean: bool) -> Motion:
+    return to_motion(features, fps, clean=clean)
+
+
+def _from_babel(features: np.ndarray, fps: float, clean: bool) -> Motion:
+    motion = babel.forward(babel.decode(features, fps))
+    return clean_feet(motion) if clean else motion
+
+
+_DECODED: dict[int, Callable[[np.ndarray, float, bool], Motion]] = {WIDTH: _from_humanml, babel.WIDTH: _from_babel}
+"""How the numbers of a frame become a motion, by their count."""
 
 
 def _frames(seconds: float, fps: float) -> int:
