@@ -70,23 +70,80 @@ class Transitions:
     blend: int = 10
     """Frames over which neighbours are blended."""
     intervals: int = 32
-    """Captions of one long motion."""
+    """Captions of one long motion, and of one batch of R-precision."""
+    replications: int = 3
+    steps: int = STEPS
+    guidance: float = GUIDANCE
+    seed: int = 0
 
     def __post_init__(self) -> None:
         if min(self.handshake, self.unfoldings, self.intervals) < 1 or min(self.margin, self.blend) < 0:
             raise MotionloomError(
                 "a handshake, unfoldings and intervals are at least 1, a margin and a blend at least 0"
             )
+        _need(
+            max(self.handshake, self.margin, self.blend) <= 100 and max(self.unfoldings, self.intervals) <= 1000,
+            "a handshake, a margin and a blend are at most 100 frames, unfoldings and intervals at most 1000",
+        )
+        _need(
+            1 <= self.replications <= MOST_REPLICATIONS,
+            f"replications must be 1 to {MOST_REPLICATIONS}; got {self.replications}",
+        )
+        _need(1 <= self.steps <= 1000, f"steps are 1 to 1000; got {self.steps}")
+        _need(
+            math.isfinite(self.guidance) and abs(self.guidance) <= 100,
+            f"a guidance of {self.guidance:g} makes no motion; usual values are 1 to 7",
+        )
+        _need(
+            self.seed >= 0 and self.seed + (self.replications + 1) * STRIDE < LARGEST_SEED,
+            f"a seed is a whole number from 0 to below 2**61; got {self.seed}",
+        )
 
     @property
     def window(self) -> int:
         """Frames of a transition: 60 for HumanML3D."""
         return self.handshake + self.margin
 
+    @property
+    def shortest(self) -> int:
+        """Visible frames of an interval at least: DoubleTake's rows need two handshakes, two blends and 10 frames."""
+        return 2 * self.handshake + 2 * self.blend + 10 - self.handshake // 2
+
+    @property
+    def longest(self) -> int:
+        """Visible frames at most: with both handshakes a row then has the 196 that HumanML3D's priors saw."""
+        return max(self.shortest, 196 - self.handshake)
+
+    @property
+    def seams(self) -> int:
+        """Transitions of one replication."""
+        return self.unfoldings * (self.intervals - 1)
+
+    def first_seed(self, replication: int, unfolding: int) -> int:
+        """No two long motions share one, nor do their segments."""
+        return self.seed + replication * STRIDE + unfolding * (1 << 16)
+
+    def drawn(self) -> dict[str, Any]:
+        """Everything that changes the motions of one replication: what a resumed run must agree in."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "replications"}
+
     def described(self) -> dict[str, Any]:
         """For a report."""
         said = f"{self.handshake} frames of handshake, {self.margin} of margin, {self.blend} blended"
-        return {"transitions": said, "unfoldings": self.unfoldings, "intervals": self.intervals}
+        return {
+            "transitions": said,
+            "unfoldings": self.unfoldings,
+            "intervals": self.intervals,
+            "visible lengths": f"those of real motions, raised to {self.shortest} and cut to {self.longest} frames; "
+            "DoubleTake's rows are longer by half a handshake at each seam, so that all motions have the same frames",
+            "captions": "one per item, items without replacement within a replication, drawn by seed",
+            "steps": self.steps,
+            "sampler": f"{SOLVER}, {SPACING} spacing",
+            "guidance": float(self.guidance),
+            "seed": self.seed,
+            "replications": self.replications,
+            "interval": "1.96 sigma / sqrt(replications)",
+        }
 
 
 @dataclass(frozen=True)
@@ -196,6 +253,11 @@ def quick(protocol: Protocol) -> Protocol:
     return replace(
         protocol, count=protocol.batch or 32, replications=2, multimodality=(4, 6), multimodal_replications=1, steps=few
     )
+
+
+def quick_transitions(how: Transitions) -> Transitions:
+    """The same in minutes: eight captions, one unfolding, two replications."""
+    return replace(how, intervals=min(how.intervals, 8), unfoldings=1, replications=min(how.replications, 2))
 
 
 def _need(fine: bool, message: str) -> None:

@@ -138,6 +138,24 @@ def _text(job: Job, settings: Mapping[str, Any]) -> Report:
     return _sealed(found, job)
 
 
+def _transitions(job: Job, settings: Mapping[str, Any]) -> Report:
+    from motionloom.evaluation import protocol, transitions
+
+    how = protocol.quick_transitions(protocol.Transitions()) if settings["quick"] else protocol.Transitions()
+    found = transitions.run(
+        job.weights, evaluator=job.evaluator, data=job.data, how=how, folder=job.folder, device=job.device,
+        command=command("transitions", job), progress=job.tools.progress,
+    )  # fmt: skip
+    return _sealed(found, job)
+
+
+def _real_seams(job: Job) -> list[Path]:
+    """What `_judge` names, and the shipped numbers of real transitions."""
+    from motionloom.evaluation.real_seams import shipped_file
+
+    return [*_judge(job), *([shipped_file()] if shipped_file().is_file() else [])]
+
+
 def _evaluator(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.evaluation.evaluators import load_evaluator
     from motionloom.evaluation.own import validate
@@ -159,6 +177,8 @@ def _agreement(job: Job, settings: Mapping[str, Any]) -> Report:
 SUITES: tuple[Suite, ...] = (
     Suite("text", "R-precision, FID and the field's other metrics beside real motion and published rows", _text,
           {"quick": False}, {"quick": True}, "used", _judge),
+    Suite("transitions", "long motion: its segments, and jerk, skate and realism where they meet", _transitions,
+          {"quick": False}, {"quick": True}, "used", _real_seams),
     Suite("obedience", "20 everyday prompts, each with a physical check", _obedience,
           {"seeds": 10, "paraphrases": True}, {"seeds": 2, "paraphrases": False}),
     Suite("realism", "skate, penetration, jerk, bones and speeds beside real clips", _realism,
