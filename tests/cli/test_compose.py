@@ -1,4 +1,4 @@
-"""compose, as a stranger types it: with a quick maker of pieces in place of the network, and once with a tiny network."""
+"""compose, as a stranger types it: with a quick maker of pieces in the network's place, and with a tiny network."""
 
 import json
 import signal

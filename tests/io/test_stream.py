@@ -1,6 +1,7 @@
 """Files that grow: piece by piece they are what the whole motion would have been, also when it stops in between."""
 
 import errno
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 
 from motionloom import io
 from motionloom.errors import MotionloomError
+from motionloom.io import bvh_writer
 from motionloom.io import stream as streams
 from motionloom.io.stream import joined, open_stream, resampled
 from motionloom.motion import Motion
@@ -28,7 +30,7 @@ def spinning(frames: int, *, seed: int = 0) -> Motion:
 
 def cut(motion: Motion, places: list[int]) -> list[Motion]:
     ends = [0, *sorted({p for p in places if 0 < p < len(motion)}), len(motion)]
-    return [motion.frames(a, b) for a, b in zip(ends, ends[1:])]
+    return [motion.frames(a, b) for a, b in pairwise(ends)]
 
 
 def write(path: Path, pieces: list[Motion], **options) -> Path:
@@ -72,10 +74,16 @@ def test_the_number_of_frames_is_that_written_whatever_was_expected(tmp_path):
 @pytest.mark.parametrize("problem", [KeyboardInterrupt, MotionloomError, ZeroDivisionError])
 def test_what_was_finished_before_a_problem_is_a_valid_file(tmp_path, suffix, problem):
     motion, place = spinning(60), tmp_path / f"a{suffix}"
-    with pytest.raises(problem), open_stream(place, total=60) as stream:
-        stream.write(motion.frames(0, 25))
-        stream.write(motion.frames(25, 40))
-        raise problem
+    stream = open_stream(place, total=60)
+
+    def interrupted() -> None:
+        with stream:
+            stream.write(motion.frames(0, 25))
+            stream.write(motion.frames(25, 40))
+            raise problem
+
+    with pytest.raises(problem):
+        interrupted()
     found = io.load(place)
     assert len(found) == 40
     assert largest_distance(motion.frames(0, 40), found) < 1e-4
@@ -105,22 +113,20 @@ def test_nothing_stands_at_the_place_until_it_is_closed(tmp_path):
 
 def test_a_full_disk_keeps_the_pieces_that_fitted(tmp_path, monkeypatch):
     """The third piece gets half of itself onto the disk; the file ends after the second."""
-    motion, put = spinning(60), io.bvh_writer._put
-    with (
-        pytest.raises(MotionloomError, match=r"cannot write .*a\.bvh: No space"),
-        open_stream(tmp_path / "a.bvh", total=60) as stream,
-    ):
+    motion, put = spinning(60), bvh_writer._put
+
+    def full(file, data):
+        if len(data) < 1000:
+            return put(file, data)
+        put(file, data[: len(data) // 2])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with open_stream(tmp_path / "a.bvh", total=60) as stream:
         stream.write(motion.frames(0, 20))
         stream.write(motion.frames(20, 40))
-
-        def full(file, data):
-            if len(data) < 1000:
-                return put(file, data)
-            put(file, data[: len(data) // 2])
-            raise OSError(errno.ENOSPC, "No space left on device")
-
-        monkeypatch.setattr(io.bvh_writer, "_put", full)
-        stream.write(motion.frames(40, 60))
+        monkeypatch.setattr(bvh_writer, "_put", full)
+        with pytest.raises(MotionloomError, match=r"cannot write .*a\.bvh: No space"):
+            stream.write(motion.frames(40, 60))
     assert len(io.load(tmp_path / "a.bvh")) == 40
 
 

@@ -7,14 +7,16 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from motionloom.errors import MotionloomError
 from motionloom.io.lined_yaml import Lined, fail, read_lined
 from motionloom.io.text import shown
+from motionloom.tasks.fields import Field, listed
 
 if TYPE_CHECKING:
     from motionloom.tasks.goals import Goal
@@ -223,7 +225,7 @@ class _Reader:
             try:
                 whole = merged(whole, self.goal(other, "goal", frames))
             except MotionloomError as error:
-                self.fail(other.line, _bare(error, self.path))
+                self.fail(other.line, str(error))
         return whole
 
     def goal(self, found: Lined, name: str, frames: int) -> Goal:
@@ -239,7 +241,7 @@ class _Reader:
         try:
             return read_goal(what, frames=frames, fps=FPS, folder=self.path.parent)
         except MotionloomError as error:
-            self.fail(found.key_line or found.line, f"{name}: {_bare(error, self.path)}")
+            self.fail(_line(found, str(error)), f"{name}: {error}")
 
     def start(self, found: Lined | None) -> Path | None:
         if found is None:
@@ -253,29 +255,10 @@ class _Reader:
 
     def file(self, found: Lined, name: str) -> Path:
         """A file in the timeline's folder or below it; a timeline from a stranger reads nothing else."""
-        said = found.value
-        if not isinstance(said, str) or not said.strip() or not said.isprintable():
-            self.fail(found.line, f"'{name}' must be the name of a file; got {_got(found)}")
-        foreign = PureWindowsPath(said)
-        if foreign.drive or foreign.root or ".." in foreign.parts:
-            self.fail(
-                found.line,
-                f"{shown(said)} leads out of the timeline's folder; put the file beside the timeline and name it from "
-                "there, without '..' and without a leading '/'",
-            )
-        place = self.path.parent / said
         try:
-            inside = place.resolve().is_relative_to(self.path.parent.resolve())
-            there = place.is_file()
-        except (OSError, ValueError, RuntimeError):
-            inside, there = True, False
-        if not inside:
-            self.fail(
-                found.line, f"{shown(said)} is a link that leads out of the timeline's folder; copy the file there"
-            )
-        if not there:
-            self.fail(found.line, f"there is no file {shown(said, 200)} in the timeline's folder")
-        return place
+            return Field(found.value, name).file(self.path.parent)
+        except MotionloomError as error:
+            self.fail(found.line, str(error))
 
     def seed(self, found: Lined | None) -> int | None:
         if found is None:
@@ -302,14 +285,14 @@ class _Reader:
             self.fail(found.line, f"'{name}' must be {low:g} to {high:g}; got {value:g}")
         return value
 
-    def mapping(self, found: Lined, keys: Iterable[str], what: str) -> dict[str, Lined]:
+    def mapping(self, found: Lined, keys: Sequence[str], what: str) -> dict[str, Lined]:
         if not isinstance(found.value, dict):
-            self.fail(found.line, f"{what} must be a mapping with {_listed(keys)}; got {_got(found)}")
+            self.fail(found.line, f"{what} must be a mapping with {listed(keys)}; got {_got(found)}")
         for key, value in found.value.items():
             if key not in keys:
-                near = difflib.get_close_matches(key[:40], list(keys), n=1)
+                near = difflib.get_close_matches(key[:40], keys, n=1)
                 meant = f" (did you mean '{near[0]}'?)" if near else ""
-                self.fail(value.key_line, f"unknown key {shown(key)}{meant}; {what} has {_listed(keys)}")
+                self.fail(value.key_line, f"unknown key {shown(key)}{meant}; {what} has {listed(keys)}")
         return found.value
 
     def fail(self, line: int, message: str) -> NoReturn:
@@ -320,11 +303,17 @@ def _got(found: Lined) -> str:
     return "an empty list" if found.value == [] else found.kind
 
 
-def _listed(keys: Iterable[str]) -> str:
-    *first, last = keys
-    return f"{', '.join(first)} and {last}"
-
-
-def _bare(error: MotionloomError, path: Path) -> str:
-    """What was wrong, without a second mention of the file."""
-    return str(error).removeprefix(f"{path}: ").removeprefix(f"{path}, ")
+def _line(found: Lined, message: str) -> int:
+    """The line of what a message names as ``'joints[1].points[3].time'``; that of the whole where it names none."""
+    named = re.match(r"'([\w.\[\]]+)' ", message)
+    line = found.key_line or found.line
+    for step in re.findall(r"\w+", named[1]) if named else ():
+        inner = found.value
+        if isinstance(inner, dict) and step in inner:
+            found = inner[step]
+        elif isinstance(inner, list) and step.isdecimal() and int(step) < len(inner):
+            found = inner[int(step)]
+        else:
+            return line
+        line = found.key_line or found.line
+    return line
