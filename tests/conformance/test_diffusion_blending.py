@@ -21,7 +21,9 @@ def recorded_denoiser(recorded: Case) -> Denoiser:
         nets.append(from_published({name: torch.from_numpy(array) for name, array in filled.items()}).eval())
     text = torch.from_numpy(normal(stream(config["seed"], TEXT), (rows, 512)))
     given = torch.from_numpy(mask(config["mask"])).expand(rows, config["shape"][3], -1)
-    return blended(nets, condition(text), given, weights=config["weights"], guidance=config["guidance"])
+    return blended(
+        nets, condition(text), torch.zeros_like(given), given, weights=config["weights"], guidance=config["guidance"]
+    )
 
 
 @pytest.mark.parametrize("recorded", cases("diffusion_blending", kind="blending"))

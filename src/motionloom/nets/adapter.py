@@ -1,10 +1,12 @@
 """Low-rank changes of a prior's network that teach it one kind of control, and their files.
 
-A layer's weight W becomes W + U D with thin U and D (LoRA, Hu et al. 2022). An adapter may also add a mask input: the
-network then sees which numbers of the state are given, through embed(x) + U_m D_m mask. The published control models
-are full fine-tunes and are not told (Shafir et al. 2024, algorithm 1); those are ordinary priors.
+A layer's weight W becomes W + U D with thin U and D (LoRA, Hu et al. 2022). An adapter may also add an input: the
+network then sees which numbers are given and what they are, through embed(x) + U_g D_g [given, mask]. In the state
+itself they are scaled by the signal, which is next to nothing at the levels where it is decided what will be shown. The
+published control models are full fine-tunes and have the state alone (Shafir et al. 2024, algorithm 1); those are
+ordinary priors.
 
-An `AdaptedNet` is called like the network it comes from; with `Controlled` as its condition it sees the mask.
+An `AdaptedNet` is called like the network it comes from; with `Controlled` as its condition it sees what is given.
 """
 
 import copy
@@ -33,16 +35,21 @@ MAX_BYTES = 64 << 20
 MAX_RANK = 512
 CHANGED = ("embed", "out", "project", "query", "heard", "linear1", "linear2", "change")
 """Last names of the layers that an adapter changes."""
-MASK = "mask"
-"""The name under which an adapter keeps its mask input."""
+GIVEN = "given"
+"""The name under which an adapter keeps its input for what is given."""
+
+SPARSE = 100
+"""Numbers of a token that are given at once, roughly: how strong that input is when training begins."""
 
 
 class Controlled(NamedTuple):
-    """The condition of an `AdaptedNet`: what the network is bound to, and which numbers of the state are given."""
+    """The condition of an `AdaptedNet`: what the network is bound to, and what is given."""
 
     bound: Bound
+    given: Tensor
+    """(rows, frames, features) standardised; what is not given may be anything finite."""
     mask: Tensor
-    """(rows, frames, features) bool or 0..1."""
+    """(rows, frames, features) bool: which numbers are given."""
 
 
 class HasNet(Protocol):
@@ -61,8 +68,8 @@ class Adapter:
     """What it was trained for: ``trajectory``, a joint, ``any`` ..."""
     rank: int
     tensors: Mapping[str, Tensor]
-    """``LAYER.down`` (rank, in) and ``LAYER.up`` (out, rank); ``mask.down`` (its rank, patch * features) and
-    ``mask.up``."""
+    """``LAYER.down`` (rank, in) and ``LAYER.up`` (out, rank); ``given.down`` (its rank, patch * 2 * features: for each
+    frame of a token first the given numbers, then the mask) and ``given.up``."""
     base: str
     """Name of the prior it changes."""
     fingerprint: str
@@ -72,14 +79,14 @@ class Adapter:
     notes: dict[str, Any] = field(default_factory=dict)
 
     @property
-    def reads_mask(self) -> bool:
-        """Whether it has a mask input."""
-        return f"{MASK}.down" in self.tensors
+    def sees_given(self) -> bool:
+        """Whether it has an input for what is given."""
+        return f"{GIVEN}.down" in self.tensors
 
     @property
-    def mask_rank(self) -> int:
-        """Rank of the mask input; 0: none."""
-        return len(self.tensors[f"{MASK}.down"]) if self.reads_mask else 0
+    def given_rank(self) -> int:
+        """Rank of that input; 0: none."""
+        return len(self.tensors[f"{GIVEN}.down"]) if self.sees_given else 0
 
     @staticmethod
     def load(adapter: str | Path, prior: HasNet) -> "Adapter":
@@ -148,9 +155,9 @@ class AdaptedNet(nn.Module):
     The condition is a `Controlled`, or a plain `Bound`, which means that nothing is given.
     """
 
-    def __init__(self, net: PriorNet, reads_mask: bool) -> None:
+    def __init__(self, net: PriorNet, sees_given: bool) -> None:
         super().__init__()
-        self.net, self.reads_mask = net, reads_mask
+        self.net, self.sees_given = net, sees_given
 
     @property
     def config(self) -> NetConfig:
@@ -163,13 +170,16 @@ class AdaptedNet(nn.Module):
 
     def forward(self, x: Tensor, level: int | Tensor, bound: Bound | Controlled) -> Tensor:
         """(rows, frames, features) standardised at ``level`` to the clean guess."""
-        plain, mask = (bound.bound, bound.mask) if isinstance(bound, Controlled) else (bound, torch.zeros_like(x))
-        return self.net(torch.cat([x, mask.to(x)], dim=-1) if self.reads_mask else x, level, plain)
+        if isinstance(bound, Controlled):
+            plain, shown = bound.bound, [torch.where(bound.mask, bound.given.to(x), 0.0), bound.mask.to(x)]
+        else:
+            plain, shown = bound, [torch.zeros_like(x)] * 2
+        return self.net(torch.cat([x, *shown], dim=-1) if self.sees_given else x, level, plain)
 
 
-def show(net: nn.Module, bound: Bound, mask: Tensor) -> Bound | Controlled:
-    """The condition under which a network is told which numbers are given, if it can be told."""
-    return Controlled(bound, mask) if isinstance(net, AdaptedNet) else bound
+def show(net: nn.Module, bound: Bound, given: Tensor, mask: Tensor) -> Bound | Controlled:
+    """The condition under which a network is told what is given, if it can be told; see `Controlled`."""
+    return Controlled(bound, given, mask) if isinstance(net, AdaptedNet | AdapterNet) else bound
 
 
 def adapted(net: PriorNet, adapter: Adapter) -> AdaptedNet:
@@ -178,19 +188,19 @@ def adapted(net: PriorNet, adapter: Adapter) -> AdaptedNet:
     for name, layer in linears(made).items():
         down, up = (adapter.tensors[f"{name}.{part}"].to(layer.weight) for part in ("down", "up"))
         layer.weight = nn.Parameter(layer.weight + up @ down, requires_grad=False)
-    if adapter.reads_mask:
-        down, up = (adapter.tensors[f"{MASK}.{part}"].to(made.embed.weight) for part in ("down", "up"))
+    if adapter.sees_given:
+        down, up = (adapter.tensors[f"{GIVEN}.{part}"].to(made.embed.weight) for part in ("down", "up"))
         wide = beside(made.embed.weight, up @ down, net.config)
         made.embed = nn.Linear(wide.shape[1], wide.shape[0], device="meta")
         made.embed.weight = nn.Parameter(wide, requires_grad=False)
         made.embed.bias = nn.Parameter(net.embed.bias.detach().clone(), requires_grad=False)
-    return AdaptedNet(made, adapter.reads_mask)
+    return AdaptedNet(made, adapter.sees_given)
 
 
-def beside(embed: Tensor, mask: Tensor, config: NetConfig) -> Tensor:
-    """Weights that read frames of [state, mask, flags], from those of state and flags and those of the mask."""
+def beside(embed: Tensor, given: Tensor, config: NetConfig) -> Tensor:
+    """Weights that read frames of [state, given, mask, flags], from those of state and flags and those of the rest."""
     state = embed.unflatten(1, (config.patch, -1))
-    shown = mask.unflatten(1, (config.patch, config.features))
+    shown = given.unflatten(1, (config.patch, -1))
     return torch.cat([state[..., : config.features], shown, state[..., config.features :]], dim=-1).flatten(1)
 
 
@@ -205,8 +215,8 @@ class LowRank(nn.Module):
         return self.layer(x) + F.linear(F.linear(x, self.down), self.up)
 
 
-class MaskedEmbed(nn.Module):
-    """The first layer with a mask input, in training."""
+class GivenEmbed(nn.Module):
+    """The first layer with an input for what is given, in training."""
 
     def __init__(self, embed: nn.Module, down: nn.Parameter, up: nn.Parameter, config: NetConfig) -> None:
         super().__init__()
@@ -214,10 +224,10 @@ class MaskedEmbed(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         count = self.config.features
-        state, mask, flags = x.unflatten(-1, (self.config.patch, -1)).split(
-            [count, count, x.shape[-1] // self.config.patch - 2 * count], dim=-1
+        state, given, flags = x.unflatten(-1, (self.config.patch, -1)).split(
+            [count, 2 * count, x.shape[-1] // self.config.patch - 3 * count], dim=-1
         )
-        seen = F.linear(F.linear(mask.flatten(-2), self.down), self.up)
+        seen = F.linear(F.linear(given.flatten(-2), self.down), self.up)
         return self.embed(torch.cat([state, flags], dim=-1).flatten(-2)) + seen
 
 
@@ -227,25 +237,26 @@ class AdapterNet(nn.Module):
     Its parameters and its state are the adapter's tensors alone; the frozen network is not a part of it.
     """
 
-    def __init__(self, net: PriorNet, rank: int, *, mask_rank: int, start: Adapter | None = None) -> None:
+    def __init__(self, net: PriorNet, rank: int, *, given_rank: int, start: Adapter | None = None) -> None:
         super().__init__()
         base = copy.deepcopy(net).eval().requires_grad_(False)
         layers = linears(base)
         sizes = {name: (layer.in_features, layer.out_features, rank) for name, layer in layers.items()}
-        if mask_rank:
-            sizes[MASK] = (net.config.patch * net.config.features, net.config.width, mask_rank)
+        if given_rank:
+            sizes[GIVEN] = (net.config.patch * 2 * net.config.features, net.config.width, given_rank)
         self.factors = nn.ParameterDict()
         for name, (inner, outer, size) in sizes.items():
-            self.factors[_plain(f"{name}.down")] = nn.Parameter(torch.randn(size, inner) / math.sqrt(inner))
+            spread = 1 / math.sqrt(SPARSE if name == GIVEN else inner)  # few of the many numbers are given
+            self.factors[_plain(f"{name}.down")] = nn.Parameter(torch.randn(size, inner) * spread)
             self.factors[_plain(f"{name}.up")] = nn.Parameter(torch.zeros(outer, size))
         if start:
             self.load_state_dict({f"factors.{_plain(k)}": v.float() for k, v in start.tensors.items()})
         for name, layer in layers.items():
             parent = base.get_submodule(name.rpartition(".")[0])
             setattr(parent, name.rsplit(".", 1)[-1], LowRank(layer, *self._pair(name)))
-        if mask_rank:
-            setattr(base, "embed", MaskedEmbed(base.embed, *self._pair(MASK), net.config))  # noqa: B010
-        self._net = (AdaptedNet(base, bool(mask_rank)),)  # in a tuple: not a sub-module
+        if given_rank:
+            setattr(base, "embed", GivenEmbed(base.embed, *self._pair(GIVEN), net.config))  # noqa: B010
+        self._net = (AdaptedNet(base, bool(given_rank)),)  # in a tuple: not a sub-module
 
     def _pair(self, name: str) -> tuple[nn.Parameter, nn.Parameter]:
         return self.factors[_plain(f"{name}.down")], self.factors[_plain(f"{name}.up")]  # type: ignore[return-value]
@@ -307,8 +318,8 @@ def _shapes(
     for name, layer in layers.items():
         yield f"{name}.down", (adapter.rank, layer.in_features)
         yield f"{name}.up", (layer.out_features, adapter.rank)
-    if adapter.reads_mask:
-        down = adapter.tensors[f"{MASK}.down"]
+    if adapter.sees_given:
+        down = adapter.tensors[f"{GIVEN}.down"]
         size = min(len(down), MAX_RANK) if down.ndim else 0
-        yield f"{MASK}.down", (size, config.patch * config.features)
-        yield f"{MASK}.up", (config.width, size)
+        yield f"{GIVEN}.down", (size, config.patch * 2 * config.features)
+        yield f"{GIVEN}.up", (config.width, size)

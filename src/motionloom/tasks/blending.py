@@ -66,7 +66,7 @@ def control_features(
     their union); what is not given may hold anything. weights: one per network, a number or what broadcasts to the
     motions, or either by level (`diffusion.blend`); the mean by default. They are used as they are. seeds: one per
     row; a row's motion depends on no other row. noise_free False is MDM's inpainting: noise everywhere, and no
-    network is told the mask. corrections: change each row's blended guess before the given numbers are put in.
+    network is told what is given. corrections: change each row's blended guess before the given numbers are put in.
     Raises MotionloomError for what does not fit together. (Shafir et al. 2024, algorithm 2 and section 4.3.)
     """
     mask = torch.as_tensor(mask, device=prior.mean.device)
@@ -85,7 +85,7 @@ def control_features(
             f"of {', '.join(SOLVERS)}"
         )
     shown = mask if noise_free else torch.zeros_like(mask)
-    denoise = blended(nets, prior.condition(list(prompts)), shown, weights=weights, guidance=guidance)
+    denoise = blended(nets, prior.condition(list(prompts)), known, shown, weights=weights, guidance=guidance)
     if corrections is not None:
         denoise = corrected(denoise, corrections)
     return controlled(
@@ -95,11 +95,14 @@ def control_features(
 
 
 def blended(
-    nets: Sequence[Net], cond: Condition, mask: Tensor, *, weights: Sequence[Weight], guidance: float
+    nets: Sequence[Net], cond: Condition, known: Tensor, mask: Tensor, *, weights: Sequence[Weight], guidance: float
 ) -> Denoiser:
-    """DiffusionBlending: every network guided by itself, then their weighted sum; told the mask those that can be."""
+    """DiffusionBlending: networks guided by themselves, then their weighted sum; told what is given if they can be."""
     null = cond.null()
-    guided = [guide(net, show(net, net.bind(cond), mask), show(net, net.bind(null), mask), guidance) for net in nets]
+    guided = [
+        guide(net, show(net, net.bind(cond), known, mask), show(net, net.bind(null), known, mask), guidance)
+        for net in nets
+    ]
     return guided[0] if len(nets) == 1 and weights[0] == 1.0 else blend(guided, weights)
 
 

@@ -3,7 +3,7 @@
     noise <- noise * (1 - M);   x_t = signal * x_0 + noise_t * noise;   loss over all numbers of the clean guess
 
 The given numbers M of a state are thus signal * x_0, without noise. From a finished prior, either all its weights are
-trained on (``full``, as published) or a low-rank adapter that is also told M (`motionloom.nets.adapter`).
+trained on (``full``, as published) or a low-rank adapter that is also told what is given (`motionloom.nets.adapter`).
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from motionloom.checkpoint import Card, Prior, find_device, save_prior
 from motionloom.data.sets import FAVOUR, Batches, MotionSet, load_set, read_clips
 from motionloom.errors import MotionloomError
-from motionloom.nets.adapter import Adapter, AdapterNet, Controlled, adapted, fingerprint, show, tensors_of
+from motionloom.nets.adapter import Adapter, AdapterNet, adapted, fingerprint, show, tensors_of
 from motionloom.nets.prior import Condition, PriorNet
 from motionloom.nets.text import TextEncoder
 from motionloom.train.loop import Average, Log, World, changed, train
@@ -31,15 +31,14 @@ HELD_WINDOW, HELD_ROWS = 80, 48
 
 
 class Shown(nn.Module):
-    """A network in training that binds its condition and is told the mask, if it can be, in one call."""
+    """A network in training that binds its condition and is told what is given, if it can be, in one call."""
 
     def __init__(self, net: PriorNet | AdapterNet) -> None:
         super().__init__()
         self.net = net
 
-    def forward(self, x: Tensor, level: Tensor, cond: Condition, mask: Tensor) -> Tensor:
-        bound = self.net.bind(cond)
-        return self.net(x, level, Controlled(bound, mask) if isinstance(self.net, AdapterNet) else bound)
+    def forward(self, x: Tensor, level: Tensor, cond: Condition, given: Tensor, mask: Tensor) -> Tensor:
+        return self.net(x, level, show(self.net, self.net.bind(cond), given, mask))
 
 
 class ControlledGuess(CleanGuess):
@@ -54,7 +53,7 @@ class ControlledGuess(CleanGuess):
         masks = draw_masks(self.control, drawn.cond.lengths.cpu().numpy(), drawn.clean.shape[1], rng=rng)
         mask = torch.from_numpy(masks).to(self.device)
         noised = self.schedule.noised(drawn.clean, drawn.level, drawn.noise * ~mask)
-        return self.error(net(noised, drawn.level, drawn.cond, mask), drawn)
+        return self.error(net(noised, drawn.level, drawn.cond, drawn.clean, mask), drawn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +72,7 @@ class Held:
     @torch.no_grad()
     def errors(self, net: nn.Module) -> tuple[float, float]:
         """Mean squared error of the clean guess over the given and over the free numbers, standardised."""
-        guess = net(self.noised, self.level, show(net, net.bind(self.cond), self.mask))  # type: ignore[operator]
+        guess = net(self.noised, self.level, show(net, net.bind(self.cond), self.clean, self.mask))  # type: ignore[operator]
         error = (guess - self.clean) ** 2
         return float(error[self.mask].mean()), float(error[~self.mask].mean())
 
@@ -165,14 +164,14 @@ def _trained(recipe: Recipe, prior: Prior, device: str) -> PriorNet | AdapterNet
             raise MotionloomError("a full fine-tune does not go on from an adapter; give one of full and adapter")
         return Prior.load(recipe.start or "default").net.requires_grad_(True).to(device)
     start = Adapter.load(recipe.adapter, prior) if recipe.adapter else None
-    rank, mask_rank = recipe.rank, recipe.mask_rank
-    if start and (start.rank, start.mask_rank) != (rank, mask_rank):
+    rank, given_rank = recipe.rank, recipe.given_rank
+    if start and (start.rank, start.given_rank) != (rank, given_rank):
         raise MotionloomError(
-            f"the adapter {recipe.adapter} has rank {start.rank} and mask_rank {start.mask_rank}, and the recipe says "
-            f"{rank} and {mask_rank}; copy them"
+            f"the adapter {recipe.adapter} has rank {start.rank} and given_rank {start.given_rank}, and the recipe "
+            f"says {rank} and {given_rank}; copy them"
         )
     base = Prior.load(recipe.start or "default", device=device).net
-    return AdapterNet(base, rank, mask_rank=mask_rank, start=start)
+    return AdapterNet(base, rank, given_rank=given_rank, start=start)
 
 
 def _report(held: Held, net: nn.Module, base: nn.Module) -> str:

@@ -65,8 +65,8 @@ class Recipe:
     """Control training: change all weights, as published, instead of making an adapter."""
     rank: int = 12
     """Rank of an adapter."""
-    mask_rank: int = 32
-    """Rank of an adapter's mask input; 0: the network is not told what is given."""
+    given_rank: int = 64
+    """Rank of an adapter's input for what is given; 0: the network is not told, as published."""
     adapter: str = ""
     """Adapter to go on from: a shipped name or a path; empty: none."""
     net: dict[str, Any] = field(default_factory=dict)
@@ -115,7 +115,7 @@ def _check(path: Path, recipe: Recipe) -> None:
         "decay": 10.0,
         "displacement": 1000.0,
         "rank": 512,
-        "mask_rank": 512,
+        "given_rank": 512,
         "save_every": 10**9,
     }
     for key, limit in limits.items():
