@@ -56,7 +56,7 @@ def _control(arguments: argparse.Namespace) -> None:
 
     if arguments.out:
         obey.check_report(arguments.out / "report.json")
-    usual = control.QUICK_KINDS if arguments.quick else control_kinds.DEFAULT
+    usual = control_kinds.QUICK if arguments.quick else control_kinds.DEFAULT
     found = control.run(
         arguments.weights, data=arguments.data, evaluator=arguments.evaluator,
         kinds=usual if arguments.kinds is None else arguments.kinds,

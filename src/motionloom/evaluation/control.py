@@ -261,14 +261,13 @@ def measure(
 def _new(
     trial: Trial, parts: Parts, one: Kind, name: str, replication: int, *, progress: Callable[[str], None]
 ) -> dict[str, float]:
-    label = f"{one.name} {name} {replication}"
-    found = parts.find(label)
-    if found is None:
-        found = of_method(trial, one, name, replication)
-        parts.keep(label, found)
-        said = ", ".join(f"{k} {found[k]:.2f} cm" for k in ("root_error", "joint_error") if k in found)
-        progress(f"{one.title}, {name}, {replication + 1} of {trial.protocol.replications}: {said}, "
-                 f"{found['seconds']:.2f} s per motion")  # fmt: skip
+    found = of_method(trial, one, name, replication)
+    parts.keep(f"{one.name} {name} {replication}", found)
+    said = ", ".join(f"{k} {found[k]:.2f} cm" for k in ("root_error", "joint_error") if k in found)
+    progress(
+        f"{one.title}, {name}, {replication + 1} of {trial.protocol.replications}: {said}, "
+        f"{found['seconds']:.2f} s per motion"
+    )
     return found
 
 
@@ -367,9 +366,6 @@ def settings(
         count=count, batch=min(32, max(count, 4)), replications=replications, multimodality=(0, 0), steps=(steps,),
         guidance=guidance, seed=seed,
     )  # fmt: skip
-
-
-QUICK_KINDS = ("trajectory", "left_wrist", "trajectory+left_wrist", "keyframes")
 
 
 def quick() -> Protocol:

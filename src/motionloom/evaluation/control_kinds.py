@@ -26,6 +26,8 @@ DEFAULT = (
     "keyframes", "in_between",
 )  # fmt: skip
 """Every kind of the paper's Table 4, each joint without and with the path, and two sparse ones."""
+QUICK = (TRAJECTORY, "left_wrist", f"{TRAJECTORY}+left_wrist", "keyframes")
+"""One of each sort, to see that everything works."""
 MOST_KINDS = 50
 
 

@@ -14,6 +14,7 @@ from typing import Any, Literal
 from motionloom.checkpoint import Prior, shipped
 from motionloom.errors import MotionloomError
 from motionloom.evaluation import obey, physical, realism
+from motionloom.evaluation.control_kinds import DEFAULT, QUICK
 from motionloom.evaluation.report import Report
 
 
@@ -156,6 +157,24 @@ def _real_seams(job: Job) -> list[Path]:
     return [*_judge(job), *([shipped_file()] if shipped_file().is_file() else [])]
 
 
+def _control(job: Job, settings: Mapping[str, Any]) -> Report:
+    from motionloom.evaluation import control
+
+    found = control.run(
+        job.weights, data=job.data, evaluator=job.evaluator, kinds=settings["kinds"],
+        protocol=control.settings(count=settings["count"], replications=settings["replications"]),
+        folder=job.folder, device=job.device, command=command("control", job), progress=job.tools.progress,
+    )  # fmt: skip
+    return _sealed(found, job)
+
+
+def _controls(job: Job) -> list[Path]:
+    """What `_judge` names, and the adapters."""
+    from motionloom.nets.adapter import adapters
+
+    return [*_judge(job), *adapters().values()]
+
+
 def _evaluator(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.evaluation.evaluators import load_evaluator
     from motionloom.evaluation.own import validate
@@ -179,6 +198,9 @@ SUITES: tuple[Suite, ...] = (
           {"quick": False}, {"quick": True}, "used", _judge),
     Suite("transitions", "long motion: its segments, and jerk, skate and realism where they meet", _transitions,
           {"quick": False}, {"quick": True}, "used", _real_seams),
+    Suite("control", "goals out of real motions: error, skate and jerk beside published ways of control", _control,
+          {"kinds": DEFAULT, "count": 32, "replications": 3}, {"kinds": QUICK, "count": 8, "replications": 1}, "needed",
+          _controls),
     Suite("obedience", "20 everyday prompts, each with a physical check", _obedience,
           {"seeds": 10, "paraphrases": True}, {"seeds": 2, "paraphrases": False}),
     Suite("realism", "skate, penetration, jerk, bones and speeds beside real clips", _realism,
