@@ -15,7 +15,7 @@ from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.edit import edit, kept_numbers
-from motionloom.tasks.redraw import Stretch, arrival, redraw
+from motionloom.tasks.redraw import Stretch, arrival, joining, redraw
 from motionloom.tasks.splice import carried, in_manner_of, kept_parts, person_at_20, splice, standing
 from tests.nets import tiny
 
@@ -132,12 +132,31 @@ def test_a_stretch_arrives_where_the_clip_goes_on() -> None:
     assert torch.equal(bent[mask], wild[mask])
 
 
+def test_what_is_drawn_leaves_the_known_frames_without_a_jump() -> None:
+    """Parabolas known outside, a line far away drawn inside: value and change go on at the borders."""
+    t = torch.arange(60.0, dtype=torch.float64)[None, :, None]
+    rates = torch.linspace(-1, 1, WIDTH, dtype=torch.float64)
+    known = 0.01 * rates * (t - 20) ** 2 + 1
+    mask = torch.ones_like(known, dtype=torch.bool)
+    mask[:, 20:40] = False
+    mask[:, :, 30] = True
+    drawn = torch.where(mask, known, 5 + 0.3 * t)
+    joined = joining(known, mask, Stretch(np.zeros((61, 22, 3)), 20, 40, np.zeros(WIDTH, bool)))(drawn)
+    assert torch.equal(joined[mask], known[mask])
+    free = [n for n in range(259) if n != 30]
+    for border, step in ((19, 1), (40, -1)):
+        pace = known[:, border] - known[:, border - step]
+        first, second = joined[:, border + step], joined[:, border + 2 * step]
+        torch.testing.assert_close((first - known[:, border])[:, free], pace[:, free])
+        assert ((second - first - pace)[:, free].abs() < 0.5).all(), "a jump would be 4 or more"
+    torch.testing.assert_close(joined[:, 29:31], drawn[:, 29:31], atol=0.2, rtol=0)
+
+
 def test_an_open_stretch_is_left_alone() -> None:
     """At the clip's end, and where the root is known anyway, there is nothing to arrive at."""
     known = torch.from_numpy(humanml.motion_to_features(person(3.0)))[None]
     mask = torch.zeros_like(known, dtype=torch.bool)
     at_end = Stretch(np.zeros((60, 22, 3)), 30, known.shape[1], np.zeros(WIDTH, bool))
-    assert arrival(known, mask, at_end)(2 * known) is not None
     assert torch.equal(arrival(known, mask, at_end)(2 * known), 2 * known)
     mask[..., :3] = True
     assert torch.equal(arrival(known, mask, replace(at_end, last=50))(2 * known), 2 * known)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from motionloom.checkpoint import Prior
-from motionloom.diffusion import SOLVERS, Denoiser, guide, inpaint, levels, observe, restart, row_draw, sample
+from motionloom.diffusion import SOLVERS, guide, inpaint, levels, observe, restart, row_draw, sample
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT
 from motionloom.metrics.physics import heading
@@ -21,6 +21,9 @@ from motionloom.tasks.goals import Placement
 from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS, smooth
 
 Array = NDArray[np.float64]
+
+JOIN = 10
+"""Frames over which what the network draws is led from the known frames' course to its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +78,14 @@ def redraw(
     mask[:, stretch.first : stretch.last] = torch.from_numpy(stretch.keep).to(mask.device)
     spread = torch.where(prior.std > 0, prior.std, 1.0)
     data = (known - prior.mean) / spread
-    arrive = arrival(known, mask, stretch)
+    meet, reach = joining(known, mask, stretch), arrival(known, mask, stretch)
     cond = prior.condition([text])
     free = guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), guidance)
-    denoise = _arriving(inpaint(free, data, mask), arrive, prior.mean, spread)
+
+    def denoise(state: Tensor, level: int) -> Tensor:
+        guess = inpaint(free, data, mask)(state, level) * spread + prior.mean
+        return (reach(meet(guess)) - prior.mean) / spread
+
     draw = row_draw([seed])
     way = _levels(prior, steps, stretch.strength)
     hold = observe(data, mask, prior.schedule, draw)
@@ -90,7 +97,7 @@ def redraw(
         state = snapshot.state
         progress()
     made = state * spread + prior.mean
-    made = arrive(torch.where(mask, known, smooth(made) if prior.net.config.patch > 1 else made))
+    made = reach(meet(torch.where(mask, known, smooth(made) if prior.net.config.patch > 1 else made)))
     features = made[0].cpu().double()
     return Drawn(_placed(features, known[0].cpu().double(), stretch, place), features[:, LAYOUT["contacts"]].numpy())
 
@@ -129,8 +136,32 @@ def arrival(known: Tensor, mask: Tensor, stretch: Stretch) -> Callable[[Tensor],
     return arrive
 
 
-def _arriving(denoise: Denoiser, arrive: Callable[[Tensor], Tensor], mean: Tensor, spread: Tensor) -> Denoiser:
-    return lambda x, level: (arrive(denoise(x, level) * spread + mean) - mean) / spread
+def joining(known: Tensor, mask: Tensor, stretch: Stretch) -> Callable[[Tensor], Tensor]:
+    """A function that bends the free numbers so that they leave the known ones, and come to them, without a jump.
+
+    On features (rows, frames, 263), not standardised. At each border the first frame of the stretch becomes what the
+    two known frames beside it lead to, in value and in change; the difference fades over `JOIN` frames as a cubic.
+    """
+    first, last, frames = stretch.first, stretch.last, known.shape[1]
+    reach = min(JOIN, (last - first) // 2)
+    u = torch.arange(reach, device=known.device, dtype=known.dtype)[:, None] / max(reach, 1)
+    value, change = (1 - u) ** 2 * (1 + 2 * u), (1 - u) ** 2 * u * reach
+    free = ~mask
+    free[..., LAYOUT["contacts"]] = False
+    borders = [(first - 1, 1)] * (first >= 2) + [(last, -1)] * (last <= frames - 2)
+
+    def join(features: Tensor) -> Tensor:
+        bent = features.clone()
+        for border, step in borders if reach >= 2 else ():
+            pace = known[:, border] - known[:, border - step]
+            start = border + step
+            lack = known[:, border] + pace - features[:, start]
+            slope = pace - (features[:, start + step] - features[:, start])
+            at = start + step * torch.arange(reach, device=known.device)
+            bent[:, at] += value * lack[:, None] + change * slope[:, None]
+        return torch.where(free, bent, features)
+
+    return join
 
 
 def _levels(prior: Prior, steps: int, strength: float) -> list[int]:
