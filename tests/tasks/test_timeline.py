@@ -378,3 +378,15 @@ def test_prompts_make_the_timeline_that_a_file_of_them_makes(read):
         plain_timeline(["a", "b"], seconds=1).segments
         == read("segments: [{text: a, seconds: 1, transition: 0.5}, {text: b, seconds: 1}]").segments
     )
+
+
+def test_the_document_explains_every_key_with_an_example_that_is_read(tmp_path):
+    text = (ROOT / "docs" / "compose.md").read_text()
+    example = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)[0]
+    (tmp_path / "t.yaml").write_text(example)
+    io.save(Motion(SMPL22, 20.0, np.zeros((3, 3)), np.tile(IDENTITY, (3, 22, 1))), tmp_path / "walk.bvh")
+    assert read_timeline(tmp_path / "t.yaml").frames == 100 + 50 + 80 + 100
+    plain = yaml.safe_load(example)
+    assert set(plain) == set(KEYS)
+    assert {key for segment in plain["segments"] if isinstance(segment, dict) for key in segment} == set(SEGMENT_KEYS)
+    assert valid(plain)
