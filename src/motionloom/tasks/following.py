@@ -10,7 +10,6 @@ from motionloom.features.humanml import resample_positions
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.fields import listed
 from motionloom.tasks.goals import FPS, Goal, Placement, body_facing
 
 
@@ -35,7 +34,7 @@ def tracks(positions: np.ndarray, joints: Sequence[int], *, frames: int, at: Seq
         rows = np.array([round(time * FPS) for time in at], dtype=int)
         if len(rows) == 0 or rows.min() < 0 or rows.max() > known:
             raise MotionloomError(
-                f"a motion can be followed at 0 to {(known - 1) / FPS:g} s here; got {listed([f'{t:g}' for t in at])}"
+                f"a motion can be followed at 0 to {(known - 1) / FPS:g} s here; got {', '.join(f'{t:g}' for t in at[:20]) or 'none'}"
             )
         rows = np.minimum(rows, known - 1)
     goal = Goal.nothing(frames)
