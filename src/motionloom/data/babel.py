@@ -14,7 +14,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations
+from itertools import permutations, product
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,7 @@ BRIEFEST = 0.5
 """Seconds: shorter recordings are dropped."""
 _RELEASE = "babel_v1.0_release"
 _MAX_JSON = 1 << 28
+_MAX_LABELS = 1000
 _POSES = {"t pose", "a pose", "tpose", "apose"}
 
 
@@ -165,8 +166,8 @@ def _recording(number: str, split: str, entry: dict[str, Any]) -> Recording:
 
 def _labels(annotation: dict[str, Any] | None) -> list[dict[str, Any]]:
     labels = annotation["labels"] if annotation is not None else []
-    if not isinstance(labels, list):
-        raise ValueError("labels is not a list")
+    if not isinstance(labels, list) or len(labels) > _MAX_LABELS:
+        raise ValueError(f"labels is not a list of at most {_MAX_LABELS}")
     return labels
 
 
@@ -263,14 +264,13 @@ def pairs(segments: Sequence[Segment]) -> list[Pair]:
         for a, b in permutations(actions, 2)
         if a.start < b.start <= a.end + TOUCH and a.end < b.end
     ]  # fmt: skip
-    made += [
-        Pair((a.text, b.text), (a.start, t.start), (t.start, t.end), (t.end, b.end))
-        for t in known
-        if t.is_transition
-        for a, b in permutations(actions, 2)
-        if a.start < t.start <= a.end + TOUCH and a.end <= t.end
-        if t.start <= b.start <= t.end + TOUCH and b.end > t.end
-    ]
+    for t in (s for s in known if s.is_transition):
+        before = [a for a in actions if a.start < t.start <= a.end + TOUCH and a.end <= t.end]
+        after = [b for b in actions if t.start <= b.start <= t.end + TOUCH and b.end > t.end]
+        made += [
+            Pair((a.text, b.text), (a.start, t.start), (t.start, t.end), (t.end, b.end))
+            for a, b in product(before, after)
+        ]
     return list(dict.fromkeys(made))
 
 
