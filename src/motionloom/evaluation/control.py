@@ -43,6 +43,8 @@ COUNT, REPLICATIONS = 32, 3
 RATIOS = {"share_ratio": "skate_share", "speed_ratio": "skate_speed", "slide_ratio": "skate_slide",
           "jerk_ratio": "jerk"}  # fmt: skip
 """Columns that hold a number against that of the uncontrolled row of the same kind and manner (`BASE`)."""
+SEEN = {"skate_share": 0.1, "skate_speed": 0.1, "skate_slide": 0.01, "jerk": 0.1}
+"""Of uncontrolled motions: what is smaller is nothing, and nothing is held against it."""
 
 COLUMNS: tuple[Column, ...] = (
     Column("r3", "R@3", "up", "share of captions whose own motion is among the three nearest of its batch"),
@@ -278,7 +280,7 @@ def against(
     if base is None:
         return list(numbers)
     return [
-        {**own, **{name: own[of] / plain[of] for name, of in RATIOS.items() if plain[of] > 0}}
+        {**own, **{name: own[of] / plain[of] for name, of in RATIOS.items() if plain[of] > SEEN[of]}}
         for own, plain in zip(numbers, base, strict=True)
     ]
 
