@@ -45,10 +45,15 @@ class ControlledGuess(CleanGuess):
     """`CleanGuess` of states whose given numbers are free of noise; the masks of a step follow from (seed, step)."""
 
     control = "any"
+    early = False
+    """Draw levels as the spacing ``early`` of `motionloom.diffusion.levels` does: most of them near pure noise."""
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `Objective.loss`; ``net`` is a wrapped `Shown`."""
         drawn = self.drawn(seed, step, rows)
+        if self.early:
+            even = drawn.level.double() / self.schedule.steps
+            drawn = drawn._replace(level=(self.schedule.steps * (1 - (1 - even) ** 2)).round().long())
         rng = np.random.default_rng((seed, step, 2))
         masks = draw_masks(self.control, drawn.cond.lengths.cpu().numpy(), drawn.clean.shape[1], rng=rng)
         mask = torch.from_numpy(masks).to(self.device)
@@ -130,7 +135,7 @@ def train_control(
         net, prior.schedule, batches, words,
         drop_text=recipe.drop_text, displacement=recipe.displacement, device=world.device,
     )  # fmt: skip
-    objective.control = recipe.control
+    objective.control, objective.early = recipe.control, recipe.spacing == "early"
     held, place = held_out(data, prior, recipe), folder / f"{recipe.name}.safetensors"
     say(f"{sum(p.numel() for p in net.parameters()):,} trained parameters, {len(motions.items):,} described stretches")
     for line in changed(folder, recipe) if world.rank == 0 else ():

@@ -55,8 +55,8 @@ def some_frames(length: int, frames: int, dense: float, rng: np.random.Generator
         beat = int(rng.integers(4, 31))
         chosen[int(rng.integers(beat)) % length : length : beat] = True
     elif kind == 2:
-        first, last = np.sort(rng.integers(0, length + 1, size=2))
-        chosen[first : max(last, first + 1)] = True
+        first = int(rng.integers(length))
+        chosen[first : int(rng.integers(first, length)) + 1] = True
     else:
         chosen[: int(rng.integers(1, half + 1))] = True
         if kind == 4:

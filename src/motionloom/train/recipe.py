@@ -67,6 +67,8 @@ class Recipe:
     """Rank of an adapter."""
     given_rank: int = 64
     """Rank of an adapter's input for what is given; 0: the network is not told, as published."""
+    spacing: str = "index"
+    """Control training: levels evenly drawn (``index``, as published), or as often as samplers go there (``early``)."""
     adapter: str = ""
     """Adapter to go on from: a shipped name or a path; empty: none."""
     net: dict[str, Any] = field(default_factory=dict)
@@ -128,6 +130,7 @@ def _check(path: Path, recipe: Recipe) -> None:
         and len(recipe.windows) == len(recipe.shares) > 0 and 0 < min(recipe.windows) <= max(recipe.windows) <= 10_000
         and min(recipe.shares) >= 0 < sum(recipe.shares)
         and recipe.amp in ("bf16", "none") and recipe.schedule in ("cosine", "linear")
+        and recipe.spacing in ("index", "early")
     )  # fmt: skip
     if not good:
         raise MotionloomError(
