@@ -115,11 +115,26 @@ def test_a_jump_at_the_seam_has_the_jerk_and_the_step_of_a_step_function() -> No
     found = transitions.of_method(replace(trial(), mean_jerk=0.0), Maker(jumping), 0)
     assert found["pj"] == pytest.approx(0.5)
     assert found["auj"] == pytest.approx(1.0)
+    assert found["auj_own"] == pytest.approx(1.0)
     assert found["step"] == pytest.approx(250)
     small = JERK_HUMANML3D
     assert found["auj_humanml3d"] == pytest.approx(0.25 * 4 - 3 * small + 54 * small)
     assert found["seam_jerk"] == pytest.approx(0.25 * 4 / 57 * FPS**3)
     assert found["inside_jerk"] == pytest.approx(0, abs=1e-6)
+
+
+def test_what_shakes_alike_everywhere_has_no_area_of_its_own() -> None:
+    """A body that jerks to and fro by 1 cm each frame: third difference 4 cm, in windows and outside."""
+
+    def shaking(frames: Sequence[int]) -> np.ndarray:
+        p = standing(sum(frames))
+        p[::2, :, 0] += 0.01
+        return p
+
+    found = transitions.of_method(trial(), Maker(shaking), 0)
+    assert found["pj"] == pytest.approx(0.04)
+    assert found["auj_own"] == pytest.approx(0, abs=1e-9)
+    assert found["auj"] == pytest.approx(57 * abs(0.04 - trial().mean_jerk))
 
 
 def test_skate_is_counted_on_its_own_side_of_the_window() -> None:
