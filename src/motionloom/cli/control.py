@@ -8,7 +8,8 @@ from motionloom.cli import generate
 from motionloom.cli.sampling import add_sampling, bar, check_outs, check_prompt, fail
 
 if TYPE_CHECKING:
-    from motionloom.tasks.control import Controlled
+    from motionloom.checkpoint import Prior
+    from motionloom.tasks.control import Adapters, Controlled
     from motionloom.tasks.goals import Goal
 
 MAX_COUNT = 1000
@@ -138,10 +139,12 @@ def _make(arguments: argparse.Namespace, goal: "Goal") -> "tuple[list[Controlled
     return made, time.perf_counter() - began
 
 
-def _adapters(names: list[str], prior):
+def _adapters(names: list[str], prior: "Prior") -> "Adapters":
     """'auto', 'none' or the adapters of these names."""
-    if not names or names in (["auto"], ["none"]):
-        return names[0] if names else "auto"
+    if not names or names == ["auto"]:
+        return "auto"
+    if names == ["none"]:
+        return "none"
     if {"auto", "none"} & set(names):
         fail("--adapters is auto, none, or names of adapters; not a mix of them")
     from motionloom.nets.adapter import Adapter
