@@ -65,26 +65,28 @@ def same(a: Motion, b: Motion, frames: slice) -> bool:
     return all(np.array_equal(one[frames], other[frames]) for one, other in pairs)
 
 
-def clips() -> dict[str, Motion]:
-    large = from_smpl22(person(5.0, 30.0), rig())
-    return {"person at 20": person(5.0), "person at 120": person(5.0, 120.0), "rig": large, "floating": floating(large)}
+def clip_of(kind: str) -> Motion:
+    if kind.startswith("person"):
+        return person(3.0, float(kind.split()[-1]))
+    large = from_smpl22(person(3.0, 30.0), rig())
+    return large if kind == "rig" else floating(large)
 
 
-@pytest.mark.parametrize("kind", ["person at 20", "person at 120", "rig", "floating"])
+@pytest.mark.parametrize("kind", ["person at 20", "person at 60", "rig", "floating"])
 def test_outside_of_the_stretch_everything_stays_to_the_bit(prior: Prior, kind: str) -> None:
     """And inside it does not; the length, rate and skeleton are the clip's."""
-    clip = clips()[kind]
-    made = edit(prior, clip, "a person turns", between=[(1.0, 2.0), (3.5, 4.0)], **FEW)[0]
-    f = round(clip.fps)
+    clip = clip_of(kind)
+    made = edit(prior, clip, "a person turns", between=[(0.5, 1.2), (2.0, 2.5)], **FEW)[0]
+    borders = [round(s * clip.fps) for s in (0.5, 1.2, 2.0, 2.5)]
     assert (len(made), made.fps, made.skeleton) == (len(clip), clip.fps, clip.skeleton)
-    assert all(same(made, clip, s) for s in (slice(0, f), slice(2 * f, round(3.5 * f)), slice(4 * f, None)))
+    assert all(same(made, clip, slice(*s)) for s in ((0, borders[0]), borders[1:3], (borders[3], None)))
     moved = np.linalg.norm(made.positions() - clip.positions(), axis=-1).max(axis=1)
-    assert (moved[f + 5 : 2 * f - 5] > 1e-3).all()
+    assert (moved[borders[0] + 4 : borders[1] - 4] > 1e-3).all()
 
 
 @pytest.mark.parametrize("kind", ["person at 20", "rig", "floating"])
 def test_kept_joints_keep_their_rotations_and_the_root_its_place(prior: Prior, kind: str) -> None:
-    clip = clips()[kind]
+    clip = clip_of(kind)
     made = edit(prior, clip, "a person jumps", keep=["lower_body"], **FEW)[0]
     shift = len(clip.skeleton) > 22
     lower = [j + shift for j in SMPL22.groups["lower_body"]]
@@ -149,7 +151,7 @@ def test_what_is_drawn_leaves_the_known_frames_without_a_jump() -> None:
         first, second = joined[:, border + step], joined[:, border + 2 * step]
         torch.testing.assert_close((first - known[:, border])[:, free], pace[:, free])
         assert ((second - first - pace)[:, free].abs() < 0.5).all(), "a jump would be 4 or more"
-    torch.testing.assert_close(joined[:, 29:31], drawn[:, 29:31], atol=0.2, rtol=0)
+    torch.testing.assert_close(joined[:, 29:31], drawn[:, 29:31], atol=0.6, rtol=0)
 
 
 def test_an_open_stretch_is_left_alone() -> None:
@@ -200,15 +202,17 @@ def test_a_splice_leaves_neither_a_jump_nor_a_kink() -> None:
 
 
 def test_a_looped_clip_can_follow_itself(prior: Prior) -> None:
-    """Frame 0, moved behind the last frame, continues its motion: at the wrap no step is longer than in the stretch."""
-    clip = person(4.0, 30.0)
+    """Frame 0, moved behind the last frame, continues it: no joint turns much faster there than the arms swing."""
+    clip = person(3.75, 30.0)
     made = edit(prior, clip, loop=True, **FEW)[0]
-    assert (len(made), same(made, clip, slice(0, 90))) == (120, True)
-    inner = np.diff(made.rotations[-6:], axis=0)
-    wrap = made.rotations[0] - made.rotations[-1]
-    turn = rot.multiply(made.rotations[0], rot.inverse(made.rotations[-1]))[1:]
-    assert np.degrees(np.linalg.norm(rot.quat_to_rotvec(turn), axis=-1)).max() < 12
-    assert np.abs(wrap[1:]).max() < 3 * np.abs(inner[:, 1:]).max()
+    assert (len(made), same(made, clip, slice(0, 82))) == (112, True)
+
+    def wrap(motion: Motion) -> float:
+        turn = rot.multiply(motion.rotations[0], rot.inverse(motion.rotations[-1]))[1:]
+        return float(np.linalg.norm(rot.quat_to_rotvec(turn), axis=-1).max())
+
+    assert wrap(made) < 1.5 * 0.5 * 2 * np.pi / 30
+    assert wrap(clip) > 3 * 0.5 * 2 * np.pi / 30, "the clip alone would jump"
 
 
 def test_a_clip_that_ends_where_it_began_loops_in_the_world(prior: Prior) -> None:
@@ -221,7 +225,7 @@ def test_a_clip_that_ends_where_it_began_loops_in_the_world(prior: Prior) -> Non
 
 
 def test_an_extended_clip_is_the_clip_and_more(prior: Prior) -> None:
-    clip = clips()["rig"]
+    clip = clip_of("rig")
     made = edit(prior, clip, "a person sits", extend=1.5, **FEW)[0]
     assert len(made) == len(clip) + 45
     assert same(made, clip, slice(0, len(clip)))
@@ -230,14 +234,18 @@ def test_an_extended_clip_is_the_clip_and_more(prior: Prior) -> None:
 
 def test_versions_have_their_own_seeds(prior: Prior) -> None:
     clip = person(3.0)
-    two = edit(prior, clip, "a person jumps", between=[(1, 2)], count=2, seed=4, **FEW)
+    said: list[tuple[int, int]] = []
+    two = edit(
+        prior, clip, "a person jumps", between=[(1, 2)], count=2, seed=4, progress=lambda *p: said.append(p), **FEW
+    )
+    assert said == [(1, 4), (2, 4), (3, 4), (4, 4)]
     alone = edit(prior, clip, "a person jumps", between=[(1, 2)], seed=5, **FEW)[0]
     assert np.array_equal(two[1].rotations, alone.rotations)
     assert not np.array_equal(two[0].rotations, two[1].rotations)
 
 
 def test_the_skeleton_can_be_the_persons(prior: Prior) -> None:
-    made = edit(prior, clips()["rig"], "a person jumps", between=[(1, 2)], skeleton="smpl", **FEW)[0]
+    made = edit(prior, clip_of("rig"), "a person jumps", between=[(1, 2)], skeleton="smpl", **FEW)[0]
     assert made.skeleton == SMPL22
     assert made.fps == 30
 

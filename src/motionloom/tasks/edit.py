@@ -86,15 +86,21 @@ def edit(
     if skeleton not in ("own", "smpl"):
         raise MotionloomError(f"the skeleton is 'own' or 'smpl'; got {skeleton!r}")
     clip = motion if skeleton == "own" else to_smpl22(motion)
-    pen = _Pen(prior, text, guidance, steps, clean)
-    stages = _stages(pen, clip, asked)
+    done = calls = 0
+
+    def tick() -> None:
+        nonlocal done
+        done += 1
+        if progress:
+            progress(done, calls)
+
+    stages = _stages(_Pen(prior, text, guidance, steps, clean, tick), clip, asked)
+    calls = count * len(stages) * steps
     made = []
     for number in range(count):
         version = clip
         for stage in stages:
             version = stage(version, seed + number)
-            if progress:
-                progress(number * len(stages) + stages.index(stage) + 1, count * len(stages))
         made.append(version)
     return made
 
@@ -124,10 +130,14 @@ class _Pen:
     guidance: float
     steps: int
     clean: bool
+    tick: Callable[[], None]
+    """Called after each network call."""
 
     def draw(self, window: Motion, stretch: Stretch, seed: int) -> Motion:
         """The window with a new stretch, on its own skeleton, not yet spliced."""
-        drawn = redraw(self.prior, stretch, self.text, seed=seed, guidance=self.guidance, steps=self.steps)
+        drawn = redraw(
+            self.prior, stretch, self.text, seed=seed, guidance=self.guidance, steps=self.steps, progress=self.tick
+        )
         return dressed(drawn, window, clean=self.clean)
 
 
