@@ -6,6 +6,7 @@ drawn motion is put into the world and fitted to what is left of the wishes (`fi
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import torch
@@ -13,10 +14,15 @@ from torch import Tensor
 
 from motionloom import rotations as rot
 from motionloom.checkpoint import Prior
-from motionloom.diffusion import SOLVERS, guide, levels, row_draw, sample
+from motionloom.diffusion import SOLVERS, Denoiser, Weight, guide, levels, mix, row_draw, sample
 from motionloom.errors import MotionloomError
+from motionloom.features.layout import mask as named
+from motionloom.features.layout import ric
 from motionloom.motion import Motion
+from motionloom.nets.adapter import Adapter, adapted
+from motionloom.nets.adapter import adapters as shipped
 from motionloom.skeleton import SMPL22
+from motionloom.tasks.blending import blended
 from motionloom.tasks.fitting import fit
 from motionloom.tasks.goals import Goal, Placement, placement_of
 from motionloom.tasks.steering import Correction, corrected, toward
@@ -29,10 +35,11 @@ from motionloom.tasks.text import (
     SPACING,
     STEPS,
     Progress,
-    _check,
     smooth,
     to_motion,
-)  # fmt: skip
+)
+
+Adapters = Literal["auto", "none"] | Sequence[Adapter]
 
 MISSED = 0.05
 """Metres off beyond which a wish counts as missed."""
@@ -65,6 +72,8 @@ def control(
     seed: int = 0,
     guidance: float = GUIDANCE,
     steps: int = STEPS,
+    adapters: Adapters = "auto",
+    weights: Sequence[Weight] | None = None,
     exact: bool = True,
     clean: bool = True,
     progress: Progress | None = None,
@@ -72,20 +81,23 @@ def control(
     """Make ``count`` motions of the goal's length that do what ``prompt`` says and what ``goal`` asks.
 
     Motion i is drawn from ``seed + i`` alone. ``goal`` in the world at 20 frames per second; where the person stands
-    at frame 0 is `placement_of` it. ``exact``: fit the drawn motion to the goal; ``clean``: lock planted feet.
+    at frame 0 is `placement_of` it. adapters: networks trained to see what is asked, blended with ``weights`` (one
+    each, else the mean); "auto" takes the shipped ones that fit (`fitting_adapters`), "none" the prior's own network.
+    exact: fit the drawn motion to the goal; clean: lock planted feet.
     Raises MotionloomError for what cannot be asked; a goal out of reach is no error (see `Controlled.missed`).
     """
     if count < 1:
         raise MotionloomError(f"nothing to make: {count} motions; ask for 1 or more")
     if not 0 <= seed < LARGEST_SEED:
         raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {seed}")
-    if not 4 <= len(goal) <= LONGEST * prior.fps:
-        raise MotionloomError(f"a goal of {len(goal)} frames cannot be followed; give 4 to {LONGEST * prior.fps:.0f}")
+    longest = round(LONGEST * prior.fps)
+    if not 4 <= len(goal) <= longest:
+        raise MotionloomError(f"a goal of {len(goal)} frames cannot be followed; one of 4 to {longest} can")
     place = placement_of(goal)
-    change = toward(goal.seen_from(place), prior)
+    chosen = fitting_adapters(prior, goal) if adapters == "auto" else () if adapters == "none" else adapters
     made = steered_features(
-        prior, [prompt] * count, len(goal), corrections=[change] * count, seeds=[seed + i for i in range(count)],
-        guidance=guidance, steps=steps, progress=progress,
+        prior, [prompt] * count, goal.seen_from(place), seeds=[seed + i for i in range(count)], guidance=guidance,
+        steps=steps, adapters=chosen, weights=weights, progress=progress,
     )  # fmt: skip
     drawn = [moved(to_motion(row.numpy().astype(np.float64), prior.fps, clean=clean), place) for row in made]
     return [judged(fit(motion, goal) if exact else motion, motion, goal) for motion in drawn]
@@ -95,28 +107,38 @@ def control(
 def steered_features(
     prior: Prior,
     prompts: Sequence[str],
-    frames: int,
+    goal: Goal,
     *,
-    corrections: Sequence[Correction | None],
     seeds: Sequence[int],
     guidance: float = GUIDANCE,
     steps: int = STEPS,
-    solver: str = SOLVER,
-    spacing: str = SPACING,
+    adapters: Sequence[Adapter] = (),
+    weights: Sequence[Weight] | None = None,
     progress: Progress | None = None,
 ) -> list[Tensor]:
-    """`motionloom.tasks.text.sample_features` for rows of one length, each guess changed by the row's correction."""
-    _check(prior, prompts, steps=steps, guidance=guidance, solver=solver)
-    way = levels(prior.schedule, steps, spacing=spacing)  # type: ignore[arg-type]
+    """`motionloom.tasks.text.sample_features` for rows of the goal's length, each guess steered towards ``goal``.
+
+    ``goal`` as of `steering.toward`. With ``adapters`` their blended guesses are steered, and the numbers that are
+    asked stand in the state without noise, as the last steered guess has them (as `blending.control_features`, whose
+    numbers are known beforehand; here they depend on where the rest of the body goes).
+    """
+    _check(prior, prompts, steps=steps, guidance=guidance, weights=weights, adapters=adapters)
+    way = levels(prior.schedule, steps, spacing=SPACING)
+    nets = [adapted(prior.net, adapter) for adapter in adapters]
+    change, mask = toward(goal, prior), controlled_numbers(goal).to(prior.mean.device)
     result: list[Tensor] = []
     for start in range(0, len(prompts), ROWS):
-        rows = slice(start, start + ROWS)
-        cond = prior.condition(list(prompts[rows]))
-        guided = guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), guidance)
-        draw = row_draw(seeds[rows])
-        state = draw(torch.empty(len(prompts[rows]), frames, len(prior.mean), device=prior.mean.device))
-        denoise = corrected(guided, corrections[rows])
-        walk = sample(denoise, state, levels=way, solver=SOLVERS[solver], schedule=prior.schedule, draw=draw)
+        said = list(prompts[start : start + ROWS])
+        cond, draw = prior.condition(said), row_draw(seeds[start : start + ROWS])
+        if nets:
+            shown = mask.expand(len(said), -1, -1)
+            shares = weights or [1 / len(nets)] * len(nets)
+            denoise = _seeing(blended(nets, cond, shown, weights=shares, guidance=guidance), change, prior, mask)
+        else:
+            guided = guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), guidance)
+            denoise = corrected(guided, [change] * len(said))
+        state = draw(torch.empty(len(said), len(goal), len(prior.mean), device=prior.mean.device))
+        walk = sample(denoise, state, levels=way, solver=SOLVERS[SOLVER], schedule=prior.schedule, draw=draw)
         for done, snapshot in enumerate(walk, start=1):
             state = snapshot.state
             if progress:
@@ -124,6 +146,62 @@ def steered_features(
         finished = state * prior.std + prior.mean
         result += list((smooth(finished) if prior.net.config.patch > 1 else finished).cpu())
     return result
+
+
+def controlled_numbers(goal: Goal) -> Tensor:
+    """(frames, 263) bool: the numbers of the representation that a goal is about, frame by frame."""
+    mask = np.zeros((len(goal), len(named("root"))), dtype=bool)
+    mask[goal.asked[:, 0].any(axis=-1)] |= named("root_horizontal")
+    mask[goal.asked[:, 0, 1], 3] = True
+    for joint in range(1, len(SMPL22)):
+        mask[goal.asked[:, joint].any(axis=-1), ric(joint)] = True
+    return torch.from_numpy(mask)
+
+
+def fitting_adapters(prior: Prior, goal: Goal) -> list[Adapter]:
+    """The shipped adapters for what is asked: one per joint that has its own, ``any`` for the others; none for another
+    prior's weights."""
+    names = shipped()
+    wanted = {("trajectory" if joint == "pelvis" else joint) for joint in goal.joints}
+    chosen = {name if name in names else "any" for name in wanted} & set(names)
+    try:
+        return [Adapter.load(name, prior) for name in sorted(chosen)]
+    except MotionloomError:
+        return []
+
+
+def _seeing(denoise: Denoiser, change: Correction, prior: Prior, mask: Tensor) -> Denoiser:
+    """The steered denoiser that shows its network the last steered guess without noise where ``mask`` is True."""
+    last: Tensor | None = None
+
+    def seen(state: Tensor, level: int) -> Tensor:
+        nonlocal last
+        signal, _ = prior.schedule.at(level)
+        shown = mix(state, torch.zeros_like(state) if last is None else signal * last, mask)
+        guess = denoise(shown, level)
+        last = torch.stack([change(row, level) for row in guess])
+        return last
+
+    return seen
+
+
+def _check(
+    prior: Prior,
+    prompts: Sequence[str],
+    *,
+    steps: int,
+    guidance: float,
+    weights: Sequence[Weight] | None,
+    adapters: Sequence[Adapter],
+) -> None:
+    if not isinstance(steps, int) or not 1 <= steps <= prior.schedule.steps:
+        raise MotionloomError(f"{steps} steps cannot be taken; these weights take 1 to {prior.schedule.steps}")
+    if not np.isfinite(guidance) or abs(guidance) > 100:
+        raise MotionloomError(f"a guidance of {guidance:g} makes no motion; usual values are 1 to 7")
+    if not all(prompt.strip() for prompt in prompts):
+        raise MotionloomError("a prompt is empty; say in words what the person does")
+    if weights is not None and len(weights) != len(adapters):
+        raise MotionloomError(f"there are {len(weights)} weights for {len(adapters)} adapters; give one for each")
 
 
 def moved(motion: Motion, place: Placement) -> Motion:

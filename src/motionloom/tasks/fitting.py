@@ -58,8 +58,8 @@ _BEND = (0.03, 2.6)
 _BASES = {3: 0, 6: 0, 9: 0, 12: 0, 15: 0, 13: 0, 14: 0, 16: 0, 17: 0, 4: 1, 7: 1, 10: 1, 5: 2, 8: 2, 11: 2,
           18: 16, 20: 16, 19: 17, 21: 17}  # fmt: skip
 """Joint from which another's reach is measured."""
-_STRETCH, _LEAN, _WALK = 0.99, 0.08, 0.5
-"""Share of a chain's length that is reached, metres that the body leans, and goes, after what is out of reach."""
+_EASY, _STRETCH, _LEAN, _WALK = 0.97, 0.99, 0.08, 0.5
+"""Shares of a chain's length that are reached with ease, and at all; metres that the body leans, and goes, for more."""
 
 _AXES = {limb.middle: np.array(limb.hinge, dtype=np.float64) for limb in LIMBS}
 _COLUMNS = 3 + 3 * len(_BALLS) + len(_HINGES)
@@ -161,7 +161,7 @@ def _root_shift(places: Array, goal: Goal) -> Array:
     for joint, base, length in _chains():
         line = np.where(goal.asked[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
         distance = np.linalg.norm(line, axis=-1, keepdims=True).clip(1e-9)
-        beyond = line * (1 - (length + _LEAN) / distance).clip(0) * [1, 0, 1]
+        beyond = line * (1 - _EASY * length / distance).clip(0) * [1, 0, 1]
         beyond *= np.minimum(1, _WALK / np.linalg.norm(beyond, axis=-1, keepdims=True).clip(1e-9))
         far = np.linalg.norm(beyond, axis=-1, keepdims=True) > np.linalg.norm(need, axis=-1, keepdims=True)
         need, weight = np.where(far, beyond, need), np.where(far, 1 / 0.02, weight)

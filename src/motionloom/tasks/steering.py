@@ -35,15 +35,20 @@ MOST = 4000
 """Wishes on one coordinate that are solved for at once; of more, evenly many frames are used."""
 _PACE, _YAW = 0.015, 0.03
 """Standard deviations of the root's velocity (metres a frame) and of the heading's (radians a frame)."""
-_STILL, _HEIGHT = 0.003, 0.10
+_STILL, _HEIGHT = 0.003, 0.06
 """The same for the root's velocity where a limb can do it (metres a frame), and for its going up and down (metres)."""
+_LIFT, _HOPELESS = 0.3, 1.0
+"""Metres that the body goes up or down to bring a wish into reach; the need beyond which it does not try."""
 _WIDTHS = ((0.9, 12.0), (0.5, 8.0), (0.0, 5.0))
 """Frames over which a change is spread, from noises (of the schedule) above the first number of each pair."""
-_SWING = {3: 0.1, 6: 0.1, 9: 0.1, 12: 0.2, 13: 0.15, 14: 0.15, 16: 0.5, 17: 0.5, 18: 0.5, 19: 0.5,
-          1: 0.35, 2: 0.35, 4: 0.5, 5: 0.5, 7: 0.3, 8: 0.3, 0: 0.05}  # fmt: skip
+_SWING = {3: 0.05, 6: 0.05, 9: 0.05, 12: 0.2, 13: 0.15, 14: 0.15, 16: 0.5, 17: 0.5, 18: 0.5, 19: 0.5,
+          1: 0.35, 2: 0.35, 4: 0.5, 5: 0.5, 7: 0.3, 8: 0.3, 0: 0.02}  # fmt: skip
 """Radians by which the bones beyond a joint may be off."""
-_REACH = {18: 0.15, 19: 0.15, 20: 0.3, 21: 0.3, 4: 0.15, 5: 0.15, 7: 0.3, 8: 0.3, 10: 0.3, 11: 0.3}
+_SLACK = {18: 0.15, 19: 0.15, 20: 0.25, 21: 0.25, 4: 0.15, 5: 0.15, 7: 0.3, 8: 0.3, 10: 0.3, 11: 0.3}
 """Metres that a joint can go before the root must come along; 0.1 for those of the trunk."""
+_REACH = {20: (16, 0.48), 21: (17, 0.48), 18: (16, 0.25), 19: (17, 0.25), 7: (1, 0.79), 8: (2, 0.79), 10: (1, 0.85),
+          11: (2, 0.85)}  # fmt: skip
+"""Where limbs begin, and metres that they reach without being quite straight."""
 _LONGEST = 0.8
 """Metres that a limb is moved at most: what is out of reach is pointed at."""
 _TURN_OVER, _SLOW = 6.0, 0.005
@@ -120,6 +125,9 @@ class _Plan:
     turning: NDArray[np.intp]
     turn: Array
     """The same for the heading."""
+    lifting: NDArray[np.intp]
+    lift: Array
+    """The same for the body's going up and down."""
     limbs: tuple[_Limbs | None, ...]
     """For x, y and z."""
     body: Array
@@ -140,11 +148,13 @@ def _plan(goal: Goal, first: int, width: float) -> _Plan:
     moving = np.flatnonzero(goal.asked[..., [0, 2]].any(axis=(1, 2)))
     noise = np.where(goal.asked[moving, 0][:, [0, 2]].any(axis=-1), EXACT, FEW)
     turning = np.flatnonzero(goal.facing_asked)
+    lifting = np.flatnonzero(goal.asked[:, list(_REACH)].all(axis=-1).any(axis=-1) & ~goal.asked[:, 0, 1])
     still = _STILL**2 * pace
     limbs = tuple(_limb_plan(goal.asked[..., c], _TOGETHER[c], body, None if c == 1 else still) for c in range(3))
     return _Plan(
         goal, first, moving, _gain(_PACE**2 * pace, moving, noise),
-        turning, _gain(_YAW**2 * pace, turning, np.full(len(turning), 0.02)), limbs, body, still[:, :frames],
+        turning, _gain(_YAW**2 * pace, turning, np.full(len(turning), 0.02)),
+        lifting, _gain(_LIFT**2 * body, lifting, np.full(len(lifting), FEW)), limbs, body, still[:, :frames],
     )  # fmt: skip
 
 
@@ -201,11 +211,12 @@ def _offsets() -> Array:
 def _together() -> tuple[Array, Array, Array]:
     """Covariances (22, 22) of the joints' changes on x, y and z, the root's path left out."""
     limbs = _offsets() @ _offsets().T
-    carried = np.ones(len(SMPL22))  # what goes up and down with the root: the feet stay, the knees bend
-    carried[[4, 5]], carried[[7, 8, 10, 11]] = 0.5, 0.0
-    return limbs, limbs + _HEIGHT**2 * np.outer(carried, carried), limbs
+    return limbs, limbs + _HEIGHT**2 * np.outer(_CARRIED, _CARRIED), limbs
 
 
+_CARRIED = np.ones(len(SMPL22))
+"""What goes up and down with the root: the feet stay, the knees bend."""
+_CARRIED[[4, 5]], _CARRIED[[7, 8, 10, 11]] = 0.5, 0.0
 _TOGETHER = _together()
 
 
@@ -234,9 +245,13 @@ def _bent(features: Array, plan: _Plan) -> Array:
     """Features (frames, 263), not standardised, changed to meet the goal."""
     guess = _decoded(features, plan.first)
     error = np.where(plan.goal.asked, plan.goal.positions - guess.world(), 0.0)
-    path = guess.path + plan.move @ _asked_of_root(error, plan.goal.asked)[plan.moving]
+    path = guess.path + plan.move @ _asked_of_root(guess.world(), error, plan.goal)[plan.moving]
     facing = guess.facing + _turning_with(guess.path, path, plan.first)
     guess = replace(guess, path=path, facing=facing)
+    if len(plan.lifting):
+        local = guess.local.copy()
+        local[..., 1] += np.outer(plan.lift @ _out_of_reach(guess.world(), plan.goal)[plan.lifting], _CARRIED)
+        guess = replace(guess, local=local)
     if len(plan.turning):
         guess = replace(guess, facing=facing + plan.turn @ _facing_error(guess.world(), plan.goal)[plan.turning])
     error = np.where(plan.goal.asked, plan.goal.positions - guess.world(), 0.0)
@@ -281,17 +296,35 @@ def _encoded(old: Array, guess: _Guess) -> Array:
     return new
 
 
-def _asked_of_root(error: Array, asked: NDArray[np.bool_]) -> Array:
+def _asked_of_root(places: Array, error: Array, goal: Goal) -> Array:
     """(frames, 2) metres: how far the root must go in each frame, the pelvis's own wish first.
 
-    A joint asks for what is beyond its reach only; several joints for the mean of that.
+    A joint asks for what is beyond its slack, or beyond the reach of its limb; several joints for the mean of that.
     """
     far = np.linalg.norm(error, axis=-1, keepdims=True)
-    beyond = error * np.clip(1 - _REACHES[:, None] / far.clip(1e-9), 0, None)
-    count = asked.any(axis=-1).sum(axis=1).clip(1)
-    flat = (beyond.sum(axis=1) / count[:, None])[:, [0, 2]]
-    own = asked[:, 0][:, [0, 2]]
-    return np.where(own.any(axis=-1, keepdims=True), np.where(own, error[:, 0][:, [0, 2]], 0.0), flat)
+    beyond = (error * np.clip(1 - _SLACKS[:, None] / far.clip(1e-9), 0, None))[..., [0, 2]]
+    for joint, (base, reach) in _REACH.items():
+        line = np.where(goal.asked[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
+        room = np.sqrt((reach**2 - line[:, 1] ** 2).clip((0.2 * reach) ** 2))
+        flat = line[:, [0, 2]]
+        flat = flat * (1 - room / np.linalg.norm(flat, axis=-1).clip(1e-9)).clip(0)[:, None]
+        more = np.linalg.norm(flat, axis=-1) > np.linalg.norm(beyond[:, joint], axis=-1)
+        beyond[:, joint] = np.where(more[:, None], flat, beyond[:, joint])
+    mean = beyond.sum(axis=1) / goal.asked.any(axis=-1).sum(axis=1).clip(1)[:, None]
+    own = goal.asked[:, 0][:, [0, 2]]
+    return np.where(own.any(axis=-1, keepdims=True), np.where(own, error[:, 0][:, [0, 2]], 0.0), mean)
+
+
+def _out_of_reach(places: Array, goal: Goal) -> Array:
+    """(frames,) metres: how far up the body must go so that limbs reach what is above or below them."""
+    need = np.zeros(len(places))
+    for joint, (base, reach) in _REACH.items():
+        asked = goal.asked[:, joint].all(axis=-1)
+        line = np.where(asked[:, None], goal.positions[:, joint] - places[:, base], 0.0)
+        room = np.sqrt((reach**2 - (line[:, [0, 2]] ** 2).sum(-1)).clip((0.3 * reach) ** 2))
+        beyond = np.sign(line[:, 1]) * (np.abs(line[:, 1]) - room).clip(0)
+        need = np.where(np.abs(beyond) > np.abs(need), beyond, need)
+    return np.where(np.abs(need) < _HOPELESS, need, 0.0)
 
 
 def _turning_with(old: Array, new: Array, first: int) -> Array:
@@ -321,4 +354,4 @@ def _turned(points: Array, facing: Array) -> Array:
     return np.stack([c * x + s * z, points[..., 1], c * z - s * x], axis=-1)
 
 
-_REACHES = np.array([0.0, *(_REACH.get(joint, 0.1) for joint in range(1, len(SMPL22)))])
+_SLACKS = np.array([0.0, *(_SLACK.get(joint, 0.1) for joint in range(1, len(SMPL22)))])
