@@ -41,6 +41,9 @@ GIVEN = "given"
 SPARSE = 100
 """Numbers of a token that are given at once, roughly: how strong that input is when training begins."""
 
+QUICK = 5.0
+"""How much quicker that input learns than the changes of the network: in training it is kept divided by this."""
+
 
 class Controlled(NamedTuple):
     """The condition of an `AdaptedNet`: what the network is bound to, and what is given."""
@@ -227,7 +230,7 @@ class GivenEmbed(nn.Module):
         state, given, flags = x.unflatten(-1, (self.config.patch, -1)).split(
             [count, 2 * count, x.shape[-1] // self.config.patch - 3 * count], dim=-1
         )
-        seen = F.linear(F.linear(given.flatten(-2), self.down), self.up)
+        seen = F.linear(F.linear(given.flatten(-2), QUICK * self.down), QUICK * self.up)
         return self.embed(torch.cat([state, flags], dim=-1).flatten(-2)) + seen
 
 
@@ -246,11 +249,11 @@ class AdapterNet(nn.Module):
             sizes[GIVEN] = (net.config.patch * 2 * net.config.features, net.config.width, given_rank)
         self.factors = nn.ParameterDict()
         for name, (inner, outer, size) in sizes.items():
-            spread = 1 / math.sqrt(SPARSE if name == GIVEN else inner)  # few of the many numbers are given
+            spread = 1 / math.sqrt(inner) if name != GIVEN else 1 / (QUICK * math.sqrt(SPARSE))
             self.factors[_plain(f"{name}.down")] = nn.Parameter(torch.randn(size, inner) * spread)
             self.factors[_plain(f"{name}.up")] = nn.Parameter(torch.zeros(outer, size))
         if start:
-            self.load_state_dict({f"factors.{_plain(k)}": v.float() for k, v in start.tensors.items()})
+            self.load_state_dict({f"factors.{_plain(k)}": v.float() / _pace(k) for k, v in start.tensors.items()})
         for name, layer in layers.items():
             parent = base.get_submodule(name.rpartition(".")[0])
             setattr(parent, name.rsplit(".", 1)[-1], LowRank(layer, *self._pair(name)))
@@ -271,7 +274,12 @@ class AdapterNet(nn.Module):
 
 def tensors_of(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """An adapter's tensors out of the state of an `AdapterNet`."""
-    return {key.removeprefix("factors.").replace("/", "."): value for key, value in state.items()}
+    named = {key.removeprefix("factors.").replace("/", "."): value for key, value in state.items()}
+    return {key: value * _pace(key) for key, value in named.items()}
+
+
+def _pace(key: str) -> float:
+    return QUICK if key.startswith(f"{GIVEN}.") else 1.0
 
 
 def _plain(name: str) -> str:
