@@ -99,6 +99,8 @@ def test_a_window_sees_both_its_neighbours() -> None:
     transitions.of_method(world, maker, 0)
     prompts = maker.calls[0][0]
     first = seen[1][0][:, HIDDEN].mean(0)
+    frames = maker.calls[0][1]
+    assert [len(part) for part in seen[0][:8]] == [frames[0] - 10, *(n - 20 for n in frames[1:7]), frames[7] - 10]
     assert len(seen[1]) == HOW.seams
     assert first == pytest.approx((place(number_in(prompts[0])) + place(number_in(prompts[1]))) / 2)
 

@@ -241,7 +241,8 @@ def test_the_long_motion_has_every_frame_once(data: st.DataObject) -> None:
 
 def test_repetitions_are_rows_of_their_own() -> None:
     """Two repetitions in one batch give what each gives alone with its noise."""
-    plan, one = Plan.of([50, 60], 10, 5, repetitions=2), Plan.of([50, 60], 10, 5)
+    lengths, hands, ramps = [50, 60, 45], (10, 8), (5, 3)
+    plan, one = Plan.of(lengths, hands, ramps, repetitions=2), Plan.of(lengths, hands, ramps)
 
     def net(x: Tensor, level: int) -> Tensor:
         return torch.tanh(x) + 0.01 * level
@@ -253,9 +254,10 @@ def test_repetitions_are_rows_of_their_own() -> None:
             net, net, x, plan, mode=MODES["paper"], way=WAY, schedule=SCHEDULE, draws=draws
         ).unfolded  # fmt: skip
 
-    together = taken(plan, [1, 2, 3, 4], [5, 6])
-    alone = torch.cat([taken(one, [1, 2], [5]), taken(one, [3, 4], [6])])
+    together = taken(plan, [1, 2, 3, 4, 5, 6], [7, 8, 9, 10])
+    alone = torch.cat([taken(one, [1, 2, 3], [7, 8]), taken(one, [4, 5, 6], [9, 10])])
     assert torch.allclose(together, alone, atol=1e-6)
+    assert torch.equal(flags(plan), torch.cat([flags(one), flags(one)]))
 
 
 def test_flags_mark_what_rows_share() -> None:
