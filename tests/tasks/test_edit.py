@@ -143,7 +143,7 @@ def test_what_is_drawn_leaves_the_known_frames_without_a_jump() -> None:
     mask[:, 20:40] = False
     mask[:, :, 30] = True
     drawn = torch.where(mask, known, 5 + 0.3 * t)
-    joined = joining(known, mask, Stretch(np.zeros((61, 22, 3)), 20, 40, np.zeros(WIDTH, bool)))(drawn)
+    joined = joining(known, mask, 20, 40)(drawn)
     assert torch.equal(joined[mask], known[mask])
     free = [n for n in range(259) if n != 30]
     for border, step in ((19, 1), (40, -1)):

@@ -8,6 +8,7 @@ from .denoisers import Denoiser, Weight, blend, from_noise, guide, inpaint, join
 from .sampling import Snapshot, masked_draw, restart, row_draw, run, sample
 from .schedule import SPACINGS, Draw, Schedule, State, cosine, from_betas, levels, linear
 from .solvers import DDPM, SOLVERS, Ddim, DpmSolver2M, Solver, Step
+from .staggered import Guess, Link, staggered
 
 __all__ = [
     "DDPM",
@@ -18,6 +19,8 @@ __all__ = [
     "Denoiser",
     "DpmSolver2M",
     "Draw",
+    "Guess",
+    "Link",
     "Schedule",
     "Snapshot",
     "Solver",
@@ -42,4 +45,5 @@ __all__ = [
     "row_draw",
     "run",
     "sample",
+    "staggered",
 ]

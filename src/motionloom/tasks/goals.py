@@ -118,6 +118,12 @@ class Goal:
             start=None if self.start is None else self.start.seen_from(place),
         )
 
+    def placed(self, place: Placement) -> "Goal":
+        """The same wishes, told in coordinates in which ``place`` is the origin facing +Z, in those of the world."""
+        away = Placement(facing=-place.facing)
+        x, _, z = away.to_world(np.array([-place.x, 0.0, -place.z]))
+        return self.seen_from(Placement(float(x), float(z), -place.facing))
+
 
 def placement_of(goal: Goal) -> Placement:
     """Where the person stands at frame 0: `Goal.start` or, without it, what the wishes say.
@@ -151,6 +157,13 @@ def body_facing(positions: np.ndarray) -> float:
     return float(np.arctan2(-across[2], across[0]))
 
 
+def joined(first: Goal, second: Goal) -> Goal:
+    """The wishes of one stretch of frames and of the one behind it."""
+    pairs = zip(_parts(first), _parts(second), strict=True)
+    positions, asked, facing, facing_asked = (np.concatenate(pair) for pair in pairs)
+    return Goal(positions, asked, facing, facing_asked, first.start)
+
+
 def merged(first: Goal, second: Goal) -> Goal:
     """The wishes of both; MotionloomError where they ask for different places (`AGREE`), naming joint and time."""
     if len(first) != len(second):
@@ -165,6 +178,11 @@ def merged(first: Goal, second: Goal) -> Goal:
         )
     _check_turns(first, second)
     _check_starts(first.start, second.start)
+    return overlaid(first, second)
+
+
+def overlaid(first: Goal, second: Goal) -> Goal:
+    """The wishes of both; those of the first where both ask for the same."""
     return Goal(
         np.where(first.asked, first.positions, second.positions),
         first.asked | second.asked,

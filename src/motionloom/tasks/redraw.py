@@ -78,7 +78,7 @@ def redraw(
     mask[:, stretch.first : stretch.last] = torch.from_numpy(stretch.keep).to(mask.device)
     spread = torch.where(prior.std > 0, prior.std, 1.0)
     data = (known - prior.mean) / spread
-    meet, reach = joining(known, mask, stretch), arrival(known, mask, stretch)
+    meet, reach = joining(known, mask, stretch.first, stretch.last), arrival(known, mask, stretch)
     cond = prior.condition([text])
     free = guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), guidance)
 
@@ -136,13 +136,14 @@ def arrival(known: Tensor, mask: Tensor, stretch: Stretch) -> Callable[[Tensor],
     return arrive
 
 
-def joining(known: Tensor, mask: Tensor, stretch: Stretch) -> Callable[[Tensor], Tensor]:
+def joining(known: Tensor, mask: Tensor, first: int, last: int) -> Callable[[Tensor], Tensor]:
     """A function that bends the free numbers so that they leave the known ones, and come to them, without a jump.
 
-    On features (rows, frames, 263), not standardised. At each border the first frame of the stretch becomes what the
-    two known frames beside it lead to, in value and in change; the difference fades over `JOIN` frames as a cubic.
+    On features (rows, frames, 263), not standardised; ``mask`` is True at known ones, the stretch is ``first`` to
+    before ``last``. At each border the first frame of the stretch becomes what the two known frames beside it lead to, in
+    value and in change; the difference fades over `JOIN` frames as a cubic.
     """
-    first, last, frames = stretch.first, stretch.last, known.shape[1]
+    frames = known.shape[1]
     reach = min(JOIN, (last - first) // 2)
     u = torch.arange(reach, device=known.device, dtype=known.dtype)[:, None] / max(reach, 1)
     value, change = (1 - u) ** 2 * (1 + 2 * u), (1 - u) ** 2 * u * reach

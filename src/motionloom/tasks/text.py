@@ -49,7 +49,7 @@ def sample_features(
 
     The network sees at most `ROWS` motions at once, of equal length, so that memory does not grow with their number.
     """
-    _check(prior, prompts, steps=steps, guidance=guidance, solver=solver)
+    check(prior, prompts, steps=steps, guidance=guidance, solver=solver)
     if not all(0 <= seed < 2 * LARGEST_SEED for seed in seeds):
         raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {min(seeds)}")
     way = levels(prior.schedule, steps, spacing=spacing)  # type: ignore[arg-type]
@@ -181,7 +181,8 @@ def _groups(frames: Sequence[int]) -> list[list[int]]:
     return [rows[i : i + ROWS] for rows in by_length.values() for i in range(0, len(rows), ROWS)]
 
 
-def _check(prior: Prior, prompts: Sequence[str], *, steps: int, guidance: float, solver: str) -> None:
+def check(prior: Prior, prompts: Sequence[str], *, steps: int, guidance: float, solver: str) -> None:
+    """Raise MotionloomError for settings and prompts that nothing can be drawn with."""
     if solver not in SOLVERS:
         raise MotionloomError(f"no solver {solver!r}; there are {', '.join(SOLVERS)}")
     if not isinstance(steps, int) or not 1 <= steps <= prior.schedule.steps:

@@ -1,0 +1,171 @@
+"""The walk of a chain of rows whose ends overlap, of any number of rows in constant memory.
+
+Long motion is a chain of rows; the last frames of a row are the first frames of the next. At each level the two
+copies of an overlap become (1 - a) * previous + a * next with a = 0, 1/h, ... (DoubleTake's handshake; Shafir et al.
+2024, eq. 2). Two things differ from `constraints.handshake` over one batch of all rows:
+
+* Both copies get the *same* noise, at the start and in each move. Averaging independent noise would shrink its spread
+  to 0.7 in the middle of the overlap; equal states and equal noise make the average one of the guesses alone.
+* A row may go from step k to k + 1 as soon as its two neighbours have reached step k. Nothing else ties rows together,
+  so rows of a long chain walk at different levels, a bounded number of them at a time, first ones first, and each is
+  handed out when it and the next one are clean. Which rows happen to share a network call changes nothing.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor
+
+from .schedule import Draw, Schedule, State
+from .solvers import Solver, Step
+
+
+@dataclass(frozen=True)
+class Link:
+    """A row of the chain."""
+
+    length: int
+    """Frames."""
+    overlap: int
+    """Frames shared with the next row; of no meaning for the last one."""
+    seed: int
+
+
+@dataclass(eq=False)
+class _Row:
+    link: Link
+    step: Step
+    generator: torch.Generator
+    state: State
+    done: int = 0
+    """Moves made."""
+    drawn: dict[int, Tensor] = field(default_factory=dict)
+    """The row's own noise by the move it is for (0: the start), as long as it or the next row needs it."""
+    draws: int = 0
+
+    def noise(self, move: int, features: int) -> Tensor:
+        """(length, features) drawn in order, so that the noise of a move does not depend on who asks first."""
+        while self.draws <= move:
+            self.drawn[self.draws] = torch.randn((self.link.length, features), generator=self.generator)
+            self.draws += 1
+        for old in [known for known in self.drawn if known < self.done - 1]:
+            del self.drawn[old]
+        return self.drawn[move]
+
+
+Guess = Callable[[Sequence[int], Sequence[State], Sequence[int]], Sequence[State]]
+"""(numbers of rows, their states (length, features), their levels) -> guesses of the clean data."""
+
+
+def staggered(
+    links: Iterable[Link],
+    guess: Guess,
+    *,
+    levels: Sequence[int],
+    solver: Solver,
+    schedule: Schedule,
+    features: int,
+    together: int = 16,
+    moved: Callable[[int], None] = lambda rows: None,
+) -> Iterator[State]:
+    """Clean rows (length, features) in order, overlaps included twice; the copies of an overlap are equal.
+
+    ``links`` is read as the walk gets there. ``together``: rows per network call at most. ``moved`` is told how many
+    rows made a move. Raises ValueError where the overlaps of a row do not fit into it.
+    """
+    return _Chain(links, guess, levels, solver, schedule, features, together, moved).walk()
+
+
+class _Chain:
+    def __init__(
+        self, links: Iterable[Link], guess: Guess, levels: Sequence[int], solver: Solver, schedule: Schedule,
+        features: int, together: int, moved: Callable[[int], None],
+    ) -> None:  # fmt: skip
+        self.links, self.guess, self.levels, self.solver, self.schedule = iter(links), guess, levels, solver, schedule
+        self.features, self.together, self.moved = features, together, moved
+        self.rows: dict[int, _Row] = {}
+        self.ended = False
+
+    def walk(self) -> Iterator[State]:
+        last, first = len(self.levels) - 1, 0
+        self._admit()
+        while self.rows:
+            if ready := self._ready():
+                self._move(ready)
+            while first in self.rows and self.rows[first].done == last and self._neighbour_done(first, last):
+                yield self.rows.pop(first).state
+                first += 1
+
+    def _neighbour_done(self, number: int, last: int) -> bool:
+        following = self.rows.get(number + 1)
+        return following.done == last if following else self.ended
+
+    def _admit(self) -> bool:
+        """Take the next row of the chain, if there is one."""
+        link = None if self.ended else next(self.links, None)
+        if link is None:
+            self.ended = True
+            return False
+        number = max(self.rows, default=-1) + 1
+        before = self.rows.get(number - 1)
+        shared, following = before.link.overlap if before else 0, max(link.overlap, 0)
+        if link.length < shared + following:
+            raise ValueError(
+                f"row {number} of {link.length} frames cannot share {shared} with the row before and {following} after"
+            )
+        row = _Row(link, self.solver.start(self.schedule), torch.Generator().manual_seed(link.seed), torch.empty(0))
+        self.rows[number] = row
+        row.state = self._noise(number, 0)
+        return True
+
+    def _ready(self) -> list[int]:
+        """The first rows whose neighbours are as far as they are."""
+        found: list[int] = []
+        number = min(self.rows)
+        while len(found) < self.together and (number in self.rows or (number == max(self.rows) + 1 and self._admit())):
+            row = self.rows[number]
+            if number + 1 not in self.rows:
+                self._admit()
+            near = (self.rows.get(number - 1), self.rows.get(number + 1))
+            if row.done < len(self.levels) - 1 and all(one is None or one.done >= row.done for one in near):
+                found.append(number)
+            number += 1
+        return found
+
+    def _move(self, numbers: Sequence[int]) -> None:
+        rows = [self.rows[number] for number in numbers]
+        at = [self.levels[row.done] for row in rows]
+        cleans = self.guess(numbers, [row.state for row in rows], at)
+        for number, row, clean, level in zip(numbers, rows, cleans, at, strict=True):
+            draw = self._draw(number, row.done + 1)
+            row.state = row.step(row.state, clean, level, self.levels[row.done + 1], draw)
+            row.done += 1
+        for number in numbers:
+            self._shake(number - 1, number)
+            if number + 1 not in numbers:
+                self._shake(number, number + 1)
+        self.moved(len(numbers))
+
+    def _shake(self, left: int, right: int) -> None:
+        """Make the copies of an overlap equal, if both rows are there and equally far."""
+        a, b = self.rows.get(left), self.rows.get(right)
+        if a is None or b is None or a.done != b.done or not a.link.overlap:
+            return
+        h = a.link.overlap
+        weight = (torch.arange(h, dtype=a.state.dtype, device=a.state.device) / h)[:, None]
+        shared = torch.lerp(a.state[-h:], b.state[:h], weight)
+        a.state = torch.cat([a.state[:-h], shared])
+        b.state = torch.cat([shared, b.state[h:]])
+
+    def _draw(self, number: int, move: int) -> Draw:
+        return lambda like: self._noise(number, move).to(like)
+
+    def _noise(self, number: int, move: int) -> Tensor:
+        """The row's noise for a move: its own, but that of the row before where they overlap."""
+        row, before = self.rows[number], self.rows.get(number - 1)
+        own = row.noise(move, self.features)
+        if before is None or not before.link.overlap:
+            return own
+        h = before.link.overlap
+        return torch.cat([before.noise(move, self.features)[-h:], own[h:]])

@@ -1,0 +1,96 @@
+"""Places of joints to a body, while they come in: constant bones, still feet and met goals in a moving window.
+
+`ik`, `feet` and `fitting` look at a stretch of motion at once. Here they look at blocks with a margin on either side,
+and where two blocks meet one fades into the other; blocks begin at fixed frames, so nothing depends on how the frames
+arrived.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.features.feet import clean_feet
+from motionloom.features.ik import motion_from_positions
+from motionloom.motion import Motion
+from motionloom.tasks.fitting import fit
+from motionloom.tasks.goals import Goal, joined
+
+Array = NDArray[np.float64]
+
+BLOCK = 300
+"""Frames handed out at once."""
+MARGIN = 60
+"""Frames looked at before and behind them: further than a stance or the turn of a straight limb is felt."""
+FADE = 20
+"""Frames over which one block's body becomes the next one's."""
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Some frames of a motion, as a network drew them."""
+
+    positions: Array
+    """(frames, 22, 3) metres in the world; bones may breathe."""
+    contacts: Array
+    """(frames, 4) as in the features."""
+    goal: Goal
+    """What is asked of these frames, in the world; empty where nothing is."""
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def crop(self, first: int, last: int) -> "Places":
+        """The frames from ``first`` to before ``last``."""
+        return Places(self.positions[first:last], self.contacts[first:last], self.goal.crop(first, last))
+
+
+def bodies(pieces: Iterable[Places], fps: float, *, clean: bool = True) -> Iterator[Motion]:
+    """Consecutive blocks of the 22-joint person, as many frames in all as the pieces have; see `posed`."""
+    waiting: Places | None = None
+    before, tail = 0, None
+    for piece in pieces:
+        waiting = piece if waiting is None else _strung(waiting, piece)
+        while len(waiting) >= before + BLOCK + MARGIN:
+            made = posed(waiting.crop(0, before + BLOCK + MARGIN), fps, clean=clean)
+            yield _faded(tail, made.frames(before, before + BLOCK))
+            tail = made.frames(before + BLOCK, before + BLOCK + FADE)
+            waiting = waiting.crop(before + BLOCK - MARGIN, len(waiting))
+            before = MARGIN
+    if waiting is not None and len(waiting) > before:
+        made = posed(waiting, fps, clean=clean)
+        yield _faded(tail, made.frames(before, len(waiting)))
+
+
+def posed(places: Places, fps: float, *, clean: bool = True) -> Motion:
+    """A person with constant bones who takes these places, keeps planted feet still (``clean``) and meets the goal."""
+    motion = motion_from_positions(places.positions, fps)
+    if clean:
+        motion = clean_feet(motion, contacts=places.contacts)
+    return motion if places.goal.empty else fit(motion, places.goal)
+
+
+def _strung(first: Places, second: Places) -> Places:
+    return Places(
+        np.concatenate([first.positions, second.positions]),
+        np.concatenate([first.contacts, second.contacts]),
+        joined(first.goal, second.goal),
+    )
+
+
+def _faded(old: Motion | None, new: Motion) -> Motion:
+    """The new block, begun as the frames ``old`` that the block before it saw in its place."""
+    if old is None:
+        return new
+    count = min(len(old), len(new))
+    u = (np.arange(count) + 1) / (count + 1)
+    share = u * u * (3 - 2 * u)
+    root, turns = new.root.copy(), new.rotations.copy()
+    same = (turns[0] * old.rotations[0]).sum(-1) < 0
+    turns[:, same] *= -1  # quaternions of both signs are one turn; files want them without a change of sign
+    root[:count] = old.root[:count] + share[:, None] * (root[:count] - old.root[:count])
+    mixed = old.rotations[:count] + share[:, None, None] * (turns[:count] - old.rotations[:count])
+    turns[:count] = rot.normalize(mixed)
+    return replace(new, root=root, rotations=turns)

@@ -1,0 +1,357 @@
+"""Long motion: a list of prompts to one motion without seams, of any length, in constant memory (DoubleTake).
+
+Each segment is a row of the sampler. A row reaches over its seams into the neighbours, half a transition on either
+side, and neighbours agree on what they share at every level (`diffusion.staggered`), so that a transition is drawn
+knowing what comes before and after it. Rows come out one by one; their features are cut at the seams and strung
+together, and a moving window of frames becomes positions and a body.
+
+The published procedure and that of the paper are in `tasks.double_take`; docs/decisions/0013 tells them apart.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn import functional as F
+
+from motionloom.checkpoint import Prior
+from motionloom.diffusion import SOLVERS, Link, levels, staggered
+from motionloom.errors import MotionloomError
+from motionloom.features import humanml
+from motionloom.features.layout import FPS, LAYOUT, WIDTH
+from motionloom.metrics.physics import heading
+from motionloom.motion import Motion
+from motionloom.nets.prior import Bound
+from motionloom.tasks.body import Places, bodies
+from motionloom.tasks.goals import Goal, Placement, merged, overlaid, placement_of
+from motionloom.tasks.paths import along
+from motionloom.tasks.redraw import joining
+from motionloom.tasks.splice import person_at_20
+from motionloom.tasks.steering import Correction, toward
+from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, STEPS
+from motionloom.tasks.text import check as check_sampling
+
+Array = NDArray[np.float64]
+
+TOGETHER = 16
+"""Rows denoised at once."""
+TRANSITION = 1.0
+"""Seconds that neighbours share unless said otherwise: the paper's handshake."""
+
+LOOK_BACK = 20
+"""Frames of an older motion that a new one is made to follow."""
+
+Progress = Callable[[int], None]
+"""Told how many more row moves were made; a segment takes as many as there are steps."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One prompted stretch of a long motion."""
+
+    text: str
+    seconds: float
+    guidance: float | None = None
+    """Strength of the text; None: that of the whole."""
+    transition: float = TRANSITION
+    """Seconds shared with the next segment, half before and half after the seam."""
+    goal: Goal | None = None
+    """Wishes for the frames of this segment, seen from where the person stands when it begins (origin, facing +Z)."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Row:
+    frames: int
+    """Between its seams."""
+    before: int
+    """Frames of the transition that lie before its first seam."""
+    after: int
+    overlap: int
+    """Frames shared with the next row."""
+    guidance: float
+    cond: Bound
+    null: Bound
+    correct: Correction
+
+    @property
+    def length(self) -> int:
+        return self.before + self.frames + self.after
+
+
+def compose(
+    prior: Prior,
+    segments: Iterable[Segment],
+    *,
+    seed: int = 0,
+    guidance: float = GUIDANCE,
+    steps: int = STEPS,
+    start: Motion | None = None,
+    path: Goal | None = None,
+    clean: bool = True,
+    together: int = TOGETHER,
+    progress: Progress | None = None,
+) -> Iterator[Motion]:
+    """One long motion of the 22-joint person, block after block in one world, as it is made.
+
+    In all it has the sum of ``round(seconds * 20)`` frames at 20 per second. start: a motion of anybody that this one
+    goes on from, in its place; it is not repeated. path: where the pelvis is on the ground in each frame of the whole
+    (`Goal` of that length, in the world); goals of segments are seen from where the person stands when they begin.
+    clean: keep planted feet still. Segments may be endless if there is no path; memory does not grow with them.
+    Raises `MotionloomError` for what cannot be asked. (Shafir et al. 2024, section 4, as in docs/decisions/0013.)
+    """
+    if len(prior.mean) != WIDTH or prior.fps != FPS:
+        raise MotionloomError(
+            f"these weights make {len(prior.mean)} numbers a frame; long motion needs {WIDTH} at {FPS:g} fps"
+        )
+    check_sampling(prior, [], steps=steps, guidance=guidance, solver=SOLVER)
+    if not 0 <= seed < LARGEST_SEED:
+        raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {seed}")
+    past = None if start is None else Past.of(start)
+    track = None if path is None else _Track.along(path, prior.fps)
+    wishes: deque[Goal | None] = deque()
+
+    def asked() -> Iterator[Segment]:
+        first = 0
+        for segment in segments:
+            wishes.append(segment.goal)
+            frames = round(segment.seconds * prior.fps)
+            yield track.led(segment, first, frames) if track else segment
+            first += frames
+
+    pieces = long_features(
+        prior, asked(), seed=seed, guidance=guidance, steps=steps, past=past, together=together, progress=progress
+    )
+    place = past.end if past else track.stands(0) if track else Placement()
+    return bodies(_in_world(prior, pieces, wishes, place, track), prior.fps, clean=clean)
+
+
+@torch.inference_mode()
+def long_features(
+    prior: Prior,
+    segments: Iterable[Segment],
+    *,
+    seed: int = 0,
+    guidance: float = GUIDANCE,
+    steps: int = STEPS,
+    solver: str = SOLVER,
+    spacing: str = SPACING,
+    past: "Past | None" = None,
+    together: int = TOGETHER,
+    progress: Progress | None = None,
+) -> Iterator[Tensor]:
+    """Features (frames, 263), not standardised, one piece per segment; strung together they are the long motion.
+
+    Piece i has ``round(seconds * fps)`` frames. Row i draws from ``seed + i``. ``segments`` may be endless: it is read
+    as the walk gets there. ``together``: rows per network call; it changes speed and memory, not the result.
+    Raises `MotionloomError` for transitions that do not fit.
+    """
+    rows: dict[int, _Row] = {}
+    way = levels(prior.schedule, steps, spacing=spacing)  # type: ignore[arg-type]
+
+    def links() -> Iterator[Link]:
+        for number, row in enumerate(_rows(prior, segments, guidance, past)):
+            rows[number] = row
+            yield Link(row.length, row.overlap, seed + number)
+
+    def guess(numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
+        chosen = [rows[number] for number in numbers]
+        cleans = _settled(prior, chosen, states, at, last=way[-2])
+        return [row.correct(clean, level) for row, clean, level in zip(chosen, cleans, at, strict=True)]
+
+    walk = staggered(
+        links(), guess, levels=way, solver=SOLVERS[solver], schedule=prior.schedule, features=len(prior.mean),
+        together=together, moved=progress or (lambda count: None),
+    )  # fmt: skip
+    for number, state in enumerate(walk):
+        row = rows.pop(number)
+        yield (state[row.before : row.before + row.frames] * prior.std + prior.mean).cpu()
+
+
+def _rows(prior: Prior, segments: Iterable[Segment], guidance: float, past: "Past | None") -> Iterator[_Row]:
+    """The rows of the chain; one segment is read ahead, since the last has no transition behind it."""
+    before, number = len(past.known) if past else 0, 0
+    null = prior.net.bind(prior.condition([""]))
+    iterator = iter(segments)
+    segment = next(iterator, None)
+    while segment is not None:
+        following = next(iterator, None)
+        overlap = 2 * max(1, round(segment.transition * prior.fps / 2)) if following else 0
+        frames, shared = round(segment.seconds * prior.fps), before if number else 0
+        if frames < shared + overlap // 2 or frames < 2:
+            raise MotionloomError(
+                f"segment {number + 1} ({segment.text[:40]!r}) of {segment.seconds:g} s is shorter than the halves of "
+                "its transitions together; make it longer or the transitions shorter"
+            )
+        length = before + frames + overlap // 2
+        bound = prior.net.bind(prior.condition([segment.text], [length]))
+        edits = [past.holder(prior, length)] if past and not number else []
+        if segment.goal and not segment.goal.empty:
+            edits.append(toward(segment.goal, prior, first=before))
+        scale = guidance if segment.guidance is None else segment.guidance
+        yield _Row(frames, before, overlap // 2, overlap, scale, bound, null, _one_after_the_other(edits))
+        before, segment, number = overlap // 2, following, number + 1
+
+
+def _one_after_the_other(edits: Sequence[Correction]) -> Correction:
+    def correct(clean: Tensor, level: int) -> Tensor:
+        for edit in edits:
+            clean = edit(clean, level)
+        return clean
+
+    return correct
+
+
+def _settled(prior: Prior, rows: list[_Row], states: Sequence[Tensor], at: Sequence[int], *, last: int) -> list[Tensor]:
+    """Guesses; those of the last move are averages over all ways to divide the frames into the network's tokens.
+
+    A token holds several frames, and between tokens the network leaves small steps. (Averaging over shifts is the
+    cycle spinning of Coifman & Donoho 1995; `smooth` is the cheaper remedy of single motions.)
+    """
+    cleans = _guess(prior, rows, states, at)
+    ending = [i for i, level in enumerate(at) if level == last]
+    shifts = range(1, prior.net.config.patch)
+    if not ending or not shifts:
+        return cleans
+    sums = {i: cleans[i].clone() for i in ending}
+    for shift in shifts:
+        shifted = _guess(prior, [rows[i] for i in ending], [states[i][shift:] for i in ending], [last] * len(ending))
+        for i, clean in zip(ending, shifted, strict=True):
+            sums[i][shift:] += clean
+    for i, total in sums.items():
+        ways = torch.arange(1, len(total) + 1, device=total.device).clamp(max=len(shifts) + 1)
+        cleans[i] = total / ways[:, None]
+    return cleans
+
+
+def _guess(prior: Prior, rows: list[_Row], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
+    """Guided guesses of rows of different lengths and levels, as one network call."""
+    frames = [len(state) for state in states]
+    x = torch.stack([F.pad(state, (0, 0, 0, max(frames) - len(state))) for state in states]).to(prior.mean)
+    lengths = torch.tensor([*frames, *frames], device=x.device)
+    bound = _together([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
+    level = torch.tensor([*at, *at], device=x.device)
+    conditional, unconditional = prior.net(torch.cat([x, x]), level, bound).chunk(2)
+    scale = torch.tensor([row.guidance for row in rows]).to(x)[:, None, None]
+    guided = torch.lerp(unconditional, conditional, scale)
+    return [clean[:count] for clean, count in zip(guided, frames, strict=True)]
+
+
+def _together(bounds: list[Bound]) -> Bound:
+    """Rows of several conditions, their words padded to the longest."""
+    most = max(one.words.shape[-1] for one in bounds)
+
+    def padded(one: Tensor) -> Tensor:  # words are the axis before the last
+        return F.pad(one, (0, 0, 0, most - one.shape[-2]))
+
+    return Bound(
+        torch.cat([one.text for one in bounds]),
+        torch.cat([padded(one.keys) for one in bounds]),
+        torch.cat([padded(one.values) for one in bounds]),
+        torch.cat([F.pad(one.words, (0, most - one.words.shape[-1])) for one in bounds]),
+        torch.cat([one.lengths for one in bounds]),
+        torch.cat([one.flags for one in bounds]),
+    )
+
+
+# Into the world
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """The end of a motion that a long one goes on from."""
+
+    known: Tensor
+    """(frames, 263) features of its last frames, not standardised."""
+    end: Placement
+    """Where the person is one frame behind them: at frame 0 of what follows."""
+
+    @staticmethod
+    def of(motion: Motion) -> "Past":
+        """Of anybody's motion of at least `LOOK_BACK` frames at 20 per second."""
+        positions = person_at_20(motion)
+        if len(positions) <= LOOK_BACK:
+            raise MotionloomError(
+                f"the motion to go on from is {motion.seconds:.2f} s long; at least {LOOK_BACK / FPS:g} s are needed"
+            )
+        positions = positions[-LOOK_BACK - 1 :]
+        x, _, z = positions[0, 0]
+        begin = Placement(float(x), float(z), float(heading(positions[:1])[0]))
+        known = humanml.encode(begin.from_world(positions)).astype(np.float64)
+        return Past(torch.from_numpy(known).float(), _decoded(known, begin)[1])
+
+    def holder(self, prior: Prior, length: int) -> Correction:
+        """Makes the first frames of a row's guess the known ones, and the next ones leave them without a jump."""
+        count, width = self.known.shape
+        known = torch.cat([self.known, self.known.new_zeros(length - count, width)]).to(prior.mean)[None]
+        mask = torch.zeros_like(known, dtype=torch.bool)
+        mask[:, :count] = True
+        meet = joining(known, mask, count, length)
+        spread = torch.where(prior.std > 0, prior.std, 1.0)
+
+        def hold(clean: Tensor, level: int) -> Tensor:
+            features = torch.where(mask, known, clean * spread + prior.mean)
+            return ((meet(features) - prior.mean) / spread)[0]
+
+        return hold
+
+
+@dataclass(frozen=True, eq=False)
+class _Track:
+    """A path for the whole, and which way it goes."""
+
+    path: Goal
+    ways: Array
+    """(frames,) radians."""
+
+    @staticmethod
+    def along(path: Goal, fps: float) -> "_Track":
+        if not path.asked[:, 0, [0, 2]].all():
+            raise MotionloomError("the path of a long motion must say where to be in every frame; give points for all")
+        return _Track(path, np.where(path.facing_asked, path.facing, along(path.positions[:, 0, [0, 2]], fps)))
+
+    def stands(self, frame: int) -> Placement:
+        """Where the person is at that frame."""
+        if frame == 0:
+            return placement_of(self.path)
+        x, _, z = self.path.positions[frame, 0]
+        return Placement(float(x), float(z), float(self.ways[frame]))
+
+    def led(self, segment: Segment, first: int, frames: int) -> Segment:
+        """The segment that begins with frame ``first``, with its part of the path among its wishes."""
+        if first + frames > len(self.path):
+            raise MotionloomError(
+                f"the path has {len(self.path)} frames and the segments have more; make them equally long"
+            )
+        part = self.path.crop(first, first + frames).seen_from(self.stands(first))
+        return replace(segment, goal=part if segment.goal is None else merged(part, segment.goal))
+
+
+def _in_world(
+    prior: Prior, pieces: Iterable[Tensor], wishes: deque[Goal | None], place: Placement, track: _Track | None
+) -> Iterator[Places]:
+    """Each piece where the one before it ends; on a path bent once more, so that errors do not add up."""
+    mean, first = prior.mean.cpu(), 0
+    spread = torch.where(prior.std > 0, prior.std, 1.0).cpu()
+    for piece in pieces:
+        wish = wishes.popleft()
+        goal = Goal.nothing(len(piece)) if wish is None else wish.placed(place)
+        if track:
+            part = track.path.crop(first, first + len(piece))
+            piece = toward(part.seen_from(place), prior)((piece - mean) / spread, 0) * spread + mean
+            goal = overlaid(part, goal)
+        features = piece.numpy().astype(np.float64)
+        positions, after = _decoded(features, place)
+        yield Places(positions, features[:, LAYOUT["contacts"]], goal)
+        place, first = after, first + len(piece)
+
+
+def _decoded(features: Array, place: Placement) -> tuple[Array, Placement]:
+    """(frames, 22, 3) of features (frames, 263) that begin at a place, and the place of the frame behind them."""
+    positions = humanml.decode_positions(np.concatenate([features, features[-1:]]))
+    x, _, z = place.to_world(positions[-1, 0])
+    facing = place.facing - 2 * float(features[:, LAYOUT["yaw_velocity"]].sum())
+    return place.to_world(positions[:-1]), Placement(float(x), float(z), facing)
