@@ -8,6 +8,7 @@ import torch
 
 from motionloom.checkpoint import Prior
 from motionloom.errors import MotionloomError
+from motionloom.nets.adapter import Adapter, fingerprint, linears
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.control import control, controlled_numbers, judged
 from motionloom.tasks.goals import Goal, Placement
@@ -76,7 +77,7 @@ def test_what_is_missed_is_said_worst_first(prior: Prior) -> None:
 def test_error_is_the_mean_distance_over_what_is_asked(prior: Prior) -> None:
     """One joint 3 cm off on x and 4 cm on z where only these are asked, another met: 2.5 cm."""
     motion = generate(prior, "a person walks", seconds=1.0, steps=2, clean=False)[0]
-    goal = replace(Goal.nothing(len(motion)), positions=[*motion.positions(), 0.03, 7.0, 0.04])
+    goal = replace(Goal.nothing(len(motion)), positions=motion.positions() + np.array([0.03, 7.0, 0.04]))
     goal.asked[5, WRIST, [0, 2]] = True
     goal.positions[9, 0], goal.asked[9, 0] = motion.root[9], True
     found = judged(motion, motion, goal)
@@ -90,6 +91,25 @@ def test_the_numbers_that_a_goal_is_about() -> None:
     mask = controlled_numbers(goal)
     assert mask[5].nonzero().ravel().tolist() == [0, 1, 2]
     assert mask[3].nonzero().ravel().tolist() == [0, 1, 2, 64, 65, 66]
+
+
+def test_adapters_are_told_the_last_steered_guess_and_none_that_change_nothing_change_little(prior: Prior) -> None:
+    """An adapter of zeros is the prior; what it is shown is the steered guess in the numbers asked, noise-free."""
+    blank = adapter(prior)
+    made = control(prior, "a person walks", path(), seed=1, steps=3, adapters=[blank, blank], weights=[0.25, 0.75])[0]
+    assert made.error < 0.005
+    free = replace(Goal.nothing(24), start=Placement())
+    same = control(prior, "a person walks", free, seed=1, steps=3, adapters=[blank])[0]
+    plain = control(prior, "a person walks", free, seed=1, steps=3, adapters="none")[0]
+    np.testing.assert_allclose(same.motion.positions(), plain.motion.positions(), atol=1e-5)
+
+
+def adapter(prior: Prior) -> Adapter:
+    """Of rank 1 and zeros."""
+    layers = linears(prior.net)
+    tensors = {f"{name}.down": torch.zeros(1, layer.in_features) for name, layer in layers.items()}
+    tensors |= {f"{name}.up": torch.zeros(layer.out_features, 1) for name, layer in layers.items()}
+    return Adapter("blank", "any", 1, tensors, "tiny", fingerprint(prior.net))
 
 
 @pytest.mark.parametrize(

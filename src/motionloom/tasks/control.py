@@ -4,8 +4,9 @@ The goal is seen from where the person stands at frame 0; there it steers every 
 drawn motion is put into the world and fitted to what is left of the wishes (`fitting`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -131,9 +132,9 @@ def steered_features(
         said = list(prompts[start : start + ROWS])
         cond, draw = prior.condition(said), row_draw(seeds[start : start + ROWS])
         if nets:
-            shown = mask.expand(len(said), -1, -1)
-            shares = weights or [1 / len(nets)] * len(nets)
-            denoise = _seeing(blended(nets, cond, shown, weights=shares, guidance=guidance), change, prior, mask)
+            shares = list(weights or [1 / len(nets)] * len(nets))
+            told = partial(blended, nets, cond, weights=shares, guidance=guidance)
+            denoise = _seeing(told, change, prior, mask)
         else:
             guided = guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), guidance)
             denoise = corrected(guided, [change] * len(said))
@@ -170,15 +171,20 @@ def fitting_adapters(prior: Prior, goal: Goal) -> list[Adapter]:
         return []
 
 
-def _seeing(denoise: Denoiser, change: Correction, prior: Prior, mask: Tensor) -> Denoiser:
-    """The steered denoiser that shows its network the last steered guess without noise where ``mask`` is True."""
+def _seeing(told: Callable[[Tensor, Tensor], Denoiser], change: Correction, prior: Prior, mask: Tensor) -> Denoiser:
+    """The steered denoiser that shows its networks the last steered guess, free of noise, where ``mask`` is True.
+
+    ``told`` (given, mask) are the networks that know what is given. At the first level nothing is.
+    """
     last: Tensor | None = None
 
     def seen(state: Tensor, level: int) -> Tensor:
         nonlocal last
-        signal, _ = prior.schedule.at(level)
-        shown = mix(state, torch.zeros_like(state) if last is None else signal * last, mask)
-        guess = denoise(shown, level)
+        if last is None:
+            guess = told(torch.zeros_like(state), torch.zeros_like(state, dtype=torch.bool))(state, level)
+        else:
+            shown = mix(state, prior.schedule.at(level)[0] * last, mask)
+            guess = told(last, mask.expand(len(state), -1, -1))(shown, level)
         last = torch.stack([change(row, level) for row in guess])
         return last
 

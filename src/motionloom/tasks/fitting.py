@@ -134,14 +134,13 @@ def _in_reach(places: Array, goal: Goal) -> Array:
     """(frames, 22, 3) the wishes, those out of reach brought as near to the body as it can follow them."""
     result = goal.positions.copy()
     for joint, base, length in _chains():
-        line = np.where(goal.asked[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
-        base_asked = goal.asked[:, base].any(axis=-1)
-        centre = np.where(base_asked[:, None] & goal.asked[:, base], goal.positions[:, base], places[:, base])
+        base_asked = goal.asked[:, base].any(axis=-1, keepdims=True)
+        centre = np.where(goal.asked[:, base], goal.positions[:, base], places[:, base])
         line = np.where(goal.asked[:, joint], goal.positions[:, joint] - centre, 0.0)
         longest = _STRETCH * length + np.where(base_asked, 0.0, _LEAN)
-        share = np.minimum(1.0, longest / np.linalg.norm(line, axis=-1).clip(1e-9))
-        far = (share < 1)[:, None] & goal.asked[:, joint]
-        result[:, joint] = np.where(far, centre + line * share[:, None], result[:, joint])
+        share = np.minimum(1.0, longest / np.linalg.norm(line, axis=-1, keepdims=True).clip(1e-9))
+        far = (share < 1) & goal.asked[:, joint]
+        result[:, joint] = np.where(far, centre + line * share, result[:, joint])
     return result
 
 
@@ -190,7 +189,7 @@ def _feet(places: Array, shift: Array, goal: Goal, fps: float) -> _Wishes:
     wanted = places[:, list(FEET)].copy()
     weights = np.where(planted, 1 / STANDING, 1 / SWINGING)
     for side in (slice(0, 2), slice(2, 4)):
-        wanted[:, side] += _foot_shift(shift, planted[:, side].any(axis=1))[:, None]
+        wanted[:, side] += _foot_shift(shift, planted[:, side].max(axis=1))[:, None]
     near = np.ones(13)
     for joint, columns in _FEET_OF.items():
         asked = np.convolve(goal.asked[:, joint].any(axis=-1), near)[6:-6] > 0.5

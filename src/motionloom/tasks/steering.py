@@ -172,7 +172,7 @@ def _summed(velocity: Array, first: int) -> Array:
 def _gain(covariance: Array, asked: NDArray[np.intp], noise: Array) -> Array:
     """(rows, asked): the posterior mean from what is seen at ``asked``, with noise of these standard deviations."""
     inner = covariance[np.ix_(asked, asked)] + np.diag(noise**2)
-    return np.linalg.solve(inner, covariance[asked]).T
+    return np.asarray(np.linalg.solve(inner, covariance[asked]).T, dtype=np.float64)
 
 
 def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Array | None) -> _Limbs | None:
@@ -183,7 +183,7 @@ def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Ar
     if still is not None:
         inner += still[np.ix_(t, t)]
     inner[np.diag_indices_from(inner)] += EXACT**2
-    return _Limbs((t, j), np.linalg.inv(inner), together)
+    return _Limbs((t, j), np.asarray(np.linalg.inv(inner), dtype=np.float64), together)
 
 
 def _thinned(asked: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -319,8 +319,8 @@ def _out_of_reach(places: Array, goal: Goal) -> Array:
     """(frames,) metres: how far up the body must go so that limbs reach what is above or below them."""
     need = np.zeros(len(places))
     for joint, (base, reach) in _REACH.items():
-        asked = goal.asked[:, joint].all(axis=-1)
-        line = np.where(asked[:, None], goal.positions[:, joint] - places[:, base], 0.0)
+        asked = goal.asked[:, joint].all(axis=-1, keepdims=True)
+        line = np.where(asked, goal.positions[:, joint] - places[:, base], 0.0)
         room = np.sqrt((reach**2 - (line[:, [0, 2]] ** 2).sum(-1)).clip((0.3 * reach) ** 2))
         beyond = np.sign(line[:, 1]) * (np.abs(line[:, 1]) - room).clip(0)
         need = np.where(np.abs(beyond) > np.abs(need), beyond, need)
