@@ -34,7 +34,8 @@ def tracks(positions: np.ndarray, joints: Sequence[int], *, frames: int, at: Seq
         rows = np.array([round(time * FPS) for time in at], dtype=int)
         if len(rows) == 0 or rows.min() < 0 or rows.max() > known:
             raise MotionloomError(
-                f"a motion can be followed at 0 to {(known - 1) / FPS:g} s here; got {', '.join(f'{t:g}' for t in at[:20]) or 'none'}"
+                f"a motion can be followed at 0 to {(known - 1) / FPS:g} s here; got "
+                f"{', '.join(f'{t:g}' for t in at[:20]) or 'none'}"
             )
         rows = np.minimum(rows, known - 1)
     goal = Goal.nothing(frames)

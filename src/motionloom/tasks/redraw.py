@@ -140,8 +140,8 @@ def joining(known: Tensor, mask: Tensor, first: int, last: int) -> Callable[[Ten
     """A function that bends the free numbers so that they leave the known ones, and come to them, without a jump.
 
     On features (rows, frames, 263), not standardised; ``mask`` is True at known ones, the stretch is ``first`` to
-    before ``last``. At each border the first frame of the stretch becomes what the two known frames beside it lead to, in
-    value and in change; the difference fades over `JOIN` frames as a cubic.
+    before ``last``. At each border its first frame becomes what the two known frames beside it lead to, in value and
+    in change; the difference fades over `JOIN` frames as a cubic.
     """
     frames = known.shape[1]
     reach = min(JOIN, (last - first) // 2)
