@@ -17,7 +17,7 @@ def add(commands) -> None:
     )  # fmt: skip
     seams.add_argument("--evaluator", default="own", metavar="own|FILE", help="who judges (default: the shipped one)")
     seams.add_argument(
-        "--methods", type=_words, metavar="ours,published,paper,first-take,concatenation,slerp",
+        "--methods", type=_words, metavar="ours,ours-exported,published,paper,first-take,concatenation,slerp",
         help="rows (default: these); also second-take, published-1000, paper-1000: the last two take hours",
     )  # fmt: skip
     seams.add_argument("--intervals", type=int, help="captions of one long motion (default 32)")

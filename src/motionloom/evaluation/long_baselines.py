@@ -77,6 +77,15 @@ def _ours(prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequen
     return from_features(torch.cat(pieces).cpu())
 
 
+def _exported(prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequence[int], seed: int) -> Long:
+    """What a user gets: constant bones, planted feet held still."""
+    from motionloom.tasks.long import Segment, compose
+
+    segments = [Segment(text, n / FPS) for text, n in zip(prompts, frames, strict=True)]
+    blocks = compose(prior, segments, seed=seed, guidance=how.guidance, steps=how.steps)
+    return from_positions(np.concatenate([block.positions() for block in blocks]))
+
+
 def _double_take(
     prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequence[int], seed: int, *,
     mode: Literal["published", "paper"], steps: int | None = None, first: bool = False, second: bool = False,
@@ -109,6 +118,7 @@ def _slerp(prior: Prior, how: Transitions, prompts: Sequence[str], frames: Seque
 
 _MAKERS: Mapping[str, Callable[..., Long]] = {
     "ours": _ours,
+    "ours-exported": _exported,
     "published": partial(_double_take, mode="published"),
     "paper": partial(_double_take, mode="paper"),
     "first-take": partial(_double_take, mode="published", first=True),
@@ -118,10 +128,11 @@ _MAKERS: Mapping[str, Callable[..., Long]] = {
     "published-1000": partial(_double_take, mode="published", steps=1000),
     "paper-1000": partial(_double_take, mode="paper", steps=1000),
 }
-DEFAULT = ("ours", "published", "paper", "first-take", "concatenation", "slerp")
+DEFAULT = ("ours", "ours-exported", "published", "paper", "first-take", "concatenation", "slerp")
 """Without second take only and without the slow ones of 1000 steps."""
 TITLES = {
-    "ours": "motionloom compose",
+    "ours": "motionloom compose, as drawn",
+    "ours-exported": "motionloom compose, as exported",
     "published": "DoubleTake, published",
     "paper": "DoubleTake, paper",
     "first-take": "first take only",
