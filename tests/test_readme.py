@@ -26,6 +26,7 @@ DOCUMENTS = [
     *sorted((ROOT / "docs").rglob("*.md")),
 ]
 EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
+TIMELINES = sorted((ROOT / "examples" / "timelines").glob("*.yaml"))
 BLOCK = re.compile(r"(<!-- run -->\n)?```(sh|python)\n(.*?)```", re.DOTALL)
 WEIGHTS = sorted((ROOT / "src" / "motionloom" / "weights").glob("*.safetensors"))
 needs_weights = pytest.mark.skipif(not WEIGHTS, reason="no shipped weights in src/motionloom/weights")
@@ -87,6 +88,27 @@ def test_the_examples_run(example: Path, tmp_path: Path) -> None:
     if not WEIGHTS and "Prior" in example.read_text():
         pytest.skip("no shipped weights in src/motionloom/weights")
     execute([sys.executable, str(example)], tmp_path)
+
+
+@needs_weights
+@pytest.mark.slow
+def test_the_timelines_become_motions() -> None:
+    """Each timeline of the examples is made, in few steps, to its last frame; what it goes on from and to is met."""
+    from motionloom import Prior, compose, load
+    from motionloom.io.stream import joined
+    from motionloom.tasks.timeline import read_timeline
+
+    prior = Prior.load()
+    for example in TIMELINES:
+        asked = read_timeline(example)
+        start = None if asked.start is None else load(asked.start)
+        made = joined(list(compose(prior, asked.segments, path=asked.path, start=start, seed=asked.seed or 0, steps=3)))
+        assert len(made) == asked.frames, example.name
+        if asked.path is not None:
+            apart = (made.root - asked.path.positions[:, 0])[:, [0, 2]]
+            assert abs(apart).max() < 0.05, example.name
+        if start is not None:
+            assert abs(made.root[0] - start.root[-1])[[0, 2]].max() < 0.2, example.name
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)

@@ -3,6 +3,8 @@
 from motionloom import Prior, generate, save
 motions = generate(Prior.load(), ["a person walks forward"], seconds=5.0, seed=1)
 save(motions[0], "walk.bvh")
+
+`compose` makes long motions out of `Segment`s, `control` motions that meet a `Goal`, `edit` changes clips.
 """
 
 from importlib import import_module
@@ -15,6 +17,10 @@ if TYPE_CHECKING:
     from motionloom.motion import Motion
     from motionloom.retarget import from_smpl22, retarget, to_smpl22
     from motionloom.skeleton import SMPL22, Skeleton
+    from motionloom.tasks.control import Controlled, control
+    from motionloom.tasks.edit import edit
+    from motionloom.tasks.goals import Goal
+    from motionloom.tasks.long import Segment, compose
     from motionloom.tasks.text import generate
 
 _PLACES = {
@@ -29,15 +35,27 @@ _PLACES = {
     "to_smpl22": "retarget",
     "SMPL22": "skeleton",
     "Skeleton": "skeleton",
+    "Controlled": "tasks.control",
+    "control": "tasks.control",
+    "edit": "tasks.edit",
+    "Goal": "tasks.goals",
+    "Segment": "tasks.long",
+    "compose": "tasks.long",
     "generate": "tasks.text",
 }
 
 __all__ = [
     "SMPL22",
+    "Controlled",
+    "Goal",
     "Motion",
     "MotionloomError",
     "Prior",
+    "Segment",
     "Skeleton",
+    "compose",
+    "control",
+    "edit",
     "from_smpl22",
     "generate",
     "load",

@@ -19,6 +19,7 @@ from motionloom.motion import Motion
 from motionloom.rotations import IDENTITY
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.timeline import KEYS, SCHEMA, SEGMENT_KEYS, plain_timeline, read_timeline
+from tests.schema_check import fits
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples" / "timelines").glob("*.yaml"))
@@ -279,39 +280,8 @@ def test_plain_values_survive(tmp_path, value):
 # The schema ------------------------------------------------------------------------------------------------------
 
 
-def fits(value, rule: dict, whole: dict) -> bool:
-    """A JSON Schema validator for the words that the timeline's schema uses, and no other."""
-    known = {
-        "$schema", "$id", "$defs", "title", "description", "type", "additionalProperties", "required", "properties",
-        "minItems", "maxItems", "items", "$ref", "minimum", "maximum", "minLength", "maxLength", "pattern", "anyOf",
-        "not",
-    }  # fmt: skip
-    assert set(rule) <= known
-    types = {"object": dict, "array": list, "string": str, "number": int | float, "integer": int}
-    if "type" in rule and (not isinstance(value, types[rule["type"]]) or isinstance(value, bool)):
-        return False
-    if "$ref" in rule and not fits(value, whole["$defs"][rule["$ref"].removeprefix("#/$defs/")], whole):
-        return False
-    if "anyOf" in rule and not any(fits(value, other, whole) for other in rule["anyOf"]):
-        return False
-    if "not" in rule and fits(value, rule["not"], whole):
-        return False
-    if isinstance(value, dict):
-        properties = rule.get("properties", {})
-        extra = rule.get("additionalProperties") is False and set(value) - set(properties)
-        missing = set(rule.get("required", ())) - set(value)
-        return not extra and not missing and all(fits(value[k], properties[k], whole) for k in value if k in properties)
-    if isinstance(value, list):
-        long_enough = rule.get("minItems", 0) <= len(value) <= rule.get("maxItems", 10**9)
-        return long_enough and all(fits(item, rule.get("items", {}), whole) for item in value)
-    if isinstance(value, str):
-        short_enough = rule.get("minLength", 0) <= len(value) <= rule.get("maxLength", 10**9)
-        return short_enough and re.search(rule.get("pattern", ""), value) is not None
-    return rule.get("minimum", -np.inf) <= value <= rule.get("maximum", np.inf) if value is not None else True
-
-
 def valid(value) -> bool:
-    """By the jsonschema library where it is installed, else by the little validator above."""
+    """By the jsonschema library where it is installed, else by the little validator of the tests."""
     schema = json.loads(SCHEMA.read_text())
     mine = fits(value, schema, schema)
     try:
