@@ -8,7 +8,12 @@ def add(subparsers) -> None:
     """Register `bench`."""
     parser = subparsers.add_parser("bench", help="measure speed and memory on this machine")
     parser.add_argument("--weights", default="default", help="shipped name or file (default: default)")
-    parser.add_argument("--quick", action="store_true", help="fewer repeats and sizes")
+    parser.add_argument(
+        "--long", action="store_true", help="measure long motion instead: 1 to 10 minutes of it; takes some minutes"
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="fewer repeats and sizes; with --long 10 to 40 s of motion"
+    )
     parser.add_argument("--device", default="cpu", help="cpu or cuda for the network's part (default cpu)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to this file as well")
     parser.set_defaults(run=_bench)
@@ -20,13 +25,15 @@ def _bench(arguments: argparse.Namespace) -> None:
     from motionloom.bench import bench, defaults, table
     from motionloom.checkpoint import Prior
     from motionloom.evaluation.obey import check_report, plain, write_json
+    from motionloom.tasks.long import compose
     from motionloom.tasks.text import generate
 
     if arguments.json:
         check_report(arguments.json)
     prior = Prior.load(arguments.weights, device=arguments.device)
     found = bench(
-        prior, defaults(generate), quick=arguments.quick, weights=arguments.weights,
+        prior, defaults(compose if arguments.long else generate), what="long" if arguments.long else "short",
+        quick=arguments.quick, weights=arguments.weights,
         progress=lambda line: print(line, file=sys.stderr, flush=True),
     )  # fmt: skip
     if arguments.json:

@@ -54,7 +54,9 @@ def _tools(arguments: argparse.Namespace):
         generator=lambda finished: generator(prior(), finished=finished),
         prior=prior,
         memory=lambda steps: _memory(arguments, steps),
-        speed=lambda quick: bench(prior(), defaults(generate), quick=quick, weights=arguments.weights, progress=_say),
+        speed=lambda quick: bench(
+            prior(), defaults(generate), what="all", quick=quick, weights=arguments.weights, progress=_say
+        ),
         progress=_say,
     )
 

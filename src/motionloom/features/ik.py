@@ -190,13 +190,14 @@ def _steadied_limbs(seen: Array, local: Array) -> Array:
     Squared distance to each rotation, weighted by the inverse square of the relative error of the limb's lengths,
     plus the squared change per frame: limbs of the right lengths stay exactly as they are.
     """
+    ends = [[limb.start, limb.middle, limb.end] for limb in LIMBS]
+    joints = [[limb.start, limb.middle] for limb in LIMBS]
+    lengths = _LENGTHS[[[limb.middle, limb.end] for limb in LIMBS]]
+    drawn = np.linalg.norm(np.diff(seen[:, ends], axis=2), axis=-1)
+    error = np.abs(1 - drawn / lengths).mean(-1)
+    weight = (_DOUBTFUL / error.clip(1e-6))[..., None, None] ** 2  # (frames, limbs, joint, number)
     result = local.copy()
-    for limb in LIMBS:
-        drawn = np.linalg.norm(np.diff(seen[:, [limb.start, limb.middle, limb.end]], axis=1), axis=-1)
-        error = np.abs(1 - drawn / _LENGTHS[[limb.middle, limb.end]]).mean(-1)
-        weight = (_DOUBTFUL / error.clip(1e-6))[:, None] ** 2
-        for joint in (limb.start, limb.middle):
-            result[:, joint] = _tridiagonal(weight, 1.0, weight * local[:, joint])
+    result[:, joints] = _tridiagonal(weight, 1.0, weight * local[:, joints])  # all at once: its loop is over frames
     return rot.normalize(result)
 
 

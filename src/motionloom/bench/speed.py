@@ -1,17 +1,13 @@
-"""`motionloom bench`: speed as ratios within one run, so that they mean the same on any machine.
-
-Times are medians of interleaved repeats. Nothing here is a test: a busy machine makes it slower, not wrong.
-"""
+"""Tools that time and weigh, and what `generate` costs."""
 
 import inspect
 import os
-import platform
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -78,11 +74,14 @@ def noise(prior: Prior, rows: int, seconds: float) -> Tensor:
     return row_draw(range(rows))(torch.empty(shape, device=prior.mean.device))
 
 
-def timed(jobs: Sequence[Callable[[], Any]], repeats: int) -> list[float]:
-    """Median seconds of each job, taken in turns after one unmeasured round, so that a slow moment hits all alike."""
+def timed(jobs: Sequence[Callable[[], Any]], repeats: int, *, warm: int | None = None) -> list[float]:
+    """Median seconds of each job, taken in turns after one unmeasured round, so that a slow moment hits all alike.
+
+    warm: how many of the jobs, the first ones, are in the unmeasured round; None: all.
+    """
     times: list[list[float]] = [[] for _ in jobs]
     for turn in range(repeats + 1):
-        for job, kept in zip(jobs, times, strict=True):
+        for job, kept in zip(jobs, times, strict=True) if turn else zip(jobs[:warm], times):
             _wait()
             start = time.perf_counter()
             job()
@@ -243,58 +242,3 @@ def commands(weights: str, *, repeats: int, run: Callable[[Sequence[str]], Proce
             "memory of a 10-second generation", memory, "MB", "< 1500", memory < 1500, "peak resident, whole process"
         ),
     ]
-
-
-def bench(
-    prior: Prior,
-    how: Sampling,
-    *,
-    quick: bool = False,
-    weights: str = "default",
-    sizes: Sequence[int] = (1024, 2048),
-    run: Callable[[Sequence[str]], Process] = process,
-    progress: Callable[[str], None] = lambda line: None,
-) -> dict[str, Any]:
-    """Everything, as plain data. ``sizes``: square matrices whose product is the measure of the machine."""
-    about = machine(prior)  # before this run itself is load
-    repeats, counts = (1, (1, 2, 4)) if quick else (5, (1, 2, 4, 8, 16))
-    parts: list[Callable[[], list[Entry]]] = [
-        lambda: [speed_of_default(prior, how, seconds=6.0, repeats=min(repeats, 3))],
-        lambda: [
-            efficiency(prior, how, rows=rows, seconds=9.8, repeats=4 * repeats, sizes=sizes) for rows in (1, counts[-1])
-        ],
-        lambda: [linearity(prior, how, counts=counts, seconds=6.0, repeats=repeats)],
-        lambda: commands(weights, repeats=min(repeats, 3), run=run),
-    ]
-    entries: list[Entry] = []
-    for part in parts:
-        for entry in part():
-            entries.append(entry)
-            progress(f"{entry.name}: {entry.value:.3g} {entry.unit}")
-    return {"machine": about, "quick": quick, "entries": [asdict(entry) for entry in entries]}
-
-
-def machine(prior: Prior) -> dict[str, Any]:
-    """What it ran on."""
-    device = prior.mean.device
-    return {
-        "device": torch.cuda.get_device_name(device)
-        if device.type == "cuda"
-        else platform.processor() or platform.machine(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
-        "load": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else 0.0,
-        "threads": torch.get_num_threads(),
-        "torch": torch.__version__,
-        "python": platform.python_version(),
-        "type": str(next(prior.net.parameters()).dtype).removeprefix("torch."),
-        "parameters": sum(p.numel() for p in prior.net.parameters()),
-    }
-
-
-def table(found: dict[str, Any]) -> list[list[str]]:
-    """Rows of text, the heading first."""
-    rows = [["what", "measured", "", "target", "", "how"]]
-    for entry in found["entries"]:
-        verdict = "ok" if entry["passes"] else "MISSED"
-        rows.append([entry["name"], f"{entry['value']:.3g}", entry["unit"], entry["target"], verdict, entry["note"]])
-    return rows
