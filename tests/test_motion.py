@@ -105,6 +105,13 @@ def test_resampling_to_a_multiple_keeps_the_old_frames() -> None:
     assert np.allclose(out.positions()[::3], motion.positions())
 
 
+def test_poses_between_frames_and_beyond_the_ends() -> None:
+    motion = spin(5, 30.0, speed=2.0)
+    out = motion.at(np.array([-1.0, 0.0, 1.5, 4.0, 7.0]), 30.0)
+    assert np.allclose(out.positions()[[0, 1, 3, 4]], motion.positions()[[0, 0, 4, 4]])
+    assert np.allclose(out.positions()[2], spin(10, 60.0, speed=2.0).positions()[3])
+
+
 def test_resampling_goes_the_short_way_where_signs_flip() -> None:
     motion = spin(5, 30.0, speed=2.0)
     flipped = Motion(SMPL22, 30.0, motion.root, motion.rotations * np.array([1, -1, 1, -1, 1.0])[:, None, None])

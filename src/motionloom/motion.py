@@ -112,10 +112,13 @@ class Motion:
                 f"and at most {MAX_POSES:,} of both together are made; ask for a lower rate or crop the motion first"
             )
         count = int(np.floor(frames + 1e-6)) + 1
-        at = np.arange(count) * (self.fps / fps)
-        low = np.minimum(at.astype(int), len(self) - 1)
+        return self.at(np.arange(count) * (self.fps / fps), fps)
+
+    def at(self, places: np.ndarray, fps: float) -> "Motion":
+        """The poses at fractional frame numbers, as a motion of rate ``fps``; beyond either end that end's pose."""
+        low = np.clip(np.floor(places).astype(int), 0, len(self) - 1)
         high = np.minimum(low + 1, len(self) - 1)
-        amount = at - low
+        amount = np.asarray(places - low, dtype=np.float64).clip(0, 1)
 
         def lerp(x: Array) -> Array:
             a = amount.reshape(-1, *[1] * (x.ndim - 1))

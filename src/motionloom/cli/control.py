@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.cli import generate
-from motionloom.cli.sampling import add_sampling, bar, check_outs, check_prompt, fail
+from motionloom.cli.sampling import add_sampling, bar, check_outs, check_prompt, fail, places, write
 
 if TYPE_CHECKING:
     from motionloom.checkpoint import Prior
@@ -55,8 +54,6 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
 
 def run_control(arguments: argparse.Namespace) -> None:
     """``motionloom control PROMPT --goal FILE``."""
-    from motionloom.io import check_output
-
     if arguments.schema:
         from motionloom.tasks.goal_file import SCHEMA
 
@@ -68,16 +65,14 @@ def run_control(arguments: argparse.Namespace) -> None:
     if arguments.prompt is None:
         fail("no prompt; say what the person does, such as: motionloom control 'a person walks' --goal goal.json")
     check_prompt(arguments.prompt)
-    places = [generate._places(out, arguments.count) for out in outs]
-    for place in (place for several in places for place in several):
-        check_output(place)
+    files = places(outs, arguments.count)
     goal = _goal(arguments)
     made, seconds = _make(arguments, goal)
     motions = [one.motion for one in made]
     if arguments.fps is not None:
         motions = [motion.resample(arguments.fps) for motion in motions]
     captions = [arguments.prompt] * arguments.count
-    written = [generate._write(motions, several, captions) for several in places]
+    written = [write(motions, several, captions) for several in files]
     _report(arguments, made, written, seconds)
 
 
@@ -89,7 +84,7 @@ def _goal(arguments: argparse.Namespace) -> "Goal":
     from motionloom.tasks.goal_file import follow, read_goal
     from motionloom.tasks.goals import FPS, merged
     from motionloom.tasks.reach import check_reach
-    from motionloom.tasks.text import _frames
+    from motionloom.tasks.text import frames_in
 
     if bool(arguments.follow) != (arguments.clip is not None):
         fail("--follow names joints of the motion that --from names; give both or none")
@@ -101,7 +96,7 @@ def _goal(arguments: argparse.Namespace) -> "Goal":
     seconds = arguments.seconds
     if seconds is None:
         seconds = 5.0 if clip is None else (len(clip) - 1) / clip.fps + 1 / FPS
-    frames = _frames(seconds, FPS)
+    frames = frames_in(seconds, FPS)
     goals = [read_goal(file, frames=frames, folder=file.parent) for file in arguments.goal]
     if arguments.path is not None:
         size = {} if arguments.width is None else {"width": arguments.width}

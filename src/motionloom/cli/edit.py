@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.cli import files, generate
-from motionloom.cli.sampling import add_sampling, bar, check_outs, check_prompt, fail
+from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
+from motionloom.cli.sampling import add_sampling, bar, check_outs, check_prompt, fail, places, write
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
@@ -40,8 +40,8 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--seed", type=int, default=0, help="the first version's seed (default 0)")
     parser.add_argument("--count", type=int, default=1, help="versions to make (default 1)")
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
-    add_sampling(parser)
-    files._add_reading(parser)
+    add_sampling(parser, own_rate="the clip's")
+    add_reading(parser)
     _take_text_anywhere(parser)
     parser.set_defaults(run=run_edit)
 
@@ -62,29 +62,25 @@ def _take_text_anywhere(parser: argparse.ArgumentParser) -> None:
 
 def run_edit(arguments: argparse.Namespace) -> None:
     """``motionloom edit CLIP TEXT``."""
-    from motionloom.io import check_output
-
     outs = check_outs(arguments)
     if not 1 <= arguments.count <= MAX_COUNT or not 0 <= arguments.seed < 2**62:
         fail(f"--count must be 1 to {MAX_COUNT} and --seed 0 or more; got {arguments.count} and {arguments.seed}")
     if arguments.text is not None:
         check_prompt(arguments.text)
     captions = [arguments.text or arguments.clip.stem] * arguments.count
-    places = [generate._places(out, arguments.count) for out in outs]
-    for place in (place for several in places for place in several):
-        check_output(place)
-    clip, unit, orders = files._read(arguments, arguments.clip)
-    motions, seconds = _make(arguments, files._crop(clip, arguments))
+    files = places(outs, arguments.count)
+    clip, unit, orders = read_clip(arguments, arguments.clip)
+    motions, seconds = _make(arguments, crop(clip, arguments))
     if arguments.skeleton == "smpl":
         unit, orders = None, {}
     written = []
-    for several in places:
+    for several in files:
         if several[0].suffix.lower() == ".bvh":
             written += [_write_bvh(motion, place, unit, orders) for motion, place in zip(motions, several, strict=True)]
         else:
-            written += generate._write(motions, several, captions)
+            written += write(motions, several, captions)
     _report(arguments, written, seconds)
-    files._note_rate(arguments, [arguments.clip])
+    note_rate(arguments, [arguments.clip])
 
 
 def _make(arguments: argparse.Namespace, clip: "Motion") -> "tuple[list[Motion], float]":

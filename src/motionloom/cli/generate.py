@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from motionloom.cli.sampling import add_sampling, bar, check_outs, check_prompt, fail
+from motionloom.cli.sampling import add_sampling, bar, check_outs, check_prompt, fail, places, write
 
 MAX_PROMPTS = 1000
 MAX_MOTIONS = 10_000
@@ -26,8 +26,6 @@ def add(subparsers) -> None:
 
 
 def _generate(arguments: argparse.Namespace) -> None:
-    from motionloom.io import check_output
-
     prompts = _prompts(arguments)
     outs = check_outs(arguments)
     if not 1 <= arguments.count <= MAX_MOTIONS or not 0 <= arguments.seed < 2**62:
@@ -35,11 +33,9 @@ def _generate(arguments: argparse.Namespace) -> None:
     if len(prompts) * arguments.count > MAX_MOTIONS:
         fail(f"{len(prompts)} prompts, {arguments.count} of each, are too many; at most {MAX_MOTIONS:,} in one call")
     captions = [prompt for prompt in prompts for _ in range(arguments.count)]
-    places = [_places(out, len(captions)) for out in outs]
-    for place in (place for several in places for place in several):
-        check_output(place)
+    files = places(outs, len(captions))
     motions, seconds = _make(arguments, prompts)
-    written = [path for several in places for path in _write(motions, several, captions)]
+    written = [path for several in files for path in write(motions, several, captions)]
     _report(arguments, captions, written, seconds)
 
 
@@ -82,22 +78,6 @@ def _make(arguments: argparse.Namespace, prompts: list[str]):
     if arguments.fps is not None:
         motions = [motion.resample(arguments.fps) for motion in motions]
     return motions, time.perf_counter() - began
-
-
-def _places(out: Path, count: int) -> list[Path]:
-    """One file for one motion, or for a picture of all of them; else numbered files."""
-    if count == 1 or out.suffix.lower() == ".png":
-        return [out]
-    width = len(str(count - 1))
-    return [out.with_name(f"{out.stem}_{i:0{width}d}{out.suffix}") for i in range(count)]
-
-
-def _write(motions, places: list[Path], captions: list[str]) -> list[Path]:
-    from motionloom.io import save
-
-    if len(places) == 1:
-        return [save(motions, places[0], captions=captions)]
-    return [save(one, place, captions=[said]) for one, place, said in zip(motions, places, captions, strict=True)]
 
 
 def _report(arguments: argparse.Namespace, captions: list[str], written: list[Path], seconds: float) -> None:

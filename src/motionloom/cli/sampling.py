@@ -1,16 +1,19 @@
 """What the commands that make motions share: options, the checks of them, a progress bar."""
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
+
+if TYPE_CHECKING:
+    from motionloom.motion import Motion
 
 MAX_CHARACTERS = 20_000
 
 
-def add_sampling(parser: argparse.ArgumentParser) -> None:
-    """``--out``, and how and where motions are sampled."""
+def add_sampling(parser: argparse.ArgumentParser, *, own_rate: str = "the model's 20") -> None:
+    """``--out``, and how and where motions are sampled; ``own_rate`` is the files' without ``--fps``, in words."""
     parser.add_argument(
         "--out", type=Path, action="append", metavar="NAME",
         help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default motion.bvh)",
@@ -19,7 +22,7 @@ def add_sampling(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
     )
-    parser.add_argument("--fps", type=float, help="frame rate of the files (default: the model's 20)")
+    parser.add_argument("--fps", type=float, help=f"frame rate of the files (default: {own_rate})")
     parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
@@ -44,6 +47,33 @@ def check_outs(arguments: argparse.Namespace) -> list[Path]:
     if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
         fail(f"--fps must be 1 to 1000; got {arguments.fps:g}")
     return outs
+
+
+def numbered(out: Path, count: int) -> list[Path]:
+    """One file for one motion, or for a picture of all of them; else numbered files."""
+    if count == 1 or out.suffix.lower() == ".png":
+        return [out]
+    width = len(str(count - 1))
+    return [out.with_name(f"{out.stem}_{i:0{width}d}{out.suffix}") for i in range(count)]
+
+
+def places(outs: Sequence[Path], count: int) -> list[list[Path]]:
+    """The files of ``count`` motions for each ``--out``, refused where nothing can be written."""
+    from motionloom.io import check_output
+
+    several = [numbered(out, count) for out in outs]
+    for place in (place for one in several for place in one):
+        check_output(place)
+    return several
+
+
+def write(motions: "list[Motion]", files: Sequence[Path], captions: Sequence[str]) -> list[Path]:
+    """Motions into the files of one ``--out``."""
+    from motionloom.io import save
+
+    if len(files) == 1:
+        return [save(motions, files[0], captions=captions)]
+    return [save(one, file, captions=[said]) for one, file, said in zip(motions, files, captions, strict=True)]
 
 
 def check_prompt(prompt: str) -> None:

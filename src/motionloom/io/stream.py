@@ -13,7 +13,6 @@ from types import TracebackType
 
 import numpy as np
 
-from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io import check_output, save
 from motionloom.io.atomic import atomic_path
@@ -186,16 +185,5 @@ def resampled(pieces: Iterable[Motion], fps: float) -> Iterator[Motion]:
         last = first + len(part) - 1
         count = int(np.floor(last / part.fps * fps + 1e-6)) + 1
         if count > made:
-            yield _at(part, np.arange(made, count) * (part.fps / fps) - first, fps)
+            yield part.at(np.arange(made, count) * (part.fps / fps) - first, fps)
         carried, first, made = part.frames(len(part) - 1, len(part)), last, count
-
-
-def _at(motion: Motion, at: np.ndarray, fps: float) -> Motion:
-    """The motion at fractional frames, places linearly and rotations spherically interpolated."""
-    low = np.clip(np.floor(at).astype(int), 0, len(motion) - 1)
-    high = np.minimum(low + 1, len(motion) - 1)
-    amount = (at - low)[:, None]
-    root = motion.root[low] * (1 - amount) + motion.root[high] * amount
-    shape = (len(at), len(motion.skeleton))
-    turned = rot.slerp(motion.rotations[low], motion.rotations[high], np.broadcast_to(amount, shape))
-    return replace(motion, fps=float(fps), root=root, rotations=turned)

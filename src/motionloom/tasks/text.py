@@ -106,7 +106,7 @@ def generate(
             f"nothing to make: {len(said)} prompts, {count} of each; give at least one prompt and count 1"
         )
     said = [prompt for prompt in said for _ in range(count)]
-    frames = [_frames(length, prior.fps) for length in lengths for _ in range(count)]
+    frames = [frames_in(length, prior.fps) for length in lengths for _ in range(count)]
     if not 0 <= seed < LARGEST_SEED:
         raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {seed}")
     made = sample_features(
@@ -165,7 +165,8 @@ _DECODED: dict[int, Callable[[np.ndarray, float, bool], Motion]] = {WIDTH: _from
 """How the numbers of a frame become a motion, by their count."""
 
 
-def _frames(seconds: float, fps: float) -> int:
+def frames_in(seconds: float, fps: float) -> int:
+    """Frames of a motion of so many seconds; MotionloomError beyond `LONGEST`."""
     if not (np.isfinite(seconds) and 0 < seconds <= LONGEST):
         raise MotionloomError(
             f"a motion of {seconds:g} seconds cannot be made; ask for more than 0 and at most {LONGEST:g}"

@@ -1,0 +1,114 @@
+"""What the commands that read motion files share: options, reading, cutting, notes."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from motionloom.motion import Motion
+
+RATE_ASSUMED = "an AMC file does not state its rate; 120 frames per second are assumed (--source-fps says otherwise)"
+_UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "in": 0.0254, "ft": 0.3048}
+
+
+def add_reading(command: argparse.ArgumentParser) -> None:
+    """How a file is read, and which part of it."""
+    command.add_argument(
+        "--unit", type=as_unit, metavar="UNIT", help="unit of a BVH or ASF read: m, cm, inch, or metres"
+    )
+    command.add_argument("--up", choices=("y", "z"), default="y", help="the axis that is up in the file (default y)")
+    command.add_argument(
+        "--asf", type=Path, metavar="FILE", help="skeleton of an AMC file (default: the one beside it)"
+    )
+    command.add_argument("--source-fps", type=as_rate, metavar="N", help="take this rate for the file's (AMC: 120)")
+    command.add_argument("--start", type=as_seconds, metavar="S", help="begin at this second")
+    command.add_argument("--end", type=as_seconds, metavar="S", help="end at this second")
+
+
+def _number(text: str) -> float:
+    value = float(text)
+    if not abs(value) < 1e9:
+        raise ValueError
+    return value
+
+
+def as_rate(text: str) -> float:
+    """Frames per second, as an argparse type."""
+    try:
+        value = _number(text)
+    except ValueError:
+        value = 0.0
+    if not 0.1 <= value <= 1000:
+        raise argparse.ArgumentTypeError(f"a number of 0.1 to 1000 frames per second is needed; got {text!r}")
+    return value
+
+
+def as_seconds(text: str) -> float:
+    """Seconds, 0 or more."""
+    try:
+        value = _number(text)
+    except ValueError:
+        value = -1.0
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"a number of seconds, 0 or more, is needed; got {text!r}")
+    return value
+
+
+def as_unit(text: str) -> float:
+    """Metres per unit of length, from a number or the unit's name."""
+    try:
+        value = _UNITS[text.lower()] if text.lower() in _UNITS else _number(text)
+    except ValueError:
+        value = 0.0
+    if not 1e-6 <= value <= 1e6:
+        units = ", ".join(_UNITS)
+        raise argparse.ArgumentTypeError(f"a unit is {units} or a number of metres above 0; got {text!r}")
+    return value
+
+
+def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float | None, dict[str, str]]":
+    """The motion and, of a BVH, the unit of its file and the orders of its rotations."""
+    from motionloom import io
+
+    unit, orders = None, {}
+    if path.suffix.lower() == ".bvh" and not path.is_dir() and arguments.asf is None:
+        from motionloom.io.bvh import read_bvh
+
+        file = read_bvh(path, fps=arguments.source_fps, unit=arguments.unit)
+        motion, unit, orders = file.motion, file.unit, dict(file.orders)
+    else:
+        motion = io.load(path, fps=arguments.source_fps, asf=arguments.asf, unit=arguments.unit)
+    return (_stand_up(motion) if arguments.up == "z" else motion), unit, orders
+
+
+def _stand_up(motion: "Motion") -> "Motion":
+    """From Z up to Y up: a quarter turn of everything about X."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from motionloom import rotations as rot
+
+    turn = rot.rotvec_to_quat(np.array([-np.pi / 2, 0.0, 0.0]))
+    rotations = motion.rotations.copy()
+    rotations[:, 0] = rot.multiply(turn, rotations[:, 0])
+    return replace(motion, root=rot.rotate(turn, motion.root), rotations=rotations)
+
+
+def crop(motion: "Motion", arguments: argparse.Namespace) -> "Motion":
+    """The part between ``--start`` and ``--end``."""
+    if arguments.start is None and arguments.end is None:
+        return motion
+    return motion.crop(arguments.start or 0.0, motion.seconds if arguments.end is None else arguments.end)
+
+
+def rate_assumed(arguments: argparse.Namespace, paths: list[Path]) -> bool:
+    """Whether a file's rate was neither in it nor given."""
+    return arguments.source_fps is None and any(path.suffix.lower() == ".amc" for path in paths)
+
+
+def note_rate(arguments: argparse.Namespace, paths: list[Path]) -> None:
+    """Say so on stderr."""
+    if rate_assumed(arguments, paths):
+        print(f"note: {RATE_ASSUMED}", file=sys.stderr)
