@@ -13,6 +13,7 @@ copies of an overlap become (1 - a) * previous + a * next with a = 0, 1/h, ... (
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import torch
 from torch import Tensor
@@ -72,8 +73,11 @@ def staggered(
     """Clean rows (length, features) in order, overlaps included twice; the copies of an overlap are equal.
 
     ``links`` is read as the walk gets there. ``together``: rows per network call at most. ``moved`` is told how many
-    rows made a move. Raises ValueError where the overlaps of a row do not fit into it.
+    rows made a move. Rows live where the guesses do, on any device. Raises ValueError where the overlaps of a row do
+    not fit into it, and for levels that do not fall.
     """
+    if len(levels) < 2 or any(s >= t for t, s in pairwise(levels)) or together < 1:
+        raise ValueError(f"a walk needs falling levels and a row per call, got {list(levels)} and {together} together")
     return _Chain(links, guess, levels, solver, schedule, features, together, moved).walk()
 
 
@@ -109,15 +113,22 @@ class _Chain:
             return False
         number = max(self.rows, default=-1) + 1
         before = self.rows.get(number - 1)
-        shared, following = before.link.overlap if before else 0, max(link.overlap, 0)
-        if link.length < shared + following:
-            raise ValueError(
-                f"row {number} of {link.length} frames cannot share {shared} with the row before and {following} after"
-            )
+        if before is not None:
+            self._check(number - 1, before.link, link)
         row = _Row(link, self.solver.start(self.schedule), torch.Generator().manual_seed(link.seed), torch.empty(0))
         self.rows[number] = row
         row.state = self._noise(number, 0)
         return True
+
+    def _check(self, number: int, link: Link, following: Link) -> None:
+        """Whether a row can share what it says, now that there is a row behind it."""
+        earlier = self.rows.get(number - 1)
+        shared = earlier.link.overlap if earlier else 0
+        if link.overlap < 0 or link.length < shared + link.overlap or following.length < link.overlap:
+            raise ValueError(
+                f"row {number} of {link.length} frames cannot share {shared} with the row before and {link.overlap} "
+                f"with the {following.length} of the row behind"
+            )
 
     def _ready(self) -> list[int]:
         """The first rows whose neighbours are as far as they are."""
@@ -139,7 +150,7 @@ class _Chain:
         cleans = self.guess(numbers, [row.state for row in rows], at)
         for number, row, clean, level in zip(numbers, rows, cleans, at, strict=True):
             draw = self._draw(number, row.done + 1)
-            row.state = row.step(row.state, clean, level, self.levels[row.done + 1], draw)
+            row.state = row.step(row.state.to(clean), clean, level, self.levels[row.done + 1], draw)
             row.done += 1
         for number in numbers:
             self._shake(number - 1, number)

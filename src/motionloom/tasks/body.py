@@ -54,13 +54,13 @@ def bodies(pieces: Iterable[Places], fps: float, *, clean: bool = True) -> Itera
     for piece in pieces:
         waiting = piece if waiting is None else _strung(waiting, piece)
         while len(waiting) >= before + BLOCK + MARGIN:
-            made = posed(waiting.crop(0, before + BLOCK + MARGIN), fps, clean=clean)
+            made = _as(tail, posed(waiting.crop(0, before + BLOCK + MARGIN), fps, clean=clean), before)
             yield _faded(tail, made.frames(before, before + BLOCK))
             tail = made.frames(before + BLOCK, before + BLOCK + FADE)
             waiting = waiting.crop(before + BLOCK - MARGIN, len(waiting))
             before = MARGIN
     if waiting is not None and len(waiting) > before:
-        made = posed(waiting, fps, clean=clean)
+        made = _as(tail, posed(waiting, fps, clean=clean), before)
         yield _faded(tail, made.frames(before, len(waiting)))
 
 
@@ -80,6 +80,17 @@ def _strung(first: Places, second: Places) -> Places:
     )
 
 
+def _as(old: Motion | None, new: Motion, at: int) -> Motion:
+    """The new motion with the signs of quaternions that ``old`` begins with at frame ``at``; both signs are one turn.
+
+    Of the whole, not of what is handed out: the next block takes its signs from the frames behind.
+    """
+    if old is None:
+        return new
+    other = (new.rotations[at] * old.rotations[0]).sum(-1) < 0
+    return replace(new, rotations=np.where(other[:, None], -new.rotations, new.rotations))
+
+
 def _faded(old: Motion | None, new: Motion) -> Motion:
     """The new block, begun as the frames ``old`` that the block before it saw in its place."""
     if old is None:
@@ -88,8 +99,6 @@ def _faded(old: Motion | None, new: Motion) -> Motion:
     u = (np.arange(count) + 1) / (count + 1)
     share = u * u * (3 - 2 * u)
     root, turns = new.root.copy(), new.rotations.copy()
-    same = (turns[0] * old.rotations[0]).sum(-1) < 0
-    turns[:, same] *= -1  # quaternions of both signs are one turn; files want them without a change of sign
     root[:count] = old.root[:count] + share[:, None] * (root[:count] - old.root[:count])
     mixed = old.rotations[:count] + share[:, None, None] * (turns[:count] - old.rotations[:count])
     turns[:count] = rot.normalize(mixed)

@@ -32,7 +32,7 @@ from motionloom.tasks.paths import along
 from motionloom.tasks.redraw import joining
 from motionloom.tasks.splice import person_at_20
 from motionloom.tasks.steering import Correction, toward
-from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, STEPS
+from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, LONGEST, SOLVER, SPACING, STEPS
 from motionloom.tasks.text import check as check_sampling
 
 Array = NDArray[np.float64]
@@ -61,6 +61,20 @@ class Segment:
     """Seconds shared with the next segment, half before and half after the seam."""
     goal: Goal | None = None
     """Wishes for the frames of this segment, seen from where the person stands when it begins (origin, facing +Z)."""
+
+    def __post_init__(self) -> None:
+        said = f"the segment {self.text[:40]!r}"
+        limits = (
+            ("seconds", self.seconds, LONGEST),
+            ("transition", self.transition, LONGEST),
+            ("guidance", self.guidance, 100),
+        )
+        for name, value, most in limits:
+            if value is not None and not abs(value) <= most:
+                raise MotionloomError(f"{said} has {name} {value:g}; give a number, at most {most:g}")
+        frames = round(self.seconds * FPS)
+        if self.goal is not None and len(self.goal) != frames:
+            raise MotionloomError(f"{said} has {frames} frames and its goal {len(self.goal)}; make them equally long")
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +173,8 @@ def long_features(
 
     def guess(numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
         chosen = [rows[number] for number in numbers]
-        cleans = _settled(prior, chosen, states, at, last=way[-2])
+        here = [state.to(prior.mean) for state in states]  # the noise that rows begin with is the CPU's
+        cleans = _settled(prior, chosen, here, at, last=way[-2])
         return [row.correct(clean, level) for row, clean, level in zip(chosen, cleans, at, strict=True)]
 
     walk = staggered(
@@ -214,12 +229,13 @@ def _settled(prior: Prior, rows: list[_Row], states: Sequence[Tensor], at: Seque
     cleans = _guess(prior, rows, states, at)
     ending = [i for i, level in enumerate(at) if level == last]
     shifts = range(1, prior.net.config.patch)
-    if not ending or not shifts:
-        return cleans
     sums = {i: cleans[i].clone() for i in ending}
     for shift in shifts:
-        shifted = _guess(prior, [rows[i] for i in ending], [states[i][shift:] for i in ending], [last] * len(ending))
-        for i, clean in zip(ending, shifted, strict=True):
+        longer = [i for i in ending if len(states[i]) > shift]
+        if not longer:
+            break
+        shifted = _guess(prior, [rows[i] for i in longer], [states[i][shift:] for i in longer], [last] * len(longer))
+        for i, clean in zip(longer, shifted, strict=True):
             sums[i][shift:] += clean
     for i, total in sums.items():
         ways = torch.arange(1, len(total) + 1, device=total.device).clamp(max=len(shifts) + 1)
