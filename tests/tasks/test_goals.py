@@ -9,7 +9,16 @@ from hypothesis import strategies as st
 
 from motionloom.errors import MotionloomError
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.goals import Goal, Placement, body_facing, merged, placement_of, turn_between
+from motionloom.tasks.goals import (
+    Goal,
+    Placement,
+    body_facing,
+    joined,
+    merged,
+    overlaid,
+    placement_of,
+    turn_between,
+)
 
 PLACES = st.builds(Placement, *[st.floats(-50, 50)] * 2, st.floats(-7, 7))
 
@@ -136,3 +145,49 @@ def test_goals_of_the_wrong_shape_or_not_finite_are_refused() -> None:
         replace(goal, facing=np.zeros(3))
     with pytest.raises(MotionloomError, match="not finite"):
         replace(goal, positions=np.full((10, 22, 3), np.nan))
+
+
+def test_joined_goals_are_one_behind_the_other() -> None:
+    """Cut anywhere and joined, a goal is itself; the second's start is nobody's."""
+    goal = replace(merged(asking(3, "head", [1, 2, 3]), facing(6, 0.5)), start=Placement(1, 2, 3))
+    for cut in range(1, 10):
+        again = joined(goal.crop(0, cut), replace(goal.crop(cut, 10), start=Placement(9, 9, 9)))
+        assert np.array_equal(again.positions, goal.positions)
+        assert np.array_equal(again.asked, goal.asked)
+        assert np.array_equal(again.facing, goal.facing)
+        assert np.array_equal(again.facing_asked, goal.facing_asked)
+        assert again.start == goal.start
+    assert len(joined(Goal.nothing(2), Goal.nothing(5))) == 7
+
+
+def test_of_overlaid_goals_the_first_one_counts() -> None:
+    first, second = (
+        merged(asking(3, "head", [1, 2, 3]), facing(2, 1.5)),
+        merged(asking(3, "head", [7, 8, 9]), facing(2, 0)),
+    )
+    first.asked[3, 15, 1] = False
+    both = overlaid(first, merged(second, merged(asking(4, "neck", [4, 5, 6]), facing(5, 0.25))))
+    assert both.positions[3, 15].tolist() == [1, 8, 3]
+    assert both.positions[4, 12].tolist() == [4, 5, 6]
+    assert (both.facing[2], both.facing[5], both.asked.sum(), both.facing_asked.sum()) == (1.5, 0.25, 6, 2)
+    here, there = (replace(goal, start=Placement(x)) for goal, x in ((first, 1.0), (second, 2.0)))
+    assert [overlaid(*pair).start for pair in ((here, there), (first, there), (here, second))] == [
+        Placement(1.0), Placement(2.0), Placement(1.0),
+    ]  # fmt: skip
+
+
+def test_placing_a_goal_turns_and_moves_it() -> None:
+    """One ahead of somebody at (5, 7) who faces +X is at (6, 7), and a facing of 0.5 is a quarter turn more."""
+    goal = replace(merged(asking(3, "head", [0, 2, 1]), facing(3, 0.5)), start=Placement(1, 0, 0.25))
+    placed = goal.placed(Placement(5, 7, np.pi / 2))
+    assert placed.positions[3, 15] == pytest.approx([6, 2, 7])
+    assert placed.facing[3] == pytest.approx(0.5 + np.pi / 2)
+    assert placed.start == Placement(pytest.approx(5), pytest.approx(6), pytest.approx(0.25 + np.pi / 2))
+
+
+@given(PLACES)
+def test_a_goal_placed_and_seen_from_there_is_itself(place: Placement) -> None:
+    goal = merged(asking(3, "head", [1, 2, 3]), facing(3, 0.5))
+    again = goal.placed(place).seen_from(place)
+    assert np.allclose(again.positions[goal.asked], goal.positions[goal.asked], atol=1e-8)
+    assert again.facing[3] == pytest.approx(0.5)

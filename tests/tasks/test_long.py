@@ -1,0 +1,267 @@
+"""Long motion with a random prior: lengths, seams, goals and paths where they belong, going on from a clip."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import pytest
+import torch
+
+from motionloom.checkpoint import Prior
+from motionloom.errors import MotionloomError
+from motionloom.features import humanml
+from motionloom.metrics.physics import heading
+from motionloom.motion import Motion
+from motionloom.retarget import to_smpl22
+from motionloom.tasks.goals import Goal, Placement
+from motionloom.tasks.long import Past, Segment, _decoded, compose, long_features
+from motionloom.tasks.splice import carried
+from motionloom.tasks.text import sample_features
+from tests.nets import tiny
+from tests.tasks.test_edit import person
+
+WALK, TURN = "a person walks", "a person turns left"
+
+
+@pytest.fixture(scope="module")
+def prior() -> Prior:
+    """Random weights around a walking person, so that what is drawn has human sizes."""
+    features = humanml.motion_to_features(person(2.0))
+    std = np.full(263, 0.02, np.float32)
+    std[:3] = 0.004
+    return replace(tiny.prior(), mean=torch.from_numpy(features.mean(0)), std=torch.from_numpy(std))
+
+
+def features(prior: Prior, segments, **more) -> list[torch.Tensor]:
+    return list(long_features(prior, segments, **{"steps": 3, **more}))
+
+
+def whole(prior: Prior, segments, **more) -> Motion:
+    blocks = list(compose(prior, segments, **{"steps": 3, **more}))
+    return replace(
+        blocks[0],
+        root=np.concatenate([block.root for block in blocks]),
+        rotations=np.concatenate([block.rotations for block in blocks]),
+    )
+
+
+def on_ground(points: np.ndarray) -> Goal:
+    """A path through x and z of the pelvis in every frame."""
+    goal = Goal.nothing(len(points))
+    goal.positions[:, 0, ::2], goal.asked[:, 0, ::2] = points, True
+    return goal
+
+
+def test_frames_are_the_sum_of_the_segments_rounded(prior: Prior) -> None:
+    """Alone, shorter than a token, and more than a block of bodies."""
+    for seconds in ([0.1], [0.15], [0.52, 1.23, 0.98], [4.0] * 5):
+        segments = [Segment(WALK, s, transition=0.2) for s in seconds]
+        frames = [round(s * 20) for s in seconds]
+        assert [len(piece) for piece in features(prior, segments, steps=1)] == frames
+        made = whole(prior, segments, steps=1)
+        assert (len(made), made.fps) == (sum(frames), 20)
+
+
+def test_company_and_patch_do_not_matter(prior: Prior) -> None:
+    """Rows of several lengths, levels, texts and guidances in one network call, or each in its own."""
+    net = replace(prior, net=tiny.net(tiny.PUBLISHED))
+    segments = [
+        Segment((WALK, TURN, "jump")[i % 3], 1.0 + 0.15 * i, guidance=float(i), transition=0.1 * i) for i in range(6)
+    ]
+    for one in (prior, net):
+        alone = features(one, segments, together=1)
+        for together in (2, 16):
+            for a, b in zip(alone, features(one, segments, together=together), strict=True):
+                torch.testing.assert_close(a, b, atol=1e-4, rtol=0)
+
+
+def test_one_segment_is_drawn_as_a_single_motion_is(prior: Prior) -> None:
+    """With one frame per token there is nothing to settle: the published net's `sample_features`, to the rounding."""
+    one = replace(prior, net=tiny.net(tiny.PUBLISHED))
+    made = features(one, [Segment(TURN, 1.0, guidance=4.0)], seed=9)[0]
+    other = sample_features(one, [TURN], [20], seeds=[9], steps=3, guidance=4.0)[0]
+    torch.testing.assert_close(made, other, atol=1e-5, rtol=0)
+
+
+def test_seeds_guidance_texts_and_transitions_matter(prior: Prior) -> None:
+    segments = [Segment(WALK, 1.5), Segment(TURN, 1.5), Segment(WALK, 1.5)]
+    base = features(prior, segments)
+    assert all(torch.equal(a, b) for a, b in zip(base, features(prior, segments), strict=True))
+    for at, change in [
+        (1, {"guidance": 7.0}),
+        (1, {"text": "jump"}),
+        (1, {"transition": 0.5}),
+        (0, {"transition": 0.3}),
+    ]:
+        changed = [replace(s, **change) if i == at else s for i, s in enumerate(segments)]
+        assert (features(prior, changed)[at] - base[at]).abs().max() > 1e-3
+    assert (features(prior, segments, seed=1)[0] - base[0]).abs().max() > 1e-3
+    assert torch.equal(features(prior, [replace(s, guidance=2.5) for s in segments])[1], base[1])
+    assert (features(prior, segments, guidance=0.0)[2] - base[2]).abs().max() > 1e-3
+
+
+def test_guidance_weighs_the_text(prior: Prior) -> None:
+    """At 0 the text does not matter."""
+    a, b = (features(prior, [Segment(text, 1.0, guidance=0.0)])[0] for text in (WALK, "jump"))
+    torch.testing.assert_close(a, b, atol=1e-6, rtol=0)
+
+
+def test_what_is_far_behind_changes_nothing(prior: Prior) -> None:
+    """Rows tell their neighbours one row per move: with 2 moves, row i depends on rows up to i + 2 and no further."""
+    segments = [Segment(WALK, 1.5) for _ in range(6)]
+    base = features(prior, segments, steps=2)
+    more = features(prior, [*segments[:5], Segment(TURN, 2.0), Segment("jump", 1.0)], steps=2, together=3)
+    apart = [(a - b).abs().amax(dim=1) for a, b in zip(base[:5], more)]
+    assert max(float(one.max()) for one in apart[:3]) < 1e-4
+    assert float(apart[3][:-10].max()) < 1e-4  # of the last it could reach, it reaches what is shared
+    assert float(apart[4].max()) > 1e-3
+
+
+def test_pieces_meet_at_the_seams(prior: Prior) -> None:
+    """The step over a seam is one as others are, where neighbours share frames."""
+    pieces = features(prior, [Segment(WALK if i % 2 else TURN, 1.5) for i in range(6)], steps=12)
+    jumps = (torch.cat(pieces).diff(dim=0) / prior.std).norm(dim=1).numpy()
+    seams = np.cumsum([len(piece) for piece in pieces])[:-1] - 1
+    assert jumps[seams].mean() < 1.3 * np.delete(jumps, seams).mean()
+
+
+def test_the_network_does_as_much_for_each_segment(prior: Prior) -> None:
+    """Row moves are segments times steps: time is linear."""
+    for count in (1, 4, 9):
+        said: list[int] = []
+        features(prior, [Segment(WALK, 1.0, transition=0.3)] * count, steps=4, progress=said.append)
+        assert sum(said) == 4 * count
+
+
+def test_endless_segments_come_as_they_are_read_and_leaving_stops_everything(prior: Prior) -> None:
+    read: list[object] = []
+
+    def endless() -> Iterator[Segment]:
+        try:
+            while True:
+                read.append(1)
+                yield Segment(WALK, 3.0)
+        finally:
+            read.append("closed")
+
+    state = torch.get_rng_state()
+    made = compose(prior, endless(), steps=1, together=2)
+    assert not read
+    block = next(made)
+    assert len(block) > 0
+    assert len(read) < 20
+    assert not torch.is_inference_mode_enabled()
+    made.close()  # type: ignore[attr-defined]
+    assert read[-1] == "closed"
+    assert torch.equal(torch.get_rng_state(), state)
+    assert len(list(islice(long_features(prior, endless(), steps=2), 3))) == 3
+
+
+@pytest.mark.parametrize("facing", [0.0, 2.0], ids=["ahead", "aside"])
+def test_a_goal_is_met_in_the_frame_of_its_segment(prior: Prior, facing: float) -> None:
+    """The root of the second segment is asked 0.3 m to the left of and ahead of where it begins, a second later."""
+    goal = Goal.nothing(40)
+    goal.positions[20, 0, ::2], goal.asked[20, 0, ::2] = (0.3, 0.5), True
+    clip = carried(person(2.0), np.array([np.cos(facing / 2), 0, np.sin(facing / 2), 0]), np.zeros(3), np.zeros(3))
+    segments = [Segment(TURN, 2.0), Segment(WALK, 2.0, goal=goal), Segment(TURN, 2.0)]
+    calm = prior.std.clone()
+    calm[:3] = 0.001  # the neighbours do not know the goal, and what they draw of the overlaps counts
+    prior = replace(prior, std=calm)
+    first = features(prior, [replace(segments[1], text=TURN)], past=Past.of(clip))[0].numpy().astype(np.float64)
+    np.testing.assert_allclose(humanml.decode_positions(first)[20, 0, ::2], (0.3, 0.5), atol=0.01)
+    pieces = features(prior, segments, past=Past.of(clip))
+    place = Past.of(clip).end
+    _, place = _decoded(pieces[0].numpy().astype(np.float64), place)
+    seen = humanml.decode_positions(pieces[1].numpy().astype(np.float64))
+    np.testing.assert_allclose(seen[20, 0, ::2], (0.3, 0.5), atol=0.1)
+    made = whole(prior, segments, start=clip, clean=False)
+    np.testing.assert_allclose(made.root[60, ::2], place.to_world(np.array([0.3, 0, 0.5]))[::2], atol=0.01)
+
+
+def test_a_path_is_followed_to_its_end(prior: Prior) -> None:
+    """A circle around (5, -4) through 12 segments; the last second is as near as the first."""
+    t = np.arange(12 * 30) / 20
+    points = np.stack([5 + 3 * np.sin(0.3 * t), -4 + 3 * np.cos(0.3 * t)], axis=-1)
+    made = whole(prior, [Segment(WALK, 1.5) for _ in range(12)], path=on_ground(points))
+    apart = np.linalg.norm(made.root[:, ::2] - points, axis=-1)
+    assert apart.max() < 0.02
+    assert apart[-20:].mean() < apart[:20].mean() + 0.005
+    way = np.arctan2(*np.diff(points, axis=0).T)
+    turn = (heading(made.positions())[:-1] - way + np.pi) % (2 * np.pi) - np.pi
+    assert np.abs(turn[30:]).mean() < 1.0
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.0, -2.5])
+def test_a_motion_goes_on_where_a_clip_ends(prior: Prior, turn: float) -> None:
+    """A clip at 30 fps elsewhere, facing anywhere: next place and velocity are what the clip's last frames lead to."""
+    quaternion = np.array([np.cos(turn / 2), 0, np.sin(turn / 2), 0])
+    clip = carried(person(61 / 30, 30.0), quaternion, np.zeros(3), np.array([4.0, 0, -7.0]))
+    assert len(clip) == 61  # two seconds: frames 0, 3, 6, ... are frames at 20 fps
+    made = whole(prior, [Segment(WALK, 2.0)], start=clip, clean=False)
+    old, new = to_smpl22(clip).resample(20).positions(), made.positions()  # which stands on the floor
+    step = old[-1] - old[-2]
+    assert np.linalg.norm(new[0] - (old[-1] + step), axis=-1).max() < 0.05
+    apart = np.linalg.norm((new[1] - new[0]) - step, axis=-1)
+    assert apart[[0, 3, 6, 9, 12, 15]].max() < 0.005
+    assert apart.max() < 0.07  # legs that swing are a pace faster or slower by such a step
+    assert abs(float(np.diff(heading(np.stack([old[-1], new[0]])))[0])) < 0.05
+
+
+def test_the_place_behind_features_is_where_the_next_ones_begin() -> None:
+    """Features of a person's motion cut in two and strung together are the motion."""
+    places = person(4.0).positions()
+    x, _, z = places[0, 0]
+    begin = Placement(float(x), float(z), float(heading(places[:1])[0]))
+    numbers = humanml.encode(begin.from_world(places)).astype(np.float64)
+    first, middle = _decoded(numbers[:33], begin)
+    second, end = _decoded(numbers[33:], middle)
+    np.testing.assert_allclose(np.concatenate([first, second]), places[:-1], atol=1e-4)
+    np.testing.assert_allclose([end.x, end.z], places[-1, 0, ::2], atol=1e-4)
+    assert len(Past.of(person(4.0)).known) == 20
+
+
+@pytest.mark.parametrize(
+    ("seconds", "asked", "said"),
+    [
+        ([1.0, 0.5, 1.0], {}, r"segment 2 \('a person walks'\) of 0.5 s is shorter"),
+        ([0.05], {}, "segment 1 .* is shorter"),
+        ([-1.0], {}, "segment 1 .* is shorter"),
+        ([1.0, 1.0], {"path": on_ground(np.zeros((39, 2)))}, "path has 39 frames"),
+        ([1.0], {"path": Goal.nothing(20)}, "in every frame"),
+        ([1.0], {"seed": -1}, "seed"),
+        ([1.0], {"seed": 2**62}, "seed"),
+        ([1.0], {"steps": 0}, "0 steps"),
+        ([1.0], {"steps": 51}, "51 steps"),
+        ([1.0], {"guidance": float("nan")}, "guidance"),
+        ([1.0], {"start": person(0.9)}, "0.90 s long; at least 1 s"),
+    ],
+    ids=str,
+)
+def test_what_cannot_be_asked_is_told(prior: Prior, seconds: list[float], asked: dict, said: str) -> None:
+    with pytest.raises(MotionloomError, match=said) as caught:
+        list(compose(prior, [Segment(WALK, s) for s in seconds], **{"steps": 1, **asked}))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"seconds": float("nan")},
+        {"seconds": float("inf")},
+        {"seconds": 1e6},
+        {"transition": float("nan")},
+        {"guidance": float("nan")},
+        {"guidance": 1e9},
+        {"goal": Goal.nothing(19)},
+    ],
+    ids=["nan", "inf", "hours", "transition", "guidance", "too strong", "goal"],
+)
+def test_segments_of_nonsense_are_refused(more: dict) -> None:
+    with pytest.raises(MotionloomError, match="the segment 'a person walks' has"):
+        Segment(**{"text": WALK, "seconds": 1.0, **more})
+
+
+def test_weights_for_other_numbers_are_refused(prior: Prior) -> None:
+    with pytest.raises(MotionloomError, match="135 numbers a frame"):
+        compose(replace(prior, mean=torch.zeros(135), std=torch.ones(135)), [Segment(WALK, 1.0)])
