@@ -50,9 +50,15 @@ class _Row:
         while self.draws <= move:
             self.drawn[self.draws] = torch.randn((self.link.length, features), generator=self.generator)
             self.draws += 1
-        for old in [known for known in self.drawn if known < self.done - 1]:
-            del self.drawn[old]
         return self.drawn[move]
+
+    def moved(self) -> None:
+        """One move more; of the noise up to it the next row needs the overlap, of what lies further back nothing."""
+        self.done += 1
+        for old in [move for move in self.drawn if move <= self.done]:
+            used = self.drawn.pop(old)
+            if old >= self.done - 1:
+                self.drawn[old] = used[-max(self.link.overlap, 1) :].clone()
 
 
 Guess = Callable[[Sequence[int], Sequence[State], Sequence[int]], Sequence[State]]
@@ -151,7 +157,7 @@ class _Chain:
         for number, row, clean, level in zip(numbers, rows, cleans, at, strict=True):
             draw = self._draw(number, row.done + 1)
             row.state = row.step(row.state.to(clean), clean, level, self.levels[row.done + 1], draw)
-            row.done += 1
+            row.moved()
         for number in numbers:
             self._shake(number - 1, number)
             if number + 1 not in numbers:
