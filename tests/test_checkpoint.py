@@ -160,6 +160,13 @@ def test_metadata_that_is_no_description_is_refused(file: Path, tmp_path: Path, 
         load_prior(write(tmp_path / "a.safetensors", parts(file)[0], text))
 
 
+def test_weights_of_something_else_are_no_prior(file: Path, tmp_path: Path) -> None:
+    """An evaluator's or an adapter's; nothing of Python is in the sentence."""
+    save_file(parts(file)[0], tmp_path / "a.safetensors", {"motionloom-adapter": "{}"})
+    with pytest.raises(MotionloomError, match=r"a.safetensors does not describe a motionloom prior; name"):
+        load_prior(tmp_path / "a.safetensors")
+
+
 @pytest.mark.parametrize("key", ["net.embed.weight", "net.blocks.1.table", "mean", "std"])
 @pytest.mark.parametrize("fault", ["missing", "misshapen", "nan", "more"])
 def test_tensors_that_do_not_fit_are_refused(file: Path, tmp_path: Path, key: str, fault: str) -> None:

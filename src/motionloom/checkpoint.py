@@ -187,6 +187,8 @@ def load_prior(path: Path, device: str | torch.device = "cpu") -> Prior:
 
 
 def _about(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
+    if "motionloom" not in metadata:  # such as an evaluator's or an adapter's
+        raise MotionloomError(f"{path} does not describe a motionloom prior; name a file that does")
     try:
         about = json.loads(metadata["motionloom"])
         if about["format"] != FORMAT:

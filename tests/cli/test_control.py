@@ -98,6 +98,14 @@ def test_goals_a_drawing_and_a_clip_to_follow_go_together(weights: Path, asked: 
     assert drawn.positions[59, 0, 2] == pytest.approx(1.2 * 3)
 
 
+def test_a_drawing_named_on_the_line_may_be_a_link(weights: Path, asked: list, folder: Path) -> None:
+    """Only files from strangers are kept in their folder."""
+    (folder / "inner").mkdir()
+    (folder / "inner" / "link.svg").symlink_to(folder / "line.svg")
+    assert control(weights, "walk", "--path", "inner/link.svg", "--seconds", "3") == 0
+    assert asked[-1]["goal"].positions[59, 0, 2] == pytest.approx(1.2 * 3)
+
+
 def test_a_path_elsewhere_moves_the_start_of_somebody_who_follows(weights: Path, asked: list) -> None:
     """The clip's person stands at x = 2, its hand 0.6 m further: in reach of a path at x = 2.3."""
     Path("goal.json").write_text(json.dumps({"path": {"points": [[2.3, 0]]}}))

@@ -92,6 +92,7 @@ REFUSED = [
     ("segments:\n- text: walk\n  secnds: 3", 3, "unknown key 'secnds' (did you mean 'seconds'?); a segment has text, "),
     ("seed: 1\nsegmets: [a]", 2, "unknown key 'segmets' (did you mean 'segments'?); a timeline has segments, seed"),
     ("segments: [a]\nzzz: 1", 2, "unknown key 'zzz'; a timeline has"),
+    ("segments: [a]\npath:\n  curve: s\n  size: 2", 3, "write it as path: {path: {curve: ...}}"),
     ("seed: 1\n", 1, "no 'segments'"),
     ("- walk\n- jump", 1, "a timeline must be a mapping with segments, "),
     ("walk", 1, "got 'walk'"),

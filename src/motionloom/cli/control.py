@@ -100,8 +100,9 @@ def _goal(arguments: argparse.Namespace) -> "Goal":
     goals = [read_goal(file, frames=frames, folder=file.parent) for file in arguments.goal]
     if arguments.path is not None:
         size = {} if arguments.width is None else {"width": arguments.width}
-        drawn = {"path": {"svg": arguments.path.name, **size}}
-        goals.append(read_goal(drawn, frames=frames, folder=arguments.path.parent))
+        drawing = arguments.path.resolve() if arguments.path.exists() else arguments.path  # a link may lead anywhere
+        drawn = {"path": {"svg": drawing.name, **size}}
+        goals.append(read_goal(drawn, frames=frames, folder=drawing.parent))
     if clip is not None:
         goals.append(follow(clip, arguments.follow, frames=frames))
     whole = goals[0]

@@ -235,6 +235,9 @@ class _Reader:
         if isinstance(what, str):
             what = self.file(found, name)
         elif isinstance(what, dict):
+            for key in ("points", "svg", "curve"):
+                if name == "path" and key in what:
+                    self.fail(what[key].key_line, f"'path' holds a goal; write it as path: {{path: {{{key}: ...}}}}")
             what = found.plain()
         else:
             self.fail(found.line, f"'{name}' must be a mapping or the name of a goal file; got {_got(found)}")
