@@ -36,6 +36,16 @@ def test_an_unknown_option_points_to_the_help_of_its_command(words, page, capsys
     assert said.err.endswith(f"see {page}\n")
 
 
+@pytest.mark.parametrize("moment", ["while commands are read", "while one runs"])
+def test_ctrl_c_is_one_line_and_130_at_any_moment(moment, monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(generate, "add" if moment == "while commands are read" else "_prompts", interrupted)
+    assert main(["generate", "a person walks"]) == 130
+    assert capsys.readouterr() == ("", "motionloom: interrupted\n")
+
+
 def test_no_command_at_all_lists_the_commands_on_stderr(capsys):
     assert main([]) == 2
     said = capsys.readouterr()

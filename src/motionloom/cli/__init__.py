@@ -7,6 +7,8 @@ import sys
 import warnings
 from collections.abc import Sequence
 
+from motionloom.errors import MotionloomError
+
 FAMILIES = ("generate", "compose", "control", "edit", "files", "data", "train", "evaluate", "bench", "weights")
 
 
@@ -37,22 +39,8 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; 0 done, 2 a mistake in what was asked or given, 130 interrupted."""
-    from motionloom.errors import MotionloomError
-
-    top = parser()
-    arguments = top.parse_args(argv)
-    if arguments.version:
-        from importlib.metadata import version
-
-        print(f"motionloom {version('motionloom')}")
-        return 0
-    if not hasattr(arguments, "run"):
-        top.print_help(sys.stderr)
-        return 2
-    try:
-        with warnings.catch_warnings():
-            warnings.showwarning = _warn
-            return arguments.run(arguments) or 0
+    try:  # from here on: a Ctrl-C while the commands are still being imported is one too
+        return _run(argv)
     except MotionloomError as error:
         print(f"motionloom: {error}", file=sys.stderr)
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
@@ -64,6 +52,22 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("motionloom: interrupted", file=sys.stderr)
         return 130
     return 2
+
+
+def _run(argv: Sequence[str] | None) -> int:
+    top = parser()
+    arguments = top.parse_args(argv)
+    if arguments.version:
+        from importlib.metadata import version
+
+        print(f"motionloom {version('motionloom')}")
+        return 0
+    if not hasattr(arguments, "run"):
+        top.print_help(sys.stderr)
+        return 2
+    with warnings.catch_warnings():
+        warnings.showwarning = _warn
+        return arguments.run(arguments) or 0
 
 
 def _warn(message: Warning | str, *_: object) -> None:
