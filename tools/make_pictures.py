@@ -4,32 +4,110 @@ python tools/make_pictures.py [FOLDER]
 """
 
 import sys
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+from PIL import Image, ImageDraw
+
 from motionloom.cli import main
+from motionloom.io import draw, load
+from motionloom.io.atomic import atomic_path
+from motionloom.io.figure import figure
+from motionloom.motion import Motion
+from motionloom.tasks.goal_file import read_goal
+from motionloom.tasks.goals import Goal
 
 ROOT = Path(__file__).resolve().parents[1]
+CLIP, GOALS = str(ROOT / "examples" / "clips" / "walk.bvh"), ROOT / "examples" / "goals"
 
-PICTURES: dict[str, list[str]] = {
-    "walk": ["a person walks forward and waves"],
-    "jump": ["a person jumps up and down"],
-    "run": ["a person runs forward"],
-    "punch": ["a person throws punches with both fists"],
-    "seeds": ["a person dances", "--count", "3"],
-}
-"""File name -> words of `motionloom generate`. These are first draws of seed 1, not the best of many."""
+SHEETS: dict[str, list[list[str]]] = {
+    "walk": [["generate", "a person walks forward and waves", "--seed", "1", "--out", "{out}"]],
+    "long": [
+        ["compose", "a person walks forward", "a person jumps up", "a person squats down", "a person dances",
+         "--seconds", "4", "--seed", "1", "--out", "{out}"]
+    ],
+    "edit": [
+        ["edit", CLIP, "a person waves with both hands", "--keep", "lower_body", "--seed", "1",
+         "--out", "{work}/waving.bvh"],
+        ["view", CLIP, "{work}/waving.bvh", "--out", "{out}"],
+    ],
+}  # fmt: skip
+"""File name -> commands; {out} is the picture. These are first draws of seed 1, not the best of many."""
+
+ASKED: draw.Colour = (240, 196, 60)
+"""The colour of what was asked for."""
 
 
-def draw(folder: Path) -> list[Path]:
-    """Generate every picture into ``folder`` and return the files; stops at the first command that fails."""
-    folder.mkdir(parents=True, exist_ok=True)
-    drawn = []
-    for name, words in PICTURES.items():
-        drawn.append(folder / f"{name}.png")
-        if main(["generate", *words, "--seed", "1", "--out", str(drawn[-1])]):
-            raise SystemExit(f"could not draw {name}")
-    return drawn
+def sheets(folder: Path, work: Path) -> list[Path]:
+    """Contact sheets that the commands draw by themselves."""
+    for name, commands in SHEETS.items():
+        for command in commands:
+            run([word.format(out=folder / f"{name}.png", work=work) for word in command])
+    return [folder / f"{name}.png" for name in SHEETS]
+
+
+def controlled(folder: Path, work: Path) -> list[Path]:
+    """Motions of `motionloom control` with what was asked of them in yellow: a path from above, a letter in the air."""
+    eight, letter = (GOALS / f"{name}.json" for name in ("figure_eight", "letter"))
+    motion = control("a person walks", eight, 14.0, work)
+    goal = read_goal(eight, frames=len(motion), folder=GOALS)
+    middle = motion.root.mean(axis=0) * [1, 0, 1] + [0, 0.62, 0]
+    above = draw.Camera(middle, (960, 430), 4.3, 0.0, 0.6)
+    path = strobe(motion, above, range(0, len(motion), 20), asked=goal, joint="pelvis", to=folder / "path.png")
+
+    motion = control("a person draws with the right hand", letter, 5.0, work)
+    goal = read_goal(letter, frames=len(motion), folder=GOALS)
+    front = draw.Camera(np.array([0.0, 0.95, 0.0]), (360, 430), 2.0, -0.2, 0.1)
+    written = strobe(motion, front, [60], asked=goal, joint="right_wrist", to=folder / "letter.png")
+    return [path, written]
+
+
+def control(prompt: str, goal: Path, seconds: float, work: Path) -> Motion:
+    """What the command makes of a prompt and a goal file."""
+    out = work / f"{goal.stem}.npz"
+    run(["control", prompt, "--goal", str(goal), "--seconds", str(seconds), "--seed", "1", "--out", str(out)])
+    return load(out)
+
+
+def strobe(motion: Motion, camera: draw.Camera, frames: Sequence[int], *, asked: Goal, joint: str, to: Path) -> Path:
+    """One picture of a motion in several frames, and of a joint's way: asked in yellow, made on top of it."""
+    shape, index, ground = figure(motion), motion.skeleton.index(joint), joint == "pelvis"
+    flat = np.array([1.0, 0.0, 1.0]) if ground else np.ones(3)
+    wanted = asked.asked[:, index].any(axis=-1)
+    picture = Image.new("RGB", (camera.size[0] * draw.SMOOTH, camera.size[1] * draw.SMOOTH), draw.PAPER)
+    pen = ImageDraw.Draw(picture)
+
+    def way(places: np.ndarray, colour: draw.Colour, width: float) -> None:
+        draw.paint_path(pen, camera, places[wanted, index] * flat, colour, width)
+
+    def bodies() -> None:
+        for frame in sorted(frames, key=lambda frame: -float(camera.see(shape.path[frame])[1])):
+            draw.paint_body(pen, camera, shape, frame)
+
+    draw.paint_floor(pen, camera, shape.floor)
+    for frame in frames:
+        draw.paint_shadow(picture, camera, shape, frame)
+    if not ground:  # what lies on the ground is under the feet, what is in the air before the body
+        bodies()
+    way(asked.positions, ASKED, 0.07 if ground else 0.045)
+    way(motion.positions(), draw.PATH, 0.018)
+    if ground:
+        bodies()
+    with atomic_path(to) as temporary:
+        picture.reduce(draw.SMOOTH).save(temporary, format="PNG")
+    return to
+
+
+def run(command: list[str]) -> None:
+    """One `motionloom` command; stops everything if it fails."""
+    if main(command):
+        raise SystemExit(f"this failed: motionloom {' '.join(command)}")
 
 
 if __name__ == "__main__":
-    print(*draw(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs" / "pictures"), sep="\n")
+    into = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs" / "pictures"
+    into.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as temporary:
+        print(*sheets(into, Path(temporary)), *controlled(into, Path(temporary)), sep="\n")
