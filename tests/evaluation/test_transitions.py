@@ -292,6 +292,8 @@ def test_ways_by_name() -> None:
     assert list(methods(prior, HOW, ["slerp", "ours", "slerp"])) == ["slerp", "ours"]
     with pytest.raises(MotionloomError, match="no method 'magic'"):
         methods(prior, HOW, ["magic"])
+    with pytest.raises(MotionloomError, match="no method is named; the methods are ours, "):
+        methods(prior, HOW, ())
     assert titled("published-1000", 24) != titled("published", 24)
     assert len({titled(name, 24) for name in long_baselines.TITLES}) == len(long_baselines.TITLES)
 

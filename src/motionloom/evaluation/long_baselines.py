@@ -41,9 +41,11 @@ Method: TypeAlias = Callable[[Sequence[str], Sequence[int], int], Long]
 
 
 def methods(prior: Prior, how: Transitions, names: Sequence[str] | None = None) -> dict[str, Method]:
-    """The named ways (default `DEFAULT`), in that order; MotionloomError for a name there is not."""
+    """The named ways (default `DEFAULT`), in that order; MotionloomError for a name there is not, and for none."""
     made = {name: partial(maker, prior, how) for name, maker in _MAKERS.items()}
-    wanted = list(dict.fromkeys(names or DEFAULT))
+    wanted = list(dict.fromkeys(DEFAULT if names is None else names))
+    if not wanted:
+        raise MotionloomError(f"no method is named; the methods are {', '.join(made)}")
     for name in wanted:
         if name not in made:
             raise MotionloomError(f"there is no method {name!r}; the methods are {', '.join(made)}")
