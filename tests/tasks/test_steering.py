@@ -132,6 +132,30 @@ def test_a_goal_may_begin_inside_a_row(prior: Prior) -> None:
     np.testing.assert_allclose(changed[:1], row[:1], atol=0.3)
 
 
+def planted(row: Tensor, prior: Prior, standing: slice) -> Tensor:
+    """The guess with its left foot told to be in contact."""
+    row = row.clone()
+    row[standing, 259:261] = 1 / prior.std[259]
+    return row
+
+
+def test_a_foot_in_contact_stands_while_the_path_is_moved(prior: Prior) -> None:
+    """A path of 3 cm a frame, aside too, moves the body; the toes told to stand do not slide, the others do."""
+    row = planted(guess() / 5, prior, slice(20, 27))
+    goal = wish(60, 0, {k: (0.3 * k / 60, 0.0, 0.03 * k) for k in range(60)})
+    after = decoded(toward(goal, prior)(row, 25), prior)[20:27]
+    slid = np.linalg.norm(np.diff(after[:, [10, 11]][..., [0, 2]], axis=0), axis=-1).max(axis=0)
+    assert slid[0] < 0.2 * slid[1]
+    np.testing.assert_allclose(after[:, 0, [0, 2]], goal.positions[20:27, 0, [0, 2]], atol=0.01)
+
+
+def test_a_foot_in_contact_that_is_asked_elsewhere_goes_there(prior: Prior) -> None:
+    row = planted(guess(), prior, slice(20, 50))
+    place = decoded(row, prior)[30, 10] + [0.05, 0.03, 0.0]
+    after = decoded(toward(wish(60, 10, {30: tuple(place)}), prior)(row, 1), prior)
+    np.testing.assert_allclose(after[30, 10], place, atol=2e-3)
+
+
 def test_the_displacements_stay_those_of_the_places(prior: Prior) -> None:
     """The joint velocities change by as much as the displacements that the places show."""
     row = guess()

@@ -36,6 +36,7 @@ from motionloom.tasks.text import (
     SPACING,
     STEPS,
     Progress,
+    check,
     smooth,
     to_motion,
 )
@@ -123,7 +124,9 @@ def steered_features(
     asked stand in the state without noise, as the last steered guess has them (as `blending.control_features`, whose
     numbers are known beforehand; here they depend on where the rest of the body goes).
     """
-    _check(prior, prompts, steps=steps, guidance=guidance, weights=weights, adapters=adapters)
+    check(prior, prompts, steps=steps, guidance=guidance, solver=SOLVER)
+    if weights is not None and len(weights) != len(adapters):
+        raise MotionloomError(f"there are {len(weights)} weights for {len(adapters)} adapters; give one for each")
     way = levels(prior.schedule, steps, spacing=SPACING)
     nets = [adapted(prior.net, adapter) for adapter in adapters]
     change, mask = toward(goal, prior), controlled_numbers(goal).to(prior.mean.device)
@@ -160,15 +163,19 @@ def controlled_numbers(goal: Goal) -> Tensor:
 
 
 def fitting_adapters(prior: Prior, goal: Goal) -> list[Adapter]:
-    """The shipped adapters for what is asked: one per joint that has its own, ``any`` for the others; none for another
-    prior's weights."""
+    """The shipped adapters for what is asked: one per joint that has its own, ``any`` for the others.
+
+    None for another prior's weights; MotionloomError for files that are damaged.
+    """
     names = shipped()
     wanted = {("trajectory" if joint == "pelvis" else joint) for joint in goal.joints}
     chosen = {name if name in names else "any" for name in wanted} & set(names)
     try:
         return [Adapter.load(name, prior) for name in sorted(chosen)]
-    except MotionloomError:
-        return []
+    except MotionloomError as error:
+        if "belongs to the weights" in str(error):
+            return []
+        raise
 
 
 def _seeing(told: Callable[[Tensor, Tensor], Denoiser], change: Correction, prior: Prior, mask: Tensor) -> Denoiser:
@@ -189,25 +196,6 @@ def _seeing(told: Callable[[Tensor, Tensor], Denoiser], change: Correction, prio
         return last
 
     return seen
-
-
-def _check(
-    prior: Prior,
-    prompts: Sequence[str],
-    *,
-    steps: int,
-    guidance: float,
-    weights: Sequence[Weight] | None,
-    adapters: Sequence[Adapter],
-) -> None:
-    if not isinstance(steps, int) or not 1 <= steps <= prior.schedule.steps:
-        raise MotionloomError(f"{steps} steps cannot be taken; these weights take 1 to {prior.schedule.steps}")
-    if not np.isfinite(guidance) or abs(guidance) > 100:
-        raise MotionloomError(f"a guidance of {guidance:g} makes no motion; usual values are 1 to 7")
-    if not all(prompt.strip() for prompt in prompts):
-        raise MotionloomError("a prompt is empty; say in words what the person does")
-    if weights is not None and len(weights) != len(adapters):
-        raise MotionloomError(f"there are {len(weights)} weights for {len(adapters)} adapters; give one for each")
 
 
 def moved(motion: Motion, place: Placement) -> Motion:

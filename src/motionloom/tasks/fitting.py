@@ -20,6 +20,7 @@ from motionloom.features.layout import FEET
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.goals import Goal
+from motionloom.tasks.stances import carried, runs
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -34,21 +35,8 @@ STEPS = 12
 _DONE = 1e-4
 """Metres: no wish gets nearer by more in the last step."""
 
-_BALLS = {
-    0: 0.15,
-    1: 0.5,
-    2: 0.5,
-    3: 0.15,
-    6: 0.15,
-    9: 0.15,
-    12: 0.2,
-    13: 0.1,
-    14: 0.1,
-    16: 0.6,
-    17: 0.6,
-    7: 0.3,
-    8: 0.3,
-}
+_BALLS = {0: 0.15, 1: 0.5, 2: 0.5, 3: 0.15, 6: 0.15, 9: 0.15, 12: 0.2, 13: 0.1, 14: 0.1, 16: 0.6, 17: 0.6, 7: 0.3,
+          8: 0.3}  # fmt: skip
 """Joints that turn freely, and radians by which they usually may."""
 _HINGES = {LIMBS[0].middle: 0.6, LIMBS[1].middle: 0.6, LIMBS[2].middle: 0.8, LIMBS[3].middle: 0.8}
 _ROOT = 0.05
@@ -125,9 +113,7 @@ def _wishes(goal: Goal, part: slice) -> _Wishes:
 def _windows(goal: Goal) -> Iterator[tuple[int, int]]:
     """Stretches of frames around wishes."""
     asked = goal.asked.any(axis=(1, 2)).astype(float)
-    near = np.convolve(asked, np.ones(2 * ROUND + 1))[ROUND:-ROUND] > 0.5
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
-    yield from zip(edges[::2].tolist(), edges[1::2].tolist())
+    yield from runs(np.convolve(asked, np.ones(2 * ROUND + 1))[ROUND:-ROUND] > 0.5)
 
 
 def _in_reach(places: Array, goal: Goal) -> Array:
@@ -189,29 +175,13 @@ def _feet(places: Array, shift: Array, goal: Goal, fps: float) -> _Wishes:
     wanted = places[:, list(FEET)].copy()
     weights = np.where(planted, 1 / STANDING, 1 / SWINGING)
     for side in (slice(0, 2), slice(2, 4)):
-        wanted[:, side] += _foot_shift(shift, planted[:, side].max(axis=1))[:, None]
+        wanted[:, side] += carried(shift, planted[:, side].max(axis=1))[:, None]
     near = np.ones(13)
     for joint, columns in _FEET_OF.items():
         asked = np.convolve(goal.asked[:, joint].any(axis=-1), near)[6:-6] > 0.5
         for column in columns:
             weights[:, column] = np.where(asked, 1e-3 / SWINGING, weights[:, column])
     return _Wishes(FEET, wanted, np.repeat(weights[..., None], 3, axis=-1))
-
-
-def _foot_shift(shift: Array, standing: Flags) -> Array:
-    """(frames, 3): constant while the foot stands, between stances the body's shift and what leads from one to the
-    other."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], standing.astype(int), [0]])))
-    extra = np.zeros_like(shift)
-    at, values = [-1.0 * ROUND], [np.zeros(3)]
-    for start, stop in zip(edges[::2], edges[1::2]):
-        mean = shift[start:stop].mean(0)
-        extra[start:stop] = mean - shift[start:stop]
-        at += [float(start), float(stop - 1)]
-        values += [extra[start], extra[stop - 1]]
-    at, values = [*at, float(len(shift) + ROUND)], np.array([*values, np.zeros(3)])
-    between = np.stack([np.interp(np.arange(len(shift)), at, values[:, c]) for c in range(3)], axis=-1)
-    return shift + np.where(standing[:, None], extra, between)
 
 
 # The pose and its derivatives

@@ -23,6 +23,7 @@ from motionloom.features.layout import LAYOUT, WIDTH
 from motionloom.metrics.physics import heading
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.goals import Goal, turn_between
+from motionloom.tasks.stances import EASE, stilled
 
 Array = NDArray[np.float64]
 
@@ -51,6 +52,8 @@ _REACH = {20: (16, 0.48), 21: (17, 0.48), 18: (16, 0.25), 19: (17, 0.25), 7: (1,
 """Where limbs begin, and metres that they reach without being quite straight."""
 _LONGEST = 0.8
 """Metres that a limb is moved at most: what is out of reach is pointed at."""
+_LEGS = (4, 7, 10), (5, 8, 11)
+"""Knee, ankle and foot, in the order of the contacts."""
 _TURN_OVER, _SLOW = 6.0, 0.005
 """Frames over which the body turns with its path; metres a frame below which a path has no direction."""
 
@@ -267,7 +270,26 @@ def _bent(features: Array, plan: _Plan) -> Array:
         if c != 1:
             path[:, c // 2] += plan.still @ pull.sum(1)
     local = guess.local + _turned(change, -guess.facing[:-1, None])
-    return _encoded(features, replace(guess, path=path, local=local))
+    guess = replace(guess, path=path, local=local)
+    steps = _standing(guess.world(), features[:, LAYOUT["contacts"]], plan.goal)
+    local = local + _turned(steps, -guess.facing[:-1, None])
+    return _encoded(features, replace(guess, local=local))
+
+
+def _standing(places: Array, contacts: Array, goal: Goal) -> Array:
+    """(frames, 22, 3) metres that legs go so that feet stand still where the guess says that they do.
+
+    A leg of which something is asked stays as it is around then.
+    """
+    change = np.zeros_like(places)
+    for side, (knee, ankle, toe) in enumerate(_LEGS):
+        asked = goal.asked[:, [knee, ankle, toe]].any(axis=(1, 2))
+        free = np.convolve(asked, np.ones(4 * EASE + 1))[2 * EASE : -2 * EASE] < 0.5
+        told = (contacts[:, 2 * side : 2 * side + 2] > 0.5) & free[:, None]
+        still = stilled(places[:, ankle], places[:, toe], told)
+        change[:, [ankle, toe]] = still[:, None]
+        change[:, knee] = still / 2
+    return change
 
 
 def _decoded(features: Array, first: int) -> _Guess:
