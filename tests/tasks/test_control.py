@@ -1,6 +1,7 @@
 """Goals to motions with a random prior: worlds, seeds and sentences; the shipped prior on one goal."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from motionloom.checkpoint import Prior
 from motionloom.errors import MotionloomError
 from motionloom.nets.adapter import Adapter, fingerprint, linears
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.control import control, controlled_numbers, judged
+from motionloom.tasks.control import control, controlled_numbers, fitting_adapters, judged
 from motionloom.tasks.goals import Goal, Placement
 from motionloom.tasks.text import generate
 from tests.nets import tiny
@@ -110,6 +111,19 @@ def adapter(prior: Prior) -> Adapter:
     tensors = {f"{name}.down": torch.zeros(1, layer.in_features) for name, layer in layers.items()}
     tensors |= {f"{name}.up": torch.zeros(layer.out_features, 1) for name, layer in layers.items()}
     return Adapter("blank", "any", 1, tensors, "tiny", fingerprint(prior.net))
+
+
+def test_shipped_adapters_of_other_weights_are_left_out_and_damaged_ones_are_said(
+    prior: Prior, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = {"trajectory": adapter(prior).save(tmp_path / "trajectory.safetensors")}
+    monkeypatch.setattr("motionloom.tasks.control.shipped", lambda: files)
+    monkeypatch.setattr("motionloom.nets.adapter.adapters", lambda: files)
+    assert [found.name for found in fitting_adapters(prior, path())] == ["blank"]
+    assert fitting_adapters(tiny.prior(seed=5), path()) == []
+    files["trajectory"].write_bytes(b"not an adapter")
+    with pytest.raises(MotionloomError, match="not an adapter"):
+        fitting_adapters(prior, path())
 
 
 @pytest.mark.parametrize(

@@ -93,6 +93,15 @@ def test_a_quarter_turned_world_gives_the_quarter_turned_motion() -> None:
     np.testing.assert_allclose(turned.positions(), place.to_world(fit(motion, goal).positions()), atol=1e-5)
 
 
+def test_the_mirror_image_is_fitted_to_the_mirror_image() -> None:
+    """To 6 mm: the person's own left and right bones differ by millimetres, and the other hand is asked."""
+    motion = standing(60)
+    place = motion.positions()[30, WRIST] + [0.1, 0.2, 0.0]
+    made = fit(motion, asked(motion, WRIST, [30], place)).mirror().positions()
+    other = fit(motion.mirror(), asked(motion, SMPL22.index("left_wrist"), [30], place * [-1, 1, 1])).positions()
+    np.testing.assert_allclose(made, other, atol=0.006)
+
+
 def test_out_of_reach_the_arm_points_there_and_the_body_stays() -> None:
     motion = standing(60)
     goal = asked(motion, WRIST, slice(25, 35), np.array([-0.2, 5.0, 0.0]))

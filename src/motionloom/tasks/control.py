@@ -84,7 +84,8 @@ def control(
 
     Motion i is drawn from ``seed + i`` alone. ``goal`` in the world at 20 frames per second; where the person stands
     at frame 0 is `placement_of` it. adapters: networks trained to see what is asked, blended with ``weights`` (one
-    each, else the mean); "auto" takes the shipped ones that fit (`fitting_adapters`), "none" the prior's own network.
+    each, else the mean; see `fitting_adapters`). "auto" and "none": the prior's own network; the shipped adapters were
+    measured and make no smaller errors but more jerk (docs/decisions/0012).
     exact: fit the drawn motion to the goal; clean: lock planted feet.
     Raises MotionloomError for what cannot be asked; a goal out of reach is no error (see `Controlled.missed`).
     """
@@ -96,7 +97,7 @@ def control(
     if not 4 <= len(goal) <= longest:
         raise MotionloomError(f"a goal of {len(goal)} frames cannot be followed; one of 4 to {longest} can")
     place = placement_of(goal)
-    chosen = fitting_adapters(prior, goal) if adapters == "auto" else () if adapters == "none" else adapters
+    chosen = () if isinstance(adapters, str) else adapters
     made = steered_features(
         prior, [prompt] * count, goal.seen_from(place), seeds=[seed + i for i in range(count)], guidance=guidance,
         steps=steps, adapters=chosen, weights=weights, progress=progress,

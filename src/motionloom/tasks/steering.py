@@ -54,7 +54,7 @@ _LONGEST = 0.8
 """Metres that a limb is moved at most: what is out of reach is pointed at."""
 _LEGS = (4, 7, 10), (5, 8, 11)
 """Knee, ankle and foot, in the order of the contacts."""
-_TURN_OVER, _SLOW = 6.0, 0.005
+_TURN_OVER, _SLOW = 6.0, 0.01
 """Frames over which the body turns with its path; metres a frame below which a path has no direction."""
 
 
