@@ -26,6 +26,11 @@ DEFAULT = (
     "keyframes", "in_between",
 )  # fmt: skip
 """Every kind of the paper's Table 4, each joint without and with the path, and two sparse ones."""
+SUITE = (
+    TRAJECTORY, "left_wrist", "head", "trajectory+left_wrist", "trajectory+right_foot", "left_wrist+right_foot",
+    "keyframes", "in_between",
+)  # fmt: skip
+"""Those of the suite of `evaluate all`: all of `DEFAULT` take hours on two CPU cores."""
 QUICK = (TRAJECTORY, "left_wrist", f"{TRAJECTORY}+left_wrist", "keyframes")
 """One of each sort, to see that everything works."""
 MOST_KINDS = 50

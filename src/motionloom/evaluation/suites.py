@@ -14,7 +14,7 @@ from typing import Any, Literal
 from motionloom.checkpoint import Prior, shipped
 from motionloom.errors import MotionloomError
 from motionloom.evaluation import obey, physical, realism
-from motionloom.evaluation.control_kinds import DEFAULT, QUICK
+from motionloom.evaluation.control_kinds import QUICK, SUITE
 from motionloom.evaluation.report import Report
 
 
@@ -199,7 +199,7 @@ SUITES: tuple[Suite, ...] = (
     Suite("transitions", "long motion: its segments, and jerk, skate and realism where they meet", _transitions,
           {"quick": False}, {"quick": True}, "used", _real_seams),
     Suite("control", "goals out of real motions: error, skate and jerk beside published ways of control", _control,
-          {"kinds": DEFAULT, "count": 32, "replications": 3}, {"kinds": QUICK, "count": 8, "replications": 1}, "needed",
+          {"kinds": SUITE, "count": 16, "replications": 2}, {"kinds": QUICK, "count": 8, "replications": 1}, "needed",
           _controls),
     Suite("obedience", "20 everyday prompts, each with a physical check", _obedience,
           {"seeds": 10, "paraphrases": True}, {"seeds": 2, "paraphrases": False}),
