@@ -40,7 +40,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list:
     """What the command asks of the task, which here only stands there, 1 cm beside its goals."""
     calls = []
 
-    def fake(prior, prompt, goal, *, count, seed, guidance, steps, exact, clean, progress, adapters="auto"):
+    def fake(prior, prompt, goal, *, count, seed, guidance, steps, exact, clean, progress, adapters="none"):
         calls.append({"prompt": prompt, "goal": goal, "count": count, "seed": seed, "exact": exact, "clean": clean,
                       "guidance": guidance, "steps": steps, "adapters": adapters})  # fmt: skip
         progress(1, 1)
@@ -73,7 +73,7 @@ def test_options_reach_the_task(weights: Path, asked: list, capsys: pytest.Captu
     call = asked[0]
     goal = call.pop("goal")
     assert call == {"prompt": "a person walks", "count": 2, "seed": 5, "guidance": 3.0, "steps": 7, "exact": False,
-                    "clean": False, "adapters": "auto"}  # fmt: skip
+                    "clean": False, "adapters": "none"}  # fmt: skip
     assert len(goal) == 40
     assert goal.positions[39, 0, ::2].tolist() == [1, 1.2]
     said = capsys.readouterr()

@@ -113,14 +113,15 @@ def adapter(prior: Prior) -> Adapter:
     return Adapter("blank", "any", 1, tensors, "tiny", fingerprint(prior.net))
 
 
-def test_shipped_adapters_of_other_weights_are_left_out_and_damaged_ones_are_said(
+def test_shipped_adapters_of_other_weights_and_damaged_ones_are_said(
     prior: Prior, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     files = {"trajectory": adapter(prior).save(tmp_path / "trajectory.safetensors")}
     monkeypatch.setattr("motionloom.tasks.control.shipped", lambda: files)
     monkeypatch.setattr("motionloom.nets.adapter.adapters", lambda: files)
     assert [found.name for found in fitting_adapters(prior, path())] == ["blank"]
-    assert fitting_adapters(tiny.prior(seed=5), path()) == []
+    with pytest.raises(MotionloomError, match="belongs to the weights"):
+        fitting_adapters(tiny.prior(seed=5), path())
     files["trajectory"].write_bytes(b"not an adapter")
     with pytest.raises(MotionloomError, match="not an adapter"):
         fitting_adapters(prior, path())

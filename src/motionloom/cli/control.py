@@ -45,7 +45,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--loose", action="store_true", help="leave the motion as drawn, near the goals")
     parser.add_argument(
         "--adapters", action="append", default=[], metavar="NAME|FILE",
-        help="auto (the default), none, or adapters to use, repeatable",
+        help="none (the default), fitting (the shipped ones for these goals), or names of adapters, repeatable",
     )  # fmt: skip
     parser.add_argument("--schema", action="store_true", help="print what a goal file may hold as JSON Schema and end")
     add_sampling(parser)
@@ -136,13 +136,13 @@ def _make(arguments: argparse.Namespace, goal: "Goal") -> "tuple[list[Controlled
 
 
 def _adapters(names: list[str], prior: "Prior") -> "Adapters":
-    """'auto', 'none' or the adapters of these names."""
-    if not names or names == ["auto"]:
-        return "auto"
-    if names == ["none"]:
+    """'none', 'fitting' or the adapters of these names."""
+    if not names or names == ["none"]:
         return "none"
-    if {"auto", "none"} & set(names):
-        fail("--adapters is auto, none, or names of adapters; not a mix of them")
+    if names == ["fitting"]:
+        return "fitting"
+    if {"fitting", "none"} & set(names):
+        fail("--adapters is none, fitting, or names of adapters; not a mix of them")
     from motionloom.nets.adapter import Adapter
 
     return [Adapter.load(name, prior) for name in names]

@@ -41,7 +41,7 @@ from motionloom.tasks.text import (
     to_motion,
 )
 
-Adapters = Literal["auto", "none"] | Sequence[Adapter]
+Adapters = Literal["none", "fitting"] | Sequence[Adapter]
 
 MISSED = 0.05
 """Metres off beyond which a wish counts as missed."""
@@ -74,7 +74,7 @@ def control(
     seed: int = 0,
     guidance: float = GUIDANCE,
     steps: int = STEPS,
-    adapters: Adapters = "auto",
+    adapters: Adapters = "none",
     weights: Sequence[Weight] | None = None,
     exact: bool = True,
     clean: bool = True,
@@ -84,8 +84,8 @@ def control(
 
     Motion i is drawn from ``seed + i`` alone. ``goal`` in the world at 20 frames per second; where the person stands
     at frame 0 is `placement_of` it. adapters: networks trained to see what is asked, blended with ``weights`` (one
-    each, else the mean; see `fitting_adapters`). "auto" and "none": the prior's own network; the shipped adapters were
-    measured and make no smaller errors but more jerk (docs/decisions/0012).
+    each, else the mean); "fitting" takes the shipped ones that fit (`fitting_adapters`), "none" the prior's own
+    network: the shipped ones were measured to make no smaller errors but more jerk (docs/decisions/0012).
     exact: fit the drawn motion to the goal; clean: lock planted feet.
     Raises MotionloomError for what cannot be asked; a goal out of reach is no error (see `Controlled.missed`).
     """
@@ -97,7 +97,7 @@ def control(
     if not 4 <= len(goal) <= longest:
         raise MotionloomError(f"a goal of {len(goal)} frames cannot be followed; one of 4 to {longest} can")
     place = placement_of(goal)
-    chosen = () if isinstance(adapters, str) else adapters
+    chosen = fitting_adapters(prior, goal) if adapters == "fitting" else () if adapters == "none" else adapters
     made = steered_features(
         prior, [prompt] * count, goal.seen_from(place), seeds=[seed + i for i in range(count)], guidance=guidance,
         steps=steps, adapters=chosen, weights=weights, progress=progress,
@@ -166,17 +166,12 @@ def controlled_numbers(goal: Goal) -> Tensor:
 def fitting_adapters(prior: Prior, goal: Goal) -> list[Adapter]:
     """The shipped adapters for what is asked: one per joint that has its own, ``any`` for the others.
 
-    None for another prior's weights; MotionloomError for files that are damaged.
+    MotionloomError for other weights than those they belong to, and for damaged files.
     """
     names = shipped()
     wanted = {("trajectory" if joint == "pelvis" else joint) for joint in goal.joints}
     chosen = {name if name in names else "any" for name in wanted} & set(names)
-    try:
-        return [Adapter.load(name, prior) for name in sorted(chosen)]
-    except MotionloomError as error:
-        if "belongs to the weights" in str(error):
-            return []
-        raise
+    return [Adapter.load(name, prior) for name in sorted(chosen)]
 
 
 def _seeing(told: Callable[[Tensor, Tensor], Denoiser], change: Correction, prior: Prior, mask: Tensor) -> Denoiser:
