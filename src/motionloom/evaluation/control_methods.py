@@ -15,6 +15,7 @@ from motionloom.features import humanml
 from motionloom.metrics.physics import Array
 from motionloom.motion import Motion
 from motionloom.nets.adapter import Adapter, adapted
+from motionloom.tasks.blending import Net, control_features
 from motionloom.tasks.text import ROWS, SOLVER, SPACING, sample_features, smooth, to_motion
 
 UNCONTROLLED, EXPORTED = "uncontrolled", "uncontrolled, as exported"
@@ -97,7 +98,7 @@ def uncontrolled(prior: Prior, how: Sampling, *, exported: bool) -> Method:
     return draw
 
 
-def published(prior: Prior, how: Sampling, nets: Sequence[torch.nn.Module], *, noise_free: bool) -> Method:
+def published(prior: Prior, how: Sampling, nets: Sequence[Net], *, noise_free: bool) -> Method:
     """Control in the representation: the fixed numbers are written into every guess (`tasks.blending`)."""
 
     def draw(wishes: Sequence[Wish], *, seeds: Sequence[int]) -> list[Made]:
@@ -113,12 +114,10 @@ def published(prior: Prior, how: Sampling, nets: Sequence[torch.nn.Module], *, n
 
 
 def _controlled(
-    prior: Prior, how: Sampling, nets: Sequence[torch.nn.Module], wishes: Sequence[Wish], seeds: Sequence[int],
+    prior: Prior, how: Sampling, nets: Sequence[Net], wishes: Sequence[Wish], seeds: Sequence[int],
     noise_free: bool,
 ) -> np.ndarray:  # fmt: skip
     """(rows, frames, 263) not standardised, of wishes of one length."""
-    from motionloom.tasks.blending import control_features
-
     mask = torch.from_numpy(np.stack([wish.mask for wish in wishes])).to(prior.mean.device)
     given = torch.from_numpy(np.stack([wish.known for wish in wishes])).to(prior.mean)
     known = (given - prior.mean) / prior.std

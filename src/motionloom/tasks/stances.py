@@ -40,7 +40,7 @@ def stilled(ankle: Array, toe: Array, planted: Flags) -> Array:
         both = flags[1:] & flags[:-1]
         steps[both] = -np.diff(place, axis=0)[both]  # toes last: the foot turns about them while all of it stands
     steps[:, 1] = 0
-    stances, paths = runs(planted.any(axis=1)), []
+    stances, paths = runs(planted[:, 0] | planted[:, 1]), []
     for start, stop in stances:
         path = np.concatenate([np.zeros((1, 3)), np.cumsum(steps[start : stop - 1], axis=0)])
         path -= path.mean(0)
