@@ -110,7 +110,7 @@ def test_the_defaults_are_read_from_generates_signature() -> None:
 def test_a_real_process_is_timed_and_weighed() -> None:
     used = bench.process(["--help"])
     assert 0 < used.seconds < 60
-    assert 5 < used.peak_mb < 2000
+    assert 5 < used.peak_mb < 100  # its own memory: this process, with torch, holds several times as much
 
 
 def test_a_process_that_fails_says_why() -> None:

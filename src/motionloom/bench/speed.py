@@ -2,6 +2,7 @@
 
 import inspect
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -208,22 +209,34 @@ class Process:
     """Greatest resident memory, 2^20 bytes."""
 
 
+_COMMAND = """import os, sys
+from motionloom.cli import main
+try:
+    sys.exit(main())
+finally:
+    if os.path.exists("/proc/self/status"):
+        print(*(line for line in open("/proc/self/status") if line.startswith("VmHWM")), file=sys.stderr)
+"""
+"""A command that says its own peak at the end: what Linux tells the parent includes the parent's memory at the start."""
+
+
 def process(arguments: Sequence[str]) -> Process:
     """Run `motionloom ARGUMENTS` in a fresh interpreter; raises MotionloomError with its last line if it fails."""
     if not hasattr(os, "wait4"):
         raise MotionloomError("this system does not tell what a process used; run bench on Linux or macOS")
-    code = "import sys; from motionloom.cli import main; sys.exit(main())"
     with tempfile.TemporaryFile() as said:
         start = time.perf_counter()
-        child = subprocess.Popen([sys.executable, "-c", code, *arguments], stdout=subprocess.DEVNULL, stderr=said)
+        child = subprocess.Popen([sys.executable, "-c", _COMMAND, *arguments], stdout=subprocess.DEVNULL, stderr=said)
         _, status, used = os.wait4(child.pid, 0)
         seconds = time.perf_counter() - start
         child.returncode = os.waitstatus_to_exitcode(status)
+        said.seek(0)
+        lines = said.read().decode(errors="replace").strip().splitlines()
+        told = re.fullmatch(r"VmHWM:\s*(\d+) kB", lines.pop().strip()) if lines and "VmHWM" in lines[-1] else None
         if child.returncode:
-            said.seek(0)
-            lines = said.read().decode(errors="replace").strip().splitlines()
             raise MotionloomError(f"motionloom {' '.join(arguments)} failed: {lines[-1] if lines else 'no message'}")
-    return Process(seconds, used.ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10))
+    peak = int(told[1]) if told else used.ru_maxrss / (2**10 if sys.platform == "darwin" else 1)
+    return Process(seconds, peak / 2**10)
 
 
 def commands(weights: str, *, repeats: int, run: Callable[[Sequence[str]], Process] = process) -> list[Entry]:
