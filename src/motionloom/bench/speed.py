@@ -217,7 +217,7 @@ finally:
     if os.path.exists("/proc/self/status"):
         print(*(line for line in open("/proc/self/status") if line.startswith("VmHWM")), file=sys.stderr)
 """
-"""A command that says its own peak at the end: what Linux tells the parent includes the parent's memory at the start."""
+"""A command that says its own peak at the end: what Linux tells the parent begins with the parent's memory."""
 
 
 def process(arguments: Sequence[str]) -> Process:
