@@ -52,6 +52,9 @@ measure: $(VENV)/.runtime  ## measure the shipped weights anew (DATA=built set);
 	$(BIN)/motionloom evaluate realism $(if $(DATA),--data $(DATA)) --out benchmarks/realism
 	$(BIN)/motionloom evaluate realism $(if $(DATA),--data $(DATA)) --finished --out benchmarks/realism_finished
 	$(BIN)/motionloom bench --json benchmarks/speed.json > benchmarks/speed.txt
+	$(BIN)/motionloom bench --long --json benchmarks/long.json > benchmarks/long.txt
+	$(BIN)/python benchmarks/user_goals.py --out out/user_goals > benchmarks/user_goals/table.txt
+	cp out/user_goals/user_goals.json benchmarks/user_goals/
 	$(BIN)/python tools/fill_readme.py
 	$(BIN)/motionloom evaluate all $(if $(DATA),--data $(DATA)) --keep $(RELEASE) --results docs/results.md
 
