@@ -1,8 +1,9 @@
 """`motionloom evaluate control`: does a motion go where it is asked to, and does it still look real."""
 
 import argparse
-import sys
 from pathlib import Path
+
+from motionloom.cli.evaluate_text import say, selected, words
 
 
 def add(commands) -> None:
@@ -17,7 +18,7 @@ def add(commands) -> None:
     )  # fmt: skip
     control.add_argument("--evaluator", default="own", metavar="own|FILE", help="who judges (default: the shipped one)")
     control.add_argument(
-        "--kinds", type=_words, metavar="trajectory,left_wrist,...",
+        "--kinds", type=words, metavar="trajectory,left_wrist,...",
         help="goals: trajectory, left_wrist, right_wrist, left_foot, right_foot, head, several with + between them, "
         "keyframes, in_between (default: the paper's and more, 14)",
     )  # fmt: skip
@@ -27,10 +28,8 @@ def add(commands) -> None:
     control.add_argument("--steps", type=int, help="sampler steps (default: as generate)")
     control.add_argument("--guidance", type=float, help="strength of the text (default: as generate)")
     control.add_argument("--seed", type=int, help="first seed (default 0)")
-    control.add_argument("--split", type=_words, metavar="val,test", help="splits of --data (default val,test)")
-    control.add_argument(
-        "--sources", type=_words, metavar="cmu", help="sources of --data (default cmu; all: every one)"
-    )
+    control.add_argument("--split", type=words, metavar="val,test", help="splits of --data (default val,test)")
+    control.add_argument("--sources", type=words, metavar="cmu", help="sources of --data (default cmu; all: every one)")
     control.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     control.add_argument(
         "--out", type=Path, help="folder for report.md, report.json and plots; a run that was stopped goes on"
@@ -38,14 +37,6 @@ def add(commands) -> None:
     control.add_argument("--quick", action="store_true", help="eight motions, one replication, few kinds")
     control.add_argument("--json", action="store_true", help="print JSON instead of a table")
     control.set_defaults(run=_control)
-
-
-def _words(said: str) -> tuple[str, ...]:
-    return tuple(word.strip() for word in said.split(",") if word.strip())
-
-
-def _say(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
 
 
 def _control(arguments: argparse.Namespace) -> None:
@@ -60,8 +51,8 @@ def _control(arguments: argparse.Namespace) -> None:
     found = control.run(
         arguments.weights, data=arguments.data, evaluator=arguments.evaluator,
         kinds=usual if arguments.kinds is None else arguments.kinds,
-        methods=arguments.method or control.METHODS, selection=_selection(arguments), protocol=_protocol(arguments),
-        folder=arguments.out, device=arguments.device, command=_command(arguments), progress=_say,
+        methods=arguments.method or control.METHODS, selection=selected(arguments), protocol=_protocol(arguments),
+        folder=arguments.out, device=arguments.device, command=_command(arguments), progress=say,
     )  # fmt: skip
     if arguments.out:
         report.write(found, arguments.out)
@@ -81,16 +72,6 @@ def _protocol(arguments: argparse.Namespace):
     if arguments.quick:
         said = {"count": quick().count, "replications": quick().replications, **said}
     return settings(**said)
-
-
-def _selection(arguments: argparse.Namespace):
-    """None where nothing was said: the defaults."""
-    from motionloom.evaluation.protocol import Selection
-
-    if arguments.split is None and arguments.sources is None:
-        return None
-    sources = arguments.sources if arguments.sources is not None else Selection.sources
-    return Selection(arguments.split or Selection.splits, () if sources == ("all",) else sources)
 
 
 def _command(arguments: argparse.Namespace) -> str:

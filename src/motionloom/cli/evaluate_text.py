@@ -28,8 +28,8 @@ def add(commands) -> None:
     text.add_argument("--guidance", type=float, help="strength of the text (default: as generate)")
     text.add_argument("--solver", help="solver name (default: as generate)")
     text.add_argument("--seed", type=int, help="first seed (default 0)")
-    text.add_argument("--split", type=_words, metavar="val,test", help="splits of --data (default val,test)")
-    text.add_argument("--sources", type=_words, metavar="cmu", help="sources of --data (default cmu; all: every one)")
+    text.add_argument("--split", type=words, metavar="val,test", help="splits of --data (default val,test)")
+    text.add_argument("--sources", type=words, metavar="cmu", help="sources of --data (default cmu; all: every one)")
     text.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     text.add_argument(
         "--out", type=Path, help="folder for report.md, report.json and plots; a run that stopped goes on"
@@ -49,7 +49,7 @@ def _steps(said: str) -> tuple[int, ...]:
         raise argparse.ArgumentTypeError(f"{said!r} are not whole numbers with commas, such as 5,20,50") from None
 
 
-def _words(said: str) -> tuple[str, ...]:
+def words(said: str) -> tuple[str, ...]:
     return tuple(word.strip() for word in said.split(",") if word.strip())
 
 
@@ -68,7 +68,7 @@ def _times(said: str) -> tuple[int, int]:
         raise argparse.ArgumentTypeError(f"{said!r} is not captions x motions of each, such as 10x10, or 0") from None
 
 
-def _say(line: str) -> None:
+def say(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
@@ -80,13 +80,13 @@ def _text(arguments: argparse.Namespace) -> None:
 
     if arguments.make_reference:
         return _make_reference(arguments)
-    protocol, selection = _protocol(arguments), _selection(arguments)
+    protocol, selection = _protocol(arguments), selected(arguments)
     if arguments.out:
         obey.check_report(arguments.out / "report.json")
     found = text.run(
         arguments.weights, evaluator=arguments.evaluator, data=arguments.data, selection=selection, protocol=protocol,
         folder=arguments.out, device=arguments.device, memory=lambda steps: _memory(arguments, steps),
-        command=_command(arguments), progress=_say,
+        command=_command(arguments), progress=say,
     )  # fmt: skip
     if arguments.out:
         report.write(found, arguments.out)
@@ -106,7 +106,7 @@ def _make_reference(arguments: argparse.Namespace) -> None:
     if arguments.data is None:
         raise MotionloomError("a reference is made of real motions; name them with --data")
     text_reference.check_reference(arguments.make_reference)
-    found = reference(load_evaluator(arguments.evaluator), arguments.data, _selection(arguments), _say)
+    found = reference(load_evaluator(arguments.evaluator), arguments.data, selected(arguments), say)
     path = text_reference.save(found, arguments.make_reference)
     print(f"{path}: {len(found.names)} items, {path.stat().st_size / 1e6:.2f} MB")
 
@@ -133,7 +133,7 @@ def _protocol(arguments: argparse.Namespace):
     return quick(protocol) if arguments.quick else protocol
 
 
-def _selection(arguments: argparse.Namespace):
+def selected(arguments: argparse.Namespace):
     """None where nothing was said: the defaults, or those of the shipped numbers."""
     from motionloom.evaluation.protocol import Selection
 

@@ -1,8 +1,9 @@
 """`motionloom evaluate transitions`: long motion, how good its segments are and how smooth what joins them."""
 
 import argparse
-import sys
 from pathlib import Path
+
+from motionloom.cli.evaluate_text import say, selected, words
 
 
 def add(commands) -> None:
@@ -17,7 +18,7 @@ def add(commands) -> None:
     )  # fmt: skip
     seams.add_argument("--evaluator", default="own", metavar="own|FILE", help="who judges (default: the shipped one)")
     seams.add_argument(
-        "--methods", type=_words, metavar="ours,ours-exported,published,paper,first-take,concatenation,slerp",
+        "--methods", type=words, metavar="ours,ours-exported,published,paper,first-take,concatenation,slerp",
         help="rows (default: these); also second-take, published-1000, paper-1000: the last two take hours",
     )  # fmt: skip
     seams.add_argument("--intervals", type=int, help="captions of one long motion (default 32)")
@@ -26,8 +27,8 @@ def add(commands) -> None:
     seams.add_argument("--steps", type=int, help="sampler steps (default 24)")
     seams.add_argument("--guidance", type=float, help="strength of the text (default: as generate)")
     seams.add_argument("--seed", type=int, help="first seed (default 0)")
-    seams.add_argument("--split", type=_words, metavar="val,test", help="splits of --data (default val,test)")
-    seams.add_argument("--sources", type=_words, metavar="cmu", help="sources of --data (default cmu; all: every one)")
+    seams.add_argument("--split", type=words, metavar="val,test", help="splits of --data (default val,test)")
+    seams.add_argument("--sources", type=words, metavar="cmu", help="sources of --data (default cmu; all: every one)")
     seams.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     seams.add_argument("--out", type=Path, help="folder for the report and plots; a run that stopped goes on")
     seams.add_argument("--quick", action="store_true", help="one unfolding of 8 captions, two replications")
@@ -38,14 +39,6 @@ def add(commands) -> None:
     seams.set_defaults(run=_transitions)
 
 
-def _words(said: str) -> tuple[str, ...]:
-    return tuple(word.strip() for word in said.split(",") if word.strip())
-
-
-def _say(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
-
-
 def _transitions(arguments: argparse.Namespace) -> None:
     import json
     from dataclasses import replace
@@ -54,13 +47,13 @@ def _transitions(arguments: argparse.Namespace) -> None:
 
     if arguments.make_reference:
         return _make_reference(arguments)
-    how, selection = _protocol(arguments), _selection(arguments)
+    how, selection = _protocol(arguments), selected(arguments)
     if arguments.out:
         obey.check_report(arguments.out / "report.json")
     found = transitions.run(
         arguments.weights, evaluator=arguments.evaluator, data=arguments.data, selection=selection, how=how,
         names=arguments.methods, folder=arguments.out, device=arguments.device, command=_command(arguments),
-        progress=_say,
+        progress=say,
     )  # fmt: skip
     if arguments.out:
         report.write(found, arguments.out)
@@ -79,7 +72,7 @@ def _make_reference(arguments: argparse.Namespace) -> None:
     if arguments.data is None:
         raise MotionloomError("a reference is made of real motions; name them with --data")
     obey.check_report(arguments.make_reference)
-    how, chosen = _protocol(arguments), fitting(arguments.data, _selection(arguments))
+    how, chosen = _protocol(arguments), fitting(arguments.data, selected(arguments))
     items = read_items(arguments.data, chosen)
     crops = real_seams.Crops.of([item.features for item in items], how.window, None, seed=how.seed)
     said = f"{' + '.join(chosen.splits)} of {', '.join(chosen.sources) or 'all sources'}"
@@ -94,13 +87,6 @@ def _protocol(arguments: argparse.Namespace):
     names = ("intervals", "unfoldings", "replications", "steps", "guidance", "seed")
     how = Transitions(**{n: getattr(arguments, n) for n in names if getattr(arguments, n) is not None})
     return quick_transitions(how) if arguments.quick else how
-
-
-def _selection(arguments: argparse.Namespace):
-    """None where nothing was said: the defaults, or those of the shipped numbers."""
-    from motionloom.cli.evaluate_text import _selection as chosen
-
-    return chosen(arguments)
 
 
 def _command(arguments: argparse.Namespace) -> str:
