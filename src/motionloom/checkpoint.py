@@ -19,7 +19,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
-from motionloom.diffusion import Schedule, cosine, linear
+from motionloom.diffusion import SCHEDULES, Schedule
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.nets.prior import Condition, NetConfig, PriorNet, condition
@@ -28,7 +28,6 @@ from motionloom.nets.text import MiniLM, TextEncoder
 
 FORMAT = 1
 MAX_BYTES = 2 << 30
-SCHEDULES = {"cosine": cosine, "linear": linear}
 
 
 @dataclass(frozen=True)

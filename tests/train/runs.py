@@ -8,9 +8,9 @@ from pathlib import Path
 
 import torch
 
-from motionloom.checkpoint import SCHEDULES
 from motionloom.data.build import Clip, Note, write_clip
 from motionloom.data.sets import Batches, load_set
+from motionloom.diffusion import SCHEDULES
 from motionloom.features import humanml as hml
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.train.loop import World, train

@@ -3,22 +3,27 @@
 Nothing here knows about motion. Read `schedule`, `solvers`, `sampling`, then `denoisers` and `constraints`.
 """
 
+from .bases import Basis, Dct, Frames
 from .constraints import Constraint, chain, handshake, observe
 from .denoisers import Denoiser, Weight, blend, from_noise, guide, inpaint, join_rows, mix
 from .sampling import Snapshot, masked_draw, restart, row_draw, run, sample
-from .schedule import SPACINGS, Draw, Schedule, State, cosine, from_betas, levels, linear
+from .schedule import SCHEDULES, SPACINGS, Draw, Schedule, State, cosine, from_betas, levels, linear, sigmoid, sqrt
 from .solvers import DDPM, SOLVERS, Ddim, DpmSolver2M, Solver, Step
 from .staggered import Guess, Link, staggered
 
 __all__ = [
     "DDPM",
+    "SCHEDULES",
     "SOLVERS",
     "SPACINGS",
+    "Basis",
     "Constraint",
+    "Dct",
     "Ddim",
     "Denoiser",
     "DpmSolver2M",
     "Draw",
+    "Frames",
     "Guess",
     "Link",
     "Schedule",
@@ -45,5 +50,7 @@ __all__ = [
     "row_draw",
     "run",
     "sample",
+    "sigmoid",
+    "sqrt",
     "staggered",
 ]

@@ -11,6 +11,7 @@ from typing import TypeAlias
 import torch
 from torch import Tensor
 
+from .bases import Basis
 from .denoisers import mix
 from .schedule import Draw, Schedule, State
 
@@ -18,14 +19,24 @@ Constraint: TypeAlias = Callable[[State, int], State]
 """(state, the level it has just reached) -> edited state, of the same shape."""
 
 
-def observe(known: State, mask: Tensor, schedule: Schedule, draw: Draw) -> Constraint:
+def observe(known: State, mask: Tensor, schedule: Schedule, draw: Draw, *, basis: Basis | None = None) -> Constraint:
     """Where `mask` is 1 (True) the state becomes signal * known + noise * draw(known), at the level it reached.
 
     With a normal draw it is the known half of RePaint (Lugmayr et al. 2022, eq. 8a). With `draw=torch.zeros_like`
     it is the noise-filtered sampling of PriorMDM's fine-tuned control, where the network is shown the goal without
     noise. A soft mask mixes linearly. The loop does not edit the starting state: call the constraint on it first.
+
+    With a ``basis``, `known` and the state are coefficients and `mask` is over time, (..., frames, features): both are
+    mixed in time and taken back, which drops what the basis does not keep (DCT-Completion; Chen et al. 2023, eq. 7).
     """
-    return lambda x, level: mix(x, schedule.noised(known, level, draw(known)), mask)
+
+    def held(x: State, level: int) -> State:
+        noised = schedule.noised(known, level, draw(known))
+        if basis is None:
+            return mix(x, noised, mask)
+        return basis.to_spectrum(mix(basis.to_time(x), basis.to_time(noised), mask))
+
+    return held
 
 
 def handshake(lengths: Sequence[int], overlap: int) -> Constraint:

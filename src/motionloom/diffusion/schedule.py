@@ -11,9 +11,10 @@ tensors they multiply alone.
 
 import bisect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import TypeAlias
 
 import torch
@@ -105,12 +106,27 @@ def from_betas(name: str, betas: Sequence[float] | Tensor) -> Schedule:
 
 def cosine(steps: int) -> Schedule:
     """The cosine schedule (Nichol & Dhariwal 2021, eq. 17), betas cut at 0.999."""
+    return _from_signal("cosine", steps, lambda u: math.cos((u + 0.008) / 1.008 * math.pi / 2) ** 2)
+
+
+def sqrt(steps: int) -> Schedule:
+    """The square-root schedule (Li et al. 2022, "Diffusion-LM"), betas cut at 0.999: much noise already at level 1."""
+    return _from_signal("sqrt", steps, lambda u: 1 - math.sqrt(u + 1e-4))
+
+
+def sigmoid(steps: int) -> Schedule:
+    """The sigmoid schedule (Jabri et al. 2022) from -3 to 3 at temperature 0.7, betas cut at 0.999."""
+
+    def logistic(x: float) -> float:
+        return 1 / (1 + math.exp(-x / 0.7))
+
+    return _from_signal("sigmoid", steps, lambda u: logistic(3) - logistic(6 * u - 3))
+
+
+def _from_signal(name: str, steps: int, kept: Callable[[float], float]) -> Schedule:
+    """The schedule whose share of signal at time u in [0, 1] is proportional to ``kept(u)``."""
     _check_steps(steps)
-
-    def kept(u: float) -> float:
-        return math.cos((u + 0.008) / 1.008 * math.pi / 2) ** 2
-
-    return from_betas("cosine", [min(1 - kept((i + 1) / steps) / kept(i / steps), 0.999) for i in range(steps)])
+    return from_betas(name, [min(max(1 - kept((i + 1) / steps) / kept(i / steps), 0.0), 0.999) for i in range(steps)])
 
 
 def linear(steps: int) -> Schedule:
@@ -118,6 +134,12 @@ def linear(steps: int) -> Schedule:
     _check_steps(steps)
     scale = 1000 / steps
     return from_betas("linear", torch.linspace(scale * 1e-4, scale * 0.02, steps, dtype=torch.float64).clamp(max=0.999))
+
+
+SCHEDULES: Mapping[str, Callable[[int], Schedule]] = MappingProxyType(
+    {"cosine": cosine, "linear": linear, "sqrt": sqrt, "sigmoid": sigmoid}
+)
+"""Schedules by the names that recipes and weight files use: from a number of levels."""
 
 
 def levels(schedule: Schedule, steps: int, *, spacing: str = "index") -> list[int]:

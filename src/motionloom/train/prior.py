@@ -8,7 +8,6 @@ import torch
 from torch import Tensor, nn
 
 from motionloom.checkpoint import (
-    SCHEDULES,
     Card,
     Prior,
     find_device,
@@ -18,6 +17,7 @@ from motionloom.checkpoint import (
     save_prior,
 )
 from motionloom.data.sets import FAVOUR, Batches, MotionSet, load_set
+from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.nets.text import MiniLM, TextEncoder

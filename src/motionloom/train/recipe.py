@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, get_type_hints
 
+from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
 from motionloom.nets.prior import NetConfig
 
@@ -129,7 +130,7 @@ def _check(path: Path, recipe: Recipe) -> None:
         and recipe.levels > 1 and 0 <= recipe.cooldown <= 1 and recipe.clip > 0 and recipe.save_every > 0
         and len(recipe.windows) == len(recipe.shares) > 0 and 0 < min(recipe.windows) <= max(recipe.windows) <= 10_000
         and min(recipe.shares) >= 0 < sum(recipe.shares)
-        and recipe.amp in ("bf16", "none") and recipe.schedule in ("cosine", "linear")
+        and recipe.amp in ("bf16", "none") and recipe.schedule in SCHEDULES
         and recipe.spacing in ("index", "early")
     )  # fmt: skip
     if not good:

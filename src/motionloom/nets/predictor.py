@@ -1,0 +1,167 @@
+"""TransLinear, the network of HumanMAC (Chen et al. 2023, section 3.3): a transformer whose tokens are frequencies.
+
+As published, with the published names of its weights, so that published checkpoints load; or with two additions of
+ours (`NetConfig.beside`, `NetConfig.told`) for networks that are told which numbers are given.
+"""
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from motionloom.errors import MotionloomError
+
+
+@dataclass(frozen=True)
+class NetConfig:
+    """Sizes; the defaults are the published Human3.6M network of 28,401,712 parameters."""
+
+    channels: int = 48
+    """Numbers per token: 3 per joint."""
+    kept: int = 20
+    """Tokens: frequencies, the lowest first."""
+    layers: int = 8
+    """Even: the first half hands what it was given to the second half."""
+    width: int = 512
+    heads: int = 8
+    dropout: float = 0.2
+    told: tuple[int, int] | None = None
+    """Rows and channels of what the network is told; None: the spectrum of the observation, (kept, channels)."""
+    beside: bool = False
+    """Whether every token also sees its own row of what is told (the first ``kept`` rows). Not published."""
+
+    def __post_init__(self) -> None:
+        sizes = (self.channels, self.kept, self.layers, self.width, self.heads, *self.told_shape)
+        small = all(isinstance(n, int) and not isinstance(n, bool) and 0 < n <= 8192 for n in sizes)
+        if not small or self.layers > 128 or self.width % (2 * self.heads) or not 0 <= self.dropout < 1:
+            raise MotionloomError(f"the network's sizes are not usable: {asdict(self)}")
+        if self.layers % 2:
+            raise MotionloomError(
+                f"the number of layers must be even, for the first half feeds the second; got {self.layers}"
+            )
+        if self.beside and self.told_shape[0] < self.kept:
+            raise MotionloomError(f"{self.kept} tokens cannot each see one of {self.told_shape[0]} rows")
+
+    @property
+    def told_shape(self) -> tuple[int, int]:
+        """Rows and channels of what the network is told."""
+        return self.told or (self.kept, self.channels)
+
+    @staticmethod
+    def parse(values: dict[str, Any]) -> "NetConfig":
+        """From plain data out of a recipe or a weight file; raises MotionloomError."""
+        try:
+            told = values.get("told")
+            return NetConfig(**(values | {"told": None if told is None else (told[0], told[1])}))
+        except (TypeError, IndexError, KeyError) as error:
+            raise MotionloomError(f"the network's settings are not usable: {error}") from None
+
+
+class TransLinear(nn.Module):
+    """``net(x, t, told)``: the guess of the noise (published) or of the clean spectrum, of x's shape.
+
+    x (rows, kept, channels); t (rows,) the published counting of noise levels, 0 the first noisy one; told (rows,
+    *config.told_shape) or None. ``keep`` (rows,) bool: the rows that are told; the others are treated as with None.
+    """
+
+    def __init__(self, config: NetConfig) -> None:
+        super().__init__()
+        self.config = config
+        width, (rows, channels) = config.width, config.told_shape
+        self.sequence_embedding = nn.Parameter(torch.randn(config.kept, width))
+        self.joint_embed = nn.Linear(config.channels + config.beside * channels, width)
+        self.time_embed = nn.Sequential(nn.Linear(width, width), nn.SiLU(), nn.Linear(width, width))
+        self.cond_embed = nn.Linear(rows * channels, width)
+        self.temporal_decoder_blocks = nn.ModuleList(_Block(config) for _ in range(config.layers))
+        self.out = _zeroed(nn.Linear(width, config.channels))
+
+    def forward(self, x: Tensor, t: Tensor, told: Tensor | None = None, keep: Tensor | None = None) -> Tensor:
+        style = self.time_embed(waves(t, self.config.width).to(x))
+        if told is not None:
+            asked = self.cond_embed(told.flatten(1))
+            style = style + (asked if keep is None else asked * keep[:, None])
+        if self.config.beside:
+            x = torch.cat([x, self._beside(x, told, keep)], dim=-1)
+        h = self.joint_embed(x) + self.sequence_embedding
+        half, given = self.config.layers // 2, []
+        for number, block in enumerate(self.temporal_decoder_blocks):
+            if number < half:
+                given.append(h)
+                h = block(h, style)
+            else:
+                h = block(h, style) + given.pop()
+        return self.out(h)
+
+    def _beside(self, x: Tensor, told: Tensor | None, keep: Tensor | None) -> Tensor:
+        if told is None:
+            return x.new_zeros(*x.shape[:2], self.config.told_shape[1])
+        own = told[:, : self.config.kept]
+        return own if keep is None else own * keep[:, None, None]
+
+
+class _Block(nn.Module):
+    def __init__(self, config: NetConfig) -> None:
+        super().__init__()
+        self.sa_block, self.ffn = _Attention(config), _FeedForward(config)
+
+    def forward(self, x: Tensor, style: Tensor) -> Tensor:
+        return self.ffn(self.sa_block(x, style), style)
+
+
+class _Attention(nn.Module):
+    def __init__(self, config: NetConfig) -> None:
+        super().__init__()
+        width, self.heads, self.dropout = config.width, config.heads, config.dropout
+        self.norm = nn.LayerNorm(width)
+        self.query, self.key, self.value = (nn.Linear(width, width, bias=False) for _ in range(3))
+        self.proj_out = _Stylization(config)
+
+    def forward(self, x: Tensor, style: Tensor) -> Tensor:
+        z = self.norm(x)
+        q, k, v = (m(z).unflatten(-1, (self.heads, -1)).transpose(1, 2) for m in (self.query, self.key, self.value))
+        y = F.scaled_dot_product_attention(q, k, v, dropout_p=self.dropout if self.training else 0.0)
+        return x + self.proj_out(y.transpose(1, 2).flatten(2), style)
+
+
+class _FeedForward(nn.Module):
+    def __init__(self, config: NetConfig) -> None:
+        super().__init__()
+        self.linear1 = nn.Linear(config.width, 2 * config.width)
+        self.linear2 = _zeroed(nn.Linear(2 * config.width, config.width))
+        self.dropout = nn.Dropout(config.dropout)
+        self.proj_out = _Stylization(config)
+
+    def forward(self, x: Tensor, style: Tensor) -> Tensor:
+        return x + self.proj_out(self.linear2(self.dropout(F.gelu(self.linear1(x)))), style)
+
+
+class _Stylization(nn.Module):
+    """What closes a sub-block: its result scaled and shifted by time and condition, through one layer from zero."""
+
+    def __init__(self, config: NetConfig) -> None:
+        super().__init__()
+        width = config.width
+        self.emb_layers = nn.Sequential(nn.SiLU(), nn.Linear(width, 2 * width))
+        self.norm = nn.LayerNorm(width)
+        self.out_layers = nn.Sequential(nn.SiLU(), nn.Dropout(config.dropout), _zeroed(nn.Linear(width, width)))
+
+    def forward(self, h: Tensor, style: Tensor) -> Tensor:
+        scale, shift = self.emb_layers(style)[:, None].chunk(2, dim=-1)
+        return self.out_layers(self.norm(h) * (1 + scale) + shift)
+
+
+def waves(t: Tensor, width: int) -> Tensor:
+    """(rows, width) of integers t (rows,): cosines, then sines, of wave lengths from 2 pi to 10,000 times that."""
+    half = width // 2
+    rates = torch.exp(-math.log(10_000) / half * torch.arange(half, dtype=torch.float32, device=t.device))
+    angle = t[:, None].float() * rates
+    return torch.cat([angle.cos(), angle.sin()], dim=-1)
+
+
+def _zeroed(layer: nn.Linear) -> nn.Linear:
+    nn.init.zeros_(layer.weight)
+    nn.init.zeros_(layer.bias)
+    return layer
