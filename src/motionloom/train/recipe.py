@@ -74,6 +74,8 @@ class Recipe:
     """Adapter to go on from: a shipped name or a path; empty: none."""
     net: dict[str, Any] = field(default_factory=dict)
     """Sizes of the network, see `motionloom.nets.prior.NetConfig`."""
+    predictor: dict[str, Any] = field(default_factory=dict)
+    """Training a predictor: see `motionloom.train.predictor.Settings`."""
 
 
 def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Recipe:

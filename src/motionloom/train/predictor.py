@@ -1,0 +1,273 @@
+"""Training a predictor: windows of recordings, what of them is told, and the weight file that comes out.
+
+Manner `published` is HumanMAC's training (Chen et al. 2023, section 3.2): noise prediction on raw spectra, the padded
+observation told to four samples in five (one coin per sample; the published code throws one per batch). Manner `told`
+trains one network for every mask: most rows are told a past, some also the end of the window, some joints or the root's
+way in the future.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, get_type_hints
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from motionloom.checkpoint import Card, find_device
+from motionloom.data.prediction import Protocol, Recording
+from motionloom.diffusion import SCHEDULES, Dct, Frames
+from motionloom.errors import MotionloomError
+from motionloom.features.positions import Place
+from motionloom.nets.predictor import NetConfig, TransLinear
+from motionloom.predictor import Predictor, find_predictor, load_predictor, save_predictor, told_shape
+from motionloom.train.loop import Average, Log, World, changed, train
+from motionloom.train.recipe import Recipe
+
+WHOLE_PAST = 0.75
+"""How often all of the past is told; else its last 2 frames or more."""
+KINDS = {"past": 0.6, "end": 0.15, "joints": 0.1, "way": 0.05, "scattered": 0.1}
+"""How often what is told, manner `told`: the past alone; and the window's end; some joints in all of the future; the
+root's way in the future; some joints in some stretches."""
+STATISTICS = 4096
+"""Windows that mean and spread are measured on."""
+HELD = 256
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The ``[predictor]`` table of a recipe."""
+
+    manner: Literal["published", "told"] = "told"
+    kept: int = 24
+    """Frequencies."""
+    dct: bool = True
+    """False: frames themselves are the tokens (the paper's table 7)."""
+    layers: int = 8
+    width: int = 256
+    heads: int = 8
+    dropout: float = 0.1
+    untold: float = 0.1
+    """Share of samples that are told nothing (published: 0.2)."""
+
+    @staticmethod
+    def parse(values: dict[str, Any]) -> "Settings":
+        """From a recipe's table; raises MotionloomError for what there is not and for values of the wrong kind."""
+        hints = get_type_hints(Settings)
+        for key, value in values.items():
+            if key not in hints:
+                known = ", ".join(f.name for f in fields(Settings))
+                raise MotionloomError(f"[predictor] has no setting {key!r}; the settings are {known}")
+            kind = str if key == "manner" else hints[key]
+            fits = isinstance(value, (int, float) if kind is float else kind)
+            if not fits or (kind is not bool and isinstance(value, bool)):
+                raise MotionloomError(f"[predictor] {key} must be of kind {kind.__name__}; got {value!r}")
+        settings = Settings(**values)
+        if settings.manner not in ("published", "told") or not 0 <= settings.untold < 1:
+            raise MotionloomError("[predictor] manner is 'published' or 'told', and untold a share below 1")
+        return settings
+
+
+class Drawn(NamedTuple):
+    """Windows of one step."""
+
+    features: Tensor
+    """(rows, frames, channels)"""
+    pose: Tensor
+    """(rows, channels) the last observed pose."""
+    mask: Tensor
+    """(rows, frames, parts) what is told."""
+
+
+class Windows:
+    """Random windows of recordings; recordings are drawn by the root of their length, windows in them evenly."""
+
+    def __init__(self, recordings: tuple[Recording, ...], protocol: Protocol, *, manner: str) -> None:
+        long = [r.positions for r in recordings if len(r.positions) >= protocol.frames]
+        if not long:
+            raise MotionloomError(f"no recording to train on has the {protocol.frames} frames of a window")
+        self.protocol, self.layout, self.manner = protocol, protocol.layout, manner
+        self.positions = np.concatenate(long)
+        self.lengths = np.array([len(p) for p in long])
+        self.starts = np.cumsum(self.lengths) - self.lengths
+        self.shares = np.sqrt(self.lengths) / np.sqrt(self.lengths).sum()
+
+    def draw(self, seed: int, step: int, rows: int) -> Drawn:
+        """Windows, mirrored half of the time, and what is told of them; from ``(seed, step)`` alone."""
+        rng = np.random.default_rng((seed, step))
+        frames, layout = self.protocol.frames, self.layout
+        which = rng.choice(len(self.lengths), rows, p=self.shares)
+        first = self.starts[which] + rng.integers(0, self.lengths[which] - frames + 1)
+        places = self.positions[first[:, None] + np.arange(frames)].astype(np.float64)
+        flipped = rng.random(rows) < 0.5
+        places[flipped] = layout.mirrored(places[flipped])
+        past = self._pasts(rng, rows)
+        last = places[np.arange(rows), past - 1]
+        features = layout.encode(places, self._place(rng, last))
+        mask = np.stack([self._told(rng, int(h)) for h in past])
+        pose = features[np.arange(rows), past - 1]
+        return Drawn(*(torch.from_numpy(np.ascontiguousarray(x, dtype=np.float32)) for x in (features, pose, mask)))
+
+    def _pasts(self, rng: np.random.Generator, rows: int) -> NDArray[np.int64]:
+        whole = np.full(rows, self.protocol.observed)
+        if self.manner == "published":
+            return whole
+        return np.where(rng.random(rows) < WHOLE_PAST, whole, rng.integers(2, self.protocol.observed + 1, rows))
+
+    def _place(self, rng: np.random.Generator, last: NDArray[np.float64]) -> Place:
+        """Where the window is told from; seen from anywhere where the layout does not turn the person itself."""
+        place = self.layout.place(last)
+        if self.layout.across:
+            return place
+        turn = np.where(rng.random(len(last)) < 0.5, rng.uniform(0, 2 * np.pi, len(last)), 0.0)
+        return Place(place.origin, turn)
+
+    def _told(self, rng: np.random.Generator, past: int) -> NDArray[np.float32]:
+        frames, parts = self.protocol.frames, self.layout.parts
+        mask = np.zeros((frames, parts), dtype=np.float32)
+        mask[:past] = 1
+        kind = "past" if self.manner == "published" else rng.choice(list(KINDS), p=list(KINDS.values()))
+        if kind == "end":
+            mask[
+                frames - rng.integers(1, max(2, (frames - past) * 2 // 3)) :, rng.random() < 0.5 and self.layout.root :
+            ] = 1
+        elif kind == "joints":
+            mask[past:, rng.choice(parts, rng.integers(1, parts), replace=False)] = 1
+        elif kind == "way" and self.layout.root:
+            mask[past:, 0] = 1
+        elif kind == "scattered":
+            for _ in range(rng.integers(1, 4)):
+                a, b = np.sort(rng.integers(past, frames + 1, 2))
+                mask[a:b, rng.choice(parts, rng.integers(1, parts + 1), replace=False)] = 1
+        return mask
+
+
+class Completion:
+    """Mean squared error of the network's guess at a uniformly drawn level."""
+
+    def __init__(self, predictor: Predictor, windows: Windows, *, untold: float, device: str = "cpu") -> None:
+        self.predictor, self.windows, self.untold, self.device = predictor.to(device), windows, untold, device
+        scale = predictor.std if predictor.manner == "told" else torch.ones_like(predictor.std)
+        self.scale = (scale / scale.mean()).to(device)
+
+    @property
+    def net(self) -> nn.Module:
+        """The trained weights."""
+        return self.predictor.net
+
+    def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
+        """See `Objective.loss`: the noise's error (published, 1 at first), or the clean spectrum's.
+
+        The latter is standardised and weighted by its spread, between metres and equal weights for all frequencies.
+        """
+        p, drawn = self.predictor, Drawn(*(x.to(self.device) for x in self.windows.draw(seed, step, rows)))
+        generator = torch.Generator().manual_seed(int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0]))
+        low = 2 if p.manner == "published" else 1  # the published code never trains its first noisy level
+        level = torch.randint(low, p.schedule.steps + 1, (rows,), generator=generator).to(self.device)
+        clean = p.to_state(drawn.features, drawn.pose)
+        noise = torch.randn(clean.shape, generator=generator).to(self.device)
+        keep = (torch.rand(rows, generator=generator) >= self.untold).to(self.device)
+        told = p.tell(drawn.features, drawn.mask, drawn.pose)
+        guess = net(p.schedule.noised(clean, level, noise), level - 1, told, keep)
+        wanted = noise if p.manner == "published" else clean
+        return ((guess.float() - wanted) ** 2 * self.scale).mean()
+
+
+def new_predictor(protocol: Protocol, settings: Settings, windows: Windows, *, schedule: str, levels: int) -> Predictor:
+    """An untrained predictor for a protocol's windows, with their statistics."""
+    layout, frames = protocol.layout, protocol.frames
+    basis = Dct(frames, settings.kept) if settings.dct else Frames(frames)
+    kept = basis.kept
+    told = told_shape(layout, kept) if settings.manner == "told" else None
+    config = NetConfig(
+        layout.channels, kept, settings.layers, settings.width, settings.heads, settings.dropout, told, told is not None
+    )
+    drawn = windows.draw(2**31 - 1, 0, STATISTICS)
+    pose = torch.stack([drawn.pose.mean(0), drawn.pose.std(0).clamp(min=1e-3)])
+    plain = torch.zeros(kept, layout.channels)
+    predictor = Predictor(
+        TransLinear(config), SCHEDULES[schedule](levels), layout, basis, protocol.observed, protocol.fps,
+        settings.manner, plain, torch.ones_like(plain), pose, Card("predictor"),
+    )  # fmt: skip
+    if settings.manner == "published":
+        return predictor
+    state = predictor.to_state(drawn.features, drawn.pose)
+    return replace(predictor, mean=state.mean(0), std=state.std(0).clamp(min=1e-4))
+
+
+def train_predictor(
+    recipe: Recipe,
+    protocol: Protocol,
+    folder: Path | str,
+    *,
+    device: str | None = None,
+    stop: int | None = None,
+    say: Callable[[str], None] = print,
+) -> Path:
+    """Train (or go on training) a predictor on a data set; returns the weight file ``folder/NAME.safetensors``.
+
+    Raises MotionloomError for settings that cannot be and data too short for one window.
+    """
+    if device:
+        find_device(device)
+    world, folder = World.join(device), Path(folder)
+    settings = Settings.parse(recipe.predictor)
+    windows = Windows(protocol.split("train"), protocol, manner=settings.manner)
+    torch.manual_seed(recipe.seed)
+    if recipe.start:
+        predictor = load_predictor(find_predictor(recipe.start))
+        predictor.net.requires_grad_(True)
+        if predictor.layout != protocol.layout or predictor.frames != protocol.frames:
+            raise MotionloomError(
+                f"{recipe.start} sees other joints or windows than the data; train from random weights"
+            )
+    else:
+        predictor = new_predictor(protocol, settings, windows, schedule=recipe.schedule, levels=recipe.levels)
+    minutes = windows.lengths.sum() / protocol.fps / 60
+    say(f"{sum(p.numel() for p in predictor.net.parameters()):,} parameters, {minutes:.0f} minutes recorded")
+    for line in changed(folder, recipe) if world.rank == 0 else ():
+        say(f"going on with another recipe than before: {line}")
+    objective = Completion(predictor, windows, untold=settings.untold, device=world.device)
+    place = folder / f"{recipe.name}.safetensors"
+    held = _held(protocol, settings)
+
+    def export(_: nn.Module, average: Average, step: int) -> None:
+        made = _finished(predictor, recipe, protocol, average, step=step, minutes=minutes)
+        save_predictor(made, place)
+        if held is not None:
+            say(f"step {step}: held-out loss {_held_loss(made, held, settings):.4f}")
+
+    log = Log(folder, recipe, say=say) if world.rank == 0 else None
+    train(objective, recipe, folder, world=world, wrap=_wrap(recipe), on_save=export, on_step=log, stop=stop)
+    return place
+
+
+def _wrap(recipe: Recipe) -> Callable[[nn.Module], nn.Module]:
+    return lambda net: torch.compile(net) if recipe.compile else net  # type: ignore[return-value]
+
+
+def _held(protocol: Protocol, settings: Settings) -> Windows | None:
+    try:
+        return Windows(protocol.split("val"), protocol, manner=settings.manner)
+    except MotionloomError:
+        return None
+
+
+@torch.no_grad()
+def _held_loss(made: Predictor, held: Windows, settings: Settings) -> float:
+    return float(Completion(made, held, untold=settings.untold).loss(made.net, 0, 0, HELD))
+
+
+def _finished(
+    predictor: Predictor, recipe: Recipe, protocol: Protocol, average: Average, *, step: int, minutes: float
+) -> Predictor:
+    net = TransLinear(predictor.net.config)
+    net.load_state_dict({k: v.cpu() for k, v in average.weights.items()})
+    seen = len({r.subject for r in protocol.split("train")})
+    notes = {"steps": step, "batch": recipe.batch, "seed": recipe.seed, "minutes": round(float(minutes), 1)}
+    notes |= {"data": protocol.name, "subjects": seen, "from": Path(recipe.start).stem}
+    card = Card(recipe.name, recipe.licence or protocol.licence, protocol.licence, notes)
+    numbers = {key: getattr(predictor, key).cpu() for key in ("mean", "std", "pose")}
+    return replace(predictor, net=net.eval().requires_grad_(False), card=card, **numbers)
