@@ -170,12 +170,14 @@ def load_predictor(path: Path) -> Predictor:
         config, layout = NetConfig.parse(about["net"]), Layout.parse(about["layout"])
         basis = _basis(config.kept, about["frames"], about["dct"])
         levels, name = about["schedule"]["steps"], about["schedule"]["name"]
-        fps, observed, card = float(about["fps"]), about["observed"], Card(**about["card"])
+        fps, observed, manner, card = float(about["fps"]), about["observed"], about["manner"], Card(**about["card"])
+        told = {"told": told_shape(layout, config.kept), "published": None}
         good = (
-            name in SCHEDULES and isinstance(levels, int) and 1 <= levels <= 100_000 and about["manner"] in ("published", "told")
+            name in SCHEDULES and isinstance(levels, int) and 1 <= levels <= 100_000
             and math.isfinite(fps) and 1 <= fps <= 1000 and isinstance(observed, int) and 2 <= observed < basis.frames
-            and layout.channels == config.channels and isinstance(card.name, str)
-            and config.told == (told_shape(layout, config.kept) if about["manner"] == "told" else None)
+            and layout.channels == config.channels and config.told == told[manner]
+            and all(isinstance(text, str) for text in (card.name, card.licence, card.data))
+            and isinstance(card.notes, dict)
         )  # fmt: skip
         if not good:
             raise ValueError("values that do not fit together")
@@ -183,13 +185,16 @@ def load_predictor(path: Path) -> Predictor:
         raise
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         raise MotionloomError(f"{path} does not describe a predictor ({error!r}); name a file that does") from None
-    net = TransLinear(config)
+    with torch.device("meta"):  # what a file only claims to hold takes no memory
+        net = TransLinear(config)
     fill(net, {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}, path)
     mean, std, pose = (_usable(path, tensors, key) for key in ("mean", "std", "pose"))
-    if mean.shape != std.shape or mean.shape != (config.kept, config.channels) or pose.shape != (2, config.channels):
+    shape = (config.kept, config.channels)
+    fits = mean.shape == shape and std.shape == shape and pose.shape == (2, config.channels)
+    if not fits or std.min() <= 0 or pose[1].min() <= 0:
         raise MotionloomError(f"{path} lacks usable statistics; fetch the weights again")
     return Predictor(
-        net.eval().requires_grad_(False), SCHEDULES[name](levels), layout, basis, observed, fps, about["manner"],
+        net.eval().requires_grad_(False), SCHEDULES[name](levels), layout, basis, observed, fps, manner,
         mean, std, pose, card,
     )  # fmt: skip
 
@@ -202,7 +207,7 @@ def _basis(kept: int, frames: Any, dct: Any) -> Basis:
 
 def _usable(path: Path, tensors: dict[str, Tensor], name: str) -> Tensor:
     values = tensors.get(name, torch.empty(0)).float()
-    if not len(values) or not bool(values.isfinite().all()) or (name == "std" and values.min() <= 0):
+    if not values.numel() or not bool(values.isfinite().all()):
         raise MotionloomError(f"{path} lacks usable statistics ({name}); fetch the weights again")
     return values
 
@@ -214,4 +219,4 @@ def fill(net: TransLinear, weights: dict[str, Tensor], path: Path) -> None:
     wrong = wrong or [k for k in wanted if not bool(weights[k].isfinite().all())]
     if wrong:
         raise MotionloomError(f"{path} does not hold the weights it describes (such as {wrong[0]}); fetch it again")
-    net.load_state_dict(weights)
+    net.load_state_dict(weights, assign=next(net.parameters()).is_meta)

@@ -61,7 +61,7 @@ def test_changes_replace_entries_and_leave_the_rest_of_a_table_alone(tmp_path: P
         "drop_text = 1.0",
         "amp = 'fp8'",
         "clip = 0",
-        "schedule = 'sigmoid'",
+        "schedule = 'stepwise'",
         "levels = 1",
         "levels = 1000000000",
         "seed = -1",

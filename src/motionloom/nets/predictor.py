@@ -36,7 +36,8 @@ class NetConfig:
     def __post_init__(self) -> None:
         sizes = (self.channels, self.kept, self.layers, self.width, self.heads, *self.told_shape)
         small = all(isinstance(n, int) and not isinstance(n, bool) and 0 < n <= 8192 for n in sizes)
-        if not small or self.layers > 128 or self.width % (2 * self.heads) or not 0 <= self.dropout < 1:
+        small = small and isinstance(self.beside, bool) and self.layers <= 128
+        if not small or self.width % (2 * self.heads) or not 0 <= self.dropout < 1:
             raise MotionloomError(f"the network's sizes are not usable: {asdict(self)}")
         if self.layers % 2:
             raise MotionloomError(
@@ -54,9 +55,11 @@ class NetConfig:
     def parse(values: dict[str, Any]) -> "NetConfig":
         """From plain data out of a recipe or a weight file; raises MotionloomError."""
         try:
-            told = values.get("told")
-            return NetConfig(**(values | {"told": None if told is None else (told[0], told[1])}))
-        except (TypeError, IndexError, KeyError) as error:
+            settings: dict[str, Any] = dict(values)
+            if settings.get("told") is not None:
+                settings["told"] = settings["told"][0], settings["told"][1]
+            return NetConfig(**settings)
+        except (TypeError, ValueError, IndexError, KeyError) as error:
             raise MotionloomError(f"the network's settings are not usable: {error}") from None
 
 
