@@ -5,7 +5,7 @@ Either way the file appears whole, at its place, when the stream is closed, also
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +22,8 @@ from motionloom.motion import MAX_POSES, Motion
 MAX_BVH_FRAMES = 2_500_000
 """Of a person of 22 joints: a file of 1.8 GB, 34 hours; larger ones are read by nobody, not by this project either."""
 MAX_GIF_SECONDS = 60.0
+PERSON = 22
+"""Joints of the person that is meant where nobody says how many there are."""
 
 
 class Stream(ABC):
@@ -85,21 +87,32 @@ class Stream(ABC):
     def _drop(self) -> None: ...
 
 
-def open_stream(path: Path | str, *, total: int | None, fps: float = 20.0, caption: str = "") -> Stream:
+def open_stream(
+    path: Path | str,
+    *,
+    total: int | None,
+    fps: float = 20.0,
+    caption: str = "",
+    joints: int = PERSON,
+    order: str | Mapping[str, str] = "ZXY",
+    unit: float = 1.0,
+) -> Stream:
     """A file to be written piece by piece; the suffix picks the format as in `save`, and nothing is made yet.
 
     ``total`` is the number of frames to come if that is known; with it what the format cannot hold is refused now
-    and not after hours of work. ``caption`` labels pictures and films. Raises `MotionloomError` like `check_output`.
+    and not after hours of work. ``caption`` labels pictures and films; ``order`` and ``unit`` are those of a BVH, as
+    in `save_bvh`. Raises `MotionloomError` like `check_output`.
     """
     path = check_output(path)
-    suffix = path.suffix.lower()
     if total is not None:
-        _check_length(path, suffix, total, fps)
-    return _Growing(path, total) if suffix == ".bvh" else _Kept(path, caption)
+        check_length(path, total=total, fps=fps, joints=joints)
+    return _Growing(path, total, order, unit) if path.suffix.lower() == ".bvh" else _Kept(path, caption)
 
 
-def _check_length(path: Path, suffix: str, total: int, fps: float) -> None:
-    most = MAX_BVH_FRAMES if suffix == ".bvh" else MAX_POSES // 22
+def check_length(path: Path, *, total: int, fps: float, joints: int = PERSON) -> None:
+    """Refuse more frames of so many joints than the format, or this machine's memory, can hold."""
+    suffix = path.suffix.lower()
+    most = MAX_BVH_FRAMES * PERSON // max(joints, PERSON) if suffix == ".bvh" else MAX_POSES // max(joints, PERSON)
     most = min(most, int(MAX_GIF_SECONDS * fps)) if suffix == ".gif" else most
     if total > most:
         better = "write an .mp4 or .bvh, or" if suffix == ".gif" else "split it, or"
@@ -112,9 +125,9 @@ def _check_length(path: Path, suffix: str, total: int, fps: float) -> None:
 class _Growing(Stream):
     """BVH: on the disk, in a file beside the target, until it is closed."""
 
-    def __init__(self, path: Path, total: int | None) -> None:
+    def __init__(self, path: Path, total: int | None, order: str | Mapping[str, str], unit: float) -> None:
         super().__init__(path)
-        self._total = total
+        self._total, self._order, self._unit = total, order, unit
         self._stack = ExitStack()
         self._bvh: GrowingBvh | None = None
 
@@ -123,7 +136,7 @@ class _Growing(Stream):
             if self._bvh is None:
                 temporary = self._stack.enter_context(atomic_path(self.path))
                 file = self._stack.enter_context(temporary.open("wb", buffering=0))
-                self._bvh = GrowingBvh(file, piece, frames=self._total)
+                self._bvh = GrowingBvh(file, piece, order=self._order, unit=self._unit, frames=self._total)
             self._bvh.write(piece)
         except OSError as error:
             raise MotionloomError(f"cannot write {self.path}: {error.strerror or error}") from error

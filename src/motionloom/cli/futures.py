@@ -1,0 +1,207 @@
+"""Where the files of predictions go, and how they are written: futures, pictures of them, and futures of hours."""
+
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from motionloom.cli.sampling import fail, numbered
+
+if TYPE_CHECKING:
+    from motionloom.io.stream import Stream
+    from motionloom.motion import Motion
+
+FORMATS = ("bvh", "glb", "npz", "mp4", "gif", "png")
+OVERLAYS = (".png", ".mp4", ".gif")
+PICTURES = ("overview.png", "overlay.mp4")
+SHOWN = 50
+"""Futures that pictures show, the first ones."""
+BEFORE, BEHIND = 2.0, 10.0
+"""Seconds of the past, and of futures of any length, that pictures show."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """The files of one ``--out``."""
+
+    folder: Path
+    futures: tuple[tuple[str, ...], ...]
+    """For each format one name per future."""
+    overlays: tuple[str, ...]
+    """Pictures of all futures over each other."""
+
+    @property
+    def files(self) -> list[Path]:
+        """All places, in the order in which they are told."""
+        return [self.folder / name for names in (*self.futures, self.overlays) for name in names]
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How the past's own file says its numbers, if it is a BVH."""
+
+    unit: float = 1.0
+    orders: dict[str, str] = field(default_factory=dict)
+
+
+def targets(outs: Sequence[Path], count: int, formats: Sequence[str], *, pictures: bool) -> list[Target]:
+    """The files to write; refuses places that cannot be, before any work."""
+    from motionloom.io import check_output
+
+    if len({out.resolve() for out in outs}) != len(outs):
+        fail("the same --out is given twice; give each its own name")
+    found = [_target(out, count, formats, pictures=pictures) for out in outs]
+    for place in (place for target in found if target.folder.is_dir() for place in target.files):
+        check_output(place)
+    return found
+
+
+def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool) -> Target:
+    from motionloom.io import WRITES, check_output
+    from motionloom.io.folder import check_folder
+
+    suffix = out.suffix.lower()
+    if suffix in WRITES and not out.is_dir():
+        check_output(out)
+        if suffix in OVERLAYS:
+            return Target(out.parent, (), (out.name,))
+        return Target(out.parent, (tuple(place.name for place in numbered(out, count)),), ())
+    if suffix and not out.is_dir():
+        fail(f"cannot write {out}: a file ends in {', '.join(WRITES)}, and a folder's name has no ending; got {suffix}")
+    check_folder(out)
+    width = max(2, len(str(count - 1)))
+    names = tuple(tuple(f"future_{i:0{width}d}.{one}" for i in range(count)) for one in dict.fromkeys(formats))
+    return Target(out, names, PICTURES if pictures else ())
+
+
+def write_futures(
+    wanted: Sequence[Target], motions: "Sequence[Motion]", past: int, manner: Manner, *, caption: str
+) -> list[Path]:
+    """Motions that begin with ``past`` given frames, into all files at once: they all appear, or none does."""
+    from motionloom.io import save
+    from motionloom.io.bvh_writer import save_bvh
+    from motionloom.io.folder import atomic_folder
+
+    with ExitStack() as stack:
+        for target in wanted:
+            folder = stack.enter_context(atomic_folder(target.folder))
+            for names in target.futures:
+                for motion, name in zip(motions, names, strict=True):
+                    if name.lower().endswith(".bvh"):
+                        save_bvh(motion, folder / name, order=manner.orders, unit=manner.unit)
+                    else:
+                        save(motion, folder / name, captions=[Path(name).stem])
+            draw_overlays(motions, past, [folder / name for name in target.overlays], caption=caption)
+    return [file for target in wanted for file in target.files]
+
+
+def draw_overlays(motions: "Sequence[Motion]", past: int, files: Sequence[Path], *, caption: str) -> None:
+    """Pictures and films of the first futures over each other; the motions begin with ``past`` common frames."""
+    if not files:
+        return
+    from motionloom.io.overlay import draw_futures
+
+    known = motions[0].frames(0, past)
+    futures = [motion.frames(past, len(motion)) for motion in motions[:SHOWN]]
+    for file in files:
+        draw_futures(known, futures, file, caption=caption, lead=BEFORE)
+
+
+# Futures of any length, one after the other, on the disk
+
+
+@dataclass(eq=False)
+class Long:
+    """Futures that are written while they are made, and what became of them."""
+
+    wanted: Sequence[Target]
+    manner: Manner
+    past: int
+    """Frames that are given, at the beginning of each."""
+    frames: int
+    """Frames of each, the past's among them."""
+    caption: str
+    finished: list[tuple[Path, float]] = field(default_factory=list)
+    """Files that are whole or, after an interruption, valid, and their seconds (0 of pictures)."""
+
+    def write(self, makers: "Iterable[Iterable[Motion]]") -> bool:
+        """One future after the other, each in pieces; true if that was interrupted after something was finished.
+
+        A failure in between leaves what was finished too, and its message says so.
+        """
+        from motionloom.errors import MotionloomError
+        from motionloom.io.folder import atomic_folder
+
+        problem: BaseException | None = None
+        with ExitStack() as stack:
+            folders = [stack.enter_context(atomic_folder(target.folder)) for target in self.wanted]
+            try:
+                heads = [self._one(number, pieces, folders) for number, pieces in enumerate(makers)]
+                self._draw(heads[:SHOWN], folders)
+            except (KeyboardInterrupt, MotionloomError) as error:
+                if not self.finished:
+                    raise
+                problem = error
+        if isinstance(problem, MotionloomError):
+            raise MotionloomError(f"{problem} (what was finished is in {self.kept()})") from problem
+        return problem is not None
+
+    def kept(self) -> str:
+        """What was finished, in words."""
+        return ", ".join(f"{path}, {seconds:.2f} s" for path, seconds in self.finished if seconds)
+
+    def _one(self, number: int, pieces: "Iterable[Motion]", folders: Sequence[Path]) -> "Motion | None":
+        """Write one future to the end; gives what pictures show of it."""
+        streams: list[tuple[Path, Stream]] = []
+        shown: list[Motion] = []
+        at = 0
+        try:
+            with ExitStack() as stack:
+                for piece in pieces:
+                    if not streams:
+                        streams = self._open(number, piece, folders)
+                        for _, stream in streams:
+                            stack.enter_context(stream)
+                    for _, stream in streams:
+                        stream.write(piece)
+                    shown += self._shown(piece, at) if number < SHOWN else []
+                    at += len(piece)
+        finally:
+            self.finished += [(place, stream.seconds) for place, stream in streams if stream.saved]
+        return _joined(shown)
+
+    def _open(self, number: int, piece: "Motion", folders: Sequence[Path]) -> "list[tuple[Path, Stream]]":
+        """The files of one future, and where they will be; those that grow on the disk last: they close first."""
+        from motionloom.io.stream import open_stream
+
+        found = []
+        for target, folder in zip(self.wanted, folders, strict=True):
+            for names in target.futures:
+                stream = open_stream(
+                    folder / names[number], total=self.frames, fps=piece.fps, joints=len(piece.skeleton),
+                    caption=Path(names[number]).stem, order=self.manner.orders, unit=self.manner.unit,
+                )  # fmt: skip
+                found.append((target.folder / names[number], stream))
+        return sorted(found, key=lambda pair: pair[0].suffix.lower() == ".bvh")
+
+    def _shown(self, piece: "Motion", at: int) -> "list[Motion]":
+        """What pictures show of a piece whose first frame is number ``at``."""
+        first = max(self.past - round(BEFORE * piece.fps) - at, 0)
+        behind = min(self.past + round(BEHIND * piece.fps) - at, len(piece))
+        return [piece.frames(first, behind)] if first < behind else []
+
+    def _draw(self, heads: "Sequence[Motion | None]", folders: Sequence[Path]) -> None:
+        motions = [head for head in heads if head is not None]
+        for target, folder in zip(self.wanted, folders, strict=True):
+            if not motions:
+                continue
+            past = min(self.past, round(BEFORE * motions[0].fps))
+            draw_overlays(motions, past, [folder / name for name in target.overlays], caption=self.caption)
+            self.finished += [(target.folder / name, 0.0) for name in target.overlays]
+
+
+def _joined(pieces: "Sequence[Motion]") -> "Motion | None":
+    from motionloom.io.stream import joined
+
+    return joined(pieces) if pieces else None

@@ -1,0 +1,387 @@
+"""`motionloom predict` and `motionloom switch`: what may come after a motion, and the way from one to another."""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from motionloom.cli.futures import FORMATS, Long, Manner, Target, targets, write_futures
+from motionloom.cli.reading import add_reading, as_seconds, crop, note_rate, read_clip
+from motionloom.cli.sampling import bar, fail
+
+if TYPE_CHECKING:
+    from motionloom.motion import Motion
+    from motionloom.predictor import Predictor
+    from motionloom.tasks.predict import Hold
+
+MAX_COUNT = 1000
+LONG = 30.0
+"""Seconds from which on futures are written while they are made, one after the other."""
+DAY = 86_400.0
+LISTED = 40
+"""Files told at the end; --json lists all."""
+SAME_BONE = 1e-4
+"""Metres by which bones of one skeleton may differ from file to file: numbers are rounded when they are written."""
+
+
+class _PrintSchema(argparse.Action):
+    """Print what a mask file may hold, and end."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from motionloom.tasks.mask_file import SCHEMA
+
+        print(SCHEMA.read_text(encoding="utf-8"), end="")
+        parser.exit()
+
+
+def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Register ``predict`` and ``switch``."""
+    predict = subparsers.add_parser(
+        "predict",
+        help="make motions that may come after a motion file",
+        description="Make futures of a motion (.bvh, .amc with its .asf, .glb, .npz): see docs/predict.md.",
+    )
+    predict.add_argument("past", type=Path, metavar="PAST")
+    predict.add_argument(
+        "--seconds", "--horizon", type=float, default=2.0, metavar="S", help="how far to predict (default 2)"
+    )
+    predict.add_argument("--count", type=int, default=10, help="futures to make (default 10)")
+    predict.add_argument(
+        "--out", type=Path, action="append", metavar="FOLDER|NAME",
+        help="folder of the files, or a name as of other commands, repeatable (default futures)",
+    )  # fmt: skip
+    predict.add_argument(
+        "--format", action="append", choices=FORMATS, help="of the files in the folder, repeatable (default bvh)"
+    )
+    predict.add_argument("--no-picture", action="store_true", help="no overview.png and overlay.mp4 in the folder")
+    predict.add_argument(
+        "--hold", action="append", default=[], metavar="PART",
+        help="part that moves as in --from, repeatable: a joint, a group such as lower_body, root",
+    )  # fmt: skip
+    predict.add_argument("--mask", type=Path, metavar="FILE", help="a JSON file of parts and when they are held")
+    predict.add_argument("--from", dest="source", type=Path, metavar="MOTION", help="what held parts move as")
+    predict.add_argument(
+        "--from-time", type=as_seconds, default=0.0, metavar="S", help="the second of --from at which it begins"
+    )
+    predict.add_argument("--no-root", action="store_true", help="leave the person in its place, as published")
+    predict.add_argument("--schema", action=_PrintSchema, nargs=0, help="print the JSON Schema of mask files and end")
+    _add_sampling(predict, "--from")
+    predict.set_defaults(run=run_predict)
+    _add_switch(subparsers)
+
+
+def _add_switch(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    switch = subparsers.add_parser(
+        "switch",
+        help="lead from one motion file into another",
+        description="Write PAST, a transition and TARGET as one motion: see docs/predict.md.",
+    )
+    switch.add_argument("past", type=Path, metavar="PAST")
+    switch.add_argument("target", type=Path, metavar="TARGET")
+    switch.add_argument("--seconds", type=float, default=1.0, metavar="S", help="of the transition (default 1)")
+    switch.add_argument("--count", type=int, default=1, help="versions to make (default 1)")
+    switch.add_argument(
+        "--facing", choices=("turned", "kept"), default="turned",
+        help="turn TARGET to go on as PAST faces, or keep its own direction (default turned)",
+    )  # fmt: skip
+    switch.add_argument(
+        "--out", type=Path, action="append", metavar="NAME",
+        help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default switch.bvh)",
+    )  # fmt: skip
+    _add_sampling(switch, "TARGET")
+    switch.set_defaults(run=run_switch)
+
+
+def _add_sampling(parser: argparse.ArgumentParser, other: str) -> None:
+    """How and where is sampled, how files are read; ``other`` is the second motion, in words."""
+    parser.add_argument("--retarget", action="store_true", help=f"put {other} on PAST's skeleton if it has another")
+    parser.add_argument("--seed", type=int, default=0, help="the same seed makes the same motions (default 0)")
+    parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster")
+    parser.add_argument("--guidance", type=float, default=1.0, help="strength of what is known (default 1)")
+    parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
+    parser.add_argument(
+        "--weights", default="predictor", metavar="NAME|PATH", help="shipped name or file (default: predictor)"
+    )
+    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
+    parser.add_argument("--json", action="store_true", help="print what was made as JSON")
+    add_reading(parser)
+
+
+def run_predict(arguments: argparse.Namespace) -> int:
+    """``motionloom predict PAST``."""
+    _check(arguments, longest=DAY)
+    outs = arguments.out or [Path("futures")]
+    wanted = targets(outs, arguments.count, arguments.format or ["bvh"], pictures=not arguments.no_picture)
+    past, manner = _read_past(arguments)
+    horizon = round(arguments.seconds * past.fps)
+    _check_size(arguments, past, horizon, wanted)
+    hold = _hold(arguments, past, horizon)
+    predictor = _predictor(arguments)
+    if arguments.seconds > LONG:
+        long = Long(wanted, manner, len(past), len(past) + horizon, _caption(arguments))
+        return _predict_long(arguments, predictor, past, hold=hold, long=long)
+    from motionloom.tasks.predict import predict
+
+    with bar("predicting") as progress:
+        motions = predict(
+            predictor, past, count=arguments.count, seconds=arguments.seconds, seed=arguments.seed, hold=hold,
+            guidance=arguments.guidance, root=not arguments.no_root, clean=not arguments.raw, progress=progress,
+            **_steps(arguments),
+        )  # fmt: skip
+    written = write_futures(wanted, motions, len(past), manner, caption=_caption(arguments))
+    _report(arguments, [str(file) for file in written])
+    _note_seen(predictor, past)
+    note_rate(arguments, _inputs(arguments))
+    return 0
+
+
+def run_switch(arguments: argparse.Namespace) -> int:
+    """``motionloom switch PAST TARGET``."""
+    _check(arguments, longest=LONG)
+    outs = arguments.out or [Path("switch.bvh")]
+    for out in outs:
+        _check_file(out)
+    wanted = targets(outs, arguments.count, [], pictures=False)
+    past, manner = _read_past(arguments)
+    _check_size(arguments, past, round(arguments.seconds * past.fps), wanted)
+    target = _like_past(arguments, arguments.target, past)
+    _check_poses(arguments, (len(past) + len(target) + round(arguments.seconds * past.fps)) * len(past.skeleton))
+    predictor = _predictor(arguments)
+    from motionloom.tasks.predict import switch
+
+    with bar("switching") as progress:
+        motions = switch(
+            predictor, past, target, count=arguments.count, seconds=arguments.seconds, seed=arguments.seed,
+            facing=arguments.facing, guidance=arguments.guidance, clean=not arguments.raw, progress=progress,
+            **_steps(arguments),
+        )  # fmt: skip
+    written = write_futures(wanted, motions, len(past), manner, caption=_caption(arguments))
+    _report(arguments, [str(file) for file in written])
+    note_rate(arguments, _inputs(arguments))
+    return 0
+
+
+# Futures of any length
+
+
+def _predict_long(
+    arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", *, hold: "Hold | None", long: Long
+) -> int:
+    """One future after the other, in memory that does not grow with their length."""
+    from contextlib import closing
+
+    if past.translations is not None:
+        fail(
+            f"the bones of {arguments.past} change length, and such a motion cannot be written piece by piece; predict "
+            f"at most {LONG:g} s, or give its bones constant lengths with: motionloom export {arguments.past} "
+            "steady.bvh --skeleton smpl22"
+        )
+    with closing(_pieces(arguments, predictor, past, hold, frames=long.frames)) as makers:
+        interrupted = long.write(makers)
+    _report(arguments, [f"{file}: {s:.2f} s" if s and not arguments.json else str(file) for file, s in long.finished])
+    if interrupted:
+        total = long.frames / past.fps
+        print(f"motionloom: interrupted; what was finished is in {long.kept()} of {total:.2f} s", file=sys.stderr)
+        return 130
+    _note_seen(predictor, past)
+    note_rate(arguments, _inputs(arguments))
+    return 0
+
+
+def _pieces(
+    arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", hold: "Hold | None", *, frames: int
+) -> "Iterator[Iterator[Motion]]":
+    """Of each future its pieces, while a bar shows how far they are."""
+    from motionloom.tasks.predict import predict_pieces
+
+    with bar("predicting") as move:
+
+        def moved(pieces: "Iterator[Motion]", done: int) -> "Iterator[Motion]":
+            for piece in pieces:
+                yield piece
+                done += len(piece)
+                move(done, frames * arguments.count)
+
+        for number in range(arguments.count):
+            pieces = predict_pieces(
+                predictor, past, seconds=arguments.seconds, seed=arguments.seed + number, hold=hold,
+                guidance=arguments.guidance, root=not arguments.no_root, clean=not arguments.raw, **_steps(arguments),
+            )  # fmt: skip
+            yield moved(pieces, number * frames)
+
+
+# What is read
+
+
+def _predictor(arguments: argparse.Namespace) -> "Predictor":
+    from motionloom.predictor import Predictor
+
+    return Predictor.load(arguments.weights, device=arguments.device)
+
+
+def _steps(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The task's own number unless the line says another."""
+    return {} if arguments.steps is None else {"steps": arguments.steps}
+
+
+def _inputs(arguments: argparse.Namespace) -> list[Path]:
+    other = getattr(arguments, "target", None) or getattr(arguments, "source", None)
+    return [arguments.past] if other is None else [arguments.past, other]
+
+
+def _caption(arguments: argparse.Namespace) -> str:
+    return (
+        " to ".join(path.stem for path in _inputs(arguments)) if hasattr(arguments, "target") else arguments.past.stem
+    )
+
+
+def _read_past(arguments: argparse.Namespace) -> "tuple[Motion, Manner]":
+    whole, unit, orders = read_clip(arguments, arguments.past)
+    past = crop(whole, arguments)
+    if len(past) < 2:
+        fail(f"{arguments.past} has one frame here, and a past has at least two; only they say where the person goes")
+    return past, Manner(unit or 1.0, orders)
+
+
+def _like_past(arguments: argparse.Namespace, path: Path, past: "Motion") -> "Motion":
+    """A second motion, on the past's skeleton and at its rate; read as the past is where it is such a file too."""
+    from dataclasses import replace
+
+    from motionloom import io
+    from motionloom.retarget import retarget
+
+    alike = path.suffix.lower() == arguments.past.suffix.lower()
+    motion = read_clip(arguments, path)[0] if alike else io.load(path)
+    if _same(motion, past):
+        motion = replace(motion, skeleton=past.skeleton)
+    elif arguments.retarget:
+        motion = retarget(motion, past.skeleton)
+    else:
+        fail(
+            f"{path} has another skeleton than {arguments.past} ({len(motion.skeleton)} joints, {len(past.skeleton)} "
+            f"there, or other bones); give --retarget, or put it on that one first: motionloom export {path} "
+            f"same.bvh --skeleton {arguments.past}"
+        )
+    if abs(motion.fps - past.fps) < 1e-3 * past.fps:  # the same rate, rounded otherwise
+        return replace(motion, fps=past.fps)
+    return motion.resample(past.fps)
+
+
+def _same(motion: "Motion", past: "Motion") -> bool:
+    """Whether two files have one skeleton, but for the last digits."""
+    import numpy as np
+
+    one, other = motion.skeleton, past.skeleton
+    if one.names != other.names or one.parents != other.parents:
+        return False
+    return bool(np.abs(one.offsets[1:] - other.offsets[1:]).max(initial=0.0) < SAME_BONE)
+
+
+def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "Hold | None":
+    """What is held, if anything is."""
+    from motionloom.tasks import mask_file
+    from motionloom.tasks.predict import HeldPart, Hold
+
+    if not (arguments.hold or arguments.mask):
+        if arguments.source is not None:
+            fail("--from says what held parts move as, and none is held; give --hold PART or --mask FILE")
+        return None
+    if arguments.source is None:
+        fail("--hold and --mask name parts that move as in another motion; say which one with --from MOTION")
+    parts = mask_file.read_mask(arguments.mask, fps=past.fps) if arguments.mask else ()
+    if arguments.hold:
+        names = [name.strip() for part in arguments.hold for name in part.split(",") if name.strip()]
+        parts = (*parts, HeldPart(mask_file.check_names(names)))
+    seconds = horizon / past.fps
+    late = min(min(begin for begin, _ in part.spans) for part in parts)
+    if late >= seconds:
+        fail(f"nothing is held before {late:g} s, and the prediction ends at {seconds:g} s; give a longer --seconds")
+    if mask_file.all_held(parts, seconds):
+        fail("all joints are held all of the time, so that nothing is left to predict; hold fewer")
+    source = _like_past(arguments, arguments.source, past)
+    skipped = round(arguments.from_time * past.fps)
+    last = max(min(end, seconds) for part in parts for begin, end in part.spans if begin < seconds)
+    if len(source) - skipped < round(last * past.fps):
+        fail(
+            f"{arguments.source} has {max(len(source) - skipped, 0) / past.fps:.2f} s from {arguments.from_time:g} s "
+            f"on, and parts are held for {last:.2f} s; give a longer motion, a shorter --seconds, or hold them for "
+            "less with 'to' in a --mask"
+        )
+    return Hold(source.frames(skipped, len(source)), parts)
+
+
+# What cannot be asked
+
+
+def _check(arguments: argparse.Namespace, *, longest: float) -> None:
+    if not 0 < arguments.seconds <= longest:
+        most = "86,400, a day" if longest == DAY else f"{longest:g}"
+        fail(f"--seconds must be above 0 and at most {most}; got {arguments.seconds:g}")
+    if not 1 <= arguments.count <= MAX_COUNT or not 0 <= arguments.seed < 2**62:
+        fail(f"--count must be 1 to {MAX_COUNT} and --seed 0 or more; got {arguments.count} and {arguments.seed}")
+    if arguments.steps is not None and not 1 <= arguments.steps <= 100_000:
+        fail(f"--steps must be 1 or more; got {arguments.steps}")
+    if not abs(arguments.guidance) <= 100:
+        fail(f"--guidance must be -100 to 100, usually about 1; got {arguments.guidance:g}")
+
+
+def _check_file(out: Path) -> None:
+    """A place of one file, not a folder."""
+    from motionloom.io import check_output
+
+    check_output(out)
+
+
+def _check_size(arguments: argparse.Namespace, past: "Motion", horizon: int, wanted: list[Target]) -> None:
+    """Refuse what no file or memory holds, and less than a frame."""
+    from motionloom.io.stream import check_length
+
+    if horizon < 1:
+        fail(f"{arguments.seconds:g} s are less than a frame of {arguments.past} ({1 / past.fps:.3g} s); give more")
+    joints, frames = len(past.skeleton), len(past) + horizon
+    for target, names in ((target, names) for target in wanted for names in target.futures):
+        check_length(target.folder / names[0], total=frames, fps=past.fps, joints=joints)
+    if arguments.seconds <= LONG:
+        _check_poses(arguments, frames * joints)
+
+
+def _check_poses(arguments: argparse.Namespace, each: int) -> None:
+    from motionloom.motion import MAX_POSES
+
+    if each * arguments.count > MAX_POSES:
+        fail(
+            f"{arguments.count} motions of {each:,} poses of joints each do not fit into memory, at most "
+            f"{MAX_POSES:,} in all do; lower --count, or take less of the past with --start"
+        )
+
+
+# What is told
+
+
+def _note_seen(predictor: "Predictor", past: "Motion") -> None:
+    seen = predictor.observed / predictor.fps
+    if past.seconds > seen + 1 / past.fps:
+        print(
+            f"note: the predictor sees the last {seen:.2f} s of the {past.seconds:.2f} s of the past", file=sys.stderr
+        )
+
+
+def _report(arguments: argparse.Namespace, written: list[str]) -> None:
+    if arguments.json:
+        import json
+
+        about = {
+            "past": str(arguments.past),
+            "seconds": arguments.seconds,
+            "count": arguments.count,
+            "seed": arguments.seed,
+            "weights": str(arguments.weights),
+            "files": written,
+        }
+        print(json.dumps(about, indent=1))
+        return
+    for line in written[:LISTED]:
+        print(f"wrote {line}")
+    if len(written) > LISTED:
+        print(f"... and {len(written) - LISTED:,} more; --json lists all")
