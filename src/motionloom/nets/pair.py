@@ -1,0 +1,285 @@
+"""Two people from two frozen priors and a communication block (Shafir et al. 2024, section 3.2, "ComMDM").
+
+Both people go through the same frozen network. After some of its layers the block sees what became of the one and of
+the other, and corrects the one; the roles exchanged, with the same weights, it corrects the other. A state has one slot
+before the frames, whose first four numbers are the person's part of D: where the two stand to each other at frame 0
+(`features.pair.PlaceCode`). So D is drawn along with the motion, and whatever holds, guides or edits rows of a state
+(guidance, inpainting, `observe`) does it here too.
+
+    net(state (2 * pairs, 1 + frames, numbers), level, bound) -> the same; rows a0, b0, a1, b1, ...
+
+The block is as published, over both manners of `PriorNet`. Over `modulated`, whose level and text are in no token, the
+block gets them as one, sees normalised activations (they have no norm there), and speaks through a last layer.
+"""
+
+import copy
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal, NamedTuple
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from motionloom.diffusion import Schedule
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import WIDTH, ric
+from motionloom.features.pair import PlaceCode, along, compose, put, seen
+from motionloom.nets.prior import Bound, Condition, NetConfig, PriorNet, _valid, sinusoids
+from motionloom.nets.prior import PublishedBlock as EncoderBlock
+
+PLACE = 4
+"""Numbers of D per person."""
+HEARD = (15, 20, 21)
+"""Joints of the other person whose way an ``aware`` block is told: head and wrists."""
+_SPREAD = 0.7
+"""Standard deviation of the numbers of D, roughly: how far a noisy one is trusted."""
+_FAR = 5.0
+"""Metres beyond which the other person is told to be no further."""
+
+
+@dataclass(frozen=True)
+class PairConfig:
+    """Sizes of a communication block; the defaults are the published ones."""
+
+    layers: int = 1
+    split: int = 8
+    """It sits after so many layers of the prior; 0: before the first."""
+    width: int = 512
+    heads: int = 4
+    hidden: int = 1024
+    dropout: float = 0.1
+    adds: Literal["all", "condition"] = "all"
+    """What is corrected: all tokens, or the condition token alone (manner ``published`` only)."""
+    aware: bool = False
+    """Whether it is also told where the other person is, frame by frame, by what the priors alone would make."""
+    places: PlaceCode = field(default_factory=PlaceCode)
+
+    def __post_init__(self) -> None:
+        numbers = (self.layers, self.width, self.heads, self.hidden)
+        whole = all(isinstance(n, int) and not isinstance(n, bool) and 0 < n <= 8192 for n in numbers)
+        split = isinstance(self.split, int) and not isinstance(self.split, bool) and 0 <= self.split <= 256
+        flags = self.adds in ("all", "condition") and isinstance(self.aware, bool)
+        if not (whole and split and flags) or self.layers > 16 or self.width % self.heads:
+            raise MotionloomError(f"the communication block's sizes are not usable: {asdict(self)}")
+        if isinstance(self.dropout, bool) or not isinstance(self.dropout, int | float) or not 0 <= self.dropout < 1:
+            raise MotionloomError(f"the communication block's sizes are not usable: {asdict(self)}")
+
+    @staticmethod
+    def parse(values: dict[str, Any]) -> "PairConfig":
+        """From plain data out of a recipe or a weight file."""
+        try:
+            plain = dict(values)
+            plain["places"] = PlaceCode(**plain.get("places", {}))
+            return PairConfig(**plain)
+        except (TypeError, ValueError) as error:
+            raise MotionloomError(f"the communication block's settings are not usable: {error}") from None
+
+    def check(self, prior: NetConfig) -> None:
+        """Raise MotionloomError where such a block cannot sit in such a prior."""
+        if self.split > prior.layers:
+            raise MotionloomError(
+                f"the communication block sits after layer {self.split}, and the prior has {prior.layers}; "
+                "use the weights it belongs to"
+            )
+        if prior.flags or prior.features < PLACE:
+            raise MotionloomError("two people need weights without transition flags; use others")
+        if prior.manner == "published" and self.width != prior.width:
+            raise MotionloomError(
+                f"a communication block of width {self.width} does not fit a prior of width {prior.width}"
+            )
+        if self.adds == "condition" and prior.manner != "published":
+            raise MotionloomError("this prior has no condition token to correct; let the block add to all tokens")
+        if self.aware and (prior.features != WIDTH or self.places.kind != "mutual"):
+            raise MotionloomError(f"an aware block needs HumanML3D's {WIDTH} numbers and places of the kind mutual")
+
+
+def fitting(prior: NetConfig, *, layers: int = 1, split: int | None = None, aware: bool = False) -> PairConfig:
+    """The settings of a new block for a prior: after its last layer, unless ``split`` says otherwise, as wide as it.
+
+    (Table 3 of the paper: higher layers do better, and one layer does better than two or four.)
+    """
+    return PairConfig(
+        layers, prior.layers if split is None else split, prior.width, prior.heads, prior.hidden, aware=aware
+    )
+
+
+class Talk(nn.Module):
+    """The communication block: the weights that are trained, and nothing else.
+
+    Fresh it says nothing: the correction is 0, so both priors are what they were, and the guess of D is 0.
+    """
+
+    def __init__(self, config: PairConfig, prior: NetConfig) -> None:
+        super().__init__()
+        config.check(prior)
+        self.config = config
+        self.normed = prior.manner == "modulated"
+        heard = prior.patch * (PLACE + 3 * len(HEARD)) if config.aware else 0
+        sizes = NetConfig(width=config.width, heads=config.heads, hidden=config.hidden, dropout=config.dropout)
+        self.places = nn.Linear(2 * PLACE, config.width)
+        self.both = nn.Linear(2 * prior.width + heard, config.width)
+        self.blocks = nn.ModuleList(EncoderBlock(sizes) for _ in range(config.layers))
+        self.place = nn.Linear(config.width, PLACE)
+        self.out = nn.Linear(config.width, prior.width) if self.normed else None
+        last = self.out or self.blocks[-1].norm2  # of the published block the last norm is the last layer
+        for layer in (last, self.place):
+            nn.init.zeros_(layer.weight)  # type: ignore[arg-type]
+            nn.init.zeros_(layer.bias)  # type: ignore[arg-type]
+
+    def forward(
+        self, tokens: Tensor, places: Tensor, mask: Tensor | None, heard: Tensor | None
+    ) -> tuple[Tensor, Tensor]:
+        """Activations (rows, 1 + tokens, width), condition first, and D (rows, 4), to a correction and a guess of D.
+
+        Rows 2k and 2k + 1 are two people. mask (rows, 1, 1, 1 + tokens): True where there is something. heard: see
+        `PairNet._heard`.
+        """
+        own = F.layer_norm(tokens, tokens.shape[-1:]) if self.normed else tokens
+        together = [own, other(own)] + ([] if heard is None else [F.pad(heard, (0, 0, 1, 0))])
+        start = self.places(torch.cat([places, other(places)], dim=-1))[:, None]
+        x = torch.cat([start, self.both(torch.cat(together, dim=-1))], dim=1)
+        mask = None if mask is None else F.pad(mask, (1, 0), value=True)
+        for block in self.blocks:
+            x = block(x, mask)
+        change = x[:, 1:] if self.out is None else self.out(x[:, 1:])
+        if self.config.adds == "condition":
+            change = torch.cat([change[:, :1], torch.zeros_like(change[:, 1:])], dim=1)
+        return change, self.place(x[:, 0])
+
+
+def other(rows: Tensor) -> Tensor:
+    """For each row that of the other person: rows 2k and 2k + 1 exchanged."""
+    return rows.unflatten(0, (-1, 2)).flip(1).flatten(0, 1)
+
+
+def join(places: Tensor, motion: Tensor) -> Tensor:
+    """D (rows, 4) and motion (rows, frames, numbers) to a state (rows, 1 + frames, numbers)."""
+    return torch.cat([F.pad(places, (0, motion.shape[-1] - PLACE))[:, None], motion], dim=1)
+
+
+def part(state: Tensor) -> tuple[Tensor, Tensor]:
+    """D (rows, 4) and the motion (rows, frames, numbers) of a state."""
+    return state[:, 0, :PLACE], state[:, 1:]
+
+
+class _Inner(NamedTuple):
+    """What goes through a prior's layers."""
+
+    x: Tensor
+    """(rows, tokens, width); published: the condition token first."""
+    condition: Tensor
+    """(rows, width) level and text."""
+    change: Tensor
+    """(rows, 6, width) of the modulated manner; else empty."""
+    mask: Tensor | None
+    """(rows, 1, 1, tokens)"""
+
+
+class PairNet(nn.Module):
+    """Two people: a frozen prior and a block. Its parameters and its state are the block's; the prior is no part of it.
+
+    The prior is copied, stays in evaluation mode and on its device, and gets no gradients. mean, std: (263,) of its
+    features, for an ``aware`` block. ``lengths`` of a condition count frames, without the slot before them.
+    """
+
+    def __init__(self, net: PriorNet, talk: Talk, schedule: Schedule, *, mean: Tensor, std: Tensor) -> None:
+        super().__init__()
+        talk.config.check(net.config)
+        base = copy.deepcopy(net).eval().requires_grad_(False)
+        self.talk, self.schedule = talk, schedule
+        self._base = (base, mean, std, schedule.signal.to(mean))  # in a tuple: not a sub-module
+
+    @property
+    def config(self) -> NetConfig:
+        """Sizes of the prior's network."""
+        return self._base[0].config
+
+    def bind(self, cond: Condition) -> Bound:
+        """See `PriorNet.bind`; a row for each person."""
+        return self._base[0].bind(cond)
+
+    def forward(self, x: Tensor, level: int | Tensor, bound: Bound) -> Tensor:
+        """States (2 * pairs, 1 + frames, numbers) at ``level``, one or one per row, to the clean guess.
+
+        The slot of D comes back with zeros behind its four numbers.
+        """
+        if x.shape[0] % 2 or x.shape[1] < 2:
+            raise MotionloomError(f"two people need an even number of rows, one slot and frames; got {tuple(x.shape)}")
+        base, split = self._base[0], self.talk.config.split
+        places, motion = part(x)
+        with torch.no_grad():
+            inner = _through(base, _enter(base, motion, level, bound), bound, slice(split))
+            heard = self._heard(inner, bound, places, motion.shape[1], level) if self.talk.config.aware else None
+        first = base.modulated  # the condition is no token there
+        tokens = torch.cat([inner.condition[:, None], inner.x], dim=1) if first else inner.x
+        mask = F.pad(inner.mask, (1, 0), value=True) if first and inner.mask is not None else inner.mask
+        change, place = self.talk(tokens, places, mask, heard)
+        inner = inner._replace(x=inner.x + change[:, first:])
+        guess = _leave(base, _through(base, inner, bound, slice(split, None)), motion.shape[1])
+        return join(place, guess)
+
+    def _heard(self, inner: _Inner, bound: Bound, places: Tensor, frames: int, level: int | Tensor) -> Tensor:
+        """(rows, tokens, patch * 13): where the other stands, faces, and has head and wrists, as the person sees it.
+
+        By the guesses of the two priors alone and by the D of the state, trusted as far as its noise lets one; numbers
+        of a person in metres, `PlaceCode` mutual.
+        """
+        base, mean, std, signals = self._base
+        guess = _leave(base, _through(base, inner, bound, slice(self.talk.config.split, None)), frames) * std + mean
+        rows = len(guess)
+        signal = signals[torch.as_tensor(level, device=signals.device).expand(rows)][:, None]
+        trust = signal * _SPREAD**2 / (signal**2 * _SPREAD**2 + 1 - signal**2)
+        way = along(guess)
+        stand = seen(way, compose(self.talk.config.places.raw(trust * places)[:, None], other(way)))
+        joints = torch.stack([guess[..., ric(j)] for j in HEARD], dim=-2)
+        told = torch.cat([stand, put(other(joints), stand[..., None, :]).flatten(-2)], dim=-1).clamp(-_FAR, _FAR)
+        valid = _valid(bound.lengths, frames)
+        told = told if valid is None else told * valid[..., None]
+        patch = base.config.patch
+        return F.pad(told, (0, 0, 0, -frames % patch)).reshape(rows, -1, patch * told.shape[-1])
+
+
+def _enter(net: PriorNet, x: Tensor, level: int | Tensor, bound: Bound) -> _Inner:
+    """Motion (rows, frames, numbers) to what the prior's first layer sees."""
+    rows, frames, _ = x.shape
+    config, valid = net.config, _valid(bound.lengths, frames)
+    tokens = net.embed(net._patches(x, valid))
+    time = torch.as_tensor(level, device=x.device).expand(rows) - 1
+    time = net.time2(F.silu(net.time1(sinusoids(time, config.width).to(tokens.dtype))))
+    both, empty = time + bound.text, x.new_zeros(rows, 0)
+    if not net.modulated:
+        tokens = torch.cat([both[:, None], tokens], dim=1)
+        mask = None if valid is None else F.pad(valid, (1, 0), value=True)[:, None, None]
+        return _Inner(tokens + _positions(tokens, 1), both, empty, mask)
+    mask = valid
+    if valid is not None:
+        mask = F.pad(valid, (0, -frames % config.patch)).view(rows, -1, config.patch).any(-1)[:, None, None]
+    change = net.change(F.silu(both)).view(rows, 6, -1)
+    return _Inner(tokens + _positions(tokens, config.patch), both, change, mask)
+
+
+def _positions(tokens: Tensor, patch: int) -> Tensor:
+    at = torch.arange(tokens.shape[1], device=tokens.device) * patch
+    return sinusoids(at, tokens.shape[2]).to(tokens.dtype)
+
+
+def _through(net: PriorNet, inner: _Inner, bound: Bound, layers: slice) -> _Inner:
+    x = inner.x
+    for i in range(*layers.indices(len(net.blocks))):
+        if net.modulated:
+            words = {"keys": bound.keys[:, i], "values": bound.values[:, i], "words": bound.words}
+            x = net.blocks[i](x, inner.mask, inner.change, **words)
+        else:
+            x = net.blocks[i](x, inner.mask)
+    return inner._replace(x=x)
+
+
+def _leave(net: PriorNet, inner: _Inner, frames: int) -> Tensor:
+    """What comes out of the last layer to motion (rows, frames, numbers)."""
+    x = inner.x
+    if net.modulated:
+        shift, scale = net.last(F.silu(inner.condition))[:, None].chunk(2, dim=-1)
+        x = F.layer_norm(x, x.shape[-1:]) * (1 + scale) + shift
+    else:
+        x = x[:, 1:]
+    return net.out(x).reshape(len(x), -1, net.config.features)[:, :frames]
