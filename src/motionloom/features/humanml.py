@@ -184,13 +184,19 @@ def resample_positions(positions: np.ndarray, fps: float, *, target: float = FPS
         raise MotionloomError(f"the frame rate must be a positive number; got {fps}")
     if fps == target or len(x) == 1:
         return x
-    at = np.arange(int(np.floor((len(x) - 1) / fps * target + 1e-6)) + 1) * (fps / target)
-    low = np.minimum(at.astype(int), len(x) - 2)
+    return positions_at(x, np.arange(int(np.floor((len(x) - 1) / fps * target + 1e-6)) + 1) * (fps / target))
+
+
+def positions_at(positions: np.ndarray, at: np.ndarray) -> Array:
+    """Places (frames, joints, 3), two frames or more, at fractional frames ``at``; beyond the ends straight on."""
+    x = np.asarray(positions, dtype=np.float64)
+    low = np.clip(np.floor(at).astype(int), 0, len(x) - 2)
     u = (at - low)[:, None, None]
     tangents = np.gradient(x, axis=0)
     h00, h10 = 2 * u**3 - 3 * u**2 + 1, u**3 - 2 * u**2 + u
     h01, h11 = 3 * u**2 - 2 * u**3, u**3 - u**2
-    return h00 * x[low] + h10 * tangents[low] + h01 * x[low + 1] + h11 * tangents[low + 1]
+    inside = h00 * x[low] + h10 * tangents[low] + h01 * x[low + 1] + h11 * tangents[low + 1]
+    return np.where((u < 0) | (u > 1), x[low] + u * (x[low + 1] - x[low]), inside)
 
 
 # Features to positions

@@ -138,21 +138,21 @@ def _turned(positions: Array, angle: Array) -> Array:
 
 
 def with_bones(positions: np.ndarray, parents: tuple[int, ...], lengths: np.ndarray) -> Array:
-    """(..., joints, 3) with every bone as long as ``lengths`` (joints,) say and as it points; the root stays."""
-    p = np.asarray(positions, dtype=np.float64)
+    """(..., frames, joints, 3) with every bone as long as ``lengths`` (..., joints) say, as it points; the root stays."""
+    p, long = np.asarray(positions, dtype=np.float64), np.asarray(lengths)[..., None, :, None]
     result = p.copy()
     for j, parent in enumerate(parents[1:], start=1):
         bone = p[..., j, :] - p[..., parent, :]
-        long = np.linalg.norm(bone, axis=-1, keepdims=True)
-        result[..., j, :] = result[..., parent, :] + bone * (lengths[j] / np.maximum(long, 1e-9))
+        scale = long[..., j, :] / np.maximum(np.linalg.norm(bone, axis=-1, keepdims=True), 1e-9)
+        result[..., j, :] = result[..., parent, :] + bone * scale
     return result
 
 
 def bone_lengths(positions: np.ndarray, parents: tuple[int, ...]) -> Array:
-    """(joints,) metres: the mean length over the frames (..., joints, 3) of each joint's bone to its parent."""
+    """(..., joints) metres: of places (..., frames, joints, 3) the mean length of each joint's bone to its parent."""
     p = np.asarray(positions, dtype=np.float64)
-    bones = np.linalg.norm(p[..., 1:, :] - p[..., list(parents[1:]), :], axis=-1)
-    return np.concatenate([[0.0], bones.reshape(-1, len(parents) - 1).mean(axis=0)])
+    bones = np.linalg.norm(p[..., 1:, :] - p[..., list(parents[1:]), :], axis=-1).mean(axis=-2)
+    return np.concatenate([np.zeros((*bones.shape[:-1], 1)), bones], axis=-1)
 
 
 SMPL_LAYOUT = Layout(SMPL22.names, SMPL22.parents, SMPL22.mirror_pairs(), ((1, 2), (16, 17)))

@@ -23,10 +23,9 @@ from motionloom.skeleton import SMPL22
 from motionloom.tasks.redraw import Stretch, redraw
 from motionloom.tasks.splice import (
     Kept,
-    carried,
+    carried_level,
     concatenated,
     dressed,
-    in_manner_of,
     kept_parts,
     person_at_20,
     splice,
@@ -217,7 +216,7 @@ def _looped(pen: _Pen, motion: Motion, blend: float, seed: int) -> Motion:
     straight = 2 * np.arccos(min(abs(float(turn[0])), 1.0)) < NEAR[1]
     here = straight and float(np.linalg.norm((end - begin)[[0, 2]])) < NEAR[0]
     if not here:
-        head = _carried(head, rot.IDENTITY if straight else turn, begin, end)
+        head = carried_level(head, rot.IDENTITY if straight else turn, begin, end)
     gap = _between(tail, head, len(motion) - rest)
     first, last = len(tail), len(tail) + len(gap)
     window = concatenated(tail, gap, head)
@@ -226,14 +225,9 @@ def _looped(pen: _Pen, motion: Motion, blend: float, seed: int) -> Motion:
     if not here:
         (to, drawn), (begin, faced) = standing(made, last), standing(window, last)
         turn = rot.IDENTITY if straight else rot.multiply(drawn, rot.inverse(faced))
-        window = concatenated(tail, gap, _carried(head, turn, begin, to))
+        window = concatenated(tail, gap, carried_level(head, turn, begin, to))
     spliced = splice(window, made, first, last=last, kept=kept_joints(motion, ()))
     return concatenated(motion.frames(0, rest), spliced.frames(first, last))
-
-
-def _carried(motion: Motion, turn: np.ndarray, about: np.ndarray, to: np.ndarray) -> Motion:
-    """Turned about +Y and moved along the floor."""
-    return in_manner_of(motion, carried(motion, turn, about, to * [1, 0, 1] + about * [0, 1, 0]))
 
 
 def _between(before: Motion, behind: Motion, frames: int) -> Motion:

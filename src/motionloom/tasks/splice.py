@@ -69,10 +69,16 @@ def person_at_20(motion: Motion) -> Array:
 def dressed(drawn: Drawn, old: Motion, *, clean: bool) -> Motion:
     """What was drawn, on the old motion's skeleton, at its rate and length, over its floor; feet cleaned."""
     places = resample_positions(drawn.positions, FPS, target=old.fps)[: len(old)]
+    nearest = np.minimum((np.arange(len(old)) * FPS / old.fps).round().astype(int), len(drawn.contacts) - 1)
+    return worn(places, old, contacts=drawn.contacts[nearest], clean=clean)
+
+
+def worn(places: Array, old: Motion, *, clean: bool, contacts: Array | None = None) -> Motion:
+    """Places (frames of ``old``, 22, 3) metres of the uniform person that the old motion is, on its skeleton, over its
+    floor; feet cleaned, by contacts (frames, 4) or by what the feet do."""
     person = motion_from_positions(places, old.fps)
     if clean:
-        nearest = np.minimum((np.arange(len(old)) * FPS / old.fps).round().astype(int), len(drawn.contacts) - 1)
-        person = clean_feet(person, contacts=drawn.contacts[nearest])
+        person = clean_feet(person, contacts=contacts)
     made = in_manner_of(old, retarget(person, old.skeleton))
     back = in_manner_of(old, retarget(to_smpl22(old), old.skeleton))
     carrier = _carrier(old.skeleton)
@@ -122,11 +128,28 @@ def splice(old: Motion, made: Motion, first: int, *, last: int, kept: Kept) -> M
     return _with_place(replace(old, rotations=rotations), place)
 
 
+def overlaid(motion: Motion, source: Motion, joints: Array, place: Array) -> Motion:
+    """``motion`` with parts of another one of the same skeleton, rate and length: exactly its own where a weight is 1.
+
+    ``joints`` (frames, joints) weigh the local rotations, ``place`` (frames,) what carries the way through the world.
+    """
+    turns = rot.slerp(motion.rotations, source.rotations, joints)
+    turns = np.where(joints[..., None] >= 1, source.rotations, np.where(joints[..., None] > 0, turns, motion.rotations))
+    share = place[:, None]
+    way = np.where(share >= 1, _place(source), (1 - share) * _place(motion) + share * _place(source))
+    return _with_place(replace(motion, rotations=turns), way)
+
+
 def carried(motion: Motion, turn: Array, about: Array, to: Array) -> Motion:
     """The motion turned by a quaternion (4,) about a point and moved so that the point comes to another (3,)."""
     rotations = motion.rotations.copy()
     rotations[:, 0] = rot.multiply(turn, rotations[:, 0])
     return replace(motion, root=rot.rotate(turn, motion.root - about) + to, rotations=rotations)
+
+
+def carried_level(motion: Motion, turn: Array, about: Array, to: Array) -> Motion:
+    """The same along the floor, told in the motion's own manner."""
+    return in_manner_of(motion, carried(motion, turn, about, to * [1, 0, 1] + about * [0, 1, 0]))
 
 
 def standing(motion: Motion, frame: int) -> tuple[Array, Array]:

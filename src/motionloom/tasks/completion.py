@@ -1,0 +1,215 @@
+"""Completing windows of motion of which something is known: the past, an end, some joints (`Predictor`).
+
+The published way (`tasks.humanmac`) mixes the known frames into the noisy state and stops one level short of clean.
+Here the network is told what is known, the walk ends clean, and what is known is written back exactly; the rest is led
+to it so that neither place nor velocity jumps, and bones keep the lengths of the past.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from motionloom.diffusion import SOLVERS, guide, levels, row_draw, run
+from motionloom.errors import MotionloomError
+from motionloom.features.positions import bone_lengths, with_bones
+from motionloom.predictor import Predictor
+
+Array = NDArray[np.float64]
+
+STEPS, SOLVER, SPACING = 8, "dpm2m", "index"
+"""The default walk, see docs/decisions."""
+EASE = 0.4
+"""Seconds over which unknown frames are led from what is known to the network's own course."""
+ROWS = 512
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What is known of the frames to come."""
+
+    positions: Array
+    """(frames, joints, 3) or (rows, frames, joints, 3) metres in the world; read where ``mask`` is above 0."""
+    mask: NDArray[np.float32]
+    """(frames, parts) 1 where a joint is given, see `Layout.part`; numbers between mix."""
+
+
+@torch.inference_mode()
+def complete(
+    predictor: Predictor,
+    features: Tensor,
+    mask: Tensor,
+    pose: Tensor,
+    *,
+    seeds: Sequence[int],
+    steps: int = STEPS,
+    guidance: float = 1.0,
+    solver: str = SOLVER,
+    spacing: str = SPACING,
+) -> Tensor:
+    """Windows (rows, frames, channels) with what is not known drawn; row i from ``seeds[i]``, alone or in a batch.
+
+    ``features`` are read where ``mask`` (rows, frames, parts) is above 0; ``pose`` (rows, channels) is the last
+    observed one. Known numbers are those that are given, and the others leave them without a jump. ``guidance``
+    above 1 exaggerates what is told (classifier-free guidance), below 1 heeds it less; it needs a second pass.
+    """
+    told = predictor.tell(features, mask, pose)
+    yes, no = (torch.full((len(told),), flag, device=told.device) for flag in (True, False))
+
+    def net(x: Tensor, level: int, cond: tuple[Tensor, Tensor]) -> Tensor:
+        return predictor.denoiser(*cond)(x, level)
+
+    draw = row_draw(seeds)
+    made = run(
+        guide(net, (told, yes), (told, no), guidance),
+        draw(torch.empty(len(told), *predictor.mean.shape, device=told.device)),
+        levels=levels(predictor.schedule, steps, spacing=spacing),
+        solver=SOLVERS[solver], schedule=predictor.schedule, draw=draw,
+    )  # fmt: skip
+    return joined(predictor.to_features(made, pose), features, mask, ease=round(EASE * predictor.fps))
+
+
+def joined(made: Tensor, known: Tensor, mask: Tensor, *, ease: int) -> Tensor:
+    """``known`` where ``mask`` is 1, around it ``made``, led there: (rows, frames, channels), mask one per 3 of them.
+
+    What made frames lack at a border, in value and in change per frame, fades over ``ease`` frames as the quintic that
+    leaves their second derivative alone. Rows whose masks are equal are done at once.
+    """
+    each = mask.to(made).repeat_interleave(3, dim=-1)
+    result = (1 - each) * made + each * known
+    sure = (mask >= 1).cpu().numpy()
+    patterns, rows = np.unique(sure.reshape(len(sure), -1), axis=0, return_inverse=True)
+    for number, pattern in enumerate(patterns.reshape(-1, *sure.shape[1:])):
+        chosen = torch.from_numpy(np.flatnonzero(rows.reshape(-1) == number)).to(made.device)
+        result[chosen] += _lead(made[chosen], known[chosen], pattern, ease) * (1 - each[chosen])
+    return result
+
+
+def _lead(made: Tensor, known: Tensor, sure: NDArray[np.bool_], ease: int) -> Tensor:
+    """What to add to ``made`` (rows, frames, channels) for one mask (frames, parts)."""
+    added, lack = torch.zeros_like(made), known - made
+    courses, parts = np.unique(sure.T, axis=0, return_inverse=True)
+    for number, course in enumerate(courses):
+        joints = np.flatnonzero(parts.reshape(-1) == number)
+        channels = torch.from_numpy((3 * joints[:, None] + np.arange(3)).ravel()).to(made.device)
+        for border, step, room in _borders(course, ease):
+            here = lack[:, border][:, channels]
+            behind = border - step
+            slope = here - lack[:, behind][:, channels] if 0 <= behind < len(course) and course[behind] else 0 * here
+            value, change = _quintic(room, made)
+            frames = border + step * torch.arange(1, room + 1, device=made.device)
+            added[:, frames[:, None], channels] += value * here[:, None] + change * slope[:, None]
+    return added
+
+
+def _borders(course: NDArray[np.bool_], ease: int) -> list[tuple[int, int, int]]:
+    """Last known frame, direction of the unknown ones, and how many of them have room to be led."""
+    found = []
+    edges = np.flatnonzero(np.diff(course.astype(int)))
+    for edge in edges:
+        border, step = (int(edge), 1) if course[edge] else (int(edge) + 1, -1)
+        others = [int(e) for e in edges if (e - edge) * step > 0]
+        free = min((abs(e - edge) for e in others), default=len(course))
+        end = len(course) - 1 - border if step > 0 else border
+        found.append((border, step, max(1, min(ease, free // 2 if others else end))))
+    return found
+
+
+def _quintic(room: int, like: Tensor) -> tuple[Tensor, Tensor]:
+    """(room, 1) from one frame behind the border on: from 1 with slope 0, and from 0 with slope 1 per frame, to 0."""
+    u = torch.arange(1, room + 1, device=like.device, dtype=like.dtype)[:, None] / (room + 1)
+    value = 1 - 10 * u**3 + 15 * u**4 - 6 * u**5
+    return value, (u - 6 * u**3 + 8 * u**4 - 3 * u**5) * (room + 1)
+
+
+def next_frames(
+    predictor: Predictor,
+    past: np.ndarray,
+    *,
+    seeds: Sequence[int],
+    known: Known | None = None,
+    frames: int | None = None,
+    exact: bool = True,
+    steps: int = STEPS,
+    guidance: float = 1.0,
+    solver: str = SOLVER,
+    spacing: str = SPACING,
+) -> Array:
+    """(rows, frames, joints, 3) metres: what comes behind pasts (rows, h, joints, 3) in the world, +Y up.
+
+    h is 2 to ``predictor.observed``. ``frames``: how many, at most (and by default) as many as the window has left
+    behind the frames it usually sees. ``exact``: bones as long as the past's; else what the network drew.
+    """
+    past = np.asarray(past, dtype=np.float64)
+    rows, h = past.shape[:2]
+    frames = predictor.frames - predictor.observed if frames is None else frames
+    _check(predictor, past, frames, known)
+    layout, place = predictor.layout, predictor.layout.place(past[:, -1])
+    seen = np.zeros((rows, predictor.frames, layout.channels))
+    mask = np.zeros((predictor.frames, layout.parts), dtype=np.float32)
+    seen[:, :h], mask[:h] = layout.encode(past, place), 1
+    if known is not None:
+        given = np.broadcast_to(known.positions, (rows, *known.positions.shape[-3:]))
+        count = min(given.shape[1], predictor.frames - h)
+        seen[:, h : h + count], mask[h : h + count] = layout.encode(given[:, :count], place), known.mask[:count]
+    features, like = torch.from_numpy(seen).to(predictor.mean), torch.from_numpy(mask).to(predictor.mean)
+    made = complete(
+        predictor, features, like.expand(rows, -1, -1), features[:, h - 1],
+        seeds=seeds, steps=steps, guidance=guidance, solver=solver, spacing=spacing,
+    )  # fmt: skip
+    places = layout.decode(made[:, h : h + frames].cpu().double().numpy(), place)
+    return with_bones(places, layout.parents, bone_lengths(past, layout.parents)) if exact else places
+
+
+def _check(predictor: Predictor, past: Array, frames: int, known: Known | None) -> None:
+    h, layout = past.shape[1], predictor.layout
+    if past.ndim != 4 or past.shape[2:] != (layout.joints, 3) or not np.isfinite(past).all():
+        raise MotionloomError(
+            f"a past for this predictor is finite places (rows, frames, {layout.joints}, 3); got shape {past.shape}"
+        )
+    if not 2 <= h <= predictor.observed or not 1 <= frames <= predictor.frames - h:
+        raise MotionloomError(
+            f"this predictor sees 2 to {predictor.observed} frames and draws, with them, at most {predictor.frames}; "
+            f"got a past of {h} and {frames} frames to draw"
+        )
+    if known is not None and known.mask.shape[1:] != (layout.parts,):
+        raise MotionloomError(f"a mask for this predictor has {layout.parts} parts; got {known.mask.shape}")
+
+
+def futures(
+    predictor: Predictor,
+    past: np.ndarray,
+    *,
+    count: int,
+    seed: int = 0,
+    frames: int | None = None,
+    rows: int = ROWS,
+    exact: bool = True,
+    steps: int = STEPS,
+    guidance: float = 1.0,
+    solver: str = SOLVER,
+    spacing: str = SPACING,
+) -> Array:
+    """(windows, count, frames, joints, 3): ``count`` futures of each past (windows, h, joints, 3); see `next_frames`.
+
+    Future i of a past is drawn from ``row_seed(seed, i)`` whatever else is asked; ``rows``: rows per network call.
+    """
+    many = np.repeat(np.asarray(past), count, axis=0)
+    seeds = [row_seed(seed, i) for _ in range(len(past)) for i in range(count)]
+    parts = [
+        next_frames(
+            predictor, many[first : first + rows], seeds=seeds[first : first + rows], frames=frames, exact=exact,
+            steps=steps, guidance=guidance, solver=solver, spacing=spacing,
+        )
+        for first in range(0, len(many), rows)
+    ]  # fmt: skip
+    made = np.concatenate(parts)
+    return made.reshape(len(past), count, *made.shape[1:])
+
+
+def row_seed(seed: int, number: int, turn: int = 0) -> int:
+    """A seed for one future and one window of it, unlike that of any other."""
+    return int(np.random.SeedSequence((seed, number, turn)).generate_state(1, np.uint64)[0] >> np.uint64(1))
