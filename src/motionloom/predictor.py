@@ -18,15 +18,18 @@ from pathlib import Path
 from typing import Any, Literal
 
 import torch
+from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
 from motionloom.checkpoint import Card, find_device, read_tensors
 from motionloom.diffusion import SCHEDULES, Basis, Dct, Denoiser, Frames, Schedule, State, from_noise
 from motionloom.errors import MotionloomError
+from motionloom.features.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT
 from motionloom.features.positions import Layout
 from motionloom.io.atomic import atomic_path
 from motionloom.nets.predictor import NetConfig, TransLinear
+from motionloom.nets.published import read_published
 
 FORMAT = 1
 LONGEST_WINDOW = 2000
@@ -160,6 +163,15 @@ def save_predictor(predictor: Predictor, path: Path | str, *, half: bool = True)
     return path
 
 
+def is_predictor(path: Path) -> bool:
+    """True for a file of `save_predictor`, damaged or not, by what its head says."""
+    try:
+        with safe_open(path, framework="pt") as file:
+            return "motionloom-predictor" in (file.metadata() or {})
+    except (SafetensorError, OSError):
+        return False
+
+
 def load_predictor(path: Path) -> Predictor:
     """Read a predictor; raises MotionloomError where the file is damaged, of another kind or of a newer format."""
     tensors, metadata = read_tensors(path)
@@ -220,3 +232,45 @@ def fill(net: TransLinear, weights: dict[str, Tensor], path: Path) -> None:
     if wrong:
         raise MotionloomError(f"{path} does not hold the weights it describes (such as {wrong[0]}); fetch it again")
     net.load_state_dict(weights, assign=next(net.parameters()).is_meta)
+
+
+_BENCHMARKS = {
+    48: ("Human3.6M", H36M_LAYOUT, 50.0, 25, 125),
+    42: ("HumanEva-I", HUMANEVA_LAYOUT, 60.0, 15, 75),
+}
+"""By the channels of published networks: data set, layout, frames per second, observed frames, all frames."""
+
+
+def is_humanmac(state: dict[str, Tensor]) -> bool:
+    """Whether these are the weights of a published HumanMAC network, by what only it has."""
+    return {"sequence_embedding", "cond_embed.weight"} <= state.keys()
+
+
+def import_humanmac(path: Path | str, *, name: str | None = None, licence: str | None = None) -> Predictor:
+    """A published HumanMAC checkpoint (a plain state dict, ``.pt``) as a predictor of the manner `published`.
+
+    Its sizes tell the data set: Human3.6M (50 fps, 25 + 100 frames) or HumanEva-I (60 fps, 15 + 60 frames), cosine
+    schedule of 1000 levels. Raises MotionloomError for anything but such weights.
+    """
+    path = Path(path)
+    state = read_published(path).state
+    embedding, out = (state.get(key, torch.empty(0)) for key in ("sequence_embedding", "out.weight"))
+    if not is_humanmac(state) or embedding.ndim != 2 or out.ndim != 2 or out.shape[0] not in _BENCHMARKS:
+        raise MotionloomError(
+            f"{path} is not a HumanMAC network of Human3.6M (48 channels) or HumanEva-I (42); name one that is"
+        )
+    data, layout, fps, observed, frames = _BENCHMARKS[out.shape[0]]
+    blocks = {key.split(".")[1] for key in state if key.startswith("temporal_decoder_blocks.")}
+    kept, width = embedding.shape
+    config = NetConfig(channels=layout.channels, kept=kept, layers=len(blocks), width=width)
+    if kept > frames:
+        raise MotionloomError(f"{path} has {kept} frequencies of {frames} frames, which there are not; fetch it again")
+    with torch.device("meta"):
+        net = TransLinear(config)
+    fill(net, {key: value.float() for key, value in state.items()}, path)
+    zeros, ones = torch.zeros(kept, layout.channels), torch.ones(kept, layout.channels)
+    card = Card(name or path.stem, licence or Card.licence, f"as published: {data}", {"imported_from": path.name})
+    return Predictor(
+        net.eval().requires_grad_(False), SCHEDULES["cosine"](1000), layout, Dct(frames, kept), observed, fps,
+        "published", zeros, ones, torch.stack([zeros[0], ones[0]]), card,
+    )  # fmt: skip

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def add(subparsers) -> None:
     """Register `import` and `weights`."""
     parser = subparsers.add_parser(
-        "import", help="published weights to one file: an MDM or PriorMDM network, or Guo's evaluator (finest.tar)"
+        "import", help="published weights to one file: an MDM, PriorMDM or HumanMAC network, or Guo's evaluator"
     )
     parser.add_argument(
         "checkpoint", type=Path, metavar="MODEL.pt|finest.tar", help="model000200000.pt, args.json beside it; or Guo's"
@@ -41,6 +41,8 @@ def _import(arguments: argparse.Namespace) -> None:
     from motionloom.checkpoint import import_published, save_prior
     from motionloom.errors import MotionloomError
     from motionloom.io.atomic import check_place
+    from motionloom.nets.published import read_published
+    from motionloom.predictor import is_humanmac
 
     if arguments.out.suffix != ".safetensors":
         raise MotionloomError(f"weights are written as .safetensors; {arguments.out.name} has another suffix")
@@ -52,6 +54,9 @@ def _import(arguments: argparse.Namespace) -> None:
         return
     if arguments.glove or arguments.vip:
         raise MotionloomError("--glove and --vip belong to an evaluator, which is published as finest.tar")
+    if is_humanmac(read_published(arguments.checkpoint).state):
+        _import_predictor(arguments)
+        return
     if arguments.mean is None or arguments.std is None:
         raise MotionloomError(
             "the weights work on standardised features and do not hold the statistics: "
@@ -62,6 +67,16 @@ def _import(arguments: argparse.Namespace) -> None:
         name=arguments.name, licence=arguments.licence, warn=lambda line: print(f"motionloom: {line}", file=sys.stderr),
     )  # fmt: skip
     print(f"wrote {save_prior(prior, arguments.out, half=arguments.half)}")
+
+
+def _import_predictor(arguments: argparse.Namespace) -> None:
+    from motionloom.errors import MotionloomError
+    from motionloom.predictor import import_humanmac, save_predictor
+
+    if arguments.mean or arguments.std:
+        raise MotionloomError("HumanMAC works on metres as they are: no --mean and no --std")
+    made = import_humanmac(arguments.checkpoint, name=arguments.name, licence=arguments.licence)
+    print(f"wrote {save_predictor(made, arguments.out, half=arguments.half)}")
 
 
 def _import_evaluator(arguments: argparse.Namespace) -> None:
@@ -121,7 +136,10 @@ def _weights(arguments: argparse.Namespace) -> None:
 def describe(path: Path, name: str | None = None) -> dict[str, Any]:
     """What a weight file says and holds; the whole file is read and checked. ``name``: the shipped one."""
     from motionloom.checkpoint import load_prior
+    from motionloom.predictor import is_predictor
 
+    if is_predictor(path):
+        return _describe_predictor(path)
     prior = load_prior(path)
     config = prior.net.config
     return {
@@ -141,6 +159,28 @@ def describe(path: Path, name: str | None = None) -> dict[str, Any]:
     }
 
 
+def _describe_predictor(path: Path) -> dict[str, Any]:
+    from motionloom.predictor import load_predictor
+
+    predictor = load_predictor(path)
+    config = predictor.net.config
+    return {
+        "name": predictor.card.name,
+        "file": str(path),
+        "megabytes": round(path.stat().st_size / 1e6, 1),
+        "licence": predictor.card.licence,
+        "data": predictor.card.data,
+        "manner": predictor.manner,
+        "parameters": sum(p.numel() for p in predictor.net.parameters()),
+        "sizes": {"layers": config.layers, "width": config.width, "heads": config.heads, "frequencies": config.kept},
+        "joints": list(predictor.layout.names),
+        "frames": {"observed": predictor.observed, "predicted": predictor.frames - predictor.observed},
+        "frames_per_second": predictor.fps,
+        "schedule": {"name": predictor.schedule.name, "steps": predictor.schedule.steps},
+        "notes": predictor.card.notes,
+    }
+
+
 def _card(about: dict[str, Any]) -> str:
     sizes = ", ".join(f"{key} {value}" for key, value in about["sizes"].items())
     rows = {
@@ -149,9 +189,15 @@ def _card(about: dict[str, Any]) -> str:
         "licence": about["licence"],
         "data": about["data"],
         "network": f"{about['manner']}, {about['parameters']:,} parameters ({sizes})",
-        "motion": f"{about['features']} numbers per frame, {about['frames_per_second']:g} frames per second",
+        "motion": f"{_seen(about)}, {about['frames_per_second']:g} frames per second",
         "schedule": f"{about['schedule']['name']}, {about['schedule']['steps']} levels",
-        "text": about["text"],
+        "text": about.get("text", "none: a predictor"),
         "notes": json.dumps(about["notes"], ensure_ascii=False) if about["notes"] else "none",
     }
     return "\n".join(f"{key:<9} {value}" for key, value in rows.items())
+
+
+def _seen(about: dict[str, Any]) -> str:
+    if "joints" not in about:
+        return f"{about['features']} numbers per frame"
+    return f"{len(about['joints'])} joints, {about['frames']['predicted']} frames after {about['frames']['observed']}"
