@@ -1,0 +1,179 @@
+"""Parts of a prediction that are given: held to what another motion does."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.features.humanml import positions_at
+from motionloom.motion import Motion
+from motionloom.predictor import Predictor
+from motionloom.retarget import to_smpl22
+from motionloom.skeleton import SMPL22
+from motionloom.tasks.completion import Known
+from motionloom.tasks.splice import carried_level, concatenated, kept_parts, overlaid, standing
+from motionloom.tasks.windows import CONTEXT, person_of
+
+Array = NDArray[np.float64]
+
+RAMP = 0.2
+"""Seconds in which a part that is held for a while is led there and back."""
+NEAR = (0.3, np.radians(20))
+"""Metres and radians within which a source already goes on from the clip and is not moved there."""
+
+
+@dataclass(frozen=True)
+class HeldPart:
+    """Some joints, and when they are held."""
+
+    joints: tuple[str, ...]
+    """Joints and groups of the 22-joint skeleton; ``root``: the way through the world (so do pelvis and its groups)."""
+    spans: tuple[tuple[float, float], ...] = ((0.0, np.inf),)
+    """Seconds (from, to) behind the end of the past."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """Parts whose future is given: they take the local rotations of another motion exactly."""
+
+    source: Motion
+    """On the past's skeleton and at its rate; its first frame is the first one to predict."""
+    parts: tuple[HeldPart, ...]
+    align: bool = True
+    """Whether a source that starts elsewhere is moved and turned on the ground to where the past ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """A `Hold`, ready: on the grid of the predictor for the network, on the past's skeleton for the result."""
+
+    places: Array
+    """(frames, 22, 3) the source as the uniform person at the predictor's rate, from the first frame to predict."""
+    mask: NDArray[np.float32]
+    """(frames, 22)"""
+    source: Motion
+    joints: Array
+    """(frames, joints of the skeleton) weights."""
+    way: Array
+    """(frames,) weight of the place."""
+
+    def known(self, first: int, last: int) -> Known | None:
+        """What the network is told of the frames ``first`` to before ``last`` behind the past (1 is the first)."""
+        frames = slice(first - 1, min(last - 1, len(self.places)))
+        if first - 1 >= len(self.places) or not self.mask[frames].any():
+            return None
+        return Known(self.places[frames], self.mask[frames])
+
+    def laid_over(self, new: Motion, done: int) -> Motion:
+        """A piece that begins ``done`` frames behind the past, with the parts that are given there."""
+        count = min(len(new), len(self.source) - done)
+        if count <= 0:
+            return new
+        here = slice(done, done + count)
+        held = overlaid(new.frames(0, count), self.source.frames(done, done + count), self.joints[here], self.way[here])
+        return concatenated(held, new.frames(count, len(new))) if count < len(new) else held
+
+
+def given(predictor: Predictor, past: Motion, hold: Hold | None, seconds: float) -> Given | None:
+    """A hold made ready for a past and a horizon; raises MotionloomError for what cannot be held."""
+    if hold is None:
+        return None
+    check_like(past, hold.source, "motion that parts are held to")
+    _check_parts(hold, seconds)
+    source = _placed(past, hold.source) if hold.align else hold.source
+    tail = past.frames(max(len(past) - round(CONTEXT * past.fps) - 2, 0), len(past))
+    together = to_smpl22(concatenated(tail, source)).positions()
+    together = together + (person_of(predictor, past)[-1, 0] - together[len(tail) - 1, 0])
+    rate = predictor.fps / past.fps
+    count = int(len(source) * rate + 1e-6)
+    places = positions_at(together, len(tail) - 1 + np.arange(1, count + 1) / rate)
+    mask = np.zeros((count, predictor.layout.parts), dtype=np.float32)
+    joints, way = np.zeros((len(source), len(past.skeleton))), np.zeros(len(source))
+    for part in hold.parts:
+        chosen, root = _resolved(part)
+        inside = _weights(part.spans, np.arange(1, count + 1) / predictor.fps, 0.0) >= 1
+        for joint in chosen | ({0} if root else set()):
+            mask[inside, predictor.layout.part(joint)] = 1
+        weight = _weights(part.spans, np.arange(1, len(source) + 1) / past.fps, RAMP)
+        flags = _own_joints(past, chosen)
+        joints = np.maximum(joints, weight[:, None] * flags)
+        way = np.maximum(way, weight * root)
+    return Given(places, mask, source, joints, way)
+
+
+def _own_joints(past: Motion, chosen: frozenset[int] | set[int]) -> Array:
+    """(joints,) 1 for the joints of the past's skeleton that some of the 22 stand for, and for what hangs on them."""
+    none = np.zeros(3, dtype=bool)
+    always = kept_parts(past.skeleton, frozenset(), none).joints
+    flags = kept_parts(past.skeleton, frozenset(chosen), none).joints & ~always
+    for joint, parent in enumerate(past.skeleton.parents):
+        flags[joint] |= always[joint] and parent >= 0 and flags[parent]
+    return flags.astype(np.float64)
+
+
+def _weights(spans: Sequence[tuple[float, float]], times: Array, ramp: float) -> Array:
+    """1 within spans of seconds, falling to 0 within ``ramp`` seconds around them."""
+    weight = np.zeros(len(times))
+    for begin, end in spans:
+        outside = np.maximum(begin - times, times - end).clip(0)
+        u = (1 - outside / ramp).clip(0, 1) if ramp else (outside <= 1e-9).astype(float)
+        weight = np.maximum(weight, u * u * (3 - 2 * u))
+    return weight
+
+
+def _resolved(part: HeldPart) -> tuple[set[int], bool]:
+    joints = set(SMPL22.resolve(name for name in part.joints if name != "root"))
+    return joints, "root" in part.joints or 0 in joints
+
+
+def _placed(past: Motion, source: Motion) -> Motion:
+    """The source where the past ends, if it is not there."""
+    (end, facing), (begin, faced) = standing(past, len(past) - 1), standing(source, 0)
+    step = end - standing(past, max(len(past) - 2, 0))[0]
+    turn = rot.multiply(facing, rot.inverse(faced))
+    apart = 2 * np.arccos(min(abs(float(turn[0])), 1.0))
+    if apart < NEAR[1] and float(np.linalg.norm((end - begin)[[0, 2]])) < NEAR[0]:
+        return source
+    return carried_level(source, turn, begin, end + step)
+
+
+def check_like(past: Motion, other: Motion, what: str) -> None:
+    """Raise MotionloomError unless both are of one skeleton, manner and rate."""
+    if other.skeleton != past.skeleton:
+        raise MotionloomError(
+            f"the {what} has another skeleton ({len(other.skeleton)} joints, the past {len(past.skeleton)}); "
+            "retarget it to the past's first"
+        )
+    if (other.translations is None) != (past.translations is None):
+        raise MotionloomError(
+            f"the {what} and the past must both have bones of constant length, or both have moving ones"
+        )
+    if abs(other.fps - past.fps) > 1e-3 * past.fps:
+        raise MotionloomError(f"the {what} has {other.fps:g} fps and the past {past.fps:g}; resample it first")
+
+
+def _check_parts(hold: Hold, seconds: float) -> None:
+    known = ("root", *SMPL22.groups, *SMPL22.names)
+    names = [name for part in hold.parts for name in part.joints]
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise MotionloomError(f"no part called {unknown[0]!r} to hold; the parts are {', '.join(known)}")
+    if not names:
+        raise MotionloomError(f"nothing to hold: no joint is named; the parts are {', '.join(known)}")
+    for begin, end in (span for part in hold.parts for span in part.spans):
+        if not 0 <= begin < end:
+            raise MotionloomError(
+                f"no stretch from {begin:g} to {end:g} s to hold; give a start of 0 or more below the end"
+            )
+        if np.isfinite(end) and min(end, seconds) > len(hold.source) / hold.source.fps + 0.5 / hold.source.fps:
+            raise MotionloomError(
+                f"parts are held until {end:g} s and the motion they come from is "
+                f"{len(hold.source) / hold.source.fps:g} s long; hold them for less or give a longer one"
+            )
+    everywhere = [p for p in hold.parts if any(a <= 0 and b >= seconds for a, b in p.spans)]
+    joints = set().union(*(_resolved(part)[0] for part in everywhere)) if everywhere else set()
+    if len(joints) == len(SMPL22):
+        raise MotionloomError("nothing to predict: all joints are held; hold fewer")

@@ -1,0 +1,82 @@
+"""The windows that predictions are made of: the uniform person at a predictor's rate, and what draws behind it."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom.features.humanml import positions_at
+from motionloom.motion import Motion
+from motionloom.predictor import Predictor
+from motionloom.retarget import to_smpl22
+from motionloom.tasks.completion import Known, next_frames, row_seed
+
+Array = NDArray[np.float64]
+
+CONTEXT = 3.0
+"""Seconds of a clip that are looked at for where its floor is."""
+Given = Callable[[int, int], Known | None]
+"""(first, last): what is known of the frames ``first`` to before ``last`` behind the past, 1 being the first."""
+
+
+@dataclass(frozen=True)
+class Pen:
+    """What draws, and how."""
+
+    predictor: Predictor
+    steps: int
+    guidance: float
+    root: bool
+    """False: the person stays in place."""
+
+    def windows(
+        self, person: Array, seeds: Sequence[tuple[int, int]], given: Given | None, count: int
+    ) -> Iterator[Array]:
+        """(rows, frames, 22, 3) one after the other behind ``person`` (rows, h, 22, 3)."""
+        frames = self.predictor.frames - self.predictor.observed
+        for number in range(count):
+            first = number * frames + 1
+            known = given(first, first + self.predictor.frames - person.shape[1]) if given else None
+            made = self.window(person, seeds, number, known)
+            yield made
+            person = np.concatenate([person, made], axis=1)[:, -self.predictor.observed :]
+
+    def window(
+        self,
+        person: Array,
+        seeds: Sequence[tuple[int, int]],
+        number: int,
+        known: Known | None,
+        *,
+        frames: int | None = None,
+    ) -> Array:
+        """(rows, frames, 22, 3): window ``number`` behind ``person`` (rows, h, 22, 3)."""
+        made = next_frames(
+            self.predictor, person, seeds=[row_seed(*seed, number) for seed in seeds], known=known, frames=frames,
+            steps=self.steps, guidance=self.guidance,
+        )  # fmt: skip
+        return made if self.root else made - made[:, :, :1] + person[:, -1:, :1]
+
+
+def person_of(predictor: Predictor, past: Motion) -> Array:
+    """(h, 22, 3) metres: the uniform person at the predictor's rate; the last frame is the past's last frame."""
+    context = past.frames(max(len(past) - round(CONTEXT * past.fps) - 2, 0), len(past))
+    places = to_smpl22(context).positions()
+    return positions_at(places, len(context) - 1 - _back(predictor, past))
+
+
+def _back(predictor: Predictor, past: Motion) -> Array:
+    """Frames of the past's rate from its end back to each of those that are seen."""
+    whole = int((len(past) - 1) / past.fps * predictor.fps + 1e-6) + 1
+    return np.arange(min(max(whole, 2), predictor.observed))[::-1] / predictor.fps * past.fps
+
+
+def seen_frames(predictor: Predictor, past: Motion) -> int:
+    """Frames of the past that lie within what is seen, at least 2."""
+    return max(int(_back(predictor, past)[0] + 1e-6) + 1, 2)
+
+
+def windows_for(predictor: Predictor, seconds: float) -> int:
+    """How many windows it takes."""
+    return int(np.ceil(seconds * predictor.fps / (predictor.frames - predictor.observed) - 1e-6))
