@@ -1,0 +1,37 @@
+"""Predictors small enough for tests: random weights none of which is zero, few joints, short windows."""
+
+import torch
+
+from motionloom.checkpoint import Card
+from motionloom.diffusion import Dct, cosine
+from motionloom.features.positions import Layout
+from motionloom.nets.predictor import NetConfig, TransLinear
+from motionloom.predictor import Predictor, told_shape
+
+BODY = Layout(("root", "left", "right", "head"), (-1, 0, 0, 0), (0, 2, 1, 3), ((1, 2),))
+"""Told with the root's way, and turned to the facing."""
+BARE = Layout(BODY.names, BODY.parents, BODY.pairs, root=False, z_up=True)
+"""As published: no way, +Z up."""
+
+
+def predictor(manner: str = "told", *, levels: int = 1000, frames: int = 20, kept: int = 8, seed: int = 0) -> Predictor:
+    """A predictor of ``frames`` frames, 5 of them observed, at 20 fps."""
+    told = manner == "told"
+    layout = BODY if told else BARE
+    shape = told_shape(layout, kept) if told else None
+    config = NetConfig(channels=layout.channels, kept=kept, layers=2, width=16, heads=2, told=shape, beside=told)
+    with torch.random.fork_rng():
+        torch.manual_seed(seed)
+        net = TransLinear(config)
+        with torch.no_grad():
+            for value in net.parameters():
+                value.add_(0.2 * torch.randn_like(value))
+        mean, std = 0.1 * torch.randn(kept, layout.channels), torch.rand(kept, layout.channels) + 0.5
+        pose = torch.stack([torch.randn(layout.channels), torch.rand(layout.channels) + 0.5])
+    if not told:
+        mean, std, pose = torch.zeros_like(mean), torch.ones_like(std), torch.stack([mean[0] * 0, std[0] * 0 + 1])
+    card = Card("tiny", "do what you like", "random numbers", {"steps": 3})
+    return Predictor(
+        net.eval().requires_grad_(False), cosine(levels), layout, Dct(frames, kept), 5, 20.0,
+        "told" if told else "published", mean, std, pose, card,
+    )  # fmt: skip
