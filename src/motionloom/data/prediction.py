@@ -99,11 +99,12 @@ def read_cmu(
     """
     takes = [take for take in find_takes(folder) if take.source == "cmu" and cmu_split(take) in splits]
     recordings = tuple(_read(takes, 30.0, cmu_split, lambda take: take.name.split("_")[0], say))
-    return _checked(folder, Protocol("cmu", 30.0, 30, 60, SMPL_LAYOUT, recordings, takes[0].licence if takes else ""))
+    return checked(folder, Protocol("cmu", 30.0, 30, 60, SMPL_LAYOUT, recordings, takes[0].licence if takes else ""))
 
 
 def read_folder(folder: Path | str, *, fps: float = 30.0, say: Callable[[str], None] = lambda line: None) -> Protocol:
-    """Motion files of a user's own (.bvh, .amc with .asf): every tenth one for validation, the next one for test."""
+    """Motion files of a user's own (.bvh, .amc with .asf): of every ten the fifth is for validation, the last for
+    test."""
     takes = sorted(find_takes(folder), key=lambda take: take.name)
     order = {take.name: number % 10 for number, take in enumerate(takes)}
     names = {9: "test", 4: "val"}
@@ -111,7 +112,7 @@ def read_folder(folder: Path | str, *, fps: float = 30.0, say: Callable[[str], N
         _read(takes, fps, lambda take: names.get(order[take.name], "train"), lambda take: take.name, say)
     )
     licence = "; ".join(sorted({take.licence for take in takes}))
-    return _checked(folder, Protocol("own", fps, round(fps), round(2 * fps), SMPL_LAYOUT, recordings, licence))
+    return checked(folder, Protocol("own", fps, round(fps), round(2 * fps), SMPL_LAYOUT, recordings, licence))
 
 
 def cmu_split(take: Take) -> str:
@@ -145,11 +146,11 @@ def _read(
         yield Recording(take.name, subject(take), said, split(take), positions.astype(np.float32))
 
 
-def _checked(folder: Path | str, protocol: Protocol) -> Protocol:
-    long = [r for r in protocol.split("train") + protocol.split("test") if len(r.positions) >= protocol.frames]
-    if not long:
+def checked(folder: Path | str, protocol: Protocol) -> Protocol:
+    """The protocol; raises MotionloomError where no recording is as long as a window."""
+    if not any(len(r.positions) >= protocol.frames for r in protocol.recordings):
         raise MotionloomError(
             f"{folder} has no recording of {protocol.frames / protocol.fps:g} s or more, which a window takes; "
-            f"it has {len(protocol.recordings)} shorter ones"
+            f"of shorter ones that can be read it has {len(protocol.recordings)}"
         )
     return protocol
