@@ -144,7 +144,6 @@ def similar_windows(last_poses: np.ndarray, threshold: float, chunk: int = 256) 
         for few in range(0, len(row), chunk):
             r, c = row[few : few + chunk], column[few : few + chunk]
             gap[r, c] = np.linalg.norm(poses[own[r]] - poses[c].astype(np.float64), axis=1) - threshold
-        gap[own - start, own] = -1.0
         found += [np.flatnonzero(near < 0).astype(np.int32) for near in gap]
     return found
 
