@@ -48,6 +48,21 @@ def test_a_streamed_bvh_is_byte_for_byte_the_saved_one(tmp_path_factory, places,
     assert streamed.read_bytes() == io.save(motion, folder / "b.bvh").read_bytes()
 
 
+def test_unit_and_orders_of_a_streamed_bvh_are_those_asked_for(tmp_path):
+    motion, manner = spinning(60), {"order": {"pelvis": "XYZ", "head": "YXZ"}, "unit": 0.01}
+    with open_stream(tmp_path / "a.bvh", total=60, order=manner["order"], unit=manner["unit"]) as stream:
+        for piece in cut(motion, [10, 33]):
+            stream.write(piece)
+    assert (tmp_path / "a.bvh").read_bytes() == bvh_writer.save_bvh(motion, tmp_path / "b.bvh", **manner).read_bytes()
+
+
+def test_more_joints_leave_room_for_fewer_frames(tmp_path):
+    for name, most in (("a.bvh", streams.MAX_BVH_FRAMES // 2), ("a.npz", streams.MAX_POSES // 44)):
+        open_stream(tmp_path / name, total=most, joints=44)
+        with pytest.raises(MotionloomError, match="split it"):
+            open_stream(tmp_path / name, total=most + 1, joints=44)
+
+
 def test_angles_go_on_across_the_seams(tmp_path):
     """A turn of ten rounds in pieces of one frame: no column ever jumps by more than the turn of one frame."""
     turn = np.zeros((200, 22, 3))

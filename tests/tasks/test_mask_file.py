@@ -38,13 +38,24 @@ def test_every_key_arrives_where_it_belongs(read, indent):
             {"joints": ["neck"]},
         ]
     }
-    assert read(json.dumps(asked, indent=indent), fps=40) == (
+    found = read(json.dumps(asked, indent=indent), fps=40)
+    inside = [k for k in range(50) if any(a <= (k + 1) / 40 <= b for a, b in found[1].spans)]
+    assert inside == [*range(10), *range(20, 30)]  # frame 0 lies 1/40 s behind the end of the past
+    assert found == (
         HeldPart(("left_arm", "head"), ((0.0, 1.5),)),
-        HeldPart(("root",), ((0.0, 0.25), (0.5, 0.75))),
+        HeldPart(("root",), found[1].spans),
         HeldPart(("torso",), ((1.0, inf),)),
         HeldPart(("feet",), ((0.0, 0.5),)),
         HeldPart(("neck",), ((0.0, inf),)),
     )
+
+
+@pytest.mark.parametrize("fps", [24, 29.97, 30, 50, 60, 119.88, 120])
+def test_neighbouring_stretches_of_frames_leave_no_gap_and_share_no_frame(read, fps):
+    spans = read('{"hold": [{"joints": ["head"], "frames": [[0, 7], [7, 1000], [1000, 2000]]}]}', fps=fps)[0].spans
+    counts = [sum(a <= (k + 1) / fps <= b for a, b in spans) for k in range(2100)]
+    assert counts == [1] * 2000 + [0] * 100
+    assert all_held((HeldPart(SMPL22.names, spans),), 2000 / fps)
 
 
 def test_yaml_says_the_same(read):

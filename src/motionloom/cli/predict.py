@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -150,12 +150,10 @@ def run_switch(arguments: argparse.Namespace) -> int:
     predictor = _predictor(arguments)
     from motionloom.tasks.predict import switch
 
-    with bar("switching") as progress:
-        motions = switch(
-            predictor, past, target, count=arguments.count, seconds=arguments.seconds, seed=arguments.seed,
-            facing=arguments.facing, guidance=arguments.guidance, clean=not arguments.raw, progress=progress,
-            **_steps(arguments),
-        )  # fmt: skip
+    motions = switch(
+        predictor, past, target, count=arguments.count, seconds=arguments.seconds, seed=arguments.seed,
+        facing=arguments.facing, guidance=arguments.guidance, clean=not arguments.raw, **_steps(arguments),
+    )  # fmt: skip
     written = write_futures(wanted, motions, len(past), manner, caption=_caption(arguments))
     _report(arguments, [str(file) for file in written])
     note_rate(arguments, _inputs(arguments))
@@ -191,7 +189,7 @@ def _predict_long(
 
 def _pieces(
     arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", hold: "Hold | None", *, frames: int
-) -> "Iterator[Iterator[Motion]]":
+) -> "Generator[Iterator[Motion], None, None]":
     """Of each future its pieces, while a bar shows how far they are."""
     from motionloom.tasks.predict import predict_pieces
 
@@ -205,7 +203,7 @@ def _pieces(
 
         for number in range(arguments.count):
             pieces = predict_pieces(
-                predictor, past, seconds=arguments.seconds, seed=arguments.seed + number, hold=hold,
+                predictor, past, seconds=arguments.seconds, number=number, seed=arguments.seed, hold=hold,
                 guidance=arguments.guidance, root=not arguments.no_root, clean=not arguments.raw, **_steps(arguments),
             )  # fmt: skip
             yield moved(pieces, number * frames)
@@ -231,9 +229,8 @@ def _inputs(arguments: argparse.Namespace) -> list[Path]:
 
 
 def _caption(arguments: argparse.Namespace) -> str:
-    return (
-        " to ".join(path.stem for path in _inputs(arguments)) if hasattr(arguments, "target") else arguments.past.stem
-    )
+    target = getattr(arguments, "target", None)
+    return arguments.past.stem if target is None else f"{arguments.past.stem} to {target.stem}"
 
 
 def _read_past(arguments: argparse.Namespace) -> "tuple[Motion, Manner]":
@@ -340,8 +337,8 @@ def _check_size(arguments: argparse.Namespace, past: "Motion", horizon: int, wan
     if horizon < 1:
         fail(f"{arguments.seconds:g} s are less than a frame of {arguments.past} ({1 / past.fps:.3g} s); give more")
     joints, frames = len(past.skeleton), len(past) + horizon
-    for target, names in ((target, names) for target in wanted for names in target.futures):
-        check_length(target.folder / names[0], total=frames, fps=past.fps, joints=joints)
+    for file in (target.folder / names[0] for target in wanted for names in target.futures):
+        check_length(file, total=frames, fps=past.fps, joints=joints)
     if arguments.seconds <= LONG:
         _check_poses(arguments, frames * joints)
 
@@ -360,11 +357,9 @@ def _check_poses(arguments: argparse.Namespace, each: int) -> None:
 
 
 def _note_seen(predictor: "Predictor", past: "Motion") -> None:
-    seen = predictor.observed / predictor.fps
-    if past.seconds > seen + 1 / past.fps:
-        print(
-            f"note: the predictor sees the last {seen:.2f} s of the {past.seconds:.2f} s of the past", file=sys.stderr
-        )
+    seen, there = predictor.observed / predictor.fps, past.seconds
+    if there > seen + 1 / past.fps:
+        print(f"note: of the {there:.2f} s of the past the predictor sees the last {seen:.2f}", file=sys.stderr)
 
 
 def _report(arguments: argparse.Namespace, written: list[str]) -> None:

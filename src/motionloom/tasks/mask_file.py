@@ -32,6 +32,8 @@ LONGEST = 86_400.0
 MAX_PARTS, MAX_NAMES, MAX_SPANS = 1000, 100, 100_000
 MAX_FRAME = 100_000_000
 MAX_BYTES = 4_000_000
+BESIDE = 0.25
+"""Of a frame: so far behind a frame a stretch of frames ends, and the next one may begin."""
 
 
 def read_mask(path: Path | str, *, fps: float) -> tuple[HeldPart, ...]:
@@ -122,13 +124,13 @@ class _Reader:
         return found.value
 
     def stretch(self, row: Lined) -> tuple[float, float]:
-        """Two frames as seconds."""
+        """Two frames as seconds: frame k lies (k + 1) / fps behind the past's end; a stretch ends beside a frame."""
         if not isinstance(row.value, list) or len(row.value) != 2:
             self.fail(row.line, f"'frames' lists pairs such as [0, 10]; got {row.kind}")
         first, behind = (self.frame(item) for item in row.value)
         if behind <= first:
             self.fail(row.line, f"frames [{first}, {behind}] end before they begin; the second is the one behind them")
-        return first / self.fps, behind / self.fps
+        return (first + BESIDE) / self.fps if first else 0.0, (behind + BESIDE) / self.fps
 
     def frame(self, found: Lined) -> int:
         value = found.value
