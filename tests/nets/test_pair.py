@@ -12,7 +12,7 @@ from torch import Tensor
 
 from motionloom.diffusion import DDPM, guide, inpaint, levels, observe, row_draw, run
 from motionloom.errors import MotionloomError
-from motionloom.features.pair import PUBLISHED_CODE, PlaceCode
+from motionloom.features.pair import PUBLISHED_CODE, PlaceCode, along, compose, decode, seen, told_from
 from motionloom.nets import pair_block
 from motionloom.nets.adapter import fingerprint
 from motionloom.nets.pair import PairConfig, PairNet, Talk, _enter, _leave, _through, fitting, join, other, part
@@ -134,20 +134,25 @@ def test_where_they_stand_reaches_both_and_the_other_numbers_of_that_slot_nobody
     assert not before[:, 0, 4:].any()
 
 
-def test_an_aware_block_hears_how_far_the_other_is():
+def test_an_aware_block_hears_where_the_others_head_and_wrists_are():
+    """Against the two motions decoded into one world by `features.pair`, each looked at from the other's root."""
     net = net_of("modulated", aware=True)
     bound, x = bound_of(net, 2), state_of(2)
-    motion = x[:, 1:]
-    stands = torch.tensor([[[1.0, 0.0, 0.0, 0.0], [-1.0, 0.0, 0.3, 2.0]]])  # face to face, two metres apart
-    places = net.talk.config.places.encode(stands)[0]
-    base = net._base[0]
-    inner = _through(base, _enter(base, motion, 1, bound), bound, slice(2))
-    heard = net._heard(inner, bound, places, FRAMES, 1)
-    first = heard[:, 0, :4]  # frame 0: nobody has moved
-    trusted = net.schedule.at(1)[0] * 0.49 / (0.49 * net.schedule.at(1)[0] ** 2 + net.schedule.at(1)[1] ** 2)
-    torch.testing.assert_close(first[0], trusted * torch.tensor([-1.0, 0.0, 0.3, 2.0]), atol=1e-5, rtol=0)
-    torch.testing.assert_close(first[1], trusted * torch.tensor([-1.0, 0.0, 0.3, 2.0]), atol=1e-5, rtol=0)
+    stands = torch.tensor([[1.0, 0.0, 0.0, 0.0], [-0.6, 0.8, 0.3, 2.0]])
+    base, mean, std, _ = net._base
+    inner = _through(base, _enter(base, x[:, 1:], 1, bound), bound, slice(2))
+    signal, noise = net.schedule.at(1)
+    trust = signal * 0.49 / (0.49 * signal**2 + noise**2)
+    heard = net._heard(inner, bound, net.talk.config.places.encode(stands) / trust, FRAMES, 1)
     assert heard.shape == (2, 5, 4 * 13)
+    heard = heard.reshape(2, 20, 13)
+    assert not heard[:, FRAMES:].any()
+    guess = base(x[:, 1:], 1, bound) * std + mean
+    world, way = decode(guess, stands), compose(stands[:, None], along(guess))
+    for me, him in ((0, 1), (1, 0)):
+        places = told_from(world[him], way[me][:, None])
+        expected = torch.cat([seen(way[me], way[him]), places[:, [15, 20, 21]].flatten(1)], dim=-1)
+        torch.testing.assert_close(heard[me, :FRAMES], expected.clamp(-5, 5), rtol=0, atol=1e-4)
 
 
 @manners

@@ -96,7 +96,7 @@ def encode(positions: np.ndarray) -> Encoded:
     """Two people in one world, (2, frames, 22, 3) metres at 20 fps, +Y up, to features (2, frames - 1, 263).
 
     Each is told from where he stands in frame 0 and from his own lowest point, as `humanml.canonical` does. The bodies
-    are taken as they are; `uniform` puts them on the uniform person.
+    are taken as they are: people of the uniform size, for the shipped weights.
     """
     p = _checked(positions)
     place = SMPL_LAYOUT.place(p[:, 0])
@@ -113,21 +113,6 @@ def decode(features: Numbers, stands: Numbers) -> Numbers:
     """
     places: Any = humanml.decode_positions(features)
     return put(places, stands[..., None, None, :])
-
-
-def uniform(positions: np.ndarray) -> tuple[Array, float]:
-    """Two people of any size on the uniform person, (2, frames, 22, 3) to the same, and the scale of their world.
-
-    Alone everybody's way is scaled with his legs (`humanml.uniform`). Here the ground is scaled for both alike, by the
-    geometric mean of the two, so that what is between them keeps its shape; heights go with each one's own legs.
-    """
-    p = _checked(positions)
-    made = np.stack([humanml.uniform(person) for person in p])
-    legs = np.linalg.norm(p[:, 0, [4, 7, 5, 8]] - p[:, 0, [1, 4, 2, 5]], axis=-1).sum(-1)
-    goal = np.linalg.norm(made[:, 0, [4, 7, 5, 8]] - made[:, 0, [1, 4, 2, 5]], axis=-1).sum(-1)
-    scale = float(np.exp(np.log(goal / legs).mean()))
-    shift = (scale * p[:, :, :1] - made[:, :, :1]) * np.array([1.0, 0.0, 1.0])
-    return made + shift, scale
 
 
 def along(features: Numbers) -> Numbers:

@@ -9,7 +9,8 @@ before the frames, whose first four numbers are the person's part of D: where th
     net(state (2 * pairs, 1 + frames, numbers), level, bound) -> the same; rows a0, b0, a1, b1, ...
 
 The block is as published, over both manners of `PriorNet`. Over `modulated`, whose level and text are in no token, the
-block gets them as one, sees normalised activations (they have no norm there), and speaks through a last layer.
+block gets them as one, sees normalised activations (they have no norm there), and speaks through a last layer, in
+units of each token's own size.
 """
 
 import copy
@@ -141,7 +142,9 @@ class Talk(nn.Module):
         mask = None if mask is None else F.pad(mask, (1, 0), value=True)
         for block in self.blocks:
             x = block(x, mask)
-        change = x[:, 1:] if self.out is None else self.out(x[:, 1:])
+        change = x[:, 1:]
+        if self.out is not None:  # as large as what it corrects, which grows from layer to layer there
+            change = self.out(change) * tokens.std(-1, keepdim=True, correction=0)
         if self.config.adds == "condition":
             change = torch.cat([change[:, :1], torch.zeros_like(change[:, 1:])], dim=1)
         return change, self.place(x[:, 0])
