@@ -83,9 +83,15 @@ def read_3dpw(
 
 def as_pair(people: np.ndarray, *, name: str) -> Array:
     """(2, frames, 22, 3) metres at 30 frames per second, upright, to the same of a `Pair`."""
-    people = np.stack([level(person, RATE) for person in people])
+    people = np.stack([level(_lowered(person), RATE) for person in people])
     legs = [float(np.linalg.norm(person[0, [5, 8]] - person[0, [2, 5]], axis=-1).sum()) for person in people]
     return checked(one_world([hml.uniform(person) for person in people], legs), RATE, name=name)
+
+
+def _lowered(person: np.ndarray) -> Array:
+    """(frames, 22, 3) with the lowest toes near y = 0: the height of the world's origin means nothing, and `level`
+    takes people far above it for climbers."""
+    return person - float(np.percentile(person[:, TOES, 1].min(axis=1), 5)) * np.array([0.0, 1.0, 0.0])
 
 
 def read_sequence(path: Path | str) -> Array:
