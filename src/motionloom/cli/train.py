@@ -3,10 +3,14 @@
 import argparse
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from motionloom.train.recipe import Recipe
 
 
 def add(subparsers) -> None:
-    """Register `train prior`, `train evaluator` and `train control`."""
+    """Register `train prior`, `train evaluator`, `train control` and `train predictor`."""
     train = subparsers.add_parser("train", help="train a model from a recipe; goes on where it was stopped")
     commands = train.add_subparsers(metavar="MODEL", required=True)
     prior = commands.add_parser("prior", help="a text-to-motion prior on a built set")
@@ -18,15 +22,23 @@ def add(subparsers) -> None:
     control = commands.add_parser("control", help="an adapter (or a whole prior) that obeys what is given")
     _options(control, "control.toml")
     control.set_defaults(run=_control)
+    predictor = commands.add_parser("predictor", help="a model of what people do next, on recordings as they are")
+    _run_options(predictor, "predictor.toml", "the mocap pack, a folder of motion files, AMASS, data_3d_h36m.npz ...")
+    predictor.add_argument("--protocol", help="cmu, h36m, humaneva, amass or own (default: recognised)")
+    predictor.set_defaults(run=_predictor)
 
 
 def _options(parser: argparse.ArgumentParser, recipe: str) -> None:
-    parser.add_argument("--recipe", type=Path, required=True, help=f"a TOML file such as recipes/{recipe}")
-    parser.add_argument("--data", type=Path, required=True, help="folder made by 'motionloom data build'")
-    parser.add_argument("--out", type=Path, required=True, help="folder of the run: state, weights, logs, pictures")
+    _run_options(parser, recipe, "folder made by 'motionloom data build'")
     parser.add_argument(
         "--text", default="default", help="weights whose text encoder is used (default: the shipped ones)"
     )
+
+
+def _run_options(parser: argparse.ArgumentParser, recipe: str, data: str) -> None:
+    parser.add_argument("--recipe", type=Path, required=True, help=f"a TOML file such as recipes/{recipe}")
+    parser.add_argument("--data", type=Path, required=True, help=data)
+    parser.add_argument("--out", type=Path, required=True, help="folder of the run: state, weights, logs, pictures")
     parser.add_argument("--device", help="cpu, cuda, cuda:1 ... (default: cuda where there is one)")
     parser.add_argument("--threads", type=int, help="CPU threads")
     parser.add_argument("--stop", type=int, help="end early after this many steps")
@@ -53,11 +65,32 @@ def _control(arguments: argparse.Namespace) -> None:
     _train(arguments, train_control)
 
 
+def _predictor(arguments: argparse.Namespace) -> None:
+    from motionloom.data.benchmarks import find_protocol
+    from motionloom.train.predictor import train_predictor
+
+    recipe = _recipe(arguments)
+    protocol = find_protocol(arguments.data, name=arguments.protocol, splits=("train", "val"), say=print)
+    place = train_predictor(recipe, protocol, arguments.out, device=arguments.device, stop=arguments.stop)
+    print(f"wrote {place}")
+
+
 def _train(arguments: argparse.Namespace, make: Callable[..., Path]) -> None:
+    from motionloom.train.prior import text_encoder
+
+    recipe = _recipe(arguments)
+    place = make(
+        recipe, arguments.data, arguments.out,
+        text=text_encoder(arguments.text), device=arguments.device, stop=arguments.stop,
+    )  # fmt: skip
+    print(f"wrote {place}")
+
+
+def _recipe(arguments: argparse.Namespace) -> "Recipe":
+    """The recipe with its changes; checks and applies what is said about the run."""
     import torch
 
     from motionloom.errors import MotionloomError
-    from motionloom.train.prior import text_encoder
     from motionloom.train.recipe import changes, load_recipe
 
     for option in ("threads", "stop"):
@@ -65,9 +98,4 @@ def _train(arguments: argparse.Namespace, make: Callable[..., Path]) -> None:
             raise MotionloomError(f"--{option} must be 1 or more; got {getattr(arguments, option)}")
     if arguments.threads:
         torch.set_num_threads(arguments.threads)
-    recipe = load_recipe(arguments.recipe, changes(arguments.set))
-    place = make(
-        recipe, arguments.data, arguments.out,
-        text=text_encoder(arguments.text), device=arguments.device, stop=arguments.stop,
-    )  # fmt: skip
-    print(f"wrote {place}")
+    return load_recipe(arguments.recipe, changes(arguments.set))
