@@ -255,10 +255,10 @@ def _like_past(arguments: argparse.Namespace, path: Path, past: "Motion") -> "Mo
     elif arguments.retarget:
         motion = retarget(motion, past.skeleton)
     else:
+        named = motion.skeleton.names == past.skeleton.names
+        what = "other bones" if named else f"{len(motion.skeleton)} joints against {len(past.skeleton)}"
         fail(
-            f"{path} has another skeleton than {arguments.past} ({len(motion.skeleton)} joints, {len(past.skeleton)} "
-            f"there, or other bones); give --retarget, or put it on that one first: motionloom export {path} "
-            f"same.bvh --skeleton {arguments.past}"
+            f"{path} has another skeleton than {arguments.past} ({what}); give --retarget, or put it on that one first: motionloom export {path} same.bvh --skeleton {arguments.past}"
         )
     if abs(motion.fps - past.fps) < 1e-3 * past.fps:  # the same rate, rounded otherwise
         return replace(motion, fps=past.fps)
