@@ -20,6 +20,8 @@ from motionloom.evaluation.obey import plain as columns_of_text
 Better = Literal["up", "down", "real", ""]
 REAL = "real"
 """Name of the row of real motions that columns with ``better="real"`` are held against."""
+SAME = "the same data and protocol: "
+"""How ``Row.measured_on`` begins where a published row was measured on what was measured here."""
 ARROWS: dict[str, str] = {"up": " ↑", "down": " ↓", "real": " →", "": ""}
 WIDE = 4
 FORMAT = 1
@@ -78,7 +80,8 @@ class Row:
     values: Mapping[str, Value]
     """By the name of the column; a column may be missing."""
     measured_on: str = ""
-    """Of a published row, the data it was measured on, which is not the data here; empty for what was measured here."""
+    """Of a published row, the data it was measured on, not the data here unless it begins with `SAME`; empty for what
+    was measured here."""
 
 
 @dataclass(frozen=True)
@@ -192,9 +195,15 @@ def tables(report: Report) -> str:
     parts = [table(_cells(report, here, bold=True))] if here else []
     for data in dict.fromkeys(row.measured_on for row in elsewhere):
         rows = [row for row in elsewhere if row.measured_on == data]
-        said = f"Published, measured on {_line(data)}: other data, so not to be compared number by number."
-        parts += [said, table(_cells(report, rows))]
+        parts += [origin(data), table(_cells(report, rows))]
     return "\n\n".join(parts)
+
+
+def origin(measured_on: str) -> str:
+    """A sentence over published rows."""
+    if measured_on.startswith(SAME):
+        return f"Published, measured on {_line(measured_on)}."
+    return f"Published, measured on {_line(measured_on)}: other data, so not to be compared number by number."
 
 
 def plain(report: Report) -> str:

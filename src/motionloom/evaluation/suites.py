@@ -175,6 +175,22 @@ def _controls(job: Job) -> list[Path]:
     return [*_judge(job), *adapters().values()]
 
 
+def _prediction(job: Job, settings: Mapping[str, Any]) -> Report:
+    from motionloom.evaluation import prediction
+
+    return prediction.run(
+        "predictor", data=job.data, how=prediction.How(**settings), folder=job.folder, device=job.device,
+        command=command("prediction", job), progress=job.tools.progress,
+    )  # fmt: skip
+
+
+def _predictors(job: Job) -> list[Path]:
+    """The shipped predictor, where it is."""
+    from motionloom.predictor import shipped_predictors
+
+    return list(shipped_predictors().values())
+
+
 def _evaluator(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.evaluation.evaluators import load_evaluator
     from motionloom.evaluation.own import validate
@@ -201,6 +217,9 @@ SUITES: tuple[Suite, ...] = (
     Suite("control", "goals out of real motions: error, skate and jerk beside published ways of control", _control,
           {"kinds": SUITE, "count": 16, "replications": 2}, {"kinds": QUICK, "count": 8, "replications": 1}, "needed",
           _controls),
+    Suite("prediction", "many futures of held-out pasts beside what came, baselines and the published sampler",
+          _prediction, {"windows": 64, "samples": 50, "published_steps": 100},
+          {"windows": 6, "samples": 6, "published_steps": 20}, "needed", _predictors),
     Suite("obedience", "20 everyday prompts, each with a physical check", _obedience,
           {"seeds": 10, "paraphrases": True}, {"seeds": 2, "paraphrases": False}),
     Suite("realism", "skate, penetration, jerk, bones and speeds beside real clips", _realism,
