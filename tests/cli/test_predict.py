@@ -105,7 +105,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
 
     def switch(predictor, past, target, *, count, seconds, seed, facing, guidance, clean, steps=None):
         seen.update(past=past, target=target, count=count, seconds=seconds, facing=facing)
-        return [stream.joined([past, future(past, seconds, i), target]) for i in range(count)]
+        still = [replace(one, translations=None) for one in (past, target)]
+        return [stream.joined([still[0], future(past, seconds, i), still[1]]) for i in range(count)]
 
     for made in (predict, predict_pieces, switch):
         monkeypatch.setattr(task, made.__name__, made)
@@ -321,6 +322,21 @@ def test_bones_that_change_length_are_written_whole_or_not_at_all(weights, asked
     assert run(weights, "predict", "past.npz", "--horizon", "40") == 2
     assert "motionloom export past.npz steady.bvh --skeleton smpl22" in capsys.readouterr().err
     assert written() == {"past.npz"}
+
+
+def test_one_motion_with_moving_bones_and_one_without_go_together(weights, asked, capsys):
+    """The still one gets its rest offsets; a moving one loses its movement only where that is asked."""
+    clip = person(1.0, 30.0)
+    moved = np.tile(SMPL22.offsets, (30, 1, 1)) * np.linspace(1, 1.1, 30)[:, None, None]
+    io.save(clip, "still.npz")
+    io.save(replace(clip, translations=moved), "moving.npz")
+    assert run(weights, "switch", "moving.npz", "still.npz", "--out", "a.npz") == 0
+    np.testing.assert_allclose(asked["target"].translations[7], SMPL22.offsets)
+    asked.clear()
+    assert run(weights, "switch", "still.npz", "moving.npz", "--out", "a.npz") == 2
+    assert "bones that change length" in capsys.readouterr().err
+    assert run(weights, "switch", "still.npz", "moving.npz", "--retarget", "--out", "a.npz") == 0
+    assert asked["target"].translations is None
 
 
 # Switching -------------------------------------------------------------------------------------------------------

@@ -245,34 +245,40 @@ def _like_past(arguments: argparse.Namespace, path: Path, past: "Motion") -> "Mo
     """A second motion, on the past's skeleton and at its rate; read as the past is where it is such a file too."""
     from dataclasses import replace
 
+    import numpy as np
+
     from motionloom import io
     from motionloom.retarget import retarget
 
     alike = path.suffix.lower() == arguments.past.suffix.lower()
     motion = read_clip(arguments, path)[0] if alike else io.load(path)
-    if _same(motion, past):
+    difference = _difference(motion, past)
+    if not difference:
         motion = replace(motion, skeleton=past.skeleton)
     elif arguments.retarget:
         motion = retarget(motion, past.skeleton)
     else:
-        named = motion.skeleton.names == past.skeleton.names
-        what = "other bones" if named else f"{len(motion.skeleton)} joints against {len(past.skeleton)}"
         fail(
-            f"{path} has another skeleton than {arguments.past} ({what}); give --retarget, or put it on that one first: motionloom export {path} same.bvh --skeleton {arguments.past}"
+            f"{path} has another skeleton than {arguments.past} ({difference}); give --retarget, or put it on that one "
+            f"first: motionloom export {path} same.bvh --skeleton {arguments.past}"
         )
+    if motion.translations is None and past.translations is not None:
+        motion = replace(motion, translations=np.tile(past.skeleton.offsets, (len(motion), 1, 1)))
     if abs(motion.fps - past.fps) < 1e-3 * past.fps:  # the same rate, rounded otherwise
         return replace(motion, fps=past.fps)
     return motion.resample(past.fps)
 
 
-def _same(motion: "Motion", past: "Motion") -> bool:
-    """Whether two files have one skeleton, but for the last digits."""
+def _difference(motion: "Motion", past: "Motion") -> str:
+    """Why two motions are not of one skeleton, in words; nothing if they are, but for the last digits of a file."""
     import numpy as np
 
     one, other = motion.skeleton, past.skeleton
     if one.names != other.names or one.parents != other.parents:
-        return False
-    return bool(np.abs(one.offsets[1:] - other.offsets[1:]).max(initial=0.0) < SAME_BONE)
+        return f"{len(one)} joints against {len(other)}" if len(one) != len(other) else "other joints"
+    if np.abs(one.offsets[1:] - other.offsets[1:]).max(initial=0.0) >= SAME_BONE:
+        return "other bones"
+    return "bones that change length" if motion.translations is not None and past.translations is None else ""
 
 
 def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "Hold | None":
