@@ -193,16 +193,6 @@ def test_people_side_by_side_hold_their_last_pose(tmp_path: Path) -> None:
     assert probe(path)[0] == 40
 
 
-def test_two_people_can_share_one_scene(tmp_path: Path) -> None:
-    motion = standing(4)
-    beside = Motion(SMPL22, 20.0, motion.root + np.array([1.0, 0, 0]), motion.rotations)
-    path = draw_video([motion, beside], tmp_path / "x.gif", size=(192, 96), together=True)
-    alone = draw_video([motion], tmp_path / "y.gif", size=(192, 96))
-    both, one = (np.asarray(Image.open(p).convert("RGB")) for p in (path, alone))
-    assert both.shape == one.shape
-    assert (both != one).any()
-
-
 def test_a_gif_lasts_as_long_as_the_motion(tmp_path: Path) -> None:
     draw_video([standing(30, 20.0, speed=1.0)], tmp_path / "x.gif", size=(96, 64))
     film = Image.open(tmp_path / "x.gif")

@@ -82,8 +82,7 @@ def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequ
     path = check_output(path)
     several = [motions] if isinstance(motions, Motion) else list(motions)
     suffix = path.suffix.lower()
-    if not several or (len(several) > 1 and suffix in _ONE_PERSON):
-        raise MotionloomError(f"{path} holds one motion; got {len(several)}, so give each its own file or write a .glb")
+    _check_count(several, path)
     if suffix == ".bvh":
         from motionloom.io.bvh_writer import save_bvh
 
@@ -102,3 +101,57 @@ def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequ
         draw = draw_sheet if suffix == ".png" else draw_video
         draw(several, path, captions=captions)
     return path
+
+
+def _check_count(motions: Sequence[Motion], path: Path) -> None:
+    if not motions or (len(motions) > 1 and path.suffix.lower() in _ONE_PERSON):
+        raise MotionloomError(f"{path} holds one motion; got {len(motions)}, so give each its own file or write a .glb")
+
+
+def save_scene(
+    motions: Sequence[Motion],
+    path: Path | str,
+    *,
+    names: Sequence[str] | None = None,
+    captions: Sequence[str] | None = None,
+) -> Path:
+    """Write people who share one world frame as one scene: GLB, or one MP4, GIF or PNG with everybody in it.
+
+    ``names``, one per person, name them in a GLB and in a picture's legend; ``captions``, one per person, stand over
+    pictures and films (one only where all are the same). `save` would draw the same people side by side instead.
+    BVH and NPZ files hold one person. The file appears whole or not at all.
+    Raises `MotionloomError` for names or captions of another count, another suffix, or a place that cannot be written.
+    """
+    path = check_output(path)
+    for what, texts in (("names", names), ("captions", captions)):
+        if texts is not None and len(texts) != len(motions):
+            raise MotionloomError(f"{len(motions)} motions need as many {what}; got {len(texts)}")
+    _check_count(motions, path)
+    suffix = path.suffix.lower()
+    if suffix in _ONE_PERSON:
+        return save(motions, path)
+    if suffix == ".glb":
+        from motionloom.io.gltf import save_glb
+
+        return save_glb(motions, path, names=names)
+    from motionloom.io.overlay import draw_scene, tint
+    from motionloom.io.scene import Actor
+
+    labels = names if names is not None else [""] * len(motions)
+    actors = [Actor(m, tint(i), label=label) for i, (m, label) in enumerate(zip(motions, labels))]
+    title = "   |   ".join(dict.fromkeys(c for c in captions or () if c))
+    return draw_scene(actors, path, caption=title)
+
+
+def load_scene(path: Path | str) -> list[Motion]:
+    """Everybody in a file, in its order and one world frame: a GLB's people, or the one motion of another format.
+
+    Raises `MotionloomError` as `load` does; `load` itself gives a GLB's first person.
+    """
+    path = Path(path)
+    _check(path, path.suffix.lower(), None, unit=None, asf=None)
+    if path.suffix.lower() != ".glb":
+        return [load(path)]
+    from motionloom.io.gltf import load_glb_people
+
+    return load_glb_people(path)

@@ -23,7 +23,6 @@ QUIET: Colour = (120, 128, 142)
 LEFT: Colour = (233, 116, 64)
 RIGHT: Colour = (52, 116, 205)
 MIDDLE: Colour = (112, 119, 134)
-TRUNKS: tuple[Colour, ...] = (MIDDLE, (156, 128, 92), (92, 132, 108), (138, 104, 136))  # tell people apart
 SKIN: Colour = (226, 190, 160)
 CONTACT: Colour = (24, 178, 107)
 PATH: Colour = (150, 92, 190)
@@ -45,6 +44,8 @@ class Camera:
     """Radians about +Y; 0 looks at the front of somebody who faces +Z."""
     elevation: float = 0.3
     """Radians above the horizon."""
+    corner: tuple[int, int] = (0, 0)
+    """Smooth-scale pixels that are cut off at the left and the top."""
 
     @property
     def distance(self) -> float:
@@ -61,8 +62,8 @@ class Camera:
         seen = (points - self.target) @ self.axes().T
         depth = np.maximum(self.distance - seen[..., 2], 0.05 * self.distance)
         scale = SMOOTH * self.size[1] / self.span * self.distance / depth
-        x = SMOOTH * self.size[0] / 2 + seen[..., 0] * scale
-        y = SMOOTH * self.size[1] / 2 - seen[..., 1] * scale
+        x = SMOOTH * self.size[0] / 2 - self.corner[0] + seen[..., 0] * scale
+        y = SMOOTH * self.size[1] / 2 - self.corner[1] - seen[..., 1] * scale
         return np.stack([x, y], axis=-1), depth, scale
 
 
@@ -73,6 +74,11 @@ def mix(a: Colour, b: Colour, amount: float) -> Colour:
         round(a[1] + (b[1] - a[1]) * amount),
         round(a[2] + (b[2] - a[2]) * amount),
     )
+
+
+def shades(tint: Colour) -> dict[int, Colour]:
+    """A person's own colour by side: the left (1) lighter, the right (-1) darker."""
+    return {0: tint, 1: mix(tint, PAPER, 0.3), -1: mix(tint, INK, 0.25)}
 
 
 _HALF = np.linspace(-np.pi / 2, np.pi / 2, 9)
@@ -109,10 +115,15 @@ def _turns_right(a: tuple[float, float], b: tuple[float, float], c: tuple[float,
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) <= 0
 
 
-def paint_floor(pen: ImageDraw.ImageDraw, camera: Camera, floor: float) -> None:
-    """Tiles of half a metre that stay in the world and fade into the paper; every second metre line is drawn."""
+def tile_step(span: float) -> float:
+    """Side of a floor tile in metres: half a metre, doubled for wide views."""
+    return TILE_SIZE * max(1, 2 ** int(np.ceil(np.log2(max(span / 4.5, 1e-6)))))
+
+
+def paint_floor(pen: ImageDraw.ImageDraw, camera: Camera, floor: float, *, step: float | None = None) -> None:
+    """Tiles that stay in the world and fade into the paper; ``step`` is their side (None: as `tile_step` says)."""
     reach = camera.span * max(1.0, 0.62 * camera.size[0] / camera.size[1]) * 1.45
-    step = TILE_SIZE * max(1, 2 ** int(np.ceil(np.log2(max(camera.span / 4.5, 1e-6)))))
+    step = tile_step(camera.span) if step is None else step
     count = int(np.ceil(reach / step)) + 1
     middle = np.floor(camera.target[[0, 2]] / step).astype(int)
     i, j = np.meshgrid(*(np.arange(m - count, m + count + 1) for m in middle), indexing="ij")
@@ -137,8 +148,8 @@ def paint_path(pen: ImageDraw.ImageDraw, camera: Camera, path: Array, colour: Co
     pen.line([tuple(p) for p in places.tolist()], fill=colour, width=thick, joint="curve")
 
 
-def paint_shadow(picture: Image.Image, camera: Camera, shape: Figure, frame: int) -> None:
-    """A soft blot on the floor straight below the body."""
+def paint_shadow(picture: Image.Image, camera: Camera, shape: Figure, frame: int, *, strength: float = 0.36) -> None:
+    """A soft blot on the floor straight below the body; ``strength`` is its opacity."""
     if not shape.bones:
         return
     places = shape.places[frame].copy()
@@ -164,13 +175,27 @@ def paint_shadow(picture: Image.Image, camera: Camera, shape: Figure, frame: int
     mask = Image.new("L", (max(wide // shrink, 1), max(tall // shrink, 1)))
     pen = ImageDraw.Draw(mask)
     for outline in outlines:
-        pen.polygon(((outline - low) / shrink).ravel().tolist(), fill=92)
+        pen.polygon(((outline - low) / shrink).ravel().tolist(), fill=round(255 * strength))
     mask = mask.filter(ImageFilter.BoxBlur(2)).resize((wide, tall), Image.Resampling.BILINEAR)
     picture.paste(SHADOW, (int(low[0]), int(low[1])), mask)
 
 
-def paint_body(pen: ImageDraw.ImageDraw, camera: Camera, shape: Figure, frame: int, *, trunk: Colour = MIDDLE) -> None:
-    """The person, far parts first; a body without bones is a ball."""
+def paint_body(
+    pen: ImageDraw.ImageDraw,
+    camera: Camera,
+    shape: Figure,
+    frame: int,
+    *,
+    trunk: Colour = MIDDLE,
+    tinted: bool = False,
+) -> None:
+    """The person, far parts first; a body without bones is a ball.
+
+    ``tinted``: all of the body in shades of ``trunk``, the left side lighter and the right darker, floor contacts
+    unmarked; else the sides and contacts have the colours of this module.
+    """
+    skin = mix(trunk, PAPER, 0.55) if tinted else SKIN
+    colours = shades(trunk) if tinted else {0: trunk, 1: LEFT, -1: RIGHT}
     if not shape.bones:
         at, _, scale = camera.see(shape.places[frame, :1])
         pen.polygon(hull(at, 0.06 * shape.height * scale), fill=trunk)
@@ -187,7 +212,8 @@ def paint_body(pen: ImageDraw.ImageDraw, camera: Camera, shape: Figure, frame: i
     middles = ((depth[a] + depth[b]) / 2 + 0.08 * shape.height * inside).tolist()
     for i, (parent, child) in enumerate(shape.bones):
         if child not in shape.trunk:
-            parts.append((middles[i], outer[i], inner[i], _bone_colour(shape, frame, parent, child) or trunk))
+            stands = not tinted and _stands(shape, frame, parent, child)
+            parts.append((middles[i], outer[i], inner[i], CONTACT if stands else colours[shape.sides[child]]))
     for joints, radius in ((shape.chest, 0.047), (shape.hips, 0.056)):
         if joints:
             at, r = seen[list(joints)], radius * shape.height * scale[list(joints)]
@@ -195,7 +221,7 @@ def paint_body(pen: ImageDraw.ImageDraw, camera: Camera, shape: Figure, frame: i
             parts.append((mean, _flat(hull(at, r + edge)), _flat(hull(at, r)), trunk))
     if shape.chest and shape.hips:
         parts.append((*_waist(seen, depth, scale, shape, edge), trunk))
-    parts += _head_parts(camera, shape, frame, edge)
+    parts += _head_parts(camera, shape, frame, edge, skin=skin)
     for _, outside, inside, colour in sorted(parts, key=lambda part: -part[0]):
         pen.polygon(outside, fill=mix(colour, INK, 0.55))
         if inside is not None:
@@ -206,12 +232,9 @@ def _flat(points: list[tuple[float, float]]) -> list[float]:
     return [v for p in points for v in p]
 
 
-def _bone_colour(shape: Figure, frame: int, parent: int, child: int) -> Colour | None:
-    """Contact or side; none for the trunk."""
+def _stands(shape: Figure, frame: int, parent: int, child: int) -> bool:
     low = shape.places[frame, parent, 1] < shape.floor + 0.09 * shape.height
-    if low and shape.contacts[frame, child]:
-        return CONTACT
-    return {1: LEFT, -1: RIGHT}.get(shape.sides[child])
+    return bool(low and shape.contacts[frame, child])
 
 
 def _waist(
@@ -226,7 +249,7 @@ def _waist(
 
 
 def _head_parts(
-    camera: Camera, shape: Figure, frame: int, edge: float
+    camera: Camera, shape: Figure, frame: int, edge: float, *, skin: Colour
 ) -> list[tuple[float, list[float], list[float], Colour]]:
     """A ball and a nose that shows where the person looks."""
     if shape.head is None:
@@ -238,7 +261,8 @@ def _head_parts(
     gaze = shape.gaze[frame]
     nose = middle + radius * 0.98 * gaze
     parts: list[tuple[float, list[float], list[float], Colour]] = []
-    for point, r, colour, nearer in ((middle, radius, SKIN, 0.0), (nose, 0.3 * radius, mix(SKIN, LEFT, 0.45), 0.0)):
+    nose_colour = mix(SKIN, LEFT, 0.45) if skin == SKIN else mix(skin, INK, 0.35)
+    for point, r, colour, nearer in ((middle, radius, skin, 0.0), (nose, 0.3 * radius, nose_colour, 0.0)):
         seen, depth, scale = camera.see(point[None])
         outlines = [_flat(hull(seen, np.array([r * scale[0] + e]))) for e in (edge, 0.0)]
         parts.append((float(depth[0]) - nearer, outlines[0], outlines[1], colour))

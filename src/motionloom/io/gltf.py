@@ -17,11 +17,11 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.io.body import Piece, body
-from motionloom.io.gltf_read import load_glb
+from motionloom.io.gltf_read import load_glb, load_glb_people
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
 
-__all__ = ["load_glb", "save_glb"]
+__all__ = ["load_glb", "load_glb_people", "save_glb"]
 
 Array = NDArray[np.float64]
 _FLOAT, _U8, _U16, _U32 = 5126, 5121, 5123, 5125
@@ -56,21 +56,27 @@ class _File:
         return len(document.accessors) - 1
 
 
-def save_glb(motions: Sequence[Motion], path: str | Path, *, body: bool = True) -> Path:
+def save_glb(
+    motions: Sequence[Motion], path: str | Path, *, body: bool = True, names: Sequence[str] | None = None
+) -> Path:
     """Write motions as one GLB: one tree of joints per person, one animation for all, a skinned mesh if ``body``.
+
+    ``names`` of the people, one per motion, go to the nodes over their trees.
 
     Nodes stand in rest pose (every rotation the identity); rotations are keyed for every joint but bone tips, places
     for the root and, where a motion has `Motion.translations`, for every joint.
-    Errors: no motions, or a path that cannot be written.
+    Errors: no motions, names of another count, or a path that cannot be written.
     """
     if not motions:
         raise MotionloomError("there is no motion to save; give at least one")
+    if names is not None and len(names) != len(motions):
+        raise MotionloomError(f"{len(motions)} motions need as many names; got {len(names)}")
     with atomic_path(path) as temp:
-        temp.write_bytes(_assemble(motions, body))
+        temp.write_bytes(_assemble(motions, body, names))
     return Path(path)
 
 
-def _assemble(motions: Sequence[Motion], with_body: bool) -> bytes:
+def _assemble(motions: Sequence[Motion], with_body: bool, names: Sequence[str] | None) -> bytes:
     asset = pygltflib.Asset(version="2.0", generator="motionloom")
     animation = pygltflib.Animation(name="motion", extras={"fps": motions[0].fps})
     tops: list[int] = []
@@ -83,7 +89,8 @@ def _assemble(motions: Sequence[Motion], with_body: bool) -> bytes:
         tops.append(len(document.nodes))
         first = tops[-1] + 1
         # A node of one's own over each tree: Blender makes one armature of all trees that stand side by side.
-        document.nodes.append(pygltflib.Node(name=f"person{tail}", children=[first]))
+        name = f"person{tail}" if names is None else names[number]
+        document.nodes.append(pygltflib.Node(name=name, children=[first]))
         document.nodes.extend(_nodes(motion.skeleton, first))
         clock = (motion.fps, len(motion))
         if clock not in clocks:

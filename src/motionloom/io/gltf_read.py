@@ -43,14 +43,40 @@ def load_glb(path: str | Path, *, person: int = 0) -> Motion:
     topmost joint are folded into the root, uniform scales into the bones. Bone tips are leaves that nothing turns.
     Errors: `MotionloomError` for everything that is wrong with the file.
     """
+    file = _open(path)
+    if not 0 <= person < len(file.people):
+        raise MotionloomError(f"{file.document.name} holds {len(file.people)} people; there is no number {person}")
+    return _motion(file, person)
+
+
+def load_glb_people(path: str | Path) -> list[Motion]:
+    """Read everybody in a .glb, or a .gltf with embedded buffers, each as `load_glb` does, in the file's order."""
+    file = _open(path)
+    return [_motion(file, person) for person in range(len(file.people))]
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """A file's nodes, what moves them, and the joints of each person."""
+
+    document: Document
+    nodes: list[_Node]
+    parents: list[int]
+    channels: list[dict[tuple[int, str], dict[str, Any]]]
+    people: list[frozenset[int]]
+
+
+def _open(path: str | Path) -> _Opened:
     document = read_document(path)
     nodes = _nodes(document)
     parents = _parents(document, nodes)
     channels = channels_of(document, len(nodes))
-    people = _people(document, nodes, parents, channels)
-    if not 0 <= person < len(people):
-        raise MotionloomError(f"{document.name} holds {len(people)} people; there is no number {person}")
-    joints = people[person]
+    return _Opened(document, nodes, parents, channels, _people(document, nodes, parents, channels))
+
+
+def _motion(file: _Opened, person: int) -> Motion:
+    document, nodes, parents, channels = file.document, file.nodes, file.parents, file.channels
+    joints = file.people[person]
     if len(joints) > MAX_JOINTS:
         raise document.bad(f"its skeleton has {len(joints)} joints; at most {MAX_JOINTS} can be read")
     moved = next((a for a in channels if any(node in joints for node, _ in a)), {})

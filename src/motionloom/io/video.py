@@ -4,28 +4,25 @@ Orange is the person's left, blue the right, grey the middle; a bone that stands
 The floor's tiles are half a metre wide and stay in the world, so a sliding foot shows.
 """
 
-import subprocess
-import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from motionloom.errors import MotionloomError
 from motionloom.io import draw
 from motionloom.io.atomic import atomic_path
 from motionloom.io.draw import Camera
 from motionloom.io.figure import Figure, figure
+from motionloom.io.film import MAX_PIXELS, caption, film_rate, film_size, font, shorten, suffixed, write_film
+from motionloom.io.scene import smoothed
 from motionloom.motion import Motion
 
 Array = NDArray[np.float64]
 CELL = (176, 236)  # one pose on a sheet, pixels
 TITLE = 46  # height of a row's caption, pixels
-MAX_FPS = 60.0
-MAX_GIF_FRAMES = 1500
-MAX_PIXELS = 4096 * 2304
 
 
 # --- contact sheets -----------------------------------------------------------------------------------------------
@@ -47,7 +44,7 @@ def draw_sheet(
     sheet = Image.new("RGB", (width, height * len(motions)), draw.PAPER)
     for row, (motion, text) in enumerate(zip(motions, texts)):
         sheet.paste(_row(figure(motion), text, columns), (0, row * height))
-    with atomic_path(_checked(path, (".png",))) as temp:
+    with atomic_path(suffixed(path, (".png",))) as temp:
         sheet.save(temp, format="PNG", optimize=False)
     return Path(path)
 
@@ -58,14 +55,14 @@ def _row(shape: Figure, text: str, columns: int) -> Image.Image:
     camera = _fit(shape, frames, CELL)
     for column, frame in enumerate(frames.tolist()):
         target = np.array([shape.path[frame, 0], camera.target[1], shape.path[frame, 2]])
-        tile = _scene([shape], [frame], Camera(target, CELL, camera.span, camera.azimuth, camera.elevation))
-        ImageDraw.Draw(tile).text((8, CELL[1] - 20), f"{frame / shape.fps:.1f} s", fill=draw.QUIET, font=_font(13))
+        tile = _scene(shape, frame, Camera(target, CELL, camera.span, camera.azimuth, camera.elevation))
+        ImageDraw.Draw(tile).text((8, CELL[1] - 20), f"{frame / shape.fps:.1f} s", fill=draw.QUIET, font=font(13))
         row.paste(tile, (CELL[0] * column, TITLE))
     row.paste(_map(shape, CELL[1]), (CELL[0] * columns, TITLE))
     pen = ImageDraw.Draw(row)
     pen.line([(0, 0), (row.width, 0)], fill=draw.LINE)
-    pen.text((10, 7), _shorten(text, 18, row.width - 20), fill=draw.INK, font=_font(18))
-    pen.text((10, 29), _summary(shape), fill=draw.QUIET, font=_font(13))
+    pen.text((10, 7), shorten(text, 18, row.width - 20), fill=draw.INK, font=font(18))
+    pen.text((10, 29), _summary(shape), fill=draw.QUIET, font=font(13))
     return row
 
 
@@ -130,7 +127,7 @@ def _map(shape: Figure, side: int) -> Image.Image:
         pen.ellipse((x - 11, y - 11, x + 11, y + 11), fill=fill, outline=draw.PATH, width=4)
     small = picture.reduce(draw.SMOOTH)
     pen = ImageDraw.Draw(small)
-    pen.text((8, side - 20), f"from above, grid {metre:g} m", fill=draw.QUIET, font=_font(13))
+    pen.text((8, side - 20), f"from above, grid {metre:g} m", fill=draw.QUIET, font=font(13))
     pen.rectangle((0, 0, side - 1, side - 1), outline=draw.LINE)
     return small
 
@@ -145,158 +142,71 @@ def draw_video(
     captions: Sequence[str] | None = None,
     size: tuple[int, int] = (960, 540),
     fps: float | None = None,
-    together: bool = False,
 ) -> Path:
-    """Film motions as .mp4 (H.264) or .gif, side by side, or in one scene where ``together`` is set.
+    """Film motions as .mp4 (H.264) or .gif, side by side; `overlay.draw_scene` shows people in one scene.
 
     ``fps`` is the film's frame rate (default: the fastest motion's, halved until at most 60; a GIF at most 25);
     time in the film is time in the motion, and a shorter motion holds its last pose.
     Errors: no motions, captions of another count, sizes below 64 or above 4K, a path that cannot be written.
     """
     texts = _captions(motions, captions)
-    gif = Path(path).suffix.lower() == ".gif"
-    rate = _film_rate(motions, fps, 25.0 if gif and fps is None else MAX_FPS)
-    width, height = (int(v) // 2 * 2 for v in size)
-    if min(width, height) < 64 or width * height > MAX_PIXELS:
-        raise MotionloomError(f"a film is 64x64 to 4096x2304 pixels; got {size[0]}x{size[1]}")
+    rate = film_rate(path, max(m.fps for m in motions), fps)
+    panel = film_size(size)
     count = max(1, *(round((len(m) - 1) / m.fps * rate) + 1 for m in motions))
-    if gif and count > MAX_GIF_FRAMES:
-        raise MotionloomError(f"a GIF of {count} frames is too long (at most {MAX_GIF_FRAMES}); write an .mp4 instead")
-    with atomic_path(_checked(path, (".mp4", ".gif"))) as temp:
-        shapes = [figure(m.resample(rate)) for m in motions]
-        frames = _film(shapes, texts, (width, height), count, together)
-        if gif:
-            _write_gif(frames, temp, rate)
-        else:
-            _write_mp4(frames, temp, (width, height), rate)
-    return Path(path)
+
+    def frames() -> Iterator[Image.Image]:
+        return _film([figure(m.resample(rate)) for m in motions], texts, panel, count)
+
+    return write_film(frames, path, panel, rate=rate, count=count)
 
 
-def _film_rate(motions: Sequence[Motion], fps: float | None, limit: float) -> float:
-    if fps is not None:
-        if not (np.isfinite(fps) and 1 <= fps <= 240):
-            raise MotionloomError(f"a film has 1 to 240 frames per second; got {fps}")
-        return float(fps)
-    rate = max(m.fps for m in motions)
-    return max(1.0, rate / np.ceil(rate / limit))
-
-
-def _film(
-    shapes: Sequence[Figure], texts: Sequence[str], size: tuple[int, int], count: int, together: bool
-) -> Iterator[Image.Image]:
+def _film(shapes: Sequence[Figure], texts: Sequence[str], size: tuple[int, int], count: int) -> Iterator[Image.Image]:
     """The film's pictures, one after the other."""
-    scenes = [list(shapes)] if together else [[s] for s in shapes]
-    titles = ["   |   ".join(t for t in texts if t)] if together else list(texts)
-    columns = len(scenes) if len(scenes) <= 3 else int(np.ceil(np.sqrt(len(scenes))))
-    rows = -(-len(scenes) // columns)
+    columns = len(shapes) if len(shapes) <= 3 else int(np.ceil(np.sqrt(len(shapes))))
+    rows = -(-len(shapes) // columns)
     panel = (size[0] // columns, size[1] // rows)
-    cameras = [_follow(scene, panel, count) for scene in scenes]
+    cameras = [_follow(shape, panel) for shape in shapes]
     seconds = max(s.seconds for s in shapes)
     for k in range(count):
         picture = Image.new("RGB", size, draw.PAPER)
-        for i, scene in enumerate(scenes):
-            frames = [min(k, len(s) - 1) for s in scene]
-            tile = _scene(scene, frames, cameras[i][min(k, len(cameras[i]) - 1)])
-            _title(tile, titles[i])
+        for i, shape in enumerate(shapes):
+            frame = min(k, len(shape) - 1)
+            tile = _scene(shape, frame, cameras[i][frame])
+            _title(tile, texts[i])
             picture.paste(tile, (panel[0] * (i % columns), panel[1] * (i // columns)))
-        clock = f"{k / scenes[0][0].fps:.1f} / {seconds:.1f} s"
+        clock = f"{k / shapes[0].fps:.1f} / {seconds:.1f} s"
         pen = ImageDraw.Draw(picture)
-        pen.text((size[0] - 12, size[1] - 10), clock, fill=draw.QUIET, font=_font(15), anchor="rs")
+        pen.text((size[0] - 12, size[1] - 10), clock, fill=draw.QUIET, font=font(15), anchor="rs")
         yield picture
 
 
 def _title(tile: Image.Image, text: str) -> None:
     big = 18 if tile.width > 400 else 13
     if text:
-        line = _shorten(text, big, tile.width - 24)
-        ImageDraw.Draw(tile).text((12, 10), line, fill=draw.INK, font=_font(big))
+        line = shorten(text, big, tile.width - 24)
+        ImageDraw.Draw(tile).text((12, 10), line, fill=draw.INK, font=font(big))
 
 
-def _follow(scene: Sequence[Figure], panel: tuple[int, int], count: int) -> list[Camera]:
-    """Cameras, one per frame, that glide after the middle of the people."""
-    cameras = [_fit(s, np.unique(np.linspace(0, len(s) - 1, 60).round().astype(int)), panel) for s in scene]
-    paths = np.stack([s.path[np.minimum(np.arange(count), len(s) - 1)] for s in scene])
-    middle = paths.mean(axis=0)
-    apart = float(np.linalg.norm(paths - middle, axis=-1).max())
-    smooth = _smooth(middle, 0.6 * scene[0].fps)
-    lag = float(np.linalg.norm(smooth - middle, axis=-1).max())
-    span = max(max(c.span for c in cameras), 2.0 * (apart + lag) * panel[1] / panel[0] + 1.1 * scene[0].height)
-    azimuth = cameras[0].azimuth
-    height = float(np.mean([c.target[1] for c in cameras]))
-    return [Camera(np.array([x, height, z]), panel, span, azimuth) for x, _, z in smooth]
+def _follow(shape: Figure, panel: tuple[int, int]) -> list[Camera]:
+    """Cameras, one per frame, that glide after a person."""
+    camera = _fit(shape, np.unique(np.linspace(0, len(shape) - 1, 60).round().astype(int)), panel)
+    glide = smoothed(shape.path, 0.6 * shape.fps)
+    lag = float(np.linalg.norm(glide - shape.path, axis=-1).max())
+    span = max(camera.span, 2.0 * lag * panel[1] / panel[0] + 1.1 * shape.height)
+    return [Camera(np.array([x, camera.target[1], z]), panel, span, camera.azimuth) for x, _, z in glide]
 
 
-def _smooth(values: Array, width: float) -> Array:
-    """Gaussian smoothing along axis 0; the ends are held."""
-    reach = int(np.ceil(2.5 * width))
-    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / max(width, 1e-6)) ** 2)
-    padded = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
-    return np.stack([np.convolve(column, kernel / kernel.sum(), mode="valid") for column in padded.T], axis=-1)
-
-
-def _scene(people: Sequence[Figure], frames: Sequence[int], camera: Camera) -> Image.Image:
-    """One picture: floor, paths, shadows and bodies, far people first."""
+def _scene(person: Figure, now: int, camera: Camera) -> Image.Image:
+    """One picture: floor, path, shadow and body."""
     big = (camera.size[0] * draw.SMOOTH, camera.size[1] * draw.SMOOTH)
     picture = Image.new("RGB", big, draw.PAPER)
     pen = ImageDraw.Draw(picture)
-    draw.paint_floor(pen, camera, people[0].floor)
-    order = sorted(range(len(people)), key=lambda i: -float(camera.see(people[i].path[frames[i]])[1]))
-    for i in order:
-        path, now = people[i].path, frames[i]
-        draw.paint_path(pen, camera, path[now:], draw.mix(draw.PATH, draw.PAPER, 0.72), 0.014)
-        draw.paint_path(pen, camera, path[: now + 1], draw.PATH, 0.02)
-        draw.paint_shadow(picture, camera, people[i], now)
-    for i in order:
-        draw.paint_body(pen, camera, people[i], frames[i], trunk=draw.TRUNKS[i % len(draw.TRUNKS)])
+    draw.paint_floor(pen, camera, person.floor)
+    draw.paint_path(pen, camera, person.path[now:], draw.mix(draw.PATH, draw.PAPER, 0.72), 0.014)
+    draw.paint_path(pen, camera, person.path[: now + 1], draw.PATH, 0.02)
+    draw.paint_shadow(picture, camera, person, now)
+    draw.paint_body(pen, camera, person, now)
     return picture.reduce(draw.SMOOTH)
-
-
-# --- writing ------------------------------------------------------------------------------------------------------
-
-
-def _write_mp4(frames: Iterator[Image.Image], path: Path, size: tuple[int, int], fps: float) -> None:
-    """Pipe raw pictures into ffmpeg: an argument list, no shell, an absolute path."""
-    import imageio_ffmpeg
-
-    command = [
-        imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
-        "-s", f"{size[0]}x{size[1]}", "-r", f"{fps:.6f}", "-i", "-", "-an", "-c:v", "libx264", "-preset", "veryfast",
-        "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", f"file:{path.absolute()}",
-    ]  # fmt: skip
-    with tempfile.TemporaryFile() as log:
-        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log)
-        assert process.stdin is not None
-        try:
-            for frame in frames:
-                process.stdin.write(frame.tobytes())
-            process.stdin.close()
-        except BrokenPipeError:
-            pass  # ffmpeg has stopped; its exit code and last words say why
-        except BaseException:
-            process.kill()
-            raise
-        finally:
-            code = process.wait()
-        if code != 0:
-            log.seek(0)
-            words = log.read().decode(errors="replace").strip().splitlines() or ["no message"]
-            raise MotionloomError(f"ffmpeg could not write the film ({words[-1][:200]}); try another path or size")
-
-
-def _write_gif(frames: Iterator[Image.Image], path: Path, fps: float) -> None:
-    """One palette for the whole film; frame times are whole hundredths of a second that add up to the true time."""
-    first = next(frames)
-    palette = first.quantize(128, dither=Image.Dither.NONE)
-    pictures = [palette, *(f.quantize(palette=palette, dither=Image.Dither.NONE) for f in frames)]
-    ends = np.round(np.arange(len(pictures) + 1) * 100 / fps).astype(int)
-    durations = (np.maximum(np.diff(ends), 2) * 10).tolist()
-    pictures[0].save(path, format="GIF", save_all=True, append_images=pictures[1:], duration=durations, loop=0)
-
-
-def _checked(path: str | Path, suffixes: tuple[str, ...]) -> Path:
-    if Path(path).suffix.lower() not in suffixes:
-        raise MotionloomError(f"cannot write {str(path)!r}: the name must end in {' or '.join(suffixes)}")
-    return Path(path)
 
 
 def _captions(motions: Sequence[Motion], captions: Sequence[str] | None) -> list[str]:
@@ -304,23 +214,4 @@ def _captions(motions: Sequence[Motion], captions: Sequence[str] | None) -> list
         raise MotionloomError("there is no motion to draw; give at least one")
     if captions is not None and len(captions) != len(motions):
         raise MotionloomError(f"{len(motions)} motions need as many captions; got {len(captions)}")
-    return [" ".join(str(c)[:2000].split()) for c in captions] if captions is not None else [""] * len(motions)
-
-
-def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    if size not in _FONTS:
-        _FONTS[size] = ImageFont.load_default(size)
-    return _FONTS[size]
-
-
-_FONTS: dict[int, ImageFont.FreeTypeFont | ImageFont.ImageFont] = {}
-
-
-def _shorten(text: str, size: int, width: float) -> str:
-    """The text, cut at the end with an ellipsis where it is wider than ``width`` pixels."""
-    font = _font(size)
-    if font.getlength(text) <= width:
-        return text
-    while text and font.getlength(text + "…") > width:
-        text = text[:-1]
-    return text.rstrip() + "…"
+    return [caption(c) for c in captions] if captions is not None else [""] * len(motions)
