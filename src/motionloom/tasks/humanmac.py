@@ -19,23 +19,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motionloom.diffusion import (
-    Basis,
-    Constraint,
-    Ddim,
-    Denoiser,
-    Draw,
-    Schedule,
-    State,
-    mix,
-    row_draw,
-    run,
-)  # fmt: skip
+from motionloom.diffusion import Basis, Constraint, Ddim, Denoiser, Draw, Schedule, State, mix, row_draw, run
 from motionloom.errors import MotionloomError
 from motionloom.predictor import Predictor
 
 Padding = Literal["last", "zero", "repeat"]
-
 Way = Callable[[Tensor], Tensor]
 
 PARTS = {
@@ -52,8 +40,7 @@ def published_levels(schedule: Schedule, steps: int) -> list[int]:
     are rounded down. Raises MotionloomError unless 1 <= steps < T.
     """
     if not 1 <= steps < schedule.steps:
-        raise MotionloomError(f"the published walk over {schedule.steps} levels has 1 to {schedule.steps - 1} steps, "
-                              f"not {steps}")  # fmt: skip
+        raise MotionloomError(f"of {schedule.steps} levels 1 to {schedule.steps - 1} steps can be made, not {steps}")
     return [2 + i * schedule.steps // steps for i in reversed(range(steps))] + [1]
 
 
