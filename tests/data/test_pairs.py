@@ -375,6 +375,16 @@ def test_a_camera_that_follows_takes_nothing_from_people_whose_feet_stand():
     assert np.abs(found - world).max() < 0.1 * 0.7 * 4
 
 
+def test_the_camera_is_where_the_extrinsics_see_the_origin_from():
+    place = np.array([1.0, 2.0, -3.0])
+    look = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    poses = np.tile(np.eye(4), (5, 1, 1))
+    poses[:, :3, :3], poses[:, :3, 3] = look, -look @ place
+    poses[2] = 7.0  # not aligned to the image: between its neighbours
+    found = threedpw._camera({"cam_poses": poses, "campose_valid": [np.array([1, 1, 0, 1, 1])]}, 5, Path("x.pkl"))
+    np.testing.assert_allclose(found, np.tile(place, (5, 1)))
+
+
 def damaged(content: dict, what: str) -> dict:
     joints = content["jointPositions"]
     return {

@@ -247,7 +247,7 @@ def test_a_group_of_no_spread_is_equal_or_infinitely_far():
 
 
 def test_shuffling_gives_everybody_a_stranger_who_begins_where_the_partner_did():
-    pairs = [rigid(couple(1.0 + n, seconds=1.0 + n, turn=n), n, (n, 0, 2 * n)) for n in range(3)]
+    pairs = [rigid(couple(1.0 + n, seconds=1.0 + n, turn=n), 2.5 * n, (n, 0, 2 * n)) for n in range(3)]
     for n, (mixed, pair) in enumerate(zip(groups.shuffled(pairs), pairs, strict=True)):
         stranger = pairs[(n + 1) % 3][1]
         frames = mixed.shape[1]
