@@ -382,6 +382,7 @@ def test_the_camera_is_where_the_extrinsics_see_the_origin_from():
     poses[:, :3, :3], poses[:, :3, 3] = look, -look @ place
     poses[2] = 7.0  # not aligned to the image: between its neighbours
     found = threedpw._camera({"cam_poses": poses, "campose_valid": [np.array([1, 1, 0, 1, 1])]}, 5, Path("x.pkl"))
+    assert found is not None
     np.testing.assert_allclose(found, np.tile(place, (5, 1)))
 
 
