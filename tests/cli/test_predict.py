@@ -231,6 +231,7 @@ def test_parts_are_held_from_the_line_and_from_a_file(weights, asked):
     assert run(weights, *words, "--hold", "left_arm", "--from-time", "0.5") == 0
     kick = io.load("kick.bvh")
     np.testing.assert_allclose(asked["hold"].source.root, kick.root[15:], atol=1e-9)
+    assert run(weights, *words, "--hold", "left_arm", "--seconds", "1.5") == 0  # as long as there is anything
 
 
 def test_a_source_at_another_rate_or_on_another_body_comes_along_if_that_is_asked(weights, asked):
@@ -408,6 +409,7 @@ HOLD = ["--hold", "head", "--from", "kick.bvh"]
         (["past.bvh", "--mask", "absent.json", "--from", "kick.bvh"], "absent.json"),
         (["past.bvh", *HOLD], "kick.bvh has 1.50 s from 0 s on, and parts are held for 2.00 s; give a longer motion"),
         (["past.bvh", *HOLD, "--seconds", "1", "--from-time", "1"], "has 0.50 s from 1 s on"),
+        (["past.bvh", *HOLD, "--seconds", "1.5334"], "parts are held for 1.53 s"),  # a frame more than there is
         (["past.bvh", *HOLD, "--seconds", "1", "--from-time", "7"], "has 0.00 s from 7 s on"),
         (["past.bvh", "--mask", "late.json", "--from", "kick.bvh"], "nothing is held before 5 s"),
         (["past.bvh", *HOLD, "--hold", "lower_body,upper_body", "--seconds", "1"], "all joints are held all of the"),
