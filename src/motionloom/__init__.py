@@ -4,7 +4,8 @@ from motionloom import Prior, generate, save
 motions = generate(Prior.load(), ["a person walks forward"], seconds=5.0, seed=1)
 save(motions[0], "walk.bvh")
 
-`compose` makes long motions out of `Segment`s, `control` motions that meet a `Goal`, `edit` changes clips.
+`compose` makes long motions out of `Segment`s, `control` motions that meet a `Goal`, `edit` changes clips; a
+`Predictor` can `predict` what somebody does next, or `switch` from one clip to another.
 """
 
 from importlib import import_module
@@ -15,12 +16,15 @@ if TYPE_CHECKING:
     from motionloom.errors import MotionloomError
     from motionloom.io import load, save
     from motionloom.motion import Motion
+    from motionloom.predictor import Predictor, save_predictor
     from motionloom.retarget import from_smpl22, retarget, to_smpl22
     from motionloom.skeleton import SMPL22, Skeleton
     from motionloom.tasks.control import Controlled, control
     from motionloom.tasks.edit import edit
     from motionloom.tasks.goals import Goal
+    from motionloom.tasks.held import HeldPart, Hold
     from motionloom.tasks.long import Segment, compose
+    from motionloom.tasks.predict import predict, switch
     from motionloom.tasks.text import generate
 
 _PLACES = {
@@ -30,6 +34,8 @@ _PLACES = {
     "load": "io",
     "save": "io",
     "Motion": "motion",
+    "Predictor": "predictor",
+    "save_predictor": "predictor",
     "from_smpl22": "retarget",
     "retarget": "retarget",
     "to_smpl22": "retarget",
@@ -39,8 +45,12 @@ _PLACES = {
     "control": "tasks.control",
     "edit": "tasks.edit",
     "Goal": "tasks.goals",
+    "HeldPart": "tasks.held",
+    "Hold": "tasks.held",
     "Segment": "tasks.long",
     "compose": "tasks.long",
+    "predict": "tasks.predict",
+    "switch": "tasks.predict",
     "generate": "tasks.text",
 }
 
@@ -48,8 +58,11 @@ __all__ = [
     "SMPL22",
     "Controlled",
     "Goal",
+    "HeldPart",
+    "Hold",
     "Motion",
     "MotionloomError",
+    "Predictor",
     "Prior",
     "Segment",
     "Skeleton",
@@ -59,9 +72,12 @@ __all__ = [
     "from_smpl22",
     "generate",
     "load",
+    "predict",
     "retarget",
     "save",
+    "save_predictor",
     "save_prior",
+    "switch",
     "to_smpl22",
 ]
 

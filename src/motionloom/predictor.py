@@ -175,6 +175,9 @@ def is_predictor(path: Path) -> bool:
 def load_predictor(path: Path) -> Predictor:
     """Read a predictor; raises MotionloomError where the file is damaged, of another kind or of a newer format."""
     tensors, metadata = read_tensors(path)
+    if "motionloom-predictor" not in metadata:
+        kind = "a prior" if "motionloom" in metadata else "something else"
+        raise MotionloomError(f"{path} is {kind}, not a predictor; name a file that 'motionloom train predictor' wrote")
     try:
         about = json.loads(metadata["motionloom-predictor"])
         if about["format"] != FORMAT:

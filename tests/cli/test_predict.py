@@ -416,7 +416,7 @@ HOLD = ["--hold", "head", "--from", "kick.bvh"]
         (["past.bvh", "--hold", "head", "--from", "other.bvh", "--seconds", "1"], "--skeleton past.bvh"),
         (["past.bvh", "--hold", "head", "--from", "absent.bvh"], "absent.bvh"),
         (["past.bvh", "--weights", "absent"], "no predictor 'absent'"),
-        (["past.bvh", "--weights", "prior.safetensors"], "does not describe a predictor"),
+        (["past.bvh", "--weights", "prior.safetensors"], "is a prior, not a predictor"),
         (["past.bvh", "--weights", "taken"], "not a whole safetensors file"),
         (["past.bvh", "--device", "abacus"], "'abacus' cannot be used"),
     ],
