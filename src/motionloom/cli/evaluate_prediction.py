@@ -47,7 +47,7 @@ def _add_study(commands) -> None:
     _shared(study)
     study.add_argument("--samples", type=int, help="futures of each past (default: of the study)")
     study.add_argument(
-        "--train-steps", type=int, metavar="N", help="training steps of each small network (default 1200)"
+        "--train-steps", type=int, metavar="N", help="training steps of each small network (default 1000)"
     )
     study.add_argument(
         "--out", type=Path, metavar="FOLDER", required=True, help="folder of NAME.md, NAME.png, NAME.json"

@@ -171,6 +171,29 @@ def _lines(report: Report, columns: Sequence[Column], lines: dict[str, list[tupl
     return _save(figure, report, path)
 
 
+def study(report: Report, path: Path) -> Path:
+    """A picture of a study: a panel per metric over its rows in order, lines over steps where rows differ in them."""
+    here = [row for row in report.rows if not row.measured_on]
+    columns, lines = _drawable(report, here)[:PANELS], by_steps(here)
+    if not columns:
+        return path
+    if lines and all(row.name == REAL or any(row in dict(p).values() for p in lines.values()) for row in here):
+        return _lines(report, columns, lines, path)
+    rows = [row for row in here if row.name != REAL]
+    figure, axes, _ = _grid(len(columns), width=2.9, height=2.3)
+    for axis, column in zip(axes, columns, strict=True):
+        found = [(k, row.values[column.name].mean) for k, row in enumerate(rows) if column.name in row.values]
+        axis.plot([k for k, _ in found], [v for _, v in found], color=OURS, marker="o", markersize=4, linewidth=1.2)
+        real = report.row(REAL)
+        if real and column.name in real.values:
+            axis.axhline(real.values[column.name].mean, color=REALITY, linewidth=0.8, linestyle="--")
+        shown = range(0, len(rows), max(1, len(rows) // 8))
+        axis.set_xticks(list(shown), [_plain(rows[k].name, 20) for k in shown], rotation=40, ha="right", fontsize=7)
+        axis.set_title(_plain(column.title, 34) + ARROWS[column.better], fontsize=9, color=INK)
+        axis.grid(color="#e4e7ec", linewidth=0.6)
+    return _save(figure, report, path)
+
+
 def _plain(text: str, most: int) -> str:
     """One line of at most ``most`` characters that matplotlib takes as it stands: no mathematics, no controls."""
     line = "".join(c for c in " ".join(text.split()) if c.isprintable())

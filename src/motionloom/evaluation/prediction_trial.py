@@ -30,6 +30,8 @@ ROWS = 512
 OF_REAL = ("jerk", "jerk_peak", "stretch", "stretch_rmse", "jitter", "jitter_rmse", "seam_velocity",
            "seam_velocity_worst", "seam_acceleration", "seam_acceleration_worst")  # fmt: skip
 """What real futures have numbers of; their errors would be 0."""
+KNOWN = {m.name for m in metrics.METRICS} | {"cmd", "root_ade", "root_fde", "seconds"}
+"""Names of everything that `score` gives."""
 EVERY = 20.0
 """Seconds between lines of progress."""
 
