@@ -1,9 +1,11 @@
 """Pickles of plain values: what pickle writes is read equal, and what could act is refused before it acts."""
 
+import collections
 import contextlib
 import io
 import os
 import pickle
+import pickletools
 import struct
 
 import numpy as np
@@ -116,6 +118,10 @@ F8 = b"cnumpy\ndtype\n(S'f8'\nI0\nI1\ntR(I3\nS'<'\nNNNI-1\nI-1\nI0\ntb"
 HOSTILE = {
     "empty": b"",
     "no-pickle": b"hello",
+    "ordered-dict": pickle.dumps(collections.OrderedDict(a=1)),
+    "set": pickle.dumps({1, 2}, 2),
+    "frozen-set": pickle.dumps(frozenset({1}), 4),
+    "long-string-that-is-not-there": b"\x80\x04\x8e" + struct.pack("<Q", 1 << 62) + b"x.",
     "cut": pickle.dumps({"a": np.arange(9.0)})[:-20],
     "trailing": pickle.dumps(1) + b"N.",
     "persistent-id": b"Pfile\n.",
@@ -153,6 +159,22 @@ HOSTILE = {
 }
 
 
+KNOWN = {"GLOBAL", "STACK_GLOBAL", "REDUCE", "BUILD"}
+"""Operations that act, of which the words of numpy's own pickles are read; any other word is tested above."""
+ACTING = {"INST", "OBJ", "NEWOBJ", "NEWOBJ_EX", "EXT1", "EXT2", "EXT4", "PERSID", "BINPERSID"}
+
+
+def test_every_operation_that_finds_or_calls_something_is_refused_by_name():
+    told = {}
+    for operation in pickletools.opcodes:
+        code = operation.code.encode("latin-1")
+        with pytest.raises(MotionloomError) as caught:
+            read_plain(b"\x80\x04](" + code + b"\x01\x00\x00\x00\x00\x00\x00\x00\n\n" + b"e.", limit=LIMIT)
+        told[operation.name] = str(caught.value)
+    assert told.keys() >= ACTING | KNOWN
+    assert all(f"asks for {name})" in told[name] for name in ACTING)
+
+
 @pytest.mark.parametrize("name", list(HOSTILE))
 def test_a_hostile_or_damaged_pickle_is_refused_with_one_sentence(name):
     with pytest.raises(MotionloomError, match="is not a pickle of plain values and is not opened") as caught:
@@ -174,6 +196,16 @@ def test_one_string_used_for_many_arrays_counts_each_time():
     arrays = (NDARRAY + b"(I1\n(I10000\nt" + F8 + b"I00\ng9\ntba") * 1000
     with pytest.raises(MotionloomError):
         read_plain(b"]" + string + arrays + b".", limit=LIMIT)
+
+
+def test_one_text_decoded_again_and_again_counts_each_time():
+    """Protocol 2 keeps bytes as text, which each mention decodes."""
+    word = b"X" + struct.pack("<I", 1000) + b"a" * 1000 + b"q\x02X" + struct.pack("<I", 6) + b"latin1"
+    first = b"c_codecs\nencode\nq\x01" + word + b"\x86q\x03R"
+    for many in (4, 5):
+        data = b"\x80\x02](" + first + b"h\x01h\x03R" * (many - 1) + b"e."
+        with contextlib.nullcontext() if many == 4 else pytest.raises(MotionloomError, match="texts hold more than"):
+            assert read_plain(data, limit=4999) == [b"a" * 1000] * many
 
 
 def test_files_beyond_the_limit_or_missing_are_refused(tmp_path):

@@ -7,9 +7,7 @@ or from JSON.
 """
 
 import ast
-import io
 import json
-import pickletools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +17,7 @@ from typing import Any, cast
 import numpy as np
 
 from motionloom.errors import MotionloomError
+from motionloom.io.plain_pickle import read_plain_file
 
 TAGS = (
     "VERB", "NOUN", "DET", "ADP", "NUM", "AUX", "PRON", "ADJ", "ADV",
@@ -97,7 +96,7 @@ def read_words(path: Path | str, *, lists: Path | str | None = None) -> Words:
 
 def _published(folder: Path) -> tuple[tuple[str, ...], np.ndarray]:
     vectors = read_array(folder / "our_vab_data.npy")
-    words, rows = read_plain(folder / "our_vab_words.pkl"), read_plain(folder / "our_vab_idx.pkl")
+    words, rows = read_flat(folder / "our_vab_words.pkl"), read_flat(folder / "our_vab_idx.pkl")
     if not isinstance(words, list) or not all(isinstance(w, str) for w in words) or not isinstance(rows, dict):
         raise MotionloomError(f"{folder}: our_vab_words.pkl must be a list of words, our_vab_idx.pkl a table of rows")
     places = [rows.get(word) for word in words]
@@ -185,70 +184,13 @@ def read_array(path: Path | str) -> np.ndarray:
         raise MotionloomError(f"{path} is not a .npy array of numbers ({reason})") from None
 
 
-def read_plain(path: Path | str) -> object:
-    """A pickle of plain values: strings and whole numbers in one list or one dictionary. Raises MotionloomError else.
+def read_flat(path: Path | str) -> list[Any] | dict[Any, Any]:
+    """One list or one table of strings and whole numbers, out of a pickle that is read and never run.
 
-    This is no unpickler. `pickletools` splits the bytes into operations without carrying any of them out, and the loop
-    below knows only those that push a string, an integer, an empty list or dictionary, or fill one of these. The
-    operations that find or call anything (GLOBAL, REDUCE, BUILD, INST, OBJ, NEWOBJ, EXT, PERSID) do not exist in it:
-    a file that has one is refused. Containers do not nest, so nothing can refer to itself or grow.
+    Raises MotionloomError for a file that is missing, larger than 16 MiB, damaged, or holds anything else.
     """
-    path = Path(path)
-    try:
-        if path.stat().st_size > _MAX_LIST_BYTES:
-            raise ValueError("it is larger than 16 MiB")
-        return _plain(path.read_bytes())
-    except (OSError, ValueError, IndexError, KeyError, TypeError) as error:
-        reason = " ".join(str(error).split())[:120]
-        raise MotionloomError(f"{path} is not a plain list or table of words and is not opened ({reason})") from None
-
-
-_PUSHES = {
-    "BINUNICODE", "SHORT_BINUNICODE", "BINUNICODE8", "UNICODE",
-    "BININT", "BININT1", "BININT2", "INT", "LONG", "LONG1", "LONG4",
-}  # fmt: skip
-_REMEMBERS = {"BINPUT", "LONG_BINPUT", "PUT"}
-_RECALLS = {"BINGET", "LONG_BINGET", "GET"}
-
-
-def _plain(data: bytes) -> object:
-    stack: list[Any] = []
-    below: list[list[Any]] = []  # the stacks under each open mark
-    memo: dict[int, Any] = {}
-    for operation, value, _ in pickletools.genops(io.BytesIO(data)):
-        name = operation.name
-        if name in _PUSHES:
-            stack.append(value)
-        elif name in ("EMPTY_LIST", "EMPTY_DICT"):
-            stack.append([] if name == "EMPTY_LIST" else {})
-        elif name in _REMEMBERS or name == "MEMOIZE":
-            memo[len(memo) if name == "MEMOIZE" else cast(int, value)] = stack[-1]
-        elif name in _RECALLS:
-            stack.append(memo[cast(int, value)])
-        elif name == "MARK":
-            below.append(stack)
-            stack = []
-        elif name in ("APPENDS", "SETITEMS"):
-            values, stack = stack, below.pop()
-            _fill(stack[-1], values)
-        elif name in ("APPEND", "SETITEM"):
-            count = 1 if name == "APPEND" else 2
-            values = stack[-count:]
-            del stack[-count:]
-            _fill(stack[-1], values)
-        elif name not in ("PROTO", "FRAME", "STOP"):
-            raise ValueError(f"it asks for {name}")
-    if below or len(stack) != 1 or not isinstance(stack[0], list | dict):
-        raise ValueError("it does not hold one list or table")
-    return stack[0]
-
-
-def _fill(container: Any, values: list[Any]) -> None:
-    if not all(isinstance(value, str | int) for value in values):
-        raise ValueError("its values nest")
-    if isinstance(container, list):
-        container.extend(values)
-    elif isinstance(container, dict) and len(values) % 2 == 0:
-        container.update(zip(values[::2], values[1::2], strict=True))
-    else:
-        raise ValueError("it fills something that is no list or table")
+    found = read_plain_file(path, limit=_MAX_LIST_BYTES)
+    values = [*found, *found.values()] if isinstance(found, dict) else found
+    if not isinstance(values, list) or not all(type(value) in (str, int) for value in values):
+        raise MotionloomError(f"{path} is not a plain list or table of words and is not opened; fetch it again")
+    return cast(list[Any] | dict[Any, Any], found)

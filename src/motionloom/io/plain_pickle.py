@@ -13,6 +13,7 @@ import io
 import math
 import pickletools
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -98,7 +99,7 @@ def read_plain(data: bytes, *, limit: int, name: str = "the pickle") -> object:
 
     Args:
         data: The whole pickle, protocols 0 to 5 without out-of-band buffers.
-        limit: Most bytes of the pickle, and most bytes of all its arrays together.
+        limit: Most bytes of the pickle, of all its arrays together, and of texts in it that are decoded to bytes.
         name: What errors call it.
 
     Returns:
@@ -125,7 +126,7 @@ class _Machine:
     stack: list[Any] = field(default_factory=list)
     below: list[list[Any]] = field(default_factory=list)  # the stacks under each open mark
     memo: dict[int, Any] = field(default_factory=dict)
-    bytes_made: int = 0
+    made: Counter[str] = field(default_factory=Counter)  # bytes of arrays, and of texts made bytes
 
     def run(self, data: bytes) -> object:
         stream = io.BytesIO(data)
@@ -220,7 +221,9 @@ class _Machine:
         if word == "scalar" and len(arguments) == 2:
             return self._values(arguments[1], arguments[0], ())[()]
         if word == "encode" and len(arguments) == 2 and arguments[1] in ("latin1", "latin-1"):
-            return self._bytes(arguments[0])
+            data = _bytes(arguments[0])
+            self._count("texts", len(data))
+            return data
         if word == "bytes" and not arguments:
             return b""
         raise ValueError(f"its {word} cannot be read")
@@ -242,7 +245,7 @@ class _Machine:
         if isinstance(data, list):
             if not isinstance(dtype, _Dtype) or dtype.numpy().hasobject is False or (columns and len(shape) > 1):
                 raise ValueError("its array holds objects")
-            self._count(8 * len(data))
+            self._count("arrays", 8 * len(data))
             made.values = list(data)
             if math.prod(shape) != len(data):
                 raise ValueError(f"its array of shape {shape} has {len(data)} values")
@@ -255,7 +258,8 @@ class _Machine:
             raise ValueError("its array does not hold numbers")
         if len(data) != math.prod(shape) * kind.itemsize:
             raise ValueError(f"its array of shape {shape} has {len(data)} bytes")
-        data = self._bytes(data)
+        self._count("arrays", len(data))
+        data = _bytes(data)
         if kind.kind == "b":
             return (np.frombuffer(data, np.uint8) != 0).reshape(shape, order=order)
         if (
@@ -265,17 +269,11 @@ class _Machine:
             raise ValueError("its array holds numbers that are no characters")
         return np.frombuffer(data, kind).reshape(shape, order=order) if data else np.zeros(shape, kind)
 
-    def _bytes(self, data: object) -> bytes:
-        if not isinstance(data, str | bytes | bytearray):
-            raise ValueError("its bytes are none")
-        self._count(len(data))
-        return data.encode("latin-1") if isinstance(data, str) else bytes(data)
-
-    def _count(self, size: int) -> None:
+    def _count(self, what: str, size: int) -> None:
         # A short file can name the same long string again and again.
-        self.bytes_made += size
-        if self.bytes_made > 2 * self.limit:
-            raise ValueError(f"its arrays hold more than {self.limit} bytes")
+        self.made[what] += size
+        if self.made[what] > self.limit:
+            raise ValueError(f"its {what} hold more than {self.limit} bytes")
 
 
 class _Finished:
@@ -325,6 +323,12 @@ def _named(module: object, word: object) -> _Name:
     if not isinstance(module, str) or not isinstance(word, str) or (module, word) not in _NAMES:
         raise ValueError(f"it names {str(module)[:40]}.{str(word)[:40]}")
     return _Name(_NAMES[module, word])
+
+
+def _bytes(data: object) -> bytes:
+    if not isinstance(data, str | bytes | bytearray):
+        raise ValueError("its bytes are none")
+    return data.encode("latin-1") if isinstance(data, str) else bytes(data)
 
 
 def _quoted(line: bytes) -> str:
