@@ -1,0 +1,290 @@
+"""Two people and what else there is: an answer to somebody's motion, and long duets of several prompts.
+
+A long duet is a chain of rows as in `tasks.long`, each holding both people. Neighbouring rows agree on what each person
+does where they overlap; where the two stand to each other is drawn for the first row, and carried along by everybody's
+own way into every further one, at each guess.
+"""
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import chain, tee
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn import functional as F
+
+from motionloom.checkpoint import Prior
+from motionloom.data.pairs import one_world
+from motionloom.diffusion import SOLVERS, Link, levels, staggered
+from motionloom.errors import MotionloomError
+from motionloom.features import pair as two
+from motionloom.features.layout import FPS, WIDTH
+from motionloom.motion import Motion
+from motionloom.nets.pair import PLACE, PairNet, join, part
+from motionloom.nets.pair_block import PairBlock
+from motionloom.retarget import joints22, to_smpl22
+from motionloom.retarget.anatomy import read_body
+from motionloom.skeleton import SMPL22
+from motionloom.tasks.body import bodies
+from motionloom.tasks.control import moved
+from motionloom.tasks.goals import Goal
+from motionloom.tasks.long import Progress as Moves
+from motionloom.tasks.long import Segment, _in_world, _Row, _rows, _together, _Track
+from motionloom.tasks.pair import (
+    Duet,
+    Seed,
+    check_asked,
+    known_state,
+    pair_features,
+    person_seeds,
+    placement,
+    prompts_of,
+    standing_at,
+)
+from motionloom.tasks.splice import person_at_20, worn
+from motionloom.tasks.text import GUIDANCE, LONGEST, SOLVER, SPACING, STEPS, Progress, check, finish, smooth
+
+Array = NDArray[np.float64]
+
+SHORTEST = 1.0
+"""Seconds of the shortest motion that somebody can react to."""
+TOGETHER = 8
+"""Rows of a long duet that are denoised at once."""
+
+
+# Somebody is given
+
+
+def react(
+    prior: Prior,
+    block: PairBlock,
+    given: Motion,
+    prompt: str = "",
+    *,
+    count: int = 1,
+    seed: Seed = 0,
+    guidance: float = GUIDANCE,
+    steps: int = STEPS,
+    clean: bool = True,
+    progress: Progress | None = None,
+) -> list[Duet]:
+    """``count`` duets whose first person is ``given``, bit for bit, and whose second is drawn to go with it.
+
+    given: one person on any humanoid skeleton that stands upright along +Y, 1 to 60 seconds, at any rate. The second
+    is the 22-joint person, of as many frames at that rate, in the same world and on the same floor. An empty prompt
+    asks for nothing in particular. Raises `MotionloomError` for what cannot be asked.
+    """
+    said = prompts_of(prompt)
+    check_asked(prior, count=count, seed=seed)
+    if not SHORTEST - 1e-6 <= given.seconds <= LONGEST:
+        raise MotionloomError(
+            f"the given motion is {given.seconds:.2f} s long; {SHORTEST:g} to {LONGEST:g} s can be reacted to"
+        )
+    legs = read_body(given.skeleton).leg, read_body(SMPL22).leg
+    ratio = float(np.mean(legs)) / legs[1]
+    alone = person_at_20(given)
+    places = one_world([alone, alone], legs)[0]
+    known, stands, _ = two.encode(np.stack([places, places]))
+    net = block.net(prior)
+    data, mask = known_state(prior, net, torch.from_numpy(known), torch.from_numpy(stands), known.shape[1])
+    mask[:, 0] = mask[1] = False
+    features, drawn = pair_features(
+        prior, net, said * count, known.shape[1],
+        seeds=[s for number in range(count) for s in person_seeds(seed, number)],
+        known=data.repeat(count, 1, 1), mask=mask.repeat(count, 1, 1),
+        guidance=guidance, steps=steps, progress=progress,
+    )  # fmt: skip
+    floor, made = _floor(given), []
+    at = np.arange(len(given)) / given.fps * FPS
+    for numbers, standing in zip(features, drawn.double().numpy(), strict=True):
+        stand = standing_at(standing, placement(stands[0]), 0)[1]
+        other = moved(finish(prior, numbers[1], clean=clean), placement(stand)).at(at, given.fps)
+        height = np.array([0.0, floor, 0.0])
+        made.append((given, replace(other, root=other.root * [ratio, 1.0, ratio] + height)))
+    return made
+
+
+def _floor(motion: Motion) -> float:
+    """Metres: the height on which somebody's own motion stands; raises where it does not stand upright along +Y."""
+    few = motion.frames(0, min(len(motion), round(3 * motion.fps) + 2))
+    uniform, own = to_smpl22(few), joints22(few)
+    worn(uniform.positions(), few, clean=False)
+    ratio = read_body(motion.skeleton).leg / read_body(SMPL22).leg
+    return float(np.median(own[:, 0, 1] - ratio * uniform.root[:, 1]))
+
+
+# Several prompts
+
+
+def compose_pair(
+    prior: Prior,
+    block: PairBlock,
+    segments: Sequence[Segment],
+    *,
+    seed: int = 0,
+    path: Goal | None = None,
+    person: int = 0,
+    guidance: float = GUIDANCE,
+    steps: int = STEPS,
+    clean: bool = True,
+    together: int = TOGETHER,
+    progress: Moves | None = None,
+) -> Iterator[Duet]:
+    """One long duet, block after block in one world, as it is made; in memory that does not grow with its length.
+
+    segments: as of `long.compose`; a text with "::" in it says what the first and what the second person does. In all
+    there are ``round(seconds * 20)`` frames of each segment. path: where ``person`` is on the ground in every frame of
+    the whole, in the world; goals of segments are his too. The first person starts at the origin facing +Z, or
+    ``person`` where the path begins. Raises `MotionloomError` for what cannot be asked.
+    (Shafir et al. 2024, sections 3 and 4, in one loop; nothing published does both.)
+    """
+    check_asked(prior, count=1, seed=seed, person=person)
+    check(prior, [], steps=steps, guidance=guidance, solver=SOLVER)
+    if not segments:
+        raise MotionloomError("there is no segment; say what the two people do, one after the other")
+    track = None if path is None else _Track.along(path, prior.fps)
+    asked = [_asked(segments, i, track if i == person else None, person) for i in (0, 1)]
+    drawn = duet_features(
+        prior, block.net(prior), asked, seed=seed, guidance=guidance, steps=steps, together=together, progress=progress
+    )
+    features, stands = next(drawn)
+    if track:
+        stands = standing_at(stands, track.stands(0), person)
+    pieces = tee(chain([features], (piece for piece, _ in drawn)))
+    people = [
+        bodies(
+            _in_world(
+                prior, _of(pieces[i], i), deque(segment.goal for segment in asked[i]), placement(stands[i]),
+                track if i == person else None,
+            ),
+            prior.fps, clean=clean,
+        )
+        for i in (0, 1)
+    ]  # fmt: skip
+    yield from zip(*people, strict=True)
+
+
+def _asked(segments: Sequence[Segment], person: int, track: _Track | None, goals_of: int) -> list[Segment]:
+    """The segments of one person; on a path each has its part among its wishes."""
+    result, first = [], 0
+    for segment in segments:
+        own = replace(segment, text=prompts_of(segment.text)[person], goal=segment.goal if person == goals_of else None)
+        frames = round(own.seconds * FPS)
+        result.append(track.led(own, first, frames) if track else own)
+        first += frames
+    return result
+
+
+def _of(pieces: Iterable[Tensor], person: int) -> Iterator[Tensor]:
+    return (piece[person] for piece in pieces)
+
+
+@torch.inference_mode()
+def duet_features(
+    prior: Prior,
+    net: PairNet,
+    segments: Sequence[Sequence[Segment]],
+    *,
+    seed: int = 0,
+    guidance: float = GUIDANCE,
+    steps: int = STEPS,
+    together: int = TOGETHER,
+    progress: Moves | None = None,
+) -> Iterator[tuple[Tensor, Array]]:
+    """Pieces (2, frames, 263), not standardised, one per segment, and stands (2, 4) at the first frame of the first.
+
+    segments: those of each person, of equal lengths and transitions. Strung together the pieces are the two motions.
+    Row i draws from ``seed + i``.
+    """
+    guess = _Guess(prior, net)
+    way = levels(prior.schedule, steps, spacing=SPACING)
+
+    def links() -> Iterator[Link]:
+        both = (_rows(prior, one, guidance, None) for one in segments)
+        for number, row in enumerate(zip(*both, strict=True)):
+            guess.rows[number] = row
+            yield Link(row[0].length, row[0].overlap, seed + number)
+
+    walk = staggered(
+        links(), guess, levels=way, solver=SOLVERS[SOLVER], schedule=prior.schedule, features=2 * (WIDTH + PLACE),
+        together=together, moved=progress or (lambda count: None),
+    )  # fmt: skip
+    for number, state in enumerate(walk):
+        row = guess.rows.pop(number)[0]
+        guess.drop(number)
+        motion, places = _parted(state)
+        motion = smooth(motion) if prior.net.config.patch > 1 else motion
+        features = motion[:, row.before : row.before + row.frames] * prior.std + prior.mean
+        yield features.cpu(), net.talk.config.places.decode(places).cpu().double().numpy()
+
+
+def _parted(state: Tensor) -> tuple[Tensor, Tensor]:
+    """A row (length, 534) of the chain to two motions (2, length, 263) and, from its first frame, D (2, 4)."""
+    motion = state[:, : 2 * WIDTH].unflatten(1, (2, WIDTH)).transpose(0, 1)
+    return motion, state[0, 2 * WIDTH :].view(2, PLACE)
+
+
+def _strung(motion: Tensor, places: Tensor) -> Tensor:
+    """The inverse of `_parted`: D stands in the first frame, and zeros behind it."""
+    row = motion.transpose(0, 1).flatten(1)
+    return torch.cat([row, F.pad(places.reshape(1, -1), (0, 0, 0, len(row) - 1))], dim=1)
+
+
+@dataclass(eq=False)
+class _Guess:
+    """The guided guess of rows of a chain; it remembers everybody's last one, which says where the next row begins."""
+
+    prior: Prior
+    net: PairNet
+    rows: dict[int, tuple[_Row, ...]] = field(default_factory=dict)
+    ends: dict[int, Tensor] = field(default_factory=dict)
+    """Stands (2, 4) at the frame of a row with which the next one begins."""
+
+    def __call__(self, numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
+        parts = [_parted(state.to(self.prior.mean)) for state in states]
+        shown = [self._shown(n, places, level) for n, (_, places), level in zip(numbers, parts, at, strict=True)]
+        frames = [motion.shape[1] for motion, _ in parts]
+        x = torch.cat(
+            [
+                join(places, F.pad(motion, (0, 0, 0, max(frames) - motion.shape[1])))
+                for places, (motion, _) in zip(shown, parts, strict=True)
+            ]
+        )
+        cleans = self._guided([row for n in numbers for row in self.rows[n]], x, frames, at)
+        made = []
+        for number, count, level, clean in zip(numbers, frames, at, cleans.unflatten(0, (-1, 2)), strict=True):
+            places, motion = part(clean)
+            rows = zip(motion[:, :count], self.rows[number], strict=True)
+            motion = torch.stack([row.correct(one, level) for one, row in rows])
+            made.append(_strung(motion, places))
+            self._carry(number, motion, places)
+        return made
+
+    def drop(self, number: int) -> None:
+        """Forget a row that is finished, as its neighbours are."""
+        self.ends.pop(number - 1, None)
+
+    def _shown(self, number: int, places: Tensor, level: int) -> Tensor:
+        """D as the network sees it: drawn for the first row, else what the row before makes of it, without noise."""
+        end = self.ends.get(number - 1)
+        if end is None:
+            return places
+        return self.prior.schedule.at(level)[0] * self.net.talk.config.places.encode(end)
+
+    def _carry(self, number: int, motion: Tensor, places: Tensor) -> None:
+        code, row = self.net.talk.config.places, self.rows[number][0]
+        begin = code.decode(places) if number == 0 else self.ends.get(number - 1, code.decode(places))
+        features = motion * self.prior.std + self.prior.mean
+        self.ends[number] = two.later(features, begin, row.length - max(row.overlap, 1))
+
+    def _guided(self, rows: Sequence[_Row], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> Tensor:
+        """``rows``, and rows of x: a0, b0, a1, b1, ...; frames and levels: one per pair."""
+        lengths = torch.tensor(frames, device=x.device).repeat_interleave(2).repeat(2)
+        level = torch.tensor(at, device=x.device).repeat_interleave(2).repeat(2)
+        bound = _together([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
+        conditional, unconditional = self.net(torch.cat([x, x]), level, bound).chunk(2)
+        scale = torch.tensor([row.guidance for row in rows]).to(x)[:, None, None]
+        return torch.lerp(unconditional, conditional, scale)
