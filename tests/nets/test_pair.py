@@ -15,7 +15,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features.pair import PUBLISHED_CODE, PlaceCode, along, compose, decode, seen, told_from
 from motionloom.nets import pair_block
 from motionloom.nets.adapter import fingerprint
-from motionloom.nets.pair import PairConfig, PairNet, Talk, _enter, _leave, _through, fitting, join, other, part
+from motionloom.nets.pair import PairConfig, PairNet, Talk, fitting, join, other, part
 from motionloom.nets.pair_block import KEY, PairBlock, blocks, import_block
 from motionloom.nets.pair_published import adds_of, from_published_pair, is_pair
 from motionloom.nets.prior import Bound, NetConfig, condition
@@ -68,8 +68,8 @@ def test_the_prior_in_three_parts_is_the_prior(manner):
     words = torch.randn(4, 5, TEXT)
     bound = prior.bind(condition(words.mean(1), tokens=words if prior.modulated else None, lengths=[18, 7, 11, -1]))
     x, level = state_of(4)[:, 1:], torch.tensor([3, 9, 20, 50])
-    inner = _through(prior, _enter(prior, x, level, bound), bound, slice(1))
-    parts = _leave(prior, _through(prior, inner, bound, slice(1, None)), FRAMES)
+    inner = prior.through(prior.enter(x, level, bound), bound, slice(1))
+    parts = prior.leave(prior.through(inner, bound, slice(1, None)), FRAMES)
     torch.testing.assert_close(parts, prior(x, level, bound), rtol=0, atol=0)
 
 
@@ -140,7 +140,7 @@ def test_an_aware_block_hears_where_the_others_head_and_wrists_are():
     bound, x = bound_of(net, 2), state_of(2)
     stands = torch.tensor([[1.0, 0.0, 0.0, 0.0], [-0.6, 0.8, 0.3, 2.0]])
     base, mean, std, _ = net._base
-    inner = _through(base, _enter(base, x[:, 1:], 1, bound), bound, slice(2))
+    inner = base.through(base.enter(x[:, 1:], 1, bound), bound, slice(2))
     signal, noise = net.schedule.at(1)
     trust = signal * 0.49 / (0.49 * signal**2 + noise**2)
     heard = net._heard(inner, bound, net.talk.config.places.encode(stands) / trust, FRAMES, 1)

@@ -15,7 +15,7 @@ units of each token's own size.
 
 import copy
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import torch
 from torch import Tensor, nn
@@ -25,7 +25,7 @@ from motionloom.diffusion import Schedule
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import WIDTH, ric
 from motionloom.features.pair import PlaceCode, along, compose, put, seen
-from motionloom.nets.prior import Bound, Condition, NetConfig, PriorNet, _valid, sinusoids
+from motionloom.nets.prior import Bound, Condition, Inner, NetConfig, PriorNet, valid_frames
 from motionloom.nets.prior import PublishedBlock as EncoderBlock
 
 PLACE = 4
@@ -165,19 +165,6 @@ def part(state: Tensor) -> tuple[Tensor, Tensor]:
     return state[:, 0, :PLACE], state[:, 1:]
 
 
-class _Inner(NamedTuple):
-    """What goes through a prior's layers."""
-
-    x: Tensor
-    """(rows, tokens, width); published: the condition token first."""
-    condition: Tensor
-    """(rows, width) level and text."""
-    change: Tensor
-    """(rows, 6, width) of the modulated manner; else empty."""
-    mask: Tensor | None
-    """(rows, 1, 1, tokens)"""
-
-
 class PairNet(nn.Module):
     """Two people: a frozen prior and a block. Its parameters and its state are the block's; the prior is no part of it.
 
@@ -211,24 +198,24 @@ class PairNet(nn.Module):
         base, split = self._base[0], self.talk.config.split
         places, motion = part(x)
         with torch.no_grad():
-            inner = _through(base, _enter(base, motion, level, bound), bound, slice(split))
+            inner = base.through(base.enter(motion, level, bound), bound, slice(split))
             heard = self._heard(inner, bound, places, motion.shape[1], level) if self.talk.config.aware else None
         first = base.modulated  # the condition is no token there
         tokens = torch.cat([inner.condition[:, None], inner.x], dim=1) if first else inner.x
         mask = F.pad(inner.mask, (1, 0), value=True) if first and inner.mask is not None else inner.mask
         change, place = self.talk(tokens, places, mask, heard)
         inner = inner._replace(x=inner.x + change[:, first:])
-        guess = _leave(base, _through(base, inner, bound, slice(split, None)), motion.shape[1])
+        guess = base.leave(base.through(inner, bound, slice(split, None)), motion.shape[1])
         return join(place, guess)
 
-    def _heard(self, inner: _Inner, bound: Bound, places: Tensor, frames: int, level: int | Tensor) -> Tensor:
+    def _heard(self, inner: Inner, bound: Bound, places: Tensor, frames: int, level: int | Tensor) -> Tensor:
         """(rows, tokens, patch * 13): where the other stands, faces, and has head and wrists, as the person sees it.
 
         By the guesses of the two priors alone and by the D of the state, trusted as far as its noise lets one; numbers
         of a person in metres, `PlaceCode` mutual.
         """
         base, mean, std, signals = self._base
-        guess = _leave(base, _through(base, inner, bound, slice(self.talk.config.split, None)), frames) * std + mean
+        guess = base.leave(base.through(inner, bound, slice(self.talk.config.split, None)), frames) * std + mean
         rows = len(guess)
         signal = signals[torch.as_tensor(level, device=signals.device).expand(rows)][:, None]
         trust = signal * _SPREAD**2 / (signal**2 * _SPREAD**2 + 1 - signal**2)
@@ -236,53 +223,7 @@ class PairNet(nn.Module):
         stand = seen(way, compose(self.talk.config.places.raw(trust * places)[:, None], other(way)))
         joints = torch.stack([guess[..., ric(j)] for j in HEARD], dim=-2)
         told = torch.cat([stand, put(other(joints), stand[..., None, :]).flatten(-2)], dim=-1).clamp(-_FAR, _FAR)
-        valid = _valid(bound.lengths, frames)
+        valid = valid_frames(bound.lengths, frames)
         told = told if valid is None else told * valid[..., None]
         patch = base.config.patch
         return F.pad(told, (0, 0, 0, -frames % patch)).reshape(rows, -1, patch * told.shape[-1])
-
-
-def _enter(net: PriorNet, x: Tensor, level: int | Tensor, bound: Bound) -> _Inner:
-    """Motion (rows, frames, numbers) to what the prior's first layer sees."""
-    rows, frames, _ = x.shape
-    config, valid = net.config, _valid(bound.lengths, frames)
-    tokens = net.embed(net._patches(x, valid))
-    time = torch.as_tensor(level, device=x.device).expand(rows) - 1
-    time = net.time2(F.silu(net.time1(sinusoids(time, config.width).to(tokens.dtype))))
-    both, empty = time + bound.text, x.new_zeros(rows, 0)
-    if not net.modulated:
-        tokens = torch.cat([both[:, None], tokens], dim=1)
-        mask = None if valid is None else F.pad(valid, (1, 0), value=True)[:, None, None]
-        return _Inner(tokens + _positions(tokens, 1), both, empty, mask)
-    mask = valid
-    if valid is not None:
-        mask = F.pad(valid, (0, -frames % config.patch)).view(rows, -1, config.patch).any(-1)[:, None, None]
-    change = net.change(F.silu(both)).view(rows, 6, -1)
-    return _Inner(tokens + _positions(tokens, config.patch), both, change, mask)
-
-
-def _positions(tokens: Tensor, patch: int) -> Tensor:
-    at = torch.arange(tokens.shape[1], device=tokens.device) * patch
-    return sinusoids(at, tokens.shape[2]).to(tokens.dtype)
-
-
-def _through(net: PriorNet, inner: _Inner, bound: Bound, layers: slice) -> _Inner:
-    x = inner.x
-    for i in range(*layers.indices(len(net.blocks))):
-        if net.modulated:
-            words = {"keys": bound.keys[:, i], "values": bound.values[:, i], "words": bound.words}
-            x = net.blocks[i](x, inner.mask, inner.change, **words)
-        else:
-            x = net.blocks[i](x, inner.mask)
-    return inner._replace(x=x)
-
-
-def _leave(net: PriorNet, inner: _Inner, frames: int) -> Tensor:
-    """What comes out of the last layer to motion (rows, frames, numbers)."""
-    x = inner.x
-    if net.modulated:
-        shift, scale = net.last(F.silu(inner.condition))[:, None].chunk(2, dim=-1)
-        x = F.layer_norm(x, x.shape[-1:]) * (1 + scale) + shift
-    else:
-        x = x[:, 1:]
-    return net.out(x).reshape(len(x), -1, net.config.features)[:, :frames]

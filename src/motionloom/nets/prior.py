@@ -129,6 +129,21 @@ class Bound(NamedTuple):
     flags: Tensor
 
 
+class Inner(NamedTuple):
+    """What goes through a network's blocks; rows are the first axis of every part."""
+
+    x: Tensor
+    """(rows, tokens, width); published: the condition token first."""
+    condition: Tensor
+    """(rows, width) level and pooled text."""
+    mask: Tensor | None
+    """(rows, 1, 1, tokens) True where there is something; None: everywhere."""
+    change: Tensor
+    """Modulated: (rows, 6, width) for every block; else (rows, 0)."""
+    last: Tensor
+    """Modulated: (rows, 1, 2 * width) behind them; else (rows, 0)."""
+
+
 def sinusoids(positions: Tensor, width: int) -> Tensor:
     """(n,) positions to (n, width): sines in even, cosines in odd channels, base 10000 (Vaswani et al. 2017)."""
     rates = torch.exp(torch.arange(0, width, 2, device=positions.device) * (-math.log(10000.0) / width))
@@ -242,23 +257,52 @@ class PriorNet(nn.Module):
 
     def forward(self, x: Tensor, level: int | Tensor, bound: Bound) -> Tensor:
         """(rows, frames, features) standardised, at ``level`` (one, or one per row; 1..T) to the clean guess."""
+        return self.leave(self.through(self.enter(x, level, bound), bound), x.shape[1])
+
+    def enter(self, x: Tensor, level: int | Tensor, bound: Bound) -> Inner:
+        """What `forward` is given, to what the first block sees."""
         rows, frames, _ = x.shape
         if self.flag is not None:
             flags = (
                 bound.flags if bound.flags.shape[1] else torch.zeros(rows, frames, dtype=torch.long, device=x.device)
             )
             x = torch.cat([x, self.flag(flags)], dim=-1)
-        valid = _valid(bound.lengths, frames)
+        valid = valid_frames(bound.lengths, frames)
         tokens = self.embed(self._patches(x, valid))
         # published noise index t is level - 1
         time = torch.as_tensor(level, device=x.device).expand(rows) - 1
         time = self.time2(F.silu(self.time1(sinusoids(time, self.config.width).to(tokens.dtype))))
-        y = (
-            self._modulated(tokens, time, valid, bound)
-            if self.modulated
-            else self._published(tokens, time, valid, bound)
-        )
-        return self.out(y).reshape(rows, -1, self.config.features)[:, :frames]
+        both, change = time + bound.text, x.new_zeros(rows, 0)
+        last = change
+        if self.modulated:
+            told = F.silu(both)
+            change, last = self.change(told).view(rows, 6, -1), self.last(told)[:, None]
+        else:
+            tokens = torch.cat([both[:, None], tokens], dim=1)
+        places = torch.arange(tokens.shape[1], device=x.device) * self.config.patch
+        tokens = self.drop(tokens + sinusoids(places, self.config.width).to(tokens.dtype))
+        return Inner(tokens, both, self._mask(valid), change, last)
+
+    def through(self, inner: Inner, bound: Bound, layers: slice = slice(None)) -> Inner:
+        """Through some of the blocks."""
+        x = inner.x
+        for i in range(*layers.indices(len(self.blocks))):
+            if self.modulated:
+                words = {"keys": bound.keys[:, i], "values": bound.values[:, i], "words": bound.words}
+                x = self.blocks[i](x, inner.mask, inner.change, **words)
+            else:
+                x = self.blocks[i](x, inner.mask)
+        return inner._replace(x=x)
+
+    def leave(self, inner: Inner, frames: int) -> Tensor:
+        """What the last block gives, to features (rows, frames, features)."""
+        x = inner.x
+        if self.modulated:
+            shift, scale = inner.last.chunk(2, dim=-1)
+            x = F.layer_norm(x, x.shape[-1:]) * (1 + scale) + shift
+        else:
+            x = x[:, 1:]
+        return self.out(x).reshape(len(x), -1, self.config.features)[:, :frames]
 
     def _patches(self, x: Tensor, valid: Tensor | None) -> Tensor:
         """(rows, frames, numbers) to (rows, tokens, patch * numbers), padded with zeros."""
@@ -269,34 +313,17 @@ class PriorNet(nn.Module):
             x = x * valid[..., None]  # a token may be part motion and part padding
         return F.pad(x, (0, 0, 0, -x.shape[1] % patch)).reshape(len(x), -1, patch * x.shape[2])
 
-    def _published(self, x: Tensor, time: Tensor, valid: Tensor | None, bound: Bound) -> Tensor:
-        x = torch.cat([(time + bound.text)[:, None], x], dim=1)
-        x = self.drop(x + sinusoids(torch.arange(x.shape[1], device=x.device), self.config.width).to(x.dtype))
-        mask = None if valid is None else F.pad(valid, (1, 0), value=True)[:, None, None]
-        for block in self.blocks:
-            x = block(x, mask)
-        return x[:, 1:]
-
-    def _modulated(self, x: Tensor, time: Tensor, valid: Tensor | None, bound: Bound) -> Tensor:
-        x = self.drop(
-            x + sinusoids(torch.arange(x.shape[1], device=x.device) * self.config.patch, self.config.width).to(x.dtype)
-        )
-        mask = None
-        if valid is not None:
-            mask = (
-                F.pad(valid, (0, -valid.shape[1] % self.config.patch))
-                .view(len(x), -1, self.config.patch)
-                .any(-1)[:, None, None]
-            )
-        cond = F.silu(time + bound.text)
-        change = self.change(cond).view(len(x), 6, -1)
-        for i, block in enumerate(self.blocks):
-            x = block(x, mask, change, keys=bound.keys[:, i], values=bound.values[:, i], words=bound.words)
-        shift, scale = self.last(cond)[:, None].chunk(2, dim=-1)
-        return F.layer_norm(x, x.shape[-1:]) * (1 + scale) + shift
+    def _mask(self, valid: Tensor | None) -> Tensor | None:
+        """(rows, 1, 1, tokens): the condition token, and tokens of which a frame is valid."""
+        if valid is None:
+            return None
+        patch = self.config.patch
+        if not self.modulated:
+            return F.pad(valid, (1, 0), value=True)[:, None, None]
+        return F.pad(valid, (0, -valid.shape[1] % patch)).view(len(valid), -1, patch).any(-1)[:, None, None]
 
 
-def _valid(lengths: Tensor, frames: int) -> Tensor | None:
+def valid_frames(lengths: Tensor, frames: int) -> Tensor | None:
     """(rows, frames) bool, or None where all frames of all rows are valid."""
     if lengths.device.type == "cpu" and bool(((lengths < 0) | (lengths >= frames)).all()):
         return None
