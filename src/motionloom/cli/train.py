@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def add(subparsers) -> None:
-    """Register `train prior`, `train evaluator`, `train control` and `train predictor`."""
+    """Register `train prior`, `train evaluator`, `train control`, `train predictor` and `train duet`."""
     train = subparsers.add_parser("train", help="train a model from a recipe; goes on where it was stopped")
     commands = train.add_subparsers(metavar="MODEL", required=True)
     prior = commands.add_parser("prior", help="a text-to-motion prior on a built set")
@@ -26,6 +26,10 @@ def add(subparsers) -> None:
     _run_options(predictor, "predictor.toml", "the mocap pack, a folder of motion files, AMASS, data_3d_h36m.npz ...")
     predictor.add_argument("--protocol", help="cmu, h36m, humaneva, amass or own (default: recognised)")
     predictor.set_defaults(run=_predictor)
+    duet = commands.add_parser("duet", help="a block that makes two people out of a prior, from a few pairs")
+    pairs = "a folder of NAME_a.bvh, NAME_b.bvh and captions.txt, the mocap pack, or 3DPW"
+    _run_options(duet, "duet.toml", pairs, name="--pairs")
+    duet.set_defaults(run=_duet)
 
 
 def _options(parser: argparse.ArgumentParser, recipe: str) -> None:
@@ -35,9 +39,9 @@ def _options(parser: argparse.ArgumentParser, recipe: str) -> None:
     )
 
 
-def _run_options(parser: argparse.ArgumentParser, recipe: str, data: str) -> None:
+def _run_options(parser: argparse.ArgumentParser, recipe: str, data: str, *, name: str = "--data") -> None:
     parser.add_argument("--recipe", type=Path, required=True, help=f"a TOML file such as recipes/{recipe}")
-    parser.add_argument("--data", type=Path, required=True, help=data)
+    parser.add_argument(name, type=Path, required=True, help=data)
     parser.add_argument("--out", type=Path, required=True, help="folder of the run: state, weights, logs, pictures")
     parser.add_argument("--device", help="cpu, cuda, cuda:1 ... (default: cuda where there is one)")
     parser.add_argument("--threads", type=int, help="CPU threads")
@@ -72,6 +76,17 @@ def _predictor(arguments: argparse.Namespace) -> None:
     recipe = _recipe(arguments)
     protocol = find_protocol(arguments.data, name=arguments.protocol, splits=("train", "val"), say=print)
     place = train_predictor(recipe, protocol, arguments.out, device=arguments.device, stop=arguments.stop)
+    print(f"wrote {place}")
+
+
+def _duet(arguments: argparse.Namespace) -> None:
+    from motionloom.data.pairs import find_pairs
+    from motionloom.train.pair import Settings, train_pair
+
+    recipe = _recipe(arguments)
+    settings = Settings.parse(recipe.pair)
+    pairs = find_pairs(arguments.pairs, captions=settings.prefix + settings.react < 1, say=print)
+    place = train_pair(recipe, pairs, arguments.out, device=arguments.device, stop=arguments.stop)
     print(f"wrote {place}")
 
 

@@ -76,6 +76,8 @@ class Recipe:
     """Sizes of the network, see `motionloom.nets.prior.NetConfig`."""
     predictor: dict[str, Any] = field(default_factory=dict)
     """Training a predictor: see `motionloom.train.predictor.Settings`."""
+    pair: dict[str, Any] = field(default_factory=dict)
+    """Training a two-person block: see `motionloom.train.pair.Settings`."""
 
 
 def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Recipe:

@@ -1,0 +1,129 @@
+"""What training two people looks at: crops of recorded pairs, and where each of the two sees the other."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from motionloom.data.pairs import Pair, mirrored
+from motionloom.features import humanml
+from motionloom.features.pair import PlaceCode, along, compose, encode, put, seen, told_from
+from motionloom.nets.pair import other
+
+KEEN = (0, 15, 20, 21)
+"""Joints that `Sight` looks at: pelvis, head and wrists."""
+NEAR = 0.35
+"""Metres between two joints that touch or hold, about."""
+
+
+class Crops(NamedTuple):
+    """Windows of pairs."""
+
+    features: Tensor
+    """(pairs, 2, frames, 263) float32, not standardised; zeros behind a short pair's end."""
+    stands: Tensor
+    """(pairs, 2, 4) of the window's first frame."""
+    lengths: np.ndarray
+    """(pairs,) valid frames."""
+    texts: np.ndarray
+    """(pairs,) numbers of `Duets.texts`; 0 where nobody said anything."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Told:
+    features: Tensor
+    stands: Tensor
+    texts: tuple[int, ...]
+
+
+def headed(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(2, frames, 22, 3) metres in one world to features (2, frames - 1, 263) and stands (2, 4) at frame 0.
+
+    As `features.pair.encode`, but with the ``corrected`` heading that priors trained here have seen: both people face
+    where the smoothed line across their hips and shoulders says, in frame 0 too.
+    """
+    plain = encode(positions)
+    up = np.array([0.0, 1.0, 0.0])
+    local = told_from(positions - plain.floors[:, None, None, None] * up, plain.stands[:, None, None])
+    features = np.stack([humanml.encode(person, heading="corrected") for person in local])
+    turn = np.stack([humanml.heading_quaternions(person, heading="corrected")[0] for person in local])
+    w, y, zero = turn[:, 0], turn[:, 2], np.zeros(2)
+    return features, compose(plain.stands, np.stack([1 - 2 * y * y, -2 * w * y, zero, zero], axis=-1))
+
+
+class Duets:
+    """Pairs and their mirror images, told once; crops of them are slices."""
+
+    def __init__(self, pairs: Sequence[Pair], *, mirror: bool = True, texts: Sequence[str] = ()) -> None:
+        pairs = [*pairs, *(mirrored(pair) for pair in pairs)] if mirror else pairs
+        self.texts = tuple(texts) or ("", *dict.fromkeys(text for pair in pairs for text in pair.captions))
+        self.told = [self._tell(pair) for pair in pairs]
+        self.lengths = np.array([told.features.shape[1] for told in self.told])
+
+    def _tell(self, pair: Pair) -> _Told:
+        features, stands = (torch.from_numpy(np.asarray(x, dtype=np.float64)) for x in headed(pair.positions))
+        ways = compose(stands[:, None], along(features))
+        known = {text: number for number, text in enumerate(self.texts)}
+        return _Told(features.float(), ways.float(), tuple(known[t] for t in pair.captions if t in known) or (0,))
+
+    def draw(self, rng: np.random.Generator, window: int, rows: int) -> Crops:
+        """Windows anywhere in recordings drawn by the root of their length; half of them with the people exchanged."""
+        which = rng.choice(len(self.told), rows, p=np.sqrt(self.lengths) / np.sqrt(self.lengths).sum())
+        starts = rng.integers(0, np.maximum(self.lengths[which] - window, 0) + 1)
+        crops = self.crops(which, starts, window, rng=rng)
+        flip = torch.from_numpy(rng.random(rows) < 0.5)
+        features = torch.where(flip[:, None, None, None], crops.features.flip(1), crops.features)
+        return crops._replace(
+            features=features, stands=torch.where(flip[:, None, None], crops.stands.flip(1), crops.stands)
+        )
+
+    def crops(
+        self, which: np.ndarray, starts: np.ndarray, window: int, *, rng: np.random.Generator | None = None
+    ) -> Crops:
+        """The windows that begin at ``starts``; without ``rng`` with the first caption of each."""
+        features = torch.zeros(len(which), 2, window, humanml.WIDTH)
+        lengths = np.minimum(self.lengths[which] - starts, window)
+        stands, texts = [], []
+        for row, (number, start, length) in enumerate(zip(which, starts, lengths, strict=True)):
+            told = self.told[number]
+            features[row, :, :length] = told.features[:, start : start + length]
+            stands.append(told.stands[:, start])
+            texts.append(told.texts[int(rng.integers(len(told.texts))) if rng else 0])
+        return Crops(features, torch.stack(stands), lengths, np.array(texts))
+
+
+@dataclass(frozen=True)
+class Sight:
+    """Where each of two people sees the other, frame by frame, from D and features; rows 2k and 2k + 1 are two."""
+
+    code: PlaceCode
+
+    def stand(self, places: Tensor) -> Tensor:
+        """D (rows, 4), exact or guessed, to the other's stand at frame 0 as each sees it; (rows, 4), not `upright`.
+
+        (Making a direction of a guess near zero would have gradients without bounds.)
+        """
+        raw = self.code.raw(places)
+        return raw if self.code.kind == "mutual" else seen(raw, other(raw))
+
+    def partner(self, places: Tensor, features: Tensor) -> Tensor:
+        """D (rows, 4) and features (rows, frames, 263) to the other's stand as each sees it, (rows, frames, 4)."""
+        way = along(features)
+        return seen(way, compose(self.stand(places)[:, None], other(way)))
+
+    def joints(self, places: Tensor, features: Tensor) -> Tensor:
+        """(rows, frames, 4, 4, 3) metres: from each joint of `KEEN` to each of the other person, in the own heading."""
+        way = along(features)[..., None, :]
+        own = humanml.decode_positions(features)[..., list(KEEN), :]
+        theirs = put(other(own), self.stand(places)[:, None, None])
+        return told_from(theirs, way)[..., None, :, :] - told_from(own, way)[..., :, None, :]
+
+    def error(self, places: Tensor, features: Tensor, true_places: Tensor, true_features: Tensor) -> Tensor:
+        """(rows, frames) square metres of guessed `joints`; what is `NEAR` counts up to five times as much."""
+        true = self.joints(true_places, true_features)
+        near = torch.exp(-0.5 * true.square().sum(-1) / NEAR**2)
+        away = (self.joints(places, features) - true).square().sum(-1)
+        return (away * (1 + 4 * near)).mean((-1, -2))
