@@ -69,14 +69,15 @@ def complete(
         levels=levels(predictor.schedule, steps, spacing=spacing),
         solver=SOLVERS[solver], schedule=predictor.schedule, draw=draw,
     )  # fmt: skip
-    return joined(predictor.to_features(made, pose), features, mask, ease=round(EASE * predictor.fps))
+    return joined(predictor.to_features(made, pose), features, mask, ease=max(round(EASE * predictor.fps), 1))
 
 
 def joined(made: Tensor, known: Tensor, mask: Tensor, *, ease: int) -> Tensor:
     """``known`` where ``mask`` is 1, around it ``made``, led there: (rows, frames, channels), mask one per 3 of them.
 
     What made frames lack at a border, in value and in change per frame, fades over ``ease`` frames as the quintic that
-    leaves their second derivative alone. Rows whose masks are equal are done at once.
+    leaves their second derivative alone, or over the whole gap between two borders where that is shorter. Rows whose
+    masks are equal are done at once.
     """
     each = mask.to(made).repeat_interleave(3, dim=-1)
     result = (1 - each) * made + each * known
@@ -107,15 +108,12 @@ def _lead(made: Tensor, known: Tensor, sure: NDArray[np.bool_], ease: int) -> Te
 
 def _borders(course: NDArray[np.bool_], ease: int) -> list[tuple[int, int, int]]:
     """Last known frame, direction of the unknown ones, and how many of them have room to be led."""
-    found = []
-    edges = np.flatnonzero(np.diff(course.astype(int)))
-    for edge in edges:
-        border, step = (int(edge), 1) if course[edge] else (int(edge) + 1, -1)
-        others = [int(e) for e in edges if (e - edge) * step > 0]
-        free = min((abs(e - edge) for e in others), default=len(course))
-        end = len(course) - 1 - border if step > 0 else border
-        found.append((border, step, max(1, min(ease, free // 2 if others else end))))
-    return found
+    edges = np.flatnonzero(np.diff(course.astype(int))).tolist()
+    ends = [-1, *edges, len(course) - 1]
+    return [
+        (edge, 1, min(ease, behind - edge)) if course[edge] else (edge + 1, -1, min(ease, edge - before))
+        for before, edge, behind in zip(ends, edges, ends[2:])
+    ]
 
 
 def _quintic(room: int, like: Tensor) -> tuple[Tensor, Tensor]:
@@ -144,9 +142,9 @@ def next_frames(
     behind the frames it usually sees. ``exact``: bones as long as the past's; else what the network drew.
     """
     past = np.asarray(past, dtype=np.float64)
-    rows, h = past.shape[:2]
     frames = predictor.frames - predictor.observed if frames is None else frames
     _check(predictor, past, frames, known)
+    rows, h = past.shape[:2]
     layout, place = predictor.layout, predictor.layout.place(past[:, -1])
     seen = np.zeros((rows, predictor.frames, layout.channels))
     mask = np.zeros((predictor.frames, layout.parts), dtype=np.float32)
@@ -165,18 +163,29 @@ def next_frames(
 
 
 def _check(predictor: Predictor, past: Array, frames: int, known: Known | None) -> None:
-    h, layout = past.shape[1], predictor.layout
-    if past.ndim != 4 or past.shape[2:] != (layout.joints, 3) or not np.isfinite(past).all():
+    layout = predictor.layout
+    if past.ndim != 4 or not len(past) or past.shape[2:] != (layout.joints, 3) or not np.isfinite(past).all():
         raise MotionloomError(
             f"a past for this predictor is finite places (rows, frames, {layout.joints}, 3); got shape {past.shape}"
         )
+    h = past.shape[1]
     if not 2 <= h <= predictor.observed or not 1 <= frames <= predictor.frames - h:
         raise MotionloomError(
             f"this predictor sees 2 to {predictor.observed} frames and draws, with them, at most {predictor.frames}; "
             f"got a past of {h} and {frames} frames to draw"
         )
-    if known is not None and known.mask.shape[1:] != (layout.parts,):
-        raise MotionloomError(f"a mask for this predictor has {layout.parts} parts; got {known.mask.shape}")
+    if known is None:
+        return
+    given, mask = known.positions.shape, known.mask.shape
+    if (
+        mask[1:] != (layout.parts,)
+        or given[-3:] != (*mask[:1], layout.joints, 3)
+        or given[:-3] not in ((), (len(past),))
+    ):
+        raise MotionloomError(
+            f"what is known to this predictor are places (frames, {layout.joints}, 3) and a mask (frames, "
+            f"{layout.parts}); got {given} and {mask}"
+        )
 
 
 def futures(
@@ -197,6 +206,10 @@ def futures(
 
     Future i of a past is drawn from ``row_seed(seed, i)`` whatever else is asked; ``rows``: rows per network call.
     """
+    if count < 1 or rows < 1 or not len(past):
+        raise MotionloomError(
+            f"at least one future of one past is drawn, one row at once; got {count} of {len(past)}, {rows} at once"
+        )
     many = np.repeat(np.asarray(past), count, axis=0)
     seeds = [row_seed(seed, i) for _ in range(len(past)) for i in range(count)]
     parts = [

@@ -83,21 +83,25 @@ def given(predictor: Predictor, past: Motion, hold: Hold | None, seconds: float)
         return None
     check_like(past, hold.source, "motion that parts are held to")
     _check_parts(hold, seconds)
+    rate, total = predictor.fps / past.fps, max(round(seconds * past.fps), 1)
     source = _placed(past, hold.source) if hold.align else hold.source
+    source = source.frames(0, total + int(np.ceil(predictor.frames / rate)))  # the last window looks further
+    end = len(source) / past.fps
     tail = past.frames(max(len(past) - round(CONTEXT * past.fps) - 2, 0), len(past))
     together = to_smpl22(concatenated(tail, source)).positions()
     together = together + (person_of(predictor, past)[-1, 0] - together[len(tail) - 1, 0])
-    rate = predictor.fps / past.fps
     count = int(len(source) * rate + 1e-6)
     places = positions_at(together, len(tail) - 1 + np.arange(1, count + 1) / rate)
+    source = concatenated(source, *[source.frames(len(source) - 1, len(source))] * round(RAMP * past.fps))
     mask = np.zeros((count, predictor.layout.parts), dtype=np.float32)
     joints, way = np.zeros((len(source), len(past.skeleton))), np.zeros(len(source))
     for part in hold.parts:
         chosen, root = _resolved(part)
-        inside = _weights(part.spans, np.arange(1, count + 1) / predictor.fps, 0.0) >= 1
+        spans = [(begin, min(until, end)) for begin, until in part.spans if begin < end]
+        inside = _weights(spans, np.arange(1, count + 1) / predictor.fps, 0.0) >= 1
         for joint in chosen | ({0} if root else set()):
             mask[inside, predictor.layout.part(joint)] = 1
-        weight = _weights(part.spans, np.arange(1, len(source) + 1) / past.fps, RAMP)
+        weight = _weights(spans, np.arange(1, len(source) + 1) / past.fps, RAMP)
         flags = _own_joints(past, chosen)
         joints = np.maximum(joints, weight[:, None] * flags)
         way = np.maximum(way, weight * root)
@@ -118,8 +122,8 @@ def _weights(spans: Sequence[tuple[float, float]], times: Array, ramp: float) ->
     """1 within spans of seconds, falling to 0 within ``ramp`` seconds around them."""
     weight = np.zeros(len(times))
     for begin, end in spans:
-        outside = np.maximum(begin - times, times - end).clip(0)
-        u = (1 - outside / ramp).clip(0, 1) if ramp else (outside <= 1e-9).astype(float)
+        outside = (np.maximum(begin - times, times - end) - 1e-6).clip(0)
+        u = (1 - outside / ramp).clip(0, 1) if ramp else (outside == 0).astype(float)
         weight = np.maximum(weight, u * u * (3 - 2 * u))
     return weight
 
@@ -161,12 +165,17 @@ def _check_parts(hold: Hold, seconds: float) -> None:
     unknown = [name for name in names if name not in known]
     if unknown:
         raise MotionloomError(f"no part called {unknown[0]!r} to hold; the parts are {', '.join(known)}")
-    if not names:
+    if not names or not any(part.spans for part in hold.parts):
         raise MotionloomError(f"nothing to hold: no joint is named; the parts are {', '.join(known)}")
     for begin, end in (span for part in hold.parts for span in part.spans):
         if not 0 <= begin < end:
             raise MotionloomError(
                 f"no stretch from {begin:g} to {end:g} s to hold; give a start of 0 or more below the end"
+            )
+        if begin >= min(seconds, len(hold.source) / hold.source.fps):
+            raise MotionloomError(
+                f"nothing to hold from {begin:g} s on: {seconds:g} s are predicted, and the motion that parts are held "
+                f"to is {len(hold.source) / hold.source.fps:g} s long"
             )
         if np.isfinite(end) and min(end, seconds) > len(hold.source) / hold.source.fps + 0.5 / hold.source.fps:
             raise MotionloomError(

@@ -32,10 +32,12 @@ LONGEST = 24 * 3600.0
 """Seconds that are predicted at most."""
 WHOLE = 600.0
 """Seconds above which motions come in pieces only (`predict_pieces`)."""
+MOST = 6000.0
+"""Seconds of all futures together that are made at once."""
 CHUNK = 8.0
 """Seconds that become a body at once."""
-ARRIVAL = 1.5
-"""Seconds of a switch that are drawn with its target in view; a longer one begins as a free future."""
+ARRIVAL = 0.75
+"""Share of a window that is drawn with the target of a switch in view; a longer one begins as a free future."""
 TARGET = 1.0
 """Seconds of the target that are shown to the network, at most."""
 
@@ -64,7 +66,7 @@ def predict(
     """
     _check(predictor, past, seconds, count, seed=seed, steps=steps, guidance=guidance, longest=WHOLE)
     parts = given(predictor, past, hold, seconds)
-    windows, made = windows_for(predictor, seconds), []
+    windows = windows_for(predictor, _frames(past, seconds) / past.fps)
     drawn: list[list[Array]] = [[] for _ in range(count)]
     person = person_of(predictor, past)
     seen = np.broadcast_to(person, (count, *person.shape))
@@ -76,9 +78,10 @@ def predict(
             row.append(places)
         if progress:
             progress(number + 1, windows)
-    for row in drawn:
-        made.append(concatenated(past, *_dressed(predictor, past, row, seconds, hold=parts, clean=clean)))
-    return made
+    return [
+        concatenated(past, *_dressed(predictor, past, row, _frames(past, seconds), hold=parts, clean=clean))
+        for row in drawn
+    ]
 
 
 def predict_pieces(
@@ -98,11 +101,13 @@ def predict_pieces(
     _check(predictor, past, seconds, 1, seed=seed, steps=steps, guidance=guidance, longest=LONGEST)
     parts = given(predictor, past, hold, seconds)
     pen = Pen(predictor, steps, guidance, root)
+    total = _frames(past, seconds)
     windows = pen.windows(
-        person_of(predictor, past)[None], [(seed, number)], parts and parts.known, windows_for(predictor, seconds)
-    )
+        person_of(predictor, past)[None], [(seed, number)], parts and parts.known,
+        windows_for(predictor, total / past.fps),
+    )  # fmt: skip
     yield past
-    yield from _dressed(predictor, past, (window[0] for window in windows), seconds, hold=parts, clean=clean)
+    yield from _dressed(predictor, past, (window[0] for window in windows), total, hold=parts, clean=clean)
 
 
 def switch(
@@ -130,24 +135,18 @@ def switch(
         raise MotionloomError(f"facing is 'turned' or 'kept'; got {facing!r}")
     if len(target) < 2:
         raise MotionloomError(f"the target has {len(target)} frame; at least 2 are needed to arrive at it")
-    gap = max(round(seconds * past.fps), 1)
-    free = max(gap - round(ARRIVAL * past.fps), 0)
+    gap = _frames(past, seconds)
+    near = int(ARRIVAL * (predictor.frames - predictor.observed) / predictor.fps * past.fps)
+    free = max(gap - max(near, 1), 0)
     begun = [past] * count
     if free:
         begun = predict(
-            predictor,
-            past,
-            count=count,
-            seconds=free / past.fps,
-            seed=seed,
-            steps=steps,
-            guidance=guidance,
-            clean=clean,
-        )
+            predictor, past, count=count, seconds=free / past.fps, seed=seed,
+            steps=steps, guidance=guidance, clean=clean,
+        )  # fmt: skip
+    pen = Pen(predictor, steps, guidance, True)
     return [
-        _arriving(
-            Pen(predictor, steps, guidance, True), one, target, gap - free, seed=(seed, i), facing=facing, clean=clean
-        )
+        _arriving(pen, one, target, gap - free, seed=(seed, i), facing=facing, clean=clean)
         for i, one in enumerate(begun)
     ]
 
@@ -159,7 +158,8 @@ def _arriving(
     rate = predictor.fps / fps
     person, arrival = person_of(predictor, past), (gap + 1) * rate
     room = predictor.frames - len(person)
-    last = min(room, int(arrival + min(TARGET * predictor.fps, (len(target) - 1) * rate)))
+    told = max(min(TARGET * predictor.fps, (len(target) - 1) * rate), 2.0)  # two places of the grid tell a velocity
+    last = min(room, int(arrival + told))
     at = np.arange(1, last + 1)
     goal = to_smpl22(target.frames(0, min(len(target), round(CONTEXT * fps) + 2))).positions()
     turn = 0.0
@@ -170,11 +170,11 @@ def _arriving(
     mask[:, 0] = 0  # where it arrives is free
     places = pen.window(person[None], [seed], 2**20, Known(goal, mask), frames=last)[0]
     tail = past.frames(max(len(past) - seen_frames(predictor, past), 0), len(past))
-    shown = min(len(target), max(2, int((last - arrival) / rate)))
+    shown = min(len(target), int((last - arrival) / rate) + 1)
     pads = concatenated(tail, *[tail.frames(len(tail) - 1, len(tail))] * (gap + shown))
     grid = np.concatenate([person, places])
     times = (np.arange(len(pads)) - (len(tail) - 1)) * rate + len(person) - 1
-    made = worn(positions_at(grid, times), pads, clean=clean)
+    made = worn(positions_at(grid, times), pads, clean=clean, known=len(tail))
     first = len(tail) + gap
     begin, to = standing(target, 0)[0], standing(made, first)[0]
     moved = carried_level(target, rot.rotvec_to_quat(np.array([0.0, turn, 0.0])), begin, to)
@@ -187,15 +187,21 @@ def _arriving(
 # Onto the past's skeleton
 
 
+def _frames(past: Motion, seconds: float) -> int:
+    """Frames that are asked, at the past's rate."""
+    return max(round(seconds * past.fps), 1)
+
+
 def _dressed(
-    predictor: Predictor, past: Motion, windows: Iterable[Array], seconds: float,
+    predictor: Predictor, past: Motion, windows: Iterable[Array], total: int,
     *, hold: Given | None, clean: bool,
 ) -> Iterator[Motion]:  # fmt: skip
-    """What follows the past, in pieces of about `CHUNK` seconds; ``windows`` (frames, 22, 3) are read as needed."""
-    rate, total = predictor.fps / past.fps, max(round(seconds * past.fps), 1)
+    """``total`` frames behind the past, in pieces of about `CHUNK` seconds; ``windows`` (frames, 22, 3) are read as
+    needed."""
+    rate = predictor.fps / past.fps
     nothing = kept_parts(past.skeleton, frozenset(), np.zeros(3, dtype=bool))
     tail = past.frames(max(len(past) - seen_frames(predictor, past), 0), len(past))
-    grid, zero, done = person_of(predictor, past), None, 0
+    grid, done = person_of(predictor, past), 0
     zero = len(grid) - 1  # the grid's index of the past's last frame
     for places in windows:
         grid = np.concatenate([grid, places])
@@ -205,7 +211,7 @@ def _dressed(
         last = tail.frames(len(tail) - 1, len(tail))
         old = concatenated(tail, *[last] * (ready - done))
         at = (done + np.arange(len(old)) - (len(tail) - 1)) * rate + zero
-        made = worn(positions_at(grid, at), old, clean=clean)
+        made = worn(positions_at(grid, at), old, clean=clean, known=len(tail))
         new = splice(old, made, len(tail), last=len(old), kept=nothing).frames(len(tail), len(old))
         new = hold.laid_over(new, done) if hold else new
         yield new
@@ -244,6 +250,10 @@ def _check(
     if not (np.isfinite(seconds) and 0 < seconds <= longest) or round(seconds * past.fps) < 1:
         raise MotionloomError(
             f"cannot predict {seconds:g} s; ask for at least a frame ({1 / past.fps:.3g} s) and at most {longest:g} s"
+        )
+    if count * seconds > MOST:
+        raise MotionloomError(
+            f"{count} futures of {seconds:g} s are too much at once; ask for at most {MOST:g} s together"
         )
     if not 1 <= count <= 1000 or not 0 <= seed < LARGEST_SEED:
         raise MotionloomError(f"the count must be 1 to 1000 and the seed 0 to below 2**62; got {count} and {seed}")

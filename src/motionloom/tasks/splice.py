@@ -14,16 +14,18 @@ from motionloom.errors import MotionloomError
 from motionloom.features.feet import clean_feet
 from motionloom.features.humanml import resample_positions
 from motionloom.features.ik import motion_from_positions
-from motionloom.features.layout import FPS
+from motionloom.features.layout import FEET, FPS
 from motionloom.motion import Motion
 from motionloom.retarget import joints22, retarget, to_smpl22
 from motionloom.retarget.anatomy import read_body
+from motionloom.retarget.measured import mean_rotation
 from motionloom.skeleton import Skeleton
 from motionloom.tasks.redraw import Drawn
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+LEAVES = (10, 11, 15, 20, 21)
 EASE = 0.3
 """Seconds over which a difference of pose at a border fades."""
 
@@ -73,19 +75,45 @@ def dressed(drawn: Drawn, old: Motion, *, clean: bool) -> Motion:
     return worn(places, old, contacts=drawn.contacts[nearest], clean=clean)
 
 
-def worn(places: Array, old: Motion, *, clean: bool, contacts: Array | None = None) -> Motion:
+def worn(places: Array, old: Motion, *, clean: bool, contacts: Array | None = None, known: int | None = None) -> Motion:
     """Places (frames of ``old``, 22, 3) metres of the uniform person that the old motion is, on its skeleton, over its
-    floor; feet cleaned, by contacts (frames, 4) or by what the feet do."""
+    floor; feet cleaned, by contacts (frames, 4) or by what the feet do.
+
+    known: how many of the first places are the old motion's own, if what follows them is not: they tell where it is.
+    """
     person = motion_from_positions(places, old.fps)
     if clean:
         person = clean_feet(person, contacts=contacts)
     made = in_manner_of(old, retarget(person, old.skeleton))
-    back = in_manner_of(old, retarget(to_smpl22(old), old.skeleton))
-    carrier = _carrier(old.skeleton)
-    apart = rot.multiply(old.world_rotations()[:, carrier], rot.inverse(back.world_rotations()[:, carrier]))
+    back = made.frames(0, known) if known else in_manner_of(old, retarget(to_smpl22(old), old.skeleton))
+    seen, carrier = old.frames(0, len(back)), _carrier(old.skeleton)
+    apart = rot.multiply(seen.world_rotations()[:, carrier], rot.inverse(back.world_rotations()[:, carrier]))
     if np.median(np.abs(apart[:, 0])) < np.cos(np.radians(30)):
         raise MotionloomError("the clip does not stand upright along +Y; say which axis of its file is up (--up z)")
-    return _moved(made, (_place(old) - _place(back)).mean(axis=0))
+    apart = (_place(seen) - _place(back)).mean(axis=0)
+    if not known:
+        return _moved(made, apart)
+    apart[1] = (_feet(seen) - _feet(back)).mean()  # legs of another build stand as high, their hips need not
+    return _moved(_held_alike(made, old, known), apart)
+
+
+def _feet(motion: Motion) -> Array:
+    """(frames,) metres: the height of the lowest joint of the feet."""
+    return joints22(motion)[:, list(FEET), 1].min(axis=1)
+
+
+def _held_alike(made: Motion, old: Motion, known: int) -> Motion:
+    """``made`` with hands, head and toes held as they usually are in the first ``known`` frames of ``old``.
+
+    Places do not tell how; without it they would turn to how the uniform person holds them, in a blink.
+    """
+    drivers, rotations = read_body(made.skeleton).drivers, made.rotations.copy()
+    now, was = made.frames(0, known).world_rotations(), old.frames(0, known).world_rotations()
+    for joint in (drivers[leaf] for leaf in LEAVES):
+        if joint is not None and drivers.count(joint) == 1:
+            apart = mean_rotation(rot.multiply(rot.inverse(now[:, joint]), was[:, joint]), np.ones(known))
+            rotations[:, joint] = rot.multiply(rotations[:, joint], apart)
+    return replace(made, rotations=rotations)
 
 
 def in_manner_of(old: Motion, made: Motion) -> Motion:

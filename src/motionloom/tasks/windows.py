@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from motionloom.features.humanml import positions_at
 from motionloom.motion import Motion
@@ -16,6 +17,8 @@ Array = NDArray[np.float64]
 
 CONTEXT = 3.0
 """Seconds of a clip that are looked at for where its floor is."""
+SUNK, EASE = 0.02, 0.2
+"""Metres under the floor that are left, and seconds in which people who would sink further are lifted."""
 Given = Callable[[int, int], Known | None]
 """(first, last): what is known of the frames ``first`` to before ``last`` behind the past, 1 being the first."""
 
@@ -28,7 +31,7 @@ class Pen:
     steps: int
     guidance: float
     root: bool
-    """False: the person stays in place."""
+    """False: the person stays in place, but rises and sinks."""
 
     def windows(
         self, person: Array, seeds: Sequence[tuple[int, int]], given: Given | None, count: int
@@ -56,12 +59,25 @@ class Pen:
             self.predictor, person, seeds=[row_seed(*seed, number) for seed in seeds], known=known, frames=frames,
             steps=self.steps, guidance=self.guidance,
         )  # fmt: skip
-        return made if self.root else made - made[:, :, :1] + person[:, -1:, :1]
+        made = made + _lift(person, made, self.predictor.fps)[..., None, None] * [0, 1, 0]
+        return made if self.root else made + (person[:, -1:, :1] - made[:, :, :1]) * [1, 0, 1]
+
+
+def _lift(person: Array, made: Array, fps: float) -> Array:
+    """(rows, frames) metres that keep what is drawn behind a person from sinking under the floor at y = 0."""
+    lowest = np.minimum(person[:, -1, :, 1].min(axis=-1), -SUNK)  # who is lower already stays there
+    under = (lowest[:, None] - made[..., 1].min(axis=-1)).clip(0)
+    ease = max(round(EASE * fps), 1)
+    need = maximum_filter1d(under, 2 * ease + 1, axis=-1, mode="nearest")
+    need = uniform_filter1d(uniform_filter1d(need, ease, axis=-1, mode="nearest"), ease, axis=-1, mode="nearest")
+    u = (np.arange(1, made.shape[1] + 1) / (2 * ease)).clip(0, 1)
+    return need * u * u * (3 - 2 * u)
 
 
 def person_of(predictor: Predictor, past: Motion) -> Array:
     """(h, 22, 3) metres: the uniform person at the predictor's rate; the last frame is the past's last frame."""
-    context = past.frames(max(len(past) - round(CONTEXT * past.fps) - 2, 0), len(past))
+    seconds = max(CONTEXT, predictor.observed / predictor.fps)
+    context = past.frames(max(len(past) - round(seconds * past.fps) - 2, 0), len(past))
     places = to_smpl22(context).positions()
     return positions_at(places, len(context) - 1 - _back(predictor, past))
 

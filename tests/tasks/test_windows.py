@@ -1,0 +1,114 @@
+"""The windows behind predictions: the person at the predictor's rate, people who stay in place, above the floor."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from motionloom.features.positions import bone_lengths
+from motionloom.retarget import to_smpl22
+from motionloom.skeleton import SMPL22
+from motionloom.tasks import windows
+from motionloom.tasks.completion import next_frames, row_seed
+from motionloom.tasks.windows import Pen, person_of, seen_frames, windows_for
+from tests.tasks.small_predictor import FPS, FRAMES, OBSERVED, small_predictor
+from tests.tasks.test_edit import person
+
+PREDICTOR = small_predictor()
+PEN = Pen(PREDICTOR, 2, 1.0, True)
+AHEAD = FRAMES - OBSERVED
+SEEN = person_of(PREDICTOR, person(2.0, 30.0))[None]
+
+
+@pytest.mark.parametrize("fps", [10.0, 24.0, 25.0, 29.97, 30.0, 60.0, 120.0])
+def test_a_person_is_seen_at_the_rate_of_the_predictor_and_up_to_the_last_frame(fps: float) -> None:
+    """Every seen moment is the smooth clip's own moment, counted back from its end."""
+    past, fine = person(1.5, fps), person(1.5, 600.0)
+    seen = person_of(PREDICTOR, past)
+    assert seen.shape == (OBSERVED, 22, 3)
+    back = (len(past) - 1) / fps - np.arange(OBSERVED)[::-1] / FPS
+    real = to_smpl22(fine).positions()[(back * 600).round().astype(int)]
+    real += (seen[-1, 0] - real[-1, 0]) * [0, 1, 0]  # the floor is read from other frames
+    assert np.abs(seen - real).max() < (0.06 if fps < 20 else 0.012)
+    np.testing.assert_allclose(seen[-1, 4] - seen[-1, 0], real[-1, 4] - real[-1, 0], atol=0.02 if fps < 20 else 0.005)
+
+
+SHORT = [(30.0, 9, 9, 9), (30.0, 40, 15, 15), (60.0, 40, 15, 29), (120.0, 2, 2, 2), (120.0, 9, 3, 9), (10.0, 2, 4, 2)]
+
+
+@pytest.mark.parametrize(("fps", "frames", "places", "seen"), SHORT)
+def test_short_clips_are_seen_whole_and_by_two_moments_at_least(
+    fps: float, frames: int, places: int, seen: int
+) -> None:
+    past = person(2.0, fps).frames(0, frames)
+    assert person_of(PREDICTOR, past).shape == (places, 22, 3)
+    assert min(seen_frames(PREDICTOR, past), frames) == seen
+
+
+def test_a_predictor_that_sees_longer_than_floors_need_sees_all_of_it() -> None:
+    long = replace(PREDICTOR, observed=140, basis=replace(PREDICTOR.basis, frames=170))
+    past = person(6.0, 30.0)
+    seen = person_of(long, past)
+    real = to_smpl22(past).positions()[-140:]
+    assert np.abs((seen - real)[..., [0, 2]]).max() < 0.02
+
+
+@pytest.mark.parametrize(("seconds", "count"), [(0.01, 1), (0.999, 1), (1.0 + 1e-9, 1), (1.01, 2), (7.5, 8)])
+def test_as_many_windows_as_the_seconds_need(seconds: float, count: int) -> None:
+    assert windows_for(PREDICTOR, seconds) == count
+
+
+def test_each_window_sees_the_one_before() -> None:
+    """By hand: the next window is what comes behind the last frames, on the bones of the person."""
+    made = list(PEN.windows(SEEN, [(7, 3)], None, 3))
+    whole = SEEN
+    for number, window in enumerate(made):
+        by_hand = next_frames(PREDICTOR, whole[:, -OBSERVED:], seeds=[row_seed(7, 3, number)], steps=2)
+        np.testing.assert_allclose(window[..., [0, 2]], by_hand[..., [0, 2]], atol=1e-6)
+        whole = np.concatenate([whole, window], axis=1)
+    lengths = bone_lengths(SEEN, SMPL22.parents)
+    np.testing.assert_allclose(bone_lengths(whole, SMPL22.parents), lengths, atol=1e-9)
+
+
+def test_what_is_given_is_asked_for_each_window_once_and_as_far_as_it_sees() -> None:
+    asked: list[tuple[int, int]] = []
+    list(PEN.windows(SEEN, [(0, 0)], lambda first, last: asked.append((first, last)), 3))
+    assert asked == [(1, 1 + AHEAD), (1 + AHEAD, 1 + 2 * AHEAD), (1 + 2 * AHEAD, 1 + 3 * AHEAD)]
+    asked.clear()
+    list(PEN.windows(SEEN[:, -4:], [(0, 0)], lambda first, last: asked.append((first, last)), 2))
+    assert asked[0] == (1, 1 + FRAMES - 4)
+
+
+def test_a_person_in_place_keeps_to_it_but_rises_and_sinks() -> None:
+    free = next(PEN.windows(SEEN, [(0, 0)], None, 1))
+    bound = next(replace(PEN, root=False).windows(SEEN, [(0, 0)], None, 1))
+    assert (bound[:, :, 0, [0, 2]] == SEEN[:, -1:, 0, [0, 2]]).all()
+    np.testing.assert_allclose(bound - bound[:, :, :1], free - free[:, :, :1], atol=1e-12)
+    np.testing.assert_allclose(bound[..., 1], free[..., 1], atol=1e-12)
+
+
+def sinking(depth: float):
+    def drawn(predictor, past, *, frames=None, **_):
+        t = np.arange(1, AHEAD + 1)[:, None, None] / AHEAD
+        return past[:, -1:] - depth * t * [0, 1, 0]
+
+    return drawn
+
+
+def test_nobody_sinks_under_the_floor_and_the_lift_is_smooth(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(windows, "next_frames", sinking(0.5))
+    made = next(PEN.windows(SEEN, [(0, 0)], None, 1))[0]
+    assert made[..., 1].min() > SEEN[0, -1, :, 1].min().clip(max=0) - 0.05
+    whole = np.concatenate([SEEN[0, -3:, :, 1], made[..., 1]])
+    assert np.abs(np.diff(whole[2:], 2, axis=0)).max() < 0.012
+    moved = made - (SEEN[0, -1] - SEEN[0, -1, 0] + made[:, :1])
+    assert np.abs(moved).max() < 1e-9, "the body is moved as a whole"
+
+
+def test_people_above_the_floor_or_already_under_it_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(windows, "next_frames", sinking(-0.5))
+    up = next(PEN.windows(SEEN, [(0, 0)], None, 1))
+    assert np.array_equal(up, sinking(-0.5)(PREDICTOR, SEEN))
+    monkeypatch.setattr(windows, "next_frames", sinking(0.0))
+    cellar = SEEN - np.array([0, 1.0, 0])
+    assert np.array_equal(next(PEN.windows(cellar, [(0, 0)], None, 1)), sinking(0.0)(PREDICTOR, cellar))
