@@ -22,9 +22,11 @@ from torch import Tensor
 from motionloom.diffusion import SCHEDULES, Schedule
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
+from motionloom.nets.pair_published import from_published_pair, is_pair
 from motionloom.nets.prior import Condition, NetConfig, PriorNet, condition
 from motionloom.nets.published import FRAME_RATES, TEXTS, PublishedText, describe, from_published, read_published
 from motionloom.nets.text import MiniLM, TextEncoder
+from motionloom.nets.weights import fill, is_signed
 
 FORMAT = 1
 MAX_BYTES = 2 << 30
@@ -94,16 +96,7 @@ def find_device(name: str | torch.device) -> torch.device:
 def shipped() -> dict[str, Path]:
     """Names and places of the priors inside the package."""
     folder = Path(str(resources.files("motionloom"))) / "weights"
-    return {path.stem: path for path in sorted(folder.glob("*.safetensors")) if _is_prior(path)}
-
-
-def _is_prior(path: Path) -> bool:
-    """True for a file of `save_prior`, damaged or not, by what its head says."""
-    try:
-        with safe_open(path, framework="pt") as file:
-            return "motionloom" in (file.metadata() or {})
-    except (SafetensorError, OSError):
-        return False
+    return {path.stem: path for path in sorted(folder.glob("*.safetensors")) if is_signed(path, "motionloom")}
 
 
 def find_weights(weights: str | Path) -> Path:
@@ -165,9 +158,7 @@ def load_prior(path: Path, device: str | torch.device = "cpu") -> Prior:
     config = NetConfig.parse(about["net"])
     with torch.device("meta"):
         net = PriorNet(config)
-    weights = {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}
-    _check(path, {k: tuple(v.shape) for k, v in net.state_dict().items()}, weights)
-    net.load_state_dict(weights, assign=True)
+    fill(net, {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}, str(path))
     for name in ("mean", "std"):
         values = tensors.get(name, torch.empty(0)).float()
         usable = values.shape == (config.features,) and bool(values.isfinite().all())
@@ -214,22 +205,6 @@ def _about(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
         ) from None
 
 
-def _check(path: Path, wanted: dict[str, tuple[int, ...]], found: dict[str, Tensor]) -> None:
-    missing, extra = sorted(wanted.keys() - found.keys()), sorted(found.keys() - wanted.keys())
-    if missing or extra:
-        raise MotionloomError(
-            f"{path} does not fit its own description: {len(missing)} weights are missing and {len(extra)} are unknown "
-            f"(such as {(missing + extra)[0]}); fetch the weights again"
-        )
-    for key, shape in wanted.items():
-        if tuple(found[key].shape) != shape:
-            raise MotionloomError(
-                f"{path}: {key} is {tuple(found[key].shape)} and should be {shape}; fetch the weights again"
-            )
-        if not bool(found[key].isfinite().all()):
-            raise MotionloomError(f"{path}: {key} has numbers that are not finite; fetch the weights again")
-
-
 def _text(path: Path, name: str, tensors: dict[str, Tensor]) -> TextEncoder:
     if name == "minilm":
         return MiniLM.from_tensors({k[5:]: v for k, v in tensors.items() if k.startswith("text.")})
@@ -244,12 +219,13 @@ def import_published(
 ) -> Prior:  # fmt: skip
     """A published MDM or PriorMDM checkpoint (``model*.pt``, with ``args.json`` beside it) as a `Prior`.
 
+    Of a checkpoint of two people (ComMDM) it is the network of each; `nets.pair_block.import_block` reads the rest.
     mean, std: (features,) statistics published with the data set. warn: told what was missing and is assumed.
     Raises MotionloomError for anything but plain weights of MDM's ``trans_enc``.
     """
     path = Path(path)
     published = read_published(path)
-    net = from_published(published.state)
+    net = from_published_pair(published.state)[0] if is_pair(published.state) else from_published(published.state)
     said = describe(published, net)
     for line in said.warnings:
         warn(line)

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import torch
-from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
@@ -30,6 +29,7 @@ from motionloom.features.positions import Layout
 from motionloom.io.atomic import atomic_path
 from motionloom.nets.predictor import NetConfig, TransLinear
 from motionloom.nets.published import read_published
+from motionloom.nets.weights import fill, is_signed
 
 FORMAT = 1
 LONGEST_WINDOW = 2000
@@ -165,11 +165,7 @@ def save_predictor(predictor: Predictor, path: Path | str, *, half: bool = True)
 
 def is_predictor(path: Path) -> bool:
     """True for a file of `save_predictor`, damaged or not, by what its head says."""
-    try:
-        with safe_open(path, framework="pt") as file:
-            return "motionloom-predictor" in (file.metadata() or {})
-    except (SafetensorError, OSError):
-        return False
+    return is_signed(path, "motionloom-predictor")
 
 
 def load_predictor(path: Path) -> Predictor:
@@ -202,7 +198,7 @@ def load_predictor(path: Path) -> Predictor:
         raise MotionloomError(f"{path} does not describe a predictor ({error!r}); name a file that does") from None
     with torch.device("meta"):  # what a file only claims to hold takes no memory
         net = TransLinear(config)
-    fill(net, {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}, path)
+    fill(net, {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}, str(path))
     mean, std, pose = (_usable(path, tensors, key) for key in ("mean", "std", "pose"))
     shape = (config.kept, config.channels)
     fits = mean.shape == shape and std.shape == shape and pose.shape == (2, config.channels)
@@ -225,16 +221,6 @@ def _usable(path: Path, tensors: dict[str, Tensor], name: str) -> Tensor:
     if not values.numel() or not bool(values.isfinite().all()):
         raise MotionloomError(f"{path} lacks usable statistics ({name}); fetch the weights again")
     return values
-
-
-def fill(net: TransLinear, weights: dict[str, Tensor], path: Path) -> None:
-    """Put weights into a network; raises MotionloomError where names, shapes or numbers are not right."""
-    wanted = {k: tuple(v.shape) for k, v in net.state_dict().items()}
-    wrong = sorted(wanted.keys() ^ weights.keys()) or [k for k in wanted if tuple(weights[k].shape) != wanted[k]]
-    wrong = wrong or [k for k in wanted if not bool(weights[k].isfinite().all())]
-    if wrong:
-        raise MotionloomError(f"{path} does not hold the weights it describes (such as {wrong[0]}); fetch it again")
-    net.load_state_dict(weights, assign=next(net.parameters()).is_meta)
 
 
 _BENCHMARKS = {
@@ -270,7 +256,7 @@ def import_humanmac(path: Path | str, *, name: str | None = None, licence: str |
         raise MotionloomError(f"{path} has {kept} frequencies of {frames} frames, which there are not; fetch it again")
     with torch.device("meta"):
         net = TransLinear(config)
-    fill(net, {key: value.float() for key, value in state.items()}, path)
+    fill(net, {key: value.float() for key, value in state.items()}, str(path))
     zeros, ones = torch.zeros(kept, layout.channels), torch.ones(kept, layout.channels)
     card = Card(name or path.stem, licence or Card.licence, f"as published: {data}", {"imported_from": path.name})
     return Predictor(

@@ -28,6 +28,7 @@ from torch.nn import functional as F
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.nets.prior import Bound, Condition, NetConfig, PriorNet
+from motionloom.nets.weights import check
 
 KEY = "motionloom-adapter"
 FORMAT = 1
@@ -110,7 +111,7 @@ class Adapter:
                 f"the adapter {path.name} belongs to the weights {found.base!r}, and these are others; "
                 "use those weights, or train an adapter for these"
             )
-        _check(path, found, prior.net.config, linears(prior.net))
+        check(found.tensors, dict(_shapes(found, prior.net.config, linears(prior.net))), str(path))
         return found
 
     def save(self, path: Path | str) -> Path:
@@ -307,17 +308,6 @@ def _parse(path: Path, about: dict[str, Any], tensors: dict[str, Tensor]) -> Ada
     if not good or not all(isinstance(value, str) for value in said.values()):
         raise MotionloomError(f"{path} does not describe an adapter; fetch or train it again")
     return Adapter(rank=rank, tensors={k: v.float() for k, v in tensors.items()}, notes=notes, **said)  # type: ignore[arg-type]
-
-
-def _check(path: Path, adapter: Adapter, config: NetConfig, layers: Mapping[str, nn.Linear]) -> None:
-    wanted = dict(_shapes(adapter, config, layers))
-    if wanted.keys() != adapter.tensors.keys():
-        odd = sorted(wanted.keys() ^ adapter.tensors.keys())[0]
-        raise MotionloomError(f"{path} does not fit the network: {odd} is missing or unknown; fetch or train it again")
-    for key, shape in wanted.items():
-        value = adapter.tensors[key]
-        if tuple(value.shape) != shape or not bool(value.isfinite().all()):
-            raise MotionloomError(f"{path}: {key} is not {shape} finite numbers; fetch or train it again")
 
 
 def _shapes(

@@ -24,6 +24,7 @@ from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT, WIDTH
 from motionloom.io.atomic import atomic_path
 from motionloom.nets.text import MiniLM, TextEncoder
+from motionloom.nets.weights import check, shapes
 
 KEY = "motionloom_evaluator"
 """Metadata entry that tells the file's kind."""
@@ -290,12 +291,10 @@ def load_embedder(path: Path | str, text: TextEncoder) -> Embedder:
     with torch.device("meta"):
         net = EvaluatorNet(about["net"])
     weights = {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}
-    wanted = {k: v.shape for k, v in net.state_dict().items()}
-    wanted_all = {f"net.{k}": v for k, v in wanted.items()} | dict.fromkeys(("mean", "std"), torch.Size([INPUTS]))
-    if {k: v.shape for k, v in tensors.items()} != wanted_all:
-        raise MotionloomError(f"{path} does not fit its own description; train or fetch the evaluator again")
-    if not all(bool(v.isfinite().all()) for v in tensors.values()) or float(tensors["std"].min()) <= 0:
-        raise MotionloomError(f"{path} has numbers that are not finite or a spread of 0; fetch the evaluator again")
+    own = {f"net.{k}": shape for k, shape in shapes(net).items()}
+    check(tensors, own | {"mean": (INPUTS,), "std": (INPUTS,)}, str(path))
+    if float(tensors["std"].min()) <= 0:
+        raise MotionloomError(f"{path} has a spread of 0; fetch the evaluator again")
     net.load_state_dict(weights, assign=True)
     net = net.eval().requires_grad_(False)
     return Embedder(net, tensors["mean"].float(), tensors["std"].float(), text, about["card"])

@@ -17,6 +17,7 @@ from torch.nn.utils.rnn import pack_padded_sequence
 
 from motionloom.errors import MotionloomError
 from motionloom.nets.published import MAX_BYTES
+from motionloom.nets.weights import fill
 
 UNIT = 4
 """Frames per snippet."""
@@ -132,20 +133,8 @@ def from_state_dict(state: Mapping[str, Tensor]) -> GuoNets:
     sizes = _sizes(state)
     with torch.device("meta"):
         nets = GuoNets(sizes)
-    wanted = {key: tuple(value.shape) for key, value in nets.state_dict().items()}
-    found = {key: tuple(value.shape) for key, value in state.items()}
-    wrong = sorted(key for key in wanted.keys() | found.keys() if wanted.get(key) != found.get(key))
-    if wrong:
-        key = wrong[0]
-        raise MotionloomError(
-            f"the evaluator's weights do not fit: {key} is {found.get(key, 'missing')}, not {wanted.get(key, 'absent')}"
-        )
     # Copied: sums over memory of another alignment, such as a mapped file's, differ in the last bit.
-    weights = {key: value.detach().to(torch.float32, copy=True) for key, value in state.items()}
-    for key, value in weights.items():
-        if not bool(value.isfinite().all()):
-            raise MotionloomError(f"the evaluator's {key} has numbers that are not finite; fetch the file again")
-    nets.load_state_dict(weights, assign=True)
+    fill(nets, {k: v.detach().to(torch.float32, copy=True) for k, v in state.items()}, "the evaluator's file")
     return nets.eval().requires_grad_(False)
 
 

@@ -24,6 +24,7 @@ from motionloom.nets.pair import PairConfig, PairNet, Talk
 from motionloom.nets.pair_published import adds_of, from_published_pair, is_pair
 from motionloom.nets.prior import PriorNet
 from motionloom.nets.published import read_published
+from motionloom.nets.weights import check, is_signed, shapes
 
 KEY = "motionloom-pair"
 FORMAT = 1
@@ -75,14 +76,14 @@ class PairBlock:
             raise MotionloomError(
                 f"no two-person block {str(block)!r}: there is no such file, and the shipped ones are {names}"
             )
-        about, tensors = _read(path)
-        found = _parse(path, about, tensors)
+        found = read_block(path)
         if found.fingerprint != fingerprint(prior.net):
             raise MotionloomError(
                 f"the two-person block {path.name} belongs to the weights {found.base!r}, and these are others; "
                 "use those weights, or train a block for these"
             )
-        _check(path, found, prior.net)
+        with torch.device("meta"):
+            check(found.tensors, shapes(Talk(found.config, prior.net.config)), str(path))
         return found
 
     def save(self, path: Path | str, *, half: bool = True) -> Path:
@@ -112,6 +113,16 @@ def blocks() -> dict[str, Path]:
     """Names and places of the two-person blocks inside the package, for the prior ``default``."""
     folder = Path(str(resources.files("motionloom"))) / "weights" / "pair"
     return {path.stem: path for path in sorted(folder.glob("*.safetensors"))}
+
+
+def is_block(path: Path) -> bool:
+    """True for a file of `PairBlock.save`, damaged or not, by what its head says."""
+    return is_signed(path, KEY)
+
+
+def read_block(path: Path) -> PairBlock:
+    """What a file holds and says, without a prior to fit it to; raises MotionloomError as `PairBlock.load`."""
+    return _parse(path, *_read(path))
 
 
 def import_block(
@@ -162,15 +173,3 @@ def _parse(path: Path, about: dict[str, Any], tensors: dict[str, Tensor]) -> Pai
     ):
         raise MotionloomError(f"{path} does not describe a two-person block; fetch or train it again")
     return PairBlock(config=PairConfig.parse(config), tensors=tensors, notes=notes, **said)  # type: ignore[arg-type]
-
-
-def _check(path: Path, block: PairBlock, prior: PriorNet) -> None:
-    with torch.device("meta"):
-        wanted = {k: tuple(v.shape) for k, v in Talk(block.config, prior.config).state_dict().items()}
-    if wanted.keys() != block.tensors.keys():
-        odd = sorted(wanted.keys() ^ block.tensors.keys())[0]
-        raise MotionloomError(f"{path} does not fit the network: {odd} is missing or unknown; fetch or train it again")
-    for key, shape in wanted.items():
-        value = block.tensors[key]
-        if not value.is_floating_point() or tuple(value.shape) != shape or not bool(value.isfinite().all()):
-            raise MotionloomError(f"{path}: {key} is not {shape} finite numbers; fetch or train it again")

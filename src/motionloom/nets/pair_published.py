@@ -15,6 +15,7 @@ from motionloom.features.pair import PUBLISHED_CODE
 from motionloom.nets.pair import PairConfig, Talk
 from motionloom.nets.prior import PriorNet
 from motionloom.nets.published import from_published, own_name
+from motionloom.nets.weights import fill
 
 _START, _END, _WHOLE = "seqTransEncoder_start.layers.", "seqTransEncoder_end.layers.", "seqTransEncoder.layers."
 _BLOCK, _LAYERS = "multi_person.", "model.layers."
@@ -65,17 +66,7 @@ def _talk(block: dict[str, Tensor], prior: PriorNet, split: int, adds: Literal["
     )
     with torch.device("meta"):
         talk = Talk(config, sizes)
-    wanted = {key: tuple(value.shape) for key, value in talk.state_dict().items()}
-    found = {key: tuple(value.shape) for key, value in block.items()}
-    wrong = sorted(key for key in wanted.keys() | found.keys() if wanted.get(key) != found.get(key))
-    if wrong:
-        raise MotionloomError(
-            f"the communication block does not fit: {wrong[0]} is {found.get(wrong[0], 'missing')}, "
-            f"not {wanted.get(wrong[0], 'absent')}"
-        )
-    if not all(bool(value.isfinite().all()) for value in block.values()):
-        raise MotionloomError("the communication block has numbers that are not finite")
-    talk.load_state_dict(block, assign=True)
+    fill(talk, block, "the checkpoint's communication block")
     return talk.eval().requires_grad_(False)
 
 

@@ -17,6 +17,7 @@ from motionloom.errors import MotionloomError
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.nets.text import ClipText, TextEmbedding
 from motionloom.nets.text.clip import FULL_LENGTH, HUMANML_LENGTH
+from motionloom.nets.weights import fill
 
 MAX_BYTES = 2 << 30
 _IGNORED = ("clip_model.", "sequence_pos_encoder.pe", "embed_timestep.sequence_pos_encoder.pe", "t_pos_encoder.pe")
@@ -91,18 +92,7 @@ def from_published(state: dict[str, Tensor]) -> PriorNet:
     )
     with torch.device("meta"):
         net = PriorNet(config)
-    wanted = {key: tuple(value.shape) for key, value in net.state_dict().items()}
-    found = {key: tuple(value.shape) for key, value in renamed.items()}
-    wrong = sorted(key for key in wanted.keys() | found.keys() if wanted.get(key) != found.get(key))
-    if wrong:
-        key = wrong[0]
-        raise MotionloomError(
-            f"the checkpoint does not fit: {key} is {found.get(key, 'missing')}, not {wanted.get(key, 'absent')}"
-        )
-    weights = {key: value.float() for key, value in renamed.items()}
-    if not all(bool(value.isfinite().all()) for value in weights.values()):
-        raise MotionloomError("the checkpoint has numbers that are not finite")
-    net.load_state_dict(weights, assign=True)
+    fill(net, renamed, "the checkpoint")
     return net.eval().requires_grad_(False)
 
 
