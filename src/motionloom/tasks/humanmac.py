@@ -22,6 +22,7 @@ from torch import Tensor
 from motionloom.diffusion import Basis, Constraint, Ddim, Denoiser, Draw, Schedule, State, mix, row_draw, run
 from motionloom.errors import MotionloomError
 from motionloom.predictor import Predictor
+from motionloom.tasks.completion import row_seed
 
 Padding = Literal["last", "zero", "repeat"]
 Way = Callable[[Tensor], Tensor]
@@ -194,7 +195,7 @@ def published_futures(
     for first in range(0, len(past) * count, rows):
         index = torch.arange(first, min(first + rows, len(past) * count))
         window, sample = index // count, index % count
-        seeds = [_row_seed(seed, w, i) for w, i in zip(window.tolist(), sample.tolist())]
+        seeds = [row_seed(seed, w, i) for w, i in zip(window.tolist(), sample.tolist())]
         own = observed[window.to(observed.device)]
         made.append(_complete(predictor, own, told[sample], draw=row_draw(seeds), steps=steps).cpu())
     future = torch.cat(made)[:, predictor.observed :].unflatten(0, (len(past), count)).double().numpy()
@@ -219,7 +220,3 @@ def _complete(predictor: Predictor, observed: Tensor, keep: Tensor, *, draw: Dra
     walk, start = published_levels(schedule, steps), draw(known)
     state = run(denoise, start, levels=walk, solver=Ddim(), schedule=schedule, draw=draw, constrain=constrain)
     return predictor.to_features(state, pose)
-
-
-def _row_seed(seed: int, window: int, sample: int) -> int:
-    return int(np.random.SeedSequence((seed, window, sample)).generate_state(1, np.uint64)[0] >> np.uint64(1))
