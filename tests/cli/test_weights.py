@@ -12,8 +12,10 @@ from motionloom.checkpoint import load_prior, save_prior
 from motionloom.cli import main
 from motionloom.evaluation.guo import load_guo
 from motionloom.io import load
+from motionloom.nets.pair_block import PairBlock
+from motionloom.predictor import save_predictor
 from tests.evaluation import test_guo
-from tests.nets import tiny
+from tests.nets import test_pair, tiny, tiny_predictor
 from tests.nets.test_published import Bomb, state, write
 from tests.tasks.test_text import Words
 
@@ -130,6 +132,90 @@ def test_other_mistakes_are_one_sentence(folder: Path, capsys: pytest.CaptureFix
     refused(capsys, "import", "Mean.npy", "--out", "a.safetensors", *STATISTICS)
     refused(capsys, "weights", "absent")
     refused(capsys, "weights", "model000200000.pt")
+
+
+TWO = ["import", "model000200000.pt", "--out", "a.safetensors", *STATISTICS]
+
+
+@pytest.mark.parametrize("half", [[], ["--half"]], ids=["whole", "half"])
+def test_a_checkpoint_of_two_people_becomes_a_prior_and_its_block(
+    folder: Path, capsys: pytest.CaptureFixture[str], half: list[str]
+) -> None:
+    given = test_pair.published()
+    write(folder, given, {"layers": 5, "multi_func": "in_both_out_cond"})
+    assert main([*TWO, "--name", "dance", "--licence", "research only", *half]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert [line.split()[1].strip(",") for line in said] == ["a.safetensors", "a-pair.safetensors"]
+    prior = load_prior(Path("a.safetensors"))
+    end = given["seqTransEncoder_end.layers.0.norm2.bias"]
+    assert torch.allclose(prior.net.state_dict()["blocks.3.norm2.bias"], end, atol=1e-3)
+    block = PairBlock.load("a-pair.safetensors", prior)
+    assert (block.name, block.base, block.licence, block.config.adds) == (
+        "dance-pair",
+        "dance",
+        "research only",
+        "condition",
+    )
+    assert torch.allclose(block.tensors["place.weight"].float(), given["multi_person.canon_out.weight"], atol=1e-3)
+    assert main(["weights", "a-pair.safetensors"]) == 0
+    card = capsys.readouterr().out
+    assert all(word in card for word in ("dance-pair", "two-person block", "research only", "3DPW", "behind 3"))
+    assert main(["weights", "a-pair.safetensors", "--json"]) == 0
+    about = json.loads(capsys.readouterr().out)
+    assert about["belongs_to"] == {"name": "dance", "fingerprint": block.fingerprint}
+    assert about["parameters"] == sum(v.numel() for k, v in given.items() if k.startswith("multi_person."))
+
+
+def test_of_two_people_both_files_are_written_or_none(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given, one = test_pair.published(), "multi_person.canon_out.weight"
+    Path("a-pair.safetensors").mkdir()
+    write(folder, given)
+    assert "folder" in refused_after_warnings(capsys, *TWO)
+    Path("a-pair.safetensors").rmdir()
+    write(folder, given, {"multi_func": "in_both_out_direct"})
+    assert "multi_func" in refused_after_warnings(capsys, *TWO)
+    write(folder, given | {one: torch.zeros(5, 16)})
+    assert "place.weight" in refused_after_warnings(capsys, *TWO)
+    write(folder, given)
+    assert "--mean" in refused(capsys, "import", "model000200000.pt", "--out", "a.safetensors")
+
+
+def refused_after_warnings(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    """The last sentence on stderr; nothing is written."""
+    before = sorted(Path().rglob("*"))
+    assert main(list(words)) == 2
+    said = capsys.readouterr()
+    assert (said.out, sorted(Path().rglob("*"))) == ("", before)
+    return said.err.splitlines()[-1]
+
+
+def test_damaged_blocks_are_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    made, _ = test_pair.block_of("modulated")
+    path = made.save("b.safetensors")
+    path.write_bytes(path.read_bytes()[:-5])
+    refused(capsys, "weights", "b.safetensors")
+
+
+def test_all_kinds_of_shipped_weights_are_listed_and_found_by_name(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    block, _ = test_pair.block_of("modulated")
+    files = {
+        "checkpoint.shipped": {"one": save_prior(tiny.prior(), "1.safetensors")},
+        "predictor.shipped_predictors": {"two": save_predictor(tiny_predictor.predictor(), "2.safetensors")},
+        "nets.pair_block.blocks": {"three": block.save("3.safetensors")},
+    }
+    for function, found in files.items():
+        monkeypatch.setattr(f"motionloom.{function}", lambda found=found: found)
+    assert main(["weights", "--json"]) == 0
+    listed = {about["name"]: about["kind"] for about in json.loads(capsys.readouterr().out)}
+    assert listed == {"one": "prior", "two": "predictor", "three": "two-person block"}
+    assert main(["weights"]) == 0
+    assert capsys.readouterr().out.count(" MB ") == 3
+    for name, kind in listed.items():
+        assert main(["weights", name, "--json"]) == 0
+        about = json.loads(capsys.readouterr().out)
+        assert (about["name"], about["kind"]) == (name, kind)
 
 
 def test_a_card_is_printed_and_shipped_weights_are_listed(capsys: pytest.CaptureFixture[str]) -> None:

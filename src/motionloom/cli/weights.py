@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import numpy as np
 
+    from motionloom.checkpoint import Prior
+    from motionloom.nets.pair_block import PairBlock
+
 
 def add(subparsers) -> None:
     """Register `import` and `weights`."""
     parser = subparsers.add_parser(
-        "import", help="published weights to one file: an MDM, PriorMDM or HumanMAC network, or Guo's evaluator"
+        "import", help="published weights to a file: an MDM, PriorMDM or HumanMAC network, or Guo's evaluator"
     )
     parser.add_argument(
         "checkpoint", type=Path, metavar="MODEL.pt|finest.tar", help="model000200000.pt, args.json beside it; or Guo's"
@@ -41,6 +44,7 @@ def _import(arguments: argparse.Namespace) -> None:
     from motionloom.checkpoint import import_published, save_prior
     from motionloom.errors import MotionloomError
     from motionloom.io.atomic import check_place
+    from motionloom.nets.pair_published import is_pair
     from motionloom.nets.published import read_published
     from motionloom.predictor import is_humanmac
 
@@ -54,7 +58,8 @@ def _import(arguments: argparse.Namespace) -> None:
         return
     if arguments.glove or arguments.vip:
         raise MotionloomError("--glove and --vip belong to an evaluator, which is published as finest.tar")
-    if is_humanmac(read_published(arguments.checkpoint).state):
+    state = read_published(arguments.checkpoint).state
+    if is_humanmac(state):
         _import_predictor(arguments)
         return
     if arguments.mean is None or arguments.std is None:
@@ -62,11 +67,22 @@ def _import(arguments: argparse.Namespace) -> None:
             "the weights work on standardised features and do not hold the statistics: "
             "add --mean Mean.npy --std Std.npy of the data set they were trained on"
         )
+    second = check_place(arguments.out.with_name(f"{arguments.out.stem}-pair.safetensors")) if is_pair(state) else None
     prior = import_published(
         arguments.checkpoint, mean=_numbers(arguments.mean), std=_numbers(arguments.std),
         name=arguments.name, licence=arguments.licence, warn=lambda line: print(f"motionloom: {line}", file=sys.stderr),
     )  # fmt: skip
+    block = None if second is None else _imported_block(arguments, prior)
     print(f"wrote {save_prior(prior, arguments.out, half=arguments.half)}")
+    if block is not None and second is not None:
+        print(f"wrote {block.save(second, half=arguments.half)}, what makes two people of it")
+
+
+def _imported_block(arguments: argparse.Namespace, prior: "Prior") -> "PairBlock":
+    from motionloom.nets.pair_block import import_block
+
+    base = prior.card.name
+    return import_block(arguments.checkpoint, prior, base=base, name=f"{base}-pair", licence=arguments.licence)
 
 
 def _import_predictor(arguments: argparse.Namespace) -> None:
@@ -117,35 +133,43 @@ def _numbers(path: Path) -> "np.ndarray":
 
 def _weights(arguments: argparse.Namespace) -> None:
     from motionloom.checkpoint import find_weights, shipped
+    from motionloom.nets.pair_block import blocks
+    from motionloom.predictor import shipped_predictors
 
+    names = blocks() | shipped_predictors() | shipped()
     if arguments.weights is None:
-        described = [describe(path, name) for name, path in shipped().items()]
+        described = [describe(path, name) for name, path in names.items()]
         if arguments.json:
             print(json.dumps(described, indent=1))
             return
         for about in described:
-            print(f"{about['name']:<12} {about['megabytes']:6.1f} MB  {about['licence']}")
+            print(f"{about['name']:<12} {about['kind']:<17} {about['megabytes']:6.1f} MB  {about['licence']}")
         if not described:
             print("no weights ship with this installation; name a file")
         return
-    path = find_weights(arguments.weights)
-    about = describe(path, str(arguments.weights) if str(arguments.weights) in shipped() else None)
+    asked = str(arguments.weights)
+    about = describe(names.get(asked) or find_weights(asked), asked if asked in names else None)
     print(json.dumps(about, indent=1) if arguments.json else _card(about))
 
 
 def describe(path: Path, name: str | None = None) -> dict[str, Any]:
     """What a weight file says and holds; the whole file is read and checked. ``name``: the shipped one."""
-    from motionloom.checkpoint import load_prior
+    from motionloom.nets.pair_block import is_block
     from motionloom.predictor import is_predictor
 
-    if is_predictor(path):
-        return _describe_predictor(path)
+    said = _predictor(path) if is_predictor(path) else _block(path) if is_block(path) else _prior(path)
+    about = {"name": said["name"], "file": str(path), "megabytes": round(path.stat().st_size / 1e6, 1)} | said
+    return about if name is None else about | {"name": name}
+
+
+def _prior(path: Path) -> dict[str, Any]:
+    from motionloom.checkpoint import load_prior
+
     prior = load_prior(path)
     config = prior.net.config
     return {
-        "name": name or prior.card.name,
-        "file": str(path),
-        "megabytes": round(path.stat().st_size / 1e6, 1),
+        "name": prior.card.name,
+        "kind": "prior",
         "licence": prior.card.licence,
         "data": prior.card.data,
         "manner": config.manner,
@@ -159,15 +183,14 @@ def describe(path: Path, name: str | None = None) -> dict[str, Any]:
     }
 
 
-def _describe_predictor(path: Path) -> dict[str, Any]:
+def _predictor(path: Path) -> dict[str, Any]:
     from motionloom.predictor import load_predictor
 
     predictor = load_predictor(path)
     config = predictor.net.config
     return {
         "name": predictor.card.name,
-        "file": str(path),
-        "megabytes": round(path.stat().st_size / 1e6, 1),
+        "kind": "predictor",
         "licence": predictor.card.licence,
         "data": predictor.card.data,
         "manner": predictor.manner,
@@ -181,19 +204,42 @@ def _describe_predictor(path: Path) -> dict[str, Any]:
     }
 
 
+def _block(path: Path) -> dict[str, Any]:
+    from motionloom.nets.pair_block import read_block
+
+    block = read_block(path)
+    config = block.config
+    return {
+        "name": block.name,
+        "kind": "two-person block",
+        "licence": block.licence,
+        "data": block.data,
+        "manner": "aware" if config.aware else f"corrects {config.adds}",
+        "parameters": sum(value.numel() for value in block.tensors.values()),
+        "sizes": {"layers": config.layers, "behind": config.split, "width": config.width, "heads": config.heads},
+        "belongs_to": {"name": block.base, "fingerprint": block.fingerprint},
+        "notes": block.notes,
+    }
+
+
 def _card(about: dict[str, Any]) -> str:
     sizes = ", ".join(f"{key} {value}" for key, value in about["sizes"].items())
     rows = {
         "name": about["name"],
+        "kind": about["kind"],
         "file": f"{about['file']} ({about['megabytes']} MB)",
         "licence": about["licence"],
         "data": about["data"],
         "network": f"{about['manner']}, {about['parameters']:,} parameters ({sizes})",
-        "motion": f"{_seen(about)}, {about['frames_per_second']:g} frames per second",
-        "schedule": f"{about['schedule']['name']}, {about['schedule']['steps']} levels",
-        "text": about.get("text", "none: a predictor"),
-        "notes": json.dumps(about["notes"], ensure_ascii=False) if about["notes"] else "none",
     }
+    if "belongs_to" in about:
+        rows["prior"] = f"{about['belongs_to']['name']} ({about['belongs_to']['fingerprint'][:12]}), no other"
+    if "schedule" in about:
+        rows["motion"] = f"{_seen(about)}, {about['frames_per_second']:g} frames per second"
+        rows["schedule"] = f"{about['schedule']['name']}, {about['schedule']['steps']} levels"
+    if "text" in about:
+        rows["text"] = about["text"]
+    rows["notes"] = json.dumps(about["notes"], ensure_ascii=False) if about["notes"] else "none"
     return "\n".join(f"{key:<9} {value}" for key, value in rows.items())
 
 
