@@ -84,7 +84,9 @@ def worn(places: Array, old: Motion, *, clean: bool, contacts: Array | None = No
     person = motion_from_positions(places, old.fps)
     if clean:
         person = clean_feet(person, contacts=contacts)
-    made = in_manner_of(old, retarget(person, old.skeleton))
+    level = person.rotations.copy()
+    level[:, list(LEAVES[:2])] = rot.IDENTITY  # places do not tell how toes are bent: they go with the foot
+    made = in_manner_of(old, retarget(replace(person, rotations=level), old.skeleton))
     back = made.frames(0, known) if known else in_manner_of(old, retarget(to_smpl22(old), old.skeleton))
     seen, carrier = old.frames(0, len(back)), _carrier(old.skeleton)
     apart = rot.multiply(seen.world_rotations()[:, carrier], rot.inverse(back.world_rotations()[:, carrier]))
@@ -144,7 +146,7 @@ def splice(old: Motion, made: Motion, first: int, *, last: int, kept: Kept) -> M
 
     Frames outside are the old ones bit for bit, kept parts are the old ones inside too.
     """
-    ease = max(2, round(min(EASE * old.fps, (last - first) / 2)))
+    ease = min(max(2, round(min(EASE * old.fps, (last - first) / 2))), last - first)
     inside = slice(first, last)
     rotations = old.rotations.copy()
     eased = _eased_turns(old.rotations, made.rotations, first, last, ease)
