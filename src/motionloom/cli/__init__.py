@@ -9,7 +9,20 @@ from collections.abc import Sequence
 
 from motionloom.errors import MotionloomError
 
-FAMILIES = ("generate", "compose", "control", "edit", "predict", "files", "data", "train", "evaluate", "bench", "weights")
+FAMILIES = (
+    "generate",
+    "compose",
+    "control",
+    "edit",
+    "predict",
+    "duet",
+    "files",
+    "data",
+    "train",
+    "evaluate",
+    "bench",
+    "weights",
+)
 
 
 class _Parser(argparse.ArgumentParser):

@@ -242,6 +242,8 @@ class _Guess:
     rows: dict[int, tuple[_Row, ...]] = field(default_factory=dict)
     ends: dict[int, Tensor] = field(default_factory=dict)
     """Stands (2, 4) at the frame of a row with which the next one begins."""
+    noise: dict[int, Tensor] = field(default_factory=dict)
+    """(2, 4) that each row's D began as."""
 
     def __call__(self, numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
         parts = [_parted(state.to(self.prior.mean)) for state in states]
@@ -266,13 +268,14 @@ class _Guess:
     def drop(self, number: int) -> None:
         """Forget a row that is finished, as its neighbours are."""
         self.ends.pop(number - 1, None)
+        self.noise.pop(number, None)
 
     def _shown(self, number: int, places: Tensor, level: int) -> Tensor:
-        """D as the network sees it: drawn for the first row, else what the row before makes of it, without noise."""
-        end = self.ends.get(number - 1)
+        """D as the network sees it: drawn for the first row, else the end of the row before, noised as learned."""
+        noise, end = self.noise.setdefault(number, places), self.ends.get(number - 1)
         if end is None:
             return places
-        return self.prior.schedule.at(level)[0] * self.net.talk.config.places.encode(end)
+        return self.prior.schedule.noised(self.net.talk.config.places.encode(end), level, noise)
 
     def _carry(self, number: int, motion: Tensor, places: Tensor) -> None:
         code, row = self.net.talk.config.places, self.rows[number][0]

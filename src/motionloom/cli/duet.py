@@ -1,0 +1,376 @@
+"""`motionloom duet`: two people from words, going on from their past, reacting to somebody, or through a timeline."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
+from motionloom.cli.sampling import bar, check_prompt, fail
+
+if TYPE_CHECKING:
+    from motionloom.checkpoint import Prior
+    from motionloom.motion import Motion
+    from motionloom.nets.pair_block import PairBlock
+    from motionloom.tasks.goals import Goal
+    from motionloom.tasks.timeline import Timeline
+
+MAX_COUNT = 1000
+MAX_SECONDS = 3600.0
+"""Of a timeline."""
+SECONDS, ADDED = 6.0, 3.0
+"""Length of a duet, and what is added to a past, unless asked otherwise."""
+SINGLE = (".bvh", ".npz")
+"""Files of one person each."""
+
+
+def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Register `duet`."""
+    parser = subparsers.add_parser(
+        "duet",
+        help="make motions of two people together",
+        description="Two people in one world: from words, behind both their motions, or around one's: docs/duet.md.",
+    )
+    parser.add_argument(
+        "text", nargs="?", metavar="TEXT", help="what the two do; 'what the first does :: what the second does'"
+    )
+    parser.add_argument("--past", nargs=2, type=Path, metavar=("A", "B"), help="motion files of both to go on from")
+    parser.add_argument("--given", type=Path, metavar="FILE", help="motion file of the first; only the second is drawn")
+    parser.add_argument("--timeline", type=Path, metavar="YAML", help="several texts, one after the other")
+    parser.add_argument("--path", type=Path, metavar="FILE", help="goal file (.json, .yaml) or drawing (.svg) for one")
+    parser.add_argument(
+        "--person", type=int, choices=(1, 2), default=1, help="whose the path and a timeline's goals are (default 1)"
+    )
+    parser.add_argument("--seconds", type=float, metavar="S", help="length (default 6), or what --past gets (3)")
+    parser.add_argument("--seed", type=int, help="the same seed makes the same duets (default 0, or the timeline's)")
+    parser.add_argument("--count", type=int, default=1, help="duets to make (default 1)")
+    parser.add_argument("--guidance", type=float, help="strength of the text (default 2.5, or the timeline's)")
+    parser.add_argument("--block", default="duet", metavar="NAME|PATH", help="what makes two of one (default duet)")
+    _add_sampling(parser)
+    add_reading(parser)
+    _take_text_anywhere(parser)
+    parser.set_defaults(run=run_duet)
+
+
+def _add_sampling(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--out", type=Path, action="append", metavar="NAME",
+        help="file to write, repeatable: both people in a .glb .mp4 .gif .png, or two .bvh or .npz, one for each "
+        "(default duet.glb)",
+    )  # fmt: skip
+    parser.add_argument("--steps", type=int, help="network calls per duet: fewer is faster (default 24)")
+    parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="the prior (default: default)")
+    parser.add_argument("--fps", type=float, help="frame rate of the files (default 20, or that of the motions given)")
+    parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
+    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
+    parser.add_argument("--json", action="store_true", help="print what was made as JSON")
+
+
+def _take_text_anywhere(parser: argparse.ArgumentParser) -> None:
+    """Let the text stand behind options too: argparse gives up on an optional word once it has passed its place."""
+
+    def parse(args=None, namespace=None):
+        found, unknown = argparse.ArgumentParser.parse_known_args(parser, args, namespace)
+        if found.text is None and len(unknown) == 1 and not unknown[0].startswith("-"):
+            found.text, unknown = unknown[0], []
+        if unknown:
+            parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
+
+    parser.parse_known_args = parse  # type: ignore[method-assign]
+
+
+def run_duet(arguments: argparse.Namespace) -> None:
+    """``motionloom duet``."""
+    import time
+
+    _check(arguments)
+    files = [_numbered(out, arguments.count) for out in _check_outs(arguments)]
+    _check_places(files)
+    timeline = _timeline(arguments) if arguments.timeline else None
+    goal = _goal(arguments) if arguments.path else None
+    given, manners = _read(arguments)
+    prior, block = _load(arguments)
+    began = time.perf_counter()
+    with bar("drawing two people") as progress:
+        duets = _make(arguments, prior, block, given=given, timeline=timeline, goal=goal, progress=progress)
+    seconds = time.perf_counter() - began
+    if arguments.fps is not None:
+        duets = [[motion.resample(arguments.fps) for motion in duet] for duet in duets]
+    written = _write(duets, files, manners, _caption(arguments, timeline))
+    _report(arguments, duets, written, seconds)
+    note_rate(arguments, _inputs(arguments))
+
+
+def _make(
+    arguments: argparse.Namespace,
+    prior: "Prior",
+    block: "PairBlock",
+    *,
+    given: "list[Motion]",
+    timeline: "Timeline | None",
+    goal: "Goal | None",
+    progress: Any,
+) -> "list[list[Motion]]":
+    from motionloom.tasks import duet, pair
+
+    text, seed = arguments.text or "", arguments.seed or 0
+    shared: dict[str, Any] = {"clean": not arguments.raw}
+    shared |= {n: v for n in ("steps", "guidance") if (v := getattr(arguments, n)) is not None}
+    if timeline is not None:
+        return [_composed(arguments, prior, block, timeline, progress, shared)]
+    shared |= {"count": arguments.count, "seed": seed, "progress": progress}
+    if arguments.past:
+        added = ADDED if arguments.seconds is None else arguments.seconds
+        made = pair.complete_pair(prior, block, (given[0], given[1]), text, seconds=added, **shared)
+    elif arguments.given:
+        made = duet.react(prior, block, given[0], text, **shared)
+    else:
+        length = SECONDS if arguments.seconds is None else arguments.seconds
+        made = pair.generate_pair(
+            prior, block, text, seconds=length, goal=goal, person=arguments.person - 1, **shared
+        )  # fmt: skip
+    return [list(one) for one in made]
+
+
+def _composed(
+    arguments: argparse.Namespace,
+    prior: "Prior",
+    block: "PairBlock",
+    timeline: "Timeline",
+    progress: Any,
+    shared: dict[str, Any],
+) -> "list[Motion]":
+    from motionloom.tasks.duet import compose_pair
+    from motionloom.tasks.splice import concatenated
+    from motionloom.tasks.text import STEPS
+
+    if timeline.guidance is not None:
+        shared = {"guidance": timeline.guidance} | shared
+    seed = next((s for s in (arguments.seed, timeline.seed) if s is not None), 0)
+    done, total = 0, shared.get("steps", STEPS) * len(timeline.segments)
+
+    def told(more: int) -> None:
+        nonlocal done
+        done += more
+        progress(done, total)
+
+    blocks = list(
+        compose_pair(
+            prior, block, timeline.segments, seed=seed, path=timeline.path, person=arguments.person - 1,
+            progress=told, **shared,
+        )
+    )  # fmt: skip
+    return [concatenated(*[one[i] for one in blocks]) for i in (0, 1)]
+
+
+# What is read
+
+
+def _load(arguments: argparse.Namespace) -> "tuple[Prior, PairBlock]":
+    from motionloom.checkpoint import Prior
+    from motionloom.nets.pair_block import PairBlock
+
+    prior = Prior.load(arguments.weights, device=arguments.device)
+    return prior, PairBlock.load(arguments.block, prior)
+
+
+def _inputs(arguments: argparse.Namespace) -> list[Path]:
+    return list(arguments.past or ([arguments.given] if arguments.given else []))
+
+
+def _read(arguments: argparse.Namespace) -> "tuple[list[Motion], list[tuple[float, dict[str, str]]]]":
+    """Motions that are given, and how their own files say numbers."""
+    paths = _inputs(arguments)
+    if len({path.resolve() for path in paths}) < len(paths):
+        fail(f"{paths[0]} is named twice as the past; give the motion of each person")
+    motions, manners = [], []
+    for path in paths:
+        motion, unit, orders = read_clip(arguments, path)
+        motions.append(crop(motion, arguments))
+        manners.append((unit or 1.0, orders))
+    if arguments.past:
+        from motionloom.motion import MAX_POSES
+
+        added = (ADDED if arguments.seconds is None else arguments.seconds) * motions[0].fps
+        poses = sum((len(motion) + added) * len(motion.skeleton) for motion in motions) * arguments.count
+        if poses > MAX_POSES:
+            fail(f"{arguments.count} duets behind such a long past do not fit into memory; take less with --start")
+    return motions, manners
+
+
+def _timeline(arguments: argparse.Namespace) -> "Timeline":
+    from motionloom.errors import MotionloomError
+    from motionloom.io.lined_yaml import fail as fail_at
+    from motionloom.io.lined_yaml import read_lined
+    from motionloom.tasks.pair import prompts_of
+    from motionloom.tasks.timeline import read_timeline
+
+    path = arguments.timeline
+    timeline = read_timeline(path)
+    if timeline.start is None and timeline.seconds <= MAX_SECONDS:
+        parts = [segment.text for segment in timeline.segments]
+    else:
+        parts = []
+    top: Any = None
+    for number, text in enumerate(parts):
+        try:
+            prompts_of(text)
+        except MotionloomError as error:
+            top = read_lined(path).value
+            fail_at(path, top["segments"].value[number].line, str(error))
+    if not parts:
+        top = read_lined(path).value
+        if timeline.start is not None:
+            fail_at(
+                path, top["start"].key_line, "two people do not go on from one 'start'; leave it out, or use --past"
+            )
+        fail_at(path, top["segments"].key_line, f"two people do at most {MAX_SECONDS:g} s; got {timeline.seconds:g}")
+    return timeline
+
+
+def _goal(arguments: argparse.Namespace) -> "Goal":
+    """What one of the two is asked: a goal file, such a mapping in YAML, or a drawn line."""
+    from motionloom.io.lined_yaml import read_lined
+    from motionloom.tasks.goal_file import read_goal
+    from motionloom.tasks.goals import FPS
+    from motionloom.tasks.text import frames_in
+
+    path: Path = arguments.path
+    frames = frames_in(SECONDS if arguments.seconds is None else arguments.seconds, FPS)
+    if path.suffix.lower() in (".yaml", ".yml"):
+        from motionloom.errors import MotionloomError
+
+        what = read_lined(path).plain()
+        if not isinstance(what, dict):
+            fail(f"{path} must be a mapping with 'path', 'joints' or what else a goal file may hold")
+        if {"points", "svg", "curve"} & set(what):
+            what = {"path": what}
+        try:
+            return read_goal(what, frames=frames, folder=path.parent)
+        except MotionloomError as error:
+            fail(f"{path}: {error}")
+    if path.suffix.lower() == ".svg":
+        drawing = path.resolve() if path.exists() else path  # a link may lead anywhere
+        return read_goal({"path": {"svg": drawing.name}}, frames=frames, folder=drawing.parent)
+    return read_goal(path, frames=frames, folder=path.parent)
+
+
+# What cannot be asked
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    kinds = [name for name in ("past", "given", "timeline") if getattr(arguments, name)]
+    if len(kinds) > 1:
+        fail(f"--{kinds[0]} and --{kinds[1]} are different tasks; give one of them")
+    if arguments.text is not None:
+        check_prompt(arguments.text)
+    elif not kinds:
+        fail("no prompt; say what the two do, such as: motionloom duet 'two people dance salsa together'")
+    if kinds == ["timeline"] and (arguments.text is not None or arguments.count != 1):
+        fail("a timeline has its own texts and makes one duet; leave out the text and --count")
+    if arguments.seconds is not None and kinds in (["timeline"], ["given"]):
+        fail(f"--seconds does not go with --{kinds[0]}, which says how long it is")
+    if arguments.path and kinds:
+        fail(f"--path does not go with --{kinds[0]}; give it with a text, or write it into a timeline")
+    if arguments.seconds is not None and not 0 < arguments.seconds <= 60:
+        fail(f"--seconds must be above 0 and at most 60; got {arguments.seconds:g}")
+    _check_numbers(arguments)
+
+
+def _check_numbers(arguments: argparse.Namespace) -> None:
+    if not 1 <= arguments.count <= MAX_COUNT or not 0 <= (arguments.seed or 0) < 2**62:
+        fail(f"--count must be 1 to {MAX_COUNT} and --seed 0 or more; got {arguments.count} and {arguments.seed}")
+    if arguments.steps is not None and not 1 <= arguments.steps <= 100_000:
+        fail(f"--steps must be 1 or more; got {arguments.steps}")
+    if arguments.guidance is not None and not abs(arguments.guidance) <= 100:
+        fail(f"--guidance must be -100 to 100, usually 1 to 7; got {arguments.guidance:g}")
+    if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
+        fail(f"--fps must be 1 to 1000; got {arguments.fps:g}")
+
+
+def _check_outs(arguments: argparse.Namespace) -> list[Path]:
+    """The files to write: those of one person in twos of a kind, first that of the first person."""
+    outs = arguments.out or [Path("duet.glb")]
+    if len({out.resolve() for out in outs}) != len(outs):
+        fail("the same --out is given twice; give each file its own name")
+    for suffix in SINGLE:
+        own = [out for out in outs if out.suffix.lower() == suffix]
+        if len(own) not in (0, 2):
+            fail(f"a {suffix} file holds one person: give two, such as --out a{suffix} --out b{suffix}; got {len(own)}")
+    return outs
+
+
+def _numbered(out: Path, count: int) -> list[Path]:
+    if count == 1:
+        return [out]
+    width = len(str(count - 1))
+    return [out.with_name(f"{out.stem}_{i:0{width}d}{out.suffix}") for i in range(count)]
+
+
+def _check_places(files: list[list[Path]]) -> None:
+    from motionloom.io import check_output
+
+    for place in (place for several in files for place in several):
+        check_output(place)
+        if place.is_dir():
+            fail(f"{place} is a folder; name a file to write")
+
+
+# What is written and told
+
+
+def _caption(arguments: argparse.Namespace, timeline: "Timeline | None") -> str:
+    if timeline is not None:
+        return "; ".join(" ".join(segment.text.split()) for segment in timeline.segments[:20])
+    return arguments.text or " and ".join(path.stem for path in _inputs(arguments))
+
+
+def _write(
+    duets: "list[list[Motion]]",
+    files: list[list[Path]],
+    manners: "list[tuple[float, dict[str, str]]]",
+    caption: str,
+) -> list[Path]:
+    """All files, duet by duet; a person whose motion came from a BVH file is told in its unit and orders."""
+    from motionloom.io import save, save_scene
+    from motionloom.io.bvh_writer import save_bvh
+
+    written = []
+    for number, duet in enumerate(duets):
+        seen: dict[str, int] = {}
+        for out in (several[number] for several in files):
+            suffix = out.suffix.lower()
+            if suffix not in SINGLE:
+                written.append(save_scene(duet, out, names=["first", "second"], captions=[caption] * 2))
+                continue
+            person = seen.setdefault(suffix, 0)
+            seen[suffix] += 1
+            if suffix == ".bvh" and person < len(manners):
+                unit, orders = manners[person]
+                written.append(save_bvh(duet[person], out, order=orders, unit=unit))
+            else:
+                written.append(save(duet[person], out))
+    return written
+
+
+def _report(arguments: argparse.Namespace, duets: "list[list[Motion]]", written: list[Path], seconds: float) -> None:
+    if arguments.json:
+        import json
+
+        about = {
+            "prompt": arguments.text,
+            "past": [str(path) for path in arguments.past or ()],
+            "given": None if arguments.given is None else str(arguments.given),
+            "timeline": None if arguments.timeline is None else str(arguments.timeline),
+            "duets": len(duets),
+            "seconds": duets[0][0].seconds,
+            "seed": arguments.seed,
+            "weights": str(arguments.weights),
+            "block": str(arguments.block),
+            "files": [str(path) for path in written],
+            "sampling_seconds": round(seconds, 3),
+        }
+        print(json.dumps(about, indent=1))
+        return
+    for path in written:
+        print(f"wrote {path}")
