@@ -5,8 +5,8 @@ from importlib import import_module
 from pathlib import Path
 
 PARTS = (
-    "evaluate_text", "evaluate_transitions", "evaluate_control", "evaluate_prediction", "evaluate_evaluator",
-    "evaluate_all",
+    "evaluate_text", "evaluate_transitions", "evaluate_control", "evaluate_prediction", "evaluate_duet",
+    "evaluate_evaluator", "evaluate_all",
 )  # fmt: skip
 """Modules beside this one that register further commands."""
 

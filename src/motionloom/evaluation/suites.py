@@ -191,6 +191,31 @@ def _predictors(job: Job) -> list[Path]:
     return list(shipped_predictors().values())
 
 
+def _completion(job: Job, settings: Mapping[str, Any]) -> Report:
+    from motionloom.evaluation import duet
+
+    return duet.run(
+        job.weights, data=job.data, how=duet.How(**settings), folder=job.folder, device=job.device,
+        command=command("duet-completion", job), progress=job.tools.progress,
+    )  # fmt: skip
+
+
+def _duets(job: Job, settings: Mapping[str, Any]) -> Report:
+    from motionloom.evaluation import duet_text
+
+    return duet_text.run(
+        job.weights, data=job.data, how=duet_text.How(**settings), device=job.device,
+        command=command("duet-text", job), progress=job.tools.progress,
+    )  # fmt: skip
+
+
+def _blocks(job: Job) -> list[Path]:
+    """The shipped two-person blocks."""
+    from motionloom.nets.pair_block import blocks
+
+    return list(blocks().values())
+
+
 def _evaluator(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.evaluation.evaluators import load_evaluator
     from motionloom.evaluation.own import validate
@@ -220,6 +245,11 @@ SUITES: tuple[Suite, ...] = (
     Suite("prediction", "many futures of held-out pasts beside what came, baselines and the published sampler",
           _prediction, {"windows": 64, "samples": 50, "published_steps": 100},
           {"windows": 6, "samples": 6, "published_steps": 20}, "needed", _predictors),
+    Suite("duet-completion", "two people's next seconds beside what came, the prior alone and standing still",
+          _completion, {"crops": 200, "samples": 5, "steps": 24}, {"crops": 6, "samples": 2, "steps": 6},
+          "needed", _blocks),
+    Suite("duet-text", "duets from words: distance, facing, hands, penetration and synchrony beside real pairs",
+          _duets, {"duets": 24, "steps": 24}, {"duets": 4, "steps": 6}, "needed", _blocks),
     Suite("obedience", "20 everyday prompts, each with a physical check", _obedience,
           {"seeds": 10, "paraphrases": True}, {"seeds": 2, "paraphrases": False}),
     Suite("realism", "skate, penetration, jerk, bones and speeds beside real clips", _realism,
