@@ -7,7 +7,7 @@ them decided, over where each sees the other's pelvis, head and wrists (ours).
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
@@ -77,8 +77,7 @@ class Settings:
         """The block's sizes for a prior."""
         split = None if self.split < 0 else self.split
         made = fitting(prior.net.config, layers=self.layers, split=split, aware=self.aware)
-        return PairConfig.parse({f.name: getattr(made, f.name) for f in fields(made)
-                                 if f.name != "places"} | {"dropout": self.dropout})  # fmt: skip
+        return replace(made, dropout=self.dropout)
 
 
 class Drawn(NamedTuple):
@@ -346,7 +345,7 @@ class _Export:
         block = self._block(weights, step)
         now = self.held.report(block.net(self.prior)) if self.held else None
         if now:
-            block.notes.update(held_out_loss=now.loss, held_out=str(now), fresh=str(self.fresh))
+            block.notes.update(held_out=asdict(now), fresh=asdict(self.fresh) if self.fresh else {})
         block.save(self.last)
         better = now is None or now.loss < self.best
         if better:
@@ -367,5 +366,5 @@ class _Export:
 
 
 def _loss_of(block: PairBlock) -> float:
-    value = block.notes.get("held_out_loss")
-    return float(value) if isinstance(value, int | float) else float("inf")
+    held = block.notes.get("held_out")
+    return float(held["loss"]) if isinstance(held, dict) and "loss" in held else float("inf")

@@ -1,0 +1,336 @@
+"""Training two people: crops and where they stand, what is given, what the loss sees, what learns, exact resume."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from motionloom.checkpoint import Prior, read_tensors, save_prior
+from motionloom.cli import main
+from motionloom.data.pairs import Pair, mirrored
+from motionloom.errors import MotionloomError
+from motionloom.features import humanml as hml
+from motionloom.features.pair import decode
+from motionloom.nets.adapter import fingerprint
+from motionloom.nets.pair import PairNet, Talk, other
+from motionloom.nets.pair_block import PairBlock
+from motionloom.train.duets import KEEN, NEAR, Duets, Sight, headed
+from motionloom.train.pair import BEGUN, Drawn, PairGuess, Settings, held_out, told, train_pair
+from tests.data.test_pairs import write_pair
+from tests.metrics import people
+from tests.nets import tiny
+from tests.train import runs
+
+TEXT = "a person walks left"
+
+
+def walkers(turn: float = 0.4, seconds: float = 3.0) -> np.ndarray:
+    """(2, frames, 22, 3): two who turn while they walk, anywhere, the second on a stair of 20 cm."""
+    frames = len(people.walking(1.0, seconds))
+    a = people.spun(people.walking(0.8, seconds), np.linspace(0, 1.5, frames))
+    b = people.spun(people.walking(0.5, seconds), np.linspace(2.5, 2.5 + turn, frames))
+    return np.stack([hml.uniform(a) + np.array([2.0, 0.0, -1.0]), hml.uniform(b) + np.array([2.7, 0.2, 0.0])])
+
+
+def pair(name: str = "walk", split: str = "train", captions: tuple[str, ...] = (TEXT,), **given) -> Pair:
+    return Pair(name, split, captions, "own", "free", walkers(**given))
+
+
+def recipe(**changes):
+    plan = {"name": "two", "steps": 8, "batch": 3, "windows": [20, 32], "shares": [0.5, 0.5], "save_every": 4,
+            "net": {}, "amp": "none", "displacement": 0.3, "warmup": 1, "cooldown": 0.0}  # fmt: skip
+    return runs.recipe(**(plan | changes))
+
+
+def objective(*, fresh: bool = False, settings: Settings | None = None, prior: Prior | None = None, **changes):
+    settings = settings or Settings(dropout=0.0)
+    prior = prior or tiny.prior()
+    torch.manual_seed(4)
+    talk = Talk(settings.config(prior), prior.net.config)
+    with torch.no_grad():
+        for value in () if fresh else talk.parameters():
+            value.add_(torch.randn(value.shape) * 0.2)
+    net = PairNet(prior.net, talk, prior.schedule, mean=prior.mean, std=prior.std)
+    return PairGuess(net, prior, Duets([pair(), pair("b", turn=2.0)]), settings=settings, recipe=recipe(**changes))
+
+
+class Watch(nn.Module):
+    """Keeps the state it is shown."""
+
+    def forward(self, x, level, bound):
+        self.state = x
+        return x
+
+
+# What is drawn -------------------------------------------------------------------------------------------------------
+
+
+def test_a_window_decodes_to_the_recorded_places_above_each_person_s_floor():
+    recorded, duets = pair(), Duets([pair()], mirror=False)
+    crops = duets.crops(np.array([0, 0]), np.array([0, 17]), 25)
+    floor = recorded.positions[..., 1].min(axis=(1, 2))
+    above = recorded.positions - floor[:, None, None, None] * [0.0, 1.0, 0.0]
+    for row, start in enumerate((0, 17)):
+        seen = decode(crops.features[row].double(), crops.stands[row].double()).numpy()
+        np.testing.assert_allclose(seen, above[:, start : start + 25], atol=2e-4)
+
+
+def test_features_have_the_heading_that_priors_have_seen_also_in_the_first_frame():
+    features, _ = headed(walkers())
+    assert np.abs(np.diff(features[:, :5, 0], axis=1)).max() < 1e-3  # the compatible one turns by a leap there
+    for person, row in zip(walkers(), features, strict=True):
+        wanted = hml.encode(hml.canonical(person), heading="corrected")
+        np.testing.assert_allclose(row, wanted, atol=1e-5)
+
+
+def test_half_of_the_windows_are_of_mirrored_pairs_and_half_have_the_people_exchanged():
+    duets = Duets([pair()])
+    plain = [headed(p.positions)[0] for p in (pair(), mirrored(pair()))]
+    crops, found = duets.draw(np.random.default_rng(0), 30, 60), np.zeros((2, 2))
+    for window in crops.features.numpy():
+        for side, features in enumerate(plain):
+            for exchanged, first in enumerate(features):
+                places = np.lib.stride_tricks.sliding_window_view(first, 30, axis=0).swapaxes(1, 2)
+                found[side, exchanged] += np.abs(places - window[0]).max(axis=(1, 2)).min() < 1e-5
+    assert found.sum() == 60
+    assert found.min() > 6
+
+
+def test_what_is_said_goes_with_the_window_mirrored_where_it_is():
+    duets = Duets([pair(), pair("silent", captions=())])
+    assert duets.texts == ("", TEXT, "a person walks right")
+    crops = duets.crops(np.array([0, 1, 2, 3]), np.zeros(4, int), 20)
+    assert [duets.texts[n] for n in crops.texts] == [TEXT, "", "a person walks right", ""]
+
+
+def test_a_beginning_gives_both_people_and_d_and_a_reaction_one_person_without_d():
+    begun = np.array([True] * 300 + [False] * 200)
+    react = np.array([False] * 300 + [True] * 100 + [False] * 100)
+    lengths = np.array([80] * 400 + [30] * 100)
+    given = told(np.random.default_rng(0), begun, react, lengths, 80).reshape(500, 2, 81)
+    counts = given[:300].sum(-1)
+    assert (counts[:, 0] == counts[:, 1]).all()
+    assert given[:300, :, 0].all()
+    assert (np.diff(given[:300].astype(int), axis=-1) <= 0).all()  # a beginning and nothing behind it
+    assert counts.min() >= 11
+    assert counts.max() <= 41
+    assert 0.45 < (counts[:, 0] == BEGUN + 1).mean() < 0.65
+    assert not given[300:400, :, 0].any()
+    assert sorted(set(given[300:400].sum(-1).ravel())) == [0, 80]
+    assert (given[300:400].sum((1, 2)) == 80).all()
+    assert 20 < given[300:400, 0, 1].sum() < 80
+    assert not given[400:].any()
+    short = told(np.random.default_rng(0), begun, react, np.full(500, 30), 80).reshape(500, 2, 81)
+    assert short[:300].sum(-1).max() == 16
+    assert not short[..., 31:].any()
+
+
+def test_given_slots_have_no_noise_and_both_people_one_level_and_own_noise():
+    made, watch = objective(settings=Settings(prefix=0.5, react=0.5)), Watch()
+    drawn = made.drawn(1, 2, 8)
+    made.guess(watch, drawn)
+    signal = made.schedule.signal[drawn.level].float()
+    still = watch.state - signal[:, None, None] * drawn.clean
+    assert still[drawn.given].abs().max() < 1e-6 < 0.01 < still[~drawn.given].abs().mean()
+    assert torch.equal(drawn.level[0::2], drawn.level[1::2])
+    assert (drawn.noise[0::2] - drawn.noise[1::2]).abs().mean() > 0.5
+    again, later = made.drawn(1, 2, 8), made.drawn(1, 3, 8)
+    assert torch.equal(again.noise, drawn.noise)
+    assert not torch.equal(later.level, drawn.level)
+
+
+def test_texts_are_dropped_for_both_people_alike_and_early_levels_are_noisy():
+    made = objective(settings=Settings(prefix=0.4, react=0.1, silent=0.5, early=1.0), windows=[20], shares=[1.0])
+    drawn = made.drawn(0, 0, 300)
+    silent = drawn.cond.pooled.abs().sum(-1) == 0
+    assert torch.equal(silent[0::2], silent[1::2])
+    given = drawn.given.any(1)[0::2] | drawn.given.any(1)[1::2]
+    assert 0.4 < silent[0::2][given].float().mean() < 0.6
+    assert 0.03 < silent[0::2][~given].float().mean() < 0.2
+    assert drawn.level.min() >= 1
+    assert drawn.level.max() == 50
+    assert (drawn.level > 37).float().mean() == pytest.approx(0.5, abs=0.09)  # 1 - sqrt(1/4) of them
+    even = objective(settings=Settings(early=0.0)).drawn(0, 0, 300)
+    assert (even.level > 37).float().mean() == pytest.approx(0.25, abs=0.09)
+
+
+# What is learned -----------------------------------------------------------------------------------------------------
+
+
+def test_a_fresh_block_costs_what_the_prior_alone_costs_and_the_square_of_d():
+    made = objective(fresh=True, settings=Settings(prefix=0.0, react=0.0))
+    drawn = made.drawn(3, 4, 4)
+    parts = made.parts(made.guess(made.net.eval(), drawn), drawn)
+    prior, motion = tiny.prior(), drawn.clean[:, 1:]
+    noised = prior.schedule.noised(motion, drawn.level, drawn.noise[:, 1:])
+    alone = prior.net(noised, drawn.level, prior.net.bind(drawn.cond))
+    error = ((alone - motion) ** 2 * made.scale).mean()
+    torch.testing.assert_close(parts.motion, error)
+    torch.testing.assert_close(parts.place, (drawn.clean[:, 0, :4] ** 2).mean())
+    assert made.scale.mean() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("said", [Settings(dropout=0.0), Settings(dropout=0.0, aware=True)], ids=["plain", "aware"])
+def test_exchanged_people_cost_the_same(said):
+    made = objective(settings=said)
+    drawn = made.drawn(3, 4, 4)
+    exchanged = Drawn(*(other(x) for x in drawn[:4]), drawn.cond, drawn.lengths)
+    assert not torch.equal(exchanged.clean, drawn.clean)
+    before, after = (made.parts(made.guess(made.net.eval(), d), d) for d in (drawn, exchanged))
+    for a, b in zip(before, after, strict=True):
+        torch.testing.assert_close(a, b)
+
+
+def test_what_is_given_and_what_lies_behind_the_end_costs_nothing():
+    made = objective(settings=Settings(prefix=1.0, react=0.0), windows=[80], shares=[1.0])
+    drawn = made.drawn(0, 0, 3)
+    assert (drawn.lengths < 80).all()
+    guess = made.guess(made.net.eval(), drawn)
+    wrong = guess.clone()
+    wrong[drawn.given] += 7.0
+    wrong[:, 1 + int(drawn.lengths.max()) :] += 7.0
+    for a, b in zip(made.parts(guess, drawn), made.parts(wrong, drawn), strict=True):
+        torch.testing.assert_close(a, b)
+    wrong[:, int(drawn.lengths.max())] += 700.0  # the last valid frame
+    assert made.parts(wrong, drawn).motion > made.parts(guess, drawn).motion + 0.1
+    assert made.parts(guess, drawn).place == 0
+
+
+def test_what_they_see_of_each_other_is_that_of_the_world_and_counts_by_how_little_noise_there_is():
+    duets = Duets([pair()], mirror=False)
+    crops = duets.crops(np.array([0]), np.array([5]), 20)
+    made = objective()
+    code, features = made.net.talk.config.places, crops.features[0].double()
+    places, sight = code.encode(crops.stands[0].double()), Sight(code)
+    world = decode(features, crops.stands[0].double())[:, :, list(KEEN)].numpy()
+    seen = sight.joints(places, features)
+    for person in (0, 1):
+        wanted = np.linalg.norm(world[1 - person][:, None, :] - world[person][:, :, None], axis=-1)
+        np.testing.assert_allclose(seen[person].norm(dim=-1).numpy(), wanted, atol=1e-5)
+    first = world[0, 0, :, None] - world[1, 0, None, :]  # at frame 0 the own heading is the stand's
+    cos, sin = crops.stands[0, 1, :2].double().numpy()
+    np.testing.assert_allclose(seen[1, 0, :, :, 0].numpy().T, cos * first[..., 0] - sin * first[..., 2], atol=1e-5)
+    moved = places + torch.tensor([0.0, 0.0, 0.3, 0.0])
+    away = sight.error(moved, features, places, features)
+    near = np.exp(-0.5 * (seen**2).sum(-1).numpy() / NEAR**2)
+    np.testing.assert_allclose(away.numpy(), 0.09 * (1 + 4 * near).mean((-1, -2)), rtol=1e-6)
+    drawn = made.drawn(0, 1, 2)
+    guess, low = made.guess(made.net.eval(), drawn), drawn._replace(level=torch.ones_like(drawn.level))
+    high = drawn._replace(level=torch.full_like(drawn.level, 50))
+    assert made.parts(guess, high).sight < 0.01 * made.parts(guess, low).sight
+
+
+def test_only_the_block_has_gradients_and_the_frozen_network_no_dropout():
+    prior = tiny.prior(replace(tiny.MODULATED, dropout=0.5))
+    made = objective(settings=Settings(split=1, dropout=0.0), prior=prior)
+    made.net.train()
+    loss = made.loss(made.net, 1, 2, 3)
+    loss.backward()
+    assert float(loss.detach()) == float(made.loss(made.net, 1, 2, 3).detach())
+    assert all(name.startswith("talk.") and p.grad is not None for name, p in made.net.named_parameters())
+    base = made.net._base[0]
+    assert not base.training
+    assert all(p.grad is None and not p.requires_grad for p in base.parameters())
+
+
+# Runs ----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def start(tmp_path_factory) -> str:
+    return str(save_prior(tiny.prior(), tmp_path_factory.mktemp("prior") / "tiny.safetensors"))
+
+
+def trained(out, start: str, *, stop: int | None = None, pairs=None, **changes):
+    lines: list[str] = []
+    pairs = pairs or [pair(), pair("b", turn=2.0), pair("c", "val", turn=1.0)]
+    return train_pair(recipe(start=start, **changes), pairs, out, device="cpu", stop=stop, say=lines.append), lines
+
+
+def test_a_stopped_run_goes_on_exactly_and_its_file_is_a_block_for_the_prior(start, tmp_path):
+    whole, lines = trained(tmp_path / "whole", start)
+    trained(tmp_path / "parts", start, stop=4)
+    parts, _ = trained(tmp_path / "parts", start)
+    for a, b in ((whole, parts), (whole.with_name("last.safetensors"), parts.with_name("last.safetensors"))):
+        assert a.read_bytes() == b.read_bytes()
+    one, two = (read_tensors(place.with_name("state.safetensors"))[0] for place in (whole, parts))
+    assert one.keys() == two.keys()
+    assert all(torch.equal(one[key], two[key]) for key in one)
+    assert all("talk." in key for key in one if key.startswith("net."))
+    prior = Prior.load(start)
+    block = PairBlock.load(whole, prior)
+    assert block.fingerprint == fingerprint(prior.net)
+    assert block.data == "free"
+    assert block.notes["pairs"] == ["walk", "b"]
+    assert sum("held-out" in line for line in lines) == 2
+
+
+def test_the_file_holds_the_step_that_did_best_on_the_held_out_pair(start, tmp_path):
+    place, _ = trained(tmp_path, start, rate=2e-3)
+    prior = Prior.load(start)
+    good = PairBlock.load(place, prior)
+    place, lines = trained(tmp_path, start, steps=12, rate=5.0, ema=0.0)  # going on, and all is lost
+    kept, last = PairBlock.load(place, prior), PairBlock.load(place.with_name("last.safetensors"), prior)
+    assert kept.notes == good.notes
+    assert last.notes["steps"] == 12
+    assert last.notes["held_out"]["loss"] > kept.notes["held_out"]["loss"]
+    assert "best" not in lines[-1]
+    assert "going on with another recipe" in " ".join(lines)
+    held = held_out(objective(prior=prior), [pair("c", "val", turn=1.0)])
+    assert held is not None
+    assert held.report(kept.net(prior)).loss == pytest.approx(kept.notes["held_out"]["loss"], rel=0.02)
+
+
+def test_without_held_out_pairs_the_last_step_is_the_result(start, tmp_path):
+    place, lines = trained(tmp_path, start, pairs=[pair()])
+    assert PairBlock.load(place, Prior.load(start)).notes["steps"] == 8
+    assert not any("held-out" in line for line in lines)
+
+
+def test_training_teaches_a_made_up_pair(start, tmp_path):
+    """After 60 steps the places of one pair that always stands alike are known, up to who is who and which is left."""
+    rows = np.repeat(walkers()[:, :1], 60, axis=1) + np.zeros((2, 60, 1, 1))
+    still = [Pair(str(split), split, (TEXT,), "own", "free", rows) for split in ("train", "val")]
+    place, _ = trained(tmp_path, start, pairs=still, steps=60, save_every=60, rate=5e-3, ema=0.5)
+    block = PairBlock.load(place, Prior.load(start))
+    assert block.notes["held_out"]["place"] < 0.6 * block.notes["fresh"]["place"]
+
+
+BAD = {
+    "short": (lambda: [replace(pair(), positions=walkers()[:, :20])], {}, "longest pair to train on has 20 frames"),
+    "no training": (lambda: [pair(split="test")], {}, "no pair is for training"),
+    "nothing said": (lambda: [pair(captions=())], {}, "no pair says what its people do"),
+    "unknown": (lambda: [pair()], {"prefixes": 0.1}, "no setting 'prefixes'"),
+    "kind": (lambda: [pair()], {"layers": 1.5}, "layers must be of kind int"),
+    "shares": (lambda: [pair()], {"prefix": 0.8, "react": 0.4}, "are shares"),
+    "split": (lambda: [pair()], {"split": 7}, "after layer 7"),
+}
+
+
+@pytest.mark.parametrize("case", sorted(BAD))
+def test_what_cannot_be_trained_is_said_in_one_sentence_and_nothing_is_written(case, start, tmp_path):
+    pairs, table, message = BAD[case]
+    with pytest.raises(MotionloomError, match=message) as caught:
+        trained(tmp_path / "run", start, pairs=pairs(), pair=table)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "run").exists()
+
+
+def test_completion_alone_needs_no_words(start, tmp_path):
+    place, _ = trained(tmp_path, start, pairs=[pair(captions=())], pair={"prefix": 1.0, "react": 0.0}, steps=2)
+    assert place.is_file()
+
+
+def test_the_command_trains_on_a_user_s_folder_and_refuses_one_without_captions(start, tmp_path, capsys):
+    write_pair(tmp_path / "own", "walk", walkers())
+    plan = tmp_path / "plan.toml"
+    plan.write_text(f'name = "two"\nstart = "{start}"\nsteps = 2\nbatch = 2\nwindows = [20]\nshares = [1.0]\n')
+    command = ["train", "duet", "--pairs", str(tmp_path / "own"), "--recipe", str(plan), "--out", str(tmp_path / "run")]
+    assert main(command) == 2
+    assert "captions.txt" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+    (tmp_path / "own" / "captions.txt").write_text("walk: a person walks\n")
+    assert main([*command, "--device", "cpu"]) == 0
+    assert (tmp_path / "run" / "two.safetensors").is_file()
