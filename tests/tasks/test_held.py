@@ -86,7 +86,7 @@ def test_a_part_that_is_held_for_a_while_is_led_there_and_back() -> None:
     share = ready.joints[:24, 16]
     assert np.array_equal(share == 1, inside)
     assert np.abs(np.diff(share)).max() < 0.3
-    assert np.array_equal(share > 0, (times > 0.1 + 1e-3) & (times < 0.7 - 1e-3))
+    assert np.array_equal(share > 1e-6, (times > 0.1 + 1e-3) & (times < 0.7 - 1e-3))
 
 
 def test_a_source_that_ends_early_lets_go_without_a_jump() -> None:
