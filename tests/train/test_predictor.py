@@ -74,6 +74,27 @@ def test_half_of_the_windows_are_mirror_images():
     assert 0.4 < higher < 0.6
 
 
+def test_a_smoothed_past_is_what_is_told_and_the_recorded_one_is_what_is_guessed():
+    data = protocol()
+    plain = Windows(data.split("train"), data, manner="told").draw(1, 1, 40)
+    smooth = Windows(data.split("train"), data, manner="told", smoothed=1.0).draw(1, 1, 40)
+    assert torch.equal(plain.features, plain.shown)
+    assert torch.equal(plain.mask, smooth.mask)
+    rough, told = smooth.features[:, :2], smooth.shown[:, :2]
+    assert (rough - told).abs().amax((1, 2)).min() > 1e-6  # every past is another one
+    assert (rough - told).abs().max() < 0.15  # and nearly the same
+    assert torch.allclose(smooth.features[:, 8:], smooth.shown[:, 8:], atol=1e-5)
+
+
+def test_a_straight_way_is_as_it_was_when_smoothed():
+    data = protocol()
+    windows = Windows(data.split("train"), data, manner="told", smoothed=1.0)
+    ramp = np.arange(20.0)[None, :, None, None] * np.array([0.1, 0.02, -0.3]) + np.zeros((3, 20, 22, 3))
+    past = np.array([8, 5, 2])
+    kept = windows._smoothed(np.random.default_rng(0), ramp, past)
+    assert np.allclose(kept, ramp, atol=1e-9)
+
+
 def test_published_windows_drop_the_way_and_are_seen_from_anywhere():
     published = protocol(H36M_LAYOUT)
     drawn = Windows(published.split("train"), published, manner="published").draw(0, 0, 100)
@@ -139,7 +160,8 @@ def test_training_goes_on_from_another_file_and_refuses_other_windows(tmp_path):
         ({"width": "wide"}, "kind int"),
         ({"width": True}, "kind int"),
         ({"manner": "best"}, "published"),
-        ({"untold": 1}, "below 1"),
+        ({"untold": 1}, "shares"),
+        ({"smoothed": 2}, "shares"),
         ({"dct": 1}, "kind bool"),
     ],
 )

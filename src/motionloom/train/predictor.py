@@ -51,6 +51,9 @@ class Settings:
     dropout: float = 0.1
     untold: float = 0.1
     """Share of samples that are told nothing (published: 0.2)."""
+    smoothed: float = 0.0
+    """Share of samples whose past is told smoothed, as pasts are that the network drew itself: else it takes their
+    smoothness for calm, and long motions come to rest."""
 
     @staticmethod
     def parse(values: dict[str, Any]) -> "Settings":
@@ -65,8 +68,9 @@ class Settings:
             if not fits or (kind is not bool and isinstance(value, bool)):
                 raise MotionloomError(f"[predictor] {key} must be of kind {kind.__name__}; got {value!r}")
         settings = Settings(**values)
-        if settings.manner not in ("published", "told") or not 0 <= settings.untold < 1:
-            raise MotionloomError("[predictor] manner is 'published' or 'told', and untold a share below 1")
+        shares = 0 <= settings.untold < 1 and 0 <= settings.smoothed <= 1
+        if settings.manner not in ("published", "told") or not shares:
+            raise MotionloomError("[predictor] manner is 'published' or 'told', untold and smoothed are shares")
         return settings
 
 
@@ -75,6 +79,8 @@ class Drawn(NamedTuple):
 
     features: Tensor
     """(rows, frames, channels)"""
+    shown: Tensor
+    """The same as it is told: some pasts are smoothed."""
     pose: Tensor
     """(rows, channels) the last observed pose."""
     mask: Tensor
@@ -84,11 +90,13 @@ class Drawn(NamedTuple):
 class Windows:
     """Random windows of recordings; recordings are drawn by the root of their length, windows in them evenly."""
 
-    def __init__(self, recordings: tuple[Recording, ...], protocol: Protocol, *, manner: str) -> None:
+    def __init__(
+        self, recordings: tuple[Recording, ...], protocol: Protocol, *, manner: str, smoothed: float = 0.0
+    ) -> None:
         long = [r.positions for r in recordings if len(r.positions) >= protocol.frames]
         if not long:
             raise MotionloomError(f"no recording to train on has the {protocol.frames} frames of a window")
-        self.protocol, self.layout, self.manner = protocol, protocol.layout, manner
+        self.protocol, self.layout, self.manner, self.smoothed = protocol, protocol.layout, manner, smoothed
         self.positions = np.concatenate(long)
         self.lengths = np.array([len(p) for p in long])
         self.starts = np.cumsum(self.lengths) - self.lengths
@@ -104,11 +112,30 @@ class Windows:
         flipped = rng.random(rows) < 0.5
         places[flipped] = layout.mirrored(places[flipped])
         past = self._pasts(rng, rows)
-        last = places[np.arange(rows), past - 1]
-        features = layout.encode(places, self._place(rng, last))
+        given = self._smoothed(np.random.default_rng((seed, step, 3)), places, past) if self.smoothed else places
+        place = self._place(rng, given[np.arange(rows), past - 1])
+        features, shown = layout.encode(places, place), layout.encode(given, place)
         mask = np.stack([self._told(rng, int(h)) for h in past])
-        pose = features[np.arange(rows), past - 1]
-        return Drawn(*(torch.from_numpy(np.ascontiguousarray(x, dtype=np.float32)) for x in (features, pose, mask)))
+        pose = shown[np.arange(rows), past - 1]
+        drawn = (features, shown, pose, mask)
+        return Drawn(*(torch.from_numpy(np.ascontiguousarray(x, dtype=np.float32)) for x in drawn))
+
+    def _smoothed(
+        self, rng: np.random.Generator, places: NDArray[np.float64], past: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Windows (rows, frames, joints, 3), in some of them the past frames smoothed by a Gaussian of up to 0.1 s."""
+        result = places.copy()
+        for row in np.flatnonzero(rng.random(len(places)) < self.smoothed):
+            h, width = past[row], rng.uniform(0.02, 0.1) * self.protocol.fps
+            reach = int(np.ceil(3 * width))
+            kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+            known = places[row, :h]
+            ahead, behind = known[-1] - known[-2], known[1] - known[0]
+            steps = np.arange(1, reach + 1)[:, None, None]
+            longer = np.concatenate([known[0] - steps[::-1] * behind, known, known[-1] + steps * ahead])
+            spread = np.lib.stride_tricks.sliding_window_view(longer, len(kernel), axis=0)
+            result[row, :h] = spread @ (kernel / kernel.sum())
+        return result
 
     def _pasts(self, rng: np.random.Generator, rows: int) -> NDArray[np.int64]:
         whole = np.full(rows, self.protocol.observed)
@@ -169,7 +196,7 @@ class Completion:
         clean = p.to_state(drawn.features, drawn.pose)
         noise = torch.randn(clean.shape, generator=generator).to(self.device)
         keep = (torch.rand(rows, generator=generator) >= self.untold).to(self.device)
-        told = p.tell(drawn.features, drawn.mask, drawn.pose)
+        told = p.tell(drawn.shown, drawn.mask, drawn.pose)
         guess = net(p.schedule.noised(clean, level, noise), level - 1, told, keep)
         wanted = noise if p.manner == "published" else clean
         return ((guess.float() - wanted) ** 2 * self.scale).mean()
@@ -214,7 +241,7 @@ def train_predictor(
         find_device(device)
     world, folder = World.join(device), Path(folder)
     settings = Settings.parse(recipe.predictor)
-    windows = Windows(protocol.split("train"), protocol, manner=settings.manner)
+    windows = Windows(protocol.split("train"), protocol, manner=settings.manner, smoothed=settings.smoothed)
     torch.manual_seed(recipe.seed)
     if recipe.start:
         predictor = load_predictor(find_predictor(recipe.start))
