@@ -397,6 +397,13 @@ def test_hostile_pickles_are_refused_in_a_sentence(tmp_path: Path, kind: str, mo
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("kind", ["a complex array", "text in an array", "truth in an array", "objects in an array"])
+def test_only_arrays_of_numbers_are_tables(tmp_path: Path, kind: str) -> None:
+    """Whoever asks for the tables need not look again."""
+    with pytest.raises(MotionloomError, match="else than arrays of numbers"):
+        read_tables(hostile(tmp_path, HOSTILE[kind]), "positions_3d")
+
+
 def test_the_hostile_shapes_do_replace_the_good_one(tmp_path: Path) -> None:
     """The cases above differ from a file that is read in the shape alone."""
     assert read_tables(hostile(tmp_path, GOOD), "positions_3d")["S1"]["Waiting"].shape == (3, 32, 3)
