@@ -1,0 +1,165 @@
+"""duet, as a stranger types it, on a tiny prior and a block with random weights."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionloom import io
+from motionloom.checkpoint import save_prior
+from motionloom.cli import main
+from tests.io.motions import largest_distance
+from tests.nets import tiny
+from tests.tasks.two_people import block, walkers
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with weights, a block, and two people's motions."""
+    folder = tmp_path_factory.mktemp("files")
+    prior = tiny.prior()
+    save_prior(prior, folder / "tiny.safetensors", half=False)
+    block(prior).save(folder / "block.safetensors", half=False)
+    save_prior(tiny.prior(seed=1), folder / "other.safetensors", half=False)
+    for name, motion in zip("ab", walkers(1.2), strict=True):
+        io.save(motion, folder / f"{name}.bvh")
+    io.save(walkers(1.0)[1], folder / "short.bvh")
+    io.save(walkers(1.2)[1].resample(40), folder / "fast.bvh")
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Each test runs in an empty folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def duet(files: Path, *words: str, weights: str = "tiny", block: str = "block") -> int:
+    own = [str(files / word[1:]) if word.startswith("@") else word for word in words]
+    given = [] if "--block" in words else ["--block", str(files / f"{block}.safetensors")]
+    return main(["duet", *own, *given, "--weights", str(files / f"{weights}.safetensors"), "--steps", "2"])
+
+
+def written() -> set[str]:
+    return {path.name for path in Path().iterdir()}
+
+
+def test_both_people_are_in_one_scene_and_in_a_file_each_of_the_same_world(files: Path) -> None:
+    outs = [word for name in ("d.glb", "a.npz", "b.npz") for word in ("--out", name)]
+    assert duet(files, "two people walk", "--seconds", "0.6", "--raw", "--seed", "2", *outs) == 0
+    assert written() == {"d.glb", "a.npz", "b.npz"}
+    scene = io.load_scene("d.glb")
+    assert [len(motion) for motion in scene] == [12, 12]
+    for motion, name in zip(scene, "ab", strict=True):
+        assert largest_distance(motion, io.load(f"{name}.npz")) < 1e-3
+
+
+def test_several_duets_are_numbered(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert duet(files, "a person walks :: a person turns", "--seconds", "0.5", "--count", "2", "--raw", "--json") == 0
+    assert written() == {"duet_0.glb", "duet_1.glb"}
+    about = json.loads(capsys.readouterr().out)
+    assert about["files"] == ["duet_0.glb", "duet_1.glb"]
+    assert (about["duets"], about["seconds"]) == (2, 0.5)
+
+
+def test_a_past_is_the_beginning_of_what_is_written(files: Path) -> None:
+    assert duet(files, "--past", "@a.bvh", "@b.bvh", "--seconds", "0.4", "--out", "c.bvh", "--out", "d.bvh") == 0
+    for old, new in (("a", "c"), ("b", "d")):
+        before, made = io.load(files / f"{old}.bvh"), io.load(f"{new}.bvh")
+        assert made.skeleton.names == before.skeleton.names
+        assert len(made) == len(before) + round(0.4 * before.fps)
+        np.testing.assert_allclose(made.frames(0, len(before)).positions(), before.positions(), atol=1e-4)
+
+
+def test_whoever_is_given_is_the_first(files: Path) -> None:
+    assert duet(files, "--given", "@a.bvh", "two people walk", "--out", "c.npz", "--out", "d.npz", "--raw") == 0
+    assert largest_distance(io.load("c.npz"), io.load(files / "a.bvh")) < 1e-6
+    assert len(io.load("d.npz")) == len(io.load("c.npz"))
+
+
+def test_a_path_in_a_file_is_walked_by_the_person_it_is_for(files: Path) -> None:
+    Path("path.yaml").write_text("points: [[1, 2], [1, 4]]\n", encoding="utf-8")
+    words = ("two people walk", "--path", "path.yaml", "--person", "2", "--seconds", "2", "--raw")
+    assert duet(files, *words, "--out", "a.npz", "--out", "b.npz") == 0
+    root = io.load("b.npz").root
+    assert np.linalg.norm(root[0, [0, 2]] - [1, 2]) < 0.05
+    assert np.linalg.norm(root[-1, [0, 2]] - [1, 4]) < 0.3
+
+
+def test_a_timeline_is_one_duet_of_all_its_segments(files: Path) -> None:
+    Path("t.yaml").write_text(
+        "seed: 3\nsegments:\n  - {text: two people walk, seconds: 1}\n  - {text: 'a :: b', seconds: 1.5}\n",
+        encoding="utf-8",
+    )
+    assert duet(files, "--timeline", "t.yaml", "--raw", "--out", "a.npz", "--out", "b.npz") == 0
+    assert [len(io.load(f"{name}.npz")) for name in "ab"] == [50, 50]
+
+
+WRONG = {
+    "no words": ((), "no prompt"),
+    "an empty prompt": (("",), "prompt is empty"),
+    "half of two prompts": (("a ::",), "around one ::"),
+    "one file for two": (("walk", "--out", "a.bvh"), "one person"),
+    "an unknown kind of file": (("walk", "--out", "a.txt"), "must end in"),
+    "the same file twice": (("walk", "--out", "a.bvh", "--out", "./a.bvh"), "twice"),
+    "no time": (("walk", "--seconds", "0"), "--seconds"),
+    "no number of seconds": (("walk", "--seconds", "nan"), "--seconds"),
+    "too much time": (("walk", "--seconds", "61"), "at most 60"),
+    "no duets": (("walk", "--count", "0"), "--count"),
+    "a block that is not there": (("walk", "--block", "nobody"), "no two-person block"),
+    "a past that is not there": (("--past", "@a.bvh", "no.bvh"), "no.bvh"),
+    "one person as both": (("--past", "@a.bvh", "@a.bvh"), "named twice"),
+    "pasts of other lengths": (("--past", "@a.bvh", "@short.bvh"), "lengths differ"),
+    "pasts of other rates": (("--past", "@a.bvh", "@fast.bvh"), "rates differ"),
+    "two tasks": (("--past", "@a.bvh", "@b.bvh", "--given", "@a.bvh"), "give one of them"),
+    "the length of somebody given": (("--given", "@a.bvh", "--seconds", "2"), "--seconds"),
+    "a path for a past": (("--past", "@a.bvh", "@b.bvh", "--path", "p.yaml"), "--path"),
+    "no such path": (("walk", "--path", "p.yaml"), "p.yaml"),
+}
+
+
+@pytest.mark.parametrize("name", sorted(WRONG))
+def test_a_mistake_is_one_sentence_and_leaves_nothing_behind(
+    files: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    words, message = WRONG[name]
+    assert duet(files, *words) == 2
+    said = capsys.readouterr().err.strip()
+    assert message in said
+    assert len(said.splitlines()) == 1
+    assert written() == set()
+
+
+def test_one_past_is_too_few(files: Path) -> None:
+    with pytest.raises(SystemExit) as end:
+        duet(files, "--past", "@a.bvh")
+    assert end.value.code == 2
+
+
+def test_a_block_of_other_weights_is_refused(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert duet(files, "two people walk", weights="other") == 2
+    assert "belongs to the weights" in capsys.readouterr().err
+    assert written() == set()
+
+
+LINES = {
+    "a key that is none": ("segments:\n  - walk\nsed: 3\n", "line 3"),
+    "a text for one of two": ("segments:\n  - walk\n  - 'turn ::'\n", "line 3"),
+    "a beginning": ("segments:\n  - walk\nstart: a.bvh\n", "line 3"),
+    "an hour and more": ("segments:\n" + 70 * "  - {text: walk, seconds: 60}\n", "line 1"),
+}
+
+
+@pytest.mark.parametrize("name", sorted(LINES))
+def test_a_wrong_timeline_is_told_with_its_line(files: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    text, place = LINES[name]
+    Path("t.yaml").write_text(text, encoding="utf-8")
+    Path("a.bvh").write_bytes((files / "a.bvh").read_bytes())
+    assert duet(files, "--timeline", "t.yaml") == 2
+    said = capsys.readouterr().err.strip()
+    assert "t.yaml" in said
+    assert place in said
+    assert len(said.splitlines()) == 1
+    assert written() == {"t.yaml", "a.bvh"}

@@ -1,0 +1,261 @@
+"""Two people with a random prior: exchange, company, what is known, paths, and motions of two bodies in one world."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from motionloom.checkpoint import Prior
+from motionloom.data.pairs import one_world
+from motionloom.diffusion import levels
+from motionloom.errors import MotionloomError
+from motionloom.features import pair as two
+from motionloom.features.humanml import positions_at
+from motionloom.motion import Motion
+from motionloom.nets.pair import PairNet
+from motionloom.nets.pair_block import PairBlock
+from motionloom.retarget import to_smpl22
+from motionloom.tasks import pair
+from motionloom.tasks.goals import Goal, Placement
+from motionloom.tasks.pair import (
+    Ground,
+    complete_pair,
+    generate_pair,
+    known_state,
+    pair_features,
+    person_seeds,
+    placement,
+    prompts_of,
+)
+from motionloom.tasks.text import finish, sample_features
+from tests.nets import tiny
+from tests.tasks.two_people import block as block_of
+from tests.tasks.two_people import walkers
+
+FRAMES = 14
+SAID = ["a person walks", "a person turns left"]
+
+
+@pytest.fixture(scope="module")
+def prior() -> Prior:
+    return tiny.prior()
+
+
+@pytest.fixture(scope="module")
+def block(prior: Prior) -> PairBlock:
+    return block_of(prior)
+
+
+def features(prior: Prior, block: PairBlock, prompts: list[str], seeds: list[int], **given):
+    return pair_features(prior, block.net(prior), prompts, FRAMES, seeds=seeds, steps=4, **given)
+
+
+def both_known(prior: Prior, block: PairBlock, count: int = 5) -> tuple[torch.Tensor, torch.Tensor]:
+    """A state whose first frames and D are known, and its mask."""
+    first = torch.randn(2, count, 263, generator=torch.Generator().manual_seed(3)) * prior.std + prior.mean
+    stands = torch.tensor([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
+    return known_state(prior, block.net(prior), first, stands, FRAMES)
+
+
+@pytest.mark.parametrize("known", [False, True], ids=["free", "prefix"])
+def test_exchanged_people_get_exchanged_motions(prior: Prior, block: PairBlock, known: bool) -> None:
+    state, mask = both_known(prior, block) if known else (None, None)
+    given = {} if state is None else {"known": state, "mask": mask}
+    turned = {} if state is None or mask is None else {"known": state.flip(0), "mask": mask.flip(0)}
+    one, stands = features(prior, block, SAID, [1, 2], **given)
+    other, exchanged = features(prior, block, SAID[::-1], [2, 1], **turned)
+    torch.testing.assert_close(one[0], other[0].flip(0), rtol=0, atol=1e-4)
+    expected = two.seen(exchanged[0, 1], exchanged[0, 0])
+    torch.testing.assert_close(two.seen(stands[0, 0], stands[0, 1]), expected, rtol=0, atol=1e-4)
+    assert not torch.allclose(one[0, 0], one[0, 1], atol=1e-2)
+
+
+def test_a_pair_is_the_same_in_any_company(prior: Prior, block: PairBlock) -> None:
+    """Nine pairs are more than are denoised at once."""
+    seeds = list(range(18))
+    many, stands = features(prior, block, SAID * 9, seeds)
+    for number in (0, 7, 8):
+        alone, there = features(prior, block, SAID, seeds[2 * number : 2 * number + 2])
+        torch.testing.assert_close(many[number], alone[0], rtol=0, atol=1e-4)
+        torch.testing.assert_close(stands[number], there[0], rtol=1e-5, atol=1e-4)
+
+
+def test_people_who_do_not_listen_are_the_priors_own(prior: Prior) -> None:
+    made, _ = features(prior, block_of(prior, fresh=True), SAID, [3, 4])
+    alone = sample_features(prior, SAID, [FRAMES] * 2, seeds=[3, 4], steps=4)
+    torch.testing.assert_close(made[0], torch.stack(alone), rtol=0, atol=1e-5)
+
+
+def test_the_other_persons_words_matter_to_people_who_listen(prior: Prior, block: PairBlock) -> None:
+    one, _ = features(prior, block, SAID, [3, 4])
+    other, _ = features(prior, block, [SAID[0], "a person jumps"], [3, 4])
+    assert (one[0, 0] - other[0, 0]).abs().max() > 1e-3
+
+
+def test_what_is_known_is_shown_without_noise_and_comes_back(
+    prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[tuple[torch.Tensor, int]] = []
+    forward = PairNet.forward
+
+    def recorded(net: PairNet, x: torch.Tensor, level: int, bound) -> torch.Tensor:
+        seen.append((x[:2].clone(), level))
+        return forward(net, x, level, bound)
+
+    monkeypatch.setattr(PairNet, "forward", recorded)
+    state, mask = both_known(prior, block)
+    made, _ = features(prior, block, SAID, [1, 2], known=state, mask=mask)
+    assert [level for _, level in seen] == list(levels(prior.schedule, 4, spacing="early"))[:-1]
+    for x, level in seen:
+        torch.testing.assert_close(x[mask], prior.schedule.at(level)[0] * state[mask])
+    expected = state[:, 1:6] * prior.std + prior.mean
+    torch.testing.assert_close(made[0, :, :5], expected, rtol=0, atol=1e-6)
+    assert (made[0, :, 5:] - prior.mean).abs().max() > 1e-3
+
+
+def test_duets_are_repeated_by_their_seeds(prior: Prior, block: PairBlock) -> None:
+    few = {"seconds": 0.6, "steps": 2, "clean": False}
+    several = generate_pair(prior, block, SAID[0], count=2, seed=4, **few)
+    again = generate_pair(prior, block, SAID[0], count=1, seed=4, **few)
+    np.testing.assert_allclose(several[0][1].positions(), again[0][1].positions(), atol=1e-4)
+    assert np.abs(several[1][1].positions() - again[0][1].positions()).max() > 1e-2
+    assert [len(motion) for motion in again[0]] == [12, 12]
+
+
+def test_seeds_of_people_go_with_them() -> None:
+    assert person_seeds((7, 9), 3) == person_seeds((9, 7), 3)[::-1]
+    numbers = [s for number in range(50) for s in person_seeds(1, number)]
+    assert len(set(numbers)) == 100
+    assert all(0 <= s < 2**63 for s in numbers)
+
+
+def test_files_keep_the_distance_that_was_drawn(prior: Prior, block: PairBlock) -> None:
+    [duet] = generate_pair(prior, block, SAID[0], seconds=0.7, steps=4, seed=1, clean=False)
+    made, stands = pair_features(prior, block.net(prior), [SAID[0]] * 2, 14, seeds=person_seeds(1, 0), steps=4)
+    alone = np.stack([finish(prior, one, clean=False).positions() for one in made[0]])
+    expected = two.put(alone, stands[0].double().numpy()[:, None, None])
+    np.testing.assert_allclose(np.stack([motion.positions() for motion in duet]), expected, atol=1e-4)
+
+
+def walk(frames: int) -> Goal:
+    """Two metres along a quarter circle that begins in (1, 0, 2) towards +X."""
+    goal = Goal.nothing(frames)
+    angle = np.linspace(0, np.pi / 2, frames)
+    goal.positions[:, 0] = np.stack([1 + 1.3 * np.sin(angle), 0 * angle, 3.3 - 1.3 * np.cos(angle)], axis=-1)
+    goal.asked[:, 0] = [True, False, True]
+    return replace(goal, start=Placement(1.0, 2.0, np.pi / 2))
+
+
+@pytest.mark.parametrize("person", [0, 1])
+def test_a_path_leads_one_of_the_two(prior: Prior, block: PairBlock, person: int) -> None:
+    goal = walk(40)
+    [duet] = generate_pair(prior, block, SAID[0], goal=goal, person=person, steps=4, seed=2, clean=False)
+    off = [np.linalg.norm((m.root - goal.positions[:, 0])[:, [0, 2]], axis=-1).mean() for m in duet]
+    assert off[person] < 0.02 < off[1 - person]
+    assert len(duet[0]) == len(duet[1]) == 40
+
+
+def test_the_other_one_stands_as_drawn_beside_who_follows_a_path(
+    prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever starts at the goal's place, the other is seen from him as the drawn stands say."""
+    drawn = []
+    real = pair.pair_features
+    monkeypatch.setattr(pair, "pair_features", lambda *a, **k: drawn.append(real(*a, **k)) or drawn[-1])
+    [duet] = generate_pair(prior, block, SAID[0], goal=walk(40), person=1, steps=3, clean=False)
+    stands = drawn[0][1][0].double().numpy()
+    there = np.array([np.cos(np.pi / 2), np.sin(np.pi / 2), 1.0, 2.0])
+    other = placement(two.compose(there, two.seen(stands[1], stands[0])))
+    np.testing.assert_allclose(duet[0].root[0, [0, 2]], [other.x, other.z], atol=0.05)
+
+
+# Going on
+
+
+def test_one_ground_for_two_bodies_is_undone(prior: Prior) -> None:
+    ground = Ground.of(walkers(1.2))
+    alone = [to_smpl22(motion).positions() for motion in ground.motions]
+    common = one_world(alone, ground.legs)
+    for i in (0, 1):
+        np.testing.assert_allclose(ground.own(i, common[i]), alone[i], atol=1e-9)
+    assert np.abs(common[0] - alone[0]).max() > 0.01
+
+
+def test_pasts_stay_bit_for_bit_and_go_on_without_a_jump(prior: Prior, block: PairBlock) -> None:
+    past = walkers(1.2)
+    [duet] = complete_pair(prior, block, past, steps=3, seconds=0.5)
+    for made, old in zip(duet, past, strict=True):
+        assert len(made) == len(old) + round(0.5 * old.fps)
+        assert made.skeleton == old.skeleton
+        assert np.array_equal(made.root[: len(old)], old.root)
+        assert np.array_equal(made.rotations[: len(old)], old.rotations)
+        steps = np.linalg.norm(np.diff(made.positions(), axis=0), axis=-1).max(axis=1)
+        assert steps[len(old) - 1] < 1.5 * steps[len(old) - 4 : len(old) - 1].max() + 0.02
+
+
+def test_a_true_future_comes_back_onto_both_bodies_in_place(
+    prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In place of the sampler, the features of what the two (one a fifth larger) really did next."""
+    whole = walkers(1.75)
+    count = round(1.2 * whole[0].fps)
+    past = tuple(motion.frames(0, count) for motion in whole)
+
+    def true(prior, net, said, frames, **_):
+        legs = Ground.of(whole).legs
+        ground = Ground.of((past[0], past[1]))
+        seen = ground.encoded().features.shape[1]
+        at = count - 1 + (np.arange(frames + 1) - (seen - 1)) / 20 * whole[0].fps
+        uniform = one_world([to_smpl22(motion).positions() for motion in whole], legs)
+        encoded = two.encode(np.stack([positions_at(person, at) for person in uniform]))
+        return torch.from_numpy(encoded.features)[None], torch.from_numpy(encoded.stands)[None]
+
+    monkeypatch.setattr(pair, "pair_features", true)
+    [duet] = complete_pair(prior, block, (past[0], past[1]), seconds=0.5)
+    for made, old in zip(duet, whole, strict=True):
+        apart = np.linalg.norm(made.positions() - old.positions()[: len(made)], axis=-1)
+        assert apart[count:].mean() < 0.03, apart[count:].mean(axis=1)
+
+
+def shifted(motion: Motion, by: float) -> Motion:
+    return replace(motion, root=motion.root + np.array([by, 0.0, 0.0]))
+
+
+def test_pasts_of_no_pair_are_refused_in_a_sentence(prior: Prior, block: PairBlock) -> None:
+    first, second = walkers(1.2)
+    wrong = {
+        "lengths differ, 24 and 20": (first, second.frames(0, 20)),
+        "rates differ": (first, replace(second, fps=2 * second.fps)),
+        "same motion": (first, shifted(first, 1.0)),
+        "never nearer": (first, shifted(second, 50.0)),
+        "at least 1 s": (first.frames(0, 8), second.frames(0, 8)),
+    }
+    for message, past in wrong.items():
+        with pytest.raises(MotionloomError, match=message):
+            complete_pair(prior, block, past, steps=2)
+    for seconds in (0.0, float("nan"), float("inf"), 61.0, -1.0):
+        with pytest.raises(MotionloomError, match="cannot go on for"):
+            complete_pair(prior, block, (first, second), seconds=seconds, steps=2)
+
+
+def test_what_nothing_can_be_made_of_is_refused(prior: Prior, block: PairBlock) -> None:
+    wrong = [
+        ({"seconds": 0.0}, "cannot be made"), ({"seconds": float("nan")}, "cannot be made"), ({"count": 0}, "1 to"),
+        ({"seed": -1}, "seed"), ({"seed": (1, 2**62)}, "seed"), ({"steps": 0}, "steps"), ({"person": 2}, "person 2"),
+        ({"guidance": float("nan")}, "guidance"), ({"goal": Goal.nothing(3)}, "goal of 3"),
+    ]  # fmt: skip
+    for given, message in wrong:
+        with pytest.raises(MotionloomError, match=message):
+            generate_pair(prior, block, "a person walks", **given)
+    for prompt in ("", "  ", ("a person walks", "")):
+        with pytest.raises(MotionloomError, match="prompt is empty"):
+            generate_pair(prior, block, prompt)
+
+
+def test_two_prompts_are_parted_by_two_colons() -> None:
+    assert prompts_of("a person walks :: another: waits") == ("a person walks", "another: waits")
+    assert prompts_of("two people dance") == ("two people dance",) * 2
+    for wrong in ("a ::", ":: b", "a :: b :: c", "::"):
+        with pytest.raises(MotionloomError, match="around one ::"):
+            prompts_of(wrong)
