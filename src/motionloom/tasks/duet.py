@@ -199,8 +199,8 @@ def duet_features(
     segments: those of each person, of equal lengths and transitions. Strung together the pieces are the two motions.
     Row i draws from ``seed + i``.
     """
-    guess = _Guess(prior, net)
     way = levels(prior.schedule, steps, spacing=SPACING)
+    guess = _Guess(prior, net, way)
 
     def links() -> Iterator[Link]:
         both = (_rows(prior, one, guidance, None) for one in segments)
@@ -239,9 +239,10 @@ class _Guess:
 
     prior: Prior
     net: PairNet
+    way: Sequence[int]
     rows: dict[int, tuple[_Row, ...]] = field(default_factory=dict)
-    ends: dict[int, Tensor] = field(default_factory=dict)
-    """Stands (2, 4) at the frame of a row with which the next one begins."""
+    ends: dict[tuple[int, int], Tensor] = field(default_factory=dict)
+    """Stands (2, 4) at the frame of a row with which the next one begins, by row and level of the guess."""
     noise: dict[int, Tensor] = field(default_factory=dict)
     """(2, 4) that each row's D began as."""
 
@@ -262,26 +263,33 @@ class _Guess:
             rows = zip(motion[:, :count], self.rows[number], strict=True)
             motion = torch.stack([row.correct(one, level) for one, row in rows])
             made.append(_strung(motion, places))
-            self._carry(number, motion, places)
+            self._carry(number, level, motion, places)
         return made
 
     def drop(self, number: int) -> None:
         """Forget a row that is finished, as its neighbours are."""
-        self.ends.pop(number - 1, None)
+        self.ends = {key: stands for key, stands in self.ends.items() if key[0] != number - 1}
         self.noise.pop(number, None)
 
     def _shown(self, number: int, places: Tensor, level: int) -> Tensor:
         """D as the network sees it: drawn for the first row, else the end of the row before, noised as learned."""
-        noise, end = self.noise.setdefault(number, places), self.ends.get(number - 1)
+        noise, end = self.noise.setdefault(number, places), self._begin(number, level)
         if end is None:
             return places
         return self.prior.schedule.noised(self.net.talk.config.places.encode(end), level, noise)
 
-    def _carry(self, number: int, motion: Tensor, places: Tensor) -> None:
-        code, row = self.net.talk.config.places, self.rows[number][0]
-        begin = code.decode(places) if number == 0 else self.ends.get(number - 1, code.decode(places))
+    def _begin(self, number: int, level: int) -> Tensor | None:
+        """Where the two stand when a row begins, by what the row before guessed one level earlier: which of the two
+        moves first must not matter."""
+        step = self.way.index(level)
+        return self.ends.get((number - 1, self.way[step - 1])) if step else None
+
+    def _carry(self, number: int, level: int, motion: Tensor, places: Tensor) -> None:
+        begin, row = self._begin(number, level), self.rows[number][0]
+        if begin is None:
+            begin = self.net.talk.config.places.decode(places)
         features = motion * self.prior.std + self.prior.mean
-        self.ends[number] = two.later(features, begin, row.length - max(row.overlap, 1))
+        self.ends[number, level] = two.later(features, begin, row.length - max(row.overlap, 1))
 
     def _guided(self, rows: Sequence[_Row], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> Tensor:
         """``rows``, and rows of x: a0, b0, a1, b1, ...; frames and levels: one per pair."""

@@ -1,0 +1,178 @@
+"""An answer to somebody's motion, and long duets, with a random prior and with samplers that know the answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from motionloom.checkpoint import Prior
+from motionloom.errors import MotionloomError
+from motionloom.features import pair as two
+from motionloom.metrics.physics import heading
+from motionloom.motion import Motion
+from motionloom.nets.pair import PairNet, join
+from motionloom.nets.pair_block import PairBlock
+from motionloom.retarget import to_smpl22
+from motionloom.skeleton import SMPL22
+from motionloom.tasks import duet as tasks
+from motionloom.tasks.duet import compose_pair, duet_features, react
+from motionloom.tasks.goals import Goal
+from motionloom.tasks.long import Segment
+from motionloom.tasks.splice import concatenated, person_at_20
+from tests.nets import tiny
+from tests.tasks.two_people import block as block_of
+from tests.tasks.two_people import walkers
+
+SEGMENTS = [
+    Segment("a person walks", 1.0, transition=0.4),
+    Segment("a person turns :: a person jumps", 0.8, transition=0.6),
+    Segment("a person walks", 0.9),
+]
+
+
+@pytest.fixture(scope="module")
+def prior() -> Prior:
+    return tiny.prior()
+
+
+@pytest.fixture(scope="module")
+def block(prior: Prior) -> PairBlock:
+    return block_of(prior)
+
+
+def whole(blocks: list[tuple[Motion, Motion]]) -> list[Motion]:
+    return [concatenated(*[one[i] for one in blocks]) for i in (0, 1)]
+
+
+# Somebody is given
+
+
+def test_whoever_is_given_stays_and_the_other_stands_where_he_was_drawn(
+    prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In place of the sampler the features of the real partner, told in another world: he comes back in his place."""
+    given, partner = walkers(1.5, larger=1.0)
+    truth = to_smpl22(partner)
+    asked = {}
+
+    def true(prior, net, said, frames, **how):
+        asked.update(how)
+        uniform = np.stack([person_at_20(motion) for motion in (given, partner)])
+        encoded = two.encode(uniform)
+        elsewhere = two.compose(np.array([0.0, 1.0, 7.0, -3.0]), encoded.stands)
+        return torch.from_numpy(encoded.features)[None], torch.from_numpy(elsewhere)[None]
+
+    monkeypatch.setattr(tasks, "pair_features", true)
+    [(first, second)] = react(prior, block, given, "two people walk", clean=False)
+    assert first is given
+    assert (len(second), second.fps, second.skeleton) == (len(given), given.fps, SMPL22)
+    apart = np.linalg.norm(second.positions() - truth.positions(), axis=-1)
+    assert apart.mean() < 0.03
+    assert asked["mask"][0, 1:].all()
+    assert not asked["mask"][0, 0].any()
+    assert not asked["mask"][1].any()
+
+
+def test_the_given_motion_may_stand_on_a_floor_of_its_own(prior: Prior, block: PairBlock) -> None:
+    given, _ = walkers(1.2)
+    raised = replace(given, root=given.root + np.array([0.0, 0.2, 0.0]))
+    [(_, low)] = react(prior, block, given, steps=2, clean=False)
+    [(_, high)] = react(prior, block, raised, steps=2, clean=False)
+    np.testing.assert_allclose(high.root - low.root, np.broadcast_to([0.0, 0.2, 0.0], low.root.shape), atol=0.01)
+
+
+def test_motions_that_nobody_can_react_to_are_refused(prior: Prior, block: PairBlock) -> None:
+    given, _ = walkers(1.2)
+    for wrong in (given.frames(0, 5), replace(given, fps=0.1)):
+        with pytest.raises(MotionloomError, match="can be reacted to"):
+            react(prior, block, wrong)
+
+
+# Several prompts
+
+
+def test_a_long_duet_has_all_frames_of_its_segments_and_no_seam(prior: Prior, block: PairBlock) -> None:
+    made = whole(list(compose_pair(prior, block, SEGMENTS, seed=1, steps=4, clean=False)))
+    for motion in made:
+        assert len(motion) == 20 + 16 + 18
+        steps = np.linalg.norm(np.diff(motion.root, axis=0), axis=-1)
+        assert max(steps[19], steps[35]) < 1.5 * np.median(steps) + 0.05
+
+
+def test_rows_denoised_together_or_alone_make_the_same(prior: Prior, block: PairBlock) -> None:
+    net = block.net(prior)
+    both = [tasks._asked(SEGMENTS, i, None, 0) for i in (0, 1)]
+    one, several = (list(duet_features(prior, net, both, steps=3, together=n)) for n in (1, 8))
+    for (a, stands), (b, others) in zip(one, several, strict=True):
+        torch.testing.assert_close(a, b, rtol=0, atol=1e-4)
+        np.testing.assert_allclose(stands, others, atol=1e-3)
+    assert [piece.shape for piece, _ in one] == [(2, n, 263) for n in (20, 16, 18)]
+
+
+def test_only_who_listens_hears_what_the_other_is_told(prior: Prior, block: PairBlock) -> None:
+    changed = [SEGMENTS[0], replace(SEGMENTS[1], text="a person turns :: a person walks left"), SEGMENTS[2]]
+    for one, deaf in ((block, False), (block_of(prior, fresh=True), True)):
+        rows = [[tasks._asked(some, i, None, 0) for i in (0, 1)] for some in (SEGMENTS, changed)]
+        first, second = (torch.cat([p[0] for p, _ in duet_features(prior, one.net(prior), r, steps=3)]) for r in rows)
+        assert torch.allclose(first, second, atol=1e-5) == deaf
+
+
+def test_each_row_is_told_where_the_two_stand_when_it_begins(
+    prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A network that always guesses the same: D of a later row, as shown without its noise, is what bodies made of
+    the finished motion stand like at the first frame of that row."""
+    shown: dict[int, list[tuple[torch.Tensor, int]]] = {}
+    stands = torch.tensor([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
+    places = block.config.places.encode(stands)
+    features = torch.zeros(263)
+    features[:4] = torch.tensor([0.03, 0.01, 0.02, 0.9])  # everybody walks a circle, the second another one
+    other = features * torch.tensor([-0.5] + [1.0] * 262)
+    clean = (torch.stack([features, other]) - prior.mean) / prior.std
+
+    def constant(net: PairNet, x: torch.Tensor, level, bound) -> torch.Tensor:
+        half = len(x) // 2  # with text, then without
+        for row in range(half // 2):
+            length = int(bound.lengths[2 * row])
+            shown.setdefault(length, []).append((x[2 * row : 2 * row + 2, 0, :4].clone(), int(level[2 * row])))
+        motion = clean.repeat(len(x) // 2, 1)[:, None].expand(-1, x.shape[1] - 1, -1)
+        return join(places.repeat(len(x) // 2, 1), motion)
+
+    monkeypatch.setattr(PairNet, "forward", constant)
+    segments = [Segment("a person walks", 1.0, transition=0.4), Segment("a person turns", 0.8)]
+    both = [tasks._asked(segments, i, None, 0) for i in (0, 1)]
+    pieces = list(duet_features(prior, block.net(prior), both, steps=4))
+    calls = shown[4 + 16]  # the second row begins 4 frames before its seam
+    noise = calls[0][0]
+    signal, spread = prior.schedule.at(calls[-1][1])
+    told = (calls[-1][0] - spread * noise) / signal
+    motion = torch.cat([piece for piece, _ in pieces], dim=1).double().numpy()
+    there = two.decode(motion, stands.double().numpy())[:, :, 0]
+    turned = 2 * np.array([-0.03, 0.015]) * 16  # the heading's convention: features tell minus half of the turn
+    facing = np.array([0.0, np.arctan2(0.8, 0.6)]) + turned
+    way = there[1, 16] - there[0, 16]
+    c, s = np.cos(facing[0]), np.sin(facing[0])
+    expected = [
+        np.cos(facing[1] - facing[0]),
+        np.sin(facing[1] - facing[0]),
+        c * way[0] - s * way[2],
+        c * way[2] + s * way[0],
+    ]
+    np.testing.assert_allclose(told[0], expected, atol=1e-3)
+
+
+def test_a_path_for_one_of_them_holds_through_all_segments(prior: Prior, block: PairBlock) -> None:
+    path = Goal.nothing(54)
+    path.positions[:, 0, 0] = np.linspace(2.0, 5.0, 54)
+    path.asked[:, 0] = [True, False, True]
+    made = whole(list(compose_pair(prior, block, SEGMENTS, path=path, person=1, steps=3, clean=False)))
+    off = np.linalg.norm((made[1].root - path.positions[:, 0])[:, [0, 2]], axis=-1)
+    assert off.mean() < 0.03
+    assert abs(heading(made[1].positions()[:1])[0] - np.pi / 2) < 0.5
+
+
+def test_nothing_is_composed_of_nothing(prior: Prior, block: PairBlock) -> None:
+    for segments, message in (([], "no segment"), ([Segment("a :: b :: c", 2)], "around one ::")):
+        with pytest.raises(MotionloomError, match=message):
+            list(compose_pair(prior, block, segments))
