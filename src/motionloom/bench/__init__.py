@@ -1,7 +1,7 @@
 """`motionloom bench`: speed as ratios within one run, so that they mean the same on any machine.
 
 Times are medians of interleaved repeats. Nothing here is a test: a busy machine makes it slower, not wrong.
-`speed` has the tools and what `generate` costs, `long` what `compose` costs.
+`speed` has the tools and what `generate` costs, `long` what `compose` costs, `prediction` what futures cost.
 """
 
 import os
@@ -13,6 +13,7 @@ from typing import Any, Literal
 import torch
 
 from motionloom.bench.long import FULL, QUICK, entries_of, long_motion
+from motionloom.bench.prediction import prediction
 from motionloom.bench.speed import (
     Entry,
     Process,
@@ -25,8 +26,9 @@ from motionloom.bench.speed import (
     speed_of_default,
 )
 from motionloom.checkpoint import Prior
+from motionloom.predictor import Predictor
 
-__all__ = ["Entry", "Process", "Sampling", "bench", "defaults", "machine", "process", "table"]
+__all__ = ["Entry", "Process", "Sampling", "bench", "bench_prediction", "defaults", "machine", "process", "table"]
 
 
 def bench(
@@ -71,7 +73,16 @@ def bench(
     return found
 
 
-def machine(prior: Prior) -> dict[str, Any]:
+def bench_prediction(
+    predictor: Predictor, *, quick: bool = False, progress: Callable[[str], None] = lambda line: None
+) -> dict[str, Any]:
+    """What futures cost, as plain data."""
+    about = machine(predictor)
+    entries = prediction(predictor, repeats=1 if quick else 5, timed_steps=2 if quick else 10, progress=progress)
+    return {"machine": about, "quick": quick, "entries": [asdict(entry) for entry in entries]}
+
+
+def machine(prior: Prior | Predictor) -> dict[str, Any]:
     """What it ran on."""
     device = prior.mean.device
     return {

@@ -1,16 +1,21 @@
 """`motionloom bench`: speed and memory, as ratios within one run."""
 
 import argparse
+import sys
 from pathlib import Path
+from typing import Any
+
+from motionloom.cli.sampling import fail
 
 
 def add(subparsers) -> None:
     """Register `bench`."""
     parser = subparsers.add_parser("bench", help="measure speed and memory on this machine")
-    parser.add_argument("--weights", default="default", help="shipped name or file (default: default)")
+    parser.add_argument("--weights", help="shipped name or file (default: default; with --prediction: predictor)")
     parser.add_argument(
         "--long", action="store_true", help="measure long motion instead: 1 to 10 minutes of it; takes some minutes"
     )
+    parser.add_argument("--prediction", action="store_true", help="measure fifty futures of one past instead")
     parser.add_argument(
         "--quick", action="store_true", help="fewer repeats and sizes; with --long 10 to 40 s of motion"
     )
@@ -20,22 +25,14 @@ def add(subparsers) -> None:
 
 
 def _bench(arguments: argparse.Namespace) -> None:
-    import sys
-
-    from motionloom.bench import bench, defaults, table
-    from motionloom.checkpoint import Prior
+    from motionloom.bench import table
     from motionloom.evaluation.obey import check_report, plain, write_json
-    from motionloom.tasks.long import compose
-    from motionloom.tasks.text import generate
 
     if arguments.json:
         check_report(arguments.json)
-    prior = Prior.load(arguments.weights, device=arguments.device)
-    found = bench(
-        prior, defaults(compose if arguments.long else generate), what="long" if arguments.long else "short",
-        quick=arguments.quick, weights=arguments.weights,
-        progress=lambda line: print(line, file=sys.stderr, flush=True),
-    )  # fmt: skip
+    if arguments.long and arguments.prediction:
+        fail("--long and --prediction are two measurements; ask for one")
+    found = _predicted(arguments) if arguments.prediction else _generated(arguments)
     if arguments.json:
         write_json(arguments.json, found)
     on = found["machine"]
@@ -43,3 +40,28 @@ def _bench(arguments: argparse.Namespace) -> None:
     print(plain(table(found)))
     if on["load"] > 0.5:
         print(f"\nthe machine was busy when this began (load {on['load']}): run it again when nothing else does")
+
+
+def _generated(arguments: argparse.Namespace) -> dict[str, Any]:
+    from motionloom.bench import bench, defaults
+    from motionloom.checkpoint import Prior
+    from motionloom.tasks.long import compose
+    from motionloom.tasks.text import generate
+
+    weights = arguments.weights or "default"
+    return bench(
+        Prior.load(weights, device=arguments.device), defaults(compose if arguments.long else generate),
+        what="long" if arguments.long else "short", quick=arguments.quick, weights=weights, progress=_tell,
+    )  # fmt: skip
+
+
+def _predicted(arguments: argparse.Namespace) -> dict[str, Any]:
+    from motionloom.bench import bench_prediction
+    from motionloom.predictor import Predictor
+
+    predictor = Predictor.load(arguments.weights or "predictor", device=arguments.device)
+    return bench_prediction(predictor, quick=arguments.quick, progress=_tell)
+
+
+def _tell(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
