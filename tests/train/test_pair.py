@@ -87,13 +87,18 @@ def test_features_have_the_heading_that_priors_have_seen_also_in_the_first_frame
 
 def test_half_of_the_windows_are_of_mirrored_pairs_and_half_have_the_people_exchanged():
     duets = Duets([pair()])
-    plain = [headed(p.positions)[0] for p in (pair(), mirrored(pair()))]
+    worlds = [pair().positions, mirrored(pair()).positions]
+    plain = [headed(positions)[0] for positions in worlds]
     crops, found = duets.draw(np.random.default_rng(0), 30, 60), np.zeros((2, 2))
-    for window in crops.features.numpy():
+    for window, stands in zip(crops.features.numpy(), crops.stands.numpy(), strict=True):
         for side, features in enumerate(plain):
             for exchanged, first in enumerate(features):
                 places = np.lib.stride_tricks.sliding_window_view(first, 30, axis=0).swapaxes(1, 2)
-                found[side, exchanged] += np.abs(places - window[0]).max(axis=(1, 2)).min() < 1e-5
+                away = np.abs(places - window[0]).max(axis=(1, 2))
+                if away.min() < 1e-5:
+                    found[side, exchanged] += 1
+                    root = worlds[side][exchanged, away.argmin(), 0, [0, 2]]
+                    np.testing.assert_allclose(stands[0, 2:], root, atol=1e-4)  # the stands went with the people
     assert found.sum() == 60
     assert found.min() > 6
 
@@ -195,6 +200,9 @@ def test_what_is_given_and_what_lies_behind_the_end_costs_nothing():
         torch.testing.assert_close(a, b)
     wrong[:, int(drawn.lengths.max())] += 700.0  # the last valid frame
     assert made.parts(wrong, drawn).motion > made.parts(guess, drawn).motion + 0.1
+    seam = guess.clone()
+    seam[torch.arange(6), drawn.given.sum(1)] += 700.0  # the first frame that is not given
+    assert made.parts(seam, drawn).motion > made.parts(guess, drawn).motion + 0.1
     assert made.parts(guess, drawn).place == 0
 
 
