@@ -8,13 +8,14 @@ import pytest
 import torch
 
 from motionloom import bench
-from motionloom.bench import long, speed
+from motionloom.bench import long, prediction, speed
 from motionloom.checkpoint import Card, Prior
 from motionloom.cli import main
 from motionloom.diffusion import DDPM, DpmSolver2M, cosine
 from motionloom.errors import MotionloomError
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.nets.text import TextEmbedding
+from tests.tasks.small_predictor import small_predictor
 
 
 class Words:
@@ -198,3 +199,23 @@ def test_bench_does_what_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(bench.table(found)) == 4
     assert found["long"]["settings"]["prompts"] == 3
     assert json.loads(json.dumps(found))["long"]["times"] == list(found["long"]["times"])
+
+
+def test_futures_are_measured_beside_the_published_recipe(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[int, int]] = []
+
+    def recorded(predictor, past, *, count, steps):
+        asked.append((sum(p.numel() for p in predictor.net.parameters()), steps))
+        return past
+
+    monkeypatch.setattr(prediction, "published_futures", recorded)
+
+    def clock(jobs, repeats, *, warm):
+        return [float(number) for number, job in enumerate(jobs, 1) if job() is not None]
+
+    monkeypatch.setattr(prediction, "timed", clock)
+    entries = prediction.cost_of_futures(small_predictor(), repeats=1, timed_steps=4)
+    assert asked[1] == (28_401_712, 4)
+    assert [entry.value for entry in entries] == pytest.approx([1.0, 75.0, 50.0])  # 1, 2 and 3 s for 4 of 100 steps
+    assert [entry.passes for entry in entries] == [True, True, True]
+    assert "reckoned" in entries[0].note

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import torch
 
 from motionloom.bench.long import FULL, QUICK, entries_of, long_motion
-from motionloom.bench.prediction import prediction
+from motionloom.bench.prediction import cost_of_futures
 from motionloom.bench.speed import (
     Entry,
     Process,
@@ -78,7 +78,7 @@ def bench_prediction(
 ) -> dict[str, Any]:
     """What futures cost, as plain data."""
     about = machine(predictor)
-    entries = prediction(predictor, repeats=1 if quick else 5, timed_steps=2 if quick else 10, progress=progress)
+    entries = cost_of_futures(predictor, repeats=1 if quick else 5, timed_steps=2 if quick else 10, progress=progress)
     return {"machine": about, "quick": quick, "entries": [asdict(entry) for entry in entries]}
 
 

@@ -18,7 +18,7 @@ from motionloom.train.predictor import Settings, Windows, new_predictor
 COUNT, PUBLISHED_STEPS = 50, 100
 
 
-def prediction(
+def cost_of_futures(
     predictor: Predictor, *, repeats: int, timed_steps: int = 10, progress: Callable[[str], None] = lambda line: None
 ) -> list[Entry]:
     """Seconds of our default, and how often it fits into the published recipe: of these weights, of the published net.
