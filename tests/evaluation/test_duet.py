@@ -81,6 +81,18 @@ def test_standing_still_misses_who_glides_by_the_mean_of_the_way_gone() -> None:
     np.testing.assert_allclose(steady["speed"], 1.5)
 
 
+def test_baselines_see_the_first_second_and_no_frame_more() -> None:
+    crops = crops_of(couple(6.0))
+    other = Crops(crops.positions.copy(), crops.numbers)
+    other.positions[:, :, 20:] += 1.0
+    still = ways.standing()(crops, 0)
+    assert np.array_equal(still[:, :, :20], crops.positions[:, :, :20])
+    assert np.array_equal(still[:, :, 20:], np.repeat(crops.positions[:, :, 19:20], 60, axis=2))
+    mrt = ways.by_mrt(Mrt(MrtConfig(width=16, hidden=24, layers=1, heads=2, key=8)).eval())
+    for way in (ways.standing(), ways.gliding(), mrt):
+        assert np.array_equal(way(crops, 0), way(other, 0))
+
+
 def test_the_mean_of_samples_can_be_right_where_every_sample_is_wrong() -> None:
     def scattered(crops: Crops, sample: int) -> np.ndarray:
         made = perfect(crops, 0).copy()
