@@ -86,14 +86,14 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
     """What the commands asked of the tasks, which make simple motions and stop where they are told."""
     seen: dict = {"stop": None, "problem": KeyboardInterrupt}
 
-    def predict(predictor, past, *, count, seconds, seed, hold, guidance, root, clean, progress, steps=None):
+    def predict(predictor, past, *, count, seconds, seed, hold, guidance, root, clean, progress, **walk):
         seen.update(past=past, count=count, seconds=seconds, seed=seed, hold=hold, guidance=guidance, root=root)
-        seen.update(clean=clean, steps=steps)
+        seen.update(clean=clean, walk=walk)
         progress(1, 1)
         return [stream.joined([past, future(past, seconds, i)]) for i in range(count)]
 
-    def predict_pieces(predictor, past, *, seconds, number, seed, hold, guidance, root, clean, steps=None):
-        seen.update(past=past, seconds=seconds, seed=seed, hold=hold, root=root, clean=clean, steps=steps)
+    def predict_pieces(predictor, past, *, seconds, number, seed, hold, guidance, root, clean, **walk):
+        seen.update(past=past, seconds=seconds, seed=seed, hold=hold, root=root, clean=clean, walk=walk)
         if (number, -1) == seen["stop"]:
             raise seen["problem"]
         yield past
@@ -103,8 +103,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
                 raise seen["problem"]
             yield whole.frames(at, at + 300)
 
-    def switch(predictor, past, target, *, count, seconds, seed, facing, guidance, clean, steps=None):
-        seen.update(past=past, target=target, count=count, seconds=seconds, facing=facing)
+    def switch(predictor, past, target, *, count, seconds, seed, facing, guidance, clean, **walk):
+        seen.update(past=past, target=target, count=count, seconds=seconds, facing=facing, walk=walk)
         still = [replace(one, translations=None) for one in (past, target)]
         return [stream.joined([still[0], future(past, seconds, i), still[1]]) for i in range(count)]
 
@@ -157,12 +157,17 @@ def test_a_folder_holds_one_file_per_future_a_picture_and_a_film(weights, asked,
 
 
 def test_lines_ask_what_the_tasks_take(weights, asked):
-    words = ["predict", "past.bvh", "--horizon", "3", "--out", "a.npz", "--seed", "5", "--steps", "4", "--guidance"]
-    assert run(weights, *words, "1.5", "--no-root", "--raw", "--count", "2") == 0
-    keys = ("seconds", "count", "seed", "steps", "guidance", "root", "clean", "hold")
-    assert [asked[key] for key in keys] == [3, 2, 5, 4, 1.5, False, False, None]
+    words = ["predict", "past.bvh", "--horizon", "3", "--out", "a.npz", "--seed", "5", "--guidance", "1.5"]
+    walk = ["--steps", "4", "--temperature", "0"]
+    assert run(weights, *words, *walk, "--no-root", "--raw", "--count", "2") == 0
+    keys = ("seconds", "count", "seed", "walk", "guidance", "root", "clean", "hold")
+    assert [asked[key] for key in keys] == [3, 2, 5, {"steps": 4, "temperature": 0}, 1.5, False, False, None]
     assert run(weights, "predict", "past.bvh", "--no-picture") == 0
-    assert [asked[key] for key in keys] == [2, 10, 0, None, 1, True, True, None]
+    assert [asked[key] for key in keys] == [2, 10, 0, {}, 1, True, True, None]
+    assert run(weights, "predict", "past.bvh", "--horizon", "40", "--out", "a.bvh", "--temperature", "0.5") == 0
+    assert asked["walk"] == {"temperature": 0.5}
+    assert run(weights, "switch", "past.bvh", "past.bvh", "--out", "a.bvh", "--temperature", "2") == 0
+    assert asked["walk"] == {"temperature": 2}
     assert written("futures") == {f"future_{i:02d}.bvh" for i in range(10)}
 
 
@@ -389,6 +394,8 @@ HOLD = ["--hold", "head", "--from", "kick.bvh"]
         (["past.bvh", "--seed", "-1"], "--seed 0 or more"),
         (["past.bvh", "--steps", "0"], "--steps must be 1 or more; got 0"),
         (["past.bvh", "--guidance", "nan"], "--guidance must be -100 to 100"),
+        (["past.bvh", "--temperature", "2.1"], "--temperature must be 0 to 2, usually about 1; got 2.1"),
+        (["past.bvh", "--temperature", "nan"], "--temperature must be 0 to 2"),
         (["past.bvh", "--end", "0.03"], "past.bvh has one frame here"),
         (["past.bvh", "--start", "9"], "cannot crop"),
         (["absent.bvh"], "absent.bvh"),

@@ -102,19 +102,22 @@ def test_a_row_is_the_same_alone_and_among_others() -> None:
 
 
 def test_guidance_one_is_the_told_pass_zero_the_untold_and_two_goes_beyond() -> None:
-    """With one step from pure noise the answer is linear in the guidance."""
+    """With one step the answer is the network's guess from noise of the temperature, linear in the guidance."""
     features, mask, pose = told()
 
-    def made(guidance: float) -> Tensor:
-        return complete(PREDICTOR, features, mask, pose, seeds=[1, 2, 3], steps=1, guidance=guidance)
+    def made(guidance: float, temperature: float = 1.0) -> Tensor:
+        asked = {"steps": 1, "guidance": guidance, "temperature": temperature}
+        return complete(PREDICTOR, features, mask, pose, seeds=[1, 2, 3], **asked)
 
     rows = PREDICTOR.tell(features, mask, pose)
     noise = torch.stack([torch.randn(16, 66, generator=torch.Generator().manual_seed(s)) for s in (1, 2, 3)])
-    for guidance in (1.0, 0.0):
+    for guidance, scale in ((1.0, 1.0), (0.0, 1.0), (1.0, 0.5), (1.0, 0.0)):
         with torch.inference_mode():
-            guess = PREDICTOR.denoiser(rows, torch.full((3,), bool(guidance)))(noise, PREDICTOR.schedule.steps)
+            told_or_not = torch.full((3,), bool(guidance))
+            guess = PREDICTOR.denoiser(rows, told_or_not)(scale * noise, PREDICTOR.schedule.steps)
             plain = joined(PREDICTOR.to_features(guess, pose), features, mask, ease=12)
-        torch.testing.assert_close(made(guidance), plain, atol=1e-4, rtol=1e-4)
+        torch.testing.assert_close(made(guidance, scale), plain, atol=1e-4, rtol=1e-4)
+    assert (made(1.0) - made(1.0, 0.5)).abs().max() > 0.01
     assert (made(1.0) - made(0.0)).abs().max() > 0.01
     torch.testing.assert_close(made(2.0), 2 * made(1.0) - made(0.0), atol=1e-3, rtol=1e-3)
 
@@ -147,6 +150,13 @@ def test_future_number_i_of_a_past_is_the_same_whatever_else_is_asked() -> None:
         np.testing.assert_allclose(made, same, atol=1e-5)
     assert np.abs(many[0, 0] - many[0, 1]).max() > 0.01
     assert np.abs(futures(PREDICTOR, PAST, count=1, seed=10) - many[:, :1]).max() > 0.01
+
+
+def test_without_a_temperature_there_is_nothing_left_to_draw() -> None:
+    calm = futures(PREDICTOR, PAST, count=3, seed=1, temperature=0.0)
+    np.testing.assert_allclose(calm, np.repeat(calm[:, :1], 3, axis=1), atol=1e-5)
+    apart = [np.ptp(futures(PREDICTOR, PAST, count=3, seed=1, temperature=t), axis=1).max() for t in (0.5, 1.0, 1.5)]
+    assert 0.01 < apart[0] < apart[1] < apart[2]
 
 
 def test_a_past_that_is_turned_and_moved_has_its_future_turned_and_moved() -> None:

@@ -56,7 +56,8 @@ BODIES = {"person": lambda s, fps=30.0: person(s, fps), "rig": on_rig, "hips": o
 def test_the_past_comes_back_bit_for_bit_and_goes_on_without_a_seam(body: str, fps: float) -> None:
     past = BODIES[body](1.2, fps)
     n = len(past)
-    (made,) = predict(PREDICTOR, past, **FEW | {"seconds": 1.0})
+    asked = FEW | {"seconds": 1.0, "temperature": 1.0}  # random weights throw people about as much as the noise is
+    (made,) = predict(PREDICTOR, past, **asked)
     assert len(made) == n + round(fps)
     assert same(made.frames(0, n), past)
     places = joints22(made)
@@ -181,6 +182,15 @@ def test_minutes_look_back_a_few_seconds_only(monkeypatch: pytest.MonkeyPatch) -
     assert max(kept) <= 15 + 30 * (task.CHUNK + 1) + 2 * 15
 
 
+def test_without_a_temperature_every_seed_makes_the_same() -> None:
+    asked = {"seconds": 0.5, "steps": 2, "temperature": 0.0}
+    first, second = predict(PREDICTOR, PAST, count=2, **asked)
+    close(first, second)
+    close(concatenated(*predict_pieces(PREDICTOR, PAST, seed=7, **asked)), first)
+    one, other = switch(PREDICTOR, PAST, PAST, count=2, **asked | {"seconds": 1.2})
+    close(one, other)
+
+
 def test_progress_is_told_window_by_window() -> None:
     told: list[tuple[int, int]] = []
     predict(PREDICTOR, PAST, count=1, seconds=2.5, steps=1, progress=lambda done, of: told.append((done, of)))
@@ -267,6 +277,9 @@ MISTAKES = {
     "no steps": {"steps": 0},
     "half a step": {"steps": 0.5},
     "too many steps": {"steps": 1001},
+    "too hot": {"temperature": 2.01},
+    "below zero": {"temperature": -0.1},
+    "no temperature": {"temperature": float("nan")},
     "infinite guidance": {"guidance": float("inf")},
     "another predictor": {"predictor": tiny_predictor.predictor()},
     "no predictor": {"predictor": "predictor"},

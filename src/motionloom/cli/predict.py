@@ -99,6 +99,7 @@ def _add_sampling(parser: argparse.ArgumentParser, other: str) -> None:
     parser.add_argument("--seed", type=int, default=0, help="the same seed makes the same motions (default 0)")
     parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster")
     parser.add_argument("--guidance", type=float, default=1.0, help="strength of what is known (default 1)")
+    parser.add_argument("--temperature", type=float, help="livelier above 1, calmer below, 0 to 2 (default 1.15)")
     parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
     parser.add_argument(
         "--weights", default="predictor", metavar="NAME|PATH", help="shipped name or file (default: predictor)"
@@ -219,8 +220,9 @@ def _predictor(arguments: argparse.Namespace) -> "Predictor":
 
 
 def _steps(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The task's own number unless the line says another."""
-    return {} if arguments.steps is None else {"steps": arguments.steps}
+    """The task's own numbers unless the line says others."""
+    said = {"steps": arguments.steps, "temperature": arguments.temperature}
+    return {name: value for name, value in said.items() if value is not None}
 
 
 def _inputs(arguments: argparse.Namespace) -> list[Path]:
@@ -325,6 +327,8 @@ def _check(arguments: argparse.Namespace, *, longest: float) -> None:
         fail(f"--count must be 1 to {MAX_COUNT} and --seed 0 or more; got {arguments.count} and {arguments.seed}")
     if arguments.steps is not None and not 1 <= arguments.steps <= 100_000:
         fail(f"--steps must be 1 or more; got {arguments.steps}")
+    if arguments.temperature is not None and not 0 <= arguments.temperature <= 2:
+        fail(f"--temperature must be 0 to 2, usually about 1; got {arguments.temperature:g}")
     if not abs(arguments.guidance) <= 100:
         fail(f"--guidance must be -100 to 100, usually about 1; got {arguments.guidance:g}")
 

@@ -61,7 +61,7 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
         tip = directions[:, i] * np.linalg.norm(foot, axis=-1, keepdims=True)
         targets[:, i] += _correction(places[:, ankle], places[:, ankle] + tip, flags, motion.fps)
         below = floor - targets[:, i, 1] - np.minimum(tip[:, 1], 0)
-        targets[:, i, 1] += _envelope((below - _SUNK).clip(0), round(0.1 * motion.fps))
+        targets[:, i, 1] += envelope((below - _SUNK).clip(0), round(0.1 * motion.fps))
     down = _root_drop(places, targets, motion.fps)
     return _with_legs(motion, places - down[:, None, None] * [0, 1, 0], targets, directions)
 
@@ -196,13 +196,13 @@ def _hermite(steps: int, left: Array, right: Array, into: Array, out: Array) -> 
     return left + (3 * u**2 - 2 * u**3) * (right - left) + steps * (h10 * into + h11 * out)
 
 
-def _envelope(need: Array, radius: int) -> Array:
-    """A smooth curve (frames,) nowhere below ``need``: running maximum, then averages within its window."""
+def envelope(need: Array, radius: int) -> Array:
+    """A smooth curve (..., frames) nowhere below ``need``: running maximum, then averages within its window."""
     radius = max(1, radius)
-    curve = np.pad(need, 4 * radius, mode="edge")
-    curve = np.lib.stride_tricks.sliding_window_view(curve, 4 * radius + 1).max(-1)
+    curve = np.pad(need, [(0, 0)] * (need.ndim - 1) + [(4 * radius, 4 * radius)], mode="edge")
+    curve = np.lib.stride_tricks.sliding_window_view(curve, 4 * radius + 1, axis=-1).max(-1)
     for _ in range(2):
-        curve = np.lib.stride_tricks.sliding_window_view(curve, 2 * radius + 1).mean(-1)
+        curve = np.lib.stride_tricks.sliding_window_view(curve, 2 * radius + 1, axis=-1).mean(-1)
     return curve
 
 
@@ -220,7 +220,7 @@ def _root_drop(places: Array, targets: Array, fps: float) -> Array:
         height = np.sqrt((most**2 - line[:, 0] ** 2 - line[:, 2] ** 2).clip(0))
         far = np.linalg.norm(line, axis=-1) > most
         need = np.maximum(need, np.where(far, -line[:, 1] - height, 0).clip(0, 0.05))
-    return _envelope(need, round(0.15 * fps))
+    return envelope(need, round(0.15 * fps))
 
 
 def _with_legs(motion: Motion, places: Array, targets: Array, directions: Array) -> Motion:

@@ -138,7 +138,7 @@ def _turned(positions: Array, angle: Array) -> Array:
 
 
 def with_bones(positions: np.ndarray, parents: tuple[int, ...], lengths: np.ndarray) -> Array:
-    """(..., frames, joints, 3) with every bone as long as ``lengths`` (..., joints) say, as it points; the root stays."""
+    """(..., frames, joints, 3) with every bone as long as ``lengths`` (..., joints) say; the root stays."""
     p, long = np.asarray(positions, dtype=np.float64), np.asarray(lengths)[..., None, :, None]
     result = p.copy()
     for j, parent in enumerate(parents[1:], start=1):

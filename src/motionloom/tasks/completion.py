@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 
 STEPS, SOLVER, SPACING = 8, "dpm2m", "index"
 """The default walk, see docs/decisions."""
+TEMPERATURE = 1.15
+"""How much noise the walk starts from, in standard deviations: few steps draw too little of what there is, and a person
+who goes on from its own calm comes to rest; see docs/decisions."""
 EASE = 0.4
 """Seconds over which unknown frames are led from what is known to the network's own course."""
 ROWS = 512
@@ -47,6 +50,7 @@ def complete(
     seeds: Sequence[int],
     steps: int = STEPS,
     guidance: float = 1.0,
+    temperature: float = TEMPERATURE,
     solver: str = SOLVER,
     spacing: str = SPACING,
 ) -> Tensor:
@@ -55,6 +59,7 @@ def complete(
     ``features`` are read where ``mask`` (rows, frames, parts) is above 0; ``pose`` (rows, channels) is the last
     observed one. Known numbers are those that are given, and the others leave them without a jump. ``guidance``
     above 1 exaggerates what is told (classifier-free guidance), below 1 heeds it less; it needs a second pass.
+    ``temperature``: the standard deviation of the noise at the start; more makes livelier motion and more variety.
     """
     told = predictor.tell(features, mask, pose)
     yes, no = (torch.full((len(told),), flag, device=told.device) for flag in (True, False))
@@ -65,7 +70,7 @@ def complete(
     draw = row_draw(seeds)
     made = run(
         guide(net, (told, yes), (told, no), guidance),
-        draw(torch.empty(len(told), *predictor.mean.shape, device=told.device)),
+        temperature * draw(torch.empty(len(told), *predictor.mean.shape, device=told.device)),
         levels=levels(predictor.schedule, steps, spacing=spacing),
         solver=SOLVERS[solver], schedule=predictor.schedule, draw=draw,
     )  # fmt: skip
@@ -133,6 +138,7 @@ def next_frames(
     exact: bool = True,
     steps: int = STEPS,
     guidance: float = 1.0,
+    temperature: float = TEMPERATURE,
     solver: str = SOLVER,
     spacing: str = SPACING,
 ) -> Array:
@@ -156,7 +162,7 @@ def next_frames(
     features, like = torch.from_numpy(seen).to(predictor.mean), torch.from_numpy(mask).to(predictor.mean)
     made = complete(
         predictor, features, like.expand(rows, -1, -1), features[:, h - 1],
-        seeds=seeds, steps=steps, guidance=guidance, solver=solver, spacing=spacing,
+        seeds=seeds, steps=steps, guidance=guidance, temperature=temperature, solver=solver, spacing=spacing,
     )  # fmt: skip
     places = layout.decode(made[:, h : h + frames].cpu().double().numpy(), place)
     return with_bones(places, layout.parents, bone_lengths(past, layout.parents)) if exact else places
@@ -199,6 +205,7 @@ def futures(
     exact: bool = True,
     steps: int = STEPS,
     guidance: float = 1.0,
+    temperature: float = TEMPERATURE,
     solver: str = SOLVER,
     spacing: str = SPACING,
 ) -> Array:
@@ -215,7 +222,7 @@ def futures(
     parts = [
         next_frames(
             predictor, many[first : first + rows], seeds=seeds[first : first + rows], frames=frames, exact=exact,
-            steps=steps, guidance=guidance, solver=solver, spacing=spacing,
+            steps=steps, guidance=guidance, temperature=temperature, solver=solver, spacing=spacing,
         )
         for first in range(0, len(many), rows)
     ]  # fmt: skip

@@ -18,7 +18,7 @@ from motionloom.features.positions import SMPL_LAYOUT
 from motionloom.motion import Motion
 from motionloom.predictor import Predictor
 from motionloom.retarget import to_smpl22
-from motionloom.tasks.completion import STEPS, Known
+from motionloom.tasks.completion import STEPS, TEMPERATURE, Known
 from motionloom.tasks.held import Given, HeldPart, Hold, check_like, given
 from motionloom.tasks.splice import carried_level, concatenated, kept_parts, splice, standing, worn
 from motionloom.tasks.text import LARGEST_SEED, Progress
@@ -52,6 +52,7 @@ def predict(
     hold: Hold | None = None,
     steps: int = STEPS,
     guidance: float = 1.0,
+    temperature: float = TEMPERATURE,
     root: bool = True,
     clean: bool = True,
     progress: Progress | None = None,
@@ -60,17 +61,21 @@ def predict(
 
     past: of one person, two frames or more, on any humanoid skeleton (`motionloom.retarget`) and at any rate; the last
     ``predictor.observed`` / ``predictor.fps`` seconds are seen. hold: parts whose future is given. steps: network calls
-    per window. guidance: how strictly the past and what is held are heeded, 1 as learned. root: predict the way
-    through the world too; False: the person stays in place, as published (Chen et al. 2023). clean: keep planted feet
-    still. Longer than a window the future goes on from itself. Raises `MotionloomError` for what cannot be asked.
+    per window. guidance: how strictly the past and what is held are heeded, 1 as learned. temperature: above 1 the
+    futures are livelier and more various. root: predict the way through the world too; False: the person stays in
+    place, as published (Chen et al. 2023). clean: keep planted feet still. Longer than a window the future goes on from
+    itself. Raises `MotionloomError` for what cannot be asked.
     """
-    _check(predictor, past, seconds, count, seed=seed, steps=steps, guidance=guidance, longest=WHOLE)
+    _check(
+        predictor, past, seconds, count,
+        seed=seed, steps=steps, guidance=guidance, temperature=temperature, longest=WHOLE,
+    )  # fmt: skip
     parts = given(predictor, past, hold, seconds)
     windows = windows_for(predictor, _frames(past, seconds) / past.fps)
     drawn: list[list[Array]] = [[] for _ in range(count)]
     person = person_of(predictor, past)
     seen = np.broadcast_to(person, (count, *person.shape))
-    pen = Pen(predictor, steps, guidance, root)
+    pen = Pen(predictor, steps, guidance, temperature, root)
     for number, window in enumerate(
         pen.windows(seen, [(seed, i) for i in range(count)], parts and parts.known, windows)
     ):
@@ -94,13 +99,17 @@ def predict_pieces(
     hold: Hold | None = None,
     steps: int = STEPS,
     guidance: float = 1.0,
+    temperature: float = TEMPERATURE,
     root: bool = True,
     clean: bool = True,
 ) -> Iterator[Motion]:
     """Future ``number`` of `predict`, any length in constant memory: the past, then consecutive pieces behind it."""
-    _check(predictor, past, seconds, 1, seed=seed, steps=steps, guidance=guidance, longest=LONGEST)
+    _check(
+        predictor, past, seconds, 1,
+        seed=seed, steps=steps, guidance=guidance, temperature=temperature, longest=LONGEST,
+    )  # fmt: skip
     parts = given(predictor, past, hold, seconds)
-    pen = Pen(predictor, steps, guidance, root)
+    pen = Pen(predictor, steps, guidance, temperature, root)
     total = _frames(past, seconds)
     windows = pen.windows(
         person_of(predictor, past)[None], [(seed, number)], parts and parts.known,
@@ -121,6 +130,7 @@ def switch(
     facing: Literal["turned", "kept"] = "turned",
     steps: int = STEPS,
     guidance: float = 1.0,
+    temperature: float = TEMPERATURE,
     clean: bool = True,
 ) -> list[Motion]:
     """``count`` motions: the past, ``seconds`` in between, and the target from its first frame on.
@@ -129,7 +139,10 @@ def switch(
     arrives, moved along the ground and, with ``turned``, turned to face where the past ends, and is otherwise as it
     is. Raises `MotionloomError`. ("Motion switch", Chen et al. 2023, section 4.5; there the target is approached only.)
     """
-    _check(predictor, past, seconds, count, seed=seed, steps=steps, guidance=guidance, longest=WHOLE)
+    _check(
+        predictor, past, seconds, count,
+        seed=seed, steps=steps, guidance=guidance, temperature=temperature, longest=WHOLE,
+    )  # fmt: skip
     check_like(past, target, "target")
     if facing not in ("turned", "kept"):
         raise MotionloomError(f"facing is 'turned' or 'kept'; got {facing!r}")
@@ -142,9 +155,9 @@ def switch(
     if free:
         begun = predict(
             predictor, past, count=count, seconds=free / past.fps, seed=seed,
-            steps=steps, guidance=guidance, clean=clean,
+            steps=steps, guidance=guidance, temperature=temperature, clean=clean,
         )  # fmt: skip
-    pen = Pen(predictor, steps, guidance, True)
+    pen = Pen(predictor, steps, guidance, temperature, True)
     return [
         _arriving(pen, one, target, gap - free, seed=(seed, i), facing=facing, clean=clean)
         for i, one in enumerate(begun)
@@ -236,6 +249,7 @@ def _check(
     seed: int,
     steps: int,
     guidance: float,
+    temperature: float,
     longest: float,
 ) -> None:
     if not isinstance(predictor, Predictor):
@@ -261,3 +275,5 @@ def _check(
         raise MotionloomError(f"{steps} steps cannot be taken; these weights take 1 to {predictor.schedule.steps}")
     if not np.isfinite(guidance) or abs(guidance) > 100:
         raise MotionloomError(f"a guidance of {guidance:g} makes no motion; usual values are 1 to 3")
+    if not 0 <= temperature <= 2:
+        raise MotionloomError(f"the temperature is 0 to 2, usually about 1; got {temperature:g}")

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from motionloom.features.feet import envelope
 from motionloom.features.humanml import positions_at
 from motionloom.motion import Motion
 from motionloom.predictor import Predictor
@@ -30,6 +30,7 @@ class Pen:
     predictor: Predictor
     steps: int
     guidance: float
+    temperature: float
     root: bool
     """False: the person stays in place, but rises and sinks."""
 
@@ -57,7 +58,7 @@ class Pen:
         """(rows, frames, 22, 3): window ``number`` behind ``person`` (rows, h, 22, 3)."""
         made = next_frames(
             self.predictor, person, seeds=[row_seed(*seed, number) for seed in seeds], known=known, frames=frames,
-            steps=self.steps, guidance=self.guidance,
+            steps=self.steps, guidance=self.guidance, temperature=self.temperature,
         )  # fmt: skip
         made = made + _lift(person, made, self.predictor.fps)[..., None, None] * [0, 1, 0]
         return made if self.root else made + (person[:, -1:, :1] - made[:, :, :1]) * [1, 0, 1]
@@ -68,10 +69,8 @@ def _lift(person: Array, made: Array, fps: float) -> Array:
     lowest = np.minimum(person[:, -1, :, 1].min(axis=-1), -SUNK)  # who is lower already stays there
     under = (lowest[:, None] - made[..., 1].min(axis=-1)).clip(0)
     ease = max(round(EASE * fps), 1)
-    need = maximum_filter1d(under, 2 * ease + 1, axis=-1, mode="nearest")
-    need = uniform_filter1d(uniform_filter1d(need, ease, axis=-1, mode="nearest"), ease, axis=-1, mode="nearest")
     u = (np.arange(1, made.shape[1] + 1) / (2 * ease)).clip(0, 1)
-    return need * u * u * (3 - 2 * u)
+    return envelope(under, ease // 2) * u * u * (3 - 2 * u)
 
 
 def person_of(predictor: Predictor, past: Motion) -> Array:
