@@ -77,8 +77,8 @@ def test_a_pair_is_the_same_in_any_company(prior: Prior, block: PairBlock) -> No
     many, stands = features(prior, block, SAID * 9, seeds)
     for number in (0, 7, 8):
         alone, there = features(prior, block, SAID, seeds[2 * number : 2 * number + 2])
-        torch.testing.assert_close(many[number], alone[0], rtol=0, atol=1e-4)
-        torch.testing.assert_close(stands[number], there[0], rtol=1e-5, atol=1e-4)
+        torch.testing.assert_close(many[number], alone[0], rtol=0, atol=1e-3)
+        torch.testing.assert_close(stands[number], there[0], rtol=1e-5, atol=1e-3)
 
 
 def test_people_who_do_not_listen_are_the_priors_own(prior: Prior) -> None:
@@ -112,6 +112,22 @@ def test_what_is_known_is_shown_without_noise_and_comes_back(
     expected = state[:, 1:6] * prior.std + prior.mean
     torch.testing.assert_close(made[0, :, :5], expected, rtol=0, atol=1e-6)
     assert (made[0, :, 5:] - prior.mean).abs().max() > 1e-3
+
+
+def test_a_change_of_guesses_sees_one_persons_frames_and_no_more(prior: Prior, block: PairBlock) -> None:
+    state, mask = both_known(prior, block)
+    seen = []
+
+    def change(guess: torch.Tensor, level: int) -> torch.Tensor:
+        seen.append(guess)
+        return torch.where(mask[1, 1:], guess, 0.5)
+
+    made, _ = features(prior, block, SAID, [1, 2], known=state, mask=mask, change=[None, change])
+    assert len(seen) == 5
+    assert all(torch.equal(guess[:5], state[1, 1:6]) for guess in seen)
+    assert seen[0].shape == (FRAMES, 263)
+    torch.testing.assert_close(made[0, 1, 5:], (0.5 * prior.std + prior.mean).expand(FRAMES - 5, -1))
+    assert (made[0, 0, 5:] - made[0, 1, 5:]).abs().max() > 1e-2
 
 
 def test_duets_are_repeated_by_their_seeds(prior: Prior, block: PairBlock) -> None:
@@ -218,6 +234,12 @@ def test_a_true_future_comes_back_onto_both_bodies_in_place(
         assert apart[count:].mean() < 0.03, apart[count:].mean(axis=1)
 
 
+def test_a_single_frame_can_be_added(prior: Prior, block: PairBlock) -> None:
+    past = walkers(1.2)
+    [duet] = complete_pair(prior, block, past, steps=1, seconds=0.01)
+    assert [len(motion) for motion in duet] == [len(motion) + 1 for motion in past]
+
+
 def shifted(motion: Motion, by: float) -> Motion:
     return replace(motion, root=motion.root + np.array([by, 0.0, 0.0]))
 
@@ -241,7 +263,9 @@ def test_pasts_of_no_pair_are_refused_in_a_sentence(prior: Prior, block: PairBlo
 
 def test_what_nothing_can_be_made_of_is_refused(prior: Prior, block: PairBlock) -> None:
     wrong = [
-        ({"seconds": 0.0}, "cannot be made"), ({"seconds": float("nan")}, "cannot be made"), ({"count": 0}, "1 to"),
+        ({"seconds": 0.0}, "cannot be made"), ({"seconds": float("nan")}, "cannot be made"),
+        ({"count": 0}, "1 or more"),
+        ({"count": 10_000}, "10000 duets"),
         ({"seed": -1}, "seed"), ({"seed": (1, 2**62)}, "seed"), ({"steps": 0}, "steps"), ({"person": 2}, "person 2"),
         ({"guidance": float("nan")}, "guidance"), ({"goal": Goal.nothing(3)}, "goal of 3"),
     ]  # fmt: skip

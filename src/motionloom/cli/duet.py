@@ -89,6 +89,7 @@ def run_duet(arguments: argparse.Namespace) -> None:
     timeline = _timeline(arguments) if arguments.timeline else None
     goal = _goal(arguments) if arguments.path else None
     given, manners = _read(arguments)
+    _check_sizes(arguments, files, given, timeline)
     prior, block = _load(arguments)
     began = time.perf_counter()
     with bar("drawing two people") as progress:
@@ -188,13 +189,6 @@ def _read(arguments: argparse.Namespace) -> "tuple[list[Motion], list[tuple[floa
         motion, unit, orders = read_clip(arguments, path)
         motions.append(crop(motion, arguments))
         manners.append((unit or 1.0, orders))
-    if arguments.past:
-        from motionloom.motion import MAX_POSES
-
-        added = (ADDED if arguments.seconds is None else arguments.seconds) * motions[0].fps
-        poses = sum((len(motion) + added) * len(motion.skeleton) for motion in motions) * arguments.count
-        if poses > MAX_POSES:
-            fail(f"{arguments.count} duets behind such a long past do not fit into memory; take less with --start")
     return motions, manners
 
 
@@ -314,6 +308,25 @@ def _check_places(files: list[list[Path]]) -> None:
         check_output(place)
         if place.is_dir():
             fail(f"{place} is a folder; name a file to write")
+
+
+def _check_sizes(
+    arguments: argparse.Namespace, files: list[list[Path]], given: "list[Motion]", timeline: "Timeline | None"
+) -> None:
+    """Refuse what no file or memory holds, before any work."""
+    from motionloom.io.stream import check_length
+    from motionloom.motion import MAX_POSES
+
+    if timeline is None and not given:
+        return
+    added = ADDED if arguments.seconds is None else arguments.seconds
+    seconds = timeline.seconds if timeline else given[0].seconds + (added if arguments.past else 0.0)
+    rate = arguments.fps or (given[0].fps if given else 20.0)
+    joints = [len(motion.skeleton) for motion in given] or [22]
+    for place in (place for several in files for place in several):
+        check_length(place, total=round(seconds * rate), fps=rate, joints=max(joints))
+    if 2 * max(joints) * seconds * rate * arguments.count > MAX_POSES:
+        fail(f"{arguments.count} duets of {seconds:g} s do not fit into memory; lower --count, or use --start")
 
 
 # What is written and told

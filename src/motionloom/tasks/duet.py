@@ -78,7 +78,7 @@ def react(
     asks for nothing in particular. Raises `MotionloomError` for what cannot be asked.
     """
     said = prompts_of(prompt)
-    check_asked(prior, count=count, seed=seed)
+    check_asked(prior, count=count, seed=seed, seconds=given.seconds)
     if not SHORTEST - 1e-6 <= given.seconds <= LONGEST:
         raise MotionloomError(
             f"the given motion is {given.seconds:.2f} s long; {SHORTEST:g} to {LONGEST:g} s can be reacted to"

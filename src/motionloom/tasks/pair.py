@@ -59,8 +59,10 @@ CONTEXT = 3.0
 """Seconds of a past that are looked at for where its floor is."""
 SEEN = 40
 """Frames of a past, at 20 per second, that the network sees."""
-MOST = 10_000
-"""Duets that are made in one call."""
+LEAST = 4
+"""Frames behind a past that are put on a skeleton at once, at least, for its seam to fade over."""
+MOST = 10_000.0
+"""Seconds of all duets together that are made in one call."""
 
 
 @torch.inference_mode()
@@ -234,7 +236,8 @@ def generate_pair(
     said = prompts_of(prompt)
     if not all(words.strip() for words in said):
         raise MotionloomError("a prompt is empty; say in words what the two people do")
-    check_asked(prior, count=count, seed=seed, person=person)
+    length = len(goal) / FPS if goal else seconds
+    check_asked(prior, count=count, seed=seed, person=person, seconds=length)
     frames = _goal_frames(goal) if goal else frames_in(seconds, prior.fps)
     place = placement_of(goal) if goal else Placement()
     change: list[Correction | None] = [None, None]
@@ -275,14 +278,16 @@ def _goal_frames(goal: Goal) -> int:
     return len(goal)
 
 
-def check_asked(prior: Prior, *, count: int, seed: Seed, person: int = 0) -> None:
+def check_asked(prior: Prior, *, count: int, seed: Seed, person: int = 0, seconds: float = 0.0) -> None:
     """Raise MotionloomError for weights, counts, seeds and people that there are not."""
     if len(prior.mean) != WIDTH or prior.fps != FPS:
         raise MotionloomError(
             f"these weights make {len(prior.mean)} numbers a frame; two people need {WIDTH} at {FPS:g} fps"
         )
-    if not 1 <= count <= MOST:
-        raise MotionloomError(f"{count} duets cannot be made in one call; ask for 1 to {MOST:,}")
+    if count < 1 or (count > 1 and count * seconds > MOST):
+        raise MotionloomError(
+            f"{count} duets of {seconds:g} s cannot be made in one call; ask for 1 or more, of {MOST:g} s together"
+        )
     for number in seed if isinstance(seed, tuple) else (seed,):
         if not 0 <= number < LARGEST_SEED:
             raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {number}")
@@ -315,11 +320,10 @@ def complete_pair(
     `data.pairs.together` does. (Prefix completion, Shafir et al. 2024, section 5.2.)
     """
     said = prompts_of(prompt)
-    check_asked(prior, count=count, seed=seed)
-    ground = Ground.of(past)
-    added = max(round(seconds * past[0].fps), 1) if np.isfinite(seconds) else 0
+    check_asked(prior, count=count, seed=seed, seconds=seconds)
     if not 0 < seconds <= LONGEST:
         raise MotionloomError(f"two people cannot go on for {seconds:g} s; ask for more than 0 and at most {LONGEST:g}")
+    ground, added = Ground.of(past), max(round(seconds * past[0].fps), 1)
     known, stands, floors = ground.encoded()
     seen = known.shape[1]
     frames = seen + int(np.ceil(added / past[0].fps * FPS - 1e-6)) + 1
@@ -376,19 +380,17 @@ class Ground:
         ratio = float(np.mean(self.legs)) / self.legs[person]
         return places + (ratio - 1.0) * places[:, :1] * np.array([1.0, 0.0, 1.0])
 
-    def behind(
-        self, person: int, places: Array, contacts: Array, seen: int, added: int, *, clean: bool
-    ) -> Motion:  # fmt: skip
+    def behind(self, person: int, places: Array, contacts: Array, seen: int, added: int, *, clean: bool) -> Motion:
         """The person's motion with ``added`` frames more: places (frames, 22, 3) at 20 per second on the common
         ground, contacts (frames, 4); frame ``seen - 1`` is the motion's last."""
         motion = self.motions[person]
         shown = int((seen - 1) / FPS * motion.fps + 1e-6) + 1
         tail = motion.frames(len(motion) - shown, len(motion))
-        old = concatenated(tail, *[tail.frames(shown - 1, shown)] * added)
+        old = concatenated(tail, *[tail.frames(shown - 1, shown)] * max(added, LEAST))
         at = (np.arange(len(old)) - (shown - 1)) / motion.fps * FPS + seen - 1
         nearest = np.clip(at.round().astype(int), 0, len(contacts) - 1)
         drawn = positions_at(self.own(person, places), at)
         made = worn(drawn, old, contacts=contacts[nearest], clean=clean, known=shown)
         nothing = kept_parts(motion.skeleton, frozenset(), np.zeros(3, dtype=bool))
-        new = splice(old, made, shown, last=len(old), kept=nothing).frames(shown, len(old))
+        new = splice(old, made, shown, last=len(old), kept=nothing).frames(shown, shown + added)
         return concatenated(motion, new)
