@@ -99,7 +99,7 @@ def _add_sampling(parser: argparse.ArgumentParser, other: str) -> None:
     parser.add_argument("--seed", type=int, default=0, help="the same seed makes the same motions (default 0)")
     parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster")
     parser.add_argument("--guidance", type=float, default=1.0, help="strength of what is known (default 1)")
-    parser.add_argument("--temperature", type=float, help="livelier above 1, calmer below, 0 to 2 (default 1.15)")
+    parser.add_argument("--temperature", type=float, help="livelier above 1, calmer below, 0 to 2 (default 1.1)")
     parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
     parser.add_argument(
         "--weights", default="predictor", metavar="NAME|PATH", help="shipped name or file (default: predictor)"

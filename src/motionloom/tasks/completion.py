@@ -20,9 +20,9 @@ from motionloom.predictor import Predictor
 
 Array = NDArray[np.float64]
 
-STEPS, SOLVER, SPACING = 8, "dpm2m", "index"
+STEPS, SOLVER, SPACING = 5, "dpm2m", "index"
 """The default walk, see docs/decisions."""
-TEMPERATURE = 1.15
+TEMPERATURE = 1.1
 """How much noise the walk starts from, in standard deviations: few steps draw too little of what there is, and a person
 who goes on from its own calm comes to rest; see docs/decisions."""
 EASE = 0.4
