@@ -231,7 +231,7 @@ def test_a_true_future_comes_back_onto_both_bodies_in_place(
     [duet] = complete_pair(prior, block, (past[0], past[1]), seconds=0.5)
     for made, old in zip(duet, whole, strict=True):
         apart = np.linalg.norm(made.positions() - old.positions()[: len(made)], axis=-1)
-        assert apart[count:].mean() < 0.03, apart[count:].mean(axis=1)
+        assert apart[count:].mean() < 0.012, apart[count:].mean(axis=1)
 
 
 def test_a_single_frame_can_be_added(prior: Prior, block: PairBlock) -> None:
