@@ -108,6 +108,8 @@ def test_rows_denoised_together_or_alone_make_the_same(prior: Prior, block: Pair
         torch.testing.assert_close(a, b, rtol=0, atol=1e-4)
         np.testing.assert_allclose(stands, others, atol=1e-3)
     assert [piece.shape for piece, _ in one] == [(2, n, 263) for n in (20, 16, 18)]
+    again = one[1][0][:, 1:3] - one[0][0][:, -3:-1]  # the second row begins with what the first one ends with
+    assert again.abs().max() > 1e-3
 
 
 def test_only_who_listens_hears_what_the_other_is_told(prior: Prior, block: PairBlock) -> None:
