@@ -44,6 +44,14 @@ def test_a_single_frame_is_enough(seed: int) -> None:
     np.testing.assert_allclose(motion_from_positions(positions, FPS).positions(), positions, atol=1e-3)
 
 
+@settings(max_examples=5, deadline=None)
+@given(SEEDS)
+def test_hands_and_toes_go_with_what_they_hang_on(seed: int) -> None:
+    """Nothing tells how they are bent."""
+    ends = motion_from_positions(wander(seed).positions(), FPS).rotations[:, [10, 11, 20, 21]]
+    np.testing.assert_allclose(np.abs(ends), np.broadcast_to(rot.IDENTITY, ends.shape), atol=1e-9)
+
+
 @settings(max_examples=10, deadline=None)
 @given(SEEDS)
 def test_bent_limbs_give_back_their_own_rotations(seed: int) -> None:

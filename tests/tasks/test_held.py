@@ -8,9 +8,10 @@ from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.retarget import joints22
 from motionloom.skeleton import SMPL22
+from motionloom.tasks import predict as task
 from motionloom.tasks.held import HeldPart, Hold, given
-from motionloom.tasks.predict import predict
-from motionloom.tasks.splice import carried, overlaid, standing
+from motionloom.tasks.predict import predict, predict_pieces
+from motionloom.tasks.splice import carried, concatenated, overlaid, standing
 from tests.tasks.small_predictor import small_predictor
 from tests.tasks.test_edit import floating, person, rig
 
@@ -29,7 +30,7 @@ def future(hold: Hold | None, *, past: Motion = PAST, seconds: float = 0.8, **as
     return made.frames(len(past), len(made))
 
 
-@pytest.mark.parametrize("group", sorted({*SMPL22.groups, "left_knee", "head"}))
+@pytest.mark.parametrize("group", ["lower_body", "left_arm", "torso", "left_knee", "head"])
 def test_held_joints_take_the_local_rotations_of_the_source_bit_for_bit(group: str) -> None:
     made, joints = future(held(group)), sorted(SMPL22.resolve([group]))
     chosen = [j for j in joints if j != 0]  # the pelvis is moved with the aligned source
@@ -87,6 +88,16 @@ def test_a_part_that_is_held_for_a_while_is_led_there_and_back() -> None:
     assert np.array_equal(share == 1, inside)
     assert np.abs(np.diff(share)).max() < 0.3
     assert np.array_equal(share > 1e-6, (times > 0.1 + 1e-3) & (times < 0.7 - 1e-3))
+
+
+def test_what_is_held_in_a_later_piece_is_the_sources_of_that_moment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(task, "CHUNK", 0.9)
+    hold = held("left_arm", spans=((0.8, 1.4),))
+    _, *pieces = predict_pieces(PREDICTOR, PAST, seconds=1.6, steps=1, hold=hold)
+    assert [len(piece) for piece in pieces] == [30, 18]
+    times, joints = np.arange(1, 49) / 30, sorted(SMPL22.resolve(["left_arm"]))
+    same = (concatenated(*pieces).rotations[:, joints] == SOURCE.rotations[:48, joints]).all((1, 2))
+    assert np.array_equal(same, (times > 0.8 - 1e-9) & (times < 1.4 + 1e-9))
 
 
 def test_a_source_that_ends_early_lets_go_without_a_jump() -> None:

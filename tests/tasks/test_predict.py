@@ -9,7 +9,6 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io import load
 from motionloom.motion import Motion
-from motionloom.predictor import Predictor
 from motionloom.retarget import from_smpl22, joints22
 from motionloom.tasks import predict as task
 from motionloom.tasks.predict import predict, predict_pieces, switch
@@ -51,8 +50,10 @@ BODIES = {"person": lambda s, fps=30.0: person(s, fps), "rig": on_rig, "hips": o
 # The past comes back, and goes on
 
 
-@pytest.mark.parametrize("body", sorted(BODIES))
-@pytest.mark.parametrize("fps", [10.0, 24.0, 25.0, 29.97, 30.0, 60.0, 120.0])
+@pytest.mark.parametrize(
+    ("body", "fps"),
+    [("person", 10.0), ("rig", 24.0), ("hips", 25.0), ("person", 29.97), ("rig", 30.0), ("hips", 60.0), ("rig", 120.0)],
+)
 def test_the_past_comes_back_bit_for_bit_and_goes_on_without_a_seam(body: str, fps: float) -> None:
     past = BODIES[body](1.2, fps)
     n = len(past)
@@ -131,26 +132,26 @@ def test_frames_that_are_a_rounding_more_than_a_window_are_made_too() -> None:
 
 
 def test_future_i_is_the_same_alone_among_others_and_in_pieces() -> None:
-    asked = {"seconds": 2.3, "seed": 5, "steps": 2}
-    many = predict(PREDICTOR, PAST, count=4, **asked)
+    asked = {"seconds": 1.3, "seed": 5, "steps": 2}
+    many = predict(PREDICTOR, PAST, count=3, **asked)
     few = predict(PREDICTOR, PAST, count=2, **asked)
-    pieces = list(predict_pieces(PREDICTOR, PAST, number=3, **asked))
+    pieces = list(predict_pieces(PREDICTOR, PAST, number=2, **asked))
     assert same(pieces[0], PAST)
-    close(concatenated(*pieces), many[3])
+    close(concatenated(*pieces), many[2])
     for i in (0, 1):
         close(few[i], many[i])
-    again = predict(PREDICTOR, PAST, count=4, **asked)
-    assert all(same(a, b) for a, b in zip(many, again, strict=True))
-    apart = [np.abs(many[i].positions() - many[j].positions()).max() for i in range(4) for j in range(i)]
+    again = predict(PREDICTOR, PAST, count=2, **asked)
+    assert all(same(a, b) for a, b in zip(few, again, strict=True))
+    apart = [np.abs(many[i].positions() - many[j].positions()).max() for i in range(3) for j in range(i)]
     assert min(apart) > 0.01
     other = predict(PREDICTOR, PAST, count=1, **asked | {"seed": 6})[0]
     assert np.abs(other.positions() - many[0].positions()).max() > 0.01
 
 
-def test_a_long_future_comes_in_pieces_without_seams_between_them() -> None:
-    pieces = list(predict_pieces(PREDICTOR, PAST, seconds=20.5, steps=1))
-    assert len(pieces) == 4
-    assert sum(map(len, pieces)) == 30 + 615
+def test_a_long_future_comes_in_pieces_without_seams_between_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(task, "CHUNK", 3.0)
+    pieces = list(predict_pieces(PREDICTOR, PAST, seconds=8.5, steps=1))
+    assert [len(piece) for piece in pieces] == [30, 90, 90, 75]
     whole = concatenated(*pieces)
     places, at = joints22(whole), np.cumsum([len(p) for p in pieces])[:-1]
     bend = np.linalg.norm(np.diff(places, 2, axis=0), axis=-1).max(-1)
@@ -158,7 +159,7 @@ def test_a_long_future_comes_in_pieces_without_seams_between_them() -> None:
     for border in at[1:]:
         assert speed[border - 1] < 1.2 * np.delete(speed, at - 1).max()
         assert bend[border - 2 : border].max() < 1.5 * np.delete(bend, np.concatenate([at - 1, at - 2])).max()
-    close(whole, predict(PREDICTOR, PAST, count=1, seconds=20.5, steps=1)[0])
+    close(whole, predict(PREDICTOR, PAST, count=1, seconds=8.5, steps=1)[0])
 
 
 def test_minutes_look_back_a_few_seconds_only(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,8 +178,8 @@ def test_minutes_look_back_a_few_seconds_only(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(task, "worn", worn)
     monkeypatch.setattr(task, "positions_at", positions_at)
-    total = sum(len(piece) for piece in predict_pieces(PREDICTOR, PAST, seconds=120, steps=1, clean=False))
-    assert total == 30 + 3600
+    total = sum(len(piece) for piece in predict_pieces(PREDICTOR, PAST, seconds=60, steps=1, clean=False))
+    assert total == 30 + 1800
     assert max(kept) <= 15 + 30 * (task.CHUNK + 1) + 2 * 15
 
 
@@ -209,8 +210,7 @@ def test_without_its_way_a_person_comes_to_a_stop_and_stays_in_place() -> None:
 # Switch
 
 
-@pytest.mark.parametrize("facing", ["turned", "kept"])
-@pytest.mark.parametrize("body", sorted(BODIES))
+@pytest.mark.parametrize(("body", "facing"), [("person", "turned"), ("rig", "kept"), ("hips", "turned")])
 def test_a_target_comes_back_bit_for_bit_but_for_a_rigid_move_on_the_ground(body: str, facing: str) -> None:
     past, target = BODIES[body](1.0), BODIES[body](6.0).frames(140, 170)
     (made,) = switch(PREDICTOR, past, target, seconds=0.5, steps=2, facing=facing)
@@ -228,8 +228,7 @@ def test_a_target_comes_back_bit_for_bit_but_for_a_rigid_move_on_the_ground(body
     assert np.abs(off).max() < (0.35 if facing == "turned" else 1e-9)
 
 
-@pytest.mark.parametrize("seconds", [0.1, 0.5, 1.0, 2.6])
-@pytest.mark.parametrize("fps", [24.0, 30.0, 120.0])
+@pytest.mark.parametrize(("seconds", "fps"), [(0.1, 24.0), (0.1, 120.0), (0.5, 30.0), (1.0, 24.0), (2.6, 30.0)])
 def test_neither_seam_of_a_switch_jumps(seconds: float, fps: float) -> None:
     """Gaps shorter and longer than what one window sees."""
     past, target = person(1.0, fps), person(3.0, fps).frames(round(2.2 * fps), round(3 * fps))
@@ -244,7 +243,7 @@ def test_neither_seam_of_a_switch_jumps(seconds: float, fps: float) -> None:
 
 def test_many_switches_differ_and_each_has_its_own_seed() -> None:
     target = person(3.0, 30.0).frames(60, 70)
-    many = switch(PREDICTOR, PAST, target, count=3, seconds=0.6, steps=2, seed=3)
+    many = switch(PREDICTOR, PAST, target, count=2, seconds=0.6, steps=2, seed=3)
     (first,) = switch(PREDICTOR, PAST, target, count=1, seconds=0.6, steps=2, seed=3)
     close(first, many[0])
     assert np.abs(many[0].positions() - many[1].positions()).max() > 0.005
@@ -320,7 +319,5 @@ def test_a_target_that_cannot_be_arrived_at_is_told(word: str) -> None:
 
 def test_a_window_that_sees_a_second_is_enough_to_arrive() -> None:
     """Whatever the window, a switch's target is within sight of its last window."""
-    for predictor in (PREDICTOR, replace(PREDICTOR, fps=60.0)):
-        assert isinstance(predictor, Predictor)
-        (made,) = switch(predictor, PAST, PAST, seconds=1.4, steps=1)
-        assert len(made) == 30 + 42 + 30
+    (made,) = switch(replace(PREDICTOR, fps=60.0), PAST, PAST, seconds=1.4, steps=1)
+    assert len(made) == 30 + 42 + 30

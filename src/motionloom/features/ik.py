@@ -181,6 +181,7 @@ def solve_limbs(seen: np.ndarray, places: np.ndarray, world: np.ndarray, fps: fl
         world[:, c] = world[:, b]
         if limb.tip is not None:
             world[:, c] = aim(world[:, b], _REST[limb.tip], seen[:, limb.tip] - seen[:, c])
+            world[:, limb.tip] = world[:, c]  # places do not tell how toes are bent: they go with the foot
 
 
 def _steadied_limbs(seen: Array, local: Array) -> Array:

@@ -84,9 +84,7 @@ def worn(places: Array, old: Motion, *, clean: bool, contacts: Array | None = No
     person = motion_from_positions(places, old.fps)
     if clean:
         person = clean_feet(person, contacts=contacts)
-    level = person.rotations.copy()
-    level[:, list(LEAVES[:2])] = rot.IDENTITY  # places do not tell how toes are bent: they go with the foot
-    made = in_manner_of(old, retarget(replace(person, rotations=level), old.skeleton))
+    made = in_manner_of(old, retarget(person, old.skeleton))
     back = made.frames(0, known) if known else in_manner_of(old, retarget(to_smpl22(old), old.skeleton))
     seen, carrier = old.frames(0, len(back)), _carrier(old.skeleton)
     apart = rot.multiply(seen.world_rotations()[:, carrier], rot.inverse(back.world_rotations()[:, carrier]))
