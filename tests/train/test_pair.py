@@ -12,11 +12,11 @@ from motionloom.cli import main
 from motionloom.data.pairs import Pair, mirrored
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
-from motionloom.features.pair import decode
+from motionloom.features.pair import decode, encode
 from motionloom.nets.adapter import fingerprint
 from motionloom.nets.pair import PairNet, Talk, other
 from motionloom.nets.pair_block import PairBlock
-from motionloom.train.duets import KEEN, NEAR, Duets, Sight, headed
+from motionloom.train.duets import KEEN, NEAR, Duets, Sight
 from motionloom.train.pair import BEGUN, Drawn, PairGuess, Settings, held_out, told, train_pair
 from tests.data.test_pairs import write_pair
 from tests.metrics import people
@@ -78,7 +78,7 @@ def test_a_window_decodes_to_the_recorded_places_above_each_person_s_floor():
 
 
 def test_features_have_the_heading_that_priors_have_seen_also_in_the_first_frame():
-    features, _ = headed(walkers())
+    features = encode(walkers()).features
     assert np.abs(np.diff(features[:, :5, 0], axis=1)).max() < 1e-3  # the compatible one turns by a leap there
     for person, row in zip(walkers(), features, strict=True):
         wanted = hml.encode(hml.canonical(person), heading="corrected")
@@ -88,7 +88,7 @@ def test_features_have_the_heading_that_priors_have_seen_also_in_the_first_frame
 def test_half_of_the_windows_are_of_mirrored_pairs_and_half_have_the_people_exchanged():
     duets = Duets([pair()])
     worlds = [pair().positions, mirrored(pair()).positions]
-    plain = [headed(positions)[0] for positions in worlds]
+    plain = [encode(positions).features for positions in worlds]
     crops, found = duets.draw(np.random.default_rng(0), 30, 60), np.zeros((2, 2))
     for window, stands in zip(crops.features.numpy(), crops.stands.numpy(), strict=True):
         for side, features in enumerate(plain):

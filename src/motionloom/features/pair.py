@@ -17,7 +17,7 @@ from torch import Tensor
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
-from motionloom.features.humanml import recover_root
+from motionloom.features.humanml import Heading, recover_root
 from motionloom.features.positions import SMPL_LAYOUT
 
 Array = NDArray[np.float64]
@@ -92,18 +92,23 @@ def swapped(pair: Numbers, axis: int = 0) -> Numbers:
 # Features and stands
 
 
-def encode(positions: np.ndarray) -> Encoded:
+def encode(positions: np.ndarray, *, heading: Heading = "corrected") -> Encoded:
     """Two people in one world, (2, frames, 22, 3) metres at 20 fps, +Y up, to features (2, frames - 1, 263).
 
     Each is told from where he stands in frame 0 and from his own lowest point, as `humanml.canonical` does. The bodies
-    are taken as they are: people of the uniform size, for the shipped weights.
+    are taken as they are: people of the uniform size, for the shipped weights, which were trained on ``corrected``
+    headings (smoothed ones, in frame 0 too); ``compatible`` is the published way, for published weights.
     """
     p = _checked(positions)
     place = SMPL_LAYOUT.place(p[:, 0])
     stands = np.stack([np.cos(place.facing), np.sin(place.facing), place.origin[:, 0], place.origin[:, 2]], axis=-1)
     floors = p[..., 1].min(axis=(1, 2))
     local = told_from(p - floors[:, None, None, None] * np.array([0.0, 1.0, 0.0]), stands[:, None, None])
-    return Encoded(np.stack([humanml.encode(person) for person in local]), stands, floors)
+    if heading == "corrected":
+        turn = np.stack([humanml.heading_quaternions(person, heading=heading)[0] for person in local])
+        w, y, zero = turn[:, 0], turn[:, 2], np.zeros(2)
+        stands = compose(stands, np.stack([1 - 2 * y * y, -2 * w * y, zero, zero], axis=-1))
+    return Encoded(np.stack([humanml.encode(person, heading=heading) for person in local]), stands, floors)
 
 
 def decode(features: Numbers, stands: Numbers) -> Numbers:

@@ -39,21 +39,6 @@ class _Told:
     texts: tuple[int, ...]
 
 
-def headed(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(2, frames, 22, 3) metres in one world to features (2, frames - 1, 263) and stands (2, 4) at frame 0.
-
-    As `features.pair.encode`, but with the ``corrected`` heading that priors trained here have seen: both people face
-    where the smoothed line across their hips and shoulders says, in frame 0 too.
-    """
-    plain = encode(positions)
-    up = np.array([0.0, 1.0, 0.0])
-    local = told_from(positions - plain.floors[:, None, None, None] * up, plain.stands[:, None, None])
-    features = np.stack([humanml.encode(person, heading="corrected") for person in local])
-    turn = np.stack([humanml.heading_quaternions(person, heading="corrected")[0] for person in local])
-    w, y, zero = turn[:, 0], turn[:, 2], np.zeros(2)
-    return features, compose(plain.stands, np.stack([1 - 2 * y * y, -2 * w * y, zero, zero], axis=-1))
-
-
 class Duets:
     """Pairs and their mirror images, told once; crops of them are slices."""
 
@@ -64,7 +49,8 @@ class Duets:
         self.lengths = np.array([told.features.shape[1] for told in self.told])
 
     def _tell(self, pair: Pair) -> _Told:
-        features, stands = (torch.from_numpy(np.asarray(x, dtype=np.float64)) for x in headed(pair.positions))
+        features, stands, _ = encode(pair.positions)
+        features, stands = torch.from_numpy(features).double(), torch.from_numpy(stands)
         ways = compose(stands[:, None], along(features))
         known = {text: number for number, text in enumerate(self.texts)}
         return _Told(features.float(), ways.float(), tuple(known[t] for t in pair.captions if t in known) or (0,))
