@@ -5,7 +5,8 @@ motions = generate(Prior.load(), ["a person walks forward"], seconds=5.0, seed=1
 save(motions[0], "walk.bvh")
 
 `compose` makes long motions out of `Segment`s, `control` motions that meet a `Goal`, `edit` changes clips; a
-`Predictor` can `predict` what somebody does next, or `switch` from one clip to another.
+`Predictor` can `predict` what somebody does next, or `switch` from one clip to another. With a `PairBlock` two people
+come into one world: `generate_pair`, `complete_pair`, `react`, `compose_pair`.
 """
 
 from importlib import import_module
@@ -16,14 +17,17 @@ if TYPE_CHECKING:
     from motionloom.errors import MotionloomError
     from motionloom.io import load, save
     from motionloom.motion import Motion
+    from motionloom.nets.pair_block import PairBlock
     from motionloom.predictor import Predictor, save_predictor
     from motionloom.retarget import from_smpl22, retarget, to_smpl22
     from motionloom.skeleton import SMPL22, Skeleton
     from motionloom.tasks.control import Controlled, control
+    from motionloom.tasks.duet import compose_pair, react
     from motionloom.tasks.edit import edit
     from motionloom.tasks.goals import Goal
     from motionloom.tasks.held import HeldPart, Hold
     from motionloom.tasks.long import Segment, compose
+    from motionloom.tasks.pair import complete_pair, generate_pair
     from motionloom.tasks.predict import predict, switch
     from motionloom.tasks.text import generate
 
@@ -34,6 +38,7 @@ _PLACES = {
     "load": "io",
     "save": "io",
     "Motion": "motion",
+    "PairBlock": "nets.pair_block",
     "Predictor": "predictor",
     "save_predictor": "predictor",
     "from_smpl22": "retarget",
@@ -43,12 +48,16 @@ _PLACES = {
     "Skeleton": "skeleton",
     "Controlled": "tasks.control",
     "control": "tasks.control",
+    "compose_pair": "tasks.duet",
+    "react": "tasks.duet",
     "edit": "tasks.edit",
     "Goal": "tasks.goals",
     "HeldPart": "tasks.held",
     "Hold": "tasks.held",
     "Segment": "tasks.long",
     "compose": "tasks.long",
+    "complete_pair": "tasks.pair",
+    "generate_pair": "tasks.pair",
     "predict": "tasks.predict",
     "switch": "tasks.predict",
     "generate": "tasks.text",
@@ -62,17 +71,22 @@ __all__ = [
     "Hold",
     "Motion",
     "MotionloomError",
+    "PairBlock",
     "Predictor",
     "Prior",
     "Segment",
     "Skeleton",
+    "complete_pair",
     "compose",
+    "compose_pair",
     "control",
     "edit",
     "from_smpl22",
     "generate",
+    "generate_pair",
     "load",
     "predict",
+    "react",
     "retarget",
     "save",
     "save_predictor",
