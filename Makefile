@@ -53,6 +53,7 @@ measure: $(VENV)/.runtime  ## measure the shipped weights anew (DATA=built set);
 	$(BIN)/motionloom evaluate realism $(if $(DATA),--data $(DATA)) --finished --out benchmarks/realism_finished
 	$(BIN)/motionloom bench --json benchmarks/speed.json > benchmarks/speed.txt
 	$(BIN)/motionloom bench --long --json benchmarks/long.json > benchmarks/long.txt
+	$(BIN)/motionloom bench --prediction --json benchmarks/prediction.json > benchmarks/prediction.txt
 	$(BIN)/python benchmarks/user_goals.py --out out/user_goals > benchmarks/user_goals/table.txt
 	cp out/user_goals/user_goals.json benchmarks/user_goals/
 	$(BIN)/python tools/fill_readme.py
