@@ -33,6 +33,8 @@ SHEETS: dict[str, list[list[str]]] = {
          "--out", "{work}/waving.bvh"],
         ["view", CLIP, "{work}/waving.bvh", "--out", "{out}"],
     ],
+    "predict": [["predict", CLIP, "--end", "0.8", "--count", "5", "--seconds", "2", "--seed", "1", "--out", "{out}"]],
+    "duet": [["duet", "two people dance salsa together", "--seconds", "6", "--seed", "1", "--out", "{out}"]],
 }  # fmt: skip
 """File name -> commands; {out} is the picture. These are first draws of seed 1, not the best of many."""
 
