@@ -13,6 +13,7 @@ from motionloom.retarget import from_smpl22, joints22
 from motionloom.tasks import predict as task
 from motionloom.tasks.predict import predict, predict_pieces, switch
 from motionloom.tasks.splice import concatenated, standing
+from motionloom.tasks.windows import Pen, person_of
 from tests.nets import tiny_predictor
 from tests.shared import shared
 from tests.tasks.small_predictor import small_predictor
@@ -120,6 +121,25 @@ def test_head_and_toes_stay_as_they_are_held() -> None:
     assert np.degrees(np.linalg.norm(off, axis=-1)).max() < 25
 
 
+def test_a_person_wears_what_was_seen_and_then_what_was_drawn_each_at_its_frame(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """At the predictor's own rate a frame of the grid is a frame of the result."""
+    given, wear = [], task.worn
+
+    def worn(places, old, **asked):
+        given.append((places, asked["known"]))
+        return wear(places, old, **asked)
+
+    monkeypatch.setattr(task, "worn", worn)
+    predict(PREDICTOR, PAST, count=1, seconds=1.0, steps=1, temperature=1.0)
+    ((places, known),) = given
+    seen = person_of(PREDICTOR, PAST)
+    assert known == len(seen)
+    drawn = next(Pen(PREDICTOR, 1, 1.0, 1.0, True).windows(seen[None], [(0, 0)], None, 1))[0]
+    np.testing.assert_allclose(places, np.concatenate([seen, drawn]), atol=1e-5)
+
+
 def test_frames_that_are_a_rounding_more_than_a_window_are_made_too() -> None:
     """A second is a window; 60 frames of 59.94 fps are a little more than that."""
     past = person(1.0, 59.94)
@@ -203,6 +223,7 @@ def test_without_its_way_a_person_comes_to_a_stop_and_stays_in_place() -> None:
     level = made.root[:, [0, 2]]
     assert np.linalg.norm(level[-1] - level[45]) < 0.05
     assert np.linalg.norm(level[-1] - level[29]) < 0.25
+    close(concatenated(*predict_pieces(PREDICTOR, PAST, seconds=2.0, steps=2, root=False)), made)
     free = predict(PREDICTOR, PAST, **FEW | {"seconds": 2.0})[0]
     assert np.linalg.norm((free.root - made.root)[-1]) > 0.02
 
@@ -239,6 +260,23 @@ def test_neither_seam_of_a_switch_jumps(seconds: float, fps: float) -> None:
     usual = max(speed[: len(past) - 1].max(), speed[len(past) + gap :].max())
     near = [len(past) - 1, len(past), len(past) + gap - 2, len(past) + gap - 1]
     assert speed[near].max() < (2.0 if seconds >= 0.5 else 5.0) * usual
+
+
+def test_the_network_is_told_the_target_from_the_moment_on_when_it_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
+    told, draw = [], Pen.window
+
+    def window(self, person, seeds, number, known, **asked):
+        told.append(known)
+        return draw(self, person, seeds, number, known, **asked)
+
+    monkeypatch.setattr(Pen, "window", window)
+    target = person(3.0, 30.0).frames(60, 90)
+    switch(PREDICTOR, PAST, target, seconds=0.5, steps=1, facing="kept")
+    (known,) = told
+    assert np.array_equal(known.mask[:, 1] == 1, np.arange(1, len(known.mask) + 1) >= 16)
+    assert not known.mask[:, 0].any(), "where it arrives is free"
+    places, real = known.positions[15:], joints22(target)[: len(known.positions) - 15]
+    assert np.abs((places - places[:, :1]) - (real - real[:, :1])).max() < 0.01
 
 
 def test_many_switches_differ_and_each_has_its_own_seed() -> None:
