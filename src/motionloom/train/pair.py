@@ -54,7 +54,9 @@ class Settings:
     place: float = 1.0
     """Weight of the places D."""
     sight: float = 1.0
-    """Weight of where the two see each other."""
+    """Weight of where the two see each other, at the cleanest levels."""
+    faint: float = 0.25
+    """How much of that weight is left near pure noise: there it is decided whether they stay together."""
 
     @staticmethod
     def parse(values: dict[str, Any]) -> "Settings":
@@ -68,9 +70,9 @@ class Settings:
             if not fits or (hints[key] is not bool and isinstance(value, bool)):
                 raise MotionloomError(f"[pair] {key} must be of kind {hints[key].__name__}; got {value!r}")
         made = Settings(**values)
-        shares = (made.prefix, made.react, made.prefix + made.react, made.silent, made.early)
+        shares = (made.prefix, made.react, made.prefix + made.react, made.silent, made.early, made.faint)
         if not all(0 <= share <= 1 for share in shares) or not all(0 <= w <= 1e3 for w in (made.place, made.sight)):
-            raise MotionloomError("[pair] prefix, react, silent and early are shares, and place and sight are weights")
+            raise MotionloomError("[pair] prefix, react, silent, early and faint are shares, place and sight weights")
         return made
 
     def config(self, prior: Prior) -> PairConfig:
@@ -117,7 +119,7 @@ class PairGuess:
         for name, block in LAYOUT.items():
             scale[block] = WEIGHTS[name]
         self.scale = scale / scale.mean()
-        self.shares = self.schedule.alpha_bar.to(self.mean)
+        self.shares = settings.faint + (1 - settings.faint) * self.schedule.alpha_bar.to(self.mean)
 
     @property
     def net(self) -> nn.Module:
