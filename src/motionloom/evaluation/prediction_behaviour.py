@@ -22,8 +22,9 @@ from motionloom.metrics.prediction_body import seam
 from motionloom.motion import Motion
 from motionloom.predictor import Predictor
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.completion import Known, next_frames, row_seed
+from motionloom.tasks.completion import STEPS, TEMPERATURE, Known, next_frames, row_seed
 from motionloom.tasks.predict import HeldPart, Hold, predict, switch
+from motionloom.tasks.windows import Pen
 
 Found = tuple[list[Column], list[Row], dict[str, Any]]
 Say = Callable[[str], None]
@@ -65,17 +66,11 @@ def long_futures(
     """(windows, samples, frames, joints, 3): every future goes on from its own end, as `tasks.predict` does."""
     count, fps = len(trial.windows), predictor.fps
     person = np.repeat(trial.pasts(0, count), samples, axis=0)
-    frames = predictor.frames - predictor.observed
-    turns, made = int(np.ceil(seconds * fps / frames - 1e-9)), []
-    for turn in range(turns):
+    turns, made = int(np.ceil(seconds * fps / (predictor.frames - predictor.observed) - 1e-9)), []
+    pen = Pen(predictor, STEPS, 1.0, TEMPERATURE, True)
+    for turn, new in enumerate(pen.windows(person, [(seed, i) for i in range(len(person))], None, turns)):
         say(f"window {turn + 1} of {turns}")
-        seeds = [row_seed(seed, i, turn) for i in range(len(person))]
-        new = np.concatenate([
-            next_frames(predictor, person[first : first + trials.ROWS], seeds=seeds[first : first + trials.ROWS])
-            for first in range(0, len(person), trials.ROWS)
-        ])  # fmt: skip
         made.append(new)
-        person = np.concatenate([person, new], axis=1)[:, -predictor.observed :]
     whole = np.concatenate(made, axis=1)[:, : round(seconds * fps)]
     return whole.reshape(count, samples, *whole.shape[1:])
 

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 CONTEXT = 3.0
 """Seconds of a clip that are looked at for where its floor is."""
+ONWARD = 1.15
+"""How much livelier the windows behind the first begin: the network goes on from its own calm; docs/decisions/0015."""
 SUNK, EASE = 0.02, 0.2
 """Metres under the floor that are left, and seconds in which people who would sink further are lifted."""
 Given = Callable[[int, int], Known | None]
@@ -42,7 +44,7 @@ class Pen:
         for number in range(count):
             first = number * frames + 1
             known = given(first, first + self.predictor.frames - person.shape[1]) if given else None
-            made = self.window(person, seeds, number, known)
+            made = self.window(person, seeds, number, known, livelier=ONWARD if number else 1.0)
             yield made
             person = np.concatenate([person, made], axis=1)[:, -self.predictor.observed :]
 
@@ -54,11 +56,12 @@ class Pen:
         known: Known | None,
         *,
         frames: int | None = None,
+        livelier: float = 1.0,
     ) -> Array:
         """(rows, frames, 22, 3): window ``number`` behind ``person`` (rows, h, 22, 3)."""
         made = next_frames(
             self.predictor, person, seeds=[row_seed(*seed, number) for seed in seeds], known=known, frames=frames,
-            steps=self.steps, guidance=self.guidance, temperature=self.temperature,
+            steps=self.steps, guidance=self.guidance, temperature=self.temperature * livelier,
         )  # fmt: skip
         made = made + _lift(person, made, self.predictor.fps)[..., None, None] * [0, 1, 0]
         return made if self.root else made + (person[:, -1:, :1] - made[:, :, :1]) * [1, 0, 1]
