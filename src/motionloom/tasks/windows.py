@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 CONTEXT = 3.0
 """Seconds of a clip that are looked at for where its floor is."""
-ONWARD = 1.15
+ONWARD = 1.08
 """How much livelier the windows behind the first begin: the network goes on from its own calm; docs/decisions/0015."""
 SUNK, EASE = 0.02, 0.2
 """Metres under the floor that are left, and seconds in which people who would sink further are lifted."""
