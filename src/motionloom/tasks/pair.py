@@ -15,7 +15,7 @@ from torch.nn import functional as F
 
 from motionloom.checkpoint import Prior
 from motionloom.data.pairs import one_world, together
-from motionloom.diffusion import SOLVERS, Denoiser, Draw, guide, inpaint, levels, observe, row_draw, sample
+from motionloom.diffusion import SOLVERS, Draw, guide, inpaint, levels, observe, row_draw, sample
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
@@ -27,6 +27,7 @@ from motionloom.retarget import to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.tasks.completion import row_seed
 from motionloom.tasks.control import moved
+from motionloom.tasks.duet_places import leader
 from motionloom.tasks.fitting import fit
 from motionloom.tasks.goals import Goal, Placement, placement_of
 from motionloom.tasks.long import Past
@@ -78,6 +79,7 @@ def pair_features(
     change: Sequence[Correction | None] | None = None,
     guidance: float = GUIDANCE,
     steps: int = STEPS,
+    together: float = 1.0,
     quiet: bool = True,
     progress: Progress | None = None,
 ) -> tuple[Tensor, Tensor]:
@@ -87,8 +89,10 @@ def pair_features(
     (rows, 1 + frames, 263), mask (the same, or what broadcasts; True where known): a state of `nets.pair` that is given
     in part (`known_state`); with ``quiet`` the network sees it without noise (Shafir et al. 2024, section 3.3), else at
     the noise of its level (RePaint). change: for each row, or None, what its every guess goes through, standardised
-    (frames, 263), as of `steering`. With a block that says nothing a row is what `text.sample_features` makes of its
-    prompt and seed. No more than `PAIRS` pairs are denoised at once. Raises MotionloomError for what cannot be asked.
+    (frames, 263), as of `steering`. together, 0 to 1: how far every guess is led to where the block says that the two
+    stand to each other later on (`duet_places`; 0: as published). With a block that says nothing a row is what
+    `text.sample_features` makes of its prompt and seed. No more than `PAIRS` pairs are denoised at once. Raises
+    MotionloomError for what cannot be asked.
     """
     rows = len(prompts)
     if rows % 2 or rows == 0 or len(seeds) != rows or (change is not None and len(change) != rows):
@@ -96,6 +100,8 @@ def pair_features(
             f"two people need two prompts and seeds a pair; got {rows} prompts and {len(seeds)} seeds"
         )
     check(prior, [], steps=steps, guidance=guidance, solver=SOLVER)
+    if not 0 <= together <= 1:
+        raise MotionloomError(f"two people are kept together by 0 (not at all) to 1; got {together:g}")
     changes = list(change or [None] * rows)
     shape = (rows, 1 + frames, len(prior.mean))
     data = torch.zeros(shape) if known is None else known.expand(shape)
@@ -103,7 +109,7 @@ def pair_features(
     made = []
     for start in range(0, rows, 2 * PAIRS):
         some = slice(start, start + 2 * PAIRS)
-        held = _Held(data[some].to(prior.mean), here[some].to(prior.mean.device), changes[some], quiet)
+        held = _Held(data[some].to(prior.mean), here[some].to(prior.mean.device), changes[some], quiet, together)
 
         def told(done: int, before: int = start // (2 * PAIRS) * steps) -> None:
             if progress:
@@ -126,6 +132,7 @@ class _Held:
     mask: Tensor
     changes: list[Correction | None]
     quiet: bool
+    together: float
 
     def changed(self, guess: Tensor, level: int) -> Tensor:
         """States whose motions went through the changes."""
@@ -153,7 +160,12 @@ def _walked(
     cond = prior.condition(list(prompts))
     scale = guidance if any(prompt.strip() for prompt in prompts) else 1.0
     guided = inpaint(guide(net, net.bind(cond), net.bind(cond.null()), scale), held.data, held.mask)
-    denoise: Denoiser = lambda state, level: held.changed(guided(state, level), level)  # noqa: E731
+    moved = [change is not None for change in held.changes]
+    lead = leader(prior, net, net.bind(cond), seeds=seeds, mask=held.mask, moved=moved, weight=held.together)
+
+    def denoise(state: Tensor, level: int) -> Tensor:
+        return lead(state, held.changed(guided(state, level), level), level)
+
     way, draw = levels(prior.schedule, steps, spacing=SPACING), pair_draw(seeds)
     hold = observe(held.data, held.mask, prior.schedule, torch.zeros_like if held.quiet else draw)
     state = hold(draw(held.data), way[0])
@@ -222,6 +234,7 @@ def generate_pair(
     person: int = 0,
     guidance: float = GUIDANCE,
     steps: int = STEPS,
+    together: float = 1.0,
     clean: bool = True,
     progress: Progress | None = None,
 ) -> list[Duet]:
@@ -231,7 +244,8 @@ def generate_pair(
     duet i depends on it and i alone; two numbers are one for each person, and go with him where people are exchanged.
     The first person starts at the origin facing +Z. goal: what ``person`` (0 or 1) is asked in the world (`Goal`), who
     then starts at its `placement_of`; the duet is as long as the goal, and ``seconds`` is not looked at. guidance,
-    steps, clean: as of `text.generate`. Raises `MotionloomError` for what cannot be asked.
+    steps, clean: as of `text.generate`; together: as of `pair_features`. Raises `MotionloomError` for what cannot be
+    asked.
     """
     said = prompts_of(prompt)
     if not all(words.strip() for words in said):
@@ -246,7 +260,7 @@ def generate_pair(
     features, stands = pair_features(
         prior, block.net(prior), said * count, frames,
         seeds=[s for number in range(count) for s in person_seeds(seed, number)],
-        change=change * count, guidance=guidance, steps=steps, progress=progress,
+        change=change * count, guidance=guidance, steps=steps, together=together, progress=progress,
     )  # fmt: skip
     made = []
     for numbers, standing in zip(features, stands.double().numpy(), strict=True):
@@ -309,6 +323,7 @@ def complete_pair(
     seed: Seed = 0,
     guidance: float = GUIDANCE,
     steps: int = STEPS,
+    together: float = 1.0,
     clean: bool = True,
     progress: Progress | None = None,
 ) -> list[Duet]:
@@ -333,7 +348,7 @@ def complete_pair(
     features, _ = pair_features(
         prior, net, said * count, frames, seeds=[s for number in range(count) for s in person_seeds(seed, number)],
         known=data.repeat(count, 1, 1), mask=mask.repeat(count, 1, 1), change=leaving * count,
-        guidance=guidance, steps=steps, progress=progress,
+        guidance=guidance, steps=steps, together=together, progress=progress,
     )  # fmt: skip
     made = []
     for numbers in features.double().numpy():

@@ -1,0 +1,143 @@
+"""Two people who stay together: a planted drift goes away, in halves, and nobody who is given is moved."""
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from motionloom.checkpoint import Prior
+from motionloom.features import pair as two
+from motionloom.nets.pair import PairNet, join
+from motionloom.nets.pair_block import PairBlock
+from motionloom.tasks import duet_places
+from motionloom.tasks.duet_places import Places
+from motionloom.tasks.pair import generate_pair, known_state, pair_features
+from tests.nets import tiny
+from tests.tasks.two_people import block as block_of
+
+FRAMES = 101
+SAID = ["a person walks", "a person turns left"]
+BESIDE = torch.tensor([[1.0, 0.0, 0.0, 0.0], [-0.8, 0.6, 0.3, 1.0]])
+
+
+@pytest.fixture(scope="module")
+def prior() -> Prior:
+    return tiny.prior()
+
+
+@pytest.fixture(scope="module")
+def block(prior: Prior) -> PairBlock:
+    return block_of(prior)
+
+
+class Told:
+    """A network that always says that two people stand to each other as in `BESIDE`."""
+
+    def __init__(self, net: PairNet) -> None:
+        self.net, self.talk = net, net.talk
+        self.shown: list[tuple[Tensor, Tensor]] = []
+
+    def __call__(self, x: Tensor, level: int, bound) -> Tensor:
+        self.shown.append((x, bound.lengths))
+        places = self.talk.config.places.encode(BESIDE).repeat(len(x) // 2, 1)
+        return join(places, x[:, 1:])
+
+
+def drifting(prior: Prior) -> Tensor:
+    """Features (2, frames, 263) of people who turn and go their own ways."""
+    features = torch.randn(2, FRAMES, 263, generator=torch.Generator().manual_seed(1)) * 0.01
+    features[0, :, :3] += torch.tensor([0.004, 0.01, 0.02])
+    features[1, :, :3] += torch.tensor([-0.006, -0.01, 0.015])
+    return features * (prior.std > 0) + torch.where(prior.std > 0, 0.0, prior.mean)
+
+
+def led(prior: Prior, block: PairBlock, places: Places, weight: float = 1.0) -> tuple[Tensor, Tensor, Told]:
+    """Ways (2, frames, 4) in the world before and after."""
+    net, spread = block.net(prior), torch.where(prior.std > 0, prior.std, 1.0)
+    told, code, before = Told(net), net.talk.config.places, drifting(prior)
+    guess = join(code.encode(BESIDE), (before - prior.mean) / spread)
+    made = places.led(
+        prior, told, net.bind(prior.condition(SAID)), state=guess, guess=guess, level=25, weight=weight  # type: ignore
+    )  # fmt: skip
+    assert torch.equal(made[:, 0], guess[:, 0])
+    after = made[:, 1:] * spread + prior.mean
+    torch.testing.assert_close(after[..., 3:], before[..., 3:], rtol=0, atol=1e-5)
+    ways = [two.compose(BESIDE[:, None], two.along(one)) for one in (before, after)]
+    return ways[0], ways[1], told
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.0], ids=["led", "free"])
+def test_a_drift_is_gone_at_the_knots(prior: Prior, block: PairBlock, weight: float) -> None:
+    before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2), weight)
+    expected = two.seen(BESIDE[0], BESIDE[1])
+    for knot in (40, 80):
+        away = (two.seen(before[0, knot], before[1, knot]) - expected).abs().max()
+        error = (two.seen(after[0, knot], after[1, knot]) - expected).abs().max()
+        assert away > 0.3
+        assert (error < 1e-4) if weight else (error - away).abs() < 1e-4
+    torch.testing.assert_close(after[:, 0], before[:, 0])
+
+
+def test_each_goes_half_of_the_way(prior: Prior, block: PairBlock) -> None:
+    before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2))
+    moved = (after - before)[..., 2:]
+    assert moved.abs().max() > 0.2
+    torch.testing.assert_close(moved[0], -moved[1], rtol=0, atol=1e-4)
+    turned = [two.seen(before[i], after[i])[:, 1] for i in (0, 1)]
+    assert turned[0].abs().max() > 0.2
+    torch.testing.assert_close(turned[0], -turned[1], rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize("given", [0, 1])
+def test_nobody_given_is_moved_and_the_other_goes_the_whole_way(prior: Prior, block: PairBlock, given: int) -> None:
+    before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [given == 0, given == 1]))
+    torch.testing.assert_close(after[given], before[given], rtol=0, atol=1e-5)
+    expected = two.seen(BESIDE[0], BESIDE[1])
+    torch.testing.assert_close(two.seen(after[0, 80], after[1, 80])[:2], expected[:2], rtol=0, atol=1e-4)
+    assert (after[1 - given] - before[1 - given])[80, 2:].norm() > 0.3
+
+
+def test_frames_before_the_beginning_stay(prior: Prior, block: PairBlock) -> None:
+    before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [30], [False] * 2))
+    torch.testing.assert_close(after[:, :31], before[:, :31], rtol=0, atol=1e-4)
+    torch.testing.assert_close(two.seen(after[0, 70], after[1, 70]), two.seen(BESIDE[0], BESIDE[1]), rtol=0, atol=1e-4)
+
+
+def test_the_network_is_shown_crops_that_begin_at_the_knots(prior: Prior, block: PairBlock) -> None:
+    _, _, told = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2))
+    [(x, lengths)] = told.shown
+    motion = (drifting(prior) - prior.mean) / torch.where(prior.std > 0, prior.std, 1.0)
+    assert lengths.tolist() == [60, 60, 21, 21]
+    torch.testing.assert_close(x[:2, 1:], motion[:, 40:100])
+    torch.testing.assert_close(x[2:, 1:22], motion[:, 80:])
+
+
+def test_what_a_change_costs_is_spread_without_jumps() -> None:
+    spread = duet_places._spread(2, 10, 101).numpy()
+    np.testing.assert_allclose(spread[[5, 10, 50, 90, 100]], [[0, 0], [0, 0], [1, 0], [0, 1], [0, 1]], atol=1e-6)
+    assert np.abs(np.diff(spread[11:90], axis=0)).max() < 2 / duet_places.SPACING
+
+
+def test_exchanged_people_stay_together_exchanged(prior: Prior, block: PairBlock) -> None:
+    net, shared = block.net(prior), {"steps": 3}
+    one, _ = pair_features(prior, net, SAID, 70, seeds=[1, 2], **shared)
+    other, _ = pair_features(prior, net, SAID[::-1], 70, seeds=[2, 1], **shared)
+    free, _ = pair_features(prior, net, SAID, 70, seeds=[1, 2], together=0.0, **shared)
+    torch.testing.assert_close(one[0], other[0].flip(0), rtol=0, atol=1e-3)
+    assert (one - free).abs().max() > 1e-3
+    many, _ = pair_features(prior, net, SAID * 2, 70, seeds=[1, 2, 3, 4], **shared)
+    torch.testing.assert_close(many[0], one[0], rtol=0, atol=1e-3)
+
+
+def test_what_is_known_stays_known(prior: Prior, block: PairBlock) -> None:
+    net, first = block.net(prior), drifting(prior)[:, :20]
+    state, mask = known_state(prior, net, first, BESIDE, 90)
+    made, _ = pair_features(prior, net, SAID, 90, seeds=[1, 2], known=state, mask=mask, steps=2)
+    torch.testing.assert_close(made[0, :, :20], first, rtol=0, atol=1e-5)
+
+
+def test_a_fresh_block_leads_nobody(prior: Prior) -> None:
+    fresh = block_of(prior, fresh=True)
+    made = [generate_pair(prior, fresh, SAID[0], seconds=4, steps=2, clean=False, together=w)[0] for w in (0.0, 1.0)]
+    for free, held in zip(*made, strict=True):
+        assert np.array_equal(free.positions(), held.positions())
