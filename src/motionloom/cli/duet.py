@@ -44,6 +44,10 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--seed", type=int, help="the same seed makes the same duets (default 0, or the timeline's)")
     parser.add_argument("--count", type=int, default=1, help="duets to make (default 1)")
     parser.add_argument("--guidance", type=float, help="strength of the text (default 2.5, or the timeline's)")
+    parser.add_argument(
+        "--together", type=float, metavar="SHARE",
+        help="how firmly the two keep to where the block wants them, 0 (they may drift apart) to 1 (default)",
+    )  # fmt: skip
     parser.add_argument("--block", default="duet", metavar="NAME|PATH", help="what makes two of one (default duet)")
     _add_sampling(parser)
     add_reading(parser)
@@ -119,6 +123,8 @@ def _make(
     shared |= {n: v for n in ("steps", "guidance") if (v := getattr(arguments, n)) is not None}
     if timeline is not None:
         return [_composed(arguments, prior, block, timeline, progress, shared)]
+    if arguments.together is not None:
+        shared["together"] = arguments.together
     shared |= {"count": arguments.count, "seed": seed, "progress": progress}
     if arguments.past:
         added = ADDED if arguments.seconds is None else arguments.seconds
@@ -266,6 +272,8 @@ def _check(arguments: argparse.Namespace) -> None:
         fail(f"--seconds does not go with --{kinds[0]}, which says how long it is")
     if arguments.path and kinds:
         fail(f"--path does not go with --{kinds[0]}; give it with a text, or write it into a timeline")
+    if arguments.together is not None and kinds == ["timeline"]:
+        fail("--together does not go with --timeline; leave it out")
     if arguments.seconds is not None and not 0 < arguments.seconds <= 60:
         fail(f"--seconds must be above 0 and at most 60; got {arguments.seconds:g}")
     _check_numbers(arguments)
@@ -278,6 +286,8 @@ def _check_numbers(arguments: argparse.Namespace) -> None:
         fail(f"--steps must be 1 or more; got {arguments.steps}")
     if arguments.guidance is not None and not abs(arguments.guidance) <= 100:
         fail(f"--guidance must be -100 to 100, usually 1 to 7; got {arguments.guidance:g}")
+    if arguments.together is not None and not 0 <= arguments.together <= 1:
+        fail(f"--together must be 0 to 1; got {arguments.together:g}")
     if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
         fail(f"--fps must be 1 to 1000; got {arguments.fps:g}")
 

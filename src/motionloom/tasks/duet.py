@@ -68,6 +68,7 @@ def react(
     seed: Seed = 0,
     guidance: float = GUIDANCE,
     steps: int = STEPS,
+    together: float = 1.0,
     clean: bool = True,
     progress: Progress | None = None,
 ) -> list[Duet]:
@@ -75,7 +76,8 @@ def react(
 
     given: one person on any humanoid skeleton that stands upright along +Y, 1 to 60 seconds, at any rate. The second
     is the 22-joint person, of as many frames at that rate, in the same world and on the same floor. An empty prompt
-    asks for nothing in particular. Raises `MotionloomError` for what cannot be asked.
+    asks for nothing in particular. together: as of `pair.pair_features`. Raises `MotionloomError` for what cannot be
+    asked.
     """
     said = prompts_of(prompt)
     check_asked(prior, count=count, seed=seed, seconds=given.seconds)
@@ -95,7 +97,7 @@ def react(
         prior, net, said * count, known.shape[1],
         seeds=[s for number in range(count) for s in person_seeds(seed, number)],
         known=data.repeat(count, 1, 1), mask=mask.repeat(count, 1, 1),
-        guidance=guidance, steps=steps, progress=progress,
+        guidance=guidance, steps=steps, together=together, progress=progress,
     )  # fmt: skip
     floor, made = _floor(given), []
     at = np.arange(len(given)) / given.fps * FPS
