@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
-from motionloom.cli.sampling import bar, check_prompt, fail
+from motionloom.cli.sampling import bar, check_count, check_prompt, fail, places, report, take_text_anywhere
 
 if TYPE_CHECKING:
     from motionloom.checkpoint import Prior
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from motionloom.tasks.goals import Goal
     from motionloom.tasks.timeline import Timeline
 
-MAX_COUNT = 1000
 MAX_SECONDS = 3600.0
 """Of a timeline."""
 SECONDS, ADDED = 6.0, 3.0
@@ -51,7 +50,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--block", default="duet", metavar="NAME|PATH", help="what makes two of one (default duet)")
     _add_sampling(parser)
     add_reading(parser)
-    _take_text_anywhere(parser)
+    take_text_anywhere(parser)
     parser.set_defaults(run=run_duet)
 
 
@@ -69,27 +68,12 @@ def _add_sampling(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
 
 
-def _take_text_anywhere(parser: argparse.ArgumentParser) -> None:
-    """Let the text stand behind options too: argparse gives up on an optional word once it has passed its place."""
-
-    def parse(args=None, namespace=None):
-        found, unknown = argparse.ArgumentParser.parse_known_args(parser, args, namespace)
-        if found.text is None and len(unknown) == 1 and not unknown[0].startswith("-"):
-            found.text, unknown = unknown[0], []
-        if unknown:
-            parser.error(f"unrecognized arguments: {' '.join(unknown)}")
-        return found, unknown
-
-    parser.parse_known_args = parse  # type: ignore[method-assign]
-
-
 def run_duet(arguments: argparse.Namespace) -> None:
     """``motionloom duet``."""
     import time
 
     _check(arguments)
-    files = [_numbered(out, arguments.count) for out in _check_outs(arguments)]
-    _check_places(files)
+    files = places(_check_outs(arguments), arguments.count, sheets=False)
     timeline = _timeline(arguments) if arguments.timeline else None
     goal = _goal(arguments) if arguments.path else None
     given, manners = _read(arguments)
@@ -102,7 +86,7 @@ def run_duet(arguments: argparse.Namespace) -> None:
     if arguments.fps is not None:
         duets = [[motion.resample(arguments.fps) for motion in duet] for duet in duets]
     written = _write(duets, files, manners, _caption(arguments, timeline))
-    _report(arguments, duets, written, seconds)
+    report(arguments, _about(arguments, duets), written, seconds)
     note_rate(arguments, _inputs(arguments))
 
 
@@ -280,8 +264,7 @@ def _check(arguments: argparse.Namespace) -> None:
 
 
 def _check_numbers(arguments: argparse.Namespace) -> None:
-    if not 1 <= arguments.count <= MAX_COUNT or not 0 <= (arguments.seed or 0) < 2**62:
-        fail(f"--count must be 1 to {MAX_COUNT} and --seed 0 or more; got {arguments.count} and {arguments.seed}")
+    check_count(arguments)
     if arguments.steps is not None and not 1 <= arguments.steps <= 100_000:
         fail(f"--steps must be 1 or more; got {arguments.steps}")
     if arguments.guidance is not None and not abs(arguments.guidance) <= 100:
@@ -302,22 +285,6 @@ def _check_outs(arguments: argparse.Namespace) -> list[Path]:
         if len(own) not in (0, 2):
             fail(f"a {suffix} file holds one person: give two, such as --out a{suffix} --out b{suffix}; got {len(own)}")
     return outs
-
-
-def _numbered(out: Path, count: int) -> list[Path]:
-    if count == 1:
-        return [out]
-    width = len(str(count - 1))
-    return [out.with_name(f"{out.stem}_{i:0{width}d}{out.suffix}") for i in range(count)]
-
-
-def _check_places(files: list[list[Path]]) -> None:
-    from motionloom.io import check_output
-
-    for place in (place for several in files for place in several):
-        check_output(place)
-        if place.is_dir():
-            fail(f"{place} is a folder; name a file to write")
 
 
 def _check_sizes(
@@ -376,24 +343,15 @@ def _write(
     return written
 
 
-def _report(arguments: argparse.Namespace, duets: "list[list[Motion]]", written: list[Path], seconds: float) -> None:
-    if arguments.json:
-        import json
-
-        about = {
-            "prompt": arguments.text,
-            "past": [str(path) for path in arguments.past or ()],
-            "given": None if arguments.given is None else str(arguments.given),
-            "timeline": None if arguments.timeline is None else str(arguments.timeline),
-            "duets": len(duets),
-            "seconds": duets[0][0].seconds,
-            "seed": arguments.seed,
-            "weights": str(arguments.weights),
-            "block": str(arguments.block),
-            "files": [str(path) for path in written],
-            "sampling_seconds": round(seconds, 3),
-        }
-        print(json.dumps(about, indent=1))
-        return
-    for path in written:
-        print(f"wrote {path}")
+def _about(arguments: argparse.Namespace, duets: "list[list[Motion]]") -> dict[str, Any]:
+    return {
+        "prompt": arguments.text,
+        "past": [str(path) for path in arguments.past or ()],
+        "given": None if arguments.given is None else str(arguments.given),
+        "timeline": None if arguments.timeline is None else str(arguments.timeline),
+        "duets": len(duets),
+        "seconds": duets[0][0].seconds,
+        "seed": arguments.seed,
+        "weights": str(arguments.weights),
+        "block": str(arguments.block),
+    }

@@ -5,12 +5,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
-from motionloom.cli.sampling import add_sampling, bar, check_outs, check_prompt, fail, places, write
+from motionloom.cli.sampling import (
+    add_sampling,
+    bar,
+    check_count,
+    check_outs,
+    check_prompt,
+    places,
+    report,
+    take_text_anywhere,
+    write,
+)
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
-
-MAX_COUNT = 1000
 
 
 def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -42,29 +50,14 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
     add_sampling(parser, own_rate="the clip's")
     add_reading(parser)
-    _take_text_anywhere(parser)
+    take_text_anywhere(parser)
     parser.set_defaults(run=run_edit)
-
-
-def _take_text_anywhere(parser: argparse.ArgumentParser) -> None:
-    """Let the text stand behind options too: argparse gives up on an optional word once it has passed its place."""
-
-    def parse(args=None, namespace=None):
-        found, unknown = argparse.ArgumentParser.parse_known_args(parser, args, namespace)
-        if found.text is None and len(unknown) == 1 and not unknown[0].startswith("-"):
-            found.text, unknown = unknown[0], []
-        if unknown:
-            parser.error(f"unrecognized arguments: {' '.join(unknown)}")
-        return found, unknown
-
-    parser.parse_known_args = parse  # type: ignore[method-assign]
 
 
 def run_edit(arguments: argparse.Namespace) -> None:
     """``motionloom edit CLIP TEXT``."""
     outs = check_outs(arguments)
-    if not 1 <= arguments.count <= MAX_COUNT or not 0 <= arguments.seed < 2**62:
-        fail(f"--count must be 1 to {MAX_COUNT} and --seed 0 or more; got {arguments.count} and {arguments.seed}")
+    check_count(arguments)
     if arguments.text is not None:
         check_prompt(arguments.text)
     captions = [arguments.text or arguments.clip.stem] * arguments.count
@@ -79,7 +72,13 @@ def run_edit(arguments: argparse.Namespace) -> None:
             written += [_write_bvh(motion, place, unit, orders) for motion, place in zip(motions, several, strict=True)]
         else:
             written += write(motions, several, captions)
-    _report(arguments, written, seconds)
+    about = {
+        "clip": str(arguments.clip),
+        "prompt": arguments.text,
+        "seeds": [arguments.seed + i for i in range(arguments.count)],
+        "weights": str(arguments.weights),
+    }
+    report(arguments, about, written, seconds)
     note_rate(arguments, [arguments.clip])
 
 
@@ -111,21 +110,3 @@ def _write_bvh(motion: "Motion", place: Path, unit: float | None, orders: dict[s
     from motionloom.io.bvh_writer import save_bvh
 
     return save_bvh(motion, place, order=orders, unit=unit or 1.0)
-
-
-def _report(arguments: argparse.Namespace, written: list[Path], seconds: float) -> None:
-    if arguments.json:
-        import json
-
-        about = {
-            "clip": str(arguments.clip),
-            "prompt": arguments.text,
-            "seeds": [arguments.seed + i for i in range(arguments.count)],
-            "weights": str(arguments.weights),
-            "files": [str(path) for path in written],
-            "sampling_seconds": round(seconds, 3),
-        }
-        print(json.dumps(about, indent=1))
-        return
-    for path in written:
-        print(f"wrote {path}")

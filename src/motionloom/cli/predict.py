@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.futures import FORMATS, Long, Manner, Target, targets, write_futures
 from motionloom.cli.reading import add_reading, as_seconds, crop, note_rate, read_clip
-from motionloom.cli.sampling import bar, fail
+from motionloom.cli.sampling import bar, check_count, fail
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
     from motionloom.predictor import Predictor
     from motionloom.tasks.predict import Hold
 
-MAX_COUNT = 1000
 LONG = 30.0
 """Seconds from which on futures are written while they are made, one after the other."""
 DAY = 86_400.0
@@ -139,10 +138,12 @@ def run_predict(arguments: argparse.Namespace) -> int:
 
 def run_switch(arguments: argparse.Namespace) -> int:
     """``motionloom switch PAST TARGET``."""
+    from motionloom.io import check_output
+
     _check(arguments, longest=LONG)
     outs = arguments.out or [Path("switch.bvh")]
     for out in outs:
-        _check_file(out)
+        check_output(out)  # files, and no folder
     wanted = targets(outs, arguments.count, [], pictures=False)
     past, manner = _read_past(arguments)
     _check_size(arguments, past, round(arguments.seconds * past.fps), wanted)
@@ -323,21 +324,13 @@ def _check(arguments: argparse.Namespace, *, longest: float) -> None:
     if not 0 < arguments.seconds <= longest:
         most = "86,400, a day" if longest == DAY else f"{longest:g}"
         fail(f"--seconds must be above 0 and at most {most}; got {arguments.seconds:g}")
-    if not 1 <= arguments.count <= MAX_COUNT or not 0 <= arguments.seed < 2**62:
-        fail(f"--count must be 1 to {MAX_COUNT} and --seed 0 or more; got {arguments.count} and {arguments.seed}")
+    check_count(arguments)
     if arguments.steps is not None and not 1 <= arguments.steps <= 100_000:
         fail(f"--steps must be 1 or more; got {arguments.steps}")
     if arguments.temperature is not None and not 0 <= arguments.temperature <= 2:
         fail(f"--temperature must be 0 to 2, usually about 1; got {arguments.temperature:g}")
     if not abs(arguments.guidance) <= 100:
         fail(f"--guidance must be -100 to 100, usually about 1; got {arguments.guidance:g}")
-
-
-def _check_file(out: Path) -> None:
-    """A place of one file, not a folder."""
-    from motionloom.io import check_output
-
-    check_output(out)
 
 
 def _check_size(arguments: argparse.Namespace, past: "Motion", horizon: int, wanted: list[Target]) -> None:

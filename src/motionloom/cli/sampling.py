@@ -4,12 +4,13 @@ import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
 
 MAX_CHARACTERS = 20_000
+MAX_COUNT = 1000
 
 
 def add_sampling(parser: argparse.ArgumentParser, *, own_rate: str = "the model's 20") -> None:
@@ -26,6 +27,20 @@ def add_sampling(parser: argparse.ArgumentParser, *, own_rate: str = "the model'
     parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
+
+
+def take_text_anywhere(parser: argparse.ArgumentParser) -> None:
+    """Let TEXT stand behind options too: argparse gives up on an optional word once it has passed its place."""
+
+    def parse(args=None, namespace=None):
+        found, unknown = argparse.ArgumentParser.parse_known_args(parser, args, namespace)
+        if found.text is None and len(unknown) == 1 and not unknown[0].startswith("-"):
+            found.text, unknown = unknown[0], []
+        if unknown:
+            parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
+
+    parser.parse_known_args = parse  # type: ignore[method-assign]
 
 
 def fail(message: str) -> NoReturn:
@@ -49,19 +64,28 @@ def check_outs(arguments: argparse.Namespace) -> list[Path]:
     return outs
 
 
+def check_count(arguments: argparse.Namespace, *, most: int = MAX_COUNT) -> None:
+    """Refuse a ``--count`` and a ``--seed`` that cannot be."""
+    if not 1 <= arguments.count <= most or not 0 <= (arguments.seed or 0) < 2**62:
+        fail(f"--count must be 1 to {most} and --seed 0 or more; got {arguments.count} and {arguments.seed}")
+
+
 def numbered(out: Path, count: int) -> list[Path]:
-    """One file for one motion, or for a picture of all of them; else numbered files."""
-    if count == 1 or out.suffix.lower() == ".png":
+    """The file of one motion, or numbered files of several."""
+    if count == 1:
         return [out]
     width = len(str(count - 1))
     return [out.with_name(f"{out.stem}_{i:0{width}d}{out.suffix}") for i in range(count)]
 
 
-def places(outs: Sequence[Path], count: int) -> list[list[Path]]:
-    """The files of ``count`` motions for each ``--out``, refused where nothing can be written."""
+def places(outs: Sequence[Path], count: int, *, sheets: bool = True) -> list[list[Path]]:
+    """The files of ``count`` motions for each ``--out``, refused where nothing can be written.
+
+    sheets: a picture shows all motions, and so is one file.
+    """
     from motionloom.io import check_output
 
-    several = [numbered(out, count) for out in outs]
+    several = [[out] if sheets and out.suffix.lower() == ".png" else numbered(out, count) for out in outs]
     for place in (place for one in several for place in one):
         check_output(place)
     return several
@@ -74,6 +98,18 @@ def write(motions: "list[Motion]", files: Sequence[Path], captions: Sequence[str
     if len(files) == 1:
         return [save(motions, files[0], captions=captions)]
     return [save(one, file, captions=[said]) for one, file, said in zip(motions, files, captions, strict=True)]
+
+
+def report(arguments: argparse.Namespace, about: dict[str, Any], written: Sequence[Path], seconds: float) -> None:
+    """Say what was written in ``seconds`` of drawing: a line each, or as JSON behind ``about``."""
+    if arguments.json:
+        import json
+
+        files = [str(path) for path in written]
+        print(json.dumps(about | {"files": files, "sampling_seconds": round(seconds, 3)}, indent=1))
+        return
+    for path in written:
+        print(f"wrote {path}")
 
 
 def check_prompt(prompt: str) -> None:
