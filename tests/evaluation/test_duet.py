@@ -1,5 +1,6 @@
 """Two people measured with made-up ways of completing them and made-up duets: errors, resumption, verdicts, reports."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,10 +13,11 @@ import torch
 from motionloom.cli import main
 from motionloom.data.pairs import Pair
 from motionloom.errors import MotionloomError
-from motionloom.evaluation import duet, duet_text
+from motionloom.evaluation import duet, duet_blocks, duet_text
 from motionloom.evaluation import duet_ways as ways
 from motionloom.evaluation import report as reports
 from motionloom.evaluation.duet import COLUMNS, ERRORS, LOOKS, How
+from motionloom.evaluation.duet_blocks import Beside
 from motionloom.evaluation.duet_ways import FRAMES, Crops
 from motionloom.evaluation.report import REAL
 from motionloom.features import pair as two
@@ -279,6 +281,74 @@ def test_a_transformer_from_its_file_is_a_row(tmp_path: Path) -> None:
     assert list(found) == ["zero", "constant", "silent", "mrt"]
     made = found["mrt"](crops_of(couple(6.0), 2), 0)
     assert made.shape == (2, 2, FRAMES, 22, 3)
+
+
+def saved(prior, path: Path, name: str, **sizes: Any) -> Path:
+    """A fresh block of other sizes, in a file."""
+    talk = Talk(fitting(prior.net.config, **sizes), prior.net.config)
+    return PairBlock(name, talk.config, talk.state_dict(), "tiny", fingerprint(prior.net)).save(path)
+
+
+def test_other_blocks_are_rows_by_their_names_and_sizes(tmp_path: Path) -> None:
+    prior, last = tiny.prior(), tiny.prior().net.config.layers
+    files = [
+        saved(prior, tmp_path / "x.safetensors", "layers2", layers=2, split=1),
+        saved(prior, tmp_path / "y.safetensors", "known", aware=True),
+    ]
+    found = duet_blocks.beside(prior, files, {"steps": 2})
+    assert [one.row for one in found] == [
+        "layers2: 2 layers after layer 1, not aware", f"known: 1 layer after layer {last}"
+    ]  # fmt: skip
+    assert found[0].digest == hashlib.sha256(files[0].read_bytes()).hexdigest()[:12]
+    silent = ways.drawn(prior, ways.silent_net(prior), steps=2)
+    made, alone = (way(crops_of(couple(6.0), 2), 0) for way in (found[0].way, silent))
+    np.testing.assert_allclose(made, alone, atol=1e-4)  # a fresh block says nothing
+
+
+def test_two_blocks_of_one_name_and_blocks_of_another_prior_are_told(tmp_path: Path) -> None:
+    prior = tiny.prior()
+    one = saved(prior, tmp_path / "one.safetensors", "same")
+    two_of = saved(prior, tmp_path / "two.safetensors", "same", layers=2)
+    with pytest.raises(MotionloomError, match="are called 'same'"):
+        duet_blocks.beside(prior, [one, two_of], {"steps": 2})
+    with pytest.raises(MotionloomError, match=r"one\.safetensors belongs to the weights"):
+        duet_blocks.beside(ways.bare(prior), [one], {"steps": 2})
+    with pytest.raises(MotionloomError, match="there is no such file"):
+        duet_blocks.beside(prior, [tmp_path / "none.safetensors"], {"steps": 2})
+
+
+def test_a_block_beside_has_one_sample_and_a_new_one_leaves_what_is_done(tmp_path: Path) -> None:
+    crops, calls = crops_of(gliding(1.0), 4), []
+
+    def counted(name: str, off: float) -> Any:
+        def way(crops: Crops, sample: int) -> np.ndarray:
+            calls.append(name)
+            made = perfect(crops, 0).copy()
+            made[:, :, 20:, :, 0] += off
+            return made
+
+        return way
+
+    how, kinds = How(crops=4, samples=2), ("ours",)
+    first, again, second = (
+        Beside(f"{name}: 1 layer", digest, counted(digest, off))
+        for name, digest, off in [("b", "1", 0.1), ("b", "1", 0.1), ("b", "2", 0.3)]
+    )
+    ours = {"ours": counted("ours", 0.0)}
+    made = duet.measure(crops, ours, how, kinds=kinds, beside=[first], folder=tmp_path)
+    here = [row for row in made.rows if not row.measured_on]
+    assert [row.name for row in here] == ["ours, one sample", "ours, mean of 2 samples", "b: 1 layer"]
+    assert here[2].values["root_2"].mean == pytest.approx(0.1)
+    assert any(
+        "less that of b: 1 layer, crop by crop" in note and "-0.100 ± 0.000 m at 1 s" in note for note in made.notes
+    )
+    assert made.protocol["blocks beside"] == {"b: 1 layer": "1"}
+    assert calls == ["ours", "ours", "1"]
+    assert duet.measure(crops, ours, how, kinds=kinds, beside=[again], folder=tmp_path) == made
+    assert len(calls) == 3
+    other = duet.measure(crops, ours, how, kinds=kinds, beside=[second], folder=tmp_path)
+    assert calls[3:] == ["2"]
+    assert other.rows[2].values["root_2"].mean == pytest.approx(0.3)
 
 
 # From words ----------------------------------------------------------------------------------------------------------

@@ -33,6 +33,10 @@ def add(commands) -> None:
     duet.add_argument(
         "--train-mrt", type=int, metavar="STEPS", help="first train one on the train pairs, where OUT/mrt has none"
     )
+    duet.add_argument(
+        "--beside", type=Path, nargs="+", default=[], metavar="FILE",
+        help="other blocks for the same prior, each a row of the completions",
+    )  # fmt: skip
     duet.add_argument("--rows-without-published", action="store_true", help="leave out what others published")
     duet.add_argument("--seed", type=int, default=0, help="first seed (default 0)")
     duet.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
@@ -99,7 +103,7 @@ def _completion(arguments: argparse.Namespace):
     how = replace(duet.QUICK if arguments.quick else duet.How(), given=arguments.given, seed=arguments.seed, **said)
     return duet.run(
         arguments.weights, data=arguments.data, block=arguments.block, communication=arguments.communication_only,
-        mrt=_mrt(arguments), how=how, with_published=not arguments.rows_without_published,
+        mrt=_mrt(arguments), beside=arguments.beside, how=how, with_published=not arguments.rows_without_published,
         folder=arguments.out / "completion" if arguments.out else None, device=arguments.device,
         command=_command(arguments, "completion"), progress=say,
     )  # fmt: skip
@@ -151,6 +155,8 @@ def _command(arguments: argparse.Namespace, part: str) -> str:
     for name in names:
         value = getattr(arguments, name)
         words += [f"--{name.replace('_', '-')}", str(value)] if value is not None else []
+    if part == "completion" and arguments.beside:
+        words += ["--beside", *(path.name for path in arguments.beside)]
     words += ["--given", arguments.given] if part == "completion" and arguments.given != "past" else []
     words += ["--seed", str(arguments.seed)] if arguments.seed else []
     return shlex.join([*words, *(["--quick"] if arguments.quick else [])])

@@ -16,7 +16,9 @@ import numpy as np
 from motionloom.checkpoint import Prior
 from motionloom.data.pairs import Pair, find_pairs
 from motionloom.errors import MotionloomError
+from motionloom.evaluation import duet_blocks
 from motionloom.evaluation import duet_ways as ways
+from motionloom.evaluation.duet_blocks import Beside
 from motionloom.evaluation.duet_ways import FRAMES, GIVEN, Crops, Way
 from motionloom.evaluation.parts import Parts, fingerprint
 from motionloom.evaluation.published_rows import published
@@ -85,6 +87,7 @@ def run(
     block: str | Path | None = None,
     communication: Path | None = None,
     mrt: Path | None = None,
+    beside: Sequence[str | Path] = (),
     how: How | None = None,
     kinds: Sequence[str] = KINDS,
     with_published: bool = True,
@@ -96,7 +99,8 @@ def run(
     """Measure a block (a shipped name, a file, or the shipped one) on the held-out pairs of ``data``.
 
     communication: a block trained over `duet_ways.bare`; mrt: a file of `train.mrt`; without them their rows are left
-    out. ``folder`` keeps what is done, so that the same call goes on after a stop. The report is not written here.
+    out. beside: other blocks for the same prior, each a row of its own, of one sample. ``folder`` keeps what is done,
+    so that the same call goes on after a stop. The report is not written here.
     """
     how = how or How()
     if not kinds or not set(kinds) <= set(KINDS):
@@ -104,6 +108,7 @@ def run(
     prior = Prior.load(weights, device=device)
     found = PairBlock.load(chosen_block(block), prior) if "ours" in kinds else None
     made = ways_of(prior, found, how, kinds, communication=communication, mrt=mrt, device=device)
+    others = duet_blocks.beside(prior, beside, _asked(how))
     crops = draw(held_out(read(data, progress)), how)
     about = {
         "weights": Path(weights).stem, "block": found.name if found else None, "device": device,
@@ -111,8 +116,8 @@ def run(
         "block file": _digest_of(found) if found else None,
     }  # fmt: skip
     return measure(
-        crops, made, how, kinds=kinds, with_published=with_published, folder=folder, command=command, about=about,
-        progress=progress,
+        crops, made, how, kinds=kinds, beside=others, with_published=with_published, folder=folder, command=command,
+        about=about, progress=progress,
     )  # fmt: skip
 
 
@@ -164,9 +169,7 @@ def ways_of(
     device: str = "cpu",
 ) -> dict[str, Way]:
     """Every way that there are weights for, by its kind."""
-    asked: dict[str, Any] = {
-        "given": how.given, "seed": how.seed, "steps": how.steps, "guidance": how.guidance, "prompt": how.prompt
-    }  # fmt: skip
+    asked = _asked(how)
     found: dict[str, Way] = {"zero": ways.standing(), "constant": ways.gliding()}
     found["silent"] = ways.drawn(prior, ways.silent_net(prior), **asked)
     if communication is not None and "communication" in kinds:
@@ -178,21 +181,30 @@ def ways_of(
     return found
 
 
+def _asked(how: How) -> dict[str, Any]:
+    """What `duet_ways.drawn` takes."""
+    return {
+        "given": how.given, "seed": how.seed, "steps": how.steps, "guidance": how.guidance, "prompt": how.prompt
+    }  # fmt: skip
+
+
 def measure(
     crops: Crops,
     found: Mapping[str, Way],
     how: How,
     *,
     kinds: Sequence[str] = KINDS,
+    beside: Sequence[Beside] = (),
     with_published: bool = True,
     folder: Path | None = None,
     command: str = "",
     about: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] = lambda line: None,
 ) -> Report:
-    """The report of ways on crops."""
+    """The report of ways on crops. Pieces of blocks ``beside`` go by their own files: one more changes no other."""
     said = protocol_of(crops, how) | dict(about or {})
-    parts = Parts(folder, fingerprint({**said, **asdict(how)}))
+    settings = {**said, **asdict(how)}
+    parts = Parts(folder, fingerprint(settings))
     names = {"zero": ZERO, "constant": CONSTANT, "silent": SILENT, "communication": ALONE, "ours": "ours", "mrt": MRT}
     rows, errors = [], {}
     if "real" in kinds:
@@ -202,11 +214,17 @@ def measure(
         samples = how.samples if drawn else 1
         numbers = _measured(crops, found[kind], samples, parts, name=names[kind], progress=progress)
         one = f"{names[kind]}, one sample" if drawn else names[kind]
-        errors[kind] = (names[kind], {name: numbers[name] for name in ERRORS})
+        errors[kind] = (names[kind], numbers)
         rows.append(_row(one, {name: numbers[name] for name in (*ERRORS, *LOOKS, "seconds")}))
         if samples > 1:
             mean = {name: numbers[f"mean_{name}"] for name in (*ERRORS, *LOOKS)}
             rows.append(_row(f"{names[kind]}, mean of {samples} samples", mean))
+    for one in beside:
+        own = Parts(folder, fingerprint({**settings, "beside": one.digest}))
+        numbers = _measured(crops, one.way, 1, own, name=f"beside {one.digest} {one.row}", progress=progress)
+        errors[one.row] = (one.row, numbers)
+        rows.append(_row(one.row, {name: numbers[name] for name in (*ERRORS, *LOOKS, "seconds")}))
+    said |= {"blocks beside": {one.row: one.digest for one in beside}} if beside else {}
     others = published("duet-completion", [column.name for column in COLUMNS]) if with_published else ()
     return Report(
         "duet-completion", "Two people: three seconds after one", command, said, COLUMNS, (*rows, *others),
