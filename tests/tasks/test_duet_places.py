@@ -1,5 +1,8 @@
 """Two people who stay together: a planted drift goes away, in halves, and nobody who is given is moved."""
 
+from dataclasses import replace
+from typing import TypeAlias
+
 import numpy as np
 import pytest
 import torch
@@ -7,11 +10,12 @@ from torch import Tensor
 
 from motionloom.checkpoint import Prior
 from motionloom.features import pair as two
+from motionloom.features.pair import PUBLISHED_CODE
 from motionloom.nets.pair import PairNet, join
 from motionloom.nets.pair_block import PairBlock
 from motionloom.tasks import duet_places
-from motionloom.tasks.duet_places import Places
-from motionloom.tasks.pair import generate_pair, known_state, pair_features
+from motionloom.tasks.duet_places import Places, leader
+from motionloom.tasks.pair import generate_pair, known_state, pair_draw, pair_features
 from tests.nets import tiny
 from tests.tasks.two_people import block as block_of
 
@@ -141,3 +145,125 @@ def test_a_fresh_block_leads_nobody(prior: Prior) -> None:
     made = [generate_pair(prior, fresh, SAID[0], seconds=4, steps=2, clean=False, together=w)[0] for w in (0.0, 1.0)]
     for free, held in zip(*made, strict=True):
         assert np.array_equal(free.positions(), held.positions())
+
+
+# What is asked, and who is led
+
+
+class Asked(Told):
+    """Keeps everything that it is shown."""
+
+    def __call__(self, x: Tensor, level, bound) -> Tensor:
+        self.state, self.level, self.bound = x, level, bound
+        return super().__call__(x, level, bound)
+
+
+def test_every_question_is_of_its_own_pair_at_its_own_level_and_told_the_noised_guess(
+    prior: Prior, block: PairBlock
+) -> None:
+    """Two pairs, with knots at frames 40 and 80, and at 70."""
+    net, said = block.net(prior), [*SAID, "a person jumps", "a person sits down"]
+    bound, told = net.bind(prior.condition(said)), Asked(net)
+    drift, spread = drifting(prior), torch.where(prior.std > 0, prior.std, 1.0)
+    guess = join(net.talk.config.places.encode(BESIDE).repeat(2, 1), ((drift - prior.mean) / spread).repeat(2, 1, 1))
+    state = torch.randn(guess.shape, generator=torch.Generator().manual_seed(2))
+    places = Places.of([1, 2, 3, 4], FRAMES, [0, 30], [False] * 4)
+    level = torch.tensor([7, 7, 30, 30])
+    made = places.led(prior, told, bound, state=state, guess=guess, level=level, weight=1.0)  # type: ignore
+    asked = [(row, frame) for frame in (40, 80) for row in (0, 1)] + [(2, 70), (3, 70)]
+    assert told.level.tolist() == [7, 7, 7, 7, 30, 30]
+    assert told.bound.lengths.tolist() == [min(60, FRAMES - frame) for _, frame in asked]
+    ways = two.compose(BESIDE[:, None], two.along(drift))
+    for number, (row, frame) in enumerate(asked):
+        length, own = min(60, FRAMES - frame), int(level[row])
+        torch.testing.assert_close(told.state[number, 1 : 1 + length], state[row, 1 + frame : 1 + frame + length])
+        assert torch.equal(told.bound.text[number], bound.text[row])
+        there = two.seen(ways[row % 2, frame], ways[1 - row % 2, frame])  # the other, as seen from there
+        signal, noise = prior.schedule.at(own)
+        torch.testing.assert_close(told.state[number, 0, :4], signal * there + noise * places.noise[number])
+    # what is asked of the one pair changes nothing of the other
+    for pair, (begin, kept) in enumerate(((0, slice(0, 4)), (30, slice(4, 6)))):
+        rows = slice(2 * pair, 2 * pair + 2)
+        alone = Places.of([[1, 2], [3, 4]][pair], FRAMES, [begin], [False] * 2)
+        assert torch.equal(alone.noise, places.noise[kept])
+        one = alone.led(
+            prior, Told(net), net.bind(prior.condition(said[rows])), state=state[rows], guess=guess[rows],  # type: ignore
+            level=level[rows], weight=1.0,
+        )  # fmt: skip
+        torch.testing.assert_close(made[rows], one, rtol=0, atol=1e-5)
+    assert places.noise.unique().numel() == places.noise.numel()  # nothing is drawn twice, nor with the first state
+    first = pair_draw([1, 2, 3, 4])(guess)
+    assert not torch.isin(places.noise, first).any()
+
+
+def test_who_is_moved_differs_from_pair_to_pair(prior: Prior, block: PairBlock) -> None:
+    net = block.net(prior)
+    drift, spread = drifting(prior), torch.where(prior.std > 0, prior.std, 1.0)
+    guess = join(net.talk.config.places.encode(BESIDE).repeat(2, 1), ((drift - prior.mean) / spread).repeat(2, 1, 1))
+    places = Places.of([1, 2, 3, 4], FRAMES, [0, 0], [True, False, False, True])
+    made = places.led(
+        prior, Told(net), net.bind(prior.condition(SAID * 2)), state=guess, guess=guess, level=25, weight=1.0  # type: ignore
+    )  # fmt: skip
+    moved = (made - guess).abs().amax((1, 2))
+    assert moved[[0, 3]].max() < 1e-5
+    assert moved[[1, 2]].min() > 0.1
+
+
+@pytest.mark.parametrize(("frames", "knots"), [(59, ()), (60, (40,)), (99, (40,)), (100, (40, 80))])
+def test_a_knot_has_at_least_twenty_frames_behind_it(frames: int, knots: tuple[int, ...]) -> None:
+    assert Places.of([1, 2], frames, [0], [False] * 2).knots == (knots,)
+
+
+def leads(prior: Prior, block: PairBlock, mask: Tensor, moved=(False, False)) -> tuple[Tensor, Tensor, Told]:
+    """A guess before and after `leader`'s lead, where ``mask`` (2, 1 + frames) tells what is known."""
+    net, spread = block.net(prior), torch.where(prior.std > 0, prior.std, 1.0)
+    told = Told(net)
+    guess = join(net.talk.config.places.encode(BESIDE), (drifting(prior) - prior.mean) / spread)
+    known = mask[..., None].expand(guess.shape)
+    lead = leader(prior, told, net.bind(prior.condition(SAID)), seeds=[1, 2], mask=known, moved=moved)  # type: ignore
+    return guess, lead(guess, guess, 25), told
+
+
+Spans: TypeAlias = tuple[tuple[int, int], ...]
+KNOWN: dict[str, tuple[tuple[Spans, Spans], list[int] | None, list[bool]]] = {
+    "nothing": (((), ()), [60, 60, 21, 21], [True, True]),
+    "a beginning of both": ((((0, 31),), ((0, 31),)), [31, 31], [True, True]),
+    "beginnings of two lengths": ((((0, 31),), ((0, 6),)), [56, 56], [True, True]),
+    "a beginning and an end": ((((0, 6), (90, 102)), ((0, 6), (90, 102))), [56, 56], [True, True]),
+    "the first": ((((0, 102),), ()), [60, 60, 21, 21], [False, True]),
+    "the second": (((), ((1, 102),)), [60, 60, 21, 21], [True, False]),
+    "both": ((((0, 102),), ((0, 102),)), None, [False, False]),
+}
+"""Slots that are known of both people (slot 0 is D), frames shown from each knot on, and who is moved. Knots are 40
+frames apart from the end of the common beginning; 101 frames."""
+
+
+@pytest.mark.parametrize("case", list(KNOWN))
+def test_knots_begin_where_the_common_beginning_ends_and_known_numbers_stay(
+    case: str, prior: Prior, block: PairBlock
+) -> None:
+    spans, lengths, moves = KNOWN[case]
+    mask = torch.zeros(2, FRAMES + 1, dtype=torch.bool)
+    for row, some in enumerate(spans):
+        for first, last in some:
+            mask[row, first:last] = True
+    before, after, told = leads(prior, block, mask)
+    assert [one.tolist() for _, one in told.shown] == ([lengths] if lengths else [])
+    assert torch.equal(after[mask], before[mask])
+    assert [bool((row > 0.01).any()) for row in (after - before).abs()] == moves
+
+
+@pytest.mark.parametrize("away", [0, 1])
+def test_whom_others_move_is_not_led(prior: Prior, block: PairBlock, away: int) -> None:
+    nothing = torch.zeros(2, FRAMES + 1, dtype=torch.bool)
+    before, after, _ = leads(prior, block, nothing, moved=(away == 0, away == 1))
+    off = (after - before).abs().amax((1, 2))
+    assert off[away] < 1e-5
+    assert off[1 - away] > 0.1
+
+
+def test_places_of_the_world_lead_nobody(prior: Prior, block: PairBlock) -> None:
+    of_world = replace(block, config=replace(block.config, places=PUBLISHED_CODE))
+    before, after, told = leads(prior, of_world, torch.zeros(2, FRAMES + 1, dtype=torch.bool))
+    assert torch.equal(before, after)
+    assert not told.shown
