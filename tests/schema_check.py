@@ -1,6 +1,8 @@
 """A JSON Schema validator for the words that the project's schemas use, and no other."""
 
+import json
 import re
+from pathlib import Path
 from typing import Any
 
 TYPES: dict[str, Any] = {
@@ -12,6 +14,19 @@ KNOWN = {
     "maximum", "minLength", "maxLength", "pattern", "minItems", "maxItems", "items", "prefixItems", "properties",
     "additionalProperties", "required", "minProperties",
 }  # fmt: skip
+
+
+def valid(file: Path, value: Any) -> bool:
+    """By the jsonschema library where it is installed, else by the little validator; ``file`` is the schema."""
+    schema = json.loads(file.read_text())
+    mine = fits(value, schema, schema)
+    try:
+        import jsonschema
+    except ImportError:
+        return mine
+    jsonschema.Draft202012Validator.check_schema(schema)
+    assert mine == jsonschema.Draft202012Validator(schema).is_valid(value)
+    return mine
 
 
 def fits(value: Any, rule: dict, whole: dict) -> bool:

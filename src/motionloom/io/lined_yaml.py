@@ -4,8 +4,9 @@ Anchors, aliases and tags are refused, so that a small file cannot become a larg
 documents, duplicate keys, NaN and infinity. Built from the parser's events in one pass and without recursion.
 """
 
+import difflib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -64,6 +65,12 @@ class Lined:
 def fail(path: Path | str, line: int, message: str) -> NoReturn:
     """Raise a `MotionloomError` that names file and line."""
     raise MotionloomError(f"{path}, line {line}: {message}")
+
+
+def meant(word: str, known: Sequence[str]) -> str:
+    """What a message may add about a misspelt word: the known one that is like it, in brackets, if there is one."""
+    near = difflib.get_close_matches(word[:40], known, n=1)
+    return f" (did you mean {near[0]!r}?)" if near else ""
 
 
 def read_lined(path: Path | str, *, max_bytes: int = 32_000_000) -> Lined:

@@ -6,18 +6,17 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from motionloom.errors import MotionloomError
-from motionloom.io.lined_yaml import Lined, fail, read_lined
+from motionloom.io.lined_yaml import Lined, meant, read_lined
 from motionloom.io.text import shown
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.fields import listed
+from motionloom.tasks.lined_file import LinedFile
 
 if TYPE_CHECKING:
     from motionloom.tasks.predict import HeldPart
@@ -78,23 +77,18 @@ def _reach(spans: list[tuple[float, float]]) -> float:
 def _name_problem(name: str) -> str:
     if name in JOINTS:
         return ""
-    near = difflib.get_close_matches(name[:40], JOINTS, n=1)
-    meant = f" (did you mean {near[0]!r}?)" if near else ""
-    return f"no joint or group is called {shown(name)}{meant}; there are {', '.join(JOINTS)}"
+    return f"no joint or group is called {shown(name)}{meant(name, JOINTS)}; there are {', '.join(JOINTS)}"
 
 
 @dataclass(frozen=True)
-class _Reader:
-    """One mask file being read."""
-
-    path: Path
+class _Reader(LinedFile):
     fps: float
 
     def parts(self, document: Lined) -> tuple[HeldPart, ...]:
         top = self.mapping(document, KEYS, "a mask")
         if "hold" not in top:
             self.fail(document.line, "there is no 'hold'; list the parts that are held")
-        return tuple(self.part(item) for item in self.items(top["hold"], "'hold'", most=MAX_PARTS))
+        return tuple(self.part(item) for item in self.items(top["hold"], "hold", most=MAX_PARTS))
 
     def part(self, item: Lined) -> HeldPart:
         from motionloom.tasks.predict import HeldPart
@@ -102,16 +96,14 @@ class _Reader:
         given = self.mapping(item, PART_KEYS, "a held part")
         if "joints" not in given:
             self.fail(item.line, "a held part has no 'joints'; name joints, groups or root")
-        names = tuple(self.joint(one) for one in self.items(given["joints"], "'joints'", most=MAX_NAMES))
+        names = tuple(self.joint(one) for one in self.items(given["joints"], "joints", most=MAX_NAMES))
         if "frames" in given:
             if "from" in given or "to" in given:
                 self.fail(given["frames"].key_line, "a held part has either 'frames' or 'from' and 'to', not both")
-            rows = self.items(given["frames"], "'frames'", most=MAX_SPANS)
+            rows = self.items(given["frames"], "frames", most=MAX_SPANS)
             return HeldPart(names, tuple(self.stretch(row) for row in rows))
-        begin = self.seconds(given["from"], "from") if "from" in given else 0.0
-        if "to" not in given:
-            return HeldPart(names, ((begin, math.inf),))
-        end = self.seconds(given["to"], "to")
+        begin = self.seconds(given.get("from"), "from", 0.0)
+        end = self.seconds(given.get("to"), "to", math.inf)
         if end <= begin:
             self.fail(given["to"].line, f"'to' must be after 'from', {begin:g} s; got {end:g}")
         return HeldPart(names, ((begin, end),))
@@ -138,31 +130,6 @@ class _Reader:
             self.fail(found.line, f"a frame is a whole number of 0 to {MAX_FRAME:,}; got {found.kind}")
         return value
 
-    def seconds(self, found: Lined, name: str) -> float:
-        value = found.value
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            self.fail(found.line, f"'{name}' must be a number of seconds; got {found.kind}")
-        if not 0 <= value <= LONGEST:
-            self.fail(found.line, f"'{name}' must be 0 to {LONGEST:g} seconds; got {value:g}")
-        return float(value)
-
-    def items(self, found: Lined, name: str, *, most: int) -> list[Lined]:
-        if not isinstance(found.value, list) or not found.value:
-            got = "an empty list" if found.value == [] else found.kind
-            self.fail(found.line, f"{name} must be a list with at least one entry; got {got}")
-        if len(found.value) > most:
-            self.fail(found.line, f"{name} has {len(found.value):,} entries; at most {most:,} are read")
-        return found.value
-
-    def mapping(self, found: Lined, keys: Sequence[str], what: str) -> dict[str, Lined]:
-        if not isinstance(found.value, dict):
-            self.fail(found.line, f"{what} must be a mapping with {listed(keys)}; got {found.kind}")
-        for key, value in found.value.items():
-            if key not in keys:
-                near = difflib.get_close_matches(key[:40], keys, n=1)
-                meant = f" (did you mean '{near[0]}'?)" if near else ""
-                self.fail(value.key_line, f"unknown key {shown(key)}{meant}; {what} has {listed(keys)}")
-        return found.value
-
-    def fail(self, line: int, message: str) -> NoReturn:
-        fail(self.path, line, message)
+    def seconds(self, found: Lined | None, name: str, otherwise: float) -> float:
+        value = self.number(found, name, low=0, high=LONGEST, unit="seconds")
+        return otherwise if value is None else float(value)

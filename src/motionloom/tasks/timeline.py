@@ -6,17 +6,16 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from motionloom.errors import MotionloomError
-from motionloom.io.lined_yaml import Lined, fail, read_lined
-from motionloom.io.text import shown
-from motionloom.tasks.fields import Field, listed
+from motionloom.io.lined_yaml import MAX_ITEMS, Lined, read_lined
+from motionloom.tasks.fields import Field
+from motionloom.tasks.lined_file import LinedFile
 
 if TYPE_CHECKING:
     from motionloom.tasks.goals import Goal
@@ -28,7 +27,7 @@ SEGMENT_KEYS = ("text", "seconds", "guidance", "transition", "goal", "goals")
 SECONDS, TRANSITION = 5.0, 1.0
 """A segment's length, and what two neighbours share, where the file does not say."""
 SHORTEST, LONGEST, SHORTEST_TRANSITION = 0.2, 60.0, 0.05
-MAX_SEGMENTS = 200_000
+MAX_SEGMENTS = MAX_ITEMS
 MAX_CHARACTERS = 20_000
 MAX_GUIDANCE = 100.0
 MAX_SEED = 2**62
@@ -125,17 +124,12 @@ class _Row:
     goals: tuple[Lined, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Reader:
-    """One timeline file being read: what is wrong is told with its name and the line."""
-
-    path: Path
-
+class _Reader(LinedFile):
     def timeline(self, document: Lined) -> Timeline:
         top = self.mapping(document, KEYS, "a timeline")
         if "segments" not in top:
             self.fail(document.line, "there are no 'segments'; list what the person does, one after the other")
-        rows = self.rows(top["segments"])
+        rows = [self.row(item) for item in self.items(top["segments"], "segments", of="segment")]
         shared = self.number(top.get("transition"), "transition", low=SHORTEST_TRANSITION, high=LONGEST / 2)
         transitions = self.transitions(rows, shared)
         total = sum(_frames(row.seconds) for row in rows)
@@ -151,14 +145,6 @@ class _Reader:
             self.start(top.get("start")),
             self.goal(top["path"], "path", total) if "path" in top else None,
         )
-
-    def rows(self, found: Lined) -> list[_Row]:
-        items = found.value
-        if not isinstance(items, list) or not items:
-            self.fail(found.line, f"'segments' must be a list with at least one segment; got {_got(found)}")
-        if len(items) > MAX_SEGMENTS:
-            self.fail(found.line, f"{len(items):,} segments are too many; at most {MAX_SEGMENTS:,} in one file")
-        return [self.row(item) for item in items]
 
     def row(self, item: Lined) -> _Row:
         if isinstance(item.value, str):
@@ -185,10 +171,7 @@ class _Reader:
             return (given["goal"],)
         if "goals" not in given:
             return ()
-        several = given["goals"]
-        if not isinstance(several.value, list) or not several.value:
-            self.fail(several.line, f"'goals' must be a list with at least one goal; got {_got(several)}")
-        return tuple(several.value)
+        return tuple(self.items(given["goals"], "goals", of="goal"))
 
     def transitions(self, rows: list[_Row], shared: float | None) -> list[float]:
         """Each segment's transition to the next; what nobody asked for is shortened to what fits."""
@@ -240,7 +223,7 @@ class _Reader:
                     self.fail(what[key].key_line, f"'path' holds a goal; write it as path: {{path: {{{key}: ...}}}}")
             what = found.plain()
         else:
-            self.fail(found.line, f"'{name}' must be a mapping or the name of a goal file; got {_got(found)}")
+            self.fail(found.line, f"'{name}' must be a mapping or the name of a goal file; got {self.got(found)}")
         try:
             return read_goal(what, frames=frames, fps=FPS, folder=self.path.parent)
         except MotionloomError as error:
@@ -253,7 +236,7 @@ class _Reader:
 
         place = self.file(found, "start")
         if place.suffix.lower() not in READS:
-            self.fail(found.line, f"'start' must name a motion, one of {', '.join(READS)}; got {_got(found)}")
+            self.fail(found.line, f"'start' must name a motion, one of {', '.join(READS)}; got {self.got(found)}")
         return place
 
     def file(self, found: Lined, name: str) -> Path:
@@ -268,42 +251,18 @@ class _Reader:
             return None
         value = self.number(found, "seed", low=0, high=MAX_SEED - 1)
         if not isinstance(value, int | float) or value != int(value):
-            self.fail(found.line, f"'seed' must be a whole number; got {_got(found)}")
+            self.fail(found.line, f"'seed' must be a whole number; got {self.got(found)}")
         return int(value)
 
     def text(self, found: Lined) -> str:
         if not isinstance(found.value, str):
-            self.fail(found.line, f"the text must be words; got {_got(found)} (put quotes around it if it is one)")
+            self.fail(found.line, f"the text must be words; got {self.got(found)} (put quotes around it if it is one)")
         if problem := _text_problem(found.value):
             self.fail(found.line, problem)
         return found.value
 
-    def number(self, found: Lined | None, name: str, *, low: float, high: float) -> float | None:
-        if found is None:
-            return None
-        value = found.value
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            self.fail(found.line, f"'{name}' must be a number; got {_got(found)}")
-        if not low <= value <= high:
-            self.fail(found.line, f"'{name}' must be {low:g} to {high:g}; got {value:g}")
-        return value
-
-    def mapping(self, found: Lined, keys: Sequence[str], what: str) -> dict[str, Lined]:
-        if not isinstance(found.value, dict):
-            self.fail(found.line, f"{what} must be a mapping with {listed(keys)}; got {_got(found)}")
-        for key, value in found.value.items():
-            if key not in keys:
-                near = difflib.get_close_matches(key[:40], keys, n=1)
-                meant = f" (did you mean '{near[0]}'?)" if near else ""
-                self.fail(value.key_line, f"unknown key {shown(key)}{meant}; {what} has {listed(keys)}")
-        return found.value
-
-    def fail(self, line: int, message: str) -> NoReturn:
-        fail(self.path, line, message)
-
-
-def _got(found: Lined) -> str:
-    return "an empty list" if found.value == [] else found.kind
+    def got(self, found: Lined) -> str:
+        return "an empty list" if found.value == [] else found.kind
 
 
 def _line(found: Lined, message: str) -> int:
