@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
     from motionloom.checkpoint import Prior
     from motionloom.nets.pair_block import PairBlock
+    from motionloom.predictor import Predictor
 
 
 def add(subparsers) -> None:
@@ -167,40 +168,36 @@ def _prior(path: Path) -> dict[str, Any]:
 
     prior = load_prior(path)
     config = prior.net.config
-    return {
-        "name": prior.card.name,
-        "kind": "prior",
-        "licence": prior.card.licence,
-        "data": prior.card.data,
-        "manner": config.manner,
-        "parameters": sum(p.numel() for p in prior.net.parameters()),
-        "sizes": {"layers": config.layers, "width": config.width, "heads": config.heads, "patch": config.patch},
-        "features": config.features,
-        "frames_per_second": prior.fps,
-        "schedule": {"name": prior.schedule.name, "steps": prior.schedule.steps},
-        "text": prior.text.name,
-        "notes": prior.card.notes,
-    }
+    about = _network(prior, "prior", config.manner, sizes={"patch": config.patch}, seen={"features": config.features})
+    return about | {"text": prior.text.name, "notes": prior.card.notes}
 
 
 def _predictor(path: Path) -> dict[str, Any]:
     from motionloom.predictor import load_predictor
 
     predictor = load_predictor(path)
-    config = predictor.net.config
+    frames = {"observed": predictor.observed, "predicted": predictor.frames - predictor.observed}
+    seen = {"joints": list(predictor.layout.names), "frames": frames}
+    sizes = {"frequencies": predictor.net.config.kept}
+    return _network(predictor, "predictor", predictor.manner, sizes=sizes, seen=seen) | {"notes": predictor.card.notes}
+
+
+def _network(
+    whole: "Prior | Predictor", kind: str, manner: str, *, sizes: dict[str, int], seen: dict[str, Any]
+) -> dict[str, Any]:
+    """What there is to say of both kinds of networks, with their own ``sizes`` and what they see of a motion."""
+    config = whole.net.config
     return {
-        "name": predictor.card.name,
-        "kind": "predictor",
-        "licence": predictor.card.licence,
-        "data": predictor.card.data,
-        "manner": predictor.manner,
-        "parameters": sum(p.numel() for p in predictor.net.parameters()),
-        "sizes": {"layers": config.layers, "width": config.width, "heads": config.heads, "frequencies": config.kept},
-        "joints": list(predictor.layout.names),
-        "frames": {"observed": predictor.observed, "predicted": predictor.frames - predictor.observed},
-        "frames_per_second": predictor.fps,
-        "schedule": {"name": predictor.schedule.name, "steps": predictor.schedule.steps},
-        "notes": predictor.card.notes,
+        "name": whole.card.name,
+        "kind": kind,
+        "licence": whole.card.licence,
+        "data": whole.card.data,
+        "manner": manner,
+        "parameters": sum(p.numel() for p in whole.net.parameters()),
+        "sizes": {"layers": config.layers, "width": config.width, "heads": config.heads} | sizes,
+        **seen,
+        "frames_per_second": whole.fps,
+        "schedule": {"name": whole.schedule.name, "steps": whole.schedule.steps},
     }
 
 
