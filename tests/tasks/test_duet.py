@@ -102,12 +102,13 @@ def test_a_long_duet_has_all_frames_of_its_segments_and_no_seam(prior: Prior, bl
 
 def test_rows_denoised_together_or_alone_make_the_same(prior: Prior, block: PairBlock) -> None:
     net = block.net(prior)
-    both = [tasks._asked(SEGMENTS, i, None, 0) for i in (0, 1)]
-    one, several = (list(duet_features(prior, net, both, steps=3, together=n)) for n in (1, 8))
+    longer = [replace(segment, seconds=segment.seconds + 2.5) for segment in SEGMENTS]  # long enough for being led
+    both = [tasks._asked(longer, i, None, 0) for i in (0, 1)]
+    one, several = (list(duet_features(prior, net, both, steps=3, at_once=n)) for n in (1, 8))
     for (a, stands), (b, others) in zip(one, several, strict=True):
         torch.testing.assert_close(a, b, rtol=0, atol=1e-4)
         np.testing.assert_allclose(stands, others, atol=1e-3)
-    assert [piece.shape for piece, _ in one] == [(2, n, 263) for n in (20, 16, 18)]
+    assert [piece.shape for piece, _ in one] == [(2, n, 263) for n in (70, 66, 68)]
     again = one[1][0][:, 1:3] - one[0][0][:, -3:-1]  # the second row begins with what the first one ends with
     assert again.abs().max() > 1e-3
 
@@ -162,6 +163,40 @@ def test_each_row_is_told_where_the_two_stand_when_it_begins(
         c * way[2] + s * way[0],
     ]
     np.testing.assert_allclose(told[0], expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("asked", [None, 0, 1])
+def test_a_block_that_wants_them_beside_each_other_keeps_them_there_for_long(
+    prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch, asked: int | None
+) -> None:
+    """A network that always draws two people who walk apart by 0.3 m/s, and always says they stand 1 and 2 m apart;
+    who has a goal of his own is not moved for that."""
+    beside = torch.tensor([[1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 1.0, 2.0]])
+    places, features = block.config.places.encode(beside), torch.zeros(2, 263)
+    features[1, 2], features[:, 3] = 0.015, 0.9
+    clean = (features - prior.mean) / torch.where(prior.std > 0, prior.std, 1.0)
+
+    def constant(net: PairNet, x: torch.Tensor, level, bound) -> torch.Tensor:
+        motion = clean.repeat(len(x) // 2, 1)[:, None].expand(-1, x.shape[1] - 1, -1)
+        return join(places.repeat(len(x) // 2, 1), motion)
+
+    monkeypatch.setattr(PairNet, "forward", constant)
+    segments = [Segment("a person walks", 4.0, transition=1.0)] * 3
+    both = [tasks._asked(segments, i, None, 0) for i in (0, 1)]
+    if asked is not None:
+        goal = Goal.nothing(80)
+        goal.asked[0, 0, 1], goal.positions[0, 0, 1] = True, 0.9  # what he does anyway
+        both[asked] = [replace(segment, goal=goal) for segment in both[asked]]
+    for together, far in ((0.0, (3.0, 4.0)), (1.0, (0.0, 0.8))):
+        drawn = list(duet_features(prior, block.net(prior), both, steps=4, together=together))
+        made = torch.cat([piece for piece, _ in drawn], dim=1).double().numpy()
+        roots = two.decode(made, drawn[0][1])[:, :, 0]
+        off = np.linalg.norm((roots[1] - roots[0])[:, [0, 2]] - [1.0, 2.0], axis=-1)
+        assert far[0] <= off.max() < far[1]
+        if asked is not None and together:
+            np.testing.assert_allclose(
+                roots[asked, :, 2] - roots[asked, 0, 2], asked * 0.015 * np.arange(240), atol=0.02
+            )
 
 
 def test_a_path_for_one_of_them_holds_through_all_segments(prior: Prior, block: PairBlock) -> None:

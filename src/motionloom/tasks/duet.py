@@ -30,6 +30,7 @@ from motionloom.retarget.anatomy import read_body
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.body import bodies
 from motionloom.tasks.control import moved
+from motionloom.tasks.duet_places import Lead, leader
 from motionloom.tasks.goals import Goal
 from motionloom.tasks.long import Progress as Moves
 from motionloom.tasks.long import Segment, _in_world, _Row, _rows, _together, _Track
@@ -51,7 +52,7 @@ Array = NDArray[np.float64]
 
 SHORTEST = 1.0
 """Seconds of the shortest motion that somebody can react to."""
-TOGETHER = 8
+AT_ONCE = 8
 """Rows of a long duet that are denoised at once."""
 
 
@@ -131,8 +132,9 @@ def compose_pair(
     person: int = 0,
     guidance: float = GUIDANCE,
     steps: int = STEPS,
+    together: float = 1.0,
     clean: bool = True,
-    together: int = TOGETHER,
+    at_once: int = AT_ONCE,
     progress: Moves | None = None,
 ) -> Iterator[Duet]:
     """One long duet, block after block in one world, as it is made; in memory that does not grow with its length.
@@ -140,7 +142,8 @@ def compose_pair(
     segments: as of `long.compose`; a text with "::" in it says what the first and what the second person does. In all
     there are ``round(seconds * 20)`` frames of each segment. path: where ``person`` is on the ground in every frame of
     the whole, in the world; goals of segments are his too. The first person starts at the origin facing +Z, or
-    ``person`` where the path begins. Raises `MotionloomError` for what cannot be asked.
+    ``person`` where the path begins. together: as of `pair.pair_features`; whoever has a goal is not moved by it.
+    Raises `MotionloomError` for what cannot be asked.
     (Shafir et al. 2024, sections 3 and 4, in one loop; nothing published does both.)
     """
     check_asked(prior, count=1, seed=seed, person=person)
@@ -150,8 +153,9 @@ def compose_pair(
     track = None if path is None else _Track.along(path, prior.fps)
     asked = [_asked(segments, i, track if i == person else None, person) for i in (0, 1)]
     drawn = duet_features(
-        prior, block.net(prior), asked, seed=seed, guidance=guidance, steps=steps, together=together, progress=progress
-    )
+        prior, block.net(prior), asked, seed=seed, guidance=guidance, steps=steps, together=together, at_once=at_once,
+        progress=progress,
+    )  # fmt: skip
     features, stands = next(drawn)
     if track:
         stands = standing_at(stands, track.stands(0), person)
@@ -193,29 +197,31 @@ def duet_features(
     seed: int = 0,
     guidance: float = GUIDANCE,
     steps: int = STEPS,
-    together: int = TOGETHER,
+    together: float = 1.0,
+    at_once: int = AT_ONCE,
     progress: Moves | None = None,
 ) -> Iterator[tuple[Tensor, Array]]:
     """Pieces (2, frames, 263), not standardised, one per segment, and stands (2, 4) at the first frame of the first.
 
     segments: those of each person, of equal lengths and transitions. Strung together the pieces are the two motions.
-    Row i draws from ``seed + i``.
+    Row i draws from ``seed + i``. ``at_once``: rows per network call; it changes speed and memory, not the result.
     """
     way = levels(prior.schedule, steps, spacing=SPACING)
-    guess = _Guess(prior, net, way)
+    guess = _Guess(prior, net, way, together)
 
     def links() -> Iterator[Link]:
         both = (_rows(prior, one, guidance, None) for one in segments)
         for number, row in enumerate(zip(*both, strict=True)):
-            guess.rows[number] = row
+            goals = [one[number].goal for one in segments]
+            guess.add(number, row, asked=[goal is not None and not goal.empty for goal in goals], seed=seed + number)
             yield Link(row[0].length, row[0].overlap, seed + number)
 
     walk = staggered(
         links(), guess, levels=way, solver=SOLVERS[SOLVER], schedule=prior.schedule, features=2 * (WIDTH + PLACE),
-        together=together, moved=progress or (lambda count: None),
+        together=at_once, moved=progress or (lambda count: None),
     )  # fmt: skip
     for number, state in enumerate(walk):
-        row = guess.rows.pop(number)[0]
+        row = guess.rows[number][0]
         guess.drop(number)
         motion, places = _parted(state)
         motion = smooth(motion) if prior.net.config.patch > 1 else motion
@@ -242,7 +248,9 @@ class _Guess:
     prior: Prior
     net: PairNet
     way: Sequence[int]
+    together: float
     rows: dict[int, tuple[_Row, ...]] = field(default_factory=dict)
+    leads: dict[int, Lead] = field(default_factory=dict)
     ends: dict[tuple[int, int], Tensor] = field(default_factory=dict)
     """Stands (2, 4) at the frame of a row with which the next one begins, by row and level of the guess."""
     noise: dict[int, Tensor] = field(default_factory=dict)
@@ -260,16 +268,31 @@ class _Guess:
         )
         cleans = self._guided([row for n in numbers for row in self.rows[n]], x, frames, at)
         made = []
-        for number, count, level, clean in zip(numbers, frames, at, cleans.unflatten(0, (-1, 2)), strict=True):
+        for number, count, level, clean, (state, _) in zip(
+            numbers, frames, at, cleans.unflatten(0, (-1, 2)), parts, strict=True
+        ):
             places, motion = part(clean)
             rows = zip(motion[:, :count], self.rows[number], strict=True)
             motion = torch.stack([row.correct(one, level) for one, row in rows])
+            begin = self._begin(number, level)
+            begin = self.net.talk.config.places.decode(places) if begin is None else begin
+            motion = self._led(number, level, motion, begin, state=state)
             made.append(_strung(motion, places))
-            self._carry(number, level, motion, places)
+            self._carry(number, level, motion, begin)
         return made
+
+    def add(self, number: int, row: tuple[_Row, ...], *, asked: Sequence[bool], seed: int) -> None:
+        """Take in a row of the chain, of both people; ``asked``: who is asked to be somewhere."""
+        self.rows[number] = row
+        self.leads[number] = leader(
+            self.prior, self.net, _together([one.cond for one in row]), seeds=person_seeds(seed, 0),
+            mask=torch.zeros(2, 1 + row[0].length, WIDTH, dtype=torch.bool, device=self.prior.mean.device),
+            moved=asked, weight=self.together,
+        )  # fmt: skip
 
     def drop(self, number: int) -> None:
         """Forget a row that is finished, as its neighbours are."""
+        del self.rows[number], self.leads[number]
         self.ends = {key: stands for key, stands in self.ends.items() if key[0] != number - 1}
         self.noise.pop(number, None)
 
@@ -286,11 +309,13 @@ class _Guess:
         step = self.way.index(level)
         return self.ends.get((number - 1, self.way[step - 1])) if step else None
 
-    def _carry(self, number: int, level: int, motion: Tensor, places: Tensor) -> None:
-        begin, row = self._begin(number, level), self.rows[number][0]
-        if begin is None:
-            begin = self.net.talk.config.places.decode(places)
-        features = motion * self.prior.std + self.prior.mean
+    def _led(self, number: int, level: int, motion: Tensor, begin: Tensor, *, state: Tensor) -> Tensor:
+        """The guess of a row, its people led to each other from where they begin."""
+        places = self.net.talk.config.places.encode(begin)
+        return part(self.leads[number](join(places, state), join(places, motion), level))[1]
+
+    def _carry(self, number: int, level: int, motion: Tensor, begin: Tensor) -> None:
+        row, features = self.rows[number][0], motion * self.prior.std + self.prior.mean
         self.ends[number, level] = two.later(features, begin, row.length - max(row.overlap, 1))
 
     def _guided(self, rows: Sequence[_Row], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> Tensor:

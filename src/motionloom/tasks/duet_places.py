@@ -24,7 +24,7 @@ from motionloom.nets.prior import Bound
 from motionloom.tasks.completion import row_seed
 
 SPACING = 40
-"""Frames from knot to knot."""
+"""Frames from knot to knot, at most."""
 SHOWN = 60
 """Frames behind a knot that the block is shown, at most."""
 LEAST = 20
@@ -83,8 +83,8 @@ class Places:
     def of(seeds: Sequence[int], frames: int, begins: Sequence[int], given: Sequence[bool]) -> "Places":
         """seeds, given: one per row, whether that person is not moved; begins: one per pair, the last frame in which
         both are known, 0 where nothing is."""
-        knots = tuple(tuple(range(begin + SPACING, frames - LEAST + 1, SPACING)) for begin in begins)
-        spread = tuple(_spread(len(some), begin, frames) for some, begin in zip(knots, begins, strict=True))
+        knots = tuple(_knots(begin, frames) for begin in begins)
+        spread = tuple(_spread([begin, *some], frames) for some, begin in zip(knots, begins, strict=True))
         free = 1.0 - torch.tensor([float(one) for one in given]).view(-1, 2)
         shares = free / free.sum(1, keepdim=True).clamp(min=1.0)
         most = max(len(some) for some in knots)
@@ -136,12 +136,20 @@ def _crops(motion: Tensor, rows: Sequence[int], begins: Sequence[int]) -> tuple[
     return torch.stack(padded), torch.tensor(lengths, device=motion.device)
 
 
-def _spread(count: int, begin: int, frames: int) -> Tensor:
-    """(frames, count): smooth curves, 1 at the own knot, 0 at others and at the begin; level behind the last."""
-    if count == 0:
+def _knots(begin: int, frames: int) -> tuple[int, ...]:
+    """Even steps from ``begin`` to `LEAST` frames before the end; none where that is too near."""
+    room = frames - LEAST - begin
+    count = -(-room // SPACING) if room >= SPACING // 2 else 0
+    return tuple(begin + round(room * number / count) for number in range(1, count + 1))
+
+
+def _spread(at: Sequence[int], frames: int) -> Tensor:
+    """(frames, knots), from the begin and the knots behind it: smooth curves, 1 at the own knot, 0 at the others and
+    at the begin; level behind the last."""
+    if len(at) == 1:
         return torch.zeros(frames, 0)
-    at = ((np.arange(frames) - begin) / SPACING).clip(0, count)
-    return torch.from_numpy(positions_at(np.eye(count + 1)[..., None], at)[:, 1:, 0]).float()
+    along = np.interp(np.arange(frames), at, np.arange(len(at)))
+    return torch.from_numpy(positions_at(np.eye(len(at))[..., None], along)[:, 1:, 0]).float()
 
 
 def _lacking(now: Tensor, asked: Tensor) -> Tensor:
