@@ -1,6 +1,7 @@
 """duet, as a stranger types it, on a tiny prior and a block with random weights."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from motionloom import io
 from motionloom.checkpoint import save_prior
 from motionloom.cli import main
+from motionloom.tasks import pair
 from tests.io.motions import largest_distance
 from tests.nets import tiny
 from tests.tasks.two_people import block, walkers
@@ -26,6 +28,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         io.save(motion, folder / f"{name}.bvh")
     io.save(walkers(1.0)[1], folder / "short.bvh")
     io.save(walkers(1.2)[1].resample(40), folder / "fast.bvh")
+    io.save(replace(walkers(2.0)[0], fps=10.0), folder / "slow.bvh")
     return folder
 
 
@@ -97,6 +100,39 @@ def test_a_timeline_is_one_duet_of_all_its_segments(files: Path) -> None:
     assert [len(io.load(f"{name}.npz")) for name in "ab"] == [50, 50]
 
 
+LED = {
+    "a text": ("two people walk", "--seconds", "3.5"),
+    "somebody given": ("--given", "@slow.bvh"),
+    "a timeline": ("--timeline", "t.yaml"),
+}
+"""Long enough that the two are led."""
+
+
+@pytest.mark.parametrize("name", sorted(LED))
+def test_how_firmly_the_two_stay_together_changes_what_is_drawn(files: Path, name: str) -> None:
+    """From one seed the second person goes elsewhere with 0 than with 1, which is what is done unless told."""
+    Path("t.yaml").write_text("segments:\n  - {text: two people walk, seconds: 3.5}\n", encoding="utf-8")
+    made = []
+    for words in (("--together", "0"), ("--together", "1"), ()):
+        assert duet(files, *LED[name], *words, "--raw", "--out", "a.npz", "--out", "b.npz") == 0
+        made.append(io.load("b.npz").root)
+    free, firm, untold = made
+    assert np.abs(free - firm).max() > 1e-2
+    np.testing.assert_array_equal(firm, untold)
+
+
+def test_how_firmly_the_two_stay_together_is_asked_behind_a_past_too(files: Path, monkeypatch) -> None:
+    asked = []
+
+    def complete(*_, together: float, **__):
+        asked.append(together)
+        return [walkers(1.0)]
+
+    monkeypatch.setattr(pair, "complete_pair", complete)
+    assert duet(files, "--past", "@a.bvh", "@b.bvh", "--together", "0.25") == 0
+    assert asked == [0.25]
+
+
 WRONG = {
     "no words": ((), "no prompt"),
     "an empty prompt": (("",), "prompt is empty"),
@@ -108,6 +144,9 @@ WRONG = {
     "no number of seconds": (("walk", "--seconds", "nan"), "--seconds"),
     "too much time": (("walk", "--seconds", "61"), "at most 60"),
     "no duets": (("walk", "--count", "0"), "--count"),
+    "more than together": (("walk", "--together", "1.5"), "--together must be 0 to 1; got 1.5"),
+    "no share": (("walk", "--together", "nan"), "--together must be 0 to 1; got nan"),
+    "less than apart in a timeline": (("--timeline", "t.yaml", "--together", "-0.1"), "must be 0 to 1; got -0.1"),
     "a block that is not there": (("walk", "--block", "nobody"), "no two-person block"),
     "a past that is not there": (("--past", "@a.bvh", "no.bvh"), "no.bvh"),
     "one person as both": (("--past", "@a.bvh", "@a.bvh"), "named twice"),

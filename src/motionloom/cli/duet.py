@@ -2,7 +2,7 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
 from motionloom.cli.sampling import bar, check_count, check_prompt, fail, places, report, take_text_anywhere
@@ -104,11 +104,9 @@ def _make(
 
     text, seed = arguments.text or "", arguments.seed or 0
     shared: dict[str, Any] = {"clean": not arguments.raw}
-    shared |= {n: v for n in ("steps", "guidance") if (v := getattr(arguments, n)) is not None}
+    shared |= {n: v for n in ("steps", "guidance", "together") if (v := getattr(arguments, n)) is not None}
     if timeline is not None:
         return [_composed(arguments, prior, block, timeline, progress, shared)]
-    if arguments.together is not None:
-        shared["together"] = arguments.together
     shared |= {"count": arguments.count, "seed": seed, "progress": progress}
     if arguments.past:
         added = ADDED if arguments.seconds is None else arguments.seconds
@@ -191,29 +189,26 @@ def _timeline(arguments: argparse.Namespace) -> "Timeline":
 
     path = arguments.timeline
     timeline = read_timeline(path)
-    if timeline.start is None and timeline.seconds <= MAX_SECONDS:
-        parts = [segment.text for segment in timeline.segments]
-    else:
-        parts = []
-    top: Any = None
-    for number, text in enumerate(parts):
+
+    def wrong(key: str, message: str, number: int | None = None) -> NoReturn:
+        top: Any = read_lined(path).value
+        fail_at(path, top[key].key_line if number is None else top[key].value[number].line, message)
+
+    if timeline.start is not None:
+        wrong("start", "two people do not go on from one 'start'; leave it out, or use --past")
+    if timeline.seconds > MAX_SECONDS:
+        wrong("segments", f"two people do at most {MAX_SECONDS:g} s; got {timeline.seconds:g}")
+    for number, segment in enumerate(timeline.segments):
         try:
-            prompts_of(text)
+            prompts_of(segment.text)
         except MotionloomError as error:
-            top = read_lined(path).value
-            fail_at(path, top["segments"].value[number].line, str(error))
-    if not parts:
-        top = read_lined(path).value
-        if timeline.start is not None:
-            fail_at(
-                path, top["start"].key_line, "two people do not go on from one 'start'; leave it out, or use --past"
-            )
-        fail_at(path, top["segments"].key_line, f"two people do at most {MAX_SECONDS:g} s; got {timeline.seconds:g}")
+            wrong("segments", str(error), number)
     return timeline
 
 
 def _goal(arguments: argparse.Namespace) -> "Goal":
     """What one of the two is asked: a goal file, such a mapping in YAML, or a drawn line."""
+    from motionloom.errors import MotionloomError
     from motionloom.io.lined_yaml import read_lined
     from motionloom.tasks.goal_file import read_goal
     from motionloom.tasks.goals import FPS
@@ -222,8 +217,6 @@ def _goal(arguments: argparse.Namespace) -> "Goal":
     path: Path = arguments.path
     frames = frames_in(SECONDS if arguments.seconds is None else arguments.seconds, FPS)
     if path.suffix.lower() in (".yaml", ".yml"):
-        from motionloom.errors import MotionloomError
-
         what = read_lined(path).plain()
         if not isinstance(what, dict):
             fail(f"{path} must be a mapping with 'path', 'joints' or what else a goal file may hold")
@@ -256,8 +249,6 @@ def _check(arguments: argparse.Namespace) -> None:
         fail(f"--seconds does not go with --{kinds[0]}, which says how long it is")
     if arguments.path and kinds:
         fail(f"--path does not go with --{kinds[0]}; give it with a text, or write it into a timeline")
-    if arguments.together is not None and kinds == ["timeline"]:
-        fail("--together does not go with --timeline; leave it out")
     if arguments.seconds is not None and not 0 < arguments.seconds <= 60:
         fail(f"--seconds must be above 0 and at most 60; got {arguments.seconds:g}")
     _check_numbers(arguments)
