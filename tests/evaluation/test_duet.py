@@ -1,41 +1,34 @@
-"""Two people measured with made-up ways of completing them and made-up duets: errors, resumption, verdicts, reports."""
+"""Two people measured with made-up ways of completing them: errors, resumption, verdicts, reports."""
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
 from motionloom.cli import main
-from motionloom.data.pairs import Pair
 from motionloom.errors import MotionloomError
-from motionloom.evaluation import duet, duet_blocks, duet_text
+from motionloom.evaluation import duet, duet_answers, duet_blocks, duet_text
 from motionloom.evaluation import duet_ways as ways
 from motionloom.evaluation import report as reports
 from motionloom.evaluation.duet import COLUMNS, ERRORS, LOOKS, How
 from motionloom.evaluation.duet_blocks import Beside
 from motionloom.evaluation.duet_ways import FRAMES, Crops
+from motionloom.evaluation.needs import NoData, pairs_of
 from motionloom.evaluation.report import REAL
 from motionloom.features import pair as two
-from motionloom.metrics import pair as mp
 from motionloom.nets.adapter import fingerprint
 from motionloom.nets.mrt import Mrt, MrtConfig, MrtFile
 from motionloom.nets.pair import Talk, fitting
 from motionloom.nets.pair_block import PairBlock
 from motionloom.nets.prior import condition
-from tests.metrics.people import FPS, standing, walking
+from tests.evaluation.duets import block_over, couple, pair_of
+from tests.metrics.people import FPS
 from tests.nets import tiny
 from tests.nets.text.tiny import WIDTH as TEXT
-
-
-def couple(seconds: float, apart: float = 1.0, speed: float = 1.0) -> np.ndarray:
-    """(2, frames, 22, 3): two who walk side by side."""
-    one = walking(speed, seconds) if speed else standing(seconds)
-    return np.stack([one, one + np.array([apart, 0.0, 0.0])])
 
 
 def gliding(speed: float, seconds: float = 6.0) -> np.ndarray:
@@ -43,10 +36,6 @@ def gliding(speed: float, seconds: float = 6.0) -> np.ndarray:
     still = couple(seconds, speed=0.0)
     way = np.arange(still.shape[1])[:, None, None] * np.array([0.0, 0.0, speed / FPS])
     return still + way
-
-
-def pair_of(positions: np.ndarray, name: str = "p", split: str = "val", said: Sequence[str] = ()) -> Pair:
-    return Pair(name, split, tuple(said), "own", "do what you like", positions)
 
 
 def crops_of(positions: np.ndarray, count: int = 3, **how: Any) -> Crops:
@@ -167,11 +156,6 @@ def test_a_real_sampler_of_random_weights_keeps_the_given_second() -> None:
     assert np.isfinite(made).all()
 
 
-def block_over(prior) -> PairBlock:
-    talk = Talk(fitting(prior.net.config), prior.net.config)
-    return PairBlock("b", talk.config, talk.state_dict(), "tiny", fingerprint(prior.net))
-
-
 @pytest.mark.parametrize("config", [tiny.MODULATED, tiny.PUBLISHED], ids=["modulated", "published"])
 def test_layers_of_the_bare_prior_do_nothing(config) -> None:
     """What one frame says reaches no other, and words only through what all frames share."""
@@ -269,7 +253,15 @@ def test_wishes_that_cannot_be_are_told(tmp_path: Path, monkeypatch: pytest.Monk
     with pytest.raises(MotionloomError, match="no two-person block is shipped"):
         duet.chosen_block(None)
     with pytest.raises(MotionloomError, match="name some with --data"):
-        duet.read(None, print)
+        pairs_of(None)
+    with pytest.raises(NoData, match="has no pairs"):
+        pairs_of(tmp_path)
+    with pytest.raises(MotionloomError, match="is not a folder"):
+        pairs_of(tmp_path / "none")
+    (tmp_path / "x_a.bvh").write_text("")
+    with pytest.raises(MotionloomError, match="has no partner") as told:
+        pairs_of(tmp_path)
+    assert not isinstance(told.value, NoData)
     with pytest.raises(MotionloomError, match="the rows are"):
         duet.run(data=tmp_path, kinds=("best",))
 
@@ -351,89 +343,6 @@ def test_a_block_beside_has_one_sample_and_a_new_one_leaves_what_is_done(tmp_pat
     assert other.rows[2].values["root_2"].mean == pytest.approx(0.3)
 
 
-# From words ----------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Person:
-    """As much of a motion as is measured."""
-
-    places: np.ndarray
-
-    def positions(self) -> np.ndarray:
-        return self.places
-
-
-def partners(apart: float, seconds: float = 12.0, wave: float = 0.2) -> np.ndarray:
-    """(2, frames, 22, 3): two who face each other and come and go together."""
-    a = standing(seconds)
-    b = a * np.array([-1.0, 1.0, -1.0])
-    way = wave * np.sin(np.arange(len(a)) / 7.0)[:, None, None] * np.array([1.0, 0.0, 0.0])
-    return np.stack([a + way, b + way + np.array([0.0, 0.0, apart])])
-
-
-RECORDED = [
-    pair_of(partners(apart), f"r{n}", split, ["two people dance", "a couple dances"])
-    for n, (apart, split) in enumerate([(0.9, "train"), (1.0, "train"), (1.1, "train"), (1.05, "val")])
-]
-TEXT_HOW = duet_text.How(duets=5, seconds=6.0)
-
-
-def made_at(apart: float, asked: list[tuple[str, int, int]] | None = None) -> duet_text.Make:
-    def make(caption: str, count: int, seed: int) -> list:
-        if asked is not None:
-            asked.append((caption, count, seed))
-        people = partners(apart, 6.0)
-        return [cast(Any, (Person(people[0]), Person(people[1]))) for _ in range(count)]
-
-    return make
-
-
-def test_partners_are_within_the_spread_and_people_far_apart_are_not() -> None:
-    asked: list[tuple[str, int, int]] = []
-    found = duet_text.measure(RECORDED, made_at(1.0, asked), made_at(4.0), TEXT_HOW)
-    assert [row.name for row in found.rows] == [
-        "real", "real, held-out pairs", "real, partners shuffled", "ours", "ours, partners shuffled",
-        "prior without communication",
-    ]  # fmt: skip
-    assert asked == [("two people dance", 3, 0), ("a couple dances", 2, 1)]
-    ours, far = found.row("ours"), found.row("prior without communication")
-    assert ours is not None
-    assert far is not None
-    assert ours.values["distance"].mean == pytest.approx(1.0)
-    assert ours.values["distance"].count == 5
-    assert ours.values["ratio_distance"].mean < 1.5 < far.values["ratio_distance"].mean
-    assert ours.values["looking_away"].mean == pytest.approx(0, abs=1e-4)
-    assert any("ours: within 1.5 times" in note for note in found.notes)
-    assert any(f"under {duet_text.DEEP:g} cm" in note for note in found.notes)
-
-
-def test_the_ratio_of_the_distance_in_closed_form() -> None:
-    """Real distances 0.9, 1.0, 1.1, 1.05: Wasserstein distances of each from the others, by hand."""
-    found = duet_text.measure(RECORDED, made_at(1.3), None, TEXT_HOW, kinds=("ours",))
-    real = [0.9, 1.0, 1.1, 1.05]
-    spread = np.mean([np.mean([abs(one - o) for k, o in enumerate(real) if k != n]) for n, one in enumerate(real)])
-    away = np.mean([1.3 - one for one in real])
-    assert found.rows[0].values["ratio_distance"].mean == pytest.approx(away / spread, rel=2e-2)
-
-
-def test_duets_that_cannot_be_compared_are_told() -> None:
-    with pytest.raises(MotionloomError, match="no captions"):
-        duet_text.measure([replace(pair, captions=()) for pair in RECORDED], made_at(1.0), None, TEXT_HOW)
-    with pytest.raises(MotionloomError, match="fewer than two pairs"):
-        duet_text.measure(RECORDED[:1], made_at(1.0), None, TEXT_HOW)
-    with pytest.raises(MotionloomError, match="2 duets or more"):
-        duet_text.How(duets=1)
-
-
-def test_the_prior_without_communication_begins_where_real_partners_stand() -> None:
-    prior, how = tiny.prior(), duet_text.How(duets=2, seconds=2.0, steps=2, clean=False)
-    made = duet_text.beside(prior, RECORDED, how)("two people dance", 2, 0)
-    for duo in made:
-        places = np.stack([person.positions() for person in duo])
-        assert mp.distance(places)[0] == pytest.approx(1.0, abs=0.2)
-
-
 # The command ---------------------------------------------------------------------------------------------------------
 
 
@@ -445,5 +354,5 @@ def test_the_command_tells_what_is_missing(tmp_path: Path, capsys: pytest.Captur
 
 
 def test_columns_have_different_names() -> None:
-    for columns in (COLUMNS, duet_text.COLUMNS):
+    for columns in (COLUMNS, duet_text.COLUMNS, duet_answers.COLUMNS):
         assert len({column.name for column in columns}) == len({column.title for column in columns}) == len(columns)

@@ -1,25 +1,26 @@
-"""`motionloom evaluate duet`: two people, going on from what both did and from words, beside real pairs."""
+"""`motionloom evaluate duet`: two people, going on, from words, answering to one and for long, beside real pairs."""
 
 import argparse
 from pathlib import Path
 
-PARTS = ("completion", "text")
+PARTS = ("completion", "text", "answers", "long")
 
 
 def add(commands) -> None:
     """Register `evaluate duet`."""
     duet = commands.add_parser(
-        "duet", help="two people: errors of completions beside baselines, and duets from words beside real pairs"
+        "duet",
+        help="two people: errors of completions beside baselines; duets, answers and long duets beside real pairs",
     )
     duet.add_argument(
         "--data", type=Path, required=True, metavar="PACK", help="pairs: mocap pack, NAME_a.bvh and NAME_b.bvh, 3DPW"
     )
     duet.add_argument("--weights", default="default", help="the prior: shipped name or file (default: default)")
     duet.add_argument("--block", metavar="NAME|PATH", help="the two-person block (default: the shipped one)")
-    duet.add_argument("--only", choices=PARTS, help="only completions, or only duets from words")
+    duet.add_argument("--only", choices=PARTS, help="only completions, duets from words, answers to one, or long duets")
     duet.add_argument("--crops", type=int, metavar="N", help="random crops that are completed (default 200)")
     duet.add_argument("--samples", type=int, metavar="N", help="completions of each crop (default 5)")
-    duet.add_argument("--duets", type=int, metavar="N", help="duets from words (default 24)")
+    duet.add_argument("--duets", type=int, metavar="N", help="duets of each other part (default 24)")
     duet.add_argument("--steps", type=int, help="sampler steps (default: as duet)")
     duet.add_argument(
         "--given", choices=("past", "tool", "published"), default="past",
@@ -45,9 +46,9 @@ def add(commands) -> None:
         "--out",
         type=Path,
         metavar="FOLDER",
-        help="folder for the reports, in completion and text; a stopped run goes on",
+        help="folder for the reports, one of each part; a stopped run of completions goes on",
     )
-    duet.add_argument("--quick", action="store_true", help="six crops, two samples, four duets, few steps")
+    duet.add_argument("--quick", action="store_true", help="six crops, two samples, two or four duets, few steps")
     duet.add_argument("--json", action="store_true", help="print JSON instead of tables")
     duet.add_argument(
         "--write-bare", type=Path, metavar="FILE",
@@ -71,7 +72,7 @@ def _duet(arguments: argparse.Namespace) -> None:
             obey.check_report(arguments.out / part / "report.json")
     found = {}
     for part in asked:
-        found[part] = (_completion if part == "completion" else _text)(arguments)
+        found[part] = _completion(arguments) if part == "completion" else _judged(arguments, part)
         if arguments.out:
             report.write(found[part], arguments.out / part)
         if not arguments.json:
@@ -128,17 +129,19 @@ def _mrt(arguments: argparse.Namespace) -> Path | None:
     return own
 
 
-def _text(arguments: argparse.Namespace):
+def _judged(arguments: argparse.Namespace, part: str):
+    """Duets that are held against real ones."""
     from dataclasses import replace
 
     from motionloom.cli.evaluate_text import say
-    from motionloom.evaluation import duet_text
+    from motionloom.evaluation import duet_answers, duet_long, duet_text
 
+    module = {"text": duet_text, "answers": duet_answers, "long": duet_long}[part]
     said = {name: value for name in ("duets", "steps") if (value := getattr(arguments, name)) is not None}
-    how = replace(duet_text.QUICK if arguments.quick else duet_text.How(), seed=arguments.seed, **said)
-    return duet_text.run(
+    how = replace(module.QUICK if arguments.quick else module.How(), seed=arguments.seed, **said)
+    return module.run(
         arguments.weights, data=arguments.data, block=arguments.block, how=how, device=arguments.device,
-        command=_command(arguments, "text"), progress=say,
+        command=_command(arguments, part), progress=say,
     )  # fmt: skip
 
 

@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 
 from motionloom.checkpoint import Prior
-from motionloom.data.pairs import Pair, find_pairs
+from motionloom.data.pairs import Pair
 from motionloom.errors import MotionloomError
 from motionloom.evaluation import duet_blocks
 from motionloom.evaluation import duet_ways as ways
 from motionloom.evaluation.duet_blocks import Beside
 from motionloom.evaluation.duet_ways import FRAMES, GIVEN, Crops, Way
+from motionloom.evaluation.needs import NoData, pairs_of
 from motionloom.evaluation.parts import Parts, fingerprint
 from motionloom.evaluation.published_rows import published
 from motionloom.evaluation.report import REAL, Column, Report, Row, Value
@@ -109,7 +110,7 @@ def run(
     found = PairBlock.load(chosen_block(block), prior) if "ours" in kinds else None
     made = ways_of(prior, found, how, kinds, communication=communication, mrt=mrt, device=device)
     others = duet_blocks.beside(prior, beside, _asked(how))
-    crops = draw(held_out(read(data, progress)), how)
+    crops = draw(held_out(pairs_of(data, captions=False, say=progress)), how)
     about = {
         "weights": Path(weights).stem, "block": found.name if found else None, "device": device,
         "files": {str(k): _digest(v) for k, v in (("communication", communication), ("mrt", mrt)) if v},
@@ -130,18 +131,11 @@ def chosen_block(block: str | Path | None) -> str | Path:
     return next(iter(blocks()))
 
 
-def read(data: Path | str | None, progress: Callable[[str], None]) -> list[Pair]:
-    """The pairs of a folder; captions are not needed."""
-    if data is None:
-        raise MotionloomError("two people are compared with real pairs, and none are shipped; name some with --data")
-    return find_pairs(data, captions=False, say=progress)
-
-
 def held_out(pairs: Sequence[Pair]) -> list[Pair]:
-    """Those of validation and test that are long enough for a crop."""
+    """Those of validation and test that are long enough for a crop; raises NoData where there is none."""
     found = [pair for pair in pairs if pair.split in HELD_OUT and pair.frames > FRAMES]
     if not found:
-        raise MotionloomError(
+        raise NoData(
             f"there is no held-out pair of {FRAMES + 1} frames or more; ten pairs or more give one for validation"
         )
     return found

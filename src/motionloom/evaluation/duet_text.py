@@ -6,7 +6,7 @@ whose people at least begin where real partners do.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,10 +15,11 @@ import numpy as np
 import torch
 
 from motionloom.checkpoint import Prior
-from motionloom.data.pairs import Pair, find_pairs, windows
+from motionloom.data.pairs import Pair, windows
 from motionloom.errors import MotionloomError
 from motionloom.evaluation.duet import HELD_OUT, chosen_block
 from motionloom.evaluation.duet_ways import silent_net
+from motionloom.evaluation.needs import pairs_of
 from motionloom.evaluation.report import REAL, Column, Report, Row, Value
 from motionloom.features import pair as two
 from motionloom.metrics import pair as mp
@@ -86,6 +87,35 @@ class How:
 QUICK = How(duets=4, steps=6)
 Make = Callable[[str, int, int], Sequence[Duet]]
 """(caption, count, seed) to that many duets."""
+Cut = Callable[[Array], Array]
+"""A stretch of a duet (2, frames, 22, 3), of as many frames as the real windows have."""
+NOTES = (
+    "Real rows are windows of the same length; held-out pairs are held against the train pairs, all others against "
+    "all recordings.",
+    "Shuffled partners begin where the true partner began, facing as they did, and then do what they did elsewhere.",
+)
+
+
+def whole(duet: Array) -> Array:
+    """All of it."""
+    return duet
+
+
+@dataclass(frozen=True)
+class Table:
+    """Which duets are measured, and what of them."""
+
+    suite: str
+    title: str
+    captions: tuple[str, ...]
+    """What duets are made for, in turn."""
+    notes: tuple[str, ...] = NOTES
+    cuts: tuple[tuple[str, Cut], ...] = (("", whole),)
+    """Stretches that are rows, and what the rows' names end in; strangers are of the first, and so is the prior without
+    communication."""
+    columns: tuple[Column, ...] = COLUMNS
+    more: Callable[[Sequence[Array]], Mapping[str, Value]] = lambda duets: {}
+    """Further columns of all that was made, in the order of `turns`."""
 
 
 def run(
@@ -101,33 +131,49 @@ def run(
 ) -> Report:
     """Measure a block (a shipped name, a file, or the shipped one) against the pairs of ``data``, captions and all."""
     how = how or How()
-    if not kinds or not set(kinds) <= set(KINDS):
-        raise MotionloomError(f"the rows are {', '.join(KINDS)}; got {', '.join(kinds)[:200] or 'none'}")
-    if data is None:
-        raise MotionloomError("two people are compared with real pairs, and none are shipped; name some with --data")
-    prior = Prior.load(weights, device=device)
-    found = PairBlock.load(chosen_block(block), prior)
-    pairs = find_pairs(data, say=progress)
+    prior, found, pairs, about = opened(weights, data=data, block=block, kinds=kinds, device=device, progress=progress)
     ours: Make = lambda caption, count, seed: generate_pair(  # noqa: E731
         prior, found, caption, seconds=how.seconds, count=count, seed=seed, guidance=how.guidance, steps=how.steps,
         clean=how.clean,
     )  # fmt: skip
-    about = {"weights": Path(weights).stem, "block": found.name, "device": device}
     return measure(
-        pairs, ours, beside(prior, pairs, how), how, kinds=kinds, command=command, about=about, progress=progress
-    )
+        pairs, ours, beside(prior, pairs, how), how, table=text_table(pairs), kinds=kinds, command=command, about=about,
+        progress=progress,
+    )  # fmt: skip
+
+
+def opened(
+    weights: str | Path,
+    *,
+    data: Path | str | None,
+    block: str | Path | None,
+    kinds: Sequence[str],
+    device: str,
+    progress: Callable[[str], None],
+) -> tuple[Prior, PairBlock, list[Pair], dict[str, Any]]:
+    """The prior, the block and the pairs with their captions, and what the protocol says of them."""
+    if not kinds or not set(kinds) <= set(KINDS):
+        raise MotionloomError(f"the rows are {', '.join(KINDS)}; got {', '.join(kinds)[:200] or 'none'}")
+    prior = Prior.load(weights, device=device)
+    found = PairBlock.load(chosen_block(block), prior)
+    return prior, found, pairs_of(data, say=progress), {
+        "weights": Path(weights).stem, "block": found.name, "device": device
+    }  # fmt: skip
+
+
+def text_table(pairs: Sequence[Pair]) -> Table:
+    """Duets for the captions of the train pairs."""
+    silent = "The prior without communication does not know where the other is: it is given where real partners begin."
+    return Table("duet-text", "Two people from words", captions_of(pairs), (*NOTES, silent))
 
 
 def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
     """The prior without communication, its people beginning where partners of random train windows stand."""
-    frames, net = frames_in(how.seconds, prior.fps), silent_net(prior)
-    real = [window for pair in pairs if pair.split == "train" for window in windows(pair, frames, frames // 2)]
+    frames, net, begun = frames_in(how.seconds, prior.fps), silent_net(prior), beginnings(pairs, how)
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
-        rng = np.random.default_rng((how.seed, seed))
-        begun = [two.encode(real[int(rng.integers(len(real)))].positions).stands for _ in range(count)]
         nothing = torch.zeros(2, 0, len(prior.mean))
-        told = [known_state(prior, net, nothing, torch.from_numpy(stands), frames) for stands in begun]
+        told = [known_state(prior, net, nothing, torch.from_numpy(stands), frames) for stands in begun(count, seed)]
         features, stands = pair_features(
             prior, net, [caption] * (2 * count), frames,
             seeds=[s for number in range(count) for s in person_seeds(seed, number)],
@@ -145,32 +191,48 @@ def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
     return make
 
 
+def beginnings(pairs: Sequence[Pair], how: How) -> Callable[[int, int], list[Array]]:
+    """(count, seed) to stands (2, 4) of partners at the beginning of random train windows."""
+    frames = frames_in(how.seconds, mp.FPS)
+    real = [window for pair in pairs if pair.split == "train" for window in windows(pair, frames, frames // 2)]
+
+    def begun(count: int, seed: int) -> list[Array]:
+        rng = np.random.default_rng((how.seed, seed))
+        return [two.encode(real[int(rng.integers(len(real)))].positions).stands for _ in range(count)]
+
+    return begun
+
+
 def measure(
     pairs: Sequence[Pair],
     ours: Make,
     silent: Make | None,
     how: How,
     *,
+    table: Table,
     kinds: Sequence[str] = KINDS,
     command: str = "",
     about: dict[str, Any] | None = None,
     progress: Callable[[str], None] = lambda line: None,
 ) -> Report:
-    """The report of duets made for the captions of the train pairs."""
-    recorded, captions = _recorded(pairs, frames_in(how.seconds, mp.FPS)), captions_of(pairs)
+    """The report of duets made for captions, beside all pairs there are."""
+    recorded = _recorded(pairs, frames_in(how.seconds, mp.FPS))
     real = list(recorded.values())
     rows = _real_rows(recorded, {pair.name for pair in pairs if pair.split in HELD_OUT}, kinds)
     for kind, make, name in (("ours", ours, "ours"), ("silent", silent, "prior without communication")):
         if make is None or not {kind, "our-strangers" if kind == "ours" else kind} & set(kinds):
             continue
-        made, seconds = _made(make, captions, how, lambda line, n=name: progress(f"{n}: {line}"))
-        if kind in kinds:
-            rows.append(_row(name, made, real, seconds=seconds))
-        if kind == "ours" and "our-strangers" in kinds:
-            rows.append(_row("ours, partners shuffled", groups.shuffled(made), real))
-    said = protocol_of(recorded, captions, how) | (about or {})
+        made, seconds = _made(make, table.captions, how, lambda line, n=name: progress(f"{n}: {line}"))
+        for end, cut in table.cuts if kind == "ours" else table.cuts[:1]:
+            clips = [cut(duet) for duet in made]
+            if kind in kinds:
+                rows.append(_row(f"{name}{end}", clips, real, seconds=seconds, more=table.more(clips)))
+            if kind == "ours" and "our-strangers" in kinds and end == table.cuts[0][0]:
+                strangers = groups.shuffled(clips)
+                rows.append(_row(f"{name}{end}, partners shuffled", strangers, real, more=table.more(strangers)))
+    said = protocol_of(recorded, table.captions, how) | (about or {})
     return Report(
-        "duet-text", "Two people from words", command, said, COLUMNS, tuple(rows), (*verdicts(rows), *NOTES)
+        table.suite, table.title, command, said, table.columns, tuple(rows), (*verdicts(rows), *table.notes)
     )  # fmt: skip
 
 
@@ -199,38 +261,42 @@ def _real_rows(recorded: dict[str, list[Array]], held_out: set[str], kinds: Sequ
     return rows
 
 
-NOTES = (
-    "Real rows are windows of the same length; held-out pairs are held against the train pairs, all others against "
-    "all recordings.",
-    "Shuffled partners begin where the true partner began, facing as they did, and then do what they did elsewhere.",
-    "The prior without communication does not know where the other is: it is given where real partners begin.",
-)
-
-
-def captions_of(pairs: Sequence[Pair]) -> list[str]:
+def captions_of(pairs: Sequence[Pair]) -> tuple[str, ...]:
     """What the train pairs are said to do, each once."""
-    found = list(dict.fromkeys(text for pair in pairs if pair.split == "train" for text in pair.captions))
+    found = tuple(dict.fromkeys(text for pair in pairs if pair.split == "train" for text in pair.captions))
     if not found:
         raise MotionloomError("the train pairs have no captions; duets are made for them, so add captions.txt")
     return found
 
 
+def turns(captions: Sequence[str], how: How) -> list[tuple[str, int, int]]:
+    """(caption, count, seed) of all duets, captions in turn."""
+    counts = [len(range(number, how.duets, len(captions))) for number in range(len(captions))]
+    return [
+        (caption, count, how.seed * len(captions) + number)
+        for number, (caption, count) in enumerate(zip(captions, counts, strict=True))
+        if count
+    ]
+
+
 def _made(
     make: Make, captions: Sequence[str], how: How, say: Callable[[str], None]
 ) -> tuple[list[Array], float]:  # fmt: skip
-    """Positions of all duets, captions in turn, and seconds for one."""
-    counts = [len(range(number, how.duets, len(captions))) for number in range(len(captions))]
+    """Positions of all duets, in the order of `turns`, and seconds for one."""
     made, began = [], time.perf_counter()
-    for number, (caption, count) in enumerate(zip(captions, counts, strict=True)):
-        if count:
-            say(f"{count} duets of {caption!r}")
-            duets = make(caption, count, how.seed * len(captions) + number)
-            made += [np.stack([person.positions() for person in duet]) for duet in duets]
+    for caption, count, seed in turns(captions, how):
+        say(f"{count} duets of {caption!r}")
+        made += [np.stack([person.positions() for person in duet]) for duet in make(caption, count, seed)]
     return made, (time.perf_counter() - began) / how.duets
 
 
 def _row(
-    name: str, clips: Sequence[Array], real: Sequence[Sequence[Array]] | None, *, seconds: float | None = None
+    name: str,
+    clips: Sequence[Array],
+    real: Sequence[Sequence[Array]] | None,
+    *,
+    seconds: float | None = None,
+    more: Mapping[str, Value] | None = None,
 ) -> Row:
     stats = [mp.pair_stats(clip) for clip in clips]
     values = {
@@ -247,7 +313,7 @@ def _row(
         values["within"] = Value(inside / len(groups.JUDGED), count=len(groups.JUDGED))
     if seconds is not None:
         values["seconds"] = Value(seconds)
-    return Row(name, values)
+    return Row(name, {**values, **(more or {})})
 
 
 def verdicts(rows: Sequence[Row]) -> tuple[str, ...]:
@@ -261,9 +327,9 @@ def verdicts(rows: Sequence[Row]) -> tuple[str, ...]:
         inside = "within" if all(ratio <= groups.LIMIT for _, ratio in ratios) else "not within"
         told.append(f"{row.name}: {inside} {groups.LIMIT:g} times of the real pairs' spread ({said}).")
         depth = row.values["penetration"].mean
-        if row.name == "ours":
+        if "shuffled" not in row.name:
             told.append(
-                f"ours: mean penetration {depth:.2f} cm, {'under' if depth < DEEP else 'not under'} {DEEP:g} cm."
+                f"{row.name}: mean penetration {depth:.2f} cm, {'under' if depth < DEEP else 'not under'} {DEEP:g} cm."
             )
     return tuple(told)
 

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from motionloom.checkpoint import Prior, shipped
 from motionloom.errors import MotionloomError
-from motionloom.evaluation import obey, physical, realism
+from motionloom.evaluation import needs, obey, physical, realism
 from motionloom.evaluation.control_kinds import QUICK, SUITE
 from motionloom.evaluation.report import Report
 
@@ -68,6 +68,8 @@ class Suite:
     """Whether it cannot do without a set, compares with one where there is one, or reads none."""
     files: Callable[[Job], Sequence[Path]] = lambda job: ()
     """Further files whose content changes the numbers, the weights under test aside."""
+    needs: Callable[[Path], None] = lambda data: None
+    """Raises `needs.NoData` where the data have nothing of the kind it measures."""
 
     def settings(self, quick: bool) -> Mapping[str, Any]:
         """Those of a quick or of a full run."""
@@ -109,7 +111,7 @@ def _obedience(job: Job, settings: Mapping[str, Any]) -> Report:
 def _realism(job: Job, settings: Mapping[str, Any]) -> Report:
     wanted, real, about = physical.realism_orders(job.data, settings["count"])
     if not wanted:
-        raise MotionloomError(f"{job.data} has no held-out captioned clips of 2 to 10 s; leave --data out")
+        raise needs.NoData(f"{job.data} has no held-out captioned clips of 2 to 10 s; leave --data out")
     made, fps = {}, 0.0
     for name, finished in ((physical.AS_DRAWN, False), (physical.AS_EXPORTED, True)):
         made[name], fps = realism.run(job.tools.generator(finished), wanted, progress=job.tools.progress)
@@ -209,6 +211,24 @@ def _duets(job: Job, settings: Mapping[str, Any]) -> Report:
     )  # fmt: skip
 
 
+def _answers(job: Job, settings: Mapping[str, Any]) -> Report:
+    from motionloom.evaluation import duet_answers
+
+    return duet_answers.run(
+        job.weights, data=job.data, how=duet_answers.How(**settings), device=job.device,
+        command=command("duet-answers", job), progress=job.tools.progress,
+    )  # fmt: skip
+
+
+def _long_duets(job: Job, settings: Mapping[str, Any]) -> Report:
+    from motionloom.evaluation import duet_long
+
+    return duet_long.run(
+        job.weights, data=job.data, how=duet_long.How(**settings), device=job.device,
+        command=command("duet-long", job), progress=job.tools.progress,
+    )  # fmt: skip
+
+
 def _blocks(job: Job) -> list[Path]:
     """The shipped two-person blocks."""
     from motionloom.nets.pair_block import blocks
@@ -236,26 +256,34 @@ def _agreement(job: Job, settings: Mapping[str, Any]) -> Report:
 
 SUITES: tuple[Suite, ...] = (
     Suite("text", "R-precision, FID and the field's other metrics beside real motion and published rows", _text,
-          {"quick": False}, {"quick": True}, "used", _judge),
+          {"quick": False}, {"quick": True}, "used", _judge, needs.need_captions),
     Suite("transitions", "long motion: its segments, and jerk, skate and realism where they meet", _transitions,
-          {"quick": False}, {"quick": True}, "used", _real_seams),
+          {"quick": False}, {"quick": True}, "used", _real_seams, needs.need_captions),
     Suite("control", "goals out of real motions: error, skate and jerk beside published ways of control", _control,
           {"kinds": SUITE, "count": 16, "replications": 2}, {"kinds": QUICK, "count": 8, "replications": 1}, "needed",
-          _controls),
+          _controls, needs.need_captions),
     Suite("prediction", "many futures of held-out pasts beside what came, baselines and the published sampler",
           _prediction, {"windows": 64, "samples": 50, "published_steps": 100},
-          {"windows": 6, "samples": 6, "published_steps": 20}, "needed", _predictors),
+          {"windows": 6, "samples": 6, "published_steps": 20}, "needed", _predictors,
+          needs.need_recordings),
     Suite("duet-completion", "two people's next seconds beside what came, the prior alone and standing still",
           _completion, {"crops": 200, "samples": 5, "steps": 24}, {"crops": 6, "samples": 2, "steps": 6},
-          "needed", _blocks),
+          "needed", _blocks, needs.need_pairs),
     Suite("duet-text", "duets from words: distance, facing, hands, penetration and synchrony beside real pairs",
-          _duets, {"duets": 24, "steps": 24}, {"duets": 4, "steps": 6}, "needed", _blocks),
+          _duets, {"duets": 24, "steps": 24}, {"duets": 4, "steps": 6}, "needed", _blocks,
+          needs.need_pairs),
+    Suite("duet-answers", "a partner for somebody of a held-out pair, judged as duets from words are",
+          _answers, {"duets": 24, "steps": 24}, {"duets": 4, "steps": 6}, "needed", _blocks,
+          needs.need_pairs),
+    Suite("duet-long", "the last seconds of long duets beside the first, judged as duets from words are",
+          _long_duets, {"duets": 24, "steps": 24, "segments": 3}, {"duets": 2, "steps": 6, "segments": 2}, "needed",
+          _blocks, needs.need_pairs),
     Suite("obedience", "20 everyday prompts, each with a physical check", _obedience,
           {"seeds": 10, "paraphrases": True}, {"seeds": 2, "paraphrases": False}),
     Suite("realism", "skate, penetration, jerk, bones and speeds beside real clips", _realism,
           {"count": 64}, {"count": 16}, "used"),
     Suite("evaluator", "what the shipped evaluator notices on held-out real motions", _evaluator,
-          {"repeats": 20}, {"repeats": 2}, "needed", _judge),
+          {"repeats": 20}, {"repeats": 2}, "needed", _judge, needs.need_captions),
     Suite("agreement", "whether the evaluator's ranking agrees with physical obedience", _agreement,
           {"seeds": 4}, {"seeds": 1}, "", _judge),
     Suite("speed", "time and memory as ratios within one run", _speed, {"quick": False}, {"quick": True}),
