@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from motionloom.cli import main
 from motionloom.errors import MotionloomError
-from motionloom.evaluation import obey, physical, results
+from motionloom.evaluation import needs, obey, physical, results
+from motionloom.evaluation.clips import RealClip
 from motionloom.evaluation.everything import QUICK, Outcome, run_all
 from motionloom.evaluation.report import Column, Report, Row, Value, encode, markdown, read
 from motionloom.evaluation.suites import SUITES, Job, Suite, Tools, chosen, command
@@ -23,6 +25,7 @@ def never(*_: object) -> Any:
     raise AssertionError("this suite does not need it")
 
 
+STILL = np.zeros((1, 22, 3))
 TOOLS = Tools(generator=never, prior=never, speed=never, memory=never)
 
 
@@ -138,6 +141,76 @@ def test_a_suite_without_its_data_is_skipped_and_a_failing_one_stops_no_other(jo
     assert [(one.said.split(":")[0], one.failed) for one in outcomes] == [
         ("skipped", False), ("failed", True), ("measured", False)
     ]  # fmt: skip
+
+
+def test_a_suite_whose_kind_of_data_is_not_there_is_skipped_and_asked_again(job: Job, tmp_path: Path) -> None:
+    """Before it runs, or in it; once the data are there it is measured, and what is finished is not asked."""
+    (tmp_path / "set").mkdir()
+    job, out = replace(job, data=tmp_path / "set"), tmp_path / "out"
+    pairs = replace(Counted("pairs").suite("needed"), needs=needs.need_pairs)
+
+    def none(job: Job, settings: Mapping[str, Any]) -> Report:
+        raise needs.NoData("there is no held-out pair")
+
+    outcomes = run_all(job, out, [pairs, replace(Counted("later").suite("used"), run=none)])
+    assert [(one.state, one.failed, one.report) for one in outcomes] == [("skipped", False, None)] * 2
+    assert "no recordings of two people" in outcomes[0].said
+    assert outcomes[1].said == "skipped: there is no held-out pair"
+    (tmp_path / "set" / "x_a.bvh").write_text("")
+    assert [one.state for one in run_all(job, out, [pairs])] == ["measured"]
+    assert [one.state for one in run_all(job, out, [replace(pairs, needs=never)])] == ["kept"]
+
+
+def test_what_says_that_a_folder_has_pairs(tmp_path: Path) -> None:
+    """The layouts of docs/data.md; a built set is none of them."""
+    for name, lines, has in [
+        ("set", {"clips/02_01.safetensors": ""}, False),
+        ("flat", {"x_a.bvh": ""}, True),
+        ("deep", {"x/b.bvh": ""}, True),
+        ("solo", {"x.bvh": "", "y/c.bvh": ""}, False),
+        ("pack", {"manifest.csv": "path,partner\na,b\nb,a\n"}, True),
+        ("alone", {"manifest.csv": "path,partner\na,\nb,\n", "x_a.bvh": ""}, False),
+        ("older", {"manifest.csv": "path\na\n"}, False),
+    ]:
+        for place, text in lines.items():
+            (tmp_path / name / place).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / name / place).write_text(text)
+        assert needs.has_pairs(tmp_path / name) == has, name
+
+
+def test_a_set_without_test_subjects_or_captions_lacks_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "clips").mkdir()
+    with pytest.raises(needs.NoData, match="futures"):
+        needs.need_recordings(tmp_path)
+    (tmp_path / "clips" / "13_11.safetensors").write_text("")
+    needs.need_recordings(tmp_path)
+    clips = [RealClip("a", "own", "train", ("walks",), STILL), RealClip("b", "own", "val", (), STILL)]
+    monkeypatch.setattr("motionloom.evaluation.clips.real_clips", lambda folder: iter(clips))
+    with pytest.raises(needs.NoData, match="no held-out clip"):
+        needs.need_captions(tmp_path)
+    clips.append(RealClip("c", "own", "test", ("walks",), STILL))
+    needs.need_captions(tmp_path)
+
+
+def test_every_suite_that_reads_data_asks_what_it_needs(tmp_path: Path) -> None:
+    assert {s.name: s.needs.__name__ for s in SUITES if s.data and s.name != "realism"} == {
+        "text": "need_captions", "transitions": "need_captions", "control": "need_captions",
+        "evaluator": "need_captions", "prediction": "need_recordings", "duet-completion": "need_pairs",
+        "duet-text": "need_pairs", "duet-answers": "need_pairs", "duet-long": "need_pairs",
+    }  # fmt: skip
+
+
+def test_the_command_ends_well_where_suites_were_only_skipped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said: dict[str, Outcome] = {
+        "skipped": Outcome(SUITES[0], None, "skipped", "there are no pairs"),
+        "failed": Outcome(SUITES[0], None, "failed", "no motion"),
+    }
+    for state, code in (("skipped", 0), ("failed", 2)):
+        monkeypatch.setattr("motionloom.evaluation.everything.run_all", lambda *a, s=state, **k: [said[s]])
+        assert main(["evaluate", "all", "--quick", "--out", str(tmp_path)]) == code
+        assert f"{SUITES[0].name}: {state}: " in capsys.readouterr().out
 
 
 def test_a_quick_run_is_marked_and_never_replaces_a_full_one_unless_asked(job: Job, tmp_path: Path) -> None:

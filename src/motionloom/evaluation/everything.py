@@ -4,19 +4,23 @@ import hashlib
 import json
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from motionloom.checkpoint import find_weights
 from motionloom.errors import MotionloomError
 from motionloom.evaluation import obey
 from motionloom.evaluation import report as reports
+from motionloom.evaluation.needs import NoData
 from motionloom.evaluation.report import Report
 from motionloom.evaluation.suites import SUITES, Job, Suite
 
 QUICK = "Quick run: few seeds and clips, to see that everything works; these are no numbers to quote."
+
+State = Literal["measured", "kept", "skipped", "failed"]
+"""Measured now or before with the same settings; nothing there to measure; or something went wrong."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +29,18 @@ class Outcome:
 
     suite: Suite
     report: Report | None
-    said: str
-    """measured, kept, skipped or failed, and why."""
-    failed: bool = field(default=False)
+    state: State
+    why: str = ""
+
+    @property
+    def said(self) -> str:
+        """The state, and why."""
+        return f"{self.state}: {self.why}" if self.why else self.state
+
+    @property
+    def failed(self) -> bool:
+        """Whether something went wrong; nothing did where there was nothing to measure."""
+        return self.state == "failed"
 
 
 def run_all(
@@ -36,7 +49,8 @@ def run_all(
     """Run every suite into ``out/NAME``; one that was finished there with the same settings is not run again.
 
     ``keep``: also write each report as ``keep/NAME.json``, the form of a release. ``again``: forget what stands there.
-    A suite that cannot run is told in its outcome and stops no other. Raises `MotionloomError` if a quick run would
+    A suite whose kind of data is not there is skipped, and one that cannot run has failed; both are told in their
+    outcomes and stop no other. Raises `MotionloomError` if a quick run would
     replace a full one.
     """
     find_weights(job.weights)
@@ -57,12 +71,14 @@ def run_all(
 
 def _one(suite: Suite, job: Job, folder: Path, *, again: bool) -> Outcome:
     if suite.data == "needed" and job.data is None:
-        return Outcome(suite, None, "skipped: it needs --data SET, made by 'motionloom data build'")
+        return Outcome(suite, None, "skipped", "it needs --data SET, made by 'motionloom data build'")
     settings = suite.settings(job.quick)
     try:
         mark = fingerprint(suite, job)
         if not again and (found := _finished(folder, mark)):
-            return Outcome(suite, found, "kept: it was finished before with the same settings")
+            return Outcome(suite, found, "kept", "it was finished before with the same settings")
+        if job.data is not None:
+            suite.needs(job.data)
         parts = folder / f"parts-{mark[:12]}"  # other settings never meet in one folder
         if again and parts.is_dir():
             shutil.rmtree(parts)
@@ -73,8 +89,10 @@ def _one(suite: Suite, job: Job, folder: Path, *, again: bool) -> Outcome:
         (folder / "done.json").unlink(missing_ok=True)  # a kill before the next line must not pair it with this report
         reports.write(made, folder)
         obey.write_json(folder / "done.json", {"fingerprint": mark, "settings": dict(settings), "quick": job.quick})
+    except NoData as nothing:
+        return Outcome(suite, None, "skipped", str(nothing))
     except MotionloomError as error:
-        return Outcome(suite, None, f"failed: {error}", failed=True)
+        return Outcome(suite, None, "failed", str(error))
     return Outcome(suite, made, "measured")
 
 
