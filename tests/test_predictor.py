@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from safetensors.torch import save_file
 from torch import Tensor
 
 from motionloom.checkpoint import save_prior
+from motionloom.diffusion import SCHEDULES, Frames
 from motionloom.errors import MotionloomError
 from motionloom.features.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT
 from motionloom.nets.predictor import NetConfig, TransLinear
@@ -109,6 +111,21 @@ def test_a_published_guess_is_clean_where_its_noise_is_right(level: int) -> None
     assert torch.equal(ours.denoiser(None)(y, level), ours.net(y, torch.full((2,), level - 1)))
 
 
+@pytest.mark.parametrize("manner", MANNERS)
+def test_who_is_not_told_is_as_one_who_hears_nothing(manner: str) -> None:
+    made, x = predictor(manner), some(3, 8, predictor(manner).layout.channels)
+    told = some(3, *made.net.config.told_shape, seed=1)
+    every, nobody = made.denoiser(told)(x, 9), made.denoiser(None)(x, 9)
+    assert (every - nobody).abs().amax((1, 2)).min() > 1e-3
+    some_of_them = made.denoiser(told, torch.tensor([1.0, 0.0, 1.0]))(x, 9)
+    torch.testing.assert_close(some_of_them, torch.stack([every[0], nobody[1], every[2]]), atol=1e-5, rtol=1e-5)
+
+
+def test_all_numbers_go_to_another_device() -> None:
+    made = predictor().to("meta")
+    assert {x.device.type for x in (made.mean, made.std, made.pose, *made.net.parameters())} == {"meta"}
+
+
 # The weight file
 
 
@@ -125,6 +142,17 @@ def test_a_saved_predictor_comes_back(tmp_path: Path, manner: str, half: bool) -
     near = 2e-2 if half else 0
     torch.testing.assert_close(back.denoiser(told)(x, 9), made.denoiser(told)(x, 9), atol=near, rtol=near)
     assert all(torch.equal(getattr(back, name), getattr(made, name)) for name in ("mean", "std", "pose"))
+
+
+def test_schedules_and_windows_of_every_kind_come_back(tmp_path: Path) -> None:
+    """Another schedule of fewer levels; a window whose tokens are its frames."""
+    made = replace(predictor(kept=20), schedule=SCHEDULES["sqrt"](100), basis=Frames(20))
+    back = Predictor.load(save_predictor(made, tmp_path / "a.safetensors"))
+    assert (back.schedule.name, back.schedule.steps) == ("sqrt", 100)
+    assert torch.equal(back.schedule.alpha_bar, SCHEDULES["sqrt"](100).alpha_bar)
+    features, pose = some(2, 20, 12), some(2, 12, seed=1)
+    expected = (features - pose[:, None] - made.mean) / made.std
+    torch.testing.assert_close(back.to_state(features, pose), expected, atol=1e-6, rtol=1e-5)
 
 
 def test_predictors_are_written_as_safetensors_only(tmp_path: Path) -> None:
@@ -267,7 +295,8 @@ def test_a_published_checkpoint_is_a_predictor_of_its_data_set(
     assert (made.layout, made.fps, made.observed, made.frames, made.manner) == (
         layout, fps, observed, frames, "published",
     )  # fmt: skip
-    assert (made.card.name, made.card.licence, made.schedule.steps) == ("ckpt_ema_550", "research only", 1000)
+    assert (made.card.name, made.card.licence) == ("ckpt_ema_550", "research only")
+    assert (made.schedule.name, made.schedule.steps) == ("cosine", 1000)
     state = torch.load(path, weights_only=True)
     assert is_humanmac(state)
     assert all(torch.equal(value, state[key]) for key, value in made.net.state_dict().items())

@@ -10,6 +10,7 @@ from motionloom.metrics import pair as mp
 from motionloom.metrics import pair_groups as groups
 from motionloom.metrics import physics as ph
 from motionloom.metrics.physics import J
+from motionloom.metrics.skate import skate
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
 from tests.metrics import people
@@ -211,6 +212,82 @@ def test_a_constant_drift_of_both_is_no_synchrony():
     assert abs(mp.synchrony(pair)) < 0.5
 
 
+def test_what_shakes_faster_than_a_quarter_second_is_no_part_of_synchrony():
+    """Five frames are a quarter second: an oscillation of that period has mean 0 over them."""
+    t = np.arange(160)[:, None]
+    slow, quick = (np.sin(2 * np.pi * t / frames) * [1.0, 0, 0] for frames in (80, 5))
+    stand = people.standing(8.0)
+    pair = np.stack([people.moved(stand, slow + 0.3 * quick), people.moved(stand, slow - 0.3 * quick + [1.0, 0, 0])])
+    assert mp.synchrony(pair) > 0.7  # it would be below 0 with them
+    assert mp.synchrony(pair, fps=2.0) < 0
+
+
+# All numbers ---------------------------------------------------------------------------------------------------------
+
+
+def quarters() -> np.ndarray:
+    """(2, 80, 22, 3): the second stands 1, 1, 2 and 2 m ahead of the first, and turns away from him by 0, 45, 90, 90
+    degrees; a wrist of each is at 5 cm, then 20 cm, then far from the other's."""
+    parts = []
+    for apart, away, hands in ((1.0, 0.0, 0.05), (1.0, np.pi / 4, 0.2), (2.0, np.pi / 2, 0), (2.0, np.pi / 2, 0)):
+        part = couple(apart, seconds=1.0, turn=np.pi + away)
+        if hands:
+            part[0, :, J["left_wrist"]], part[1, :, J["right_wrist"]] = [0.9, 1.0, 0.5], [0.9 + hands, 1.0, 0.5]
+            part[0, :, J["left_elbow"]], part[1, :, J["right_elbow"]] = [0.6, 1.0, 0.5], [1.2 + hands, 1.0, 0.5]
+        parts.append(part)
+    return np.concatenate(parts, axis=1)
+
+
+def test_the_numbers_of_a_duet_are_means_over_its_frames_and_people():
+    found, far = mp.pair_stats(quarters()), mp.hand_distance(quarters())[40:]
+    expected = {
+        "distance": 1.5, "distance_range": 0.5, "facing": np.pi - np.radians(56.25),
+        "looking_away": np.radians(56.25) / 2, "mutual": 0.5, "hand_contact": 0.5, "touch": 0.25,
+        "hand_distance": (0.05 + 0.2) / 4 + far.mean() / 2,
+    }  # fmt: skip
+    assert {name: getattr(found, name) for name in expected} == pytest.approx(expected, abs=1e-9)
+
+
+def test_what_groups_compare_are_the_same_numbers_frame_by_frame():
+    pair = quarters()
+    pair[1, :, :, 0] += np.linspace(0, 0.04, 80)[:, None]
+    pair[:, 60:] = couple(0.1)[:, 60:]
+    found = mp.pair_stats(pair)
+    assert found.penetration > 0
+    assert found.hand_contact == 0.75
+    means = {name: series(pair).mean() for name, series in groups.SERIES.items()}
+    assert means == pytest.approx({name: getattr(found, name) for name in groups.SERIES})
+
+
+def test_speeds_and_skate_are_told_at_the_rate_of_the_frames_and_of_both_people():
+    rng = np.random.default_rng(1)
+    first, second = people.walking(0.7, 3.0, fps=30.0), people.standing(3.0, fps=30.0)
+    ways = np.cumsum(rng.normal(0, 0.03, (2, 90, 3)) * [1, 0, 1], axis=1)
+    pair = np.stack([people.moved(first, ways[0]), people.moved(second, ways[1])])
+    found, feet = mp.pair_stats(pair, fps=30.0), [skate(person, 30.0) for person in pair]
+    for name in ("share", "speed", "slide"):
+        a, b = (getattr(one, name) for one in feet)
+        assert abs(a - b) > 1e-3
+        assert getattr(found, f"skate_{name}") == pytest.approx((a + b) / 2)
+    assert found.synchrony == pytest.approx(mp.synchrony(pair, 30.0))
+    assert found.speed_synchrony == pytest.approx(mp.speed_synchrony(pair, 30.0))
+    assert len({round(f(pair, fps), 6) for f in (mp.synchrony, mp.speed_synchrony) for fps in (20.0, 30.0)}) == 4
+
+
+def test_a_capsule_is_as_thick_as_told_at_either_end():
+    points = np.array([[0.3, 0.0, 0.0], [0.3, 0.5, 0.0], [0.3, 1.0, 0.0]])
+    limb = np.array([[[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]])
+    gaps = mp._gaps(np.stack([points, points], axis=1)[None], np.zeros((3, 2)), limb, np.array([[0.1, 0.05]]))
+    np.testing.assert_allclose(gaps[0, :, 0], [0.2, 0.225, 0.25])
+
+
+def test_the_frame_of_the_first_person_is_where_he_begins_and_faces():
+    found = mp.in_first_frame(rigid(couple(1.5, turn=1.0), 2.2, (5.0, 0.3, -3.0)))
+    height = couple()[0, 0, 0, 1] + 0.3
+    np.testing.assert_allclose(found[:, 0, 0], [[0, height, 0], [0, height, 1.5]], atol=1e-9)
+    np.testing.assert_allclose([ph.heading(person)[0] for person in found], [0.0, 1.0], atol=1e-9)
+
+
 # Groups --------------------------------------------------------------------------------------------------------------
 
 
@@ -271,6 +348,32 @@ def test_true_partners_of_a_common_path_are_told_from_strangers():
     assert found.partners == pytest.approx(1)
     assert abs(found.strangers) < 0.3
     assert found.size > 3
+
+
+def test_strangers_are_everybody_with_everybody_else_where_they_were_recorded():
+    """Of a made-up measure of places and the rate."""
+    pairs = [rigid(couple(), 0.0, (float(place), 0.0, 0.0)) for place in (0.0, 1.0, 3.0)]
+
+    def of(pair: np.ndarray, fps: float) -> float:
+        return measure(pair[0, 0, 0, 0], pair[1, 0, 0, 0]) + fps
+
+    def measure(a: float, b: float) -> float:
+        return float(a + 10 * a * b + b**2)
+
+    found = groups.synchrony_against_shuffled(pairs, of=of, fps=7.0)
+    origin = couple()[:, 0, 0, 0]
+    places = [(origin[0] + p, origin[1] + p) for p in (0.0, 1.0, 3.0)]
+    own = [measure(a, b) + 7 for a, b in places]
+    others = [measure(a, b) + 7 for n, (a, _) in enumerate(places) for m, (_, b) in enumerate(places) if m != n]
+    assert found.partners == pytest.approx(np.mean(own))
+    assert found.strangers == pytest.approx(np.mean(others))
+    assert found.size == pytest.approx((np.mean(own) - np.mean(others)) / np.std(others))
+
+
+def test_quantiles_are_read_evenly_and_within_is_at_most_one_and_a_half_times():
+    assert groups.wasserstein(np.linspace(0, 1, 5), np.zeros(3)) == pytest.approx(0.5, abs=1e-9)
+    for away, within in ((1.49, True), (1.51, False)):
+        assert groups.SpreadRatio("distance", 1.0, 1.0, 1.0, away).within() is within
 
 
 @pytest.mark.parametrize("damage", ["one-person", "joints", "nan", "empty"])
