@@ -132,6 +132,92 @@ def test_a_pose_in_its_own_facing_is_the_same_wherever_it_stands_and_faces() -> 
     assert behaviour._nearest(both[:1], both[1:] + 0.3)[0] == pytest.approx(0.3 * 3**0.5)
 
 
+def gliding(frames: int = 30) -> np.ndarray:
+    """(frames, 22, 3) at 30 fps: a still body 0.9 m up whose root goes t³ metres along +X."""
+    places = np.repeat(protocol().recordings[0].positions[:1].astype(np.float64), frames, axis=0)
+    places[:, :, 0] += (np.arange(frames)[:, None] / 30) ** 3
+    return places
+
+
+def test_how_lively_motion_is_in_closed_form() -> None:
+    """A joint that goes t³ metres from the root has the jerk 6 m/s³; that of the root does not count."""
+    places, known = gliding(), behaviour._known_poses(protocol())
+    end = (29 / 30) ** 3
+    found = behaviour._lively(places[None], protocol(), known)
+    assert (found["speed"], found["jerk"]) == pytest.approx((0, 0), abs=1e-6)
+    assert (found["root_speed"], found["height"]) == pytest.approx((end / (29 / 30), places[0, 0, 1]))
+    assert found["height"] == pytest.approx(0.9)
+    places[:, 20, 1] += (np.arange(30) / 30) ** 3
+    found = behaviour._lively(places[None], protocol(), known)
+    assert (found["speed"], found["jerk"]) == pytest.approx((end / (29 / 30) / 21, 6 / 21), rel=1e-6)
+
+
+def test_the_spread_of_futures_is_metres_per_joint_between_two() -> None:
+    """Three futures, a head 0, 0.3 and 0.6 m up: 0.3, 0.6 and 0.3 m apart."""
+    futures = np.stack([gliding() for _ in range(3)])[None]
+    futures[0, :, :, 15, 1] += np.array([0.0, 0.3, 0.6])[:, None]
+    assert behaviour._spread(futures, protocol().layout) == pytest.approx(0.4 / 21**0.5)
+
+
+def test_poses_are_compared_with_those_that_were_trained_on() -> None:
+    own, known = protocol(), behaviour._known_poses(protocol())
+    for split, near in (("train", True), ("test", False)):
+        poses = np.concatenate([r.positions for r in own.split(split)]).astype(np.float64)
+        away = behaviour._nearest(behaviour.own_poses(poses, own.layout), known)
+        assert bool(away.max() < 1e-5) == near
+
+
+def test_every_second_of_a_long_future_is_told_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first second stands, the second goes 1 m/s; the two real windows are of different people."""
+    walks = np.stack([gliding(60), gliding(60)])
+    walks[:, :, :, 0] = walks[:, :1, :, 0] + np.maximum(np.arange(60) - 30, 0)[:, None] / 30
+    monkeypatch.setattr(behaviour, "long_futures", lambda *args, **given: np.stack([walks, walks]))
+    _, rows, about = behaviour.horizon(
+        predictor(), protocol(), windows=2, samples=2, seed=0, seconds=2, say=lambda line: None
+    )
+    assert [row.values["root_speed"].mean for row in rows[1:]] == pytest.approx([0, 1])
+    assert [row.values["spread"].mean for row in rows[1:]] == pytest.approx([0, 0], abs=1e-6)
+    assert rows[0].values["spread"].mean > 0.01
+    assert about["training poses"] == 180
+
+
+def test_what_comes_of_holding_a_group_is_told_of_the_other_joints(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Free joints are 10 cm off, with the group given 2 cm; second futures 1 or 4 mm more; what is held 1 mm off."""
+    trial, held = trials.prepare(protocol(), count=2), [13, 16, 18, 20]
+    told: list[np.ndarray] = []
+
+    def futures(predictor, past, *, seeds, known=None, exact):
+        number = next(k for k in range(2) if np.array_equal(trial.pasts(k, k + 1)[0], past[0]))
+        made, free = trial.future(number)[None].repeat(2, 0), [j for j in range(1, 22) if j not in held]
+        made[:, :, free, 1] += 0.1 if known is None else 0.02
+        made[1, :, free, 1] += 0.001 if known is None else 0.004
+        if known is not None:
+            told.append(known.mask)
+            made[number, 3, held[1], 2] += 0.001 * number
+        return made
+
+    turns = iter([0.25, 0.125])
+    monkeypatch.setattr(behaviour, "next_frames", futures)
+    monkeypatch.setattr(behaviour, "held_rotations", lambda *args, **given: next(turns))
+    found = behaviour.held_numbers(predictor(), trial, "left_arm", samples=2, seed=0)
+    assert sorted(behaviour.SMPL22.groups["left_arm"]) == held
+    assert all(np.array_equal(np.flatnonzero(mask.all(axis=0)), held) and mask.sum() == 4 * AHEAD for mask in told)
+    wide = 17**0.5  # of 17 joints, each as far off
+    expected = {"free": 0.1 * wide, "given": 0.02 * wide, "apd_free": 0.001 * wide * AHEAD**0.5,
+                "apd_given": 0.004 * wide * AHEAD**0.5, "held": 0.001, "rotations": 0.25}  # fmt: skip
+    assert found == pytest.approx(expected, rel=1e-6)
+
+
+def test_jumps_and_speed_of_a_way_in_between_in_closed_form() -> None:
+    """A hand at 1 m/s, from frame 10 on at 2, from frame 20 on at 5: jumps of 1 and 3 m/s, of one joint of 21."""
+    places = np.repeat(gliding(1), 40, axis=0)
+    places[:, 20, 1] += np.cumsum(np.repeat([1.0, 2.0, 5.0], [10, 10, 20])) / 30
+    found = behaviour._ends(places, 10, 20, 30.0)
+    expected = {"start_velocity": 1 / 21, "start_acceleration": 30 / 21, "end_velocity": 3 / 21,
+                "end_acceleration": 90 / 21, "speed": (10 * 2 + 5) / 11 / 21}  # fmt: skip
+    assert found == pytest.approx(expected, rel=1e-6)
+
+
 @pytest.mark.parametrize("group", ["left_arm", "lower_body"])
 def test_what_is_held_comes_out_as_given(group: str) -> None:
     """The window's places to float32, the motion's rotations exactly; what is free stays what the network says."""

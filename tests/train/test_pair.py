@@ -14,10 +14,10 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from motionloom.features.pair import decode, encode
 from motionloom.nets.adapter import fingerprint
-from motionloom.nets.pair import PairNet, Talk, other
+from motionloom.nets.pair import PairNet, Talk, other, part
 from motionloom.nets.pair_block import PairBlock
 from motionloom.train.duets import KEEN, NEAR, Duets, Sight
-from motionloom.train.pair import BEGUN, Drawn, PairGuess, Settings, held_out, told, train_pair
+from motionloom.train.pair import BEGUN, Drawn, PairGuess, Parts, Settings, held_out, told, train_pair
 from tests.data.test_pairs import write_pair
 from tests.metrics import people
 from tests.nets import tiny
@@ -231,6 +231,41 @@ def test_what_they_see_of_each_other_is_that_of_the_world_and_counts_by_how_litt
     with torch.no_grad():
         far, near_clean = (float(made.parts(guess, one).sight) for one in (high, low))
     assert far == pytest.approx(faint * near_clean, rel=0.02)
+
+
+def test_parts_of_the_loss_have_their_weights():
+    made = objective(settings=Settings(place=3.0, sight=5.0))
+    parts = Parts(*(torch.tensor(x) for x in (1.0, 10.0, 100.0, 1000.0)))
+    assert float(made.total(parts)) == pytest.approx(1 + 30 + 500 + 0.3 * 1000)
+
+
+def test_a_wrong_guess_of_where_they_stand_is_seen_by_both_even_by_whom_nothing_is_left_to_guess():
+    """One person is given; the other sees, and is seen, elsewhere."""
+    made = objective(settings=Settings(prefix=0.0, react=1.0))
+    drawn = made.drawn(3, 4, 2)._replace(level=torch.full((4,), 1))
+    assert made.parts(drawn.clean, drawn).sight < 1e-9
+    wrong = drawn.clean.clone()
+    wrong[:, 0, 2] += 0.3 / made.net.talk.config.places.ground
+    parts = made.parts(wrong, drawn)
+    assert parts.motion == 0
+    (d0, x0), x1 = part(drawn.clean), wrong[:, 1:]
+    away = made.sight.error(wrong[:, 0, :4], x1 * made.std + made.mean, d0, x0 * made.std + made.mean)
+    valid = torch.arange(away.shape[1]) < drawn.lengths[:, None]
+    seen = [row[there].mean() for row, there in zip(away, valid, strict=True)]  # of all four people
+    torch.testing.assert_close(parts.sight, torch.stack(seen).mean() * made.shares[1])
+
+
+def test_texts_are_dropped_of_who_reacts_too_and_of_whom_nobody_described():
+    made = objective(settings=Settings(prefix=0.0, react=1.0, silent=1.0), windows=[20], shares=[1.0])
+    assert made.drawn(0, 0, 20).cond.pooled.abs().sum() == 0
+    undescribed = PairGuess(
+        made.net, tiny.prior(), Duets([pair(captions=()), pair("b", turn=2.0)]), settings=Settings(prefix=0, react=0),
+        recipe=recipe(drop_text=0.0),
+    )  # fmt: skip
+    crops = undescribed.duets.crops(np.array([0, 1]), np.zeros(2, int), 20)
+    drawn = undescribed.noised(np.random.default_rng(0), crops)
+    silent = drawn.cond.pooled.abs().sum(-1) == 0
+    assert silent.tolist() == [True, True, False, False]
 
 
 def test_only_the_block_has_gradients_and_the_frozen_network_no_dropout():
