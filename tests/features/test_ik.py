@@ -123,6 +123,33 @@ def test_coincident_hips_leave_the_pelvis_in_line_with_the_chest() -> None:
     assert np.degrees(np.linalg.norm(off, axis=-1)).max() < 15
 
 
+def test_somebody_drawn_through_a_line_turns_round_evenly() -> None:
+    """A network that is not sure draws both sides of a spinning person in one place, then on the other sides."""
+    still = Motion(SMPL22, FPS, np.zeros((41, 3)), np.tile(rot.IDENTITY, (41, 22, 1)))
+    positions = still.positions()
+    side = np.cos(np.pi * np.clip((np.arange(41) - 10) / 20, 0, 1))[:, None]
+    positions[..., 0] = positions[:, :1, 0] + side * (positions[..., 0] - positions[:, :1, 0])
+    motion = motion_from_positions(positions, FPS)
+    forward = rot.rotate(motion.world_rotations()[:, [0, 9]], np.array([0.0, 0.0, 1.0]))
+    np.testing.assert_allclose(forward[0, :, 2], 1, atol=0.05)
+    np.testing.assert_allclose(forward[-1, :, 2], -1, atol=0.05)
+    steps = np.degrees(np.arccos((forward[1:] * forward[:-1]).sum(-1).clip(-1, 1)))
+    assert steps.max() < 45
+
+
+def test_a_shoulder_drawn_onto_its_collar_does_not_spin_it() -> None:
+    positions = wander(7, frames=41, amplitude=0.0).positions()
+    at = np.arange(41) * 2.0
+    circle = 0.02 * np.stack([np.cos(at), np.sin(at), 0 * at], axis=-1)
+    shift = positions[:, 13] + circle - positions[:, 16]
+    for joint in (16, 18, 20):
+        positions[:, joint] += shift
+    motion = motion_from_positions(positions, FPS)
+    collar = rot.quat_to_rotvec(motion.rotations[:, 13])
+    assert np.degrees(np.linalg.norm(collar, axis=-1)).max() < 30
+    assert turning_speeds(motion)[:, 13].max() < np.radians(10) * FPS
+
+
 def test_everything_in_one_point_is_still_a_motion() -> None:
     motion = motion_from_positions(np.zeros((4, 22, 3)), FPS)
     assert np.isfinite(motion.positions()).all()

@@ -50,7 +50,7 @@ _NEARLY_STRAIGHT = (0.95, 0.995)
 """Shares of full reach between which the observed bend takes over from the observed distance."""
 
 _DOUBTFUL = 0.12
-"""Relative error of a limb's drawn lengths at which its rotation counts as much as its change from frame to frame."""
+"""Relative error of drawn lengths at which a rotation counts as much as its change from frame to frame."""
 
 
 def motion_from_positions(positions: np.ndarray, fps: float) -> Motion:
@@ -88,10 +88,11 @@ def local_rotations(world: np.ndarray) -> Array:
 
 def _solve_trunk(seen: Array, places: Array, world: Array) -> None:
     """Fill in places and world orientations of pelvis, spine, neck, head and collars."""
-    world[:, 0] = _pelvis(seen)
+    world[:, 0] = _settled(_pelvis(seen), _misdrawn(seen[:, 1] - seen[:, 2], _REST[1] - _REST[2]))
     chest = [12, 13, 14]
     spare = (_REST[13] - _REST[14], seen[:, 13] - seen[:, 14])
-    world[:, 9] = fit_rotation(_REST[chest], seen[:, chest] - seen[:, 9:10], spare=spare)
+    turned = fit_rotation(_REST[chest], seen[:, chest] - seen[:, 9:10], spare=spare)
+    world[:, 9] = _settled(turned, _misdrawn(spare[1], spare[0]))
     for joint, share in ((3, 1 / 3), (6, 2 / 3)):
         child = SMPL22.children(joint)[0]
         guess = rot.slerp(world[:, 0], world[:, 9], np.full(len(seen), share))
@@ -105,7 +106,12 @@ def _solve_trunk(seen: Array, places: Array, world: Array) -> None:
     shift = np.einsum("j,fjk->fk", weights / weights.sum(), (seen - places)[:, (0, *trunk)])
     places[:, (0, *trunk)] += shift[:, None]
     for joint, child in ((12, 15), (13, 16), (14, 17)):
-        world[:, joint] = aim(world[:, 9], _REST[child], seen[:, child] - places[:, joint])
+        drawn = seen[:, child] - places[:, joint]
+        error = _misdrawn(drawn, _REST[child])
+        usual = rot.rotate(world[:, 9], np.broadcast_to(_REST[child], drawn.shape))
+        turned = aim(world[:, 9], _REST[child], drawn + 2 * error[:, None] * usual)
+        local = _settled(rot.multiply(rot.inverse(world[:, 9]), turned), error)
+        world[:, joint] = rot.multiply(world[:, 9], local)
         places[:, child] = _end_of(child, places, world)
     world[:, 15] = rot.multiply(world[:, 12], _level_head(world[:, 9], world[:, 12]))
 
@@ -126,6 +132,23 @@ def _steadied(bone: Array, guess: Array, child: int) -> Array:
     length = np.linalg.norm(bone, axis=-1)
     noise = float(np.std(length) / _LENGTHS[child])
     return bone + min(2.0, 6.0 * noise) * rot.rotate(guess, np.broadcast_to(_REST[child], bone.shape))
+
+
+def _misdrawn(bone: Array, rest: Array) -> Array:
+    """(frames,): how far the length of a drawn bone (frames, 3) is from its own, in units of that."""
+    return np.abs(1 - np.linalg.norm(bone, axis=-1) / np.linalg.norm(rest))
+
+
+def _settled(turns: Array, error: Array) -> Array:
+    """Rotations (frames, ..., 4), steadied in time as far as what they were read off was drawn wrongly (frames, ...).
+
+    Where a network is not sure it draws in between: somebody who spins has both hips, or a limb its two ends, in one
+    place, and what is read off that turns by half a circle within a frame. Minimises the squared distance to each
+    rotation, weighted by the inverse square of the relative error, plus the squared change per frame: what is drawn
+    with the right lengths stays exactly as it is.
+    """
+    weight = (_DOUBTFUL / error.clip(1e-6))[..., None] ** 2
+    return rot.normalize(_tridiagonal(weight, 1.0, weight * rot.unroll(turns)))
 
 
 def _pelvis(seen: Array) -> Array:
@@ -185,21 +208,16 @@ def solve_limbs(seen: np.ndarray, places: np.ndarray, world: np.ndarray, fps: fl
 
 
 def _steadied_limbs(seen: Array, local: Array) -> Array:
-    """Local rotations (frames, 22, 4), steadied in time at hips, knees, shoulders and elbows drawn doubtfully.
-
-    A limb drawn short would have to fold up, or open, within a frame to reach its end: what is drawn then says little.
-    Squared distance to each rotation, weighted by the inverse square of the relative error of the limb's lengths,
-    plus the squared change per frame: limbs of the right lengths stay exactly as they are.
-    """
+    """Local rotations (frames, 22, 4), `_settled` at hips, knees, shoulders and elbows: a limb drawn short would have
+    to fold up, or open, within a frame to reach its end."""
     ends = [[limb.start, limb.middle, limb.end] for limb in LIMBS]
     joints = [[limb.start, limb.middle] for limb in LIMBS]
     lengths = _LENGTHS[[[limb.middle, limb.end] for limb in LIMBS]]
     drawn = np.linalg.norm(np.diff(seen[:, ends], axis=2), axis=-1)
     error = np.abs(1 - drawn / lengths).mean(-1)
-    weight = (_DOUBTFUL / error.clip(1e-6))[..., None, None] ** 2  # (frames, limbs, joint, number)
     result = local.copy()
-    result[:, joints] = _tridiagonal(weight, 1.0, weight * local[:, joints])  # all at once: its loop is over frames
-    return rot.normalize(result)
+    result[:, joints] = _settled(local[:, joints], error[..., None])  # all at once: its loop is over frames
+    return result
 
 
 def hinge_frame(limb: Limb, child: int, bone: np.ndarray, axis: np.ndarray) -> Array:
