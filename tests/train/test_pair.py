@@ -245,7 +245,7 @@ def test_a_wrong_guess_of_where_they_stand_is_seen_by_both_even_by_whom_nothing_
     drawn = made.drawn(3, 4, 2)._replace(level=torch.full((4,), 1))
     assert made.parts(drawn.clean, drawn).sight < 1e-9
     wrong = drawn.clean.clone()
-    wrong[:, 0, 2] += 0.3 / made.net.talk.config.places.ground
+    wrong[:, 0, 2] += torch.tensor([0.1, 0.2, 0.4, 0.8]) / made.net.talk.config.places.ground
     parts = made.parts(wrong, drawn)
     assert parts.motion == 0
     (d0, x0), x1 = part(drawn.clean), wrong[:, 1:]
