@@ -216,13 +216,13 @@ def test_knots_stand_evenly_up_to_twenty_frames_before_the_end(begin: int, frame
     assert Places.of([1, 2], frames, [begin], [False] * 2).knots == (knots,)
 
 
-def leads(prior: Prior, block: PairBlock, mask: Tensor, moved=(False, False)) -> tuple[Tensor, Tensor, Told]:
+def leads(prior: Prior, block: PairBlock, mask: Tensor, still=(False, False)) -> tuple[Tensor, Tensor, Told]:
     """A guess before and after `leader`'s lead, where ``mask`` (2, 1 + frames) tells what is known."""
     net, spread = block.net(prior), torch.where(prior.std > 0, prior.std, 1.0)
     told = Told(net)
     guess = join(net.talk.config.places.encode(BESIDE), (drifting(prior) - prior.mean) / spread)
     known = mask[..., None].expand(guess.shape)
-    lead = leader(prior, told, net.bind(prior.condition(SAID)), seeds=[1, 2], mask=known, moved=moved)  # type: ignore
+    lead = leader(prior, told, net.bind(prior.condition(SAID)), seeds=[1, 2], mask=known, still=still)  # type: ignore
     return guess, lead(guess, guess, 25), told
 
 
@@ -258,7 +258,7 @@ def test_knots_begin_where_the_common_beginning_ends_and_known_numbers_stay(
 @pytest.mark.parametrize("away", [0, 1])
 def test_whom_others_move_is_not_led(prior: Prior, block: PairBlock, away: int) -> None:
     nothing = torch.zeros(2, FRAMES + 1, dtype=torch.bool)
-    before, after, _ = leads(prior, block, nothing, moved=(away == 0, away == 1))
+    before, after, _ = leads(prior, block, nothing, still=(away == 0, away == 1))
     off = (after - before).abs().amax((1, 2))
     assert off[away] < 1e-5
     assert off[1 - away] > 0.1

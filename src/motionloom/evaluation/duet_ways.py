@@ -122,7 +122,7 @@ def drawn(
             prior, net, [prompt] * len(people), FRAMES,
             seeds=[s for number in crops.numbers for s in person_seeds(row_seed(seed, sample), number)],
             known=torch.cat([state for state, _ in told]), mask=torch.cat([mask for _, mask in told]),
-            change=leaving if given == "past" else None, guidance=guidance, steps=steps,
+            change=leaving if given == "past" else None, still=[False] * len(people), guidance=guidance, steps=steps,
         )  # fmt: skip
         stands, floors = np.stack([one.stands for one in known]), np.stack([one.floors for one in known])
         return two.decode(features.double().numpy(), stands) + floors[..., None, None, None] * _UP

@@ -287,7 +287,7 @@ class _Guess:
         self.leads[number] = leader(
             self.prior, self.net, _together([one.cond for one in row]), seeds=person_seeds(seed, 0),
             mask=torch.zeros(2, 1 + row[0].length, WIDTH, dtype=torch.bool, device=self.prior.mean.device),
-            moved=asked, weight=self.together,
+            still=asked, weight=self.together,
         )  # fmt: skip
 
     def drop(self, number: int) -> None:

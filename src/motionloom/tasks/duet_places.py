@@ -42,13 +42,13 @@ def leader(
     *,
     seeds: Sequence[int],
     mask: Tensor,
-    moved: Sequence[bool],
+    still: Sequence[bool],
     weight: float = 1.0,
 ) -> Lead:
     """What leads the guesses of some pairs of one length; nothing does where a block never says where people stand.
 
     bound, seeds: of each row; mask (rows, 1 + frames, 263): True where a state is known; it stays. Whose frames are all
-    known, or who is ``moved`` by others, is not led; then the other goes all of the way. weight: share of the way, 0 to
+    known, or who is to be ``still``, is not led; then the other goes all of the way. weight: share of the way, 0 to
     1. Codes of the kind world are left alone: they tell where crops stand in a file, as published.
     """
     silent = not any(bool(value.any()) for value in net.talk.place.parameters())
@@ -56,7 +56,7 @@ def leader(
         return lambda state, guess, level: guess
     known = mask[:, 1:, :3].all(dim=-1)
     both = known.unflatten(0, (-1, 2)).all(dim=1)
-    given = [away or bool(row.all()) for away, row in zip(moved, known, strict=True)]
+    given = [kept or bool(row.all()) for kept, row in zip(still, known, strict=True)]
     places = Places.of(seeds, known.shape[1], both.cumprod(dim=1).sum(dim=1).tolist(), given)
 
     def lead(state: Tensor, guess: Tensor, level: int) -> Tensor:

@@ -77,6 +77,7 @@ def pair_features(
     known: Tensor | None = None,
     mask: Tensor | None = None,
     change: Sequence[Correction | None] | None = None,
+    still: Sequence[bool] | None = None,
     guidance: float = GUIDANCE,
     steps: int = STEPS,
     together: float = 1.0,
@@ -90,26 +91,30 @@ def pair_features(
     in part (`known_state`); with ``quiet`` the network sees it without noise (Shafir et al. 2024, section 3.3), else at
     the noise of its level (RePaint). change: for each row, or None, what its every guess goes through, standardised
     (frames, 263), as of `steering`. together, 0 to 1: how far every guess is led to where the block says that the two
-    stand to each other later on (`duet_places`; 0: as published). With a block that says nothing a row is what
+    stand to each other later on (`duet_places`; 0: as published); rows that are ``still`` are not moved for that: whose
+    guesses are changed, unless said otherwise. With a block that says nothing a row is what
     `text.sample_features` makes of its prompt and seed. No more than `PAIRS` pairs are denoised at once. Raises
     MotionloomError for what cannot be asked.
     """
     rows = len(prompts)
-    if rows % 2 or rows == 0 or len(seeds) != rows or (change is not None and len(change) != rows):
+    changes = list(change or [None] * rows)
+    kept = [one is not None for one in changes] if still is None else list(still)
+    if rows % 2 or rows == 0 or {len(seeds), len(changes), len(kept)} != {rows}:
         raise MotionloomError(
             f"two people need two prompts and seeds a pair; got {rows} prompts and {len(seeds)} seeds"
         )
     check(prior, [], steps=steps, guidance=guidance, solver=SOLVER)
     if not 0 <= together <= 1:
         raise MotionloomError(f"two people are kept together by 0 (not at all) to 1; got {together:g}")
-    changes = list(change or [None] * rows)
     shape = (rows, 1 + frames, len(prior.mean))
     data = torch.zeros(shape) if known is None else known.expand(shape)
     here = torch.zeros(shape, dtype=torch.bool) if mask is None else mask.expand(shape)
     made = []
     for start in range(0, rows, 2 * PAIRS):
         some = slice(start, start + 2 * PAIRS)
-        held = _Held(data[some].to(prior.mean), here[some].to(prior.mean.device), changes[some], quiet, together)
+        held = _Held(
+            data[some].to(prior.mean), here[some].to(prior.mean.device), changes[some], kept[some], quiet, together
+        )
 
         def told(done: int, before: int = start // (2 * PAIRS) * steps) -> None:
             if progress:
@@ -131,6 +136,7 @@ class _Held:
     data: Tensor
     mask: Tensor
     changes: list[Correction | None]
+    still: list[bool]
     quiet: bool
     together: float
 
@@ -160,8 +166,7 @@ def _walked(
     cond = prior.condition(list(prompts))
     scale = guidance if any(prompt.strip() for prompt in prompts) else 1.0
     guided = inpaint(guide(net, net.bind(cond), net.bind(cond.null()), scale), held.data, held.mask)
-    moved = [change is not None for change in held.changes]
-    lead = leader(prior, net, net.bind(cond), seeds=seeds, mask=held.mask, moved=moved, weight=held.together)
+    lead = leader(prior, net, net.bind(cond), seeds=seeds, mask=held.mask, still=held.still, weight=held.together)
 
     def denoise(state: Tensor, level: int) -> Tensor:
         return lead(state, held.changed(guided(state, level), level), level)
@@ -347,7 +352,7 @@ def complete_pair(
     leaving = [Past(torch.from_numpy(one).float(), Placement()).holder(prior, frames) for one in known]
     features, _ = pair_features(
         prior, net, said * count, frames, seeds=[s for number in range(count) for s in person_seeds(seed, number)],
-        known=data.repeat(count, 1, 1), mask=mask.repeat(count, 1, 1), change=leaving * count,
+        known=data.repeat(count, 1, 1), mask=mask.repeat(count, 1, 1), change=leaving * count, still=[False] * (2 * count),
         guidance=guidance, steps=steps, together=together, progress=progress,
     )  # fmt: skip
     made = []
