@@ -235,7 +235,7 @@ def test_a_true_future_comes_back_onto_both_bodies_in_place(
 
 
 def test_who_goes_on_is_led_to_the_other(prior: Prior, block: PairBlock) -> None:
-    past = walkers(2.0)
+    past = walkers(1.2)
     apart, led = (complete_pair(prior, block, past, seconds=3.0, steps=2, together=share)[0] for share in (0.0, 1.0))
     for one, other in zip(apart, led, strict=True):
         assert np.array_equal(one.root[: len(past[0])], other.root[: len(past[0])])
