@@ -15,7 +15,7 @@ from motionloom.metrics.physics import heading
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.tasks.goals import Goal, Placement
-from motionloom.tasks.long import Past, Segment, _decoded, compose, long_features
+from motionloom.tasks.long import Past, Segment, compose, decoded, long_features
 from motionloom.tasks.splice import carried
 from motionloom.tasks.text import sample_features
 from tests.nets import tiny
@@ -172,7 +172,7 @@ def test_a_goal_is_met_in_the_frame_of_its_segment(prior: Prior, facing: float) 
     np.testing.assert_allclose(humanml.decode_positions(first)[20, 0, ::2], (0.3, 0.5), atol=0.01)
     pieces = features(prior, segments, past=Past.of(clip))
     place = Past.of(clip).end
-    _, place = _decoded(pieces[0].numpy().astype(np.float64), place)
+    _, place = decoded(pieces[0].numpy().astype(np.float64), place)
     seen = humanml.decode_positions(pieces[1].numpy().astype(np.float64))
     np.testing.assert_allclose(seen[20, 0, ::2], (0.3, 0.5), atol=0.1)
     made = whole(prior, segments, start=clip, clean=False)
@@ -214,8 +214,8 @@ def test_the_place_behind_features_is_where_the_next_ones_begin() -> None:
     x, _, z = places[0, 0]
     begin = Placement(float(x), float(z), float(heading(places[:1])[0]))
     numbers = humanml.encode(begin.from_world(places)).astype(np.float64)
-    first, middle = _decoded(numbers[:33], begin)
-    second, end = _decoded(numbers[33:], middle)
+    first, middle = decoded(numbers[:33], begin)
+    second, end = decoded(numbers[33:], middle)
     np.testing.assert_allclose(np.concatenate([first, second]), places[:-1], atol=1e-4)
     np.testing.assert_allclose([end.x, end.z], places[-1, 0, ::2], atol=1e-4)
     assert len(Past.of(person(4.0)).known) == 20

@@ -33,7 +33,7 @@ from motionloom.tasks.control import moved
 from motionloom.tasks.duet_places import Lead, leader
 from motionloom.tasks.goals import Goal
 from motionloom.tasks.long import Progress as Moves
-from motionloom.tasks.long import Segment, _in_world, _Row, _rows, _together, _Track
+from motionloom.tasks.long import Row, Segment, Track, bound_together, chain_rows, in_world
 from motionloom.tasks.pair import (
     Duet,
     Seed,
@@ -150,7 +150,7 @@ def compose_pair(
     check(prior, [], steps=steps, guidance=guidance, solver=SOLVER)
     if not segments:
         raise MotionloomError("there is no segment; say what the two people do, one after the other")
-    track = None if path is None else _Track.along(path, prior.fps)
+    track = None if path is None else Track.along(path, prior.fps)
     asked = [_asked(segments, i, track if i == person else None, person) for i in (0, 1)]
     drawn = duet_features(
         prior, block.net(prior), asked, seed=seed, guidance=guidance, steps=steps, together=together, at_once=at_once,
@@ -162,7 +162,7 @@ def compose_pair(
     pieces = tee(chain([features], (piece for piece, _ in drawn)))
     people = [
         bodies(
-            _in_world(
+            in_world(
                 prior, _of(pieces[i], i), deque(segment.goal for segment in asked[i]), placement(stands[i]),
                 track if i == person else None,
             ),
@@ -173,7 +173,7 @@ def compose_pair(
     yield from zip(*people, strict=True)
 
 
-def _asked(segments: Sequence[Segment], person: int, track: _Track | None, goals_of: int) -> list[Segment]:
+def _asked(segments: Sequence[Segment], person: int, track: Track | None, goals_of: int) -> list[Segment]:
     """The segments of one person; on a path each has its part among its wishes."""
     result, first = [], 0
     for segment in segments:
@@ -210,7 +210,7 @@ def duet_features(
     guess = _Guess(prior, net, way, together)
 
     def links() -> Iterator[Link]:
-        both = (_rows(prior, one, guidance, None) for one in segments)
+        both = (chain_rows(prior, one, guidance, None) for one in segments)
         for number, row in enumerate(zip(*both, strict=True)):
             goals = [one[number].goal for one in segments]
             guess.add(number, row, asked=[goal is not None and not goal.empty for goal in goals], seed=seed + number)
@@ -249,7 +249,7 @@ class _Guess:
     net: PairNet
     way: Sequence[int]
     together: float
-    rows: dict[int, tuple[_Row, ...]] = field(default_factory=dict)
+    rows: dict[int, tuple[Row, ...]] = field(default_factory=dict)
     leads: dict[int, Lead] = field(default_factory=dict)
     ends: dict[tuple[int, int], Tensor] = field(default_factory=dict)
     """Stands (2, 4) at the frame of a row with which the next one begins, by row and level of the guess."""
@@ -281,11 +281,11 @@ class _Guess:
             self._carry(number, level, motion, begin)
         return made
 
-    def add(self, number: int, row: tuple[_Row, ...], *, asked: Sequence[bool], seed: int) -> None:
+    def add(self, number: int, row: tuple[Row, ...], *, asked: Sequence[bool], seed: int) -> None:
         """Take in a row of the chain, of both people; ``asked``: who is asked to be somewhere."""
         self.rows[number] = row
         self.leads[number] = leader(
-            self.prior, self.net, _together([one.cond for one in row]), seeds=person_seeds(seed, 0),
+            self.prior, self.net, bound_together([one.cond for one in row]), seeds=person_seeds(seed, 0),
             mask=torch.zeros(2, 1 + row[0].length, WIDTH, dtype=torch.bool, device=self.prior.mean.device),
             still=asked, weight=self.together,
         )  # fmt: skip
@@ -318,11 +318,11 @@ class _Guess:
         row, features = self.rows[number][0], motion * self.prior.std + self.prior.mean
         self.ends[number, level] = two.later(features, begin, row.length - max(row.overlap, 1))
 
-    def _guided(self, rows: Sequence[_Row], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> Tensor:
+    def _guided(self, rows: Sequence[Row], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> Tensor:
         """``rows``, and rows of x: a0, b0, a1, b1, ...; frames and levels: one per pair."""
         lengths = torch.tensor(frames, device=x.device).repeat_interleave(2).repeat(2)
         level = torch.tensor(at, device=x.device).repeat_interleave(2).repeat(2)
-        bound = _together([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
+        bound = bound_together([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
         conditional, unconditional = self.net(torch.cat([x, x]), level, bound).chunk(2)
         scale = torch.tensor([row.guidance for row in rows]).to(x)[:, None, None]
         return torch.lerp(unconditional, conditional, scale)

@@ -78,7 +78,7 @@ class Segment:
 
 
 @dataclass(frozen=True, eq=False)
-class _Row:
+class Row:
     frames: int
     """Between its seams."""
     before: int
@@ -125,7 +125,7 @@ def compose(
     if not 0 <= seed < LARGEST_SEED:
         raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {seed}")
     past = None if start is None else Past.of(start)
-    track = None if path is None else _Track.along(path, prior.fps)
+    track = None if path is None else Track.along(path, prior.fps)
     wishes: deque[Goal | None] = deque()
 
     def asked() -> Iterator[Segment]:
@@ -140,7 +140,7 @@ def compose(
         prior, asked(), seed=seed, guidance=guidance, steps=steps, past=past, together=together, progress=progress
     )
     place = past.end if past else track.stands(0) if track else Placement()
-    return bodies(_in_world(prior, pieces, wishes, place, track), prior.fps, clean=clean)
+    return bodies(in_world(prior, pieces, wishes, place, track), prior.fps, clean=clean)
 
 
 @torch.inference_mode()
@@ -163,11 +163,11 @@ def long_features(
     as the walk gets there. ``together``: rows per network call; it changes speed and memory, not the result.
     Raises `MotionloomError` for transitions that do not fit.
     """
-    rows: dict[int, _Row] = {}
+    rows: dict[int, Row] = {}
     way = levels(prior.schedule, steps, spacing=spacing)  # type: ignore[arg-type]
 
     def links() -> Iterator[Link]:
-        for number, row in enumerate(_rows(prior, segments, guidance, past)):
+        for number, row in enumerate(chain_rows(prior, segments, guidance, past)):
             rows[number] = row
             yield Link(row.length, row.overlap, seed + number)
 
@@ -186,7 +186,7 @@ def long_features(
         yield (state[row.before : row.before + row.frames] * prior.std + prior.mean).cpu()
 
 
-def _rows(prior: Prior, segments: Iterable[Segment], guidance: float, past: "Past | None") -> Iterator[_Row]:
+def chain_rows(prior: Prior, segments: Iterable[Segment], guidance: float, past: "Past | None") -> Iterator[Row]:
     """The rows of the chain; one segment is read ahead, since the last has no transition behind it."""
     before, number = len(past.known) if past else 0, 0
     null = prior.net.bind(prior.condition([""]))
@@ -207,7 +207,7 @@ def _rows(prior: Prior, segments: Iterable[Segment], guidance: float, past: "Pas
         if segment.goal and not segment.goal.empty:
             edits.append(toward(segment.goal, prior, first=before))
         scale = guidance if segment.guidance is None else segment.guidance
-        yield _Row(frames, before, overlap // 2, overlap, scale, bound, null, _one_after_the_other(edits))
+        yield Row(frames, before, overlap // 2, overlap, scale, bound, null, _one_after_the_other(edits))
         before, segment, number = overlap // 2, following, number + 1
 
 
@@ -220,7 +220,7 @@ def _one_after_the_other(edits: Sequence[Correction]) -> Correction:
     return correct
 
 
-def _settled(prior: Prior, rows: list[_Row], states: Sequence[Tensor], at: Sequence[int], *, last: int) -> list[Tensor]:
+def _settled(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int], *, last: int) -> list[Tensor]:
     """Guesses; those of the last move are averages over all ways to divide the frames into the network's tokens.
 
     A token holds several frames, and between tokens the network leaves small steps. (Averaging over shifts is the
@@ -243,12 +243,12 @@ def _settled(prior: Prior, rows: list[_Row], states: Sequence[Tensor], at: Seque
     return cleans
 
 
-def _guess(prior: Prior, rows: list[_Row], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
+def _guess(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
     """Guided guesses of rows of different lengths and levels, as one network call."""
     frames = [len(state) for state in states]
     x = torch.stack([F.pad(state, (0, 0, 0, max(frames) - len(state))) for state in states]).to(prior.mean)
     lengths = torch.tensor([*frames, *frames], device=x.device)
-    bound = _together([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
+    bound = bound_together([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
     level = torch.tensor([*at, *at], device=x.device)
     conditional, unconditional = prior.net(torch.cat([x, x]), level, bound).chunk(2)
     scale = torch.tensor([row.guidance for row in rows]).to(x)[:, None, None]
@@ -256,7 +256,7 @@ def _guess(prior: Prior, rows: list[_Row], states: Sequence[Tensor], at: Sequenc
     return [clean[:count] for clean, count in zip(guided, frames, strict=True)]
 
 
-def _together(bounds: list[Bound]) -> Bound:
+def bound_together(bounds: list[Bound]) -> Bound:
     """Rows of several conditions, their words padded to the longest."""
     most = max(one.words.shape[-1] for one in bounds)
 
@@ -297,7 +297,7 @@ class Past:
         x, _, z = positions[0, 0]
         begin = Placement(float(x), float(z), float(heading(positions[:1])[0]))
         known = humanml.encode(begin.from_world(positions)).astype(np.float64)
-        return Past(torch.from_numpy(known).float(), _decoded(known, begin)[1])
+        return Past(torch.from_numpy(known).float(), decoded(known, begin)[1])
 
     def holder(self, prior: Prior, length: int) -> Correction:
         """Makes the first frames of a row's guess the known ones, and the next ones leave them without a jump."""
@@ -316,7 +316,7 @@ class Past:
 
 
 @dataclass(frozen=True, eq=False)
-class _Track:
+class Track:
     """A path for the whole, and which way it goes."""
 
     path: Goal
@@ -324,10 +324,10 @@ class _Track:
     """(frames,) radians."""
 
     @staticmethod
-    def along(path: Goal, fps: float) -> "_Track":
+    def along(path: Goal, fps: float) -> "Track":
         if not path.asked[:, 0, [0, 2]].all():
             raise MotionloomError("the path of a long motion must say where to be in every frame; give points for all")
-        return _Track(path, np.where(path.facing_asked, path.facing, along(path.positions[:, 0, [0, 2]], fps)))
+        return Track(path, np.where(path.facing_asked, path.facing, along(path.positions[:, 0, [0, 2]], fps)))
 
     def stands(self, frame: int) -> Placement:
         """Where the person is at that frame."""
@@ -346,8 +346,8 @@ class _Track:
         return replace(segment, goal=part if segment.goal is None else merged(part, segment.goal))
 
 
-def _in_world(
-    prior: Prior, pieces: Iterable[Tensor], wishes: deque[Goal | None], place: Placement, track: _Track | None
+def in_world(
+    prior: Prior, pieces: Iterable[Tensor], wishes: deque[Goal | None], place: Placement, track: Track | None
 ) -> Iterator[Places]:
     """Each piece where the one before it ends; on a path bent once more, so that errors do not add up."""
     mean, first = prior.mean.cpu(), 0
@@ -360,12 +360,12 @@ def _in_world(
             piece = toward(part.seen_from(place), prior)((piece - mean) / spread, 0) * spread + mean
             goal = overlaid(part, goal)
         features = piece.numpy().astype(np.float64)
-        positions, after = _decoded(features, place)
+        positions, after = decoded(features, place)
         yield Places(positions, features[:, LAYOUT["contacts"]], goal)
         place, first = after, first + len(piece)
 
 
-def _decoded(features: Array, place: Placement) -> tuple[Array, Placement]:
+def decoded(features: Array, place: Placement) -> tuple[Array, Placement]:
     """(frames, 22, 3) of features (frames, 263) that begin at a place, and the place of the frame behind them."""
     positions = humanml.decode_positions(np.concatenate([features, features[-1:]]))
     x, _, z = place.to_world(positions[-1, 0])

@@ -352,8 +352,8 @@ def complete_pair(
     leaving = [Past(torch.from_numpy(one).float(), Placement()).holder(prior, frames) for one in known]
     features, _ = pair_features(
         prior, net, said * count, frames, seeds=[s for number in range(count) for s in person_seeds(seed, number)],
-        known=data.repeat(count, 1, 1), mask=mask.repeat(count, 1, 1), change=leaving * count, still=[False] * (2 * count),
-        guidance=guidance, steps=steps, together=together, progress=progress,
+        known=data.repeat(count, 1, 1), mask=mask.repeat(count, 1, 1), change=leaving * count,
+        still=[False] * (2 * count), guidance=guidance, steps=steps, together=together, progress=progress,
     )  # fmt: skip
     made = []
     for numbers in features.double().numpy():
