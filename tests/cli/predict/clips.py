@@ -1,0 +1,52 @@
+"""The clips that the commands run beside, a tiny network, and futures whose way is known."""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from motionloom.checkpoint import Card
+from motionloom.cli import main
+from motionloom.diffusion import Dct, linear
+from motionloom.features.positions import SMPL_LAYOUT
+from motionloom.motion import Motion
+from motionloom.nets.predictor import NetConfig, TransLinear
+from motionloom.predictor import Predictor, told_shape
+from motionloom.skeleton import SMPL22, Skeleton
+
+KEPT, OBSERVED, FRAMES, FPS = 24, 15, 75, 30.0
+
+
+def tiny_predictor() -> Predictor:
+    """Random weights that move a person a little: half a second seen, two seconds made."""
+    torch.manual_seed(3)
+    shape = told_shape(SMPL_LAYOUT, KEPT)
+    net = TransLinear(NetConfig(channels=66, kept=KEPT, layers=2, width=32, heads=2, told=shape, beside=True)).eval()
+    zeros = torch.zeros(KEPT, 66)
+    pose = torch.stack([torch.zeros(66), torch.ones(66)])
+    return Predictor(
+        net.requires_grad_(False), linear(100), SMPL_LAYOUT, Dct(FRAMES, KEPT), OBSERVED, FPS, "told",
+        zeros, zeros + 0.01, pose, Card("tiny"),
+    )  # fmt: skip
+
+
+def larger() -> Skeleton:
+    return Skeleton(SMPL22.names, SMPL22.parents, 1.1 * SMPL22.offsets)
+
+
+CLIPS = {"past.bvh", "kick.bvh", "other.bvh"}
+
+
+def written(place: str = ".") -> set[str]:
+    return {path.name for path in Path(place).iterdir()} - CLIPS
+
+
+def future(past: Motion, seconds: float, number: int) -> Motion:
+    """The person goes on along +Z, at ``number`` + 1 metres a second, in the past's last pose."""
+    count = round(seconds * past.fps)
+    root = past.root[-1] + np.arange(1, count + 1)[:, None] / past.fps * [0, 0, number + 1]
+    return Motion(past.skeleton, past.fps, root, np.repeat(past.rotations[-1:], count, axis=0))
+
+
+def run(weights: str, *words: str) -> int:
+    return main([*words, "--weights", weights])

@@ -1,0 +1,81 @@
+"""What the tests of predict and switch share: the files they run beside, and quick makers in the network's place."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from motionloom import cli
+from motionloom.io import stream
+from motionloom.io.bvh_writer import save_bvh
+from motionloom.motion import Motion
+from motionloom.predictor import save_predictor
+from motionloom.tasks import predict as task
+from tests.cli.predict.clips import future, larger, tiny_predictor
+from tests.tasks.test_edit import person
+
+
+@pytest.fixture(scope="module")
+def weights(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return str(save_predictor(tiny_predictor(), tmp_path_factory.mktemp("weights") / "tiny.safetensors"))
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Each test runs beside two clips in centimetres with angles in another order, one of which is on another body."""
+    monkeypatch.chdir(tmp_path)
+    if "predict" not in cli.FAMILIES:
+        monkeypatch.setattr(cli, "FAMILIES", (*cli.FAMILIES, "predict"))
+    save_bvh(person(1.0, 30.0), "past.bvh", order="XYZ", unit=0.01)
+    save_bvh(person(1.5, 30.0), "kick.bvh", order="XYZ", unit=0.01)
+    other = person(1.0, 30.0)
+    save_bvh(Motion(larger(), 30.0, other.root, other.rotations), "other.bvh")
+    return tmp_path
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
+    """What the commands asked of the tasks, which make simple motions and stop where they are told."""
+    seen: dict = {"stop": None, "problem": KeyboardInterrupt}
+
+    def predict(predictor, past, *, count, seconds, seed, hold, guidance, root, clean, progress, **walk):
+        seen.update(past=past, count=count, seconds=seconds, seed=seed, hold=hold, guidance=guidance, root=root)
+        seen.update(clean=clean, walk=walk)
+        progress(1, 1)
+        return [stream.joined([past, future(past, seconds, i)]) for i in range(count)]
+
+    def predict_pieces(predictor, past, *, seconds, number, seed, hold, guidance, root, clean, **walk):
+        seen.update(past=past, seconds=seconds, seed=seed, hold=hold, root=root, clean=clean, walk=walk)
+        if (number, -1) == seen["stop"]:
+            raise seen["problem"]
+        yield past
+        whole = future(past, seconds, number)
+        for piece, at in enumerate(range(0, len(whole), 300)):
+            if (number, piece) == seen["stop"]:
+                raise seen["problem"]
+            yield whole.frames(at, at + 300)
+
+    def switch(predictor, past, target, *, count, seconds, seed, facing, guidance, clean, **walk):
+        seen.update(past=past, target=target, count=count, seconds=seconds, facing=facing, walk=walk)
+        still = [replace(one, translations=None) for one in (past, target)]
+        return [stream.joined([still[0], future(past, seconds, i), still[1]]) for i in range(count)]
+
+    for made in (predict, predict_pieces, switch):
+        monkeypatch.setattr(task, made.__name__, made)
+    return seen
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list:
+    """What was drawn over each other, instead of the slow drawing."""
+    from motionloom.io import overlay
+
+    seen: list = []
+
+    def draw_futures(past, futures, path, *, caption, lead):
+        seen.append((past, futures, path.name, caption))
+        path.write_bytes(b"drawn")
+        return path
+
+    monkeypatch.setattr(overlay, "draw_futures", draw_futures)
+    return seen
