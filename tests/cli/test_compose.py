@@ -1,29 +1,21 @@
 """compose, as a stranger types it: with a quick maker of pieces in the network's place, and with a tiny network."""
 
 import json
-import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from motionloom import io
-from motionloom.checkpoint import save_prior
 from motionloom.cli import main
 from motionloom.errors import MotionloomError
-from motionloom.io import stream
 from motionloom.motion import Motion
 from motionloom.rotations import IDENTITY
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import long
-from tests.nets import tiny
+from tests.cli.said import complaint
 
 THREE = "seed: 4\nguidance: 3\nsegments:\n- walk\n- {text: jump, seconds: 2}\n- text: sit down\n  seconds: 1\n"
-
-
-@pytest.fixture(scope="module")
-def weights(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return str(save_prior(tiny.prior(), tmp_path_factory.mktemp("weights") / "tiny.safetensors"))
 
 
 @pytest.fixture(autouse=True)
@@ -126,14 +118,7 @@ def test_an_interruption_leaves_what_was_finished(weights, asked, name, capsys):
     assert [row["text"] for row in json.loads(said.out)["segments"]] == ["walk", "jump"]
 
 
-def test_a_real_ctrl_c_between_two_pieces_is_such_an_interruption(weights, asked, monkeypatch):
-    write = stream.Stream.write
-
-    def interrupted(self, piece):
-        write(self, piece)
-        signal.raise_signal(signal.SIGINT)
-
-    monkeypatch.setattr(stream.Stream, "write", interrupted)
+def test_a_real_ctrl_c_between_two_pieces_is_such_an_interruption(weights, asked, ctrl_c):
     assert compose(weights, "walk", "jump", "--out", "a.bvh") == 130
     assert len(io.load("a.bvh")) == 100
 
@@ -202,10 +187,7 @@ def test_mistakes_are_one_sentence_and_nothing_is_written(weights, asked, words,
     Path("long.yaml").write_text("segments:\n" + "- {text: walk, seconds: 60}\n" * 2100)
     before = written()
     assert compose(weights, *words) == 2
-    said = capsys.readouterr().err
-    assert message in said
-    assert said.startswith("motionloom: ")
-    assert said.count("\n") == 1
+    assert message in complaint(capsys)
     assert (written(), "segments" in asked) == (before, False)
 
 

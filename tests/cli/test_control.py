@@ -7,21 +7,15 @@ import numpy as np
 import pytest
 
 from motionloom import io
-from motionloom.checkpoint import save_prior
 from motionloom.cli import main
 from motionloom.motion import Motion
 from motionloom.rotations import IDENTITY
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import control as task
 from motionloom.tasks.goal_file import SCHEMA
-from tests.nets import tiny
+from tests.cli.said import complaint
 
 GOAL = {"path": {"points": [[1, 0], [1, 1.2]]}}
-
-
-@pytest.fixture(scope="module")
-def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return save_prior(tiny.prior(), tmp_path_factory.mktemp("weights") / "tiny.safetensors")
 
 
 @pytest.fixture(autouse=True)
@@ -51,11 +45,11 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list:
     return calls
 
 
-def control(weights: Path, *words: str) -> int:
-    return main(["control", *words, "--weights", str(weights)])
+def control(weights: str, *words: str) -> int:
+    return main(["control", *words, "--weights", weights])
 
 
-def test_options_reach_the_task(weights: Path, asked: list, capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_reach_the_task(weights: str, asked: list, capsys: pytest.CaptureFixture[str]) -> None:
     words = [
         "a person walks",
         "--goal",
@@ -82,7 +76,7 @@ def test_options_reach_the_task(weights: Path, asked: list, capsys: pytest.Captu
     assert len(io.load("a_1.npz")) == 40
 
 
-def test_goals_a_drawing_and_a_clip_to_follow_go_together(weights: Path, asked: list) -> None:
+def test_goals_a_drawing_and_a_clip_to_follow_go_together(weights: str, asked: list) -> None:
     words = ["walk", "--follow", "left_wrist", "--follow", "head", "--from", "clip.bvh"]
     assert control(weights, *words) == 0
     followed = asked[-1]["goal"]
@@ -98,7 +92,7 @@ def test_goals_a_drawing_and_a_clip_to_follow_go_together(weights: Path, asked: 
     assert drawn.positions[59, 0, 2] == pytest.approx(1.2 * 3)
 
 
-def test_a_drawing_named_on_the_line_may_be_a_link(weights: Path, asked: list, folder: Path) -> None:
+def test_a_drawing_named_on_the_line_may_be_a_link(weights: str, asked: list, folder: Path) -> None:
     """Only files from strangers are kept in their folder."""
     (folder / "inner").mkdir()
     (folder / "inner" / "link.svg").symlink_to(folder / "line.svg")
@@ -106,14 +100,14 @@ def test_a_drawing_named_on_the_line_may_be_a_link(weights: Path, asked: list, f
     assert asked[-1]["goal"].positions[59, 0, 2] == pytest.approx(1.2 * 3)
 
 
-def test_a_path_elsewhere_moves_the_start_of_somebody_who_follows(weights: Path, asked: list) -> None:
+def test_a_path_elsewhere_moves_the_start_of_somebody_who_follows(weights: str, asked: list) -> None:
     """The clip's person stands at x = 2, its hand 0.6 m further: in reach of a path at x = 2.3."""
     Path("goal.json").write_text(json.dumps({"path": {"points": [[2.3, 0]]}}))
     assert control(weights, "walk", "--goal", "goal.json", "--follow", "left_wrist", "--from", "clip.bvh") == 0
     assert asked[-1]["goal"].start.x == 2.3
 
 
-def test_the_report_is_json_when_asked(weights: Path, asked: list, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_report_is_json_when_asked(weights: str, asked: list, capsys: pytest.CaptureFixture[str]) -> None:
     assert control(weights, "walk", "--goal", "goal.json", "--json", "--out", "a.npz", "--fps", "30") == 0
     about = json.loads(capsys.readouterr().out)
     assert about["motions"] == [
@@ -124,7 +118,7 @@ def test_the_report_is_json_when_asked(weights: Path, asked: list, capsys: pytes
     assert io.load("a.npz").fps == 30
 
 
-def test_a_motion_is_made_from_end_to_end(weights: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_motion_is_made_from_end_to_end(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Even a prior of random weights is bent to the path."""
     assert control(weights, "walk", "--goal", "goal.json", "--seconds", "1", "--steps", "3", "--out", "a.npz") == 0
     motion = io.load("a.npz")
@@ -154,13 +148,11 @@ def test_the_schema_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     ids=lambda words: " ".join(words),
 )  # fmt: skip
 def test_mistakes_are_one_sentence_and_nothing_is_written(
-    weights: Path, asked: list, words: list[str], capsys: pytest.CaptureFixture[str]
+    weights: str, asked: list, words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The path of the drawing contradicts that of the goal."""
     before = {path.name for path in Path().iterdir()}
     assert control(weights, *words) == 2
-    said = capsys.readouterr()
-    assert said.err.strip().count("\n") == 0
-    assert said.err.startswith("motionloom: ")
+    complaint(capsys)
     assert {path.name for path in Path().iterdir()} == before
     assert not asked

@@ -4,14 +4,22 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.cli.sampling import add_sampling, bar, check_outs, check_prompt, fail, places, write
+from motionloom.cli.sampling import (
+    add_sampling,
+    bar,
+    check_count,
+    check_outs,
+    check_prompt,
+    fail,
+    places,
+    report,
+    write,
+)
 
 if TYPE_CHECKING:
     from motionloom.checkpoint import Prior
     from motionloom.tasks.control import Adapters, Controlled
     from motionloom.tasks.goals import Goal
-
-MAX_COUNT = 1000
 
 
 def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -60,8 +68,7 @@ def run_control(arguments: argparse.Namespace) -> None:
         print(SCHEMA.read_text(encoding="utf-8"), end="")
         return
     outs = check_outs(arguments)
-    if not 1 <= arguments.count <= MAX_COUNT or not 0 <= arguments.seed < 2**62:
-        fail(f"--count must be 1 to {MAX_COUNT} and --seed 0 or more; got {arguments.count} and {arguments.seed}")
+    check_count(arguments)
     if arguments.prompt is None:
         fail("no prompt; say what the person does, such as: motionloom control 'a person walks' --goal goal.json")
     check_prompt(arguments.prompt)
@@ -156,8 +163,6 @@ def _report(arguments: argparse.Namespace, made: "list[Controlled]", written: li
         for sentence in one.missed:
             print(f"motionloom: {which}{sentence}", file=sys.stderr)
     if arguments.json:
-        import json
-
         motions = [
             {
                 "prompt": arguments.prompt, "seed": arguments.seed + number,
@@ -169,9 +174,8 @@ def _report(arguments: argparse.Namespace, made: "list[Controlled]", written: li
             "motions": motions,
             "seconds": len(made[0].motion) / made[0].motion.fps,
             "weights": str(arguments.weights),
-            "files": [str(path) for several in written for path in several],
         }
-        print(json.dumps(about | {"sampling_seconds": round(seconds, 3)}, indent=1))
+        report(arguments, about, [path for several in written for path in several], seconds)
         return
     for several in written:
         for number, path in enumerate(several):

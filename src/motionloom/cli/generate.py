@@ -3,7 +3,17 @@
 import argparse
 from pathlib import Path
 
-from motionloom.cli.sampling import add_sampling, bar, check_outs, check_prompt, fail, places, write
+from motionloom.cli.sampling import (
+    add_sampling,
+    bar,
+    check_count,
+    check_outs,
+    check_prompt,
+    fail,
+    places,
+    report,
+    write,
+)
 
 MAX_PROMPTS = 1000
 MAX_MOTIONS = 10_000
@@ -28,15 +38,16 @@ def add(subparsers) -> None:
 def _generate(arguments: argparse.Namespace) -> None:
     prompts = _prompts(arguments)
     outs = check_outs(arguments)
-    if not 1 <= arguments.count <= MAX_MOTIONS or not 0 <= arguments.seed < 2**62:
-        fail(f"--count must be 1 to 10000 and --seed 0 or more; got {arguments.count} and {arguments.seed}")
+    check_count(arguments, most=MAX_MOTIONS)
     if len(prompts) * arguments.count > MAX_MOTIONS:
         fail(f"{len(prompts)} prompts, {arguments.count} of each, are too many; at most {MAX_MOTIONS:,} in one call")
     captions = [prompt for prompt in prompts for _ in range(arguments.count)]
     files = places(outs, len(captions))
     motions, seconds = _make(arguments, prompts)
     written = [path for several in files for path in write(motions, several, captions)]
-    _report(arguments, captions, written, seconds)
+    made = [{"prompt": caption, "seed": arguments.seed + i} for i, caption in enumerate(captions)]
+    about = {"motions": made, "seconds": arguments.seconds, "weights": str(arguments.weights)}
+    report(arguments, about, written, seconds)
 
 
 def _prompts(arguments: argparse.Namespace) -> list[str]:
@@ -78,20 +89,3 @@ def _make(arguments: argparse.Namespace, prompts: list[str]):
     if arguments.fps is not None:
         motions = [motion.resample(arguments.fps) for motion in motions]
     return motions, time.perf_counter() - began
-
-
-def _report(arguments: argparse.Namespace, captions: list[str], written: list[Path], seconds: float) -> None:
-    if arguments.json:
-        import json
-
-        made = [{"prompt": caption, "seed": arguments.seed + i} for i, caption in enumerate(captions)]
-        about = {
-            "motions": made,
-            "seconds": arguments.seconds,
-            "weights": str(arguments.weights),
-            "files": [str(p) for p in written],
-        }
-        print(json.dumps(about | {"sampling_seconds": round(seconds, 3)}, indent=1))
-        return
-    for path in written:
-        print(f"wrote {path}")

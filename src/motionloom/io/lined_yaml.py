@@ -6,7 +6,7 @@ documents, duplicate keys, NaN and infinity. Built from the parser's events in o
 
 import difflib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -67,7 +67,7 @@ def fail(path: Path | str, line: int, message: str) -> NoReturn:
     raise MotionloomError(f"{path}, line {line}: {message}")
 
 
-def meant(word: str, known: Sequence[str]) -> str:
+def meant(word: str, known: Collection[str]) -> str:
     """What a message may add about a misspelt word: the known one that is like it, in brackets, if there is one."""
     near = difflib.get_close_matches(word[:40], known, n=1)
     return f" (did you mean {near[0]!r}?)" if near else ""

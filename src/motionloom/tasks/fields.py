@@ -1,6 +1,5 @@
 """Parsed JSON or YAML from strangers, taken apart so that every mistake is told with the name of its key."""
 
-import difflib
 import math
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -8,6 +7,7 @@ from pathlib import Path, PureWindowsPath
 from typing import Any, NoReturn
 
 from motionloom.errors import MotionloomError
+from motionloom.io.lined_yaml import meant
 from motionloom.io.text import shown
 
 
@@ -35,9 +35,8 @@ class Field:
             self.wrong(f"a mapping with {listed(known)}")
         for key in self.value:
             if key not in known:
-                near = difflib.get_close_matches(str(key)[:40], known, n=1)
-                meant = f" (did you mean '{near[0]}'?)" if near else ""
-                self.fail(f"has the unknown key {shown(str(key))}{meant}; it may have {listed(known)}")
+                word = str(key)
+                self.fail(f"has the unknown key {shown(word)}{meant(word, known)}; it may have {listed(known)}")
         for key in needed:
             if key not in self.value:
                 self.fail(f"has no '{key}'; it needs {listed(needed)}")
@@ -81,10 +80,7 @@ class Field:
         if not isinstance(self.value, str):
             self.wrong(f"one of {', '.join(known)}")
         if self.value not in known:
-            near = difflib.get_close_matches(self.value[:40], known, n=1)
-            self.fail(
-                f"is {shown(self.value)}{f' (did you mean {near[0]!r}?)' if near else ''}; there are {', '.join(known)}"
-            )
+            self.fail(f"is {shown(self.value)}{meant(self.value, known)}; there are {', '.join(known)}")
         return self.value
 
     def file(self, folder: Path) -> Path:

@@ -1,7 +1,6 @@
 """Futures of any length, written while they are made."""
 
 import json
-import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +9,6 @@ import pytest
 
 from motionloom import io
 from motionloom.errors import MotionloomError
-from motionloom.io import stream
 from motionloom.io.bvh import read_bvh
 from motionloom.io.bvh_writer import save_bvh
 from motionloom.skeleton import SMPL22
@@ -55,14 +53,7 @@ def test_an_interruption_leaves_what_was_finished(weights, asked, drawn, name, c
     assert json.loads(said.out)["files"] == files
 
 
-def test_a_real_ctrl_c_is_such_an_interruption(weights, asked, monkeypatch):
-    write = stream.Stream.write
-
-    def interrupted(self, piece):
-        write(self, piece)
-        signal.raise_signal(signal.SIGINT)
-
-    monkeypatch.setattr(stream.Stream, "write", interrupted)
+def test_a_real_ctrl_c_is_such_an_interruption(weights, asked, ctrl_c):
     assert run(weights, "predict", "past.bvh", "--horizon", "40") == 130
     assert len(io.load("futures/future_00.bvh")) == 30
     assert written("futures") == {"future_00.bvh"}
