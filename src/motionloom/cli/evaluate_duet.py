@@ -97,7 +97,7 @@ def _printed(found) -> str:
 def _completion(arguments: argparse.Namespace):
     from dataclasses import replace
 
-    from motionloom.cli.evaluate_text import say
+    from motionloom.cli.measuring import say
     from motionloom.evaluation import duet
 
     said = {name: value for name in ("crops", "samples", "steps") if (value := getattr(arguments, name)) is not None}
@@ -120,7 +120,7 @@ def _mrt(arguments: argparse.Namespace) -> Path | None:
     if own is None or arguments.train_mrt < 1:
         raise MotionloomError("--train-mrt needs one step or more, and --out FOLDER for its weights")
     if not own.is_file():
-        from motionloom.cli.evaluate_text import say
+        from motionloom.cli.measuring import say
         from motionloom.data.pairs import find_pairs
         from motionloom.train.mrt import train_mrt
 
@@ -133,7 +133,7 @@ def _judged(arguments: argparse.Namespace, part: str):
     """Duets that are held against real ones."""
     from dataclasses import replace
 
-    from motionloom.cli.evaluate_text import say
+    from motionloom.cli.measuring import say
     from motionloom.evaluation import duet_answers, duet_long, duet_text
 
     module = {"text": duet_text, "answers": duet_answers, "long": duet_long}[part]

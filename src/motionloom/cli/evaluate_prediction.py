@@ -1,8 +1,9 @@
 """`motionloom evaluate prediction` and `evaluate study`: how good futures are, and what makes them so."""
 
 import argparse
-import sys
 from pathlib import Path
+
+from motionloom.cli.measuring import say
 
 SINGLES = ("all", "skip", "skip-multimodal")
 ROWS = ("real", "zero", "constant", "ours", "ours-many", "published")
@@ -67,10 +68,6 @@ def _shared(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--threads", type=int, metavar="N", help="CPU threads (default: all)")
 
 
-def _say(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
-
-
 def _prediction(arguments: argparse.Namespace) -> None:
     import json
 
@@ -84,7 +81,7 @@ def _prediction(arguments: argparse.Namespace) -> None:
         arguments.weights, data=arguments.data, name=arguments.protocol, how=how,
         kinds=arguments.row or prediction.KINDS,
         with_published=not arguments.rows_without_published, folder=arguments.out, device=arguments.device,
-        command=_command(arguments, "prediction"), progress=_say,
+        command=_command(arguments, "prediction"), progress=say,
     )  # fmt: skip
     if arguments.out:
         report.write(found, arguments.out)
@@ -114,7 +111,7 @@ def _study(arguments: argparse.Namespace) -> None:
     found = studies.run(
         arguments.name, arguments.weights, data=arguments.data, protocol=arguments.protocol, folder=arguments.out,
         keep=arguments.keep or arguments.out / "networks", budget=budget, device=arguments.device,
-        command=_command(arguments, "study"), progress=_say,
+        command=_command(arguments, "study"), progress=say,
     )  # fmt: skip
     print(report.plain(found))
     print(f"\nwritten: {arguments.out / arguments.name}.md, .json, .png")

@@ -1,8 +1,9 @@
 """`motionloom evaluate text`: the field's text-to-motion metrics beside real motion, baselines and published rows."""
 
 import argparse
-import sys
 from pathlib import Path
+
+from motionloom.cli.measuring import add_judged, add_selection, given, say, selected, show, typed
 
 PROMPT = "a person walks forward and waves"
 
@@ -10,12 +11,7 @@ PROMPT = "a person walks forward and waves"
 def add(commands) -> None:
     """Register `evaluate text`."""
     text = commands.add_parser("text", help="R-precision, FID, MM-Dist, Diversity, MultiModality, realism, speed")
-    text.add_argument("--weights", default="default", help="shipped name or file (default: default)")
-    text.add_argument(
-        "--data", type=Path, metavar="SET",
-        help="built set, recordings or HumanML3D folder (default: the shipped numbers of held-out CMU recordings)",
-    )  # fmt: skip
-    text.add_argument("--evaluator", default="own", metavar="own|FILE", help="who judges (default: the shipped one)")
+    add_judged(text, data=" (default: the shipped numbers of held-out CMU recordings)")
     text.add_argument("--steps", type=_steps, metavar="5,24,50", help="sampler steps, one row each (default 5,12,24)")
     text.add_argument("--replications", type=int, help="(default 5)")
     text.add_argument("--count", type=int, help="real items, spread evenly (default: all)")
@@ -27,10 +23,7 @@ def add(commands) -> None:
     text.add_argument("--multimodality", type=_times, metavar="10x10", help="captions x motions of each; 0: none")
     text.add_argument("--guidance", type=float, help="strength of the text (default: as generate)")
     text.add_argument("--solver", help="solver name (default: as generate)")
-    text.add_argument("--seed", type=int, help="first seed (default 0)")
-    text.add_argument("--split", type=words, metavar="val,test", help="splits of --data (default val,test)")
-    text.add_argument("--sources", type=words, metavar="cmu", help="sources of --data (default cmu; all: every one)")
-    text.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
+    add_selection(text)
     text.add_argument(
         "--out", type=Path, help="folder for report.md, report.json and plots; a run that stopped goes on"
     )
@@ -49,10 +42,6 @@ def _steps(said: str) -> tuple[int, ...]:
         raise argparse.ArgumentTypeError(f"{said!r} are not whole numbers with commas, such as 5,20,50") from None
 
 
-def words(said: str) -> tuple[str, ...]:
-    return tuple(word.strip() for word in said.split(",") if word.strip())
-
-
 def _batch(said: str) -> int | str:
     try:
         return said if said == "all" else int(said)
@@ -68,15 +57,8 @@ def _times(said: str) -> tuple[int, int]:
         raise argparse.ArgumentTypeError(f"{said!r} is not captions x motions of each, such as 10x10, or 0") from None
 
 
-def say(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
-
-
 def _text(arguments: argparse.Namespace) -> None:
-    import json
-    from dataclasses import replace
-
-    from motionloom.evaluation import obey, report, text
+    from motionloom.evaluation import obey, text
 
     if arguments.make_reference:
         return _make_reference(arguments)
@@ -88,13 +70,7 @@ def _text(arguments: argparse.Namespace) -> None:
         folder=arguments.out, device=arguments.device, memory=lambda steps: _memory(arguments, steps),
         command=_command(arguments), progress=say,
     )  # fmt: skip
-    if arguments.out:
-        report.write(found, arguments.out)
-    if arguments.json:
-        print(json.dumps(report.encode(found), indent=1))
-    else:  # the published rows are wide, and of other data: they stand in the files
-        here = tuple(row for row in found.rows if not row.measured_on)
-        print(report.plain(replace(found, rows=here)))
+    show(found, arguments)
 
 
 def _make_reference(arguments: argparse.Namespace) -> None:
@@ -115,32 +91,14 @@ def _protocol(arguments: argparse.Namespace):
     """The defaults with what was said."""
     from motionloom.evaluation.protocol import Protocol, quick
 
-    said = {
-        "steps": arguments.steps,
-        "replications": arguments.replications,
-        "count": arguments.count,
-        "lengths": arguments.lengths,
-        "caption_length": arguments.cap_len,
-        "multimodality": arguments.multimodality,
-        "guidance": arguments.guidance,
-        "solver": arguments.solver,
-        "seed": arguments.seed,
-    }
-    how = {name: value for name, value in said.items() if value is not None}
+    names = ("steps", "replications", "count", "lengths", "multimodality", "guidance", "solver", "seed")
+    how = given(arguments, names)
+    if arguments.cap_len is not None:
+        how["caption_length"] = arguments.cap_len
     if arguments.batch is not None:
         how["batch"] = None if arguments.batch == "all" else arguments.batch
     protocol = Protocol(**how)
     return quick(protocol) if arguments.quick else protocol
-
-
-def selected(arguments: argparse.Namespace):
-    """None where nothing was said: the defaults, or those of the shipped numbers."""
-    from motionloom.evaluation.protocol import Selection
-
-    if arguments.split is None and arguments.sources is None:
-        return None
-    sources = arguments.sources if arguments.sources is not None else Selection.sources
-    return Selection(arguments.split or Selection.splits, () if sources == ("all",) else sources)
 
 
 def _memory(arguments: argparse.Namespace, steps: int) -> float:
@@ -157,26 +115,9 @@ def _memory(arguments: argparse.Namespace, steps: int) -> float:
 
 
 def _command(arguments: argparse.Namespace) -> str:
-    """What to type to measure the same again; where data lie differs between machines, so they are called SET."""
-    import shlex
-
-    words = ["motionloom", "evaluate", "text", "--weights", arguments.weights]
-    words += ["--data", "SET"] if arguments.data else []
-    words += ["--evaluator", Path(arguments.evaluator).name] if arguments.evaluator != "own" else []
-    said = {
-        "--steps": arguments.steps and ",".join(map(str, arguments.steps)),
-        "--replications": arguments.replications,
-        "--count": arguments.count,
-        "--batch": arguments.batch,
-        "--lengths": arguments.lengths,
-        "--cap-len": arguments.cap_len,
-        "--multimodality": arguments.multimodality and "x".join(map(str, arguments.multimodality)),
-        "--guidance": arguments.guidance,
-        "--solver": arguments.solver,
-        "--seed": arguments.seed,
-        "--split": arguments.split and ",".join(arguments.split),
-        "--sources": arguments.sources and ",".join(arguments.sources),
-    }
-    for name, value in said.items():
-        words += [name, str(value)] if value is not None else []
-    return shlex.join([*words, *(["--quick"] if arguments.quick else [])])
+    names = ("steps", "replications", "count", "batch", "lengths", "cap_len", "multimodality")
+    names += ("guidance", "solver", "seed", "split", "sources")
+    said = given(arguments, names)
+    if arguments.multimodality:
+        said["multimodality"] = "x".join(map(str, arguments.multimodality))
+    return typed("text", arguments, said)

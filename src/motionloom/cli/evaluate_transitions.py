@@ -3,7 +3,9 @@
 import argparse
 from pathlib import Path
 
-from motionloom.cli.evaluate_text import say, selected, words
+from motionloom.cli.measuring import add_judged, add_selection, given, say, selected, show, typed, words
+
+SETTINGS = ("intervals", "unfoldings", "replications", "steps", "guidance", "seed")
 
 
 def add(commands) -> None:
@@ -11,12 +13,7 @@ def add(commands) -> None:
     seams = commands.add_parser(
         "transitions", help="long motion: segments, jerk and skate at the seams, beside DoubleTake and cheap baselines"
     )
-    seams.add_argument("--weights", default="default", help="shipped name or file (default: default)")
-    seams.add_argument(
-        "--data", type=Path, metavar="SET",
-        help="built set, recordings or HumanML3D folder (default: the shipped numbers of held-out CMU recordings)",
-    )  # fmt: skip
-    seams.add_argument("--evaluator", default="own", metavar="own|FILE", help="who judges (default: the shipped one)")
+    add_judged(seams, data=" (default: the shipped numbers of held-out CMU recordings)")
     seams.add_argument(
         "--methods", type=words, metavar="ours,ours-exported,published,paper,first-take,concatenation,slerp",
         help="rows (default: these); also second-take, published-1000, paper-1000: the last two take hours",
@@ -26,10 +23,7 @@ def add(commands) -> None:
     seams.add_argument("--replications", type=int, help="(default 3)")
     seams.add_argument("--steps", type=int, help="sampler steps (default 24)")
     seams.add_argument("--guidance", type=float, help="strength of the text (default: as generate)")
-    seams.add_argument("--seed", type=int, help="first seed (default 0)")
-    seams.add_argument("--split", type=words, metavar="val,test", help="splits of --data (default val,test)")
-    seams.add_argument("--sources", type=words, metavar="cmu", help="sources of --data (default cmu; all: every one)")
-    seams.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
+    add_selection(seams)
     seams.add_argument("--out", type=Path, help="folder for the report and plots; a run that stopped goes on")
     seams.add_argument("--quick", action="store_true", help="one unfolding of 8 captions, two replications")
     seams.add_argument("--json", action="store_true", help="print JSON instead of a table")
@@ -40,10 +34,7 @@ def add(commands) -> None:
 
 
 def _transitions(arguments: argparse.Namespace) -> None:
-    import json
-    from dataclasses import replace
-
-    from motionloom.evaluation import obey, report, transitions
+    from motionloom.evaluation import obey, transitions
 
     if arguments.make_reference:
         return _make_reference(arguments)
@@ -55,13 +46,7 @@ def _transitions(arguments: argparse.Namespace) -> None:
         names=arguments.methods, folder=arguments.out, device=arguments.device, command=_command(arguments),
         progress=say,
     )  # fmt: skip
-    if arguments.out:
-        report.write(found, arguments.out)
-    if arguments.json:
-        print(json.dumps(report.encode(found), indent=1))
-    else:  # the published rows are of other data: they stand in the files
-        here = tuple(row for row in found.rows if not row.measured_on)
-        print(report.plain(replace(found, rows=here)))
+    show(found, arguments)
 
 
 def _make_reference(arguments: argparse.Namespace) -> None:
@@ -84,20 +69,9 @@ def _protocol(arguments: argparse.Namespace):
     """The defaults with what was said."""
     from motionloom.evaluation.protocol import Transitions, quick_transitions
 
-    names = ("intervals", "unfoldings", "replications", "steps", "guidance", "seed")
-    how = Transitions(**{n: getattr(arguments, n) for n in names if getattr(arguments, n) is not None})
+    how = Transitions(**given(arguments, SETTINGS))
     return quick_transitions(how) if arguments.quick else how
 
 
 def _command(arguments: argparse.Namespace) -> str:
-    """What to type to measure the same again; where data lie differs between machines, so they are called SET."""
-    import shlex
-
-    words = ["motionloom", "evaluate", "transitions", "--weights", arguments.weights]
-    words += ["--data", "SET"] if arguments.data else []
-    words += ["--evaluator", Path(arguments.evaluator).name] if arguments.evaluator != "own" else []
-    for name in ("methods", "intervals", "unfoldings", "replications", "steps", "guidance", "seed", "split", "sources"):
-        value = getattr(arguments, name)
-        if value is not None:
-            words += [f"--{name}", ",".join(value) if isinstance(value, tuple) else str(value)]
-    return shlex.join([*words, *(["--quick"] if arguments.quick else [])])
+    return typed("transitions", arguments, given(arguments, ("methods", *SETTINGS, "split", "sources")))

@@ -1,0 +1,79 @@
+"""What the commands share that measure motion beside real motion: options, what they choose, and how they end."""
+
+import argparse
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from motionloom.evaluation.protocol import Selection
+    from motionloom.evaluation.report import Report
+
+
+def add_judged(parser: argparse.ArgumentParser, *, data: str) -> None:
+    """``--weights``, ``--data`` and ``--evaluator``; ``data`` says what is done with the real motions."""
+    parser.add_argument("--weights", default="default", help="shipped name or file (default: default)")
+    parser.add_argument("--data", type=Path, metavar="SET", help=f"built set, recordings or HumanML3D folder{data}")
+    parser.add_argument("--evaluator", default="own", metavar="own|FILE", help="who judges (default: the shipped one)")
+
+
+def add_selection(parser: argparse.ArgumentParser) -> None:
+    """``--seed``, ``--split``, ``--sources`` and ``--device``."""
+    parser.add_argument("--seed", type=int, help="first seed (default 0)")
+    parser.add_argument("--split", type=words, metavar="val,test", help="splits of --data (default val,test)")
+    parser.add_argument("--sources", type=words, metavar="cmu", help="sources of --data (default cmu; all: every one)")
+    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
+
+
+def words(said: str) -> tuple[str, ...]:
+    """What stands between commas."""
+    return tuple(word.strip() for word in said.split(",") if word.strip())
+
+
+def say(line: str) -> None:
+    """Tell how far it is, on stderr."""
+    print(line, file=sys.stderr, flush=True)
+
+
+def selected(arguments: argparse.Namespace) -> "Selection | None":
+    """None where nothing was said: the defaults, or those of the shipped numbers."""
+    from motionloom.evaluation.protocol import Selection
+
+    if arguments.split is None and arguments.sources is None:
+        return None
+    sources = arguments.sources if arguments.sources is not None else Selection.sources
+    return Selection(arguments.split or Selection.splits, () if sources == ("all",) else sources)
+
+
+def given(arguments: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
+    """The options of those names that were said."""
+    return {name: value for name in names if (value := getattr(arguments, name)) is not None}
+
+
+def typed(suite: str, arguments: argparse.Namespace, said: Mapping[str, Any], *more: str) -> str:
+    """What to type to measure the same again; where data lie differs between machines, so they are called SET."""
+    import shlex
+
+    line = ["motionloom", "evaluate", suite, "--weights", arguments.weights]
+    line += ["--data", "SET"] if arguments.data else []
+    line += ["--evaluator", Path(arguments.evaluator).name] if arguments.evaluator != "own" else []
+    for name, value in said.items():
+        line += [f"--{name.replace('_', '-')}", ",".join(map(str, value)) if isinstance(value, tuple) else str(value)]
+    return shlex.join([*line, *more, *(["--quick"] if arguments.quick else [])])
+
+
+def show(found: "Report", arguments: argparse.Namespace) -> None:
+    """Write a report into ``--out`` and print it; published rows are wide and of other data, and stand in files."""
+    import json
+    from dataclasses import replace
+
+    from motionloom.evaluation import report
+
+    if arguments.out:
+        report.write(found, arguments.out)
+    if arguments.json:
+        print(json.dumps(report.encode(found), indent=1))
+    else:
+        here = tuple(row for row in found.rows if not row.measured_on)
+        print(report.plain(replace(found, rows=here)))
