@@ -13,6 +13,7 @@ from motionloom.metrics.physics import heading
 from motionloom.motion import Motion
 from motionloom.nets.pair import PairNet, join
 from motionloom.nets.pair_block import PairBlock
+from motionloom.nets.prior import Bound
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import duet as tasks
@@ -121,12 +122,14 @@ def test_only_who_listens_hears_what_the_other_is_told(prior: Prior, block: Pair
         assert torch.allclose(first, second, atol=1e-5) == deaf
 
 
-def test_each_row_is_told_where_the_two_stand_when_it_begins(
+def test_each_row_is_told_and_led_from_where_the_two_stand_when_it_begins(
     prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A network that always guesses the same: D of a later row, as shown without its noise, is what bodies made of
-    the finished motion stand like at the first frame of that row."""
+    the finished motion stand like at the first frame of that row; each is led with noise and words of its own."""
     shown: dict[int, list[tuple[torch.Tensor, int]]] = {}
+    begins: dict[int, torch.Tensor] = {}
+    leads: list[dict] = []
     stands = torch.tensor([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
     places = block.config.places.encode(stands)
     features = torch.zeros(263)
@@ -142,27 +145,51 @@ def test_each_row_is_told_where_the_two_stand_when_it_begins(
         motion = clean.repeat(len(x) // 2, 1)[:, None].expand(-1, x.shape[1] - 1, -1)
         return join(places.repeat(len(x) // 2, 1), motion)
 
+    def led(guess: tasks._Guess, number: int, level: int, motion: torch.Tensor, begin: torch.Tensor, *, state):
+        begins[number] = begin
+        return motion
+
+    def leader(prior: Prior, net: PairNet, bound: Bound, **how) -> object:
+        leads.append(how | {"text": bound.text})
+        return None
+
     monkeypatch.setattr(PairNet, "forward", constant)
-    segments = [Segment("a person walks", 1.0, transition=0.4), Segment("a person turns", 0.8)]
+    monkeypatch.setattr(tasks._Guess, "_led", led)
+    monkeypatch.setattr(tasks, "leader", leader)
+    segments = [
+        Segment("a person walks", 1.0, transition=0.4),
+        Segment("a person turns :: a person jumps", 0.8, transition=0.6),
+        Segment("a person walks", 1.1),
+    ]
     both = [tasks._asked(segments, i, None, 0) for i in (0, 1)]
-    pieces = list(duet_features(prior, block.net(prior), both, steps=4))
-    calls = shown[4 + 16]  # the second row begins 4 frames before its seam
-    noise = calls[0][0]
-    signal, spread = prior.schedule.at(calls[-1][1])
-    told = (calls[-1][0] - spread * noise) / signal
+    both[1][0] = replace(both[1][0], goal=Goal.nothing(20))  # which asks for nothing
+    pieces = list(duet_features(prior, block.net(prior), both, steps=4, together=0.7))
     motion = torch.cat([piece for piece, _ in pieces], dim=1).double().numpy()
     there = two.decode(motion, stands.double().numpy())[:, :, 0]
-    turned = 2 * np.array([-0.03, 0.015]) * 16  # the heading's convention: features tell minus half of the turn
-    facing = np.array([0.0, np.arctan2(0.8, 0.6)]) + turned
-    way = there[1, 16] - there[0, 16]
-    c, s = np.cos(facing[0]), np.sin(facing[0])
-    expected = [
-        np.cos(facing[1] - facing[0]),
-        np.sin(facing[1] - facing[0]),
-        c * way[0] - s * way[2],
-        c * way[2] + s * way[0],
-    ]
-    np.testing.assert_allclose(told[0], expected, atol=1e-3)
+    for number, length, frame in ((1, 4 + 16 + 6, 20 - 4), (2, 6 + 22, 36 - 6)):  # by half of the transition earlier
+        calls = shown[length]
+        noise = calls[0][0]
+        signal, spread = prior.schedule.at(calls[-1][1])
+        told = (calls[-1][0] - spread * noise) / signal
+        turned = 2 * np.array([-0.03, 0.015]) * frame  # the heading's convention: features tell minus half of the turn
+        facing = np.array([0.0, np.arctan2(0.8, 0.6)]) + turned
+        way = there[1, frame] - there[0, frame]
+        c, s = np.cos(facing[0]), np.sin(facing[0])
+        expected = [
+            np.cos(facing[1] - facing[0]),
+            np.sin(facing[1] - facing[0]),
+            c * way[0] - s * way[2],
+            c * way[2] + s * way[0],
+        ]
+        np.testing.assert_allclose(told[0], expected, atol=1e-3)
+        np.testing.assert_allclose(two.seen(begins[number][0], begins[number][1]), expected, atol=1e-3)
+    assert len({seed for how in leads for seed in how["seeds"]}) == 6
+    assert {how["weight"] for how in leads} == {0.7}
+    assert not any(any(how["still"]) for how in leads)
+    for how, said in zip(leads, ("a person walks", "a person turns", "a person walks"), strict=True):
+        net = block.net(prior)
+        words = [said, "a person jumps" if said == "a person turns" else said]
+        torch.testing.assert_close(how["text"], net.bind(prior.condition(words)).text)
 
 
 @pytest.mark.parametrize("asked", [None, 0, 1])
@@ -199,7 +226,35 @@ def test_a_block_that_wants_them_beside_each_other_keeps_them_there_for_long(
             )
 
 
-def test_a_path_for_one_of_them_holds_through_all_segments(prior: Prior, block: PairBlock) -> None:
+def test_a_row_is_led_from_where_it_begins_and_shows_the_noised_state(prior: Prior, block: PairBlock) -> None:
+    guess, asked = tasks._Guess(prior, block.net(prior), [50, 1], 1.0), {}
+
+    def lead(state: torch.Tensor, clean: torch.Tensor, level: int) -> torch.Tensor:
+        asked.update(state=state, clean=clean, level=level)
+        return clean + 1
+
+    guess.leads[3] = lead
+    state, motion = torch.randn(2, 2, 30, 263, generator=torch.Generator().manual_seed(0))
+    begin = torch.tensor([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
+    assert torch.equal(guess._led(3, 50, motion, begin, state=state), motion + 1)
+    assert asked["level"] == 50
+    assert torch.equal(asked["state"], join(block.config.places.encode(begin), state))
+    assert torch.equal(asked["clean"], join(block.config.places.encode(begin), motion))
+
+
+def test_a_path_for_one_of_them_holds_through_all_segments(
+    prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A network that always draws two real people, who look where their features say that they do."""
+    encoded = two.encode(np.stack([person_at_20(motion) for motion in walkers(1.2, larger=1.0)]))
+    clean = (torch.from_numpy(encoded.features[:, 8]).float() - prior.mean) / prior.std
+    places = block.config.places.encode(torch.from_numpy(encoded.stands).float())
+
+    def constant(net: PairNet, x: torch.Tensor, level, bound) -> torch.Tensor:
+        motion = clean.repeat(len(x) // 2, 1)[:, None].expand(-1, x.shape[1] - 1, -1)
+        return join(places.repeat(len(x) // 2, 1), motion)
+
+    monkeypatch.setattr(PairNet, "forward", constant)
     path = Goal.nothing(54)
     path.positions[:, 0, 0] = np.linspace(2.0, 5.0, 54)
     path.asked[:, 0] = [True, False, True]

@@ -15,7 +15,7 @@ from motionloom.nets.pair import PairNet, join
 from motionloom.nets.pair_block import PairBlock
 from motionloom.tasks import duet_places
 from motionloom.tasks.duet_places import Places, leader
-from motionloom.tasks.pair import generate_pair, known_state, pair_features
+from motionloom.tasks.pair import generate_pair, known_state, pair_draw, pair_features
 from tests.nets import tiny
 from tests.tasks.two_people import block as block_of
 
@@ -82,6 +82,19 @@ def test_a_drift_is_gone_at_the_knots(prior: Prior, block: PairBlock, weight: fl
     torch.testing.assert_close(after[:, 0], before[:, 0])
 
 
+def test_half_led_is_half_of_the_way(prior: Prior, block: PairBlock) -> None:
+    """At the knots, from one to the other on the ground and in how they face."""
+    places = Places.of([1, 2], FRAMES, [0], [False] * 2)
+    free, half, whole = (led(prior, block, places, weight)[1][:, [40, 80]] for weight in (0.0, 0.5, 1.0))
+    way = [(one[1] - one[0])[:, 2:] for one in (free, half, whole)]
+    assert (way[2] - way[0]).norm(dim=-1).min() > 0.2
+    torch.testing.assert_close(way[1], (way[0] + way[2]) / 2, rtol=0, atol=1e-4)
+    for person in (0, 1):
+        torch.testing.assert_close(
+            two.seen(free[person], half[person])[:, :2], two.seen(half[person], whole[person])[:, :2], rtol=0, atol=1e-4
+        )
+
+
 def test_each_goes_half_of_the_way(prior: Prior, block: PairBlock) -> None:
     before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2))
     moved = (after - before)[..., 2:]
@@ -120,6 +133,21 @@ def test_what_a_change_costs_is_spread_without_jumps() -> None:
     spread = duet_places._spread([10, 50, 90], 101).numpy()
     np.testing.assert_allclose(spread[[5, 10, 50, 90, 100]], [[0, 0], [0, 0], [1, 0], [0, 1], [0, 1]], atol=1e-6)
     assert np.abs(np.diff(spread[11:90], axis=0)).max() < 2 / duet_places.SPACING
+    assert np.abs(np.diff(spread[11:90], 2, axis=0)).max() < 0.2 / duet_places.SPACING  # nor a bend, as of lines
+
+
+def test_no_more_than_sixty_frames_are_shown() -> None:
+    motion = torch.arange(100.0).repeat(2, 1)[..., None]
+    crops, lengths = duet_places._crops(motion, [0, 1, 1], [0, 39, 50])
+    assert (crops.shape, lengths.tolist()) == ((3, 60, 1), [60, 60, 50])
+    assert crops[:, 0, 0].tolist() == [0, 39, 50]
+    assert not crops[2, 50:].any()
+
+
+def test_what_places_are_asked_with_is_not_what_the_duet_begins_as() -> None:
+    noise = Places.of([1, 2], 200, [0], [False] * 2).noise
+    assert noise.shape == (10, 4)
+    assert not torch.isin(noise, pair_draw([1, 2])(torch.zeros(2, 201, 263))).any()
 
 
 def test_exchanged_people_stay_together_exchanged(prior: Prior, block: PairBlock) -> None:
@@ -210,7 +238,7 @@ def test_who_is_moved_differs_from_pair_to_pair(prior: Prior, block: PairBlock) 
 @pytest.mark.parametrize(
     ("begin", "frames", "knots"),
     [(0, 39, ()), (0, 40, (20,)), (0, 60, (40,)), (0, 61, (20, 41)), (0, 100, (40, 80)), (10, 100, (45, 80)),
-     (10, 110, (50, 90)), (60, 99, ()), (60, 100, (80,))],
+     (0, 120, (33, 67, 100)), (10, 110, (50, 90)), (60, 99, ()), (60, 100, (80,))],
 )  # fmt: skip
 def test_knots_stand_evenly_up_to_twenty_frames_before_the_end(begin: int, frames: int, knots: tuple[int, ...]) -> None:
     assert Places.of([1, 2], frames, [begin], [False] * 2).knots == (knots,)
