@@ -1,10 +1,10 @@
 """`motionloom bench`: speed and memory, as ratios within one run."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
+from motionloom.cli.measuring import say
 from motionloom.cli.sampling import fail
 
 
@@ -51,7 +51,7 @@ def _generated(arguments: argparse.Namespace) -> dict[str, Any]:
     weights = arguments.weights or "default"
     return bench(
         Prior.load(weights, device=arguments.device), defaults(compose if arguments.long else generate),
-        what="long" if arguments.long else "short", quick=arguments.quick, weights=weights, progress=_tell,
+        what="long" if arguments.long else "short", quick=arguments.quick, weights=weights, progress=say,
     )  # fmt: skip
 
 
@@ -60,8 +60,4 @@ def _predicted(arguments: argparse.Namespace) -> dict[str, Any]:
     from motionloom.predictor import Predictor
 
     predictor = Predictor.load(arguments.weights or "predictor", device=arguments.device)
-    return bench_prediction(predictor, quick=arguments.quick, progress=_tell)
-
-
-def _tell(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
+    return bench_prediction(predictor, quick=arguments.quick, progress=say)

@@ -4,6 +4,8 @@ import argparse
 from importlib import import_module
 from pathlib import Path
 
+from motionloom.cli.measuring import say
+
 PARTS = (
     "evaluate_text", "evaluate_transitions", "evaluate_control", "evaluate_prediction", "evaluate_duet",
     "evaluate_evaluator", "evaluate_all",
@@ -77,12 +79,6 @@ def _settings(arguments: argparse.Namespace) -> dict:
     return {name: getattr(arguments, name) for name in ("weights", "steps", "guidance", "solver", "finished")}
 
 
-def _say(line: str) -> None:
-    import sys
-
-    print(line, file=sys.stderr, flush=True)
-
-
 def _obedience(arguments: argparse.Namespace) -> None:
     import json
 
@@ -94,7 +90,7 @@ def _obedience(arguments: argparse.Namespace) -> None:
     settings = _settings(arguments)
     results = obey.run(
         _generator(arguments), checks, seeds=arguments.seeds, first_seed=arguments.seed,
-        paraphrases=arguments.paraphrases, settings=settings, folder=arguments.out, progress=_say,
+        paraphrases=arguments.paraphrases, settings=settings, folder=arguments.out, progress=say,
     )  # fmt: skip
     rows = obey.table(results, checks, real=known()["checks"])
     found = obey.totals(results, checks)
@@ -133,7 +129,7 @@ def _realism(arguments: argparse.Namespace) -> None:
         wanted, real = realism.orders(chosen), [clip.positions for clip in chosen]
     else:
         wanted, real = realism.everyday(arguments.count), known()["realism"]["held_out"]
-    made, fps = realism.run(_generator(arguments), wanted, seed=arguments.seed, progress=_say)
+    made, fps = realism.run(_generator(arguments), wanted, seed=arguments.seed, progress=say)
     found = {"settings": _settings(arguments), **realism.judge(made, fps, real)}
     rows = realism.table(found)
     said = f"{found['passed']} of {len(rows) - 1} numbers within 1.5 times of real (or too small to see)"
@@ -153,7 +149,7 @@ def _reference(arguments: argparse.Namespace) -> None:
 
     if arguments.out:
         obey.check_report(arguments.out)
-    found = reference.reference(real_clips(arguments.data), progress=_say)
+    found = reference.reference(real_clips(arguments.data), progress=say)
     if arguments.out:
         obey.write_json(arguments.out, found)
     print(obey.plain(reference.rates(found)))

@@ -1,8 +1,9 @@
 """`motionloom evaluate all` and `evaluate compare`: every suite in one run; two runs held against each other."""
 
 import argparse
-import sys
 from pathlib import Path
+
+from motionloom.cli.measuring import say
 
 
 def add(commands) -> None:
@@ -31,10 +32,6 @@ def add(commands) -> None:
     compare.set_defaults(run=_compare)
 
 
-def _say(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
-
-
 def _tools(arguments: argparse.Namespace):
     """Motions and speeds of the weights, which are loaded once, when a suite first asks."""
     from functools import cache
@@ -55,9 +52,9 @@ def _tools(arguments: argparse.Namespace):
         prior=prior,
         memory=lambda steps: _memory(arguments, steps),
         speed=lambda quick: bench(
-            prior(), defaults(generate), what="all", quick=quick, weights=arguments.weights, progress=_say
+            prior(), defaults(generate), what="all", quick=quick, weights=arguments.weights, progress=say
         ),
-        progress=_say,
+        progress=say,
     )
 
 
@@ -78,7 +75,7 @@ def _all(arguments: argparse.Namespace) -> int:
         print(report.plain(one), end="\n\n")
     if arguments.results:
         for suite in results.fill_page(arguments.results, made, again=arguments.again):
-            _say(f"{arguments.results} keeps the full numbers of {suite}; say --again to replace them by quick ones")
+            say(f"{arguments.results} keeps the full numbers of {suite}; say --again to replace them by quick ones")
     for outcome in outcomes:
         print(f"{outcome.suite.name}: {outcome.said}")
     return 2 if any(outcome.failed for outcome in outcomes) else 0

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from motionloom.cli.measuring import say, set_threads
+
 PARTS = ("completion", "text", "answers", "long")
 
 
@@ -60,10 +62,9 @@ def add(commands) -> None:
 def _duet(arguments: argparse.Namespace) -> None:
     import json
 
-    from motionloom.cli.evaluate_prediction import _threads
     from motionloom.evaluation import obey, report
 
-    _threads(arguments)
+    set_threads(arguments)
     if arguments.write_bare:
         return _write_bare(arguments)
     asked = [part for part in PARTS if arguments.only in (None, part)]
@@ -97,7 +98,6 @@ def _printed(found) -> str:
 def _completion(arguments: argparse.Namespace):
     from dataclasses import replace
 
-    from motionloom.cli.measuring import say
     from motionloom.evaluation import duet
 
     said = {name: value for name in ("crops", "samples", "steps") if (value := getattr(arguments, name)) is not None}
@@ -120,7 +120,6 @@ def _mrt(arguments: argparse.Namespace) -> Path | None:
     if own is None or arguments.train_mrt < 1:
         raise MotionloomError("--train-mrt needs one step or more, and --out FOLDER for its weights")
     if not own.is_file():
-        from motionloom.cli.measuring import say
         from motionloom.data.pairs import find_pairs
         from motionloom.train.mrt import train_mrt
 
@@ -133,7 +132,6 @@ def _judged(arguments: argparse.Namespace, part: str):
     """Duets that are held against real ones."""
     from dataclasses import replace
 
-    from motionloom.cli.measuring import say
     from motionloom.evaluation import duet_answers, duet_long, duet_text
 
     module = {"text": duet_text, "answers": duet_answers, "long": duet_long}[part]

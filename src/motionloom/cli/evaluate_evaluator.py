@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from motionloom.cli.measuring import say
+
 
 def add(commands) -> None:
     """Register `evaluate evaluator` among the commands of `evaluate`."""
@@ -22,7 +24,6 @@ def add(commands) -> None:
 
 def _evaluator(arguments: argparse.Namespace) -> None:
     import json
-    import sys
 
     from motionloom.checkpoint import Prior
     from motionloom.errors import MotionloomError
@@ -36,9 +37,6 @@ def _evaluator(arguments: argparse.Namespace) -> None:
         raise MotionloomError(
             f"repeats go from 1 to 10000 and seeds from 0 to 1000; got {arguments.repeats} and {arguments.seeds}"
         )
-
-    def say(line: str) -> None:
-        print(line, file=sys.stderr, flush=True)
 
     evaluator = load_evaluator(arguments.evaluator)
     prior = Prior.load(arguments.weights) if arguments.seeds else None

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from motionloom.cli.measuring import say
+from motionloom.cli.measuring import say, set_threads
 
 SINGLES = ("all", "skip", "skip-multimodal")
 ROWS = ("real", "zero", "constant", "ours", "ours-many", "published")
@@ -74,7 +74,7 @@ def _prediction(arguments: argparse.Namespace) -> None:
     from motionloom.evaluation import obey, prediction, report
 
     how = _how(arguments)
-    _threads(arguments)
+    set_threads(arguments)
     if arguments.out:
         obey.check_report(arguments.out / "report.json")
     found = prediction.run(
@@ -103,7 +103,7 @@ def _study(arguments: argparse.Namespace) -> None:
     from motionloom.evaluation import prediction_studies as studies
     from motionloom.evaluation import report
 
-    _threads(arguments)
+    set_threads(arguments)
     budget = studies.budget(
         arguments.name, quick=arguments.quick, windows=arguments.windows, samples=arguments.samples,
         train_steps=arguments.train_steps, seed=arguments.seed,
@@ -115,18 +115,6 @@ def _study(arguments: argparse.Namespace) -> None:
     )  # fmt: skip
     print(report.plain(found))
     print(f"\nwritten: {arguments.out / arguments.name}.md, .json, .png")
-
-
-def _threads(arguments: argparse.Namespace) -> None:
-    from motionloom.errors import MotionloomError
-
-    if arguments.threads is None:
-        return
-    if not 1 <= arguments.threads <= 1024:
-        raise MotionloomError(f"the number of threads must be from 1 to 1024; got {arguments.threads}")
-    import torch
-
-    torch.set_num_threads(arguments.threads)
 
 
 def _command(arguments: argparse.Namespace, kind: str) -> str:

@@ -46,6 +46,19 @@ def selected(arguments: argparse.Namespace) -> "Selection | None":
     return Selection(arguments.split or Selection.splits, () if sources == ("all",) else sources)
 
 
+def set_threads(arguments: argparse.Namespace) -> None:
+    """Have torch use ``--threads``."""
+    from motionloom.errors import MotionloomError
+
+    if arguments.threads is None:
+        return
+    if not 1 <= arguments.threads <= 1024:
+        raise MotionloomError(f"the number of threads must be from 1 to 1024; got {arguments.threads}")
+    import torch
+
+    torch.set_num_threads(arguments.threads)
+
+
 def given(arguments: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
     """The options of those names that were said."""
     return {name: value for name in names if (value := getattr(arguments, name)) is not None}
