@@ -264,6 +264,29 @@ def test_a_path_for_one_of_them_holds_through_all_segments(
     assert abs(heading(made[1].positions()[:1])[0] - np.pi / 2) < 0.5
 
 
+def test_guesses_go_where_their_person_is_asked_to_be(
+    prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A network that always draws people who stand; the second is asked to be 0.3 m to his left after two seconds."""
+    features = torch.zeros(2, 263)
+    features[:, 3] = 0.9
+    clean = (features - prior.mean) / torch.where(prior.std > 0, prior.std, 1.0)
+
+    def constant(net: PairNet, x: torch.Tensor, level, bound) -> torch.Tensor:
+        motion = clean.repeat(len(x) // 2, 1)[:, None].expand(-1, x.shape[1] - 1, -1)
+        return join(x[:, 0, :4], motion)
+
+    monkeypatch.setattr(PairNet, "forward", constant)
+    both = [tasks._asked([Segment("a person walks", 2.0)], i, None, 0) for i in (0, 1)]
+    goal = Goal.nothing(40)
+    goal.asked[39, 0, 0], goal.positions[39, 0, 0] = True, 0.3
+    both[1] = [replace(both[1][0], goal=goal)]
+    [(piece, _)] = duet_features(prior, block.net(prior), both, steps=4, together=0.0)
+    first, second = two.along(piece.double())[:, 39, 2]
+    assert abs(first) < 1e-4
+    assert second == pytest.approx(0.3, abs=0.05)
+
+
 def test_nothing_is_composed_of_nothing(prior: Prior, block: PairBlock) -> None:
     for segments, message in (([], "no segment"), ([Segment("a :: b :: c", 2)], "around one ::")):
         with pytest.raises(MotionloomError, match=message):

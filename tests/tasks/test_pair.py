@@ -234,6 +234,33 @@ def test_a_true_future_comes_back_onto_both_bodies_in_place(
         assert apart[count:].mean() < 0.012, apart[count:].mean(axis=1)
 
 
+def test_whose_guesses_are_changed_is_still_unless_said_otherwise(
+    prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nine pairs, of which eight are denoised at once; the last but one row is changed."""
+    asked: list[dict] = []
+
+    def leader(prior: Prior, net: PairNet, bound: object, **how):
+        asked.append(how)
+        return lambda state, guess, level: guess
+
+    monkeypatch.setattr(pair, "leader", leader)
+    change = [None] * 16 + [lambda guess, level: guess, None]
+    known = torch.zeros(18, 1 + FRAMES, 263, dtype=torch.bool)
+    known[17, 1:5] = True
+    how = {"seeds": list(range(18)), "steps": 1, "change": change, "mask": known, "together": 0.5}
+    for still, expected in ((None, [True, False]), ([False] * 17 + [True], [False, True])):
+        asked.clear()
+        pair_features(prior, block.net(prior), SAID * 9, FRAMES, still=still, **how)
+        first, second = asked
+        assert (first["still"], second["still"]) == ([False] * 16, expected)
+        assert (first["seeds"], second["seeds"]) == (list(range(16)), [16, 17])
+        assert (first["weight"], second["weight"]) == (0.5, 0.5)
+        assert (int(first["mask"].sum()), int(second["mask"].sum())) == (0, 4 * 263)
+    with pytest.raises(MotionloomError):
+        pair_features(prior, block.net(prior), SAID * 9, FRAMES, **how | {"still": [False]})
+
+
 def test_who_goes_on_is_led_to_the_other(prior: Prior, block: PairBlock) -> None:
     past = walkers(1.2)
     apart, led = (complete_pair(prior, block, past, seconds=3.0, steps=2, together=share)[0] for share in (0.0, 1.0))
