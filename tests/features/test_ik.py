@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
+from motionloom.features import ik
 from motionloom.features.ik import LIMBS, motion_from_positions
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
@@ -148,6 +149,48 @@ def test_a_shoulder_drawn_onto_its_collar_does_not_spin_it() -> None:
     collar = rot.quat_to_rotvec(motion.rotations[:, 13])
     assert np.degrees(np.linalg.norm(collar, axis=-1)).max() < 30
     assert turning_speeds(motion)[:, 13].max() < np.radians(10) * FPS
+
+
+def spike(joints: tuple[int, ...], shift: np.ndarray) -> np.ndarray:
+    """(41, 22) degrees: how far each joint of somebody standing still turns if some are drawn elsewhere in frame 20."""
+    positions = np.tile(SMPL22.rest_positions(), (41, 1, 1))
+    positions[20, list(joints)] += shift
+    return np.degrees(np.linalg.norm(rot.quat_to_rotvec(motion_from_positions(positions, FPS).rotations), axis=-1))
+
+
+def test_a_forearm_drawn_short_for_a_frame_does_not_fold_its_arm() -> None:
+    """It would have to fold by more than 90 degrees at the elbow for the wrist to get there."""
+    bone = SMPL22.offsets[20]
+    turns = spike((20,), 0.1 * np.linalg.norm(bone) * np.array([0.0, 0.0, 1.0]) - bone)
+    assert turns[20, [16, 18]].max() < 12
+    assert turns[:, [1, 2, 4, 5, 17, 19]].max() < 1e-3
+
+
+def test_a_collar_drawn_short_and_aside_for_a_frame_stays() -> None:
+    bone = SMPL22.offsets[16]
+    aside = 0.5 * np.linalg.norm(bone) * np.array([0.0, 0.0, 1.0])
+    assert spike((16, 18, 20), aside - bone)[20, 13] < 8
+
+
+def test_what_is_drawn_wrongly_counts_less_than_how_it_changes() -> None:
+    """Against the least squares written out, and whichever sign rotations have."""
+    rng = np.random.default_rng(0)
+    turns = rot.rotvec_to_quat(rng.normal(size=(12, 3)) * 0.3)
+    error = np.array([0.0, 0.02, 0.12, 0.5, 1.0, 0.3] * 2)
+    weight = np.sqrt((0.12 / error.clip(1e-6)) ** 2)
+    change = np.diff(np.eye(12), axis=0)
+    rows, wanted = (
+        np.concatenate([np.diag(weight), change]),
+        np.concatenate([weight[:, None] * turns, np.zeros((11, 4))]),
+    )
+    expected = np.linalg.lstsq(rows, wanted, rcond=None)[0]
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    flipped = turns * rng.choice([-1.0, 1.0], (12, 1))
+    for one in (turns, flipped):
+        found = ik._settled(one, error)
+        np.testing.assert_allclose(found * np.sign((found * expected).sum(-1, keepdims=True)), expected, atol=1e-6)
+    rest = np.array([0.0, 0.2, 0.0])
+    np.testing.assert_allclose(ik._misdrawn(np.outer([0.5, 1.0, 1.5, 0.0], [0.0, 0.0, 0.2]), rest), [0.5, 0, 0.5, 1])
 
 
 def test_everything_in_one_point_is_still_a_motion() -> None:

@@ -239,17 +239,24 @@ def test_whose_guesses_are_changed_is_still_unless_said_otherwise(
 ) -> None:
     """Nine pairs, of which eight are denoised at once; the last but one row is changed."""
     asked: list[dict] = []
+    shown: list[torch.Tensor] = []
 
     def leader(prior: Prior, net: PairNet, bound: object, **how):
         asked.append(how)
-        return lambda state, guess, level: guess
+
+        def lead(state: torch.Tensor, guess: torch.Tensor, level: int) -> torch.Tensor:
+            shown.append(guess)
+            return guess
+
+        return lead
 
     monkeypatch.setattr(pair, "leader", leader)
-    change = [None] * 16 + [lambda guess, level: guess, None]
+    change = [None] * 16 + [lambda guess, level: torch.full_like(guess, 7.0), None]
     known = torch.zeros(18, 1 + FRAMES, 263, dtype=torch.bool)
     known[17, 1:5] = True
     how = {"seeds": list(range(18)), "steps": 1, "change": change, "mask": known, "together": 0.5}
     for still, expected in ((None, [True, False]), ([False] * 17 + [True], [False, True])):
+        shown.clear()
         asked.clear()
         pair_features(prior, block.net(prior), SAID * 9, FRAMES, still=still, **how)
         first, second = asked
@@ -257,8 +264,11 @@ def test_whose_guesses_are_changed_is_still_unless_said_otherwise(
         assert (first["seeds"], second["seeds"]) == (list(range(16)), [16, 17])
         assert (first["weight"], second["weight"]) == (0.5, 0.5)
         assert (int(first["mask"].sum()), int(second["mask"].sum())) == (0, 4 * 263)
+        assert [(one[:, 1:] == 7.0).all((1, 2)).tolist() for one in shown] == [[False] * 16, [True, False]]
     with pytest.raises(MotionloomError):
         pair_features(prior, block.net(prior), SAID * 9, FRAMES, **how | {"still": [False]})
+    with pytest.raises(MotionloomError, match="kept together"):
+        pair_features(prior, block.net(prior), SAID * 9, FRAMES, **how | {"together": 1.5})
 
 
 def test_who_goes_on_is_led_to_the_other(prior: Prior, block: PairBlock) -> None:

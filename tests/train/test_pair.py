@@ -12,12 +12,14 @@ from motionloom.cli import main
 from motionloom.data.pairs import Pair, mirrored
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
+from motionloom.features.layout import LAYOUT
 from motionloom.features.pair import decode, encode
 from motionloom.nets.adapter import fingerprint
 from motionloom.nets.pair import PairNet, Talk, other, part
 from motionloom.nets.pair_block import PairBlock
 from motionloom.train.duets import KEEN, NEAR, Duets, Sight
-from motionloom.train.pair import BEGUN, Drawn, PairGuess, Parts, Settings, held_out, told, train_pair
+from motionloom.train.objectives import WEIGHTS
+from motionloom.train.pair import BEGUN, Drawn, PairGuess, Parts, Settings, _over_rows, held_out, told, train_pair
 from tests.data.test_pairs import write_pair
 from tests.metrics import people
 from tests.nets import tiny
@@ -101,6 +103,24 @@ def test_half_of_the_windows_are_of_mirrored_pairs_and_half_have_the_people_exch
                     np.testing.assert_allclose(stands[0, 2:], root, atol=1e-4)  # the stands went with the people
     assert found.sum() == 60
     assert found.min() > 6
+
+
+def test_recordings_are_drawn_by_the_root_of_their_length_and_windows_begin_anywhere_in_them():
+    short, long = pair("short", captions=("a",), seconds=1.0), pair("long", captions=("b",), seconds=4.0)
+    duets, window = Duets([short, long], mirror=False), short.frames - 3  # features have a frame less
+    crops = duets.draw(np.random.default_rng(0), window, 1500)
+    expected = np.sqrt(long.frames - 1) / (np.sqrt(long.frames - 1) + np.sqrt(short.frames - 1))
+    assert np.mean([duets.texts[n] == "b" for n in crops.texts]) == pytest.approx(expected, abs=0.05)
+    assert (crops.lengths == window).all()
+    some = crops.stands[torch.from_numpy(crops.texts == duets.texts.index("a"))].sort(dim=1).values
+    assert len(some.unique(dim=0)) == 3
+
+
+def test_windows_are_as_long_as_often_as_the_recipe_says():
+    made = objective(windows=[20, 32], shares=[3.0, 1.0])
+    found = [made.drawn(5, step, 1).clean.shape[1] - 1 for step in range(80)]
+    assert set(found) == {20, 32}
+    assert np.mean([one == 20 for one in found]) == pytest.approx(0.75, abs=0.13)
 
 
 def test_what_is_said_goes_with_the_window_mirrored_where_it_is():
@@ -231,6 +251,22 @@ def test_what_they_see_of_each_other_is_that_of_the_world_and_counts_by_how_litt
     with torch.no_grad():
         far, near_clean = (float(made.parts(guess, one).sight) for one in (high, low))
     assert far == pytest.approx(faint * near_clean, rel=0.02)
+
+
+def test_a_mean_is_over_rows_that_have_something_to_guess():
+    error = torch.tensor([[1.0, 3.0], [9.0, 9.0], [5.0, 9.0]])
+    free = torch.tensor([[True, True], [False, False], [True, False]])
+    assert float(_over_rows(error, free)) == 3.5  # of 2 and 5
+    assert float(_over_rows(error, torch.zeros_like(free))) == 0
+
+
+def test_the_numbers_of_a_frame_count_as_in_training_one_person():
+    scale = objective().scale
+    for name, block in LAYOUT.items():
+        torch.testing.assert_close(
+            scale[block], (scale[0] * WEIGHTS[name] / WEIGHTS["yaw_velocity"]).expand(len(scale[block]))
+        )
+    assert len(set(WEIGHTS.values())) > 1
 
 
 def test_parts_of_the_loss_have_their_weights():
