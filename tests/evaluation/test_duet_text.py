@@ -35,6 +35,16 @@ def made_at(apart: float, asked: list[tuple[str, int, int]] | None = None) -> du
     return make
 
 
+def drawn_apart(caption: str, count: int, seed: int) -> list:
+    """Partners who come and go together, every duet in another rhythm."""
+    made = []
+    for number in range(count):
+        people = partners(1.0, 6.0, 0.0)
+        way = np.sin(np.arange(people.shape[1]) / (4 + 3 * number + seed))[:, None, None] * np.array([0.2, 0.0, 0.0])
+        made.append(cast(Any, (Person(people[0] + way), Person(people[1] + way))))
+    return made
+
+
 def test_partners_are_within_the_spread_and_people_far_apart_are_not() -> None:
     asked: list[tuple[str, int, int]] = []
     found = duet_text.measure(RECORDED, made_at(1.0, asked), made_at(4.0), TEXT_HOW, table=TABLE)
@@ -51,7 +61,10 @@ def test_partners_are_within_the_spread_and_people_far_apart_are_not() -> None:
     assert ours.values["ratio_distance"].mean < 1.5 < far.values["ratio_distance"].mean
     assert ours.values["looking_away"].mean == pytest.approx(0, abs=1e-4)
     assert any("ours: within 1.5 times" in note for note in found.notes)
-    assert any(f"under {duet_text.DEEP:g} cm" in note for note in found.notes)
+    assert "ours: mean penetration 0.00 cm, under 3 cm." in found.notes
+    strangers = duet_text.measure(RECORDED, drawn_apart, None, TEXT_HOW, table=TABLE, kinds=("our-strangers",))
+    assert [row.name for row in strangers.rows] == ["ours, partners shuffled"]
+    assert strangers.rows[0].values["synchrony"].mean < 0.9 < ours.values["synchrony"].mean
 
 
 def test_the_ratio_of_the_distance_in_closed_form() -> None:
@@ -61,6 +74,71 @@ def test_the_ratio_of_the_distance_in_closed_form() -> None:
     spread = np.mean([np.mean([abs(one - o) for k, o in enumerate(real) if k != n]) for n, one in enumerate(real)])
     away = np.mean([1.3 - one for one in real])
     assert found.rows[0].values["ratio_distance"].mean == pytest.approx(away / spread, rel=2e-2)
+
+
+def test_real_pairs_held_out_are_beside_the_others_and_strangers_are_of_other_recordings(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The one at 1.05 m from those at 0.9, 1.0 and 1.1; three windows of each recording."""
+    shifts, shuffled = [], duet_text.groups.shuffled
+
+    def watched(clips: Any, shift: int = 1, placed: bool = True) -> Any:
+        shifts.extend([shift] if placed else [])
+        return shuffled(clips, shift=shift, placed=placed)
+
+    monkeypatch.setattr(duet_text.groups, "shuffled", watched)
+    kinds = ("held-out", "strangers")
+    found = duet_text.measure(RECORDED, made_at(1.0), None, TEXT_HOW, table=TABLE, kinds=kinds)
+    away = np.mean([0.15, 0.05, 0.05])
+    spread = np.mean([np.mean([0.1, 0.2]), np.mean([0.1, 0.1]), np.mean([0.2, 0.1])])
+    assert found.rows[0].values["ratio_distance"].mean == pytest.approx(away / spread, rel=2e-2)
+    assert shifts == [3]
+    assert [row.name for row in found.rows] == ["real, held-out pairs", "real, partners shuffled"]
+    nobody = [replace(pair, split="train") for pair in RECORDED]
+    found = duet_text.measure(nobody, made_at(1.0), None, TEXT_HOW, table=TABLE, kinds=kinds)
+    assert [row.name for row in found.rows] == ["real, partners shuffled"]
+    assert found.protocol["real windows"] == 12
+
+
+def test_the_columns_have_their_units() -> None:
+    """Two side by side who slide forward at 1 m/s, looking ahead, the feet on the floor, 10 cm apart."""
+    people = couple(6.0, apart=0.1, speed=0.0)[:, :60]
+    people = people + np.arange(60)[:, None, None] / FPS * np.array([0.0, 0.0, 1.0])
+    values = {name: value.mean for name, value in duet_text._row("x", [people, people], None).values.items()}
+    assert values["distance"] == pytest.approx(0.1)
+    assert values["looking_away"] == pytest.approx(90)
+    assert (values["skate_share"], values["skate_speed"]) == pytest.approx((100, 100), abs=2)
+    assert values["skate_slide"] == pytest.approx(50, abs=1)
+    assert 1 < values["penetration"] < 100
+    assert values["touch"] == 1
+    swing = 0.3 * np.sin(np.arange(60) / 5)[:, None, None] * np.array([0.0, 0.0, 1.0])
+    against = couple(6.0, speed=0.0)[:, :60] + np.stack([swing, -swing])
+    assert duet_text._row("x", [against], None).values["synchrony"].mean == pytest.approx(1)
+
+
+def test_duets_are_made_for_captions_of_train_pairs_each_with_seeds_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    pairs = [*RECORDED, pair_of(partners(1.0), "other", "test", ["two people fight"])]
+    assert duet_text.text_table(pairs).captions == ("two people dance", "a couple dances")
+    assert duet_text.turns(("a", "b"), duet_text.How(duets=5, seed=2)) == [("a", 3, 4), ("b", 2, 5)]
+    times = iter([3.0, 13.0])
+    monkeypatch.setattr(duet_text.time, "perf_counter", lambda: next(times))
+    found = duet_text.measure(RECORDED, made_at(1.0), None, TEXT_HOW, table=TABLE, kinds=("ours",))
+    assert [row.name for row in found.rows] == ["ours"]
+    assert found.rows[0].values["seconds"].mean == 2.0
+    assert found.rows[0].values["within"].mean == np.mean(
+        [found.rows[0].values[f"ratio_{name}"].mean <= 1.5 for name in duet_text.groups.JUDGED]
+    )
+
+
+def test_beginnings_are_of_random_train_windows() -> None:
+    def apart(how: duet_text.How, seed: int) -> list[float]:
+        return [
+            round(float(np.hypot(*(two[1] - two[0])[2:])), 3) for two in duet_text.beginnings(RECORDED, how)(40, seed)
+        ]
+
+    assert set(apart(TEXT_HOW, 0)) == {0.9, 1.0, 1.1}
+    assert apart(TEXT_HOW, 0) == apart(TEXT_HOW, 0)
+    assert apart(TEXT_HOW, 0) != apart(TEXT_HOW, 1) != apart(replace(TEXT_HOW, seed=1), 1)
 
 
 def test_duets_that_cannot_be_compared_are_told() -> None:

@@ -19,7 +19,7 @@ from motionloom.nets.pair import PairNet, Talk, other, part
 from motionloom.nets.pair_block import PairBlock
 from motionloom.train.duets import KEEN, NEAR, Duets, Sight
 from motionloom.train.objectives import WEIGHTS
-from motionloom.train.pair import BEGUN, Drawn, PairGuess, Parts, Settings, _over_rows, held_out, told, train_pair
+from motionloom.train.pair import BEGUN, Drawn, Held, PairGuess, Parts, Settings, _over_rows, held_out, told, train_pair
 from tests.data.test_pairs import write_pair
 from tests.metrics import people
 from tests.nets import tiny
@@ -267,6 +267,43 @@ def test_the_numbers_of_a_frame_count_as_in_training_one_person():
             scale[block], (scale[0] * WEIGHTS[name] / WEIGHTS["yaw_velocity"]).expand(len(scale[block]))
         )
     assert len(set(WEIGHTS.values())) > 1
+
+
+def test_being_wrong_by_one_everywhere_costs_one_however_much_is_given():
+    made = objective(settings=Settings(prefix=0.5, react=0.5))
+    drawn = made.drawn(3, 4, 8)
+    assert made.parts(drawn.clean, drawn).displacement < 1e-9
+    parts = made.parts(drawn.clean + 1.0, drawn)
+    assert float(parts.motion) == pytest.approx(1.0, abs=1e-4)
+    assert float(parts.place) == pytest.approx(1.0, abs=1e-4)
+    assert parts.displacement > 0.1
+
+
+def test_windows_near_the_end_are_shorter_and_held_out_ones_are_spread_over_pairs_for_validation():
+    duets = Duets([pair()], mirror=False)
+    crops = duets.crops(np.array([0, 0]), np.array([3, 50]), 20)
+    assert crops.lengths.tolist() == [20, pair().frames - 1 - 50]
+    assert not crops.features[1, :, int(crops.lengths[1]) :].any()
+    made = objective()
+    assert held_out(made, [pair(split="test")]) is None
+    held = held_out(made, [pair("c", "val", seconds=6.0), pair("t", "test")])
+    assert held is not None
+    assert held.drawn.clean.shape[:2] == (24, 81)
+    assert len(held.drawn.clean[::2, 40].unique(dim=0)) == 12
+
+
+def test_partners_held_out_are_off_by_metres_where_nothing_is_given(monkeypatch):
+    """Who is told sees the other 0.6 m beside where he is, who is not 0.3 m."""
+    made = objective(settings=Settings(prefix=0.0, react=1.0))
+    drawn = made.drawn(3, 4, 3)
+    drawn = drawn._replace(lengths=torch.full_like(drawn.lengths, drawn.clean.shape[1] - 1))
+    given = drawn.given[:, 1]
+    assert given.sum() == 3
+    drawn.given[given, 1:] = True
+    wrong = drawn.clean.clone()
+    wrong[:, 0, 2] += torch.where(given, 0.6, 0.3) / made.net.talk.config.places.ground
+    monkeypatch.setattr(made, "guess", lambda net, drawn: wrong)
+    assert Held(made, drawn).report(made.net).root == pytest.approx(0.3, abs=1e-3)
 
 
 def test_parts_of_the_loss_have_their_weights():
