@@ -29,6 +29,8 @@ SHOWN = 60
 """Frames behind a knot that the block is shown, at most."""
 LEAST = 20
 """Frames behind a knot, at least."""
+SURE = 40
+"""Frames behind a past of both that stay as they are: their momentum tells more than the block does."""
 
 
 Lead: TypeAlias = Callable[[Tensor, Tensor, int], Tensor]
@@ -57,7 +59,8 @@ def leader(
     known = mask[:, 1:, :3].all(dim=-1)
     both = known.unflatten(0, (-1, 2)).all(dim=1)
     given = [kept or bool(row.all()) for kept, row in zip(still, known, strict=True)]
-    places = Places.of(seeds, known.shape[1], both.cumprod(dim=1).sum(dim=1).tolist(), given)
+    past = both.cumprod(dim=1).sum(dim=1).tolist()
+    places = Places.of(seeds, known.shape[1], [count + SURE if count else 0 for count in past], given)
 
     def lead(state: Tensor, guess: Tensor, level: int) -> Tensor:
         made = places.led(prior, net, bound, state=state, guess=guess, level=level, weight=weight)
@@ -81,8 +84,8 @@ class Places:
 
     @staticmethod
     def of(seeds: Sequence[int], frames: int, begins: Sequence[int], given: Sequence[bool]) -> "Places":
-        """seeds, given: one per row, whether that person is not moved; begins: one per pair, the last frame in which
-        both are known, 0 where nothing is."""
+        """seeds, given: one per row, whether that person is not moved; begins: one per pair, the last frame that
+        stays as it is."""
         knots = tuple(_knots(begin, frames) for begin in begins)
         spread = tuple(_spread([begin, *some], frames) for some, begin in zip(knots, begins, strict=True))
         free = 1.0 - torch.tensor([float(one) for one in given]).view(-1, 2)
@@ -159,8 +162,7 @@ def _lacking(now: Tensor, asked: Tensor) -> Tensor:
     turn = two.seen(two.seen(first, second), there)
     angle = torch.atan2(turn[:, 1], turn[:, 0])
     first, second = _turned(first, -angle / 2), _turned(second, angle / 2)
-    back = two.seen(asked[:, 1], asked[:, 0])
-    line = (two.compose(first, there)[:, 2:] - first[:, 2:] - two.compose(second, back)[:, 2:] + second[:, 2:]) / 2
+    line = two.compose(first, there)[:, 2:] - first[:, 2:]
     return torch.cat([angle[:, None], line - (second - first)[:, 2:]], dim=1)
 
 
