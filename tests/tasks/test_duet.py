@@ -291,3 +291,9 @@ def test_nothing_is_composed_of_nothing(prior: Prior, block: PairBlock) -> None:
     for segments, message in (([], "no segment"), ([Segment("a :: b :: c", 2)], "around one ::")):
         with pytest.raises(MotionloomError, match=message):
             list(compose_pair(prior, block, segments))
+
+
+@pytest.mark.parametrize("share", [-0.1, 8, float("nan")])
+def test_nobody_is_kept_together_by_more_than_wholly(prior: Prior, block: PairBlock, share: float) -> None:
+    with pytest.raises(MotionloomError, match="kept together by 0"):
+        list(compose_pair(prior, block, SEGMENTS, together=share))

@@ -267,6 +267,7 @@ def test_whose_guesses_are_changed_is_still_unless_said_otherwise(
         assert [(one[:, 1:] == 7.0).all((1, 2)).tolist() for one in shown] == [[False] * 16, [True, False]]
     with pytest.raises(MotionloomError):
         pair_features(prior, block.net(prior), SAID * 9, FRAMES, **how | {"still": [False]})
+    monkeypatch.undo()
     with pytest.raises(MotionloomError, match="kept together"):
         pair_features(prior, block.net(prior), SAID * 9, FRAMES, **how | {"together": 1.5})
 

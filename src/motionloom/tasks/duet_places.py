@@ -1,4 +1,4 @@
-"""Two people stay together: while they are drawn, where they stand to each other is asked again, second by second.
+"""Two people stay together: while they are drawn, where they stand to each other is asked again and again.
 
 Features tell velocities, so small errors of a guess add up, and two people who began as partners drift apart. A block
 knows better: it guesses where two people stand to each other at the first frame of whatever it is shown, and it learned
@@ -17,6 +17,7 @@ from torch.nn import functional as F
 
 from motionloom.checkpoint import Prior
 from motionloom.diffusion import row_draw
+from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
 from motionloom.nets.pair import PLACE, PairNet, join, part
@@ -51,8 +52,10 @@ def leader(
 
     bound, seeds: of each row; mask (rows, 1 + frames, 263): True where a state is known; it stays. Whose frames are all
     known, or who is to be ``still``, is not led; then the other goes all of the way. weight: share of the way, 0 to
-    1. Codes of the kind world are left alone: they tell where crops stand in a file, as published.
+    1, else MotionloomError. Codes of the kind world are left alone: they tell where crops stand in a file (published).
     """
+    if not 0 <= weight <= 1:
+        raise MotionloomError(f"two people are kept together by 0 (not at all) to 1; got {weight:g}")
     silent = not any(bool(value.any()) for value in net.talk.place.parameters())
     if not weight or silent or net.talk.config.places.kind != "mutual":
         return lambda state, guess, level: guess

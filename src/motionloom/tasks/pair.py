@@ -104,8 +104,6 @@ def pair_features(
             f"two people need two prompts and seeds a pair; got {rows} prompts and {len(seeds)} seeds"
         )
     check(prior, [], steps=steps, guidance=guidance, solver=SOLVER)
-    if not 0 <= together <= 1:
-        raise MotionloomError(f"two people are kept together by 0 (not at all) to 1; got {together:g}")
     shape = (rows, 1 + frames, len(prior.mean))
     data = torch.zeros(shape) if known is None else known.expand(shape)
     here = torch.zeros(shape, dtype=torch.bool) if mask is None else mask.expand(shape)
