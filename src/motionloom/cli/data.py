@@ -16,7 +16,11 @@ def add(subparsers) -> None:
     build.add_argument("--captions", type=Path, help="humanml3d.jsonl(.gz) with captions for a CMU download")
     build.add_argument("--workers", type=int, default=2, help="processes (default 2)")
     build.add_argument(
-        "--mixed", type=int, default=300, help="clips with one take's arms on another's walk (default 300)"
+        "--mixed",
+        type=int,
+        default=700,
+        help="clips of each kind made from others: arms of one on another's walk, two actions in a row, gestures "
+        "(default 700)",
     )
     build.set_defaults(run=_build)
 

@@ -70,3 +70,59 @@ def wear_arms(body: Array, arms: Array) -> Array:
     hang = arms[:, UPPER] - arms[:, 9:10]
     body[:, UPPER] = body[:, 9:10] + rot.rotate(quaternion[:, None], hang)
     return body
+
+
+def can_hold(positions: Array, fps: float, *, end: bool, fastest: float = 0.45) -> bool:
+    """True where the first (``end``: last) pose of (frames, 22, 3) could be held: slow, and not in the air.
+
+    ``fastest``: m/s that the joints may move on average; the pelvis three quarters of that.
+    """
+    few = positions[-6:] if end else positions[:6]
+    moved = np.linalg.norm(ph.velocity(few, fps), axis=-1)
+    lowest = positions[..., 1].min()
+    return bool(moved.mean() < fastest and moved[:, 0].mean() < 0.75 * fastest and few[..., 1].min() < lowest + 0.12)
+
+
+def held(positions: Array, before: int, after: int, *, fps: float, seed: int) -> Array:
+    """The first pose held for ``before`` frames and the last for ``after``, alive: (frames, 22, 3) to a longer one.
+
+    People who stand sway by about a centimetre at the head and hardly at the feet (Winter 1995, quiet stance); what is
+    on the floor stays. The speed at the ends runs out within a third of a second instead of stopping dead.
+    """
+    rng = np.random.default_rng(seed)
+    tail = _pause(positions[-1], positions[-1] - positions[-2], after, fps, rng)
+    head = _pause(positions[0], positions[0] - positions[1], before, fps, rng)[::-1]
+    return np.concatenate([head, positions, tail])
+
+
+def _pause(pose: Array, step: Array, frames: int, fps: float, rng: np.random.Generator) -> Array:
+    """A pose (22, 3) that is held for some frames: it runs out of its last ``step`` (22, 3) and sways."""
+    time = np.arange(1, frames + 1) / fps
+    high = np.clip((pose[:, 1] - 0.08) / 1.4, 0, 1)
+    run_out = 0.1 * (1 - np.exp(-time / 0.1))[:, None, None] * (step * fps)[None] * (high > 0)[:, None]
+    starts = np.minimum(time / 1.0, 1.0)[:, None]
+    periods, phases = rng.uniform(1.8, 6.0, (2, 5, 3)), rng.uniform(0, 2 * np.pi, (2, 5, 3))
+    waves = np.sin(2 * np.pi * time[:, None, None, None] / periods + phases) - np.sin(phases)
+    body, arms = (waves[:, i].mean(1) * [1, 0.2, 1] * starts for i in (0, 1))
+    loose = np.zeros(len(pose))
+    loose[[18, 19]], loose[[20, 21]] = 0.4, 1.0
+    sway = 0.014 * high[:, None] * body[:, None] + 0.012 * (loose * (high > 0.2))[:, None] * arms[:, None]
+    return pose + run_out + sway
+
+
+def joined(first: Array, second: Array, *, blend: int = 10, limit: float = 0.16) -> Array | None:
+    """``second`` (frames, 22, 3) behind ``first``, turned and moved to where it ended; None where the poses differ.
+
+    The difference of the two poses fades within ``blend`` frames; ``limit``: metres rms that they may differ by.
+    """
+    turn = float(ph.heading(first)[-1] - ph.heading(second)[0])
+    half = np.array([np.cos(turn / 2), 0, np.sin(turn / 2), 0])
+    moved = rot.rotate(half, second - second[0, 0] * [1, 0, 1]) + first[-1, 0] * [1, 0, 1]
+    gap = first[-1] - moved[0]
+    if np.sqrt((gap**2).sum(-1).mean()) > limit or np.linalg.norm(gap[[7, 8, 10, 11]], axis=-1).max() > 1.6 * limit:
+        return None
+    fade = np.zeros(len(moved))
+    count = min(blend, len(moved) - 1)
+    amount = np.linspace(1, 0, count + 2)[1:-1]
+    fade[: len(amount)] = amount**3 * (10 - 15 * amount + 6 * amount**2)
+    return np.concatenate([first, moved + fade[:, None, None] * gap])

@@ -19,9 +19,11 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
 from motionloom.data import augment
-from motionloom.data.sources import Take, find_takes
+from motionloom.data.actions import ACTIONS, PREFIX, Action, action_of, core, sentences, side_of
+from motionloom.data.made import GESTURES, hands_up, lower_arms, perform, words_for
+from motionloom.data.sources import Span, Take, find_takes
 from motionloom.data.windows import label_clip
-from motionloom.data.words import LABELS, mirror_text
+from motionloom.data.words import LABELS, mirror_text, sentence
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
@@ -29,14 +31,23 @@ from motionloom.io.atomic import atomic_path
 from motionloom.metrics.physics import Array
 from motionloom.skeleton import SMPL22
 
+_DERIVED = re.compile(r"M?(mixed|joined|made)_\d")
 _NAME = re.compile(r"\w[\w.+ -]{0,120}")
 SHORTEST = 20
 LOOPED = 200
 BENDS = (0.35, 0.75, 1.0)
 """Radians per second: a wide turn, and circles in 8.4 and 6.3 seconds."""
 _MIRROR = list(SMPL22.mirror_pairs())
+LONG = 60
+"""Frames from which on the part of a described change that matters is looked for."""
+POSTURES = ("sit down", "stand up", "sit down and stand up", "lie down", "get up", "kneel", "crouch", "bow", "fall")
+"""Actions that end (and begin) in a posture which people keep, though many a recording is cut a moment before."""
+SEATED = ("sit down", "stand up", "sit down and stand up")
+THEN, MADE = "then", "made "
+"""Groups of notes besides those of `data.actions`: one action and then another; gestures of `data.made`."""
 STATES = ("walk", "walk slow", "walk fast", "jog", "run", "walk backward", "jog backward", "stand", "dance",
-           "circle left", "circle right", "run circle", "balance", "sidestep left", "sidestep right")  # fmt: skip
+           "circle left", "circle right", "run circle", "balance", "sidestep left", "sidestep right",
+          "sit")  # fmt: skip
 """Labels that stay true however long a window of them is: neighbouring windows join."""
 
 
@@ -47,9 +58,11 @@ class Note:
     first: int
     last: int
     kind: str
-    """``human``, ``index``, or the measured label."""
+    """``human``, ``index``, ``action:`` and a name of `data.actions`, or the measured label."""
     texts: tuple[str, ...] = ()
     """Sentences or verb phrases; empty for measured labels, whose wordings stand in `data.words`."""
+    core: tuple[int, int] | None = None
+    """Frames (first, end) of the clip that a training window must hold whole; None: any part shows what is said."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +74,13 @@ class Clip:
     licence: str
     split: str
     way: str
-    """``plain``, ``looped``, ``bent``, ``reversed`` or ``mixed``; mirrored copies begin with M in their name."""
+    """``plain``, ``looped``, ``bent``, ``reversed``, ``held``, ``joined``, ``made`` or ``mixed``; mirrored copies begin
+    with M in their name."""
     notes: tuple[Note, ...]
     features: np.ndarray
     """(frames, 263) float32, not standardised."""
+    kind: str = "capture"
+    """``capture``, ``keyed`` (animated by hand) or ``made`` (arms moved by rule on a recorded body)."""
 
 
 def at_origin(positions: Array) -> Array:
@@ -86,6 +102,8 @@ def clips_of(take: Take) -> Iterator[Clip]:
     yield from _with_mirror(clip)
     if take.split == "train":
         yield from _more(take, clip, positions)
+        for number, longer in enumerate(lengthened(take, clip, positions)):
+            yield from _with_mirror(replace(longer, name=f"{longer.name}{number}"))
 
 
 def _more(take: Take, clip: Clip, positions: Array) -> Iterator[Clip]:
@@ -115,11 +133,177 @@ def _clip(take: Take, features: np.ndarray, way: str, *, spans: bool = True) -> 
         first, last = round(span.start_s * FPS), min(round(min(span.end_s, 1e6) * FPS), len(features))
         if last - first >= SHORTEST and span.texts:
             notes.append(Note(first, last, span.kind, span.texts))
+            notes += _action_notes(span, features, first, last)
     said = " | ".join(text for span in take.spans for text in span.texts)
     found = label_clip(hml.decode_positions(features.astype(np.float64)), FPS, said)
     notes += [Note(a, b, label) for a, b, label in join_spans(found)]
     suffix = "" if way == "plain" else f"_{way}"
-    return Clip(take.name + suffix, take.source, take.licence, take.split, way, tuple(notes), features)
+    return Clip(take.name + suffix, take.source, take.licence, take.split, way, tuple(notes), features, take.kind)
+
+
+def _action_notes(span: Span, features: np.ndarray, first: int, last: int) -> list[Note]:
+    """The note of the action that a described stretch names, if it names one."""
+    action = action_of(span.texts)
+    texts = sentences(action, span.texts) if action else ()
+    if action is None or not texts or last - first < SHORTEST:
+        return []
+    kept = None
+    if action.kind in ("change", "once"):
+        kept = (first, last)
+        if last - first > LONG:
+            begin, end = core(hml.decode_positions(features[first:last].astype(np.float64)), FPS)
+            kept = (first + begin, first + end)
+    written = span.texts if span.kind == "human" else ()
+    if action.name in SEATED and written and hands_up(hml.decode_positions(features[first:last].astype(np.float64))):
+        texts = ()  # people take a seat with their hands down: `lengthened` makes that
+    return [Note(first, last, PREFIX + action.name, (*written, *texts), kept)]
+
+
+def lengthened(take: Take, clip: Clip, positions: Array) -> Iterator[Clip]:
+    """Short examples of an action at the lengths that are asked for: cycles go on, ends that can be held are held."""
+    seed = int.from_bytes(take.name.encode(), "little") % 2**32
+    for number, note in enumerate(n for n in clip.notes if n.kind.startswith(PREFIX)):
+        action, frames = ACTIONS[note.kind.removeprefix(PREFIX)], note.last - note.first
+        if frames > LOOPED - 40:
+            continue
+        if action.kind == "cycle" and frames < 160:
+            longer = augment.loop(clip.features[note.first : note.last], LOOPED, limit=0.12)
+            if longer is not None:
+                yield _derived(clip, longer, "looped", (replace(note, first=0, last=len(longer), core=None),))
+                continue
+        first, last = note.core or (note.first, note.last)
+        cut = positions[first : last + 1]
+        for reverse in (False, True)[: 1 + bool(action.reverse)]:
+            shown = augment.reversed_in_time(cut) if reverse else cut
+            texts = sentences(ACTIONS[action.reverse]) if reverse else note.texts
+            name = action.reverse if reverse else action.name
+            if name in SEATED and hands_up(shown):
+                lowered, said = lower_arms(shown), sentences(ACTIONS[name])
+                yield from _held(clip, lowered, PREFIX + name, said, seed=seed + 2 * number + reverse + 7)
+                if reverse:
+                    continue
+            yield from _held(clip, shown, PREFIX + name, texts, seed=seed + 2 * number + reverse)
+
+
+def _held(clip: Clip, shown: Array, kind: str, texts: tuple[str, ...], *, seed: int) -> Iterator[Clip]:
+    posture = kind.removeprefix(PREFIX) in POSTURES
+    fastest = 1.2 if posture else 0.45
+    start, end = (augment.can_hold(shown, FPS, end=at_end, fastest=fastest) for at_end in (False, True))
+    if not (start or end) or len(shown) < SHORTEST:
+        return
+    rng = np.random.default_rng(seed)
+    room = max(150 - len(shown), 30)
+    before = int(rng.integers(8, min(55, room))) if start else 0
+    after = max(room - before, 25) if end else 0
+    longer = augment.held(shown, before, after, fps=FPS, seed=seed)
+    features = hml.encode(at_origin(hml.uniform(longer)), heading="corrected")
+    whole = (max(before - 3, 0), min(before + len(shown) + 2, len(features)))
+    yield _derived(clip, features, "held", (Note(0, len(features), kind, texts, whole),))
+
+
+def _derived(clip: Clip, features: np.ndarray, way: str, notes: tuple[Note, ...]) -> Clip:
+    return replace(clip, name=f"{clip.name}_{way}", way=way, notes=notes, features=features.astype(np.float32))
+
+
+def laid_down(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
+    """From standing to lying, out of a crouch and of lying down from one, and the same film backwards: getting up."""
+    parts = {
+        name: [
+            (c, n)
+            for c in clips
+            for n in c.notes
+            if n.kind == PREFIX + name and c.way == "plain" and c.split == "train"
+        ]
+        for name in ("crouch", "lie down")
+    }
+    rng, made = np.random.default_rng(seed), 0
+    pairs = [(a, b) for a in parts["crouch"] for b in parts["lie down"]]
+    for number in rng.permutation(len(pairs)):
+        if made >= count:
+            return
+        first, second = (_core_positions(clip, note, rng) for clip, note in pairs[number])
+        first = first[: int(first[:, 0, 1].argmin()) + 1]
+        both = augment.joined(first, second, blend=14, limit=0.3)
+        if both is None or not 30 <= len(both) <= 180:
+            continue
+        clip = pairs[number][1][0]
+        for name, shown in (("lie down", both), ("get up", augment.reversed_in_time(both))):
+            texts = sentences(ACTIONS[name])
+            for longer in _held(clip, shown, PREFIX + name, texts, seed=seed * 100_003 + int(number)):
+                yield replace(longer, name=f"joined_{seed}_{name.replace(' ', '_')}{made}", way="joined")
+        made += 1
+
+
+def joined_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
+    """One action and then another, where the poses in between agree; training clips of one licence."""
+    rng = np.random.default_rng(seed)
+    pool: dict[str, list[tuple[Clip, Note]]] = {}
+    for clip in clips:
+        for note in clip.notes:
+            if note.kind.startswith(PREFIX) and clip.split == "train" and clip.way in ("plain", "held"):
+                pool.setdefault(note.kind.removeprefix(PREFIX), []).append((clip, note))
+    names, made = sorted(pool), 0
+    for number in range(60 * count if names else 0):
+        if made == count:
+            return
+        pair = [ACTIONS[names[i]] for i in rng.integers(len(names), size=2)]
+        if pair[0] is pair[1] or not all(action.says for action in pair):
+            continue
+        picked = [pool[action.name][rng.integers(len(pool[action.name]))] for action in pair]
+        parts = [_core_positions(clip, note, rng) for clip, note in picked]
+        both = augment.joined(*parts)
+        if both is None or not 40 <= len(both) <= 180:
+            continue
+        said = [_phrases(action, note) for action, (_, note) in zip(pair, picked)]
+        texts = tuple(
+            sentence(f"{a} {link} {b}", rng)
+            for link in ("and then", "and", "then") for a, b in [(rng.choice(said[0]), rng.choice(said[1]))]
+        )  # fmt: skip
+        name = f"joined_{seed}_{made:04d}"
+        keyed = "keyed" if any(clip.kind == "keyed" for clip, _ in picked) else "capture"
+        base = Clip(
+            name, picked[0][0].source, picked[0][0].licence, "train", "joined", (), picked[0][0].features, keyed
+        )
+        for clip in _held(base, both, PREFIX + THEN, texts, seed=seed * 100_003 + number):
+            made += 1
+            yield replace(clip, name=name, way="joined")
+
+
+def _phrases(action: Action, note: Note) -> list[str]:
+    side = side_of(note.texts)
+    return [*action.says, *(phrase.format(side=side) for phrase in action.sided if side)]
+
+
+def _core_positions(clip: Clip, note: Note, rng: np.random.Generator) -> Array:
+    first, last = note.core or (note.first, note.last)
+    if note.core is None and last - first > 70:
+        first += int(rng.integers(last - first - 60))
+        last = first + 60
+    return hml.decode_positions(clip.features[first:last].astype(np.float64))
+
+
+def made_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
+    """Gestures of the arms (`data.made`) on people who stand, sit or walk; training clips of one licence."""
+    rng = np.random.default_rng(seed)
+    bodies = _labelled(clips, ("stand", "walk", "sit"))
+    leads = {"stand": "", "walk": "walks", "sit": "sits"}
+    for number in range(count if bodies.get("stand") else 0):
+        gesture = GESTURES[sorted(GESTURES)[number % len(GESTURES)]]
+        where = str(rng.choice([k for k in ("stand", "stand", "stand", "walk", "sit") if k in bodies]))
+        below, note = bodies[where][rng.integers(len(bodies[where]))]
+        length = min(note.last - note.first, int(rng.integers(70, 160)))
+        first = note.first + int(rng.integers(note.last - note.first - length + 1))
+        side = str(rng.choice(["left", "right"]))
+        body = hml.decode_positions(below.features[first : first + length].astype(np.float64))
+        positions = perform(body, gesture, side, fps=FPS, rng=rng)
+        features = hml.encode(positions, heading="corrected")
+        texts = words_for(gesture, side, leads[where], rng)
+        if texts:
+            group = PREFIX + MADE + gesture.name
+            notes = (Note(0, len(features), group, texts, (0, min(30, len(features)))),)
+            yield Clip(
+                f"made_{seed}_{number:04d}", below.source, below.licence, "train", "made", notes, features, "made"
+            )
 
 
 def join_spans(spans: Sequence[tuple[int, int, str]]) -> list[tuple[int, int, str]]:
@@ -202,7 +386,10 @@ def read_clip(path: Path) -> Clip:
         with safe_open(path, framework="numpy") as file:
             about = json.loads(file.metadata()["clip"])
             features = file.get_tensor("features")
-        notes = tuple(Note(n["first"], n["last"], n["kind"], tuple(n["texts"])) for n in about.pop("notes"))
+        notes = tuple(
+            Note(n["first"], n["last"], n["kind"], tuple(n["texts"]), tuple(n["core"]) if n.get("core") else None)
+            for n in about.pop("notes")
+        )
         clip = Clip(**about, notes=notes, features=features)
         _check_clip(clip)
         return clip
@@ -226,7 +413,9 @@ def _check_clip(clip: Clip) -> None:
     for note in clip.notes:
         if not 0 <= note.first < note.last <= len(features):
             raise ValueError(f"a note spans frames {note.first} to {note.last} of {len(features)}")
-        written = note.kind in ("human", "index")
+        written = note.kind in ("human", "index") or note.kind.startswith(PREFIX)
+        if note.core and not note.first <= note.core[0] < note.core[1] <= note.last:
+            raise ValueError(f"what a window must hold, frames {note.core}, is not within {note.first} to {note.last}")
         if not all(isinstance(t, str) for t in note.texts) or (written and not note.texts):
             raise ValueError(f"a note of kind {note.kind} lacks its texts")
         if not written and not all(label in LABELS for label in note.kind.split("+", 1)):
@@ -262,7 +451,7 @@ def build(
     *,
     captions: Path | str | None = None,
     workers: int = 2,
-    mixed: int = 300,
+    mixed: int = 700,
     progress: Callable[[str], None] = print,
 ) -> Path:
     """Build a training set from folders of recordings; returns ``set.json``. Takes already done are kept."""
@@ -314,14 +503,19 @@ def _run(jobs: Sequence[Job], workers: int) -> Iterator[tuple[str, str]]:
 
 
 def _finish(out: Path, mixed: int, progress: Callable[[str], None]) -> Path:
-    clips = [
-        read_clip(path) for path in sorted((out / "clips").glob("*.safetensors")) if not path.name.startswith("mixed_")
-    ]
+    clips = [read_clip(path) for path in sorted((out / "clips").glob("*.safetensors")) if not _DERIVED.match(path.stem)]
+    frames = sum(len(clip.features) for clip in clips)
     for seed, licence in enumerate(sorted({clip.licence for clip in clips})):
-        for clip in mixed_clips([c for c in clips if c.licence == licence], mixed, seed):
-            write_clip(out / "clips", clip)
-            clips.append(clip)
-    for old in {p.stem for p in (out / "clips").glob("mixed_*.safetensors")} - {clip.name for clip in clips}:
+        same = [c for c in clips if c.licence == licence]
+        share = sum(len(clip.features) for clip in same) / frames
+        for derive in (mixed_clips, laid_down, joined_clips, made_clips):
+            for clip in derive(same, round(mixed * share), seed):
+                for both in _with_mirror(clip) if derive is not mixed_clips else (clip,):
+                    write_clip(out / "clips", both)
+                    clips.append(both)
+    for old in {p.stem for p in (out / "clips").glob("*.safetensors") if _DERIVED.match(p.stem)} - {
+        c.name for c in clips
+    }:
         (out / "clips" / f"{old}.safetensors").unlink()  # of a build that was asked for more of them
     if not clips:
         raise MotionloomError(f"no take could be used; the reasons stand in {out / 'done'}")

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from motionloom.data.actions import PREFIX
 from motionloom.data.build import STATES, Clip, Note, read_clip
 from motionloom.data.words import phrases, sentence
 from motionloom.errors import MotionloomError
@@ -17,20 +18,27 @@ from motionloom.features.layout import LAYOUT
 
 WORDINGS = 48
 """Sentences made per measured label."""
-SHARE = {"human": 0.35, "index": 0.12, "label": 0.53}
-"""How often a training sample shows a written caption, an index description, a measured label."""
+SHARE = {"action": 0.45, "human": 0.18, "index": 0.05, "label": 0.32}
+"""How often a training sample shows a named action, a written caption, an index description, a measured label."""
+WEIGHT = {"capture": 1.0, "made": 0.7, "keyed": 0.4}
+"""How often a stretch is drawn among those of its action: animated by hand it teaches what, not how."""
 
 FAVOUR: dict[str, float] = {
     **dict.fromkeys(("climb", "kick"), 4.0),
     **dict.fromkeys(("circle left", "jump"), 2.5),
-    **dict.fromkeys(("sit", "punch", "jog", "hop", "turn left", "turn right"), 1.5),
+    **dict.fromkeys(("sit down", "stand up", "punch", "jog", "hop", "turn left", "turn right"), 1.5),
+    **dict.fromkeys(("action:then",), 8.0),
+    **dict.fromkeys(("action:sit down", "action:stand up", "action:lie down", "action:get up", "action:crawl"), 1.5),
+    **dict.fromkeys(("action:stop walking", "action:stop running", "action:walk turn around", "action:pick up"), 1.5),
+    **dict.fromkeys(("action:kneel", "action:climb ladder", "action:push-up", "action:throw", "action:clap"), 1.3),
     **dict.fromkeys(("jog backward", "jumping jacks", "cartwheel", "kick ball"), 0.5),
 }
 """Labels drawn more often than the others: they came out last. A mixture of two labels is drawn 0.4 times as often."""
 
 EVENTS = {
     "kick": "kick", "kick ball": "kick", "punch": "punch|box", "jump": "jump|leap", "jump forward": "jump|leap",
-    "jump repeatedly": "jump|leap", "hop": r"\bhop", "climb": "climb|stairs|ladder", "wave": r"\bwav", "sit": r"\bsit",
+    "jump repeatedly": "jump|leap", "hop": r"\bhop", "climb": "climb|stairs|ladder", "wave": r"\bwav",
+    "sit down": r"\bsits? down|takes a seat|sitting down", "stand up": r"stands? up|gets? up|rises",
     "cartwheel": "cartwheel",
 }  # fmt: skip
 """Measured labels of something that happens at one moment, and how captions speak of it."""
@@ -46,11 +54,13 @@ class Item:
     """First frame in `MotionSet.features`."""
     frames: int
     group: str
-    """``human``, ``index`` or the measured label."""
+    """``human``, ``index``, ``action:NAME`` or the measured label."""
     texts: tuple[int, ...]
     """Numbers of its sentences in `MotionSet.texts`."""
-    whole: bool = False
-    """True where a part of it may not show what is said, such as a jump: it is never cropped."""
+    core: tuple[int, int] | None = None
+    """Frames of `MotionSet.features` (first, end) without which a window does not show what is said, such as a jump."""
+    weight: float = 1.0
+    """How often it is drawn among those of its group."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +111,7 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, 
     items, start = [], 0
     for clip in clips:
         for note in clip.notes:
-            if note.kind == "human":
+            if note.kind == "human" or note.kind.startswith(PREFIX):
                 said = tuple(_number(texts, t) for t in note.texts)
             elif note.kind == "index":
                 said = tuple(dict.fromkeys(_number(texts, sentence(p, rng)) for p in note.texts for _ in range(3)))
@@ -111,9 +121,10 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, 
                     wordings[note.kind] = tuple(_number(texts, t) for t in sorted(made))
                 said = wordings[note.kind]
             moments = _moments(clip, note)
-            whole = bool(moments) or _is_event(note)
             for first, last in ((note.first, note.last), *moments):
-                items.append(Item(start + first, last - first, note.kind, said, whole))
+                core = note.core or ((first, last) if moments or _is_event(note) else None)
+                kept = (start + core[0], start + core[1]) if core else None
+                items.append(Item(start + first, last - first, note.kind, said, kept, WEIGHT.get(clip.kind, 1.0)))
         start += len(clip.features)
     features = torch.from_numpy(np.concatenate([c.features for c in clips]))
     features = (features - torch.from_numpy(mean)) / torch.from_numpy(std)
@@ -125,7 +136,7 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, 
 
 
 def _is_event(note: Note) -> bool:
-    return note.kind not in ("human", "index", *STATES) and "+" not in note.kind
+    return note.kind not in ("human", "index", *STATES) and "+" not in note.kind and not note.kind.startswith(PREFIX)
 
 
 def _moments(clip: Clip, note: Note) -> list[tuple[int, int]]:
@@ -165,9 +176,9 @@ class Batches:
     """Draws batches; the draw of a step depends on the seed and the step alone, so that training resumes exactly.
 
     All rows of a batch share a window (one of ``windows`` frames, drawn by ``shares``); items shorter than the window
-    but at least 60 % of it are taken whole and padded. First the kind of text is drawn (`SHARE`), then for measured
-    labels the label, evenly over labels, then the item: rare actions are seen as often as walks. Stretches said to show
-    an event are never cropped.
+    but at least 60 % of it are taken whole and padded. First the kind of text is drawn (`SHARE`), then for actions and
+    measured labels the group, evenly over groups, then the item: rare actions are seen as often as walks. What an item
+    needs to show what is said of it (`Item.core`) is always within the window.
     """
 
     def __init__(
@@ -189,13 +200,21 @@ class Batches:
                     "give the recipe shorter windows"
                 )
 
-    def _pool(self, window: int) -> dict[str, dict[str, np.ndarray]]:
+    def _pool(self, window: int) -> dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
         fitting: dict[str, dict[str, list[int]]] = {}
         for number, item in enumerate(self.data.items):
-            kind = item.group if item.group in SHARE else "label"
-            if item.frames >= 0.6 * window and (not item.whole or item.frames <= 1.05 * window):
+            kind = item.group if item.group in SHARE else "action" if item.group.startswith(PREFIX) else "label"
+            if item.frames >= 0.6 * window and (item.core is None or item.core[1] - item.core[0] <= 1.05 * window):
                 fitting.setdefault(kind, {}).setdefault(item.group, []).append(number)
-        return {kind: {g: np.array(numbers) for g, numbers in groups.items()} for kind, groups in fitting.items()}
+        return {
+            kind: {g: (np.array(numbers), self._weights(numbers)) for g, numbers in groups.items()}
+            for kind, groups in fitting.items()
+        }
+
+    def _weights(self, numbers: list[int]) -> np.ndarray:
+        """How often each item of a group is drawn, as a cumulative share."""
+        total = np.cumsum([self.data.items[number].weight for number in numbers])
+        return total / total[-1]
 
     def draw(self, seed: int, step: int, rows: int) -> Batch:
         """The batch of one step."""
@@ -211,14 +230,22 @@ class Batches:
             groups = pools[kinds[kind]]
             names = list(groups)
             weights = np.array([self.favour.get(n, 0.4 if "+" in n else 1.0) for n in names])
-            numbers = groups[names[rng.choice(len(names), p=weights / weights.sum())]]
-            item = self.data.items[numbers[rng.integers(len(numbers))]]
+            numbers, shares = groups[names[rng.choice(len(names), p=weights / weights.sum())]]
+            item = self.data.items[numbers[np.searchsorted(shares, rng.random())]]
             length = min(item.frames, window)
-            start = item.start + int(rng.integers(item.frames - length + 1))
+            start = int(rng.integers(*_starts(item, length)))
             features[row, :length] = self.data.features[start : start + length]
             lengths.append(length)
             texts.append(item.texts[rng.integers(len(item.texts))])
         return Batch(features, torch.tensor(lengths), torch.tensor(texts))
+
+
+def _starts(item: Item, length: int) -> tuple[int, int]:
+    """Where a window of so many frames may begin, half-open: within the item, with its core inside."""
+    low, high = item.start, item.start + item.frames - length
+    if item.core:
+        low, high = max(low, min(item.core[1] - length, high)), min(high, max(item.core[0], low))
+    return low, max(low, high) + 1
 
 
 def summary(folder: Path | str) -> dict:

@@ -49,6 +49,8 @@ class Take:
     read: Callable[[], tuple[Array, float] | np.ndarray]
     """Joints of the uniform person (frames, 22, 3) in metres, the floor at y = 0, with their frame rate; or finished
     features (frames, 263)."""
+    kind: str = "capture"
+    """``capture`` or ``keyed``: animated by hand, which shows what is done but not how people move."""
 
 
 def find_takes(folder: Path | str, *, captions: Path | str | None = None) -> list[Take]:
@@ -97,11 +99,12 @@ def _pack_take(folder: Path, row: dict[str, str], written: dict[str, list[Span]]
         raise ValueError(f"split {row['split']!r} of {row['clip']} is not train, val or test")
     spans = [] if source.startswith("bandai") else written.get(row["clip"], [])
     index = describe_index(row["description"])
-    if index:
+    if index and (not spans or source.startswith(("cmu", "bandai"))):  # a whole sentence is no entry of an index
         spans = [*spans, Span(0.0, float(row["seconds"]), index, "index")]
     unit = None if path.suffix == ".amc" else float(row["metres_per_unit"])
     read = _reader(path, fps=float(row["fps"]), unit=unit)
-    return Take(row["clip"], source, row.get("licence") or _licence(source), row["split"], tuple(spans), read)
+    kind = "keyed" if (row.get("kind") or "").startswith("hand-keyed") else "capture"
+    return Take(row["clip"], source, row.get("licence") or _licence(source), row["split"], tuple(spans), read, kind)
 
 
 def _licence(source: str) -> str:

@@ -15,6 +15,7 @@ from motionloom.metrics.gestures import longest
 from motionloom.metrics.physics import Array
 
 Measures = dict[str, float]
+_BENT_OTHERWISE = r"danc|climb|cartwheel|dive|snake|fish|whale|crawl|flip|roll"
 _ANKLES, _FEET, _WRISTS, _SHOULDERS, _HIPS = [7, 8], [7, 8, 10, 11], [20, 21], [16, 17], [1, 2]
 
 
@@ -87,7 +88,15 @@ def _posture_measures(p: Array, body: Array, fps: float) -> Measures:
     spine = body[:, 12] - body[:, 0]
     upper, lower = p[:, [4, 5]] - p[:, _HIPS], p[:, _ANKLES] - p[:, [4, 5]]
     knees = np.arctan2(np.linalg.norm(np.cross(upper, lower), axis=-1), (upper * lower).sum(-1)).min(axis=1)
+    tilt = np.degrees(np.arctan2(np.linalg.norm(spine[:, [0, 2]], axis=-1), spine[:, 1]))
+    few = max(1, round(0.3 * fps))
     return {
+        "height_first": float(height[:few].mean()),
+        "height_last": float(height[-few:].mean()),
+        "low_share": float((height < 0.8).mean()),
+        "tilt_first": float(tilt[:few].mean()),
+        "tilt_last": float(tilt[-few:].mean()),
+        "dips": float(_swings(height, 0.2) // 2) if min(height[:few].mean(), height[-few:].mean()) > 0.88 else 0.0,
         "pelvis_low": float(np.percentile(height, 2)),
         "low_seconds": longest(height < 0.8) / fps,
         "bend": float(np.degrees(np.percentile(np.arctan2(spine[:, 2], spine[:, 1]), 98))),
@@ -150,14 +159,33 @@ def _gestures(m: Measures, words: str, seconds: float) -> list[str]:
         found.append("dance")
     if _says(words, r"balance|one leg") and m["one_leg"] > 1.5 and m["travel"] < 1.0:
         found.append("balance")
-    if _says(words, r"\bsit") and m["low_seconds"] > 0.8 and m["bend"] < 75:
-        found.append("sit")
-    elif m["pelvis_low"] < 0.72 and m["knees"] > 80 and not _says(words, r"climb|danc|snake|fish|whale|ladder"):
-        found.append("crouch")
-    if m["bend"] > 60 and m["pelvis_low"] > 0.6 and not _says(words, r"danc|climb|cartwheel|dive|snake|fish|whale"):
-        found.append("bend")
+    found += _postures(m, words)
     if m["hands_up"] > 0.6 and m["both_over_head"] > 0.05 and not _says(words, r"climb|ladder|danc|hang"):
         found.append("arms up")
+    return found
+
+
+def _postures(m: Measures, words: str) -> list[str]:
+    """Changes are seen whole: upright before sitting down, crouching and bending, upright behind standing up."""
+    if _says(words, r"\bsit|seat|chair|stool"):
+        if m["low_share"] > 0.9 and m["bend"] < 75:
+            return ["sit"]
+        if m["height_first"] > 0.88 and m["height_last"] < 0.78 and m["tilt_last"] < 45:
+            return ["sit down"]
+        if m["height_first"] < 0.78 and m["height_last"] > 0.88 and m["tilt_first"] < 45:
+            return ["stand up"]
+    found: list[str] = []
+    squats = ("squat once", "squat twice", "squat three times")
+    if _says(words, r"squat") and 1 <= m["dips"] <= 3:
+        found.append(squats[int(m["dips"]) - 1])
+    deep = (
+        m["pelvis_low"] < 0.72 and m["knees"] > 80 and not _says(words, r"climb|danc|snake|fish|whale|ladder|crawl|sit")
+    )
+    if deep and m["height_first"] > 0.85:
+        found.append("crouch")
+    upright = max(m["tilt_first"], m["tilt_last"]) < 35
+    if m["bend"] > 60 and m["pelvis_low"] > 0.6 and upright and not _says(words, _BENT_OTHERWISE):
+        found.append("bend")
     return found
 
 

@@ -85,16 +85,17 @@ class CleanGuess:
     """Mean squared error of the clean guess at a uniformly drawn level (Tevet et al. 2023, eq. 2), blocks weighted.
 
     The mean is over valid frames and numbers of each row, then over rows, as published (specification of MDM's loss).
-    ``displacement`` times the `displacement_error` comes on top: MDM's geometric losses (eq. 4 and 5), which its
-    published text models leave out.
+    ``early``: share of the samples whose level is drawn as often as samplers go there, most of them near pure noise,
+    where it is decided what a motion will show. ``displacement`` times the `displacement_error` comes on top: MDM's
+    geometric losses (eq. 4 and 5), which its published text models leave out.
     """
 
     def __init__(
         self, net: nn.Module, schedule: Schedule, batches: Batches, words: WordBank, *, drop_text: float = 0.1,
-        weights: dict[str, float] = WEIGHTS, displacement: float = 0.0, device: str = "cpu",
+        weights: dict[str, float] = WEIGHTS, displacement: float = 0.0, early: float = 0.0, device: str = "cpu",
     ) -> None:  # fmt: skip
         self.net, self.schedule, self.batches, self.words = net, schedule, batches, words
-        self.drop_text, self.displacement, self.device = drop_text, displacement, device
+        self.drop_text, self.displacement, self.early_share, self.device = drop_text, displacement, early, device
         self.mean, self.std = batches.data.mean.to(device), batches.data.std.to(device)
         scale = torch.ones(len(self.mean))
         for name, block in LAYOUT.items():
@@ -111,12 +112,20 @@ class CleanGuess:
         """What a step looks at, from ``(seed, step)`` alone, on the objective's device."""
         batch: Batch = self.batches.draw(seed, step, rows)
         generator = torch.Generator().manual_seed(int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0]))
-        level = torch.randint(1, self.schedule.steps + 1, (rows,), generator=generator)
+        level = self.drawn_levels(rows, generator)
         noise = torch.randn(batch.features.shape, generator=generator)
         keep = torch.rand(rows, generator=generator) >= self.drop_text
         cond = self.words.condition(batch.texts, batch.lengths).choose(keep)
         cond = Condition(*(part.to(self.device) for part in cond))
         return Drawn(batch.features.to(self.device), level.to(self.device), noise.to(self.device), cond)
+
+    def drawn_levels(self, rows: int, generator: torch.Generator) -> Tensor:
+        """(rows,) levels: a share ``early`` as the sampler's spacing of that name goes, the rest evenly."""
+        level = torch.randint(1, self.schedule.steps + 1, (rows,), generator=generator)
+        if not self.early_share:
+            return level
+        often = (self.schedule.steps * (1 - torch.rand(rows, generator=generator) ** 2)).ceil().clamp(min=1).long()
+        return torch.where(torch.rand(rows, generator=generator) < self.early_share, often, level)
 
     def error(self, guess: Tensor, drawn: Drawn) -> Tensor:
         """What a guess of the clean data costs."""

@@ -47,6 +47,8 @@ class Recipe:
     """Compile the network with torch.compile: pays on a GPU and on long runs."""
     displacement: float = 0.0
     """Weight of `objectives.displacement_error` in the loss; 0: the published loss alone."""
+    early: float = 0.0
+    """Share of the samples whose noise level is drawn as the sampler's spacing ``early`` goes; the rest evenly."""
     drop_text: float = 0.1
     """Share of samples trained without their text."""
     schedule: str = "cosine"
@@ -130,7 +132,7 @@ def _check(path: Path, recipe: Recipe) -> None:
             raise MotionloomError(f"{path}: {key} must be from 0 to {limit:g}; got {getattr(recipe, key)!r}")
     good = (
         recipe.steps > 0 < recipe.batch and recipe.rank > 0 < recipe.rate
-        and 0 <= recipe.ema < 1 and 0 <= recipe.drop_text < 1
+        and 0 <= recipe.ema < 1 and 0 <= recipe.drop_text < 1 and 0 <= recipe.early <= 1
         and recipe.levels > 1 and 0 <= recipe.cooldown <= 1 and recipe.clip > 0 and recipe.save_every > 0
         and len(recipe.windows) == len(recipe.shares) > 0 and 0 < min(recipe.windows) <= max(recipe.windows) <= 10_000
         and min(recipe.shares) >= 0 < sum(recipe.shares)

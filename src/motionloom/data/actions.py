@@ -1,0 +1,98 @@
+"""Everyday actions by name: which captions name them, how else people say it, which part of a recording shows them.
+
+Training draws evenly over actions instead of over captions (`data.sets`), so that rare ones are seen as often as walks.
+"""
+
+import re
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+from typing import Literal
+
+import numpy as np
+
+from motionloom.data.words import sentence
+from motionloom.metrics import physics as ph
+from motionloom.metrics.physics import Array
+
+Kind = Literal["cycle", "change", "once", "state"]
+PREFIX = "action:"
+"""What the kind of a note begins with that names an action."""
+SENTENCES = 20
+"""Sentences made for an action besides the captions themselves."""
+
+
+@dataclass(frozen=True)
+class Action:
+    """One entry of ``actions.toml``, which says what each part means."""
+
+    name: str
+    words: str
+    says: tuple[str, ...]
+    kind: Kind
+    unless: str = r"(?!)"
+    sided: tuple[str, ...] = ()
+    reverse: str = ""
+
+    def named_by(self, texts: Sequence[str]) -> bool:
+        """True where at least half of the captions name this action."""
+        lowered = [text.lower() for text in texts]
+        hits = sum(bool(re.search(self.words, t)) and not re.search(self.unless, t) for t in lowered)
+        return 2 * hits >= len(lowered) > 0
+
+
+def _read() -> dict[str, Action]:
+    table = tomllib.loads((resources.files("motionloom.data") / "actions.toml").read_text(encoding="utf-8"))
+    made = {}
+    for name, entry in table.items():
+        phrases = {key: tuple(entry.pop(key, ())) for key in ("says", "sided")}
+        made[name] = Action(name, **phrases, **entry)
+    return made
+
+
+ACTIONS: dict[str, Action] = _read()
+
+
+def action_of(texts: Sequence[str]) -> Action | None:
+    """The first action that at least half of the captions name; None where there is none."""
+    return next((action for action in ACTIONS.values() if action.named_by(texts)), None)
+
+
+def side_of(texts: Sequence[str]) -> str:
+    """``left`` or ``right`` where all captions that name a side name the same one, else empty."""
+    found = {side for text in texts for side in re.findall(r"\b(left|right)\b", text.lower())}
+    return found.pop() if len(found) == 1 else ""
+
+
+def sentences(action: Action, texts: Sequence[str] = (), *, count: int = SENTENCES) -> tuple[str, ...]:
+    """Other ways of saying an action, as whole sentences; with sides where the captions ``texts`` name one."""
+    side = side_of(texts)
+    phrases = [*action.says, *(phrase.format(side=side) for phrase in action.sided if side)]
+    if not phrases:
+        return ()
+    rng = np.random.default_rng(int.from_bytes(action.name.encode()[:8].ljust(8), "little"))
+    said = (sentence(phrases[i % len(phrases)], rng) for i in range(max(count, 2 * len(phrases))))
+    return tuple(dict.fromkeys(said))
+
+
+def core(positions: Array, fps: float, *, tail: float = 0.12) -> tuple[int, int]:
+    """Frames (first, end) within which a body changes: the middle part of the total variation of slow measures.
+
+    ``positions`` (frames, 22, 3) metres. The measures are pelvis height, pace, heading, tilt of the trunk and heights
+    of the wrists, each in units of what people notice and averaged over half a second, so that steps do not count.
+    ``tail``: share of the variation left out at either end.
+    """
+    p = ph.smooth(positions, 3)
+    spine = p[:, 12] - p[:, 0]
+    measures = np.stack([
+        p[:, 0, 1] / 0.2, ph.speed(p, fps) / 0.7, ph.heading(p) / 1.2, np.linalg.norm(spine[:, [0, 2]], axis=-1) / 0.25,
+        p[:, 20, 1] / 0.4, p[:, 21, 1] / 0.4,
+    ], axis=-1)  # fmt: skip
+    change = np.abs(np.diff(ph.smooth(measures, ph.odd(fps / 2)), axis=0)).sum(-1)
+    total = np.cumsum(change)
+    if total[-1] < 0.5:
+        return 0, len(p)
+    first, last = np.searchsorted(total, [tail * total[-1], (1 - tail) * total[-1]])
+    margin = round(0.3 * fps)
+    return max(0, int(first) - margin), min(len(p), int(last) + margin + 1)

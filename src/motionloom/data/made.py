@@ -1,0 +1,117 @@
+"""Gestures of the arms made on recorded bodies: what everyday sentences ask for and recordings lack.
+
+A gesture is a place for one wrist or both, with a swing about it (``gestures.toml``). The recorded person stands, sits
+or walks; the wrists go there and back by a smooth path, and the elbows follow in closed form (`limbs.bend`). Everything
+else of the recording stays. Clips made so are marked (``way`` ``made``) and used in training only.
+"""
+
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from motionloom import limbs
+from motionloom.data.words import sentence
+from motionloom.metrics import physics as ph
+from motionloom.metrics.physics import Array
+
+_ARMS = {"left": (16, 18, 20, 1.0), "right": (17, 19, 21, -1.0)}
+"""Shoulder, elbow, wrist, and the sign of outward along +X."""
+_MOVE = 0.5
+"""Seconds in which a wrist goes to its place."""
+
+
+@dataclass(frozen=True)
+class Gesture:
+    """One entry of ``gestures.toml``, which says what each part means."""
+
+    name: str
+    hands: str
+    place: tuple[float, float, float]
+    says: tuple[str, ...]
+    sided: tuple[str, ...] = ()
+    swing: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rate: tuple[float, float] = (1.0, 1.0)
+    pole: tuple[float, float, float] = (0.45, -1.0, -0.35)
+
+
+def _read() -> dict[str, Gesture]:
+    table: dict[str, dict[str, Any]] = tomllib.loads(
+        (resources.files("motionloom.data") / "gestures.toml").read_text(encoding="utf-8")
+    )
+    lists = {
+        name: {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()} for name, entry in table.items()
+    }
+    return {name: Gesture(name, **entry) for name, entry in lists.items()}
+
+
+GESTURES: dict[str, Gesture] = _read()
+
+
+def perform(body: Array, gesture: Gesture, side: str, *, fps: float, rng: np.random.Generator) -> Array:
+    """``body`` (frames, 22, 3) metres with the arms of a gesture; ``side``: the hand of a gesture of one hand."""
+    result = body.copy()
+    time = np.arange(len(body)) / fps
+    begin = rng.uniform(0.2, 0.9)
+    end = time[-1] - rng.uniform(0.2, 0.8) if rng.random() < 0.5 else np.inf
+    amount = np.minimum(_ease((time - begin) / _MOVE), 1 - _ease((time - end + _MOVE) / _MOVE))
+    rate, phase = rng.uniform(*gesture.rate), rng.uniform(0, 2 * np.pi)
+    swing = np.cos(2 * np.pi * rate * time + phase)
+    shift = rng.normal(0, 0.015, 3)
+    for name in ("left", "right") if gesture.hands == "both" else (side,):
+        _move_arm(result, gesture, _ARMS[name], amount, swing, shift)
+    return result
+
+
+def _move_arm(
+    body: Array, gesture: Gesture, arm: tuple[int, int, int, float], amount: Array, swing: Array, shift: Array
+) -> None:
+    shoulder, elbow, wrist, outward = arm
+    own = np.array([outward, 1.0, 1.0])
+    angle = -ph.heading(body)[:, None]
+    middle = (body[:, 16] + body[:, 17]) / 2
+    local = (
+        np.array(gesture.place) + shift + swing[:, None] * np.array(gesture.swing)
+    ) * own  # shift: one, or by frame
+    target = middle + ph.turned(local, angle[:, 0])
+    pole = ph.turned(np.broadcast_to(np.array(gesture.pole) * own, local.shape), angle[:, 0])
+    upper = float(np.linalg.norm(body[0, elbow] - body[0, shoulder]))
+    lower = float(np.linalg.norm(body[0, wrist] - body[0, elbow]))
+    weight = amount[:, None]
+    # the elbow's way out is blended as well, so that it does not jump where the gesture begins
+    along = (body[:, shoulder] + body[:, wrist]) / 2
+    pole = weight * pole + (1 - weight) * (body[:, elbow] - along) / 0.1
+    target = weight * target + (1 - weight) * body[:, wrist]
+    body[:, elbow], body[:, wrist] = limbs.bend(body[:, shoulder], target, pole, upper=upper, lower=lower)
+
+
+def hands_up(positions: Array) -> bool:
+    """True where both hands of (frames, 22, 3) are above the chest most of the time."""
+    return bool((positions[:, 20:22, 1].min(axis=1) > positions[:, 9, 1]).mean() > 0.6)
+
+
+def lower_arms(positions: Array) -> Array:
+    """The same body with its arms hanging, hands on the thighs while it sits: (frames, 22, 3) metres to the same."""
+    result = positions.copy()
+    seated = 1 - np.clip((positions[:, 0, 1] - 0.55) / 0.3, 0, 1)
+    still = np.zeros(len(positions))
+    hanging, resting = np.array([0.24, -0.49, 0.04]), np.array([0.14, -0.36, 0.27])
+    place = (1 - seated)[:, None] * hanging + seated[:, None] * resting
+    for arm in _ARMS.values():
+        _move_arm(result, Gesture("", "both", (0.0, 0.0, 0.0), ()), arm, still + 1, still, place)
+    return result
+
+
+def _ease(x: Array) -> Array:
+    x = np.clip(x, 0, 1)
+    return x**3 * (10 - 15 * x + 6 * x**2)
+
+
+def words_for(gesture: Gesture, side: str, lead: str, rng: np.random.Generator, *, count: int = 8) -> tuple[str, ...]:
+    """Sentences for a gesture; ``lead``: what the body does meanwhile, such as ``walks``, or empty."""
+    phrases = [*gesture.says, *(phrase.format(side=side) for phrase in gesture.sided if gesture.hands == "one")]
+    if lead:
+        phrases = [f"{lead} and {phrase}" for phrase in phrases]
+    return tuple(dict.fromkeys(sentence(phrases[i % len(phrases)], rng) for i in range(count)))
