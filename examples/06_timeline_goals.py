@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import SMPL22, Prior, compose, save
+from motionloom.goals.timeline import read_timeline
 from motionloom.io.stream import joined
-from motionloom.tasks.timeline import read_timeline
 
 Path("timeline.yaml").write_text("""
 seed: 2

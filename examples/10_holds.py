@@ -12,9 +12,9 @@ import torch
 
 from motionloom import SMPL22, Goal, Prior, load, save
 from motionloom.diffusion import DDPM, chain, guide, inpaint, levels, observe, row_draw, run
+from motionloom.edits.steering import corrected, toward
 from motionloom.features import humanml, layout
 from motionloom.tasks.splice import person_at_20
-from motionloom.tasks.steering import corrected, toward
 from motionloom.tasks.text import finish
 
 prior = Prior.load()

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import load, save
-from motionloom.io.overlay import draw_futures
-from motionloom.predictor import Predictor
-from motionloom.tasks.mask_file import read_mask
-from motionloom.tasks.predict import Hold, predict, switch
+from motionloom.goals.hold import Hold
+from motionloom.goals.mask_file import read_mask
+from motionloom.tasks.predict import predict, switch
+from motionloom.viz.overlay import draw_futures
+from motionloom.weights.predictor import Predictor
 
 here = Path(__file__).parent
 predictor = Predictor.load()

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import Prior, load
+from motionloom.goals.goal_file import read_goal
+from motionloom.goals.timeline import read_timeline
 from motionloom.io import save_scene
-from motionloom.nets.pair_block import PairBlock
 from motionloom.tasks.duet import compose_pair, react
-from motionloom.tasks.goal_file import read_goal
 from motionloom.tasks.pair import complete_pair, generate_pair
 from motionloom.tasks.splice import concatenated
-from motionloom.tasks.timeline import read_timeline
+from motionloom.weights.pair import PairBlock
 
 here = Path(__file__).parent
 prior = Prior.load()

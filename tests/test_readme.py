@@ -95,8 +95,8 @@ def test_the_examples_run(example: Path, tmp_path: Path) -> None:
 def test_the_timelines_become_motions() -> None:
     """Each timeline of the examples is made, in few steps, to its last frame; what it goes on from and to is met."""
     from motionloom import Prior, compose, load
+    from motionloom.goals.timeline import read_timeline
     from motionloom.io.stream import joined
-    from motionloom.tasks.timeline import read_timeline
 
     prior = Prior.load()
     for example in TIMELINES:

@@ -12,12 +12,13 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from motionloom.cli import main
-from motionloom.io import draw, load
+from motionloom.goals.goal import Goal
+from motionloom.goals.goal_file import read_goal
+from motionloom.io import load
 from motionloom.io.atomic import atomic_path
-from motionloom.io.figure import figure
 from motionloom.motion import Motion
-from motionloom.tasks.goal_file import read_goal
-from motionloom.tasks.goals import Goal
+from motionloom.viz import draw
+from motionloom.viz.figure import figure
 
 ROOT = Path(__file__).resolve().parents[1]
 CLIP, GOALS = str(ROOT / "examples" / "clips" / "walk.bvh"), ROOT / "examples" / "goals"

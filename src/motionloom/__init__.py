@@ -12,35 +12,40 @@ come into one world: `generate_pair`, `complete_pair`, `react`, `compose_pair`.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from motionloom import _moved
+
 if TYPE_CHECKING:
-    from motionloom.checkpoint import Prior, save_prior
     from motionloom.errors import MotionloomError
+    from motionloom.goals.goal import Goal
+    from motionloom.goals.hold import HeldPart, Hold
+    from motionloom.goals.segment import Segment
     from motionloom.io import load, save
     from motionloom.motion import Motion
-    from motionloom.nets.pair_block import PairBlock
-    from motionloom.predictor import Predictor, save_predictor
     from motionloom.retarget import from_smpl22, retarget, to_smpl22
     from motionloom.skeleton import SMPL22, Skeleton
     from motionloom.tasks.control import Controlled, control
     from motionloom.tasks.duet import compose_pair, react
     from motionloom.tasks.edit import edit
-    from motionloom.tasks.goals import Goal
-    from motionloom.tasks.held import HeldPart, Hold
-    from motionloom.tasks.long import Segment, compose
+    from motionloom.tasks.long import compose
     from motionloom.tasks.pair import complete_pair, generate_pair
     from motionloom.tasks.predict import predict, switch
     from motionloom.tasks.text import generate
+    from motionloom.weights.pair import PairBlock
+    from motionloom.weights.predictor import Predictor, save_predictor
+    from motionloom.weights.prior import Prior, save_prior
+
+_moved.install()
 
 _PLACES = {
-    "Prior": "checkpoint",
-    "save_prior": "checkpoint",
+    "Prior": "weights.prior",
+    "save_prior": "weights.prior",
     "MotionloomError": "errors",
     "load": "io",
     "save": "io",
     "Motion": "motion",
-    "PairBlock": "nets.pair_block",
-    "Predictor": "predictor",
-    "save_predictor": "predictor",
+    "PairBlock": "weights.pair",
+    "Predictor": "weights.predictor",
+    "save_predictor": "weights.predictor",
     "from_smpl22": "retarget",
     "retarget": "retarget",
     "to_smpl22": "retarget",
@@ -51,10 +56,10 @@ _PLACES = {
     "compose_pair": "tasks.duet",
     "react": "tasks.duet",
     "edit": "tasks.edit",
-    "Goal": "tasks.goals",
-    "HeldPart": "tasks.held",
-    "Hold": "tasks.held",
-    "Segment": "tasks.long",
+    "Goal": "goals.goal",
+    "HeldPart": "goals.hold",
+    "Hold": "goals.hold",
+    "Segment": "goals.segment",
     "compose": "tasks.long",
     "complete_pair": "tasks.pair",
     "generate_pair": "tasks.pair",

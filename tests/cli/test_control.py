@@ -8,11 +8,11 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main
+from motionloom.goals.goal_file import SCHEMA
 from motionloom.motion import Motion
 from motionloom.rotations import IDENTITY
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import control as task
-from motionloom.tasks.goal_file import SCHEMA
 from tests.cli.said import complaint
 
 GOAL = {"path": {"points": [[1, 0], [1, 1.2]]}}

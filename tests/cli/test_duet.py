@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from motionloom import io
-from motionloom.checkpoint import save_prior
 from motionloom.cli import main
 from motionloom.tasks import pair
+from motionloom.weights.prior import save_prior
 from tests.io.motions import largest_distance
 from tests.nets import tiny
 from tests.tasks.two_people import block, walkers

@@ -12,10 +12,10 @@ import pytest
 from motionloom.cli import main
 from motionloom.data.build import Clip, Note, write_clip
 from motionloom.errors import MotionloomError
-from motionloom.evaluation.report import Column, Report, Row, Value, encode, read
-from motionloom.evaluation.suites import Suite, Tools, chosen
 from motionloom.features import humanml
-from tests.metrics.people import FPS, standing, walking
+from motionloom.lab.report.report import Column, Report, Row, Value, encode, read
+from motionloom.lab.suites.registry import Suite, Tools, chosen
+from tests.kinematics.people import FPS, standing, walking
 
 
 def walks_or_stands(prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[np.ndarray], float]:
@@ -151,7 +151,7 @@ def test_a_suite_that_fails_ends_with_2_and_the_others_stand(tmp_path: Path, mon
         raise MotionloomError("no motion")
 
     bad = Suite("bad", "nothing", fails, {"n": 1}, {"n": 0})
-    monkeypatch.setattr("motionloom.evaluation.suites.chosen", lambda names: [bad, *chosen(["speed"])])
+    monkeypatch.setattr("motionloom.lab.suites.registry.chosen", lambda names: [bad, *chosen(["speed"])])
     assert main(["evaluate", "all", "--out", str(tmp_path)]) == 2
     assert read(tmp_path / "speed").suite == "speed"
 

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.checkpoint import save_prior
 from motionloom.cli import main
 from motionloom.data.build import Clip, Note, write_clip
-from motionloom.evaluation import text_reference
-from motionloom.evaluation.protocol import Selection
-from tests.evaluation.judged import Judge, features, item, place
+from motionloom.lab.suites import text_reference
+from motionloom.lab.suites.protocol import Selection
+from motionloom.weights.prior import save_prior
+from tests.lab.suites.judged import Judge, features, item, place
 from tests.nets import tiny
 
 FEW = ["--batch", "4", "--replications", "2", "--steps", "2,3", "--multimodality", "0"]
@@ -18,10 +18,10 @@ FEW = ["--batch", "4", "--replications", "2", "--steps", "2,3", "--multimodality
 
 @pytest.fixture(autouse=True)
 def _judge(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motionloom.evaluation.text.load_evaluator", lambda name: Judge(name=name))
-    monkeypatch.setattr("motionloom.evaluation.evaluators.load_evaluator", lambda name: Judge(name=name))
+    monkeypatch.setattr("motionloom.lab.suites.text.load_evaluator", lambda name: Judge(name=name))
+    monkeypatch.setattr("motionloom.lab.evaluator.evaluators.load_evaluator", lambda name: Judge(name=name))
     monkeypatch.setattr("motionloom.cli.evaluate_text._memory", lambda arguments, steps: 300.0)
-    monkeypatch.setattr("motionloom.evaluation.plots.draw", lambda report, folder: [])
+    monkeypatch.setattr("motionloom.lab.report.plots.draw", lambda report, folder: [])
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_a_run_prints_a_table_writes_a_report_and_goes_on(
         "real", "real, captions shuffled", "chance", "tiny, 2 steps", "tiny, 3 steps",
     }  # fmt: skip
     assert "Protocol" in (tmp_path / "out" / "report.md").read_text()
-    monkeypatch.setattr("motionloom.evaluation.text.sample_features", lambda *a, **k: pytest.fail("drawn twice"))
+    monkeypatch.setattr("motionloom.lab.suites.text.sample_features", lambda *a, **k: pytest.fail("drawn twice"))
     assert main([*command, "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == found
     assert main([*command, "--seed", "3"]) == 2

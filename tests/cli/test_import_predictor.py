@@ -7,9 +7,9 @@ import pytest
 import torch
 
 from motionloom.cli import main
-from motionloom.predictor import Predictor
-from tests.nets.test_published import Bomb
-from tests.test_predictor import checkpoint
+from motionloom.weights.predictor import Predictor
+from tests.lab.papers.test_mdm import Bomb
+from tests.weights.test_predictor import checkpoint
 
 START = ["import", "ckpt_ema_550.pt", "--out", "a.safetensors"]
 

@@ -7,7 +7,7 @@ import pytest
 
 from motionloom.cli import generate, main, parser
 from motionloom.errors import MotionloomError
-from motionloom.evaluation import obey
+from motionloom.lab.suites import obey
 
 
 @pytest.fixture(autouse=True)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.checkpoint import load_prior, save_prior
 from motionloom.cli import main
+from motionloom.weights.prior import load_prior, save_prior
 from tests.nets import tiny
 from tests.train import runs
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.checkpoint import load_prior, save_prior
 from motionloom.cli import main
-from motionloom.evaluation.guo import load_guo
 from motionloom.io import load
-from motionloom.nets.pair_block import PairBlock
-from motionloom.predictor import save_predictor
-from tests.evaluation import test_guo
+from motionloom.lab.papers.guo import load_guo
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.predictor import save_predictor
+from motionloom.weights.prior import load_prior, save_prior
+from tests.lab.papers import test_guo
+from tests.lab.papers.test_mdm import Bomb, state, write
 from tests.nets import test_pair, tiny, tiny_predictor
-from tests.nets.test_published import Bomb, state, write
 from tests.tasks.test_text import Words
 
 
@@ -95,7 +95,7 @@ def test_missing_options_are_warned_of_and_babel_makes_motions(
         opened.append(length)
         return Words()
 
-    monkeypatch.setattr("motionloom.nets.published.ClipText.open", clip)
+    monkeypatch.setattr("motionloom.lab.papers.mdm.ClipText.open", clip)
     asked = ["--weights", "b.safetensors", "--seconds", "0.5", "--steps", "2", "--out", "a.bvh"]
     assert main(["generate", "walk", *asked]) == 0
     motion = load("a.bvh")
@@ -201,9 +201,9 @@ def test_all_kinds_of_shipped_weights_are_listed_and_found_by_name(
 ) -> None:
     block, _ = test_pair.block_of("modulated")
     files = {
-        "checkpoint.shipped": {"one": save_prior(tiny.prior(), "1.safetensors")},
-        "predictor.shipped_predictors": {"two": save_predictor(tiny_predictor.predictor(), "2.safetensors")},
-        "nets.pair_block.blocks": {"three": block.save("3.safetensors")},
+        "weights.prior.shipped": {"one": save_prior(tiny.prior(), "1.safetensors")},
+        "weights.predictor.shipped_predictors": {"two": save_predictor(tiny_predictor.predictor(), "2.safetensors")},
+        "weights.pair.blocks": {"three": block.save("3.safetensors")},
     }
     for function, found in files.items():
         monkeypatch.setattr(f"motionloom.{function}", lambda found=found: found)

@@ -5,20 +5,34 @@ A test of a group reads
     @pytest.mark.parametrize("case", cases("diffusion", kind="schedule"))
     def test_schedule(case): compare(case, "beta", published(cosine(case.config["steps"])).beta)
 
-Where the recorded numbers are absent every such test is skipped with a reason. Arrays are compared as
+The numbers lie in `recorded`; those of another folder are compared where MOTIONLOOM_CONFORMANCE names it, or where
+MOTIONLOOM_SHARED names one that has a folder `conformance`: a group it lacks is skipped. Arrays are compared as
 `numpy.asarray(array)`, so torch tensors (CPU) and numbers will do.
 """
 
 import functools
 import json
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.shared import SHARED, shared
+
+def _folder() -> Path:
+    """Where the numbers to compare lie."""
+    if "MOTIONLOOM_CONFORMANCE" in os.environ:
+        return Path(os.environ["MOTIONLOOM_CONFORMANCE"])
+    other = Path(os.environ.get("MOTIONLOOM_SHARED", "")) / "conformance"
+    return other if "MOTIONLOOM_SHARED" in os.environ and other.is_dir() else OWN
+
+
+OWN = Path(__file__).parent / "recorded"
+FOLDER = _folder()
+"""Of the numbers that are compared."""
 
 # What a stream's numbers are for (rule R1); model m draws its weights from stream WEIGHTS + m.
 MOTION, TEXT, NOISE, KNOWN, MASK, WEIGHTS = 1, 2, 3, 4, 5, 10
@@ -47,18 +61,29 @@ class Case:
 
 def cases(group: str, *, kind: str | None = None) -> list[Any]:
     """The cases of a group (of one `config["kind"]`) for `pytest.mark.parametrize`, named as recorded."""
-    path = SHARED / "conformance" / f"{group}.json"
-    if not path.exists():
-        reason = f"{path} is not there: this test needs the material beside the repository (MOTIONLOOM_SHARED)"
+    path = FOLDER / f"{group}.json"
+    if FOLDER != OWN and not path.exists():
+        reason = f"there is no {path}"
         return [pytest.param(None, id=f"{group}-absent", marks=pytest.mark.skip(reason=reason))]
     found = [_case(group, record) for record in json.loads(path.read_text())["cases"]]
     return [pytest.param(c, id=c.name) for c in found if kind in (None, c.config["kind"])]
 
 
 def case(group: str, name: str) -> Case:
-    """One case by name, inside a test; skips the test where the recorded numbers are absent."""
-    records = json.loads(shared(f"conformance/{group}.json").read_text())["cases"]
-    return next(_case(group, record) for record in records if record["name"] == name)
+    """One case by name, inside a test; skips the test where another folder does not have it."""
+    records = json.loads(recorded(f"{group}.json").read_text())["cases"]
+    found = [_case(group, record) for record in records if record["name"] == name]
+    if not found and FOLDER != OWN:
+        pytest.skip(f"there is no case {name} in {FOLDER / group}.json")
+    return found[0]
+
+
+def recorded(file: str) -> Path:
+    """A file of recorded numbers, inside a test; skips the test where another folder does not have it."""
+    path = FOLDER / file
+    if FOLDER != OWN and not path.exists():
+        pytest.skip(f"there is no {path}")
+    return path
 
 
 def stream(seed: int, k: int) -> np.random.Generator:
@@ -119,5 +144,5 @@ def _case(group: str, record: Mapping[str, Any]) -> Case:
 
 @functools.cache
 def _arrays(group: str) -> Mapping[str, np.ndarray]:
-    with np.load(shared(f"conformance/{group}.npz"), allow_pickle=False) as stored:
+    with np.load(recorded(f"{group}.npz"), allow_pickle=False) as stored:
         return dict(stored)

@@ -5,8 +5,8 @@ import torch
 
 from motionloom.diffusion import DDPM, Denoiser, cosine
 from motionloom.features.layout import mask
+from motionloom.lab.papers.mdm import from_published
 from motionloom.nets.prior import condition
-from motionloom.nets.published import from_published
 from motionloom.tasks.blending import blended, controlled
 from tests.conformance.runner import KNOWN, MOTION, NOISE, TEXT, Case, case, cases, compare, normal, stream, weights
 from tests.conformance.test_sampling import to_motion, to_state

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from motionloom.diffusion import cosine, guide
-from motionloom.tasks.double_take import MODES, Plan, Takes, double_take, flags
+from motionloom.lab.papers.double_take import MODES, Plan, Takes, double_take, flags
 from tests.conformance.runner import Case, cases, compare
 from tests.conformance.test_sampling import dummy, published_network, recorded_draw, to_motion
 

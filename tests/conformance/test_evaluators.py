@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.nets.guo import GuoNets, GuoSizes, from_state_dict, published_order
+from motionloom.lab.papers.guo_nets import GuoNets, GuoSizes, from_state_dict, published_order
 from tests.conformance.runner import MASK, MOTION, TEXT, Case, case, cases, compare, normal, stream, weights
-from tests.nets.test_guo import Naive, table
+from tests.lab.papers.test_guo_nets import Naive, table
 
 MODELS = {"movement_encoder": 0, "motion_encoder": 1, "text_encoder": 2}
 

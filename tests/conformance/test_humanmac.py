@@ -12,10 +12,9 @@ import torch
 from torch import Tensor
 
 from motionloom.diffusion import SCHEDULES, Dct, Draw, cosine, from_noise
+from motionloom.lab.papers.humanmac import PARTS, Fixed, Target, padded, published_completion
 from motionloom.nets.predictor import NetConfig, TransLinear, waves
-from motionloom.tasks.humanmac import PARTS, Fixed, Target, padded, published_completion
-from tests.conformance.runner import MOTION, NOISE, TEXT, Case, case, cases, compare, normal, stream, weights
-from tests.shared import shared
+from tests.conformance.runner import MOTION, NOISE, TEXT, Case, case, cases, compare, normal, recorded, stream, weights
 
 SIZES = {"h36m": (48, 20, 8, 125, 25), "humaneva": (42, 10, 4, 75, 15)}
 """Channels, kept frequencies, layers, frames, observed frames."""
@@ -100,7 +99,7 @@ def wave(shape: tuple[int, ...], a: float, b: float) -> Tensor:
 
 
 def sums() -> dict:
-    return json.loads(shared("conformance/humanmac_reference_sums.json").read_text())
+    return json.loads(recorded("humanmac_reference_sums.json").read_text())
 
 
 def check(actual: Tensor, recorded: dict, *, near: float, element: float) -> None:

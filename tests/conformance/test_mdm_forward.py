@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import torch
 
+from motionloom.lab.papers.mdm import from_published
 from motionloom.nets.prior import NetConfig, PriorNet, condition
-from motionloom.nets.published import from_published
 from tests.conformance.runner import MOTION, TEXT, Case, case, cases, compare, normal, stream, weights
 
 STATES = {263: "state_dict_humanml263", 135: "state_dict_babel135_transemb"}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motionloom.metrics import frechet, retrieval, transitions
+from motionloom.lab.metrics import frechet, retrieval, transitions
 from tests.conformance.runner import MOTION, Case, cases, compare, normal, stream
 
 

@@ -25,8 +25,8 @@ from motionloom.diffusion import (
     restart,
     run,
 )
+from motionloom.lab.papers.mdm import from_published
 from motionloom.nets.prior import condition
-from motionloom.nets.published import from_published
 from tests.conformance.runner import KNOWN, MASK, NOISE, TEXT, Case, case, cases, compare, normal, stream, weights
 
 Net = Callable[[Tensor, int, Any], Tensor]

@@ -11,8 +11,8 @@ import torch
 from torch import Tensor
 
 from motionloom.diffusion import DDPM, Denoiser, chain, cosine, inpaint, observe, restart, run
+from motionloom.lab.papers.commdm import from_published_pair
 from motionloom.nets.pair import PairNet
-from motionloom.nets.pair_published import from_published_pair
 from motionloom.nets.prior import condition
 from tests.conformance.runner import KNOWN, MOTION, NOISE, TEXT, Case, case, cases, compare, normal, stream, weights
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from motionloom.features import humanml as hml
-from motionloom.features.ik import motion_from_positions
 from motionloom.io import save
-from tests.metrics import people
+from motionloom.kinematics.ik import motion_from_positions
+from tests.kinematics import people
 
 FPS = 20.0
 

@@ -6,9 +6,9 @@ import pytest
 from motionloom.data import augment
 from motionloom.features import humanml as hml
 from motionloom.features.layout import LAYOUT
-from motionloom.metrics import physics as ph
+from motionloom.kinematics import physics as ph
 from tests.features.people import wander
-from tests.metrics import people
+from tests.kinematics import people
 
 FPS = 20.0
 LEGS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11)

@@ -18,7 +18,7 @@ from motionloom.data.sources import BANDAI_LICENCE, CMU_LICENCE, UNKNOWN_LICENCE
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from tests.data import people as made
-from tests.metrics import people
+from tests.kinematics import people
 
 
 @pytest.fixture(scope="module")

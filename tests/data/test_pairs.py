@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from motionloom.data import pairs as dp
-from motionloom.data import threedpw
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
-from motionloom.features.ik import motion_from_positions
 from motionloom.io import save
-from motionloom.metrics import pair as mp
-from motionloom.metrics import physics as ph
+from motionloom.kinematics import physics as ph
+from motionloom.kinematics.ik import motion_from_positions
+from motionloom.lab.metrics import pair as mp
+from motionloom.lab.papers import threedpw
 from motionloom.skeleton import HUMANML_BONE_LENGTHS
-from tests.metrics import people
+from tests.kinematics import people
 from tests.shared import shared
 
 FPS = 20.0

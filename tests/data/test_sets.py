@@ -7,7 +7,7 @@ import numpy as np
 from motionloom.data.build import Clip, Note, write_clip
 from motionloom.data.sets import Batches, load_set
 from motionloom.features import humanml as hml
-from tests.metrics import people
+from tests.kinematics import people
 
 
 def kicking(folder: Path) -> Path:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from motionloom.data.windows import label_clip, label_window
-from tests.metrics import people
+from tests.kinematics import people
 
 FPS = 20.0
 

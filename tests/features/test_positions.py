@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from motionloom.errors import MotionloomError
-from motionloom.features.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT
 from motionloom.features.positions import SMPL_LAYOUT, Layout, bone_lengths, with_bones
+from motionloom.lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT
 
 LAYOUTS = {"smpl": SMPL_LAYOUT, "human3.6m": H36M_LAYOUT, "humaneva": HUMANEVA_LAYOUT}
 each = pytest.mark.parametrize("layout", list(LAYOUTS.values()), ids=list(LAYOUTS))

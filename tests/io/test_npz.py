@@ -51,7 +51,7 @@ def test_numpy_reads_the_documented_arrays_without_pickle(tmp_path):
 
 
 def test_plain_positions_are_read_where_they_say_their_rate(tmp_path):
-    pytest.importorskip("motionloom.features.ik")
+    pytest.importorskip("motionloom.kinematics.ik")
     motion = still(8)
     np.savez(tmp_path / "a.npz", positions=motion.positions(), fps=20)
     again = io.load(tmp_path / "a.npz")

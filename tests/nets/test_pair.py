@@ -13,14 +13,15 @@ from torch import Tensor
 from motionloom.diffusion import DDPM, guide, inpaint, levels, observe, row_draw, run
 from motionloom.errors import MotionloomError
 from motionloom.features.pair import PUBLISHED_CODE, PlaceCode, along, compose, decode, seen, told_from
-from motionloom.nets import pair_block
-from motionloom.nets.adapter import fingerprint
+from motionloom.lab.papers.commdm import adds_of, from_published_pair, is_pair
+from motionloom.lab.papers.published_priors import import_block
 from motionloom.nets.pair import PairConfig, PairNet, Talk, fitting, join, other, part
-from motionloom.nets.pair_block import KEY, PairBlock, blocks, import_block
-from motionloom.nets.pair_published import adds_of, from_published_pair, is_pair
 from motionloom.nets.prior import Bound, NetConfig, condition
+from motionloom.weights import pair as pair_block
+from motionloom.weights.adapter import fingerprint
+from motionloom.weights.pair import KEY, PairBlock, blocks
+from tests.lab.papers.test_mdm import table
 from tests.nets import tiny
-from tests.nets.test_published import table
 from tests.nets.text.tiny import WIDTH as TEXT
 
 MANNERS = {"modulated": tiny.MODULATED, "published": tiny.PUBLISHED}

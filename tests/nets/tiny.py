@@ -2,11 +2,11 @@
 
 import torch
 
-from motionloom.checkpoint import Card, Prior
 from motionloom.diffusion import cosine
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.nets.text import MiniLM
 from motionloom.nets.text.minilm import pack
+from motionloom.weights.prior import Card, Prior
 from tests.nets.text import tiny
 
 MODULATED = NetConfig(manner="modulated", width=32, layers=2, heads=2, hidden=48, text=tiny.WIDTH, patch=4, dropout=0.0)

@@ -2,11 +2,11 @@
 
 import torch
 
-from motionloom.checkpoint import Card
 from motionloom.diffusion import Dct, cosine
 from motionloom.features.positions import Layout
 from motionloom.nets.predictor import NetConfig, TransLinear
-from motionloom.predictor import Predictor, told_shape
+from motionloom.weights.predictor import Predictor, told_shape
+from motionloom.weights.prior import Card
 
 BODY = Layout(("root", "left", "right", "head"), (-1, 0, 0, 0), (0, 2, 1, 3), ((1, 2),))
 """Told with the root's way, and turned to the facing."""

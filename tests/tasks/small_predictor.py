@@ -2,11 +2,11 @@
 
 import torch
 
-from motionloom.checkpoint import Card
 from motionloom.diffusion import Dct, sqrt
 from motionloom.features.positions import SMPL_LAYOUT
 from motionloom.nets.predictor import NetConfig, TransLinear
-from motionloom.predictor import Predictor, told_shape
+from motionloom.weights.predictor import Predictor, told_shape
+from motionloom.weights.prior import Card
 
 OBSERVED, FRAMES, FPS, KEPT = 15, 45, 30.0, 16
 

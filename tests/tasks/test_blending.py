@@ -9,10 +9,10 @@ import torch
 from motionloom.diffusion import SOLVERS, cosine, guide, levels, row_draw, run
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import mask
-from motionloom.nets.adapter import adapted
 from motionloom.tasks.blending import control_features, controlled
+from motionloom.weights.adapter import adapted
 from tests.nets import tiny
-from tests.nets.test_adapter import adapter_of, trained
+from tests.weights.test_adapter import adapter_of, trained
 
 PROMPTS, FRAMES = ["a person walks", "a person waves"], 10
 

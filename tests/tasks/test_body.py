@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionloom import rotations as rot
-from motionloom.features.feet import clean_feet
-from motionloom.features.ik import motion_from_positions
+from motionloom.goals.goal import Goal
+from motionloom.kinematics.feet import clean_feet
+from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import body
 from motionloom.tasks.body import Places, bodies, posed
-from motionloom.tasks.goals import Goal
 from tests.tasks.test_edit import person
 
 

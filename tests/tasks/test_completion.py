@@ -8,9 +8,10 @@ import torch
 from scipy.interpolate import BPoly
 from torch import Tensor
 
+from motionloom.diffusion import row_seed
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import SMPL_LAYOUT, bone_lengths
-from motionloom.tasks.completion import Known, _quintic, complete, futures, joined, next_frames, row_seed
+from motionloom.tasks.completion import Known, _quintic, complete, futures, joined, next_frames
 from tests.tasks.small_predictor import FRAMES, OBSERVED, small_predictor
 from tests.tasks.test_edit import person
 

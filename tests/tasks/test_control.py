@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.checkpoint import Prior
 from motionloom.errors import MotionloomError
-from motionloom.nets.adapter import Adapter, fingerprint, linears
+from motionloom.goals.goal import Goal, Placement
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.control import control, controlled_numbers, fitting_adapters, judged
-from motionloom.tasks.goals import Goal, Placement
 from motionloom.tasks.text import generate
+from motionloom.weights.adapter import Adapter, fingerprint, linears
+from motionloom.weights.prior import Prior
 from tests.nets import tiny
 
 WRIST = SMPL22.index("right_wrist")
@@ -118,7 +118,7 @@ def test_shipped_adapters_of_other_weights_and_damaged_ones_are_said(
 ) -> None:
     files = {"trajectory": adapter(prior).save(tmp_path / "trajectory.safetensors")}
     monkeypatch.setattr("motionloom.tasks.control.shipped", lambda: files)
-    monkeypatch.setattr("motionloom.nets.adapter.adapters", lambda: files)
+    monkeypatch.setattr("motionloom.weights.adapter.adapters", lambda: files)
     assert [found.name for found in fitting_adapters(prior, path())] == ["blank"]
     with pytest.raises(MotionloomError, match="belongs to the weights"):
         fitting_adapters(tiny.prior(seed=5), path())

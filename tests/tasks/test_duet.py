@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.checkpoint import Prior
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
-from motionloom.metrics.physics import heading
+from motionloom.goals.goal import Goal
+from motionloom.goals.segment import Segment
+from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
 from motionloom.nets.pair import PairNet, join
-from motionloom.nets.pair_block import PairBlock
 from motionloom.nets.prior import Bound
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import duet as tasks
 from motionloom.tasks.duet import compose_pair, duet_features, react
-from motionloom.tasks.goals import Goal
-from motionloom.tasks.long import Segment
 from motionloom.tasks.splice import concatenated, person_at_20
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
 from tests.nets import tiny
 from tests.tasks.two_people import block as block_of
 from tests.tasks.two_people import walkers

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from motionloom import rotations as rot
-from motionloom.checkpoint import Prior
+from motionloom.edits.boundary import Stretch, arrival, joining
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import WIDTH
@@ -15,8 +15,9 @@ from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.edit import edit, kept_numbers
-from motionloom.tasks.redraw import Stretch, arrival, joining, redraw
+from motionloom.tasks.redraw import redraw
 from motionloom.tasks.splice import carried, in_manner_of, kept_parts, person_at_20, splice, standing
+from motionloom.weights.prior import Prior
 from tests.nets import tiny
 
 FEW = {"steps": 2, "guidance": 1.0}

@@ -5,11 +5,12 @@ import pytest
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
+from motionloom.goals.hold import HeldPart, Hold
 from motionloom.motion import Motion
 from motionloom.retarget import joints22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import predict as task
-from motionloom.tasks.held import HeldPart, Hold, given
+from motionloom.tasks.held import given
 from motionloom.tasks.predict import predict, predict_pieces
 from motionloom.tasks.splice import carried, concatenated, overlaid, standing
 from tests.tasks.small_predictor import small_predictor

@@ -8,16 +8,17 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.checkpoint import Prior
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
-from motionloom.metrics.physics import heading
+from motionloom.goals.goal import Goal, Placement
+from motionloom.goals.segment import Segment
+from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
-from motionloom.tasks.goals import Goal, Placement
-from motionloom.tasks.long import Past, Segment, compose, decoded, long_features
+from motionloom.tasks.long import Past, compose, decoded, long_features
 from motionloom.tasks.splice import carried
 from motionloom.tasks.text import sample_features
+from motionloom.weights.prior import Prior
 from tests.nets import tiny
 from tests.tasks.test_edit import person
 

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.checkpoint import Card, Prior
 from motionloom.diffusion import cosine
+from motionloom.goals.segment import Segment
 from motionloom.motion import Motion
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.nets.text import TextEmbedding
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import body
 from motionloom.tasks.body import Places
-from motionloom.tasks.long import Segment, compose
+from motionloom.tasks.long import compose
+from motionloom.weights.prior import Card, Prior
 
 SEGMENTS, SECONDS = 720, 5.0
 

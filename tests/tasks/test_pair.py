@@ -6,18 +6,16 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.checkpoint import Prior
-from motionloom.data.pairs import one_world
 from motionloom.diffusion import levels
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
+from motionloom.features.pair import one_world
+from motionloom.goals.goal import Goal, Placement
 from motionloom.motion import Motion
 from motionloom.nets.pair import PairNet
-from motionloom.nets.pair_block import PairBlock
 from motionloom.retarget import to_smpl22
 from motionloom.tasks import pair
-from motionloom.tasks.goals import Goal, Placement
 from motionloom.tasks.pair import (
     Ground,
     complete_pair,
@@ -29,6 +27,8 @@ from motionloom.tasks.pair import (
     prompts_of,
 )
 from motionloom.tasks.text import finish, sample_features
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
 from tests.nets import tiny
 from tests.tasks.two_people import block as block_of
 from tests.tasks.two_people import walkers

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.checkpoint import Prior, import_published, load_prior, save_prior
 from motionloom.errors import MotionloomError
 from motionloom.features.babel import decode, facing
+from motionloom.lab.papers.published_priors import import_published
 from motionloom.motion import Motion
 from motionloom.nets.text import TextEmbedding
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.text import finish, generate, sample_features, to_motion
+from motionloom.weights.prior import Prior, load_prior, save_prior
+from tests.lab.papers.test_mdm import state, write
 from tests.nets import tiny
-from tests.nets.test_published import state, write
 
 FEW = {"seconds": 1.0, "steps": 3}
 

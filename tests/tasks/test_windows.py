@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from motionloom.diffusion import row_seed
 from motionloom.features.positions import bone_lengths
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import windows
-from motionloom.tasks.completion import next_frames, row_seed
+from motionloom.tasks.completion import next_frames
 from motionloom.tasks.windows import ONWARD, Pen, person_of, seen_frames, windows_for
 from tests.tasks.small_predictor import FPS, FRAMES, OBSERVED, small_predictor
 from tests.tasks.test_edit import person

@@ -7,13 +7,13 @@ import numpy as np
 import torch
 
 from motionloom import rotations as rot
-from motionloom.checkpoint import Prior
 from motionloom.io import load
 from motionloom.motion import Motion
-from motionloom.nets.adapter import fingerprint
 from motionloom.nets.pair import Talk, fitting
-from motionloom.nets.pair_block import PairBlock
 from motionloom.tasks.splice import carried
+from motionloom.weights.adapter import fingerprint
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
 
 CLIP = Path(__file__).parents[2] / "examples" / "clips" / "walk.bvh"
 

@@ -16,7 +16,7 @@ from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.train.loop import World, train
 from motionloom.train.objectives import CleanGuess, Conditioned, WordBank
 from motionloom.train.recipe import Recipe
-from tests.metrics import people
+from tests.kinematics import people
 from tests.nets import tiny
 from tests.nets.text.tiny import WIDTH
 

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.checkpoint import Prior, read_tensors, save_prior
 from motionloom.cli import main
 from motionloom.data.sets import Batches, load_set
 from motionloom.diffusion import cosine
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import mask, ric
-from motionloom.nets.adapter import Adapter, adapted, show
 from motionloom.skeleton import SMPL22
 from motionloom.train.control import ControlledGuess, train_control
 from motionloom.train.masks import CONTROLS, NOTHING, draw_masks, some_frames
 from motionloom.train.objectives import WordBank
+from motionloom.weights.adapter import Adapter, adapted, show
+from motionloom.weights.prior import Prior, read_tensors, save_prior
 from tests.nets import tiny
 from tests.train import runs
 

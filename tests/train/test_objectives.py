@@ -6,7 +6,7 @@ import torch
 from motionloom.features import humanml as hml
 from motionloom.features.layout import FEET, LAYOUT, ric
 from motionloom.train.objectives import PLANTED, displacement_error
-from tests.metrics.people import walking
+from tests.kinematics.people import walking
 
 MEAN, STD = torch.full((263,), 0.1), torch.full((263,), 0.5)
 

@@ -7,7 +7,6 @@ import pytest
 import torch
 from torch import nn
 
-from motionloom.checkpoint import Prior
 from motionloom.data.pairs import Pair, mirrored
 from motionloom.features import humanml as hml
 from motionloom.features.layout import LAYOUT
@@ -16,7 +15,8 @@ from motionloom.nets.pair import PairNet, Talk, other, part
 from motionloom.train.duets import KEEN, NEAR, Duets, Sight
 from motionloom.train.objectives import WEIGHTS
 from motionloom.train.pair import BEGUN, Drawn, Held, PairGuess, Parts, Settings, _over_rows, held_out, told
-from tests.metrics import people
+from motionloom.weights.prior import Prior
+from tests.kinematics import people
 from tests.nets import tiny
 from tests.train import runs
 

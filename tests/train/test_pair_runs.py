@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.checkpoint import Prior, read_tensors, save_prior
 from motionloom.cli import main
 from motionloom.data.pairs import Pair
 from motionloom.errors import MotionloomError
-from motionloom.nets.adapter import fingerprint
-from motionloom.nets.pair_block import PairBlock
 from motionloom.train.pair import held_out, train_pair
+from motionloom.weights.adapter import fingerprint
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior, read_tensors, save_prior
 from tests.data.test_pairs import write_pair
 from tests.nets import tiny
 from tests.train.test_pair import TEXT, objective, pair, recipe, walkers

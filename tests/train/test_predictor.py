@@ -6,12 +6,12 @@ import torch
 
 from motionloom.data.prediction import Protocol, Recording
 from motionloom.errors import MotionloomError
-from motionloom.features.benchmark_layouts import H36M_LAYOUT
 from motionloom.features.positions import SMPL_LAYOUT
-from motionloom.predictor import load_predictor
+from motionloom.lab.papers.benchmark_layouts import H36M_LAYOUT
 from motionloom.train.predictor import KINDS, Completion, Settings, Windows, new_predictor, train_predictor
 from motionloom.train.recipe import Recipe
-from tests.metrics import people
+from motionloom.weights.predictor import load_predictor
+from tests.kinematics import people
 
 SMALL = {"kept": 6, "layers": 2, "width": 32, "heads": 2, "dropout": 0.1}
 

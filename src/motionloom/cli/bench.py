@@ -25,8 +25,8 @@ def add(subparsers) -> None:
 
 
 def _bench(arguments: argparse.Namespace) -> None:
-    from motionloom.bench import table
-    from motionloom.evaluation.obey import check_report, plain, write_json
+    from motionloom.lab.bench import table
+    from motionloom.lab.suites.obey import check_report, plain, write_json
 
     if arguments.json:
         check_report(arguments.json)
@@ -43,10 +43,10 @@ def _bench(arguments: argparse.Namespace) -> None:
 
 
 def _generated(arguments: argparse.Namespace) -> dict[str, Any]:
-    from motionloom.bench import bench, defaults
-    from motionloom.checkpoint import Prior
+    from motionloom.lab.bench import bench, defaults
     from motionloom.tasks.long import compose
     from motionloom.tasks.text import generate
+    from motionloom.weights.prior import Prior
 
     weights = arguments.weights or "default"
     return bench(
@@ -56,8 +56,8 @@ def _generated(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _predicted(arguments: argparse.Namespace) -> dict[str, Any]:
-    from motionloom.bench import bench_prediction
-    from motionloom.predictor import Predictor
+    from motionloom.lab.bench import bench_prediction
+    from motionloom.weights.predictor import Predictor
 
     predictor = Predictor.load(arguments.weights or "predictor", device=arguments.device)
     return bench_prediction(predictor, quick=arguments.quick, progress=say)

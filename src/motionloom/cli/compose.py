@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from motionloom.cli.sampling import add_sampling, bar, check_outs, fail
 
 if TYPE_CHECKING:
+    from motionloom.goals.timeline import Timeline
     from motionloom.io.stream import Stream
     from motionloom.motion import Motion
-    from motionloom.tasks.timeline import Timeline
 
 SHOWN = 40
 """Segments listed at the end; --json lists all."""
@@ -43,7 +43,7 @@ def add(subparsers) -> None:
 
 def _compose(arguments: argparse.Namespace) -> int:
     if arguments.schema:
-        from motionloom.tasks.timeline import SCHEMA
+        from motionloom.goals.timeline import SCHEMA
 
         print(SCHEMA.read_text(encoding="utf-8"), end="")
         return 0
@@ -64,7 +64,7 @@ def _compose(arguments: argparse.Namespace) -> int:
 
 def _timeline(arguments: argparse.Namespace) -> "Timeline":
     """What is asked, whether in a file or on the command line."""
-    from motionloom.tasks import timeline
+    from motionloom.goals import timeline
 
     given: list[str] = arguments.segments
     if arguments.seed is not None and not 0 <= arguments.seed < timeline.MAX_SEED:
@@ -129,10 +129,10 @@ def _write(pieces: Iterable["Motion"], streams: Sequence["Stream"], fps: float |
 
 
 def _pieces(arguments: argparse.Namespace, timeline: "Timeline") -> Generator["Motion", None, None]:
-    from motionloom.checkpoint import Prior
     from motionloom.io import load
     from motionloom.tasks import long
     from motionloom.tasks.text import GUIDANCE, STEPS
+    from motionloom.weights.prior import Prior
 
     start = None if timeline.start is None else load(timeline.start)
     prior = Prior.load(arguments.weights, device=arguments.device)

@@ -17,9 +17,9 @@ from motionloom.cli.sampling import (
 )
 
 if TYPE_CHECKING:
-    from motionloom.checkpoint import Prior
+    from motionloom.goals.goal import Goal
     from motionloom.tasks.control import Adapters, Controlled
-    from motionloom.tasks.goals import Goal
+    from motionloom.weights.prior import Prior
 
 
 def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -63,7 +63,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
 def run_control(arguments: argparse.Namespace) -> None:
     """``motionloom control PROMPT --goal FILE``."""
     if arguments.schema:
-        from motionloom.tasks.goal_file import SCHEMA
+        from motionloom.goals.goal_file import SCHEMA
 
         print(SCHEMA.read_text(encoding="utf-8"), end="")
         return
@@ -87,10 +87,10 @@ def _goal(arguments: argparse.Namespace) -> "Goal":
     """All that is asked on the line as one goal."""
     from dataclasses import replace
 
+    from motionloom.goals.goal import FPS, merged
+    from motionloom.goals.goal_file import follow, read_goal
+    from motionloom.goals.reach import check_reach
     from motionloom.io import load
-    from motionloom.tasks.goal_file import follow, read_goal
-    from motionloom.tasks.goals import FPS, merged
-    from motionloom.tasks.reach import check_reach
     from motionloom.tasks.text import frames_in
 
     if bool(arguments.follow) != (arguments.clip is not None):
@@ -127,9 +127,9 @@ def _goal(arguments: argparse.Namespace) -> "Goal":
 def _make(arguments: argparse.Namespace, goal: "Goal") -> "tuple[list[Controlled], float]":
     import time
 
-    from motionloom.checkpoint import Prior
     from motionloom.tasks.control import control
     from motionloom.tasks.text import STEPS
+    from motionloom.weights.prior import Prior
 
     prior = Prior.load(arguments.weights, device=arguments.device)
     began = time.perf_counter()
@@ -150,7 +150,7 @@ def _adapters(names: list[str], prior: "Prior") -> "Adapters":
         return "fitting"
     if {"fitting", "none"} & set(names):
         fail("--adapters is none, fitting, or names of adapters; not a mix of them")
-    from motionloom.nets.adapter import Adapter
+    from motionloom.weights.adapter import Adapter
 
     return [Adapter.load(name, prior) for name in names]
 

@@ -27,7 +27,9 @@ def add(subparsers) -> None:
 
 def _build(arguments: argparse.Namespace) -> None:
     from motionloom.data.build import build
+    from motionloom.lab.papers.readers import find_takes
 
     build(
-        arguments.folders, arguments.out, captions=arguments.captions, workers=arguments.workers, mixed=arguments.mixed
-    )
+        arguments.folders, arguments.out, captions=arguments.captions, workers=arguments.workers, mixed=arguments.mixed,
+        find=find_takes,
+    )  # fmt: skip

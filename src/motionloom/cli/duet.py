@@ -8,11 +8,11 @@ from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
 from motionloom.cli.sampling import bar, check_count, check_prompt, fail, places, report, take_text_anywhere
 
 if TYPE_CHECKING:
-    from motionloom.checkpoint import Prior
+    from motionloom.goals.goal import Goal
+    from motionloom.goals.timeline import Timeline
     from motionloom.motion import Motion
-    from motionloom.nets.pair_block import PairBlock
-    from motionloom.tasks.goals import Goal
-    from motionloom.tasks.timeline import Timeline
+    from motionloom.weights.pair import PairBlock
+    from motionloom.weights.prior import Prior
 
 MAX_SECONDS = 3600.0
 """Of a timeline."""
@@ -156,8 +156,8 @@ def _composed(
 
 
 def _load(arguments: argparse.Namespace) -> "tuple[Prior, PairBlock]":
-    from motionloom.checkpoint import Prior
-    from motionloom.nets.pair_block import PairBlock
+    from motionloom.weights.pair import PairBlock
+    from motionloom.weights.prior import Prior
 
     prior = Prior.load(arguments.weights, device=arguments.device)
     return prior, PairBlock.load(arguments.block, prior)
@@ -182,10 +182,10 @@ def _read(arguments: argparse.Namespace) -> "tuple[list[Motion], list[tuple[floa
 
 def _timeline(arguments: argparse.Namespace) -> "Timeline":
     from motionloom.errors import MotionloomError
+    from motionloom.goals.timeline import read_timeline
     from motionloom.io.lined_yaml import fail as fail_at
     from motionloom.io.lined_yaml import read_lined
     from motionloom.tasks.pair import prompts_of
-    from motionloom.tasks.timeline import read_timeline
 
     path = arguments.timeline
     timeline = read_timeline(path)
@@ -209,9 +209,9 @@ def _timeline(arguments: argparse.Namespace) -> "Timeline":
 def _goal(arguments: argparse.Namespace) -> "Goal":
     """What one of the two is asked: a goal file, such a mapping in YAML, or a drawn line."""
     from motionloom.errors import MotionloomError
+    from motionloom.goals.goal import FPS
+    from motionloom.goals.goal_file import read_goal
     from motionloom.io.lined_yaml import read_lined
-    from motionloom.tasks.goal_file import read_goal
-    from motionloom.tasks.goals import FPS
     from motionloom.tasks.text import frames_in
 
     path: Path = arguments.path

@@ -85,9 +85,9 @@ def run_edit(arguments: argparse.Namespace) -> None:
 def _make(arguments: argparse.Namespace, clip: "Motion") -> "tuple[list[Motion], float]":
     import time
 
-    from motionloom.checkpoint import Prior
     from motionloom.tasks.edit import edit
     from motionloom.tasks.text import STEPS
+    from motionloom.weights.prior import Prior
 
     prior = Prior.load(arguments.weights, device=arguments.device)
     began = time.perf_counter()

@@ -66,8 +66,8 @@ def _sampling(parser: argparse.ArgumentParser) -> None:
 
 def _generator(arguments: argparse.Namespace):
     """The prior behind a plain function of prompts, length and seed."""
-    from motionloom.checkpoint import Prior
-    from motionloom.evaluation.generator import generator
+    from motionloom.lab.suites.generator import generator
+    from motionloom.weights.prior import Prior
 
     prior = Prior.load(arguments.weights, device=arguments.device)
     return generator(
@@ -82,9 +82,9 @@ def _settings(arguments: argparse.Namespace) -> dict:
 def _obedience(arguments: argparse.Namespace) -> None:
     import json
 
-    from motionloom.evaluation import obey
-    from motionloom.evaluation.reference import known
-    from motionloom.metrics.obedience import CHECKS, check
+    from motionloom.lab.metrics.obedience import CHECKS, check
+    from motionloom.lab.suites import obey
+    from motionloom.lab.suites.reference import known
 
     checks = [check(name) for name in arguments.only] if arguments.only else list(CHECKS)
     settings = _settings(arguments)
@@ -114,9 +114,9 @@ def _realism(arguments: argparse.Namespace) -> None:
     import json
 
     from motionloom.errors import MotionloomError
-    from motionloom.evaluation import obey, realism
-    from motionloom.evaluation.clips import real_clips
-    from motionloom.evaluation.reference import known
+    from motionloom.lab.suites import obey, realism
+    from motionloom.lab.suites.clips import real_clips
+    from motionloom.lab.suites.reference import known
 
     if not 1 <= arguments.count <= 100_000:
         raise MotionloomError(f"the count must be from 1 to 100000; got {arguments.count}")
@@ -144,8 +144,8 @@ def _realism(arguments: argparse.Namespace) -> None:
 
 
 def _reference(arguments: argparse.Namespace) -> None:
-    from motionloom.evaluation import obey, reference
-    from motionloom.evaluation.clips import real_clips
+    from motionloom.lab.suites import obey, reference
+    from motionloom.lab.suites.clips import real_clips
 
     if arguments.out:
         obey.check_report(arguments.out)

@@ -36,12 +36,12 @@ def _tools(arguments: argparse.Namespace):
     """Motions and speeds of the weights, which are loaded once, when a suite first asks."""
     from functools import cache
 
-    from motionloom.bench import bench, defaults
-    from motionloom.checkpoint import Prior
     from motionloom.cli.evaluate_text import _memory
-    from motionloom.evaluation.generator import generator
-    from motionloom.evaluation.suites import Tools
+    from motionloom.lab.bench import bench, defaults
+    from motionloom.lab.suites.generator import generator
+    from motionloom.lab.suites.registry import Tools
     from motionloom.tasks.text import generate
+    from motionloom.weights.prior import Prior
 
     @cache
     def prior() -> Prior:
@@ -59,7 +59,9 @@ def _tools(arguments: argparse.Namespace):
 
 
 def _all(arguments: argparse.Namespace) -> int:
-    from motionloom.evaluation import everything, report, results, suites
+    from motionloom.lab.report import report, results
+    from motionloom.lab.suites import everything
+    from motionloom.lab.suites import registry as suites
 
     wanted = suites.chosen(arguments.only or ())
     out = arguments.out or Path("out") / ("quick" if arguments.quick else "results")
@@ -84,8 +86,8 @@ def _all(arguments: argparse.Namespace) -> int:
 def _compare(arguments: argparse.Namespace) -> int:
     import json
 
-    from motionloom.evaluation import compare
-    from motionloom.evaluation.obey import plain
+    from motionloom.lab.report import compare
+    from motionloom.lab.suites.obey import plain
 
     found, alone = compare.compare_all(arguments.before, arguments.after, anyway=arguments.anyway)
     shown = found if arguments.every else [one for one in found if one.verdict in ("worse", "better", "other")]

@@ -34,7 +34,7 @@ def add(commands) -> None:
 
 
 def _control(arguments: argparse.Namespace) -> None:
-    from motionloom.evaluation import control, control_kinds, obey
+    from motionloom.lab.suites import control, control_kinds, obey
 
     if arguments.out:
         obey.check_report(arguments.out / "report.json")
@@ -50,7 +50,7 @@ def _control(arguments: argparse.Namespace) -> None:
 
 def _protocol(arguments: argparse.Namespace):
     """The defaults, of a quick run or a full one, with what was said."""
-    from motionloom.evaluation.control import quick, settings
+    from motionloom.lab.suites.control import quick, settings
 
     said = given(arguments, SETTINGS)
     if arguments.quick:

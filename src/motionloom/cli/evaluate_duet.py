@@ -62,7 +62,8 @@ def add(commands) -> None:
 def _duet(arguments: argparse.Namespace) -> None:
     import json
 
-    from motionloom.evaluation import obey, report
+    from motionloom.lab.report import report
+    from motionloom.lab.suites import obey
 
     set_threads(arguments)
     if arguments.write_bare:
@@ -83,14 +84,14 @@ def _duet(arguments: argparse.Namespace) -> None:
 
 
 def _write_bare(arguments: argparse.Namespace) -> None:
-    from motionloom.checkpoint import Prior
-    from motionloom.evaluation.duet_ways import write_bare
+    from motionloom.lab.suites.duet_ways import write_bare
+    from motionloom.weights.prior import Prior
 
     print(write_bare(Prior.load(arguments.weights), arguments.write_bare))
 
 
 def _printed(found) -> str:
-    from motionloom.evaluation.prediction import printed
+    from motionloom.lab.suites.prediction import printed
 
     return printed(found)
 
@@ -98,7 +99,7 @@ def _printed(found) -> str:
 def _completion(arguments: argparse.Namespace):
     from dataclasses import replace
 
-    from motionloom.evaluation import duet
+    from motionloom.lab.suites import duet
 
     said = {name: value for name in ("crops", "samples", "steps") if (value := getattr(arguments, name)) is not None}
     how = replace(duet.QUICK if arguments.quick else duet.How(), given=arguments.given, seed=arguments.seed, **said)
@@ -120,8 +121,8 @@ def _mrt(arguments: argparse.Namespace) -> Path | None:
     if own is None or arguments.train_mrt < 1:
         raise MotionloomError("--train-mrt needs one step or more, and --out FOLDER for its weights")
     if not own.is_file():
-        from motionloom.data.pairs import find_pairs
-        from motionloom.train.mrt import train_mrt
+        from motionloom.lab.papers.mrt_training import train_mrt
+        from motionloom.lab.papers.readers import find_pairs
 
         pairs = find_pairs(arguments.data, captions=False, say=say)
         train_mrt(pairs, own.parent, steps=arguments.train_mrt, seed=arguments.seed, device=arguments.device, say=say)
@@ -132,7 +133,7 @@ def _judged(arguments: argparse.Namespace, part: str):
     """Duets that are held against real ones."""
     from dataclasses import replace
 
-    from motionloom.evaluation import duet_answers, duet_long, duet_text
+    from motionloom.lab.suites import duet_answers, duet_long, duet_text
 
     module = {"text": duet_text, "answers": duet_answers, "long": duet_long}[part]
     said = {name: value for name in ("duets", "steps") if (value := getattr(arguments, name)) is not None}

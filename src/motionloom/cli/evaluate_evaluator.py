@@ -25,13 +25,13 @@ def add(commands) -> None:
 def _evaluator(arguments: argparse.Namespace) -> None:
     import json
 
-    from motionloom.checkpoint import Prior
     from motionloom.errors import MotionloomError
-    from motionloom.evaluation import report as reports
-    from motionloom.evaluation.agreement import agreement
-    from motionloom.evaluation.evaluators import load_evaluator
-    from motionloom.evaluation.obey import check_report
-    from motionloom.evaluation.own import validate
+    from motionloom.lab.evaluator.agreement import agreement
+    from motionloom.lab.evaluator.evaluators import load_evaluator
+    from motionloom.lab.evaluator.own import validate
+    from motionloom.lab.report import report as reports
+    from motionloom.lab.suites.obey import check_report
+    from motionloom.weights.prior import Prior
 
     if not 1 <= arguments.repeats <= 10_000 or not 0 <= arguments.seeds <= 1000:
         raise MotionloomError(

@@ -10,7 +10,7 @@ ROWS = ("real", "zero", "constant", "ours", "ours-many", "published")
 STUDIES = (
     "coefficients", "layers", "schedules", "noising", "dct", "steps", "horizon", "hold", "switch",
 )  # fmt: skip
-"""As in `motionloom.evaluation.prediction_studies`, which takes its time to import."""
+"""As in `motionloom.lab.suites.prediction_studies`, which takes its time to import."""
 DATA = ("cmu", "h36m", "humaneva", "amass", "own")
 
 
@@ -71,7 +71,8 @@ def _shared(parser: argparse.ArgumentParser) -> None:
 def _prediction(arguments: argparse.Namespace) -> None:
     import json
 
-    from motionloom.evaluation import obey, prediction, report
+    from motionloom.lab.report import report
+    from motionloom.lab.suites import obey, prediction
 
     how = _how(arguments)
     set_threads(arguments)
@@ -92,7 +93,7 @@ def _how(arguments: argparse.Namespace):
     """The defaults, of a quick run or a full one, with what was said."""
     from dataclasses import replace
 
-    from motionloom.evaluation.prediction import QUICK, How
+    from motionloom.lab.suites.prediction import QUICK, How
 
     names = ("samples", "windows", "steps", "guidance", "published_steps", "replications", "seed")
     said = {name: value for name in names if (value := getattr(arguments, name)) is not None}
@@ -100,8 +101,8 @@ def _how(arguments: argparse.Namespace):
 
 
 def _study(arguments: argparse.Namespace) -> None:
-    from motionloom.evaluation import prediction_studies as studies
-    from motionloom.evaluation import report
+    from motionloom.lab.report import report
+    from motionloom.lab.suites import prediction_studies as studies
 
     set_threads(arguments)
     budget = studies.budget(
@@ -121,7 +122,7 @@ def _command(arguments: argparse.Namespace, kind: str) -> str:
     """What to type to measure the same again; where data lie differs between machines, so they are called DIR."""
     import shlex
 
-    from motionloom.predictor import shipped_predictors
+    from motionloom.weights.predictor import shipped_predictors
 
     words = ["motionloom", "evaluate", kind, *([arguments.name] if kind == "study" else []), "--data", "DIR"]
     weights = arguments.weights if arguments.weights in shipped_predictors() else Path(arguments.weights).name

@@ -58,7 +58,7 @@ def _times(said: str) -> tuple[int, int]:
 
 
 def _text(arguments: argparse.Namespace) -> None:
-    from motionloom.evaluation import obey, text
+    from motionloom.lab.suites import obey, text
 
     if arguments.make_reference:
         return _make_reference(arguments)
@@ -75,9 +75,9 @@ def _text(arguments: argparse.Namespace) -> None:
 
 def _make_reference(arguments: argparse.Namespace) -> None:
     from motionloom.errors import MotionloomError
-    from motionloom.evaluation import text_reference
-    from motionloom.evaluation.evaluators import load_evaluator
-    from motionloom.evaluation.text import reference
+    from motionloom.lab.evaluator.evaluators import load_evaluator
+    from motionloom.lab.suites import text_reference
+    from motionloom.lab.suites.text import reference
 
     if arguments.data is None:
         raise MotionloomError("a reference is made of real motions; name them with --data")
@@ -89,7 +89,7 @@ def _make_reference(arguments: argparse.Namespace) -> None:
 
 def _protocol(arguments: argparse.Namespace):
     """The defaults with what was said."""
-    from motionloom.evaluation.protocol import Protocol, quick
+    from motionloom.lab.suites.protocol import Protocol, quick
 
     names = ("steps", "replications", "count", "lengths", "multimodality", "guidance", "solver", "seed")
     how = given(arguments, names)
@@ -105,7 +105,7 @@ def _memory(arguments: argparse.Namespace, steps: int) -> float:
     """Peak MB of a fresh process that generates eight motions of 9.8 s, as files."""
     import tempfile
 
-    from motionloom.bench import process
+    from motionloom.lab.bench import process
 
     with tempfile.TemporaryDirectory() as folder:
         return process(

@@ -34,7 +34,7 @@ def add(commands) -> None:
 
 
 def _transitions(arguments: argparse.Namespace) -> None:
-    from motionloom.evaluation import obey, transitions
+    from motionloom.lab.suites import obey, transitions
 
     if arguments.make_reference:
         return _make_reference(arguments)
@@ -51,8 +51,8 @@ def _transitions(arguments: argparse.Namespace) -> None:
 
 def _make_reference(arguments: argparse.Namespace) -> None:
     from motionloom.errors import MotionloomError
-    from motionloom.evaluation import obey, real_seams
-    from motionloom.evaluation.items import fitting, read_items
+    from motionloom.lab.suites import obey, real_seams
+    from motionloom.lab.suites.items import fitting, read_items
 
     if arguments.data is None:
         raise MotionloomError("a reference is made of real motions; name them with --data")
@@ -67,7 +67,7 @@ def _make_reference(arguments: argparse.Namespace) -> None:
 
 def _protocol(arguments: argparse.Namespace):
     """The defaults with what was said."""
-    from motionloom.evaluation.protocol import Transitions, quick_transitions
+    from motionloom.lab.suites.protocol import Transitions, quick_transitions
 
     how = Transitions(**given(arguments, SETTINGS))
     return quick_transitions(how) if arguments.quick else how

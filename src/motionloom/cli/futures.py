@@ -100,7 +100,7 @@ def draw_overlays(motions: "Sequence[Motion]", past: int, files: Sequence[Path],
     """Pictures and films of the first futures over each other; the motions begin with ``past`` common frames."""
     if not files:
         return
-    from motionloom.io.overlay import draw_futures
+    from motionloom.viz.overlay import draw_futures
 
     known = motions[0].frames(0, past)
     futures = [motion.frames(past, len(motion)) for motion in motions[:SHOWN]]

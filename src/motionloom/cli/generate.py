@@ -74,8 +74,8 @@ def _lines(file: Path) -> list[str]:
 def _make(arguments: argparse.Namespace, prompts: list[str]):
     import time
 
-    from motionloom.checkpoint import Prior
     from motionloom.tasks.text import generate
+    from motionloom.weights.prior import Prior
 
     prior = Prior.load(arguments.weights, device=arguments.device)
     given = {"steps": arguments.steps, "solver": arguments.solver}

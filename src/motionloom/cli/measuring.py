@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from motionloom.evaluation.protocol import Selection
-    from motionloom.evaluation.report import Report
+    from motionloom.lab.report.report import Report
+    from motionloom.lab.suites.protocol import Selection
 
 
 def add_judged(parser: argparse.ArgumentParser, *, data: str) -> None:
@@ -38,7 +38,7 @@ def say(line: str) -> None:
 
 def selected(arguments: argparse.Namespace) -> "Selection | None":
     """None where nothing was said: the defaults, or those of the shipped numbers."""
-    from motionloom.evaluation.protocol import Selection
+    from motionloom.lab.suites.protocol import Selection
 
     if arguments.split is None and arguments.sources is None:
         return None
@@ -81,7 +81,7 @@ def show(found: "Report", arguments: argparse.Namespace) -> None:
     import json
     from dataclasses import replace
 
-    from motionloom.evaluation import report
+    from motionloom.lab.report import report
 
     if arguments.out:
         report.write(found, arguments.out)

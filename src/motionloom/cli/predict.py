@@ -11,9 +11,9 @@ from motionloom.cli.reading import add_reading, as_seconds, crop, note_rate, rea
 from motionloom.cli.sampling import bar, check_count, fail
 
 if TYPE_CHECKING:
+    from motionloom.goals.hold import Hold
     from motionloom.motion import Motion
-    from motionloom.predictor import Predictor
-    from motionloom.tasks.predict import Hold
+    from motionloom.weights.predictor import Predictor
 
 LONG = 30.0
 """Seconds from which on futures are written while they are made, one after the other."""
@@ -28,7 +28,7 @@ class _PrintSchema(argparse.Action):
     """Print what a mask file may hold, and end."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        from motionloom.tasks.mask_file import SCHEMA
+        from motionloom.goals.mask_file import SCHEMA
 
         print(SCHEMA.read_text(encoding="utf-8"), end="")
         parser.exit()
@@ -215,7 +215,7 @@ def _pieces(
 
 
 def _predictor(arguments: argparse.Namespace) -> "Predictor":
-    from motionloom.predictor import Predictor
+    from motionloom.weights.predictor import Predictor
 
     return Predictor.load(arguments.weights, device=arguments.device)
 
@@ -286,8 +286,8 @@ def _difference(motion: "Motion", past: "Motion") -> str:
 
 def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "Hold | None":
     """What is held, if anything is."""
-    from motionloom.tasks import mask_file
-    from motionloom.tasks.predict import HeldPart, Hold
+    from motionloom.goals import mask_file
+    from motionloom.goals.hold import HeldPart, Hold
 
     if not (arguments.hold or arguments.mask):
         if arguments.source is not None:

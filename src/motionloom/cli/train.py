@@ -58,7 +58,7 @@ def _prior(arguments: argparse.Namespace) -> None:
 
 
 def _evaluator(arguments: argparse.Namespace) -> None:
-    from motionloom.train.evaluator import train_evaluator
+    from motionloom.lab.evaluator.training import train_evaluator
 
     _train(arguments, train_evaluator)
 
@@ -70,7 +70,7 @@ def _control(arguments: argparse.Namespace) -> None:
 
 
 def _predictor(arguments: argparse.Namespace) -> None:
-    from motionloom.data.benchmarks import find_protocol
+    from motionloom.lab.papers.benchmarks import find_protocol
     from motionloom.train.predictor import train_predictor
 
     recipe = _recipe(arguments)
@@ -80,7 +80,7 @@ def _predictor(arguments: argparse.Namespace) -> None:
 
 
 def _duet(arguments: argparse.Namespace) -> None:
-    from motionloom.data.pairs import find_pairs
+    from motionloom.lab.papers.readers import find_pairs
     from motionloom.train.pair import Settings, train_pair
 
     recipe = _recipe(arguments)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import numpy as np
 
-    from motionloom.checkpoint import Prior
-    from motionloom.nets.pair_block import PairBlock
-    from motionloom.predictor import Predictor
+    from motionloom.weights.pair import PairBlock
+    from motionloom.weights.predictor import Predictor
+    from motionloom.weights.prior import Prior
 
 
 def add(subparsers) -> None:
@@ -42,12 +42,13 @@ def add(subparsers) -> None:
 
 
 def _import(arguments: argparse.Namespace) -> None:
-    from motionloom.checkpoint import import_published, save_prior
     from motionloom.errors import MotionloomError
     from motionloom.io.atomic import check_place
-    from motionloom.nets.pair_published import is_pair
-    from motionloom.nets.published import read_published
-    from motionloom.predictor import is_humanmac
+    from motionloom.lab.papers.commdm import is_pair
+    from motionloom.lab.papers.humanmac_checkpoint import is_humanmac
+    from motionloom.lab.papers.mdm import read_published
+    from motionloom.lab.papers.published_priors import import_published
+    from motionloom.weights.prior import save_prior
 
     if arguments.out.suffix != ".safetensors":
         raise MotionloomError(f"weights are written as .safetensors; {arguments.out.name} has another suffix")
@@ -80,7 +81,7 @@ def _import(arguments: argparse.Namespace) -> None:
 
 
 def _imported_block(arguments: argparse.Namespace, prior: "Prior") -> "PairBlock":
-    from motionloom.nets.pair_block import import_block
+    from motionloom.lab.papers.published_priors import import_block
 
     base = prior.card.name
     return import_block(arguments.checkpoint, prior, base=base, name=f"{base}-pair", licence=arguments.licence)
@@ -88,7 +89,8 @@ def _imported_block(arguments: argparse.Namespace, prior: "Prior") -> "PairBlock
 
 def _import_predictor(arguments: argparse.Namespace) -> None:
     from motionloom.errors import MotionloomError
-    from motionloom.predictor import import_humanmac, save_predictor
+    from motionloom.lab.papers.humanmac_checkpoint import import_humanmac
+    from motionloom.weights.predictor import save_predictor
 
     if arguments.mean or arguments.std:
         raise MotionloomError("HumanMAC works on metres as they are: no --mean and no --std")
@@ -98,7 +100,7 @@ def _import_predictor(arguments: argparse.Namespace) -> None:
 
 def _import_evaluator(arguments: argparse.Namespace) -> None:
     from motionloom.errors import MotionloomError
-    from motionloom.evaluation.guo import read_published, save_guo
+    from motionloom.lab.papers.guo import read_published, save_guo
 
     if arguments.half:
         raise MotionloomError("an evaluator is kept as float32, so that its numbers are the published ones: no --half")
@@ -133,9 +135,9 @@ def _numbers(path: Path) -> "np.ndarray":
 
 
 def _weights(arguments: argparse.Namespace) -> None:
-    from motionloom.checkpoint import find_weights, shipped
-    from motionloom.nets.pair_block import blocks
-    from motionloom.predictor import shipped_predictors
+    from motionloom.weights.pair import blocks
+    from motionloom.weights.predictor import shipped_predictors
+    from motionloom.weights.prior import find_weights, shipped
 
     names = blocks() | shipped_predictors() | shipped()
     if arguments.weights is None:
@@ -155,8 +157,8 @@ def _weights(arguments: argparse.Namespace) -> None:
 
 def describe(path: Path, name: str | None = None) -> dict[str, Any]:
     """What a weight file says and holds; the whole file is read and checked. ``name``: the shipped one."""
-    from motionloom.nets.pair_block import is_block
-    from motionloom.predictor import is_predictor
+    from motionloom.weights.pair import is_block
+    from motionloom.weights.predictor import is_predictor
 
     said = _predictor(path) if is_predictor(path) else _block(path) if is_block(path) else _prior(path)
     about = {"name": said["name"], "file": str(path), "megabytes": round(path.stat().st_size / 1e6, 1)} | said
@@ -164,7 +166,7 @@ def describe(path: Path, name: str | None = None) -> dict[str, Any]:
 
 
 def _prior(path: Path) -> dict[str, Any]:
-    from motionloom.checkpoint import load_prior
+    from motionloom.weights.prior import load_prior
 
     prior = load_prior(path)
     config = prior.net.config
@@ -173,7 +175,7 @@ def _prior(path: Path) -> dict[str, Any]:
 
 
 def _predictor(path: Path) -> dict[str, Any]:
-    from motionloom.predictor import load_predictor
+    from motionloom.weights.predictor import load_predictor
 
     predictor = load_predictor(path)
     frames = {"observed": predictor.observed, "predicted": predictor.frames - predictor.observed}
@@ -202,7 +204,7 @@ def _network(
 
 
 def _block(path: Path) -> dict[str, Any]:
-    from motionloom.nets.pair_block import read_block
+    from motionloom.weights.pair import read_block
 
     block = read_block(path)
     config = block.config

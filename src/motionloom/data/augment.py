@@ -5,8 +5,8 @@ import numpy as np
 from motionloom import rotations as rot
 from motionloom.features import humanml as hml
 from motionloom.features.layout import LAYOUT
-from motionloom.metrics import physics as ph
-from motionloom.metrics.physics import Array
+from motionloom.kinematics import physics as ph
+from motionloom.kinematics.physics import Array
 
 UPPER = (12, 13, 14, 15, 16, 17, 18, 19, 20, 21)
 """Neck, head and arms."""

@@ -28,7 +28,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
 from motionloom.io.atomic import atomic_path
-from motionloom.metrics.physics import Array
+from motionloom.kinematics.physics import Array
 from motionloom.skeleton import SMPL22
 
 _DERIVED = re.compile(r"M?(mixed|joined|made)_\d")
@@ -422,18 +422,20 @@ def _check_clip(clip: Clip) -> None:
             raise ValueError(f"there is no label {note.kind!r}")
 
 
-Job = tuple[str, str, str, str]
-"""Folder, captions, name of the take, folder of the built set."""
+Finder = Callable[..., list[Take]]
+"""As `data.sources.find_takes`; a function of a module, so that worker processes find it too."""
+Job = tuple[str, str, str, str, Finder]
+"""Folder, captions, name of the take, folder of the built set, what finds the takes of the folder."""
 
 _takes: dict[tuple[str, str], dict[str, Take]] = {}
 
 
 def _prepare(job: Job) -> tuple[str, str]:
     """In a worker: write the clips of one take. Returns its name and why it was dropped ('' if it was not)."""
-    folder, captions, name, out = job
+    folder, captions, name, out, find = job
     key = (folder, captions)
     if key not in _takes:
-        _takes[key] = {take.name: take for take in reversed(list(find_takes(folder, captions=captions or None)))}
+        _takes[key] = {take.name: take for take in reversed(find(folder, captions=captions or None))}
     reason = ""
     try:
         for clip in clips_of(_takes[key][name]):
@@ -452,13 +454,17 @@ def build(
     captions: Path | str | None = None,
     workers: int = 2,
     mixed: int = 700,
+    find: Finder = find_takes,
     progress: Callable[[str], None] = print,
 ) -> Path:
-    """Build a training set from folders of recordings; returns ``set.json``. Takes already done are kept."""
+    """Build a training set from folders of recordings; returns ``set.json``. Takes already done are kept.
+
+    find: what finds the takes of a folder.
+    """
     out = Path(out)
     if workers < 1 or mixed < 0:
         raise MotionloomError(f"at least 1 worker and 0 mixed clips are needed; got {workers} and {mixed}")
-    jobs = list(_jobs(folders, captions, out, progress=progress))
+    jobs = list(_jobs(folders, captions, out, find=find, progress=progress))
     for part in ("clips", "done"):
         (out / part).mkdir(parents=True, exist_ok=True)
     left = [job for job in jobs if not (out / "done" / job[2]).exists()]
@@ -472,11 +478,16 @@ def build(
 
 
 def _jobs(
-    folders: Sequence[Path | str], captions: Path | str | None, out: Path, *, progress: Callable[[str], None]
+    folders: Sequence[Path | str],
+    captions: Path | str | None,
+    out: Path,
+    *,
+    find: Finder,
+    progress: Callable[[str], None],
 ) -> Iterator[Job]:
     seen: dict[str, str] = {}
     for folder in folders:
-        for take in find_takes(folder, captions=captions):
+        for take in find(folder, captions=captions):
             if not _NAME.fullmatch(take.name):
                 raise MotionloomError(
                     f"{folder}: {take.name!r} cannot be the name of a clip; use letters, digits, _ - ."
@@ -485,7 +496,7 @@ def _jobs(
                 progress(f"dropped a second {take.name} in {folder}: the one in {seen[take.name]} is used")
                 continue
             seen[take.name] = str(folder)
-            yield str(folder), str(captions or ""), take.name, str(out)
+            yield str(folder), str(captions or ""), take.name, str(out), find
 
 
 def _run(jobs: Sequence[Job], workers: int) -> Iterator[tuple[str, str]]:

@@ -1,7 +1,7 @@
 """Two people in one world: pairs of recordings with captions, for learning how people move together.
 
-Readers for the pack's dancing couples, for a user's own pairs of BVH files and (in `data.threedpw`) for 3DPW. All give
-the uniform person at 20 frames per second.
+Readers for the pack's dancing couples and for a user's own pairs of BVH files (`lab.papers.threedpw` is one for 3DPW).
+All give the uniform person at 20 frames per second.
 
 **One world for two bodies.** Bones become uniform, so people of other legs take other steps; the ground plane must
 shrink or grow alike for both, or the distance between them would mean something else for each. Heights and limbs take
@@ -11,7 +11,7 @@ mean, each one's planted feet slide by about d / 2 of how fast that person trave
 """
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from csv import DictReader
 from csv import Error as CsvError
 from dataclasses import dataclass, replace
@@ -23,21 +23,11 @@ from motionloom.data import sources
 from motionloom.data.paths import inside
 from motionloom.data.words import mirror_text
 from motionloom.errors import MotionloomError
-from motionloom.features import humanml as hml
-from motionloom.features.layout import FPS
+from motionloom.features.pair import together
 from motionloom.io import load
-from motionloom.metrics.physics import Array
-from motionloom.motion import Motion
-from motionloom.retarget import to_smpl22
-from motionloom.retarget.anatomy import read_body
+from motionloom.kinematics.physics import Array
 from motionloom.skeleton import SMPL22
 
-SHORTEST = 20
-"""Frames (at 20 per second) of the shortest pair."""
-FARTHEST = 10.0
-"""Metres: people who are never nearer than this have nothing to do with one another."""
-SAME = 1e-3
-"""Metres: two motions that differ by less everywhere, but for where they stand, are one."""
 _MAX_CAPTIONS = 1 << 20
 _LONGEST_CAPTION = 1000
 _MIRROR = list(SMPL22.mirror_pairs())
@@ -83,8 +73,6 @@ def find_pairs(
     folder: Path | str, *, captions: bool = True, say: Callable[[str], None] = lambda line: None
 ) -> list[Pair]:
     """The pairs of a folder, whose layout is recognised by the files in it; `captions` as in `read_pair_folder`."""
-    from motionloom.data import threedpw  # it makes pairs, and so imports this module
-
     folder = Path(folder)
     if not folder.is_dir():
         raise MotionloomError(
@@ -92,8 +80,6 @@ def find_pairs(
         )
     if (folder / "manifest.csv").is_file():
         return read_pack_pairs(folder, say=say)
-    if threedpw.is_3dpw(folder):
-        return threedpw.read_3dpw(folder, say=say)
     return read_pair_folder(folder, captions=captions)
 
 
@@ -242,59 +228,6 @@ def _own_pair(name: str, files: tuple[Path, Path], split: str, captions: tuple[s
 
 
 # One world -----------------------------------------------------------------------------------------------------------
-
-
-def together(first: Motion, second: Motion, *, name: str = "the pair") -> Array:
-    """(2, frames, 22, 3) metres at 20 frames per second: two people's motions as uniform people in their one world.
-
-    Args:
-        first: A person of any humanoid skeleton.
-        second: The other, as many frames at the same rate in the same world.
-        name: What errors call them.
-
-    Raises:
-        MotionloomError: The rates, then the lengths differ, they are shorter than a second, the same motion twice, or
-            the people are never nearer than `FARTHEST`.
-    """
-    if abs(first.fps - second.fps) > 1e-3 * first.fps:
-        raise MotionloomError(
-            f"{name}: the frame rates differ, {first.fps:g} and {second.fps:g} frames per second; a pair has one clock"
-        )
-    if len(first) != len(second):
-        raise MotionloomError(
-            f"{name}: the lengths differ, {len(first)} and {len(second)} frames; cut both to the same moments"
-        )
-    uniform = [to_smpl22(motion).positions() for motion in (first, second)]
-    legs = [read_body(motion.skeleton).leg for motion in (first, second)]
-    return checked(one_world(uniform, legs), first.fps, name=name)
-
-
-def one_world(uniform: Sequence[np.ndarray], legs: Sequence[float]) -> Array:
-    """(2, frames, 22, 3): each uniform person of `legs` (metres, before) moved on the ground to the common scale.
-
-    ``uniform`` are two (frames, 22, 3) whose places stand scaled by the uniform legs over each person's own.
-    """
-    mean = float(np.mean(legs))
-    moved = [
-        p + (leg / mean - 1.0) * p[:, :1] * np.array([1.0, 0.0, 1.0]) for p, leg in zip(uniform, legs, strict=True)
-    ]
-    return np.stack(moved)
-
-
-def checked(positions: np.ndarray, fps: float, *, name: str) -> Array:
-    """(2, frames, 22, 3) at ``fps`` to 20 frames per second with constant bones; raises for no pair, as `together`."""
-    result = np.stack([hml.uniform(hml.resample_positions(person, fps)) for person in positions])
-    if result.shape[1] < SHORTEST:
-        raise MotionloomError(f"{name}: only {result.shape[1] / FPS:.2f} s long; at least 1 s is needed")
-    apart = result[1] - result[0]
-    if np.abs(apart - apart[0, 0] * np.array([1.0, 0.0, 1.0])).max() < SAME:
-        raise MotionloomError(f"{name} are the same motion; a pair needs a recording of each person")
-    nearest = float(np.linalg.norm(apart[:, 0, [0, 2]], axis=-1).min())
-    if nearest > FARTHEST:
-        raise MotionloomError(
-            f"{name}: the two are never nearer than {nearest:.1f} m (at most {FARTHEST:g} m); export both in one world"
-        )
-    return result
 
 
 # Parts and variants --------------------------------------------------------------------------------------------------

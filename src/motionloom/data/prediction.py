@@ -2,7 +2,7 @@
 
 A `Protocol` is a data set as benchmarks use it: recordings of joint places by split, how much is observed and
 predicted, and which windows are tested. Here are the CMU part of the mocap pack and folders of a user's own files;
-`data.benchmarks` reads Human3.6M, HumanEva-I and AMASS.
+`lab.papers.benchmarks` reads Human3.6M, HumanEva-I and AMASS.
 """
 
 from collections.abc import Callable, Iterator

@@ -10,19 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.data import babel
 from motionloom.data.paths import inside
 from motionloom.data.words import describe_index
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import WIDTH
 from motionloom.io import load
-from motionloom.metrics.physics import Array
+from motionloom.kinematics.physics import Array
 from motionloom.retarget import to_smpl22
 
 CMU_LICENCE = "CMU mocap: free for research and commercial use; acknowledge mocap.cs.cmu.edu, NSF EIA-0196217"
 BANDAI_LICENCE = "Bandai-Namco-Research-Motiondataset, CC BY-NC 4.0: non-commercial use only"
 UNKNOWN_LICENCE = "not stated: as the owner of the recordings allows"
-BABEL_LICENCE = "BABEL / AMASS: non-commercial research under the licences of BABEL, AMASS and its subsets"
 HUMANML3D_LICENCE = "HumanML3D / AMASS: research use under the licences of AMASS and its subsets"
 
 
@@ -64,8 +62,6 @@ def find_takes(folder: Path | str, *, captions: Path | str | None = None) -> lis
         return list(_pack(folder))
     if (folder / "new_joint_vecs").is_dir():
         return list(_humanml3d(folder))
-    if babel.is_babel(folder):
-        return list(_babel(folder))
     takes = list(_cmu(folder, Path(captions) if captions else None))
     if not takes:
         raise MotionloomError(
@@ -164,24 +160,6 @@ def _humanml3d(folder: Path) -> Iterator[Take]:
                 tuple(_texts(folder / "texts" / f"{name}.txt")),
                 _features(path),
             )
-
-
-def _babel(folder: Path) -> Iterator[Take]:
-    """BABEL beside AMASS: every labelled stretch keeps its label, in seconds of the recording."""
-    for recording in babel.find_recordings(folder):
-        spans = [Span(0.0, float("inf"), recording.whole, "human")] if recording.whole else []
-        spans += [Span(s.start, s.end, (s.text,), "human") for s in recording.segments if not s.is_transition]
-        yield Take(
-            recording.name, "babel", BABEL_LICENCE, recording.split, tuple(spans), _babel_reader(folder, recording)
-        )
-
-
-def _babel_reader(folder: Path, recording: babel.Recording) -> Callable[[], tuple[Array, float]]:
-    def read() -> tuple[Array, float]:
-        motion = to_smpl22(babel.read_amass(babel.find_motion(folder, recording)))
-        return motion.positions(), motion.fps
-
-    return read
 
 
 def _texts(path: Path) -> Iterator[Span]:

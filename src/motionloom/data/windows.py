@@ -3,16 +3,16 @@
 Captions of whole clips say little about the five seconds a network sees: a clip called "walk, 90-degree left turn" may
 show a straight walk. These rules read displacement, heading, heights and swings, and for gestures also ask that the
 clip's own text names the action. They describe training windows only and share no thresholds with
-`metrics.obedience`, which judges what comes out.
+`lab.metrics.obedience`, which judges what comes out.
 """
 
 import re
 
 import numpy as np
 
-from motionloom.metrics import physics as ph
-from motionloom.metrics.gestures import longest
-from motionloom.metrics.physics import Array
+from motionloom.kinematics import physics as ph
+from motionloom.kinematics.gestures import longest
+from motionloom.kinematics.physics import Array
 
 Measures = dict[str, float]
 _BENT_OTHERWISE = r"danc|climb|cartwheel|dive|snake|fish|whale|crawl|flip|roll"

@@ -6,7 +6,7 @@ Nothing here knows about motion. Read `schedule`, `solvers`, `sampling`, then `d
 from .bases import Basis, Dct, Frames
 from .constraints import Constraint, chain, handshake, observe
 from .denoisers import Denoiser, Weight, blend, from_noise, guide, inpaint, join_rows, mix
-from .sampling import Snapshot, masked_draw, restart, row_draw, run, sample
+from .sampling import Snapshot, masked_draw, restart, row_draw, row_seed, run, sample
 from .schedule import SCHEDULES, SPACINGS, Draw, Schedule, State, cosine, from_betas, levels, linear, sigmoid, sqrt
 from .solvers import DDPM, SOLVERS, Ddim, DpmSolver2M, Solver, Step
 from .staggered import Guess, Link, staggered
@@ -48,6 +48,7 @@ __all__ = [
     "observe",
     "restart",
     "row_draw",
+    "row_seed",
     "run",
     "sample",
     "sigmoid",

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -82,6 +83,11 @@ def run(
 def restart(clean: State, schedule: Schedule, level: int, draw: Draw) -> State:
     """Clean data taken to `level` with fresh noise: the start of a walk that keeps what this noise leaves of it."""
     return schedule.noised(clean, level, draw(clean))
+
+
+def row_seed(seed: int, number: int, turn: int = 0) -> int:
+    """A seed for one future and one window of it, unlike that of any other."""
+    return int(np.random.SeedSequence((seed, number, turn)).generate_state(1, np.uint64)[0] >> np.uint64(1))
 
 
 def row_draw(seeds: Sequence[int], lengths: Sequence[int] | None = None) -> Draw:

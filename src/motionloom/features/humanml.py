@@ -6,7 +6,7 @@ Metres, +Y up, a person faces +Z and has the left side at +X. Arithmetic is floa
 The numbers carry three habits of the published code, kept under ``heading="compatible"`` (weights and statistics out
 there expect them) and absent under ``heading="corrected"``: the hip labels are swapped, so hips partly cancel the
 shoulders in the heading; the heading of frame 0 is forced to +Z; see `heading_quaternions`. Rotations are shortest arcs
-from the rest directions, without twist, and not those of a body model; `motionloom.features.ik` makes real ones.
+from the rest directions, without twist, and not those of a body model; `motionloom.kinematics.ik` makes real ones.
 """
 
 from itertools import pairwise

@@ -96,7 +96,7 @@ def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequ
 
         save_glb(several, path)
     else:
-        from motionloom.io.video import draw_sheet, draw_video
+        from motionloom.viz.video import draw_sheet, draw_video
 
         draw = draw_sheet if suffix == ".png" else draw_video
         draw(several, path, captions=captions)
@@ -134,8 +134,8 @@ def save_scene(
         from motionloom.io.gltf import save_glb
 
         return save_glb(motions, path, names=names)
-    from motionloom.io.overlay import draw_scene, tint
-    from motionloom.io.scene import Actor
+    from motionloom.viz.overlay import draw_scene, tint
+    from motionloom.viz.scene import Actor
 
     labels = names if names is not None else [""] * len(motions)
     actors = [Actor(m, tint(i), label=label) for i, (m, label) in enumerate(zip(motions, labels))]

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom.io.figure import Figure, figure
 from motionloom.motion import Motion
+from motionloom.viz.figure import Figure, figure
 
 Array = NDArray[np.float64]
 SIDES = 10

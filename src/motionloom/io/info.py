@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom.io.figure import body_height, body_start
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.viz.figure import body_height, body_start
 
 Array = NDArray[np.float64]
 

@@ -188,6 +188,6 @@ def _from_positions(arrays: dict[str, np.ndarray], fps: float | None, path: Path
         raise MotionloomError(f"{path} has positions but no 'fps' or no frames; give the frame rate")
     if np.abs(places).max() > 1e6:
         raise MotionloomError(f"{path}: '{name}' reaches {np.abs(places).max():g}; positions must be in metres")
-    from motionloom.features.ik import motion_from_positions
+    from motionloom.kinematics.ik import motion_from_positions
 
     return motion_from_positions(places, fps)

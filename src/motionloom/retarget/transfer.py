@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom.limbs import bend
 from motionloom.motion import Motion
 from motionloom.retarget.anatomy import CHILD, FEET, HEAD, TOES, Body, read_body
 from motionloom.retarget.floor import Stance, read_stance
 from motionloom.retarget.joint_map import Override, joint_map
+from motionloom.retarget.limbs import bend
 from motionloom.retarget.measured import frames_of_positions, mean_rotation
 from motionloom.skeleton import SMPL22, Skeleton
 

@@ -16,7 +16,6 @@ from typing import TypeAlias
 import torch
 from torch import Tensor
 
-from motionloom.checkpoint import Prior
 from motionloom.diffusion import (
     SOLVERS,
     Denoiser,
@@ -33,11 +32,12 @@ from motionloom.diffusion import (
     row_draw,
     run,
 )
+from motionloom.edits.steering import Correction, corrected
 from motionloom.errors import MotionloomError
-from motionloom.nets.adapter import AdaptedNet, show
 from motionloom.nets.prior import Condition, PriorNet
-from motionloom.tasks.steering import Correction, corrected
 from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS
+from motionloom.weights.adapter import AdaptedNet, show
+from motionloom.weights.prior import Prior
 
 Net: TypeAlias = PriorNet | AdaptedNet
 
@@ -61,7 +61,7 @@ def control_features(
 ) -> Tensor:
     """Motions in which the given numbers are exactly those of ``known``; (rows, frames, features) standardised.
 
-    nets: networks of this prior: its own, fine-tuned ones, `nets.adapter.adapted` ones; each is guided by itself.
+    nets: networks of this prior: its own, fine-tuned ones, `weights.adapter.adapted` ones; each is guided by itself.
     prompts: one per row, "" for none. known, mask: (rows, frames, features), the mask bool (with several controls
     their union); what is not given may hold anything. weights: one per network, a number or what broadcasts to the
     motions, or either by level (`diffusion.blend`); the mean by default. They are used as they are. seeds: one per

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom.features.feet import clean_feet
-from motionloom.features.ik import motion_from_positions
+from motionloom.edits.fitting import fit
+from motionloom.goals.goal import Goal, joined
+from motionloom.kinematics.feet import clean_feet
+from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
-from motionloom.tasks.fitting import fit
-from motionloom.tasks.goals import Goal, joined
 
 Array = NDArray[np.float64]
 

@@ -1,8 +1,8 @@
 """Completing windows of motion of which something is known: the past, an end, some joints (`Predictor`).
 
-The published way (`tasks.humanmac`) mixes the known frames into the noisy state and stops one level short of clean.
-Here the network is told what is known, the walk ends clean, and what is known is written back exactly; the rest is led
-to it so that neither place nor velocity jumps, and bones keep the lengths of the past.
+The published way (`lab.papers.humanmac`) mixes the known frames into the noisy state and stops one level short of
+clean. Here the network is told what is known, the walk ends clean, and what is known is written back exactly; the rest
+is led to it so that neither place nor velocity jumps, and bones keep the lengths of the past.
 """
 
 from collections.abc import Sequence
@@ -13,10 +13,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motionloom.diffusion import SOLVERS, guide, levels, row_draw, run
+from motionloom.diffusion import SOLVERS, guide, levels, row_draw, row_seed, run
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import bone_lengths, with_bones
-from motionloom.predictor import Predictor
+from motionloom.weights.predictor import Predictor
 
 Array = NDArray[np.float64]
 
@@ -228,8 +228,3 @@ def futures(
     ]  # fmt: skip
     made = np.concatenate(parts)
     return made.reshape(len(past), count, *made.shape[1:])
-
-
-def row_seed(seed: int, number: int, turn: int = 0) -> int:
-    """A seed for one future and one window of it, unlike that of any other."""
-    return int(np.random.SeedSequence((seed, number, turn)).generate_state(1, np.uint64)[0] >> np.uint64(1))

@@ -14,23 +14,20 @@ import torch
 from torch import Tensor
 
 from motionloom import rotations as rot
-from motionloom.checkpoint import Prior
 from motionloom.diffusion import SOLVERS, Denoiser, Weight, guide, levels, mix, row_draw, sample
+from motionloom.edits.fitting import fit
+from motionloom.edits.steering import Correction, corrected, toward
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import mask as named
 from motionloom.features.layout import ric
+from motionloom.goals.goal import Goal, Placement, placement_of
+from motionloom.goals.segment import LONGEST
 from motionloom.motion import Motion
-from motionloom.nets.adapter import Adapter, adapted
-from motionloom.nets.adapter import adapters as shipped
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.blending import blended
-from motionloom.tasks.fitting import fit
-from motionloom.tasks.goals import Goal, Placement, placement_of
-from motionloom.tasks.steering import Correction, corrected, toward
 from motionloom.tasks.text import (
     GUIDANCE,
     LARGEST_SEED,
-    LONGEST,
     ROWS,
     SOLVER,
     SPACING,
@@ -40,6 +37,9 @@ from motionloom.tasks.text import (
     smooth,
     to_motion,
 )
+from motionloom.weights.adapter import Adapter, adapted
+from motionloom.weights.adapter import adapters as shipped
+from motionloom.weights.prior import Prior
 
 Adapters = Literal["none", "fitting"] | Sequence[Adapter]
 
@@ -164,11 +164,16 @@ def controlled_numbers(goal: Goal) -> Tensor:
 
 
 def fitting_adapters(prior: Prior, goal: Goal) -> list[Adapter]:
-    """The shipped adapters for what is asked: one per joint that has its own, ``any`` for the others.
+    """The adapters beside the shipped weights for what is asked: one per joint that has its own, else ``any``.
 
-    MotionloomError for other weights than those they belong to, and for damaged files.
+    MotionloomError where there are none, for other weights than those they belong to, and for damaged files.
     """
     names = shipped()
+    if not names:
+        raise MotionloomError(
+            "no adapters lie in weights/control of this installation: they come with the repository, not with the "
+            "package; name adapter files, or control without them, which is as good"
+        )
     wanted = {("trajectory" if joint == "pelvis" else joint) for joint in goal.joints}
     chosen = {name if name in names else "any" for name in wanted} & set(names)
     return [Adapter.load(name, prior) for name in sorted(chosen)]

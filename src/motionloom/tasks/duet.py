@@ -16,24 +16,23 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom.checkpoint import Prior
-from motionloom.data.pairs import one_world
 from motionloom.diffusion import SOLVERS, Link, levels, staggered
+from motionloom.edits.relative_pose import Lead, leader
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.layout import FPS, WIDTH
+from motionloom.features.pair import one_world
+from motionloom.goals.goal import Goal
+from motionloom.goals.segment import LONGEST, Segment
 from motionloom.motion import Motion
 from motionloom.nets.pair import PLACE, PairNet, join, part
-from motionloom.nets.pair_block import PairBlock
 from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.body import bodies
 from motionloom.tasks.control import moved
-from motionloom.tasks.duet_places import Lead, leader
-from motionloom.tasks.goals import Goal
 from motionloom.tasks.long import Progress as Moves
-from motionloom.tasks.long import Row, Segment, Track, bound_together, chain_rows, in_world
+from motionloom.tasks.long import Row, Track, bound_together, chain_rows, in_world
 from motionloom.tasks.pair import (
     Duet,
     Seed,
@@ -46,7 +45,9 @@ from motionloom.tasks.pair import (
     standing_at,
 )
 from motionloom.tasks.splice import person_at_20, worn
-from motionloom.tasks.text import GUIDANCE, LONGEST, SOLVER, SPACING, STEPS, Progress, check, finish, smooth
+from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS, Progress, check, finish, smooth
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 

@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom.checkpoint import Prior
+from motionloom.edits.boundary import Stretch
 from motionloom.errors import MotionloomError
 from motionloom.features import layout
 from motionloom.features.layout import FPS, WIDTH
+from motionloom.goals.segment import LONGEST
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.redraw import Stretch, redraw
+from motionloom.tasks.redraw import redraw
 from motionloom.tasks.splice import (
     Kept,
     carried_level,
@@ -31,7 +32,8 @@ from motionloom.tasks.splice import (
     splice,
     standing,
 )
-from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, LONGEST, STEPS, Progress
+from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, STEPS, Progress
+from motionloom.weights.prior import Prior
 
 WINDOW = 8.0
 """Seconds that the network sees of a clip around a short stretch, the stretch included."""

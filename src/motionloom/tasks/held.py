@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import positions_at
+from motionloom.goals.hold import HeldPart, Hold
 from motionloom.motion import Motion
-from motionloom.predictor import Predictor
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.completion import Known
 from motionloom.tasks.splice import carried_level, concatenated, kept_parts, overlaid, standing
 from motionloom.tasks.windows import CONTEXT, person_of
+from motionloom.weights.predictor import Predictor
 
 Array = NDArray[np.float64]
 
@@ -23,27 +24,6 @@ RAMP = 0.2
 """Seconds in which a part that is held for a while is led there and back."""
 NEAR = (0.3, np.radians(20))
 """Metres and radians within which a source already goes on from the clip and is not moved there."""
-
-
-@dataclass(frozen=True)
-class HeldPart:
-    """Some joints, and when they are held."""
-
-    joints: tuple[str, ...]
-    """Joints and groups of the 22-joint skeleton; ``root``: the way through the world (so do pelvis and its groups)."""
-    spans: tuple[tuple[float, float], ...] = ((0.0, np.inf),)
-    """Seconds (from, to) behind the end of the past."""
-
-
-@dataclass(frozen=True, eq=False)
-class Hold:
-    """Parts whose future is given: they take the local rotations of another motion exactly."""
-
-    source: Motion
-    """On the past's skeleton and at its rate; its first frame is the first one to predict."""
-    parts: tuple[HeldPart, ...]
-    align: bool = True
-    """Whether a source that starts elsewhere is moved and turned on the ground to where the past ends."""
 
 
 @dataclass(frozen=True, eq=False)

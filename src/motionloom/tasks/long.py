@@ -5,7 +5,7 @@ side, and neighbours agree on what they share at every level (`diffusion.stagger
 knowing what comes before and after it. Rows come out one by one; their features are cut at the seams and strung
 together, and a moving window of frames becomes positions and a body.
 
-The published procedure and that of the paper are in `tasks.double_take`; docs/decisions/0013 tells them apart.
+The published procedure and that of the paper are in `lab.papers.double_take`; docs/decisions/0013 tells them apart.
 """
 
 from collections import deque
@@ -18,63 +18,33 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom.checkpoint import Prior
 from motionloom.diffusion import SOLVERS, Link, levels, staggered
+from motionloom.edits.boundary import joining
+from motionloom.edits.steering import Correction, toward
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
-from motionloom.metrics.physics import heading
+from motionloom.goals.goal import Goal, Placement, merged, overlaid, placement_of
+from motionloom.goals.paths import along
+from motionloom.goals.segment import Segment
+from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
 from motionloom.nets.prior import Bound
 from motionloom.tasks.body import Places, bodies
-from motionloom.tasks.goals import Goal, Placement, merged, overlaid, placement_of
-from motionloom.tasks.paths import along
-from motionloom.tasks.redraw import joining
 from motionloom.tasks.splice import person_at_20
-from motionloom.tasks.steering import Correction, toward
-from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, LONGEST, SOLVER, SPACING, STEPS
+from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, STEPS
 from motionloom.tasks.text import check as check_sampling
+from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 
 TOGETHER = 16
 """Rows denoised at once."""
-TRANSITION = 1.0
-"""Seconds that neighbours share unless said otherwise: the paper's handshake."""
-
 LOOK_BACK = 20
 """Frames of an older motion that a new one is made to follow."""
 
 Progress = Callable[[int], None]
 """Told how many more row moves were made; a segment takes as many as there are steps."""
-
-
-@dataclass(frozen=True)
-class Segment:
-    """One prompted stretch of a long motion."""
-
-    text: str
-    seconds: float
-    guidance: float | None = None
-    """Strength of the text; None: that of the whole."""
-    transition: float = TRANSITION
-    """Seconds shared with the next segment, half before and half after the seam."""
-    goal: Goal | None = None
-    """Wishes for the frames of this segment, seen from where the person stands when it begins (origin, facing +Z)."""
-
-    def __post_init__(self) -> None:
-        said = f"the segment {self.text[:40]!r}"
-        limits = (
-            ("seconds", self.seconds, LONGEST),
-            ("transition", self.transition, LONGEST),
-            ("guidance", self.guidance, 100),
-        )
-        for name, value, most in limits:
-            if value is not None and not abs(value) <= most:
-                raise MotionloomError(f"{said} has {name} {value:g}; give a number, at most {most:g}")
-        frames = round(self.seconds * FPS)
-        if self.goal is not None and len(self.goal) != frames:
-            raise MotionloomError(f"{said} has {frames} frames and its goal {len(self.goal)}; make them equally long")
 
 
 @dataclass(frozen=True, eq=False)

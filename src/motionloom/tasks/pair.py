@@ -13,30 +13,27 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom.checkpoint import Prior
-from motionloom.data.pairs import one_world, together
-from motionloom.diffusion import SOLVERS, Draw, guide, inpaint, levels, observe, row_draw, sample
+from motionloom.diffusion import SOLVERS, Draw, guide, inpaint, levels, observe, row_draw, row_seed, sample
+from motionloom.edits.fitting import fit
+from motionloom.edits.relative_pose import leader
+from motionloom.edits.steering import Correction, toward
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
+from motionloom.features.pair import one_world, together
+from motionloom.goals.goal import Goal, Placement, placement_of
+from motionloom.goals.segment import LONGEST
 from motionloom.motion import Motion
 from motionloom.nets.pair import PairNet, join, part
-from motionloom.nets.pair_block import PairBlock
 from motionloom.retarget import to_smpl22
 from motionloom.retarget.anatomy import read_body
-from motionloom.tasks.completion import row_seed
 from motionloom.tasks.control import moved
-from motionloom.tasks.duet_places import leader
-from motionloom.tasks.fitting import fit
-from motionloom.tasks.goals import Goal, Placement, placement_of
 from motionloom.tasks.long import Past
 from motionloom.tasks.splice import concatenated, kept_parts, splice, worn
-from motionloom.tasks.steering import Correction, toward
 from motionloom.tasks.text import (
     GUIDANCE,
     LARGEST_SEED,
-    LONGEST,
     SOLVER,
     SPACING,
     STEPS,
@@ -46,6 +43,8 @@ from motionloom.tasks.text import (
     frames_in,
     smooth,
 )
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 Duet = tuple[Motion, Motion]

@@ -15,14 +15,15 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import positions_at
 from motionloom.features.positions import SMPL_LAYOUT
+from motionloom.goals.hold import HeldPart, Hold
 from motionloom.motion import Motion
-from motionloom.predictor import Predictor
 from motionloom.retarget import to_smpl22
 from motionloom.tasks.completion import STEPS, TEMPERATURE, Known
-from motionloom.tasks.held import Given, HeldPart, Hold, check_like, given
+from motionloom.tasks.held import Given, check_like, given
 from motionloom.tasks.splice import carried_level, concatenated, kept_parts, splice, standing, worn
 from motionloom.tasks.text import LARGEST_SEED, Progress
 from motionloom.tasks.windows import CONTEXT, Pen, person_of, seen_frames, windows_for
+from motionloom.weights.predictor import Predictor
 
 __all__ = ["HeldPart", "Hold", "predict", "predict_pieces", "switch"]
 

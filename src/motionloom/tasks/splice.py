@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
-from motionloom.features.feet import clean_feet
 from motionloom.features.humanml import resample_positions
-from motionloom.features.ik import motion_from_positions
 from motionloom.features.layout import FEET, FPS
+from motionloom.kinematics.feet import clean_feet
+from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
 from motionloom.retarget import joints22, retarget, to_smpl22
 from motionloom.retarget.anatomy import read_body

@@ -10,19 +10,18 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom.checkpoint import Prior
 from motionloom.diffusion import SOLVERS, guide, levels, row_draw, sample
 from motionloom.errors import MotionloomError
 from motionloom.features import babel, humanml
-from motionloom.features.feet import clean_feet
-from motionloom.features.ik import motion_from_positions
 from motionloom.features.layout import LAYOUT, WIDTH
+from motionloom.goals.segment import LONGEST
+from motionloom.kinematics.feet import clean_feet
+from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
+from motionloom.weights.prior import Prior
 
 STEPS, SOLVER, SPACING, GUIDANCE = 24, "ddpm", "early", 2.5
 """How motions are sampled unless asked otherwise (docs/decisions/0008)."""
-LONGEST = 60.0
-"""Seconds: beyond this one prompt is no longer one action."""
 ROWS = 8
 """Motions denoised at once."""
 

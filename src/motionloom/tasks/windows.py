@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.features.feet import envelope
+from motionloom.diffusion import row_seed
 from motionloom.features.humanml import positions_at
+from motionloom.kinematics.feet import envelope
 from motionloom.motion import Motion
-from motionloom.predictor import Predictor
 from motionloom.retarget import to_smpl22
-from motionloom.tasks.completion import Known, next_frames, row_seed
+from motionloom.tasks.completion import Known, next_frames
+from motionloom.weights.predictor import Predictor
 
 Array = NDArray[np.float64]
 

@@ -3,7 +3,7 @@
     noise <- noise * (1 - M);   x_t = signal * x_0 + noise_t * noise;   loss over all numbers of the clean guess
 
 The given numbers M of a state are thus signal * x_0, without noise. From a finished prior, either all its weights are
-trained on (``full``, as published) or a low-rank adapter that is also told what is given (`motionloom.nets.adapter`).
+trained on (``full``, as published) or a low-rank adapter that is also told what is given (`weights.adapter`).
 """
 
 from collections.abc import Callable
@@ -14,10 +14,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from motionloom.checkpoint import Card, Prior, find_device, save_prior
 from motionloom.data.sets import FAVOUR, Batches, MotionSet, load_set, read_clips
 from motionloom.errors import MotionloomError
-from motionloom.nets.adapter import Adapter, AdapterNet, adapted, fingerprint, show, tensors_of
 from motionloom.nets.prior import Condition, PriorNet
 from motionloom.nets.text import TextEncoder
 from motionloom.train.loop import Average, Log, World, changed, train
@@ -25,6 +23,8 @@ from motionloom.train.masks import check_control, draw_masks
 from motionloom.train.objectives import CleanGuess, WordBank
 from motionloom.train.prior import restandardised
 from motionloom.train.recipe import Recipe
+from motionloom.weights.adapter import Adapter, AdapterNet, adapted, fingerprint, show, tensors_of
+from motionloom.weights.prior import Card, Prior, find_device, save_prior
 
 HELD_WINDOW, HELD_ROWS = 80, 48
 """Frames and number of the held-out windows that are reported on."""

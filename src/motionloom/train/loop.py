@@ -20,11 +20,11 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 from torch.nn.attention import SDPBackend, sdpa_kernel
 
-from motionloom.checkpoint import read_tensors
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.train.objectives import Objective
 from motionloom.train.recipe import Recipe
+from motionloom.weights.prior import read_tensors
 
 STATE = "state.safetensors"
 

@@ -15,18 +15,18 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from motionloom.checkpoint import Prior, find_device
 from motionloom.data.pairs import Pair
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, LAYOUT
-from motionloom.nets.adapter import fingerprint
 from motionloom.nets.pair import PLACE, PairConfig, PairNet, Talk, fitting, join, part
-from motionloom.nets.pair_block import PairBlock
 from motionloom.nets.prior import Condition
 from motionloom.train.duets import Crops, Duets, Sight
 from motionloom.train.loop import STATE, Average, Log, World, changed, train
 from motionloom.train.objectives import WEIGHTS, WordBank, displacement_error
 from motionloom.train.recipe import Recipe
+from motionloom.weights.adapter import fingerprint
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior, find_device
 
 BEGUN, LONGEST_BEGUN, SHORTEST_BEGUN = 20, 40, 10
 """Frames of a given beginning: the commonest, the most and the fewest."""

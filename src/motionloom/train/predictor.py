@@ -16,15 +16,15 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from motionloom.checkpoint import Card, find_device
 from motionloom.data.prediction import Protocol, Recording
 from motionloom.diffusion import SCHEDULES, Dct, Frames
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import Place
 from motionloom.nets.predictor import NetConfig, TransLinear
-from motionloom.predictor import Predictor, find_predictor, load_predictor, save_predictor, told_shape
 from motionloom.train.loop import Average, Log, World, changed, train
 from motionloom.train.recipe import Recipe
+from motionloom.weights.predictor import Predictor, find_predictor, load_predictor, save_predictor, told_shape
+from motionloom.weights.prior import Card, find_device
 
 WHOLE_PAST = 0.75
 """How often all of the past is told; else its last 2 frames or more."""

@@ -7,15 +7,6 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from motionloom.checkpoint import (
-    Card,
-    Prior,
-    find_device,
-    find_weights,
-    load_prior,
-    read_tensors,
-    save_prior,
-)
 from motionloom.data.sets import FAVOUR, Batches, MotionSet, load_set
 from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
@@ -24,6 +15,15 @@ from motionloom.nets.text import MiniLM, TextEncoder
 from motionloom.train.loop import Average, Log, World, changed, train
 from motionloom.train.objectives import CleanGuess, Conditioned, WordBank
 from motionloom.train.recipe import Recipe
+from motionloom.weights.prior import (
+    Card,
+    Prior,
+    find_device,
+    find_weights,
+    load_prior,
+    read_tensors,
+    save_prior,
+)
 
 
 def train_prior(
@@ -106,7 +106,7 @@ def _prior(recipe: Recipe, motions: MotionSet, average: Average, step: int, text
 
 
 def _show(prior: Prior, recipe: Recipe, path: Path) -> None:
-    from motionloom.io.video import draw_sheet
     from motionloom.tasks.text import generate
+    from motionloom.viz.video import draw_sheet
 
     draw_sheet(generate(prior, recipe.prompts, seconds=4.0), path, captions=recipe.prompts)

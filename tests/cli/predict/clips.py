@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from motionloom.checkpoint import Card
 from motionloom.cli import main
 from motionloom.diffusion import Dct, linear
 from motionloom.features.positions import SMPL_LAYOUT
 from motionloom.motion import Motion
 from motionloom.nets.predictor import NetConfig, TransLinear
-from motionloom.predictor import Predictor, told_shape
 from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.weights.predictor import Predictor, told_shape
+from motionloom.weights.prior import Card
 
 KEPT, OBSERVED, FRAMES, FPS = 24, 15, 75, 30.0
 

@@ -9,8 +9,8 @@ from motionloom import cli
 from motionloom.io import stream
 from motionloom.io.bvh_writer import save_bvh
 from motionloom.motion import Motion
-from motionloom.predictor import save_predictor
 from motionloom.tasks import predict as task
+from motionloom.weights.predictor import save_predictor
 from tests.cli.predict.clips import future, larger, tiny_predictor
 from tests.tasks.test_edit import person
 
@@ -68,7 +68,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list:
     """What was drawn over each other, instead of the slow drawing."""
-    from motionloom.io import overlay
+    from motionloom.viz import overlay
 
     seen: list = []
 

@@ -87,7 +87,7 @@ def test_a_part_of_a_file_can_be_the_past(weights, asked):
 @pytest.mark.parametrize("out", ["futures", "old", "a.npz"])
 def test_what_cannot_be_finished_leaves_nothing(weights, asked, monkeypatch, problem, out):
     """Neither a new folder nor a file in an old one, also where only the last picture fails."""
-    from motionloom.io import overlay
+    from motionloom.viz import overlay
 
     def fails(*_, **__):
         raise problem

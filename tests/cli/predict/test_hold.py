@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import io
+from motionloom.goals.hold import HeldPart
 from motionloom.io.bvh_writer import save_bvh
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.predict import HeldPart
 from tests.cli.predict.clips import run
 from tests.tasks.test_edit import person
 

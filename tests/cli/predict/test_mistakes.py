@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.checkpoint import save_prior
 from motionloom.cli import main
 from motionloom.io.bvh_writer import save_bvh
+from motionloom.weights.prior import save_prior
 from tests.cli.predict.clips import written
 from tests.cli.said import complaint
 from tests.nets import tiny

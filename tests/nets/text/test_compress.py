@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from motionloom.errors import MotionloomError
-from motionloom.nets.text import compress
 from motionloom.nets.text.wordpiece import SPECIALS
 from tests.nets.text.tiny import VOCABULARY
+from tools import compress_text_encoder as compress
 
 
 def chosen(captions: list[str], entries: int) -> list[str]:

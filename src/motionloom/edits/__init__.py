@@ -1,0 +1,1 @@
+"""What pulls a guess of the motion to something known."""

@@ -1,0 +1,194 @@
+"""Two people stay together: while they are drawn, where they stand to each other is asked again and again.
+
+Features tell velocities, so small errors of a guess add up, and two people who began as partners drift apart. A block
+knows better: it guesses where two people stand to each other at the first frame of whatever it is shown, and it learned
+that from crops that begin anywhere. So every guess is cut at several frames, the *knots*, the block is asked where the
+two stand there, and both are led half of the way to its answers.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from motionloom.diffusion import row_draw, row_seed
+from motionloom.errors import MotionloomError
+from motionloom.features import pair as two
+from motionloom.features.humanml import positions_at
+from motionloom.nets.pair import PLACE, PairNet, join, part
+from motionloom.nets.prior import Bound
+from motionloom.weights.prior import Prior
+
+SPACING = 40
+"""Frames from knot to knot, at most."""
+SHOWN = 60
+"""Frames behind a knot that the block is shown, at most."""
+LEAST = 20
+"""Frames behind a knot, at least."""
+SURE = 40
+"""Frames behind a past of both that stay as they are: their momentum tells more than the block does."""
+
+
+Lead: TypeAlias = Callable[[Tensor, Tensor, int], Tensor]
+"""(state, its guess, level) -> the guess of states (rows, 1 + frames, 263), changed."""
+
+
+def leader(
+    prior: Prior,
+    net: PairNet,
+    bound: Bound,
+    *,
+    seeds: Sequence[int],
+    mask: Tensor,
+    still: Sequence[bool],
+    weight: float = 1.0,
+) -> Lead:
+    """What leads the guesses of some pairs of one length; nothing does where a block never says where people stand.
+
+    bound, seeds: of each row; mask (rows, 1 + frames, 263): True where a state is known; it stays. Whose frames are all
+    known, or who is to be ``still``, is not led; then the other goes all of the way. weight: share of the way, 0 to
+    1, else MotionloomError. Codes of the kind world are left alone: they tell where crops stand in a file (published).
+    """
+    if not 0 <= weight <= 1:
+        raise MotionloomError(f"two people are kept together by 0 (not at all) to 1; got {weight:g}")
+    silent = not any(bool(value.any()) for value in net.talk.place.parameters())
+    if not weight or silent or net.talk.config.places.kind != "mutual":
+        return lambda state, guess, level: guess
+    known = mask[:, 1:, :3].all(dim=-1)
+    both = known.unflatten(0, (-1, 2)).all(dim=1)
+    given = [kept or bool(row.all()) for kept, row in zip(still, known, strict=True)]
+    past = both.cumprod(dim=1).sum(dim=1).tolist()
+    places = Places.of(seeds, known.shape[1], [count + SURE if count else 0 for count in past], given)
+
+    def lead(state: Tensor, guess: Tensor, level: int) -> Tensor:
+        made = places.led(prior, net, bound, state=state, guess=guess, level=level, weight=weight)
+        return torch.where(mask, guess, made)
+
+    return lead
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where it is asked, and who is moved; for some pairs of one length."""
+
+    knots: tuple[tuple[int, ...], ...]
+    """Frames of each pair."""
+    spread: tuple[Tensor, ...]
+    """(frames, knots) of each pair: how much of what is done at a knot is done in a frame."""
+    shares: Tensor
+    """(pairs, 2) how much of the way each person goes."""
+    noise: Tensor
+    """(2 * all knots, 4) of the numbers of D."""
+
+    @staticmethod
+    def of(seeds: Sequence[int], frames: int, begins: Sequence[int], given: Sequence[bool]) -> "Places":
+        """seeds, given: one per row, whether that person is not moved; begins: one per pair, the last frame that
+        stays as it is."""
+        knots = tuple(_knots(begin, frames) for begin in begins)
+        spread = tuple(_spread([begin, *some], frames) for some, begin in zip(knots, begins, strict=True))
+        free = 1.0 - torch.tensor([float(one) for one in given]).view(-1, 2)
+        shares = free / free.sum(1, keepdim=True).clamp(min=1.0)
+        most = max(len(some) for some in knots)
+        drawn = row_draw([row_seed(seed, 0, 2) for seed in seeds])(torch.zeros(len(seeds), max(most, 1), PLACE))
+        drawn = [drawn[2 * i : 2 * i + 2, : len(some)].transpose(0, 1).flatten(0, 1) for i, some in enumerate(knots)]
+        return Places(knots, spread, shares, torch.cat(drawn))
+
+    def led(
+        self, prior: Prior, net: PairNet, bound: Bound, *, state: Tensor, guess: Tensor, level: int | Tensor,
+        weight: float,
+    ) -> Tensor:  # fmt: skip
+        """A guess (rows, 1 + frames, 263) of a state at a level, changed; ``level``: one, or one per row."""
+        owner = [pair for pair, some in enumerate(self.knots) for _ in some]
+        if not owner or not self.shares.any():
+            return guess
+        code, spread = net.talk.config.places, torch.where(prior.std > 0, prior.std, 1.0)
+        places, motion = part(guess)
+        features = motion * spread + prior.mean
+        stands = code.decode(places.unflatten(0, (-1, 2)))
+        ways = two.compose(stands.flatten(0, 1)[:, None], two.along(features)).unflatten(0, (-1, 2))
+        at = [knot for some in self.knots for knot in some]
+        now = torch.stack([ways[pair, :, frame] for pair, frame in zip(owner, at, strict=True)])
+        rows = torch.tensor([2 * pair + person for pair in owner for person in (0, 1)], device=guess.device)
+        levels = level if isinstance(level, int) else level[rows]
+        noised = prior.schedule.noised(code.encode(now).flatten(0, 1), levels, self.noise.to(guess))
+        crops, lengths = _crops(state[:, 1:], rows.tolist(), [frame for frame in at for _ in (0, 1)])
+        asked = Bound(*(one[rows] for one in bound))._replace(lengths=lengths)
+        answer, _ = part(net(join(noised, crops), levels, asked))
+        lacking = _lacking(now, code.decode(answer.unflatten(0, (-1, 2)))) * weight
+        return join(places, (self._moved(features, ways, lacking) - prior.mean) / spread)
+
+    def _moved(self, features: Tensor, ways: Tensor, lacking: Tensor) -> Tensor:
+        """Features (rows, frames, 263) with what lacks at the knots (all knots, 3): facing, x and z."""
+        made, start = [], 0
+        for pair, (some, spread) in enumerate(zip(self.knots, self.spread, strict=True)):
+            change = spread.to(features) @ lacking[start : start + len(some)]
+            start += len(some)
+            for person, sign in ((0, -1.0), (1, 1.0)):
+                share = sign * float(self.shares[pair, person])
+                made.append(_along(features[2 * pair + person], ways[pair, person], share * change))
+        return torch.stack(made)
+
+
+def _crops(motion: Tensor, rows: Sequence[int], begins: Sequence[int]) -> tuple[Tensor, Tensor]:
+    """What of a motion (some rows, frames, 263) stands in ``rows`` from frames ``begins`` on, padded; and how long."""
+    crops = [motion[row, begin : begin + SHOWN] for row, begin in zip(rows, begins, strict=True)]
+    lengths = [len(crop) for crop in crops]
+    padded = [F.pad(crop, (0, 0, 0, max(lengths) - len(crop))) for crop in crops]
+    return torch.stack(padded), torch.tensor(lengths, device=motion.device)
+
+
+def _knots(begin: int, frames: int) -> tuple[int, ...]:
+    """Even steps from ``begin`` to `LEAST` frames before the end; none where that is too near."""
+    room = frames - LEAST - begin
+    count = -(-room // SPACING) if room >= SPACING // 2 else 0
+    return tuple(begin + round(room * number / count) for number in range(1, count + 1))
+
+
+def _spread(at: Sequence[int], frames: int) -> Tensor:
+    """(frames, knots), from the begin and the knots behind it: smooth curves, 1 at the own knot, 0 at the others and
+    at the begin; level behind the last."""
+    if len(at) == 1:
+        return torch.zeros(frames, 0)
+    along = np.interp(np.arange(frames), at, np.arange(len(at)))
+    return torch.from_numpy(positions_at(np.eye(len(at))[..., None], along)[:, 1:, 0]).float()
+
+
+def _lacking(now: Tensor, asked: Tensor) -> Tensor:
+    """(rows, 3): what the second person's facing, x and z lack, relative to the first; from stands (rows, 2, 4)."""
+    first, second = now[:, 0], now[:, 1]
+    there = two.seen(asked[:, 0], asked[:, 1])
+    turn = two.seen(two.seen(first, second), there)
+    angle = torch.atan2(turn[:, 1], turn[:, 0])
+    first, second = _turned(first, -angle / 2), _turned(second, angle / 2)
+    line = two.compose(first, there)[:, 2:] - first[:, 2:]
+    return torch.cat([angle[:, None], line - (second - first)[:, 2:]], dim=1)
+
+
+def _turned(stands: Tensor, angle: Tensor) -> Tensor:
+    """Stands (rows, 4) of people who turn on the spot, in radians (rows,) to their left."""
+    c, s = angle.cos(), angle.sin()
+    return torch.stack(
+        [c * stands[:, 0] - s * stands[:, 1], s * stands[:, 0] + c * stands[:, 1], stands[:, 2], stands[:, 3]], dim=1
+    )
+
+
+def _along(features: Tensor, way: Tensor, change: Tensor) -> Tensor:
+    """Features (frames, 263) of somebody who goes ``way`` (frames, 4), with a change (frames, 3) of facing, x and z."""
+    new = features.clone()
+    turn, step = change[1:, 0], change[1:, 1:] - change[:-1, 1:]
+    new[:-1, 0] -= (change[1:, 0] - change[:-1, 0]) / 2
+    # velocities are told in the heading of the frame they lead to
+    x, z = _back(features[:-1, 1], features[:-1, 2], turn.cos(), turn.sin())
+    there = _turned(way[1:], turn)
+    more = _back(step[:, 0], step[:, 1], there[:, 0], there[:, 1])
+    new[:-1, 1], new[:-1, 2] = x + more[0], z + more[1]
+    return new
+
+
+def _back(x: Tensor, z: Tensor, c: Tensor, s: Tensor) -> tuple[Tensor, Tensor]:
+    """A way on the ground as somebody who turned by an angle of this cosine and sine sees it."""
+    return c * x - s * z, c * z + s * x

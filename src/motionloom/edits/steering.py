@@ -1,0 +1,379 @@
+"""Steering: how a goal bends sampling. Each guess of the clean motion is changed, as little as it takes, to meet it.
+
+The change is the mean of a Gaussian process given what the goal asks (Rasmussen & Williams 2006, eq. 2.23): the root's
+velocity and the joints' places may be off by smooth curves of known size, joints that hang on the same limb together.
+Given the heading, places are linear in all of these, so the change is a product with matrices that only depend on
+which joints are asked when: nothing is differentiated, and the network does not know. Its next guess does the rest.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from motionloom.diffusion import Denoiser
+from motionloom.edits.stances import EASE, stilled
+from motionloom.errors import MotionloomError
+from motionloom.features import humanml
+from motionloom.features.layout import LAYOUT, WIDTH
+from motionloom.goals.goal import Goal, turn_between
+from motionloom.kinematics.physics import heading
+from motionloom.skeleton import SMPL22
+from motionloom.weights.prior import Prior
+
+Array = NDArray[np.float64]
+
+Correction: TypeAlias = Callable[[Tensor, int], Tensor]
+"""(standardised clean guess (frames, features) of one row, its level) -> the same, changed."""
+
+EXACT, FEW = 0.002, 0.05
+"""Metres: how exactly wishes are met, and how exactly the root does the part that is beyond a joint's reach."""
+MOST = 4000
+"""Wishes on one coordinate that are solved for at once; of more, evenly many frames are used."""
+_PACE, _YAW = 0.015, 0.03
+"""Standard deviations of the root's velocity (metres a frame) and of the heading's (radians a frame)."""
+_STILL, _HEIGHT = 0.003, 0.06
+"""The same for the root's velocity where a limb can do it (metres a frame), and for its going up and down (metres)."""
+_LIFT, _HOPELESS = 0.3, 1.0
+"""Metres that the body goes up or down to bring a wish into reach; the need beyond which it does not try."""
+_WIDTHS = ((0.9, 12.0), (0.5, 8.0), (0.0, 5.0))
+"""Frames over which a change is spread, from noises (of the schedule) above the first number of each pair."""
+_SWING = {3: 0.05, 6: 0.05, 9: 0.05, 12: 0.2, 13: 0.15, 14: 0.15, 16: 0.5, 17: 0.5, 18: 0.5, 19: 0.5,
+          1: 0.35, 2: 0.35, 4: 0.5, 5: 0.5, 7: 0.3, 8: 0.3, 0: 0.02}  # fmt: skip
+"""Radians by which the bones beyond a joint may be off."""
+_SLACK = {18: 0.15, 19: 0.15, 20: 0.25, 21: 0.25, 4: 0.15, 5: 0.15, 7: 0.3, 8: 0.3, 10: 0.3, 11: 0.3}
+"""Metres that a joint can go before the root must come along; 0.1 for those of the trunk."""
+_REACH = {20: (16, 0.48), 21: (17, 0.48), 18: (16, 0.25), 19: (17, 0.25), 7: (1, 0.79), 8: (2, 0.79), 10: (1, 0.85),
+          11: (2, 0.85)}  # fmt: skip
+"""Where limbs begin, and metres that they reach without being quite straight."""
+_LONGEST = 0.8
+"""Metres that a limb is moved at most: what is out of reach is pointed at."""
+_LEGS = (4, 7, 10), (5, 8, 11)
+"""Knee, ankle and foot, in the order of the contacts."""
+_TURN_OVER, _SLOW = 6.0, 0.01
+"""Frames over which the body turns with its path; metres a frame below which a path has no direction."""
+
+
+def toward(goal: Goal, prior: Prior, *, first: int = 0) -> Correction:
+    """The correction of one row's guess so that it meets ``goal``.
+
+    ``goal`` is in the row's own frame: the root at row frame ``first`` is the origin and faces +Z, and the goal's frame
+    k is the row's frame ``first + k``; what lies beyond the row's end is ignored. The corrected guess is within
+    `EXACT` of smooth wishes, whatever the guess was. An empty goal gives the guess itself.
+    """
+    if len(prior.mean) != WIDTH:
+        raise MotionloomError(f"goals need weights that make HumanML3D's {WIDTH} numbers; these make {len(prior.mean)}")
+    if first < 0:
+        raise MotionloomError(f"a goal cannot begin at frame {first} of a row; give 0 or more")
+    mean, std = prior.mean.cpu().double().numpy(), prior.std.cpu().double().numpy()
+    plans: dict[tuple[int, float], _Plan] = {}
+
+    def correct(guess: Tensor, level: int) -> Tensor:
+        if goal.empty or first >= len(guess):
+            return guess
+        noise = prior.schedule.at(level)[1]
+        key = len(guess), next(width for least, width in _WIDTHS if noise >= least)
+        if key not in plans:
+            plans[key] = _plan(_in_row(goal, first, len(guess)), first, key[1])
+        features = guess.detach().cpu().double().numpy() * std + mean
+        changed = (_bent(features, plans[key]) - features) / std
+        return guess + torch.from_numpy(changed).to(guess)
+
+    return correct
+
+
+def corrected(denoise: Denoiser, corrections: Sequence[Correction | None]) -> Denoiser:
+    """The denoiser whose guess of row i is changed by ``corrections[i]``; None leaves the row alone."""
+    if not any(corrections):
+        return denoise
+
+    def edited(state: Tensor, level: int) -> Tensor:
+        guess = denoise(state, level)
+        if len(guess) != len(corrections):
+            raise ValueError(f"{len(corrections)} corrections for {len(guess)} rows: give one, or None, per row")
+        rows = [row if change is None else change(row, level) for row, change in zip(guess, corrections, strict=True)]
+        return torch.stack(rows)
+
+    return edited
+
+
+# What does not depend on the guess
+
+
+@dataclass(frozen=True, eq=False)
+class _Limbs:
+    """How wishes on one coordinate move the joints."""
+
+    asked: tuple[NDArray[np.intp], NDArray[np.intp]]
+    """Frames and joints."""
+    inverse: Array
+    """(asked, asked) inverse of the covariance of what is asked."""
+    together: Array
+    """(22, 22) covariance of the joints."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    goal: Goal
+    """In the row's frames."""
+    first: int
+    moving: NDArray[np.intp]
+    """Frames in which the root is asked to be somewhere, by itself or by a joint."""
+    move: Array
+    """(frames + 1, moving): the root's change from what is asked of it; one frame more than the row has."""
+    turning: NDArray[np.intp]
+    turn: Array
+    """The same for the heading."""
+    lifting: NDArray[np.intp]
+    lift: Array
+    """The same for the body's going up and down."""
+    limbs: tuple[_Limbs | None, ...]
+    """For x, y and z."""
+    body: Array
+    """(frames, frames) covariance in time of a joint's change, 1 on the diagonal."""
+    still: Array
+    """(frames + 1, frames) covariance of the root's place where limbs can do it."""
+
+
+def _in_row(goal: Goal, first: int, frames: int) -> Goal:
+    part = goal.crop(0, min(len(goal), frames - first))
+    return part.padded(first, frames - first - len(part))
+
+
+def _plan(goal: Goal, first: int, width: float) -> _Plan:
+    frames = len(goal)
+    body = 0.8 * _bell(frames, width) + 0.2 * _bell(frames, 2.5)
+    pace = _summed(_bell(frames, width), first)
+    moving = np.flatnonzero(goal.asked[..., [0, 2]].any(axis=(1, 2)))
+    noise = np.where(goal.asked[moving, 0][:, [0, 2]].any(axis=-1), EXACT, FEW)
+    turning = np.flatnonzero(goal.facing_asked)
+    lifting = np.flatnonzero(goal.asked[:, list(_REACH)].all(axis=-1).any(axis=-1) & ~goal.asked[:, 0, 1])
+    still = _STILL**2 * pace
+    limbs = tuple(_limb_plan(goal.asked[..., c], _TOGETHER[c], body, None if c == 1 else still) for c in range(3))
+    return _Plan(
+        goal, first, moving, _gain(_PACE**2 * pace, moving, noise),
+        turning, _gain(_YAW**2 * pace, turning, np.full(len(turning), 0.02)),
+        lifting, _gain(_LIFT**2 * body, lifting, np.full(len(lifting), FEW)), limbs, body, still[:, :frames],
+    )  # fmt: skip
+
+
+def _bell(frames: int, width: float) -> Array:
+    lag = np.arange(frames)[:, None] - np.arange(frames)
+    return np.exp(-0.5 * (lag / width) ** 2)
+
+
+def _summed(velocity: Array, first: int) -> Array:
+    """(frames + 1, frames + 1) covariance of what a velocity adds up to, from frame ``first`` on and back from it."""
+    total = np.pad(velocity.cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+    return total - total[first] - total[:, first : first + 1] + total[first, first]
+
+
+def _gain(covariance: Array, asked: NDArray[np.intp], noise: Array) -> Array:
+    """(rows, asked): the posterior mean from what is seen at ``asked``, with noise of these standard deviations."""
+    inner = covariance[np.ix_(asked, asked)] + np.diag(noise**2)
+    return np.asarray(np.linalg.solve(inner, covariance[asked]).T, dtype=np.float64)
+
+
+def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Array | None) -> _Limbs | None:
+    if not asked.any():
+        return None
+    t, j = np.nonzero(_thinned(asked))
+    inner = body[np.ix_(t, t)] * together[np.ix_(j, j)]
+    if still is not None:
+        inner += still[np.ix_(t, t)]
+    inner[np.diag_indices_from(inner)] += EXACT**2
+    return _Limbs((t, j), np.asarray(np.linalg.inv(inner), dtype=np.float64), together)
+
+
+def _thinned(asked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(frames, 22) with at most `MOST` wishes, in frames spread evenly: those between follow by smoothness."""
+    busy = np.flatnonzero(asked.any(axis=1))
+    stride = 1
+    while int(asked[busy[::stride]].sum()) > MOST:
+        stride += 1
+    kept = np.zeros_like(asked)
+    kept[busy[::stride]] = asked[busy[::stride]]
+    return kept
+
+
+def _offsets() -> Array:
+    """(22, 22): metres by which each joint is off when the bones beyond another are, by one standard deviation."""
+    lengths, offsets = SMPL22.bone_lengths(), np.zeros((len(SMPL22), len(SMPL22)))
+    for joint in range(1, len(SMPL22)):
+        at, length = joint, 0.0
+        while at:
+            length, at = length + lengths[at], SMPL22.parents[at]
+            offsets[joint, at] = _SWING[at] * length
+    return offsets
+
+
+def _together() -> tuple[Array, Array, Array]:
+    """Covariances (22, 22) of the joints' changes on x, y and z, the root's path left out."""
+    limbs = _offsets() @ _offsets().T
+    return limbs, limbs + _HEIGHT**2 * np.outer(_CARRIED, _CARRIED), limbs
+
+
+_CARRIED = np.ones(len(SMPL22))
+"""What goes up and down with the root: the feet stay, the knees bend."""
+_CARRIED[[4, 5]], _CARRIED[[7, 8, 10, 11]] = 0.5, 0.0
+_TOGETHER = _together()
+
+
+# The change of one guess
+
+
+@dataclass(frozen=True, eq=False)
+class _Guess:
+    """A guess in the goal's frame."""
+
+    facing: Array
+    """(frames + 1,) radians; 0 at the goal's first frame."""
+    path: Array
+    """(frames + 1, 2) metres: x and z of the root; 0 at the goal's first frame."""
+    local: Array
+    """(frames, 22, 3) metres in the heading frame; x and z from the root."""
+
+    def world(self) -> Array:
+        """(frames, 22, 3) metres."""
+        places = _turned(self.local, self.facing[:-1, None])
+        places[..., [0, 2]] += self.path[:-1, None]
+        return places
+
+
+def _bent(features: Array, plan: _Plan) -> Array:
+    """Features (frames, 263), not standardised, changed to meet the goal."""
+    guess = _decoded(features, plan.first)
+    error = np.where(plan.goal.asked, plan.goal.positions - guess.world(), 0.0)
+    path = guess.path + plan.move @ _asked_of_root(guess.world(), error, plan.goal)[plan.moving]
+    facing = guess.facing + _turning_with(guess.path, path, plan.first)
+    guess = replace(guess, path=path, facing=facing)
+    if len(plan.lifting):
+        local = guess.local.copy()
+        local[..., 1] += np.outer(plan.lift @ _out_of_reach(guess.world(), plan.goal)[plan.lifting], _CARRIED)
+        guess = replace(guess, local=local)
+    if len(plan.turning):
+        guess = replace(guess, facing=facing + plan.turn @ _facing_error(guess.world(), plan.goal)[plan.turning])
+    error = np.where(plan.goal.asked, plan.goal.positions - guess.world(), 0.0)
+    far = np.linalg.norm(error[:, 1:], axis=-1, keepdims=True)
+    error[:, 1:] *= np.minimum(1.0, _LONGEST / far.clip(1e-9))
+    path, change = guess.path.copy(), np.zeros_like(guess.local)
+    for c, limbs in enumerate(plan.limbs):
+        if limbs is None:
+            continue
+        pull = np.zeros(error.shape[:2])
+        pull[limbs.asked] = limbs.inverse @ error[..., c][limbs.asked]
+        change[..., c] = plan.body @ pull @ limbs.together
+        if c != 1:
+            path[:, c // 2] += plan.still @ pull.sum(1)
+    local = guess.local + _turned(change, -guess.facing[:-1, None])
+    guess = replace(guess, path=path, local=local)
+    steps = _standing(guess.world(), features[:, LAYOUT["contacts"]], plan.goal)
+    local = local + _turned(steps, -guess.facing[:-1, None])
+    return _encoded(features, replace(guess, local=local))
+
+
+def _standing(places: Array, contacts: Array, goal: Goal) -> Array:
+    """(frames, 22, 3) metres that legs go so that feet stand still where the guess says that they do.
+
+    A leg of which something is asked stays as it is around then.
+    """
+    change = np.zeros_like(places)
+    for side, (knee, ankle, toe) in enumerate(_LEGS):
+        asked = goal.asked[:, [knee, ankle, toe]].any(axis=(1, 2))
+        free = np.convolve(asked, np.ones(4 * EASE + 1))[2 * EASE : -2 * EASE] < 0.5
+        told = (contacts[:, 2 * side : 2 * side + 2] > 0.5) & free[:, None]
+        still = stilled(places[:, ankle], places[:, toe], told)
+        change[:, [ankle, toe]] = still[:, None]
+        change[:, knee] = still / 2
+    return change
+
+
+def _decoded(features: Array, first: int) -> _Guess:
+    facing = -2 * np.concatenate([[0.0], np.cumsum(features[:, 0])])
+    facing -= facing[first]
+    steps = np.zeros((len(features), 3))
+    steps[:, [0, 2]] = features[:, 1:3]
+    path = np.concatenate([np.zeros((1, 2)), np.cumsum(_turned(steps, facing[1:])[:, [0, 2]], axis=0)])
+    local = np.zeros((len(features), len(SMPL22), 3))
+    local[:, 0, 1] = features[:, 3]
+    local[:, 1:] = features[:, LAYOUT["ric"]].reshape(len(features), -1, 3)
+    return _Guess(facing, path - path[first], local)
+
+
+def _encoded(old: Array, guess: _Guess) -> Array:
+    """``old`` with the root, the places and the displacements of the joints changed to those of ``guess``."""
+    new = old.copy()
+    steps = np.zeros((len(old), 3))
+    steps[:, [0, 2]] = np.diff(guess.path, axis=0)
+    new[:, 0] = -np.diff(guess.facing) / 2
+    new[:, 1:3] = _turned(steps, -guess.facing[1:])[:, [0, 2]]
+    new[:, 3] = guess.local[:, 0, 1]
+    new[:, LAYOUT["ric"]] = guess.local[:, 1:].reshape(len(old), -1)
+    before, after = (humanml.displacements(torch.from_numpy(part)).numpy() for part in (old, new))
+    new[:-1, LAYOUT["joint_velocity"]] += (after - before).reshape(len(old) - 1, -1)
+    return new
+
+
+def _asked_of_root(places: Array, error: Array, goal: Goal) -> Array:
+    """(frames, 2) metres: how far the root must go in each frame, the pelvis's own wish first.
+
+    A joint asks for what is beyond its slack, or beyond the reach of its limb; several joints for the mean of that.
+    """
+    far = np.linalg.norm(error, axis=-1, keepdims=True)
+    beyond = (error * np.clip(1 - _SLACKS[:, None] / far.clip(1e-9), 0, None))[..., [0, 2]]
+    for joint, (base, reach) in _REACH.items():
+        line = np.where(goal.asked[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
+        room = np.sqrt((reach**2 - line[:, 1] ** 2).clip((0.2 * reach) ** 2))
+        flat = line[:, [0, 2]]
+        flat = flat * (1 - room / np.linalg.norm(flat, axis=-1).clip(1e-9)).clip(0)[:, None]
+        more = np.linalg.norm(flat, axis=-1) > np.linalg.norm(beyond[:, joint], axis=-1)
+        beyond[:, joint] = np.where(more[:, None], flat, beyond[:, joint])
+    mean = beyond.sum(axis=1) / goal.asked.any(axis=-1).sum(axis=1).clip(1)[:, None]
+    own = goal.asked[:, 0][:, [0, 2]]
+    return np.where(own.any(axis=-1, keepdims=True), np.where(own, error[:, 0][:, [0, 2]], 0.0), mean)
+
+
+def _out_of_reach(places: Array, goal: Goal) -> Array:
+    """(frames,) metres: how far up the body must go so that limbs reach what is above or below them."""
+    need = np.zeros(len(places))
+    for joint, (base, reach) in _REACH.items():
+        asked = goal.asked[:, joint].all(axis=-1, keepdims=True)
+        line = np.where(asked, goal.positions[:, joint] - places[:, base], 0.0)
+        room = np.sqrt((reach**2 - (line[:, [0, 2]] ** 2).sum(-1)).clip((0.3 * reach) ** 2))
+        beyond = np.sign(line[:, 1]) * (np.abs(line[:, 1]) - room).clip(0)
+        need = np.where(np.abs(beyond) > np.abs(need), beyond, need)
+    return np.where(np.abs(need) < _HOPELESS, need, 0.0)
+
+
+def _turning_with(old: Array, new: Array, first: int) -> Array:
+    """(frames + 1,) radians by which the way turned when the path (frames + 1, 2) changed: the body turns with it."""
+    ways = [np.diff(path[:, 1] + 1j * path[:, 0]) for path in (old, new)]
+    ways = [np.append(way, way[-1]) for way in ways]
+    turn = ways[1] * ways[0].conj()
+    kernel = _bell(len(turn), _TURN_OVER)
+    turn = kernel @ turn + kernel.sum(1) * _SLOW**2  # where nobody goes anywhere nothing turns
+    angle = np.unwrap(np.angle(turn))
+    start = np.arange(len(turn)) - first
+    return (angle - 2 * np.pi * np.round(angle[first] / (2 * np.pi))) * (1 - np.exp(-0.5 * (start / _TURN_OVER) ** 2))
+
+
+def _facing_error(places: Array, goal: Goal) -> Array:
+    """(frames,) radians between the facing asked and that of hips and shoulders."""
+    error = np.zeros(len(goal))
+    at = np.flatnonzero(goal.facing_asked)
+    error[at] = np.unwrap(turn_between(goal.facing[at], heading(places)[at]))
+    return error
+
+
+def _turned(points: Array, facing: Array) -> Array:
+    """Points (..., 3) of somebody who faces ``facing`` (...) in the frame of somebody who faces +Z."""
+    c, s = np.cos(facing), np.sin(facing)
+    x, z = points[..., 0], points[..., 2]
+    return np.stack([c * x + s * z, points[..., 1], c * z - s * x], axis=-1)
+
+
+_SLACKS = np.array([0.0, *(_SLACK.get(joint, 0.1) for joint in range(1, len(SMPL22)))])

@@ -1,0 +1,55 @@
+"""A YAML file from a stranger, taken apart so that every mistake is told with the file and the line."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+from motionloom.goals.fields import listed
+from motionloom.io.lined_yaml import MAX_ITEMS, Lined, fail, meant
+from motionloom.io.text import shown
+
+
+@dataclass(frozen=True)
+class LinedFile:
+    """A file being read; whoever reads a kind of file builds on it."""
+
+    path: Path
+
+    def mapping(self, found: Lined, keys: Sequence[str], what: str) -> dict[str, Lined]:
+        """The values by key; no key but ``keys``. what: the mapping, in words."""
+        if not isinstance(found.value, dict):
+            self.fail(found.line, f"{what} must be a mapping with {listed(keys)}; got {self.got(found)}")
+        for key, value in found.value.items():
+            if key not in keys:
+                self.fail(value.key_line, f"unknown key {shown(key)}{meant(key, keys)}; {what} has {listed(keys)}")
+        return found.value
+
+    def items(self, found: Lined, name: str, *, of: str = "entry", most: int = MAX_ITEMS) -> list[Lined]:
+        """The entries of a list, at least one. of: what one is, in a word."""
+        if not isinstance(found.value, list) or not found.value:
+            got = "an empty list" if found.value == [] else found.kind
+            self.fail(found.line, f"'{name}' must be a list with at least one {of}; got {got}")
+        if len(found.value) > most:
+            self.fail(found.line, f"'{name}' has {len(found.value):,} entries; at most {most:,} are read")
+        return found.value
+
+    def number(self, found: Lined | None, name: str, *, low: float, high: float, unit: str = "") -> float | None:
+        """A number from ``low`` to ``high``, None where nothing is written; it keeps its type."""
+        if found is None:
+            return None
+        value = found.value
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            kind = f"a number of {unit}" if unit else "a number"
+            self.fail(found.line, f"'{name}' must be {kind}; got {self.got(found)}")
+        if not low <= value <= high:
+            self.fail(found.line, f"'{name}' must be {low:g} to {f'{high:g} {unit}'.strip()}; got {value:g}")
+        return value
+
+    def got(self, found: Lined) -> str:
+        """What is there, for messages."""
+        return found.kind
+
+    def fail(self, line: int, message: str) -> NoReturn:
+        """Raise a `MotionloomError` that names file and line."""
+        fail(self.path, line, message)

@@ -1,0 +1,39 @@
+"""`Segment`: one prompted stretch of a long motion."""
+
+from dataclasses import dataclass
+
+from motionloom.errors import MotionloomError
+from motionloom.goals.goal import FPS, Goal
+
+LONGEST = 60.0
+"""Seconds: beyond this one prompt is no longer one action."""
+TRANSITION = 1.0
+"""Seconds that neighbours share unless said otherwise: the paper's handshake."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One prompted stretch of a long motion."""
+
+    text: str
+    seconds: float
+    guidance: float | None = None
+    """Strength of the text; None: that of the whole."""
+    transition: float = TRANSITION
+    """Seconds shared with the next segment, half before and half after the seam."""
+    goal: Goal | None = None
+    """Wishes for the frames of this segment, seen from where the person stands when it begins (origin, facing +Z)."""
+
+    def __post_init__(self) -> None:
+        said = f"the segment {self.text[:40]!r}"
+        limits = (
+            ("seconds", self.seconds, LONGEST),
+            ("transition", self.transition, LONGEST),
+            ("guidance", self.guidance, 100),
+        )
+        for name, value, most in limits:
+            if value is not None and not abs(value) <= most:
+                raise MotionloomError(f"{said} has {name} {value:g}; give a number, at most {most:g}")
+        frames = round(self.seconds * FPS)
+        if self.goal is not None and len(self.goal) != frames:
+            raise MotionloomError(f"{said} has {frames} frames and its goal {len(self.goal)}; make them equally long")

@@ -1,0 +1,281 @@
+"""Timeline files: what happens when, as YAML that says line by line what is wrong with it.
+
+`docs/compose.md` explains the keys, `motionloom compose --schema` prints them as a JSON Schema
+(`src/motionloom/schemas/timeline.schema.json`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from motionloom.errors import MotionloomError
+from motionloom.goals.fields import Field
+from motionloom.goals.lined_file import LinedFile
+from motionloom.io.lined_yaml import MAX_ITEMS, Lined, read_lined
+
+if TYPE_CHECKING:
+    from motionloom.goals.goal import Goal
+    from motionloom.goals.segment import Segment
+
+SCHEMA = Path(__file__).parents[1] / "schemas" / "timeline.schema.json"
+KEYS = ("segments", "seed", "guidance", "transition", "start", "path")
+SEGMENT_KEYS = ("text", "seconds", "guidance", "transition", "goal", "goals")
+SECONDS, TRANSITION = 5.0, 1.0
+"""A segment's length, and what two neighbours share, where the file does not say."""
+SHORTEST, LONGEST, SHORTEST_TRANSITION = 0.2, 60.0, 0.05
+MAX_SEGMENTS = MAX_ITEMS
+MAX_CHARACTERS = 20_000
+MAX_GUIDANCE = 100.0
+MAX_SEED = 2**62
+MAX_GOAL_FRAMES = 1_000_000
+"""Frames with wishes in one timeline, 0.6 GB of them."""
+FPS = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """What `motionloom.tasks.long.compose` is asked, as read from a file."""
+
+    segments: tuple[Segment, ...]
+    seed: int | None = None
+    guidance: float | None = None
+    """Strength of the text where a segment does not say; None: the default."""
+    start: Path | None = None
+    """A motion file that the motion goes on from; it is there, and not yet read."""
+    path: Goal | None = None
+    """Wishes for the whole motion in the world, one row per frame."""
+
+    @property
+    def begins(self) -> tuple[int, ...]:
+        """The frame at which each segment begins, and at last the number of frames; 20 per second."""
+        at = [0]
+        for segment in self.segments:
+            at.append(at[-1] + _frames(segment.seconds))
+        return tuple(at)
+
+    @property
+    def frames(self) -> int:
+        """Length at 20 frames per second."""
+        return sum(_frames(segment.seconds) for segment in self.segments)
+
+    @property
+    def seconds(self) -> float:
+        """Length of the whole: the sum of the segments', each a whole number of frames."""
+        return self.frames / FPS
+
+
+def read_timeline(path: Path | str) -> Timeline:
+    """Read a timeline file.
+
+    Seconds; goals in metres as `motionloom.goals.goal` defines them. Files that the timeline names lie in its own
+    folder or below. Raises `MotionloomError` with file and line for whatever is wrong.
+    """
+    path = Path(path)
+    return _Reader(path).timeline(read_lined(path))
+
+
+def plain_timeline(texts: Sequence[str], *, seconds: float = SECONDS, transition: float | None = None) -> Timeline:
+    """A timeline of equally long segments; `MotionloomError` for what a file could not ask either."""
+    from motionloom.goals.segment import Segment
+
+    if not texts:
+        raise MotionloomError("there is no segment; say what the person does, such as: motionloom compose walk jump")
+    if len(texts) > MAX_SEGMENTS:
+        raise MotionloomError(f"{len(texts):,} segments are too many; at most {MAX_SEGMENTS:,} are made in one call")
+    for number, text in enumerate(texts, start=1):
+        if problem := _text_problem(text):
+            raise MotionloomError(f"segment {number}: {problem}")
+    if not SHORTEST <= seconds <= LONGEST:
+        raise MotionloomError(f"a segment takes {SHORTEST:g} to {LONGEST:g} seconds; got {seconds:g}")
+    if transition is not None and not SHORTEST_TRANSITION <= transition <= seconds / 2 + 1e-9:
+        raise MotionloomError(
+            f"a transition takes {SHORTEST_TRANSITION:g} s to half of a segment, {seconds / 2:g} s; got {transition:g}"
+        )
+    shared = min(TRANSITION, seconds / 2) if transition is None else transition
+    return Timeline(tuple(Segment(text, seconds, transition=shared) for text in texts))
+
+
+def _frames(seconds: float) -> int:
+    return round(seconds * FPS)
+
+
+def _text_problem(text: str) -> str:
+    if not text.strip():
+        return "the text is empty; say in words what the person does"
+    if len(text) > MAX_CHARACTERS:
+        return f"the text has {len(text):,} characters; say it in at most {MAX_CHARACTERS:,}"
+    return ""
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A segment as written; None where nothing is."""
+
+    line: int
+    text: str
+    seconds: float = SECONDS
+    guidance: float | None = None
+    transition: float | None = None
+    transition_line: int = 0
+    goals: tuple[Lined, ...] = ()
+
+
+class _Reader(LinedFile):
+    def timeline(self, document: Lined) -> Timeline:
+        top = self.mapping(document, KEYS, "a timeline")
+        if "segments" not in top:
+            self.fail(document.line, "there are no 'segments'; list what the person does, one after the other")
+        rows = [self.row(item) for item in self.items(top["segments"], "segments", of="segment")]
+        shared = self.number(top.get("transition"), "transition", low=SHORTEST_TRANSITION, high=LONGEST / 2)
+        transitions = self.transitions(rows, shared)
+        total = sum(_frames(row.seconds) for row in rows)
+        wishes = sum(_frames(row.seconds) for row in rows if row.goals) + (total if "path" in top else 0)
+        if wishes > MAX_GOAL_FRAMES:
+            self.fail(
+                document.line, f"goals for {wishes:,} frames are too many; at most {MAX_GOAL_FRAMES:,} in one file"
+            )
+        return Timeline(
+            self.segments(rows, transitions),
+            self.seed(top.get("seed")),
+            self.number(top.get("guidance"), "guidance", low=-MAX_GUIDANCE, high=MAX_GUIDANCE),
+            self.start(top.get("start")),
+            self.goal(top["path"], "path", total) if "path" in top else None,
+        )
+
+    def row(self, item: Lined) -> _Row:
+        if isinstance(item.value, str):
+            return _Row(item.line, self.text(item))
+        given = self.mapping(item, SEGMENT_KEYS, "a segment")
+        if "text" not in given:
+            self.fail(item.line, "a segment has no 'text'; say in words what the person does")
+        if "goal" in given and "goals" in given:
+            self.fail(given["goals"].key_line, "a segment has either 'goal' or 'goals'; put them all into 'goals'")
+        seconds = self.number(given.get("seconds"), "seconds", low=SHORTEST, high=LONGEST)
+        transition = given.get("transition")
+        return _Row(
+            item.line,
+            self.text(given["text"]),
+            SECONDS if seconds is None else seconds,
+            self.number(given.get("guidance"), "guidance", low=-MAX_GUIDANCE, high=MAX_GUIDANCE),
+            self.number(transition, "transition", low=SHORTEST_TRANSITION, high=LONGEST / 2),
+            transition.line if transition else 0,
+            self.goals(given),
+        )
+
+    def goals(self, given: dict[str, Lined]) -> tuple[Lined, ...]:
+        if "goal" in given:
+            return (given["goal"],)
+        if "goals" not in given:
+            return ()
+        return tuple(self.items(given["goals"], "goals", of="goal"))
+
+    def transitions(self, rows: list[_Row], shared: float | None) -> list[float]:
+        """Each segment's transition to the next; what nobody asked for is shortened to what fits."""
+        result = []
+        for row, following in zip(rows, [*rows[1:], None], strict=True):
+            asked = shared if row.transition is None and following else row.transition
+            following = following or row
+            most = min(row.seconds, following.seconds) / 2
+            if asked is not None and asked > most + 1e-9:
+                short = row if row.seconds <= following.seconds else following
+                self.fail(
+                    row.transition_line or row.line,
+                    f"the transition takes {asked:g} s and the segment of line {short.line} {short.seconds:g} s; "
+                    f"it may take at most half of that, {most:g} s",
+                )
+            result.append(min(TRANSITION, most) if asked is None else asked)
+        return result
+
+    def segments(self, rows: list[_Row], transitions: list[float]) -> tuple[Segment, ...]:
+        from motionloom.goals.segment import Segment
+
+        return tuple(
+            Segment(row.text, row.seconds, row.guidance, transition, self.merged(row.goals, _frames(row.seconds)))
+            for row, transition in zip(rows, transitions, strict=True)
+        )
+
+    def merged(self, goals: tuple[Lined, ...], frames: int) -> Goal | None:
+        if not goals:
+            return None
+        from motionloom.goals.goal import merged
+
+        whole = self.goal(goals[0], "goal", frames)
+        for other in goals[1:]:
+            try:
+                whole = merged(whole, self.goal(other, "goal", frames))
+            except MotionloomError as error:
+                self.fail(other.line, str(error))
+        return whole
+
+    def goal(self, found: Lined, name: str, frames: int) -> Goal:
+        from motionloom.goals.goal_file import read_goal
+
+        what: Any = found.value
+        if isinstance(what, str):
+            what = self.file(found, name)
+        elif isinstance(what, dict):
+            for key in ("points", "svg", "curve"):
+                if name == "path" and key in what:
+                    self.fail(what[key].key_line, f"'path' holds a goal; write it as path: {{path: {{{key}: ...}}}}")
+            what = found.plain()
+        else:
+            self.fail(found.line, f"'{name}' must be a mapping or the name of a goal file; got {self.got(found)}")
+        try:
+            return read_goal(what, frames=frames, fps=FPS, folder=self.path.parent)
+        except MotionloomError as error:
+            self.fail(_line(found, str(error)), f"{name}: {error}")
+
+    def start(self, found: Lined | None) -> Path | None:
+        if found is None:
+            return None
+        from motionloom.io import READS
+
+        place = self.file(found, "start")
+        if place.suffix.lower() not in READS:
+            self.fail(found.line, f"'start' must name a motion, one of {', '.join(READS)}; got {self.got(found)}")
+        return place
+
+    def file(self, found: Lined, name: str) -> Path:
+        """A file in the timeline's folder or below it; a timeline from a stranger reads nothing else."""
+        try:
+            return Field(found.value, name).file(self.path.parent)
+        except MotionloomError as error:
+            self.fail(found.line, str(error))
+
+    def seed(self, found: Lined | None) -> int | None:
+        if found is None:
+            return None
+        value = self.number(found, "seed", low=0, high=MAX_SEED - 1)
+        if not isinstance(value, int | float) or value != int(value):
+            self.fail(found.line, f"'seed' must be a whole number; got {self.got(found)}")
+        return int(value)
+
+    def text(self, found: Lined) -> str:
+        if not isinstance(found.value, str):
+            self.fail(found.line, f"the text must be words; got {self.got(found)} (put quotes around it if it is one)")
+        if problem := _text_problem(found.value):
+            self.fail(found.line, problem)
+        return found.value
+
+    def got(self, found: Lined) -> str:
+        return "an empty list" if found.value == [] else found.kind
+
+
+def _line(found: Lined, message: str) -> int:
+    """The line of what a message names as ``'joints[1].points[3].time'``; that of the whole where it names none."""
+    named = re.match(r"'([\w.\[\]]+)' ", message)
+    line = found.key_line or found.line
+    for step in re.findall(r"\w+", named[1]) if named else ():
+        inner = found.value
+        if isinstance(inner, dict) and step in inner:
+            found = inner[step]
+        elif isinstance(inner, list) and step.isdecimal() and int(step) < len(inner):
+            found = inner[int(step)]
+        else:
+            return line
+        line = found.key_line or found.line
+    return line

@@ -1,0 +1,256 @@
+"""Foot clean-up for export: planted feet stay put, no foot is under the floor, knees keep their way.
+
+A correction of each foot is found first, as a smooth path in space; the legs follow by two-bone inverse kinematics.
+In the middle of a stance the foot turns about what is planted (heel, whole foot, then toes), as in walking.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import FEET
+from motionloom.kinematics.ik import LIMBS, Limb, aim, hinge_frame, reach
+from motionloom.motion import Motion
+from motionloom.skeleton import SMPL22
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+EASE = 0.25
+"""Seconds over which a correction of a foot's place comes and goes."""
+_TURN_EASE = 0.1
+"""The same for its direction; longer would flatten the foot while it still swings."""
+_LOW = np.array([0.11, 0.05, 0.11, 0.05])
+"""Metres above the level of standing toes below which ankles and toes may be planted."""
+_SLOW, _STILL_SLOW, _TOLD_SLOW = 0.35, 0.5, 0.6
+"""Metres per second: what starts a contact, what keeps it, and what a foot said to be planted may have."""
+_DRIFT = 0.12
+"""Metres: a planted foot that strays further from the middle of its stance means to move; the stance is split."""
+_SUNK = 0.002
+"""Metres under the floor that are left, as in recordings: lifting every millimetre would leave people afloat."""
+_LENGTHS = SMPL22.bone_lengths()
+
+
+def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: float = 0.0) -> Motion:
+    """Lock planted feet and lift feet out of the floor.
+
+    ``motion`` on the 22-joint skeleton; ``contacts`` (frames or frames - 1, 4), flags or probabilities for left ankle,
+    left foot, right ankle, right foot as the 263 features have them, else height and speed decide; ``floor`` metres.
+    Changes the legs, and the height of the root where a leg would be too short. Everything else stays as it is.
+    """
+    if motion.skeleton != SMPL22:
+        raise MotionloomError(
+            f"feet can be cleaned on the {len(SMPL22)}-joint SMPL person; this motion has "
+            f"{len(motion.skeleton)} joints of another one: retarget it first"
+        )
+    if len(motion) < 4:
+        return motion
+    places = motion.positions()
+    planted = planted_feet(places, motion.fps, contacts=contacts)
+    targets, directions = places[:, [7, 8]].copy(), np.empty((len(motion), 2, 3))
+    for i in (0, 1):
+        ankle, toe = FEET[2 * i : 2 * i + 2]
+        foot = places[:, toe] - places[:, ankle]
+        flags = planted[:, 2 * i : 2 * i + 2]
+        directions[:, i] = _steady_direction(foot, flags[:, 0] & flags[:, 1], motion.fps)
+        tip = directions[:, i] * np.linalg.norm(foot, axis=-1, keepdims=True)
+        targets[:, i] += _correction(places[:, ankle], places[:, ankle] + tip, flags, motion.fps)
+        below = floor - targets[:, i, 1] - np.minimum(tip[:, 1], 0)
+        targets[:, i, 1] += envelope((below - _SUNK).clip(0), round(0.1 * motion.fps))
+    down = _root_drop(places, targets, motion.fps)
+    return _with_legs(motion, places - down[:, None, None] * [0, 1, 0], targets, directions)
+
+
+def planted_feet(positions: np.ndarray, fps: float, *, contacts: np.ndarray | None = None) -> Flags:
+    """(frames, 4) flags for left ankle, left foot, right ankle, right foot: low, slow, and long enough to be a step.
+
+    ``positions`` (frames, 22, 3) metres; ``contacts`` as for `clean_feet` replaces the strict test of speed.
+    """
+    feet = np.asarray(positions)[:, list(FEET)]
+    speed = np.linalg.norm(np.gradient(feet, axis=0), axis=-1) * fps
+    height = feet[..., 1]
+    resting = height[:, [1, 3]][speed[:, [1, 3]] < _SLOW]
+    level = np.percentile(resting, 30) if resting.size else height.min()
+    low = height < level + _LOW
+    if contacts is None:
+        may, sure = low & (speed < _STILL_SLOW), low & (speed < _SLOW)
+    else:
+        may = low & (speed < _TOLD_SLOW) & _told(contacts, len(feet))
+        sure = may
+    least, gap = max(2, round(0.12 * fps)), max(1, round(0.1 * fps))
+    result = np.zeros_like(may)
+    for k in range(4):
+        runs = [run for run in _runs(may[:, k]) if sure[slice(*run), k].any()]
+        for start, stop in _joined(runs, gap):
+            result[start:stop, k] = stop - start >= least
+    return result
+
+
+def _told(contacts: np.ndarray, frames: int) -> Flags:
+    contacts = np.asarray(contacts, dtype=np.float64)
+    if contacts.ndim != 2 or contacts.shape[1] != 4 or len(contacts) not in (frames, frames - 1):
+        raise MotionloomError(f"contacts must be ({frames}, 4) or ({frames - 1}, 4); got {contacts.shape}")
+    return np.concatenate([contacts, contacts[-1:]])[:frames] > 0.5
+
+
+def _runs(flags: Flags) -> list[tuple[int, int]]:
+    """Half-open intervals of consecutive True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
+
+
+def _joined(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
+    """Runs with the holes of at most ``gap`` frames between them filled."""
+    result: list[tuple[int, int]] = []
+    for start, stop in runs:
+        if result and start - result[-1][1] <= gap:
+            result[-1] = (result[-1][0], stop)
+        else:
+            result.append((start, stop))
+    return result
+
+
+# Where the feet go
+
+
+def _steady_direction(foot: Array, flat: Flags, fps: float) -> Array:
+    """Unit directions ankle to toes (frames, 3); one direction while the whole foot is on the floor."""
+    unit = foot / np.linalg.norm(foot, axis=-1, keepdims=True).clip(1e-9)
+    result, runs, ease = unit.copy(), _runs(flat), max(1, round(_TURN_EASE * fps))
+    frames = np.arange(len(foot))
+    for i, (start, stop) in enumerate(runs):
+        # the easing never reaches into the neighbouring stance
+        before = min(ease, start - runs[i - 1][1] + 1) if i else ease
+        after = min(ease, runs[i + 1][0] - stop + 1) if i + 1 < len(runs) else ease
+        away = np.maximum((start - frames) / before, (frames - stop + 1) / after).clip(0, 1)
+        weight = 1 - away * away * (3 - 2 * away)
+        result += weight[:, None] * (unit[start:stop].mean(0) - result)
+    return result / np.linalg.norm(result, axis=-1, keepdims=True).clip(1e-9)
+
+
+def _correction(ankle: Array, toe: Array, planted: Flags, fps: float) -> Array:
+    """(frames, 3) metres to add to the foot so that whatever is planted does not move; eased in and out."""
+    steps = np.zeros((len(ankle) - 1, 3))
+    for place, flags in ((ankle, planted[:, 0]), (toe, planted[:, 1])):
+        both = flags[1:] & flags[:-1]
+        steps[both] = -np.diff(place, axis=0)[both]  # toes last: they are the pivot when the whole foot stands
+    steps[:, 1] = 0  # heights stay: a foot that begins to rise must not be held down
+    pieces = list(_pieces(steps, planted[:, 0] | planted[:, 1], max(2, round(EASE * fps / 2))))
+    result = np.zeros_like(ankle)
+    for start, values in pieces:
+        result[start : start + len(values)] = values
+    _bridge(result, [(start, start + len(values)) for start, values in pieces], max(2, round(EASE * fps)))
+    return result
+
+
+def _pieces(steps: Array, standing: Flags, hole: int) -> Iterator[tuple[int, Array]]:
+    """First frame and correction (frames, 3) of each stance, of mean 0; stances that stray are split at the fastest."""
+    waiting = _runs(standing)[::-1]
+    while waiting:
+        start, stop = waiting.pop()
+        if stop - start < 2:
+            continue
+        path = np.concatenate([np.zeros((1, 3)), np.cumsum(steps[start : stop - 1], axis=0)])
+        path -= path.mean(0)
+        if np.linalg.norm(path, axis=-1).max() <= _DRIFT:
+            yield start, path
+            continue
+        fastest = start + int(np.linalg.norm(steps[start : stop - 1], axis=-1).argmax())
+        waiting += [(fastest + 1 + hole, stop), (start, fastest + 1 - hole)]
+
+
+def _bridge(values: Array, pieces: list[tuple[int, int]], ease: int) -> None:
+    """Fill the frames between pieces of ``values`` (frames, 3): across short gaps directly, else by way of zero."""
+    frames = len(values)
+    ends = [(-ease, -ease), *pieces, (frames + ease, frames + ease)]
+    for (first, stop), (start, last) in pairwise(ends):
+        if 0 < stop < start < frames and start - stop < 2 * ease:
+            left, right = values[stop - 1], values[start]
+            into, out = _slope(values, stop - 1, first), _slope(values, start, last - 1)
+            values[stop:start] = _hermite(start - stop + 1, left, right, into, out)
+            continue
+        if 0 < stop < frames:
+            curve = _hermite(ease, values[stop - 1], np.zeros(3), _slope(values, stop - 1, first), np.zeros(3))
+            values[stop : stop + ease - 1] = curve[: frames - stop]
+        if 0 < start < frames:
+            curve = _hermite(ease, np.zeros(3), values[start], np.zeros(3), _slope(values, start, last - 1))
+            count = min(start, ease - 1)
+            values[start - count : start] = curve[ease - 1 - count :]
+
+
+def _slope(values: Array, at: int, towards: int) -> Array:
+    """Change per frame at the end ``at`` of a piece that lies on the side of ``towards``."""
+    inner = at + int(np.sign(towards - at))
+    return (values[at] - values[inner]) * np.sign(at - inner)
+
+
+def _hermite(steps: int, left: Array, right: Array, into: Array, out: Array) -> Array:
+    """(steps - 1, 3) values strictly between two ends ``steps`` frames apart, with given changes per frame there."""
+    u = (np.arange(1, steps) / steps)[:, None]
+    h10, h11 = u**3 - 2 * u**2 + u, u**3 - u**2
+    return left + (3 * u**2 - 2 * u**3) * (right - left) + steps * (h10 * into + h11 * out)
+
+
+def envelope(need: Array, radius: int) -> Array:
+    """A smooth curve (..., frames) nowhere below ``need``: running maximum, then averages within its window."""
+    radius = max(1, radius)
+    curve = np.pad(need, [(0, 0)] * (need.ndim - 1) + [(4 * radius, 4 * radius)], mode="edge")
+    curve = np.lib.stride_tricks.sliding_window_view(curve, 4 * radius + 1, axis=-1).max(-1)
+    for _ in range(2):
+        curve = np.lib.stride_tricks.sliding_window_view(curve, 2 * radius + 1, axis=-1).mean(-1)
+    return curve
+
+
+# Legs
+
+
+def _root_drop(places: Array, targets: Array, fps: float) -> Array:
+    """(frames,) metres by which the root goes down so that no leg is stretched beyond what it was or 99.5 %."""
+    need = np.zeros(len(places))
+    for i, limb in enumerate(LIMBS[:2]):
+        full = _LENGTHS[limb.middle] + _LENGTHS[limb.end]
+        before = np.linalg.norm(places[:, limb.end] - places[:, limb.start], axis=-1)
+        most = np.maximum(before, 0.995 * full)
+        line = targets[:, i] - places[:, limb.start]
+        height = np.sqrt((most**2 - line[:, 0] ** 2 - line[:, 2] ** 2).clip(0))
+        far = np.linalg.norm(line, axis=-1) > most
+        need = np.maximum(need, np.where(far, -line[:, 1] - height, 0).clip(0, 0.05))
+    return envelope(need, round(0.15 * fps))
+
+
+def _with_legs(motion: Motion, places: Array, targets: Array, directions: Array) -> Motion:
+    """The motion with its root at ``places[:, 0]`` and ankles and feet as wanted (frames, 2, 3)."""
+    world, rotations = motion.world_rotations(), motion.rotations.copy()
+    for i, limb in enumerate(LIMBS[:2]):
+        a, b, c = limb.start, limb.middle, limb.end
+        upper, lower = _solve_leg(limb, world, places, targets[:, i])
+        foot = aim(world[:, c], SMPL22.offsets[limb.tip or c], directions[:, i])
+        rotations[:, a] = rot.multiply(rot.inverse(world[:, 0]), upper)
+        rotations[:, b] = rot.multiply(rot.inverse(upper), lower)
+        rotations[:, c] = rot.multiply(rot.inverse(lower), foot)
+    return replace(motion, root=places[:, 0], rotations=rot.unroll(rot.normalize(rotations)))
+
+
+def _solve_leg(limb: Limb, world: Array, places: Array, target: Array) -> tuple[Array, Array]:
+    """World orientations (frames, 4) of hip and knee for an ankle at ``target``; those there are where it is there."""
+    a, b, c = limb.start, limb.middle, limb.end
+    start, lengths = places[:, a], (_LENGTHS[b], _LENGTHS[c])
+    old, new = places[:, c] - start, target - start
+    # never straighter than it was, unless it stays visibly bent: the knee's angle is wild near full reach
+    before, wanted = np.linalg.norm(old, axis=-1), np.linalg.norm(new, axis=-1)
+    bent = np.maximum(before, 0.995 * sum(lengths))
+    room = (np.maximum(before, 0.999 * sum(lengths)) - bent).clip(1e-6)
+    far = (wanted - bent).clip(0)
+    distance = np.where(far > 0, bent + room * np.tanh(far / room), wanted)
+    target = start + new * (distance / wanted.clip(1e-9))[:, None]
+    seen = places[:, [a, b, c]]
+    hinge = np.array(limb.hinge, dtype=np.float64)
+    arc = rot.shortest_arc(old, new)
+    axes = [rot.rotate(arc, rot.rotate(world[:, j], hinge)) for j in (a, b)]
+    knee, ankle = reach(start, target, seen, axes[0], lengths)
+    return hinge_frame(limb, b, knee - start, axes[0]), hinge_frame(limb, c, ankle - knee, axes[1])

@@ -1,0 +1,1 @@
+"""Published methods, checkpoints and data sets, to measure against and to import."""

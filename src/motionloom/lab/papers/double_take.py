@@ -1,0 +1,421 @@
+"""DoubleTake: one long motion from many prompts, by two passes over rows that share their ends.
+
+Shafir et al., "Human Motion Diffusion as a Generative Prior" (PriorMDM), 2024, section 4.1. All intervals are rows of
+one batch. First take: neighbouring rows are averaged over a handshake after every step. Second take: every transition,
+with the middles of both its intervals, is noised again and refined, held to the first take by a keep weight per frame.
+
+Two modes, both presets of one builder of keep weights (`Keep`): ``published`` gives what the released code gives (keep
+the handshake, refine only the ramps, restart at 900 of 1000, padding attended); ``paper`` what the paper says.
+
+States are (repetitions * intervals, frames, features), the intervals of one repetition one after the other. Everything
+above `double_take_features` is plain tensors over any denoiser. `motionloom.tasks.long` is the better default.
+"""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Literal
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from motionloom.diffusion import (
+    DDPM,
+    SOLVERS,
+    Constraint,
+    Denoiser,
+    Draw,
+    Schedule,
+    Solver,
+    State,
+    chain,
+    guide,
+    handshake,
+    inpaint,
+    levels,
+    restart,
+    row_draw,
+    run,
+)
+from motionloom.errors import MotionloomError
+from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, smooth
+from motionloom.weights.prior import Prior
+
+HANDSHAKE = 20
+"""Frames: one second of HumanML3D."""
+LEAST_MIDDLE = 10
+"""Frames of an interval that neither a handshake nor a ramp may touch."""
+SEEN = 196
+"""Frames of the longest motion in HumanML3D: more in one interval than any prior trained on it saw."""
+LONGEST_ROW, MOST_FRAMES = 2000, 200_000
+
+
+@dataclass(frozen=True)
+class Keep:
+    """How much of the first take each frame of a sandwich keeps in the second, 1: all of it."""
+
+    outside: float
+    high: float
+    """At the end of the ramp that is away from the handshake."""
+    low: float
+    """Where the ramp would reach the handshake."""
+    handshake: float
+    sampling: Literal["even", "published"] = "even"
+    """At distance d = 1 .. b from the handshake: d / b on both sides; ``published``: (d - 1) / b on the right side, and
+    no ramp at all where b is below 2."""
+
+    def ramp(self, frames: int, side: Literal["left", "right"]) -> Tensor:
+        """(frames,) weights by growing distance from the handshake."""
+        if self.sampling == "published" and frames < 2:
+            return torch.full((frames,), self.outside)
+        late = self.sampling == "published" and side == "right"
+        distance = torch.arange(frames) + (0 if late else 1)
+        return self.low + (self.high - self.low) * distance / max(frames, 1)
+
+
+@dataclass(frozen=True)
+class Mode:
+    """Everything in which the released code and the paper differ."""
+
+    keep: Keep
+    ramp: int
+    """Frames, where nothing else is asked."""
+    restart: float
+    """Share of the levels from which the second take starts."""
+    masked: bool
+    """Whether frames behind a row's end are kept out of attention."""
+
+
+MODES: dict[str, Mode] = {
+    "published": Mode(Keep(1.0, 0.85, 0.0, 1.0, "published"), ramp=20, restart=0.9, masked=False),
+    "paper": Mode(Keep(1.0, 0.85, 0.1, 0.1), ramp=10, restart=0.7, masked=True),
+}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Which frames belong to what; MotionloomError where lengths, handshakes and ramps do not fit each other."""
+
+    lengths: tuple[int, ...]
+    """Frames of each interval, both its handshakes included."""
+    handshakes: tuple[int, ...]
+    """Frames that interval i shares with interval i + 1."""
+    ramps: tuple[int, ...]
+    """Frames on either side of handshake i that the second take may change."""
+    repetitions: int = 1
+
+    def __post_init__(self) -> None:
+        count = len(self.lengths)
+        if count < 1 or self.repetitions < 1:
+            raise MotionloomError(f"there is nothing to make: {count} intervals, {self.repetitions} repetitions")
+        if len(self.handshakes) != count - 1 or len(self.ramps) != count - 1:
+            raise MotionloomError(
+                f"{count} intervals have {count - 1} transitions; got {len(self.handshakes)} handshakes and "
+                f"{len(self.ramps)} ramps: give one number, or one per transition"
+            )
+        if any(h < 1 for h in self.handshakes) or any(b < 0 for b in self.ramps):
+            raise MotionloomError("a handshake has at least one frame and a ramp none or more; ask for such numbers")
+        for row, length in enumerate(self.lengths):
+            if length < self.least(row):
+                raise MotionloomError(
+                    f"interval {row + 1} has {length} frames and needs {self.least(row)} for its handshakes, ramps and "
+                    f"{LEAST_MIDDLE} frames between them; make it longer, or the handshakes or ramps shorter"
+                )
+        if max(self.lengths) > LONGEST_ROW or sum(self.lengths) * self.repetitions > MOST_FRAMES:
+            raise MotionloomError(
+                f"an interval has at most {LONGEST_ROW} frames and all together at most {MOST_FRAMES}; got "
+                f"{max(self.lengths)} and {sum(self.lengths) * self.repetitions}: ask for fewer or shorter intervals"
+            )
+
+    @staticmethod
+    def of(
+        lengths: Sequence[int],
+        handshake: int | Sequence[int] = HANDSHAKE,
+        ramp: int | Sequence[int] = 10,
+        *,
+        repetitions: int = 1,
+    ) -> "Plan":
+        """With one handshake and ramp for all transitions, or one for each."""
+        several = [
+            (value,) * (len(lengths) - 1) if isinstance(value, int) else tuple(value) for value in (handshake, ramp)
+        ]
+        return Plan(tuple(lengths), several[0], several[1], repetitions)
+
+    def least(self, row: int) -> int:
+        """Frames that a row needs; an end without a neighbour counts like the other end, as published."""
+        if not self.handshakes:
+            return 1
+        before, after = max(row - 1, 0), min(row, len(self.handshakes) - 1)
+        ends = self.handshakes[before] + self.handshakes[after] + self.ramps[before] + self.ramps[after]
+        return ends + LEAST_MIDDLE
+
+    def middle(self, row: int) -> slice:
+        """The frames of a row without its handshakes (the first and the last row lose theirs at both ends too)."""
+        shared = self.handshakes or (0,)
+        return slice(shared[max(row - 1, 0)], self.lengths[row] - shared[min(row, len(shared) - 1)])
+
+    def size(self, row: int) -> int:
+        """Frames of `middle`."""
+        part = self.middle(row)
+        return part.stop - part.start
+
+    @property
+    def sandwiches(self) -> tuple[int, ...]:
+        """Frames of middle, handshake and middle of each transition."""
+        return tuple(self.size(i) + h + self.size(i + 1) for i, h in enumerate(self.handshakes))
+
+    @property
+    def width(self) -> int:
+        """Frames of the padded sandwiches: 2 (Lmax - 2h) + h for one handshake h, as published."""
+        return 2 * max(map(self.size, range(len(self.lengths)))) + max(self.handshakes, default=0)
+
+    @property
+    def ends(self) -> list[int]:
+        """Where each interval ends in the long motion; transition i has the frames ``ends[i] - h .. ends[i]``."""
+        parts = [self.lengths[0], *(n - h for n, h in zip(self.lengths[1:], self.handshakes, strict=True))]
+        return list(accumulate(parts))
+
+    def split(self, x: Tensor) -> Tensor:
+        """(repetitions * rows, ...) as (repetitions, rows, ...)."""
+        return x.view(self.repetitions, -1, *x.shape[1:])
+
+
+@dataclass(frozen=True, eq=False)
+class Takes:
+    """Everything that was made on the way; states as described above, transitions in place of intervals."""
+
+    first: State
+    sandwich: State
+    keep: Tensor
+    """(transitions, width)"""
+    second: State
+    rebuilt: State
+    unfolded: Tensor
+    """(repetitions, frames of the long motion, features)"""
+
+
+def flags(plan: Plan) -> Tensor:
+    """(rows, longest) integers: 1 on frames that a row shares with another, for networks that are told so."""
+    marks = torch.zeros(len(plan.lengths), max(plan.lengths), dtype=torch.long)
+    for i, h in enumerate(plan.handshakes):
+        marks[i, plan.lengths[i] - h : plan.lengths[i]] = 1
+        marks[i + 1, :h] = 1
+    return marks.repeat(plan.repetitions, 1)
+
+
+def handshakes(plan: Plan) -> Constraint:
+    """`diffusion.handshake` with a length of its own for every transition, within each repetition."""
+    joins = [handshake(plan.lengths[i : i + 2], h) for i, h in enumerate(plan.handshakes)]
+
+    def joined(x: State, level: int) -> State:
+        x = x.clone()
+        for rows in plan.split(x):
+            for i, join in enumerate(joins):
+                rows[i : i + 2] = join(rows[i : i + 2], level)
+        return x
+
+    return joined
+
+
+def first_take(
+    denoise: Denoiser,
+    x: State,
+    plan: Plan,
+    *,
+    way: Sequence[int],
+    schedule: Schedule,
+    draw: Draw,
+    solver: Solver = DDPM,
+    join: bool = True,
+) -> State:
+    """Noise at ``way[0]`` to intervals with shared ends; ``join=False`` leaves them alone (second take only)."""
+    constrain = handshakes(plan) if join and plan.handshakes else chain()
+    return run(denoise, x, levels=way, solver=solver, schedule=schedule, draw=draw, constrain=constrain)
+
+
+def sandwiches(x: State, plan: Plan) -> State:
+    """Middle, handshake (as it ends the earlier row) and middle of each transition, padded with zeros to `width`."""
+    rows = plan.split(x)
+    result = x.new_zeros(plan.repetitions, len(plan.handshakes), plan.width, x.shape[2])
+    for i, h in enumerate(plan.handshakes):
+        end = plan.lengths[i]
+        parts = [rows[:, i, plan.middle(i)], rows[:, i, end - h : end], rows[:, i + 1, plan.middle(i + 1)]]
+        result[:, i, : plan.sandwiches[i]] = torch.cat(parts, dim=1)
+    return result.flatten(0, 1)
+
+
+def keep_weights(plan: Plan, keep: Keep) -> Tensor:
+    """(transitions, width): the share of the first take that each frame of a sandwich keeps; 1 on padding."""
+    result = torch.ones(len(plan.handshakes), plan.width)
+    for i, (h, b) in enumerate(zip(plan.handshakes, plan.ramps, strict=True)):
+        start = plan.size(i)
+        result[i, : plan.sandwiches[i]] = keep.outside
+        result[i, start - b : start] = keep.ramp(b, "left").flip(0)
+        result[i, start : start + h] = keep.handshake
+        result[i, start + h : start + h + b] = keep.ramp(b, "right")
+    return result
+
+
+def second_take(
+    denoise: Denoiser,
+    sandwich: State,
+    weights: Tensor,
+    *,
+    way: Sequence[int],
+    schedule: Schedule,
+    draw: Draw,
+    solver: Solver = DDPM,
+) -> State:
+    """Sandwiches noised to ``way[0]`` and refined, the guess held to them by ``weights`` (transitions, frames)."""
+    repetitions = len(sandwich) // len(weights)
+    mask = weights.to(sandwich).repeat(repetitions, 1)[..., None]
+    x = restart(sandwich, schedule, way[0], draw)
+    held = inpaint(denoise, sandwich, mask)
+    return run(held, x, levels=way, solver=solver, schedule=schedule, draw=draw)
+
+
+def rebuild(first: State, second: State, plan: Plan) -> State:
+    """The first take with handshakes and ramps out of the second; zeros behind each row's end."""
+    result = torch.zeros_like(first)
+    rows, old, new = plan.split(result), plan.split(first), plan.split(second)
+    for i, length in enumerate(plan.lengths):
+        rows[:, i, :length] = old[:, i, :length]
+    for i, (h, b) in enumerate(zip(plan.handshakes, plan.ramps, strict=True)):
+        start, end = plan.size(i), plan.lengths[i]
+        rows[:, i, end - h - b : end] = new[:, i, start - b : start + h]
+        rows[:, i + 1, : h + b] = new[:, i, start : start + h + b]
+    return result
+
+
+def unfold(x: State, plan: Plan) -> Tensor:
+    """(repetitions, frames, features): row 0 whole, of every further row what lies behind its first handshake."""
+    rows = plan.split(x)
+    starts = (0, *plan.handshakes)
+    parts = [rows[:, i, start:length] for i, (start, length) in enumerate(zip(starts, plan.lengths, strict=True))]
+    return torch.cat(parts, dim=1)
+
+
+def restarted(way: Sequence[int], schedule: Schedule, share: float) -> list[int]:
+    """The end of a walk, from its noisiest level that is not above ``share`` of all levels."""
+    return [level for level in way if level <= round(share * schedule.steps)]
+
+
+def double_take(
+    first: Denoiser,
+    second: Denoiser,
+    x: State,
+    plan: Plan,
+    *,
+    mode: Mode,
+    way: Sequence[int],
+    schedule: Schedule,
+    draws: tuple[Draw, Draw],
+    solver: Solver = DDPM,
+    second_take_only: bool = False,
+) -> Takes:
+    """Both takes. ``first`` has the texts of the rows, ``second`` none; each is bound to the lengths it should know.
+
+    x: noise (repetitions * intervals, longest interval, features) at ``way[0]``. draws: noise for the first and for the
+    second take. One interval is sampled as ever and has no second take.
+    """
+    made = first_take(
+        first, x, plan, way=way, schedule=schedule, draw=draws[0], solver=solver, join=not second_take_only
+    )
+    if not plan.handshakes:
+        none = made.new_zeros(0, 0, made.shape[2])
+        return Takes(made, none, made.new_zeros(0, 0), none, made, unfold(made, plan))
+    inside, weights = sandwiches(made, plan), keep_weights(plan, mode.keep)
+    later = restarted(way, schedule, mode.restart)
+    refined = second_take(second, inside, weights, way=later, schedule=schedule, draw=draws[1], solver=solver)
+    rebuilt = rebuild(made, refined, plan)
+    return Takes(made, inside, weights, refined, rebuilt, unfold(rebuilt, plan))
+
+
+@torch.inference_mode()
+def double_take_features(
+    prior: Prior,
+    prompts: Sequence[str],
+    frames: Sequence[int],
+    *,
+    mode: Literal["published", "paper"] = "published",
+    handshake: int | Sequence[int] = HANDSHAKE,
+    ramp: int | Sequence[int] | None = None,
+    steps: int = 1000,
+    seed: int = 0,
+    guidance: float = GUIDANCE,
+    solver: str = SOLVER,
+    spacing: str = SPACING,
+    first_take_only: bool = False,
+    second_take_only: bool = False,
+) -> tuple[Tensor, list[int]]:
+    """One long motion as features (frames, 263), not standardised, and where each interval ends (`Plan.ends`).
+
+    frames: of each interval, its handshakes included, so that the motion has ``sum(frames) - sum(handshakes)``; an
+    interval needs two handshakes, two ramps and 10 frames. handshake, ramp: frames, one number or one per transition;
+    ramp None takes the mode's own (20 published, 10 paper). steps: of the first take; the second restarts at the
+    nearest level at or below the mode's. The second take's text is empty, and asked once per step.
+    Raises `MotionloomError` for what cannot be asked.
+    """
+    if mode not in MODES:
+        raise MotionloomError(f"DoubleTake has no mode {mode!r}; there are {', '.join(MODES)}")
+    if steps not in range(1, prior.schedule.steps + 1) or solver not in SOLVERS:
+        raise MotionloomError(
+            f"{steps} steps of {solver!r} cannot be taken; there are 1 to {prior.schedule.steps} steps and the solvers "
+            f"{', '.join(SOLVERS)}"
+        )
+    chosen = MODES[mode]
+    plan = Plan.of(list(frames), handshake, chosen.ramp if ramp is None else ramp)
+    _check(prompts, plan, seed=seed, guidance=guidance, neither=first_take_only and second_take_only)
+    count, joins = len(prompts), len(plan.handshakes)
+    seeds = [int(word) for word in np.random.SeedSequence(seed).generate_state(count + joins, np.uint64) >> 2]
+    known = (plan.lengths, plan.sandwiches) if chosen.masked else (None, None)
+    draws = row_draw(seeds[:count], known[0]), row_draw(seeds[count:], known[1])
+    x = draws[0](torch.empty(count, max(plan.lengths), len(prior.mean), device=prior.mean.device))
+    first = _with_text(prior, prompts, known[0], flags(plan), guidance)
+    way, walker = levels(prior.schedule, steps, spacing=spacing), SOLVERS[solver]  # type: ignore[arg-type]
+    if first_take_only:
+        made = unfold(first_take(first, x, plan, way=way, schedule=prior.schedule, draw=draws[0], solver=walker), plan)
+    else:
+        second = _without_text(prior, joins, known[1])
+        made = double_take(
+            first, second, x, plan, mode=chosen, way=way, schedule=prior.schedule, draws=draws, solver=walker,
+            second_take_only=second_take_only,
+        ).unfolded  # fmt: skip
+    finished = made[0] * prior.std + prior.mean
+    return (smooth(finished) if prior.net.config.patch > 1 else finished).cpu(), plan.ends
+
+
+def _with_text(
+    prior: Prior, prompts: Sequence[str], lengths: Sequence[int] | None, marks: Tensor, guidance: float
+) -> Denoiser:
+    cond = prior.condition(list(prompts), list(lengths) if lengths else None)
+    if prior.net.config.flags:
+        cond = cond._replace(flags=marks.to(prior.mean.device))
+    return guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), guidance)
+
+
+def _without_text(prior: Prior, rows: int, lengths: Sequence[int] | None) -> Denoiser:
+    if not rows:
+        return lambda x, level: x
+    bound = prior.net.bind(prior.condition([""] * rows, list(lengths) if lengths else None).null())
+    return lambda x, level: prior.net(x, level, bound)
+
+
+def _check(prompts: Sequence[str], plan: Plan, *, seed: int, guidance: float, neither: bool) -> None:
+    if len(prompts) != len(plan.lengths):
+        raise MotionloomError(f"there are {len(plan.lengths)} lengths for {len(prompts)} prompts; give one per prompt")
+    if any(not prompt.strip() for prompt in prompts):
+        raise MotionloomError("a prompt is empty; say in words what the person does")
+    if not 0 <= seed < LARGEST_SEED:
+        raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {seed}")
+    if not np.isfinite(guidance) or abs(guidance) > 100:
+        raise MotionloomError(f"a guidance of {guidance:g} makes no motion; usual values are 1 to 7")
+    if neither:
+        raise MotionloomError("the first take only and the second take only exclude each other; ask for one of them")
+    if max(plan.lengths) > SEEN:
+        warnings.warn(
+            f"an interval has {max(plan.lengths)} frames; the data behind these weights have at most {SEEN}",
+            stacklevel=3,
+        )

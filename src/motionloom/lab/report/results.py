@@ -1,0 +1,68 @@
+"""The page of results: each suite's report between its own pair of marker comments.
+
+``<!-- suite NAME -->`` and ``<!-- end -->`` enclose what is replaced; all else stays as people wrote it. Filling twice
+changes nothing.
+"""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from motionloom.errors import MotionloomError
+from motionloom.lab.report.report import Report, markdown
+from motionloom.lab.suites.obey import write_text
+
+PLACE = re.compile(r"(<!-- suite ([\w.-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+QUICK_MARK = "<!-- quick -->\n"
+LARGEST = 8 << 20
+
+
+def fill(text: str, reports: Sequence[Report], *, again: bool = False) -> tuple[str, list[str]]:
+    """The page with each report at its place, and the suites left alone since a quick run may not replace a full one.
+
+    A suite without a place gets one at the end; ``again`` lets a quick run replace a full one.
+    """
+    for report in reports:
+        if not any(found[2] == report.suite for found in PLACE.finditer(text)):
+            text = f"{text.rstrip()}\n\n## {report.title}\n\n<!-- suite {report.suite} -->\n<!-- end -->\n"
+    by_suite = {report.suite: report for report in reports}
+    left: list[str] = []
+
+    def one(found: re.Match[str]) -> str:
+        report = by_suite.get(found[2])
+        if report is None:
+            return found[0]
+        quick = bool(report.protocol.get("quick", False))
+        full_before = "|" in found[3] and QUICK_MARK not in found[3]
+        if quick and full_before and not again:
+            left.append(report.suite)
+            return found[0]
+        return f"{found[1]}{QUICK_MARK if quick else ''}{shown(report)}{found[4]}"
+
+    return PLACE.sub(one, text), left
+
+
+def shown(report: Report) -> str:
+    """The report as Markdown without its title and with no comment of its own that could end its place."""
+    body = re.sub(r"\A# .*\n+", "", markdown(report))
+    return body.replace("<!--", "< !--")
+
+
+def check_page(path: Path) -> str:
+    """The text of a page of results: ask before long work. `MotionloomError` if there is none."""
+    try:
+        if path.stat().st_size > LARGEST:
+            raise MotionloomError(f"{path} has more than {LARGEST >> 20} MiB; name a page with marker comments")
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        said = getattr(error, "strerror", None) or "it is no text"
+        raise MotionloomError(f"cannot read {path}: {said}; name a page with marker comments") from None
+
+
+def fill_page(path: Path, reports: Sequence[Report], *, again: bool = False) -> list[str]:
+    """Fill the file; the suites left alone (`fill`). `MotionloomError` if there is no such page."""
+    text = check_page(path)
+    filled, left = fill(text, reports, again=again)
+    if filled != text:
+        write_text(path, filled)
+    return left

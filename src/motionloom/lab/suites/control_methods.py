@@ -1,0 +1,178 @@
+"""The rows of the suite `control`: ways to make a motion that meets a goal, each a function of wishes and seeds."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Protocol as Interface
+
+import numpy as np
+import torch
+
+from motionloom.errors import MotionloomError
+from motionloom.features import humanml
+from motionloom.kinematics.physics import Array
+from motionloom.lab.suites.control_kinds import Kind, Wish
+from motionloom.motion import Motion
+from motionloom.tasks.blending import Net, control_features
+from motionloom.tasks.text import ROWS, SOLVER, SPACING, sample_features, smooth, to_motion
+from motionloom.weights.adapter import Adapter, adapted
+from motionloom.weights.prior import Prior
+
+UNCONTROLLED, EXPORTED = "uncontrolled", "uncontrolled, as exported"
+INPAINTING, TUNED, BLENDING = "MDM inpainting", "fine-tuned", "DiffusionBlending"
+LOOSE, OURS = "ours without exact fit", "ours"
+METHODS = (UNCONTROLLED, EXPORTED, INPAINTING, TUNED, BLENDING, LOOSE, OURS)
+"""In the order of the table."""
+BASE = {UNCONTROLLED: UNCONTROLLED, INPAINTING: UNCONTROLLED, TUNED: UNCONTROLLED, BLENDING: UNCONTROLLED,
+        EXPORTED: EXPORTED, LOOSE: EXPORTED, OURS: EXPORTED}  # fmt: skip
+"""The uncontrolled row that each is a ratio to: of motions as drawn, or of exported ones."""
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """One motion."""
+
+    positions: Array
+    """(frames, 22, 3) metres in the goal's world, at 20 frames per second."""
+    features: Array
+    """(frames, 263) not standardised, for the evaluator."""
+
+
+class Method(Interface):
+    """Motion i of the answer meets wish i as well as it can, drawn from seed i alone."""
+
+    def __call__(self, wishes: Sequence[Wish], *, seeds: Sequence[int]) -> list[Made]: ...
+
+
+Maker = Callable[[Kind, str], Method]
+"""(kind, name out of `METHODS`) to the method; MotionloomError where these weights have none of that name."""
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How everything is sampled."""
+
+    steps: int
+    guidance: float
+    solver: str = SOLVER
+    spacing: str = SPACING
+
+
+def fits(one: Kind, name: str) -> bool:
+    """Whether a method is a row of a kind: one control is fine-tuned, several are blended."""
+    return {TUNED: len(one.adapters) == 1, BLENDING: len(one.adapters) > 1}.get(name, True)
+
+
+def maker(prior: Prior, how: Sampling) -> Maker:
+    """The methods of a prior and the adapters that are shipped for it."""
+
+    @cache
+    def net(name: str):
+        return adapted(prior.net, Adapter.load(name, prior)).to(prior.mean.device)
+
+    def make(one: Kind, name: str) -> Method:
+        if name in (UNCONTROLLED, EXPORTED):
+            return uncontrolled(prior, how, exported=name == EXPORTED)
+        if name == INPAINTING:
+            return published(prior, how, [prior.net], noise_free=False)
+        if name in (TUNED, BLENDING):
+            return published(prior, how, [net(part) for part in one.adapters], noise_free=True)
+        if name in (LOOSE, OURS):
+            return ours(prior, how, exact=name == OURS)
+        raise MotionloomError(f"there is no way of control {name!r}; there are {', '.join(METHODS)}")
+
+    return make
+
+
+def uncontrolled(prior: Prior, how: Sampling, *, exported: bool) -> Method:
+    """Goals are ignored: motions from the words alone, as the network draws them or as they are exported."""
+
+    def draw(wishes: Sequence[Wish], *, seeds: Sequence[int]) -> list[Made]:
+        drawn = sample_features(
+            prior, [wish.prompt for wish in wishes], [len(wish) for wish in wishes], seeds=seeds,
+            guidance=how.guidance, steps=how.steps, solver=how.solver, spacing=how.spacing,
+        )  # fmt: skip
+        features = [one.numpy().astype(np.float64) for one in drawn]
+        return [of_motion(to_motion(one, prior.fps)) if exported else of_features(one) for one in features]
+
+    return draw
+
+
+def published(prior: Prior, how: Sampling, nets: Sequence[Net], *, noise_free: bool) -> Method:
+    """Control in the representation: the fixed numbers are written into every guess (`tasks.blending`)."""
+
+    def draw(wishes: Sequence[Wish], *, seeds: Sequence[int]) -> list[Made]:
+        result: dict[int, Made] = {}
+        for rows in groups([len(wish) for wish in wishes]):
+            drawn = _controlled(
+                prior, how, nets, [wishes[row] for row in rows], [seeds[row] for row in rows], noise_free
+            )
+            result |= {row: of_features(one) for row, one in zip(rows, drawn, strict=True)}
+        return [result[row] for row in range(len(wishes))]
+
+    return draw
+
+
+def _controlled(
+    prior: Prior, how: Sampling, nets: Sequence[Net], wishes: Sequence[Wish], seeds: Sequence[int],
+    noise_free: bool,
+) -> np.ndarray:  # fmt: skip
+    """(rows, frames, 263) not standardised, of wishes of one length."""
+    mask = torch.from_numpy(np.stack([wish.mask for wish in wishes])).to(prior.mean.device)
+    given = torch.from_numpy(np.stack([wish.known for wish in wishes])).to(prior.mean)
+    known = (given - prior.mean) / prior.std
+    state = control_features(
+        prior, nets, [wish.prompt for wish in wishes], known, mask, weights=None, seeds=seeds,
+        guidance=how.guidance, steps=how.steps, solver=how.solver, spacing=how.spacing, noise_free=noise_free,
+    )  # fmt: skip
+    drawn = state * prior.std + prior.mean
+    if prior.net.config.patch > 1:
+        drawn = smooth(drawn)  # as everything that such a network draws
+    return torch.where(mask, given, drawn).cpu().numpy().astype(np.float64)
+
+
+def ours(prior: Prior, how: Sampling, *, exact: bool) -> Method:
+    """`tasks.control.control` as it is by default, with or without its exact fit; as exported."""
+
+    def draw(wishes: Sequence[Wish], *, seeds: Sequence[int]) -> list[Made]:
+        from motionloom.tasks.control import control
+
+        made = []
+        for wish, seed in zip(wishes, seeds, strict=True):
+            (one,) = control(
+                prior, wish.prompt, wish.goal, count=1, seed=seed, guidance=how.guidance, steps=how.steps, exact=exact
+            )
+            made.append(of_motion(one.motion))
+        return made
+
+    return draw
+
+
+def of_features(features: np.ndarray) -> Made:
+    """A motion as it is drawn; it starts at the origin facing +Z, as the real one does."""
+    return Made(humanml.decode_positions(features), features)
+
+
+def of_motion(motion: Motion) -> Made:
+    """A motion as it is exported, on 22 joints at 20 frames per second; the last frame's numbers stand there twice."""
+    positions = motion.positions()
+    features = humanml.positions_to_features(positions, motion.fps).astype(np.float64)
+    return Made(positions, np.concatenate([features, features[-1:]]))  # a frame has a step only to the next one
+
+
+def groups(lengths: Sequence[int]) -> list[list[int]]:
+    """Rows of equal length, at most `ROWS` together."""
+    by_length: dict[int, list[int]] = {}
+    for row, length in enumerate(lengths):
+        by_length.setdefault(length, []).append(row)
+    return [rows[at : at + ROWS] for rows in by_length.values() for at in range(0, len(rows), ROWS)]
+
+
+def checked(made: Sequence[Made], wishes: Sequence[Wish]) -> list[Made]:
+    """The motions, if they have the lengths asked for; ValueError otherwise, since a number would be a lie."""
+    for one, wish in zip(made, wishes, strict=True):
+        if one.positions.shape != wish.goal.positions.shape or len(one.features) != len(wish):
+            raise ValueError(f"a motion of {one.positions.shape} for a goal of {wish.goal.positions.shape}")
+        if not np.isfinite(one.positions).all():
+            raise ValueError("a motion has numbers that are not finite")
+    return list(made)

@@ -1,0 +1,340 @@
+"""Prefix completion of two people: the table of Shafir et al. 2024 (priorMDM, table 3) on held-out pairs of one's own.
+
+One second of both is given and three are said. Besides the paper's errors every row has what an error cannot see: how
+much the completions move, touch and lie in each other, beside the real ones.
+"""
+
+import hashlib
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from motionloom.data.pairs import Pair
+from motionloom.errors import MotionloomError
+from motionloom.kinematics.physics import Array, foot_skate
+from motionloom.lab.metrics import pair as mp
+from motionloom.lab.papers.mrt import MrtFile
+from motionloom.lab.report.published_rows import published
+from motionloom.lab.report.report import REAL, Column, Report, Row, Value
+from motionloom.lab.suites import duet_blocks
+from motionloom.lab.suites import duet_ways as ways
+from motionloom.lab.suites.duet_blocks import Beside
+from motionloom.lab.suites.duet_ways import FRAMES, GIVEN, Crops, Way
+from motionloom.lab.suites.needs import NoData, pairs_of
+from motionloom.lab.suites.parts import Parts, fingerprint
+from motionloom.tasks.text import STEPS
+from motionloom.weights.pair import PairBlock, blocks
+from motionloom.weights.prior import Prior
+
+KINDS = ("real", "zero", "constant", "silent", "communication", "ours", "mrt")
+"""Rows of the table; ``silent``: the prior without communication; ``communication``: that alone."""
+HELD_OUT = ("val", "test")
+ERRORS = tuple(f"{what}_{k}" for what in ("root", "joint") for k in mp.HORIZONS)
+LOOKS = ("speed", "hand_contact", "penetration", "skate")
+CHUNK = 16
+"""Crops of a piece that is kept."""
+ZERO, CONSTANT, SILENT, ALONE, MRT = (
+    "zero velocity", "constant velocity", "prior without communication", "communication only",
+    "multi-range transformer",
+)  # fmt: skip
+COLUMNS = (
+    *(Column(f"root_{k}", f"root m, {k} s", "down", f"distance of the roots, first {k} s") for k in mp.HORIZONS),
+    *(Column(f"joint_{k}", f"joints m, {k} s", "down", f"the same of joints, each from its root, first {k} s")
+      for k in mp.HORIZONS),
+    Column("speed", "m/s", "real", "how fast the joints go, mean: a completion that stands still has small errors"),
+    Column("hand_contact", "hands", "real", "share of frames with a wrist nearer than 25 cm to one of the other"),
+    Column("penetration", "inside cm", "down", "deepest overlap of the two bodies (capsules), mean over frames", 2),
+    Column("skate", "skate cm/s", "real", "speed of toes below 5 cm (Kimodo), mean of both", 1),
+    Column("seconds", "s per crop", "", "wall time of one completion, on the machine that measured", 3),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class How:
+    """How completions are measured."""
+
+    crops: int = 200
+    samples: int = 5
+    """Completions of each crop; their mean is a row of its own."""
+    steps: int = STEPS
+    guidance: float = 1.0
+    prompt: str = ""
+    """What the networks are told in words; published: nothing."""
+    given: str = "past"
+    """What of the first second is known, see `duet_ways.GIVEN`."""
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, value, most in (("crops", self.crops, 10_000), ("samples", self.samples, 100)):
+            if not 1 <= value <= most:
+                raise MotionloomError(f"{name} must be from 1 to {most:,}; got {value}")
+        if self.given not in GIVEN:
+            raise MotionloomError(f"what is given is one of {', '.join(GIVEN)}; got {self.given[:40]!r}")
+        if not 0 <= self.seed < 2**31 or not np.isfinite(self.guidance) or not 1 <= self.steps <= 1000:
+            raise MotionloomError(f"seed, steps or guidance cannot be {self.seed}, {self.steps}, {self.guidance}")
+
+
+QUICK = How(crops=6, samples=2, steps=6)
+
+
+def run(
+    weights: str | Path = "default",
+    *,
+    data: Path | str | None,
+    block: str | Path | None = None,
+    communication: Path | None = None,
+    mrt: Path | None = None,
+    beside: Sequence[str | Path] = (),
+    how: How | None = None,
+    kinds: Sequence[str] = KINDS,
+    with_published: bool = True,
+    folder: Path | None = None,
+    device: str = "cpu",
+    command: str = "",
+    progress: Callable[[str], None] = lambda line: None,
+) -> Report:
+    """Measure a block (a shipped name, a file, or the shipped one) on the held-out pairs of ``data``.
+
+    communication: a block trained over `duet_ways.bare`; mrt: a file of `lab.papers.mrt_training`; without them their
+    rows are left out. beside: other blocks for the same prior, each a row of its own, of one sample. ``folder`` keeps
+    what is done, so that the same call goes on after a stop. The report is not written here.
+    """
+    how = how or How()
+    if not kinds or not set(kinds) <= set(KINDS):
+        raise MotionloomError(f"the rows are {', '.join(KINDS)}; got {', '.join(kinds)[:200] or 'none'}")
+    prior = Prior.load(weights, device=device)
+    found = PairBlock.load(chosen_block(block), prior) if "ours" in kinds else None
+    made = ways_of(prior, found, how, kinds, communication=communication, mrt=mrt, device=device)
+    others = duet_blocks.beside(prior, beside, _asked(how))
+    crops = draw(held_out(pairs_of(data, captions=False, say=progress)), how)
+    about = {
+        "weights": Path(weights).stem, "block": found.name if found else None, "device": device,
+        "files": {str(k): _digest(v) for k, v in (("communication", communication), ("mrt", mrt)) if v},
+        "block file": _digest_of(found) if found else None,
+    }  # fmt: skip
+    return measure(
+        crops, made, how, kinds=kinds, beside=others, with_published=with_published, folder=folder, command=command,
+        about=about, progress=progress,
+    )  # fmt: skip
+
+
+def chosen_block(block: str | Path | None) -> str | Path:
+    """The one that was asked for, or the shipped one; raises MotionloomError where there is none."""
+    if block is not None:
+        return block
+    if not blocks():
+        raise MotionloomError("no two-person block is shipped; name a file with --block")
+    return next(iter(blocks()))
+
+
+def held_out(pairs: Sequence[Pair]) -> list[Pair]:
+    """Those of validation and test that are long enough for a crop; raises NoData where there is none."""
+    found = [pair for pair in pairs if pair.split in HELD_OUT and pair.frames > FRAMES]
+    if not found:
+        raise NoData(
+            f"there is no held-out pair of {FRAMES + 1} frames or more; ten pairs or more give one for validation"
+        )
+    return found
+
+
+def draw(pairs: Sequence[Pair], how: How) -> Crops:
+    """Random crops, every pair as often as any, either person first."""
+    rng = np.random.default_rng(how.seed)
+    made = []
+    for _ in range(how.crops):
+        positions = pairs[int(rng.integers(len(pairs)))].positions
+        start = int(rng.integers(positions.shape[1] - FRAMES))
+        made.append(positions[:: 1 if rng.random() < 0.5 else -1, start : start + FRAMES + 1])
+    return Crops(np.stack(made), tuple(range(how.crops)))
+
+
+def ways_of(
+    prior: Prior,
+    block: PairBlock | None,
+    how: How,
+    kinds: Sequence[str] = KINDS,
+    *,
+    communication: Path | None = None,
+    mrt: Path | None = None,
+    device: str = "cpu",
+) -> dict[str, Way]:
+    """Every way that there are weights for, by its kind."""
+    asked = _asked(how)
+    found: dict[str, Way] = {"zero": ways.standing(), "constant": ways.gliding()}
+    found["silent"] = ways.drawn(prior, ways.silent_net(prior), **asked)
+    if communication is not None and "communication" in kinds:
+        found["communication"] = ways.drawn(*ways.only_communication(prior, communication), **asked)
+    if block is not None:
+        found["ours"] = ways.drawn(prior, block.net(prior), **asked)
+    if mrt is not None and "mrt" in kinds:
+        found["mrt"] = ways.by_mrt(MrtFile.load(mrt, device=device).net)
+    return found
+
+
+def _asked(how: How) -> dict[str, Any]:
+    """What `duet_ways.drawn` takes."""
+    return {
+        "given": how.given, "seed": how.seed, "steps": how.steps, "guidance": how.guidance, "prompt": how.prompt
+    }  # fmt: skip
+
+
+def measure(
+    crops: Crops,
+    found: Mapping[str, Way],
+    how: How,
+    *,
+    kinds: Sequence[str] = KINDS,
+    beside: Sequence[Beside] = (),
+    with_published: bool = True,
+    folder: Path | None = None,
+    command: str = "",
+    about: Mapping[str, Any] | None = None,
+    progress: Callable[[str], None] = lambda line: None,
+) -> Report:
+    """The report of ways on crops. Pieces of blocks ``beside`` go by their own files: one more changes no other."""
+    said = protocol_of(crops, how) | dict(about or {})
+    settings = {**said, **asdict(how)}
+    parts = Parts(folder, fingerprint(settings))
+    names = {"zero": ZERO, "constant": CONSTANT, "silent": SILENT, "communication": ALONE, "ours": "ours", "mrt": MRT}
+    rows, errors = [], {}
+    if "real" in kinds:
+        rows.append(_row(REAL, {name: looks(crops.positions[:, :, :FRAMES])[name] for name in LOOKS}))
+    for kind in [kind for kind in KINDS if kind in kinds and kind in found]:
+        drawn = kind in ("silent", "communication", "ours")
+        samples = how.samples if drawn else 1
+        numbers = _measured(crops, found[kind], samples, parts, name=names[kind], progress=progress)
+        one = f"{names[kind]}, one sample" if drawn else names[kind]
+        errors[kind] = (names[kind], numbers)
+        rows.append(_row(one, {name: numbers[name] for name in (*ERRORS, *LOOKS, "seconds")}))
+        if samples > 1:
+            mean = {name: numbers[f"mean_{name}"] for name in (*ERRORS, *LOOKS)}
+            rows.append(_row(f"{names[kind]}, mean of {samples} samples", mean))
+    for one in beside:
+        own = Parts(folder, fingerprint({**settings, "beside": one.digest}))
+        numbers = _measured(crops, one.way, 1, own, name=f"beside {one.digest} {one.row}", progress=progress)
+        errors[one.row] = (one.row, numbers)
+        rows.append(_row(one.row, {name: numbers[name] for name in (*ERRORS, *LOOKS, "seconds")}))
+    said |= {"blocks beside": {one.row: one.digest for one in beside}} if beside else {}
+    others = published("duet-completion", [column.name for column in COLUMNS]) if with_published else ()
+    return Report(
+        "duet-completion", "Two people: three seconds after one", command, said, COLUMNS, (*rows, *others),
+        (*verdicts(errors), *NOTES),
+    )  # fmt: skip
+
+
+NOTES = (
+    "Crops overlap, and all come from few recordings: intervals over crops are too narrow for other recordings.",
+    "Published rows see the velocity out of the last given frame (as --given tool and published do here), and the "
+    "errors of one sample.",
+    "Communication only: a block trained over the prior without its layers; the paper names the row and does not say "
+    "what it was.",
+)
+
+
+def _row(name: str, numbers: Mapping[str, Array]) -> Row:
+    return Row(name, {column: Value.of([float(n) for n in values]) for column, values in numbers.items()})
+
+
+def _measured(
+    crops: Crops, way: Way, samples: int, parts: Parts, *, name: str, progress: Callable[[str], None]
+) -> dict[str, Array]:
+    """(crops,) of every number, piece by piece."""
+    pieces = []
+    for start in range(0, len(crops.numbers), CHUNK):
+        kept = parts.find(f"{name} {start}")
+        if kept is None:
+            progress(f"{name}: crop {start + 1} of {len(crops.numbers)}")
+            numbers = score(crops.part(slice(start, start + CHUNK)), way, samples)
+            kept = {f"{what} {i}": float(v) for what, values in numbers.items() for i, v in enumerate(values)}
+            parts.keep(f"{name} {start}", kept)
+        pieces.append(kept)
+    whats = dict.fromkeys(key.rsplit(" ", 1)[0] for key in pieces[0])
+    return {
+        what: np.array([piece[f"{what} {i}"] for piece in pieces for i in range(len(piece) // len(whats))])
+        for what in whats
+    }
+
+
+def score(crops: Crops, way: Way, samples: int) -> dict[str, Array]:
+    """(crops,) each: errors of a sample and looks, averaged over samples; ``mean_``: those of the samples' mean."""
+    real = crops.positions[:, :, :FRAMES]
+    began = time.perf_counter()
+    made = np.stack([way(crops, sample) for sample in range(samples)])
+    spent = (time.perf_counter() - began) / samples / len(real)
+    each = [{**errors_of(real, one), **looks(one)} for one in made]
+    numbers = {name: np.mean([one[name] for one in each], axis=0) for name in each[0]}
+    if samples > 1:
+        mean = made.mean(axis=0)
+        numbers |= {f"mean_{name}": value for name, value in {**errors_of(real, mean), **looks(mean)}.items()}
+    return numbers | {"seconds": np.full(len(real), spent)}
+
+
+def errors_of(real: Array, made: Array) -> dict[str, Array]:
+    """(crops,) metres: the columns `ERRORS`."""
+    found = [mp.completion_errors(r, m) for r, m in zip(real, made, strict=True)]
+    return {
+        f"{what}_{k}": np.array([getattr(one[n], what) for one in found])
+        for what in ("root", "joint")
+        for n, k in enumerate(mp.HORIZONS)
+    }
+
+
+def looks(made: Array) -> dict[str, Array]:
+    """(crops,) each: the columns `LOOKS` of the frames after the prefix."""
+    after = made[:, :, mp.PREFIX - 1 :]
+    ahead = after[:, :, 1:]
+    speed = np.linalg.norm(np.diff(after, axis=2), axis=-1).mean(axis=(1, 2, 3)) * mp.FPS
+    feet = [np.mean([foot_skate(person, mp.FPS).contact_speed for person in one]) for one in ahead]
+    return {
+        "speed": np.asarray(speed, dtype=np.float64),
+        "hand_contact": np.array([mp.hand_contact(one) for one in ahead]),
+        "penetration": 100 * np.array([mp.penetration(one) for one in ahead]),
+        "skate": np.array(feet, dtype=np.float64),
+    }
+
+
+def verdicts(errors: Mapping[str, tuple[str, Mapping[str, Array]]]) -> tuple[str, ...]:
+    """Ours against each other way, crop by crop."""
+    if "ours" not in errors:
+        return ()
+    told = []
+    for kind, (name, numbers) in errors.items():
+        if kind == "ours":
+            continue
+        apart = [Value.of((errors["ours"][1][f"root_{k}"] - numbers[f"root_{k}"]).tolist()) for k in mp.HORIZONS]
+        said = ", ".join(f"{value.text()} m at {k} s" for k, value in zip(mp.HORIZONS, apart, strict=True))
+        told.append(
+            f"Root error of ours, one sample, less that of {name}, crop by crop (below 0: ours is better): {said}."
+        )
+    return tuple(told)
+
+
+def protocol_of(crops: Crops, how: How) -> dict[str, Any]:
+    """What stands with the table."""
+    known, true = GIVEN[how.given]
+    last = "of the real next frame" if true else "as between the last two given ones"
+    return {
+        "split": "validation and test pairs", "crops": len(crops.numbers), "frames per second": mp.FPS,
+        "frames": f"{mp.PREFIX} given, {FRAMES - mp.PREFIX} said, errors from frame {mp.PREFIX} on",
+        "known slots": f"{known + 1}: D and {known} frames, the velocity out of the last {last} ({how.given})",
+        "representation": "263 HumanML3D features a person; zero, constant and transformer: positions",
+        "frame of reference": "person 0 at frame 0; people of one size", "prompt": how.prompt or "none",
+        "samples": how.samples, "steps": how.steps, "guidance": how.guidance, "seed": how.seed,
+        "interval": "1.96 sigma / sqrt(crops)",
+        "crops chosen": hashlib.sha256(np.round(crops.positions, 4).astype(np.float32).tobytes()).hexdigest()[:12],
+    }  # fmt: skip
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:12] if path.is_file() else "missing"
+
+
+def _digest_of(block: PairBlock) -> str:
+    digest = hashlib.sha256()
+    for key in sorted(block.tensors):
+        digest.update(key.encode() + block.tensors[key].detach().cpu().contiguous().numpy().tobytes())
+    return digest.hexdigest()[:12]

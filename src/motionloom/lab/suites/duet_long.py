@@ -1,0 +1,131 @@
+"""Long duets of several captions: are partners still partners in the last seconds, or have they drifted apart?
+
+Their last stretch, and their first, are judged as duets from words are.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from motionloom.data.pairs import Pair
+from motionloom.errors import MotionloomError
+from motionloom.goals.segment import Segment
+from motionloom.lab.metrics import pair as mp
+from motionloom.lab.report.report import Report
+from motionloom.lab.suites import duet_text as judged
+from motionloom.lab.suites.duet_answers import own_seed
+from motionloom.lab.suites.duet_text import KINDS, NOTES, Make, Table
+from motionloom.motion import Motion
+from motionloom.tasks.control import moved
+from motionloom.tasks.duet import compose_pair
+from motionloom.tasks.long import compose
+from motionloom.tasks.pair import Duet, placement
+from motionloom.tasks.splice import concatenated
+from motionloom.tasks.text import frames_in
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
+
+MOST = 100
+"""Segments."""
+
+
+@dataclass(frozen=True)
+class How(judged.How):
+    """How long duets are made and measured; ``seconds`` is the length of a segment."""
+
+    segments: int = 3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 2 <= self.segments <= MOST:
+            raise MotionloomError(f"long duets have 2 to {MOST} segments; got {self.segments}")
+
+
+QUICK = How(duets=2, steps=6, segments=2)
+
+
+def run(
+    weights: str | Path = "default",
+    *,
+    data: Path | str | None,
+    block: str | Path | None = None,
+    how: How | None = None,
+    kinds: Sequence[str] = KINDS,
+    device: str = "cpu",
+    command: str = "",
+    progress: Callable[[str], None] = lambda line: None,
+) -> Report:
+    """Measure a block (a shipped name, a file, or the shipped one) in long duets for the captions of train pairs."""
+    how = how or How()
+    prior, found, pairs, about = judged.opened(
+        weights, data=data, block=block, kinds=kinds, device=device, progress=progress
+    )
+    said = judged.captions_of(pairs)
+    return judged.measure(
+        pairs, ours(prior, found, said, how), alone(prior, pairs, said, how), how, table=table(said, how), kinds=kinds,
+        command=command, about=about | {"segments": how.segments, "whole": f"{how.segments * how.seconds:g} s"},
+        progress=progress,
+    )  # fmt: skip
+
+
+def table(captions: tuple[str, ...], how: How) -> Table:
+    """The last and the first stretch, as long as a segment."""
+    frames = frames_in(how.seconds, mp.FPS)
+    cuts = (
+        (f", last {how.seconds:g} s", lambda duet: duet[:, -frames:]),
+        (f", first {how.seconds:g} s", lambda duet: duet[:, :frames]),
+    )
+    silent = "The prior without communication begins where real partners do, and never hears of the other again."
+    return Table("duet-long", "Two people for long", captions, (*NOTES, silent), cuts)
+
+
+def ours(prior: Prior, block: PairBlock, captions: Sequence[str], how: How) -> Make:
+    """`compose_pair` of captions in turn, from the one that is asked for."""
+
+    def make(caption: str, count: int, seed: int) -> list[Duet]:
+        made = []
+        for number in range(count):
+            pieces = list(
+                compose_pair(
+                    prior, block, timeline(captions, caption, how), seed=own_seed(seed, number),
+                    guidance=how.guidance, steps=how.steps, clean=how.clean,
+                )
+            )  # fmt: skip
+            made.append((_whole(first for first, _ in pieces), _whole(second for _, second in pieces)))
+        return made
+
+    return make
+
+
+def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: How) -> Make:
+    """Two long motions of the prior alone, which begin where partners of random train windows stand."""
+    begun = judged.beginnings(pairs, how)
+
+    def one(caption: str, seed: int) -> Motion:
+        return _whole(
+            compose(
+                prior, timeline(captions, caption, how), seed=seed, guidance=how.guidance, steps=how.steps,
+                clean=how.clean,
+            )
+        )  # fmt: skip
+
+    def make(caption: str, count: int, seed: int) -> list[Duet]:
+        made = []
+        for number, stands in enumerate(begun(count, seed)):
+            first, second = (
+                moved(one(caption, own_seed(seed, 2 * number + i)), placement(stand)) for i, stand in enumerate(stands)
+            )
+            made.append((first, second))
+        return made
+
+    return make
+
+
+def timeline(captions: Sequence[str], caption: str, how: How) -> list[Segment]:
+    """``how.segments`` captions in turn, the first of which is ``caption``."""
+    first = captions.index(caption)
+    return [Segment(captions[(first + n) % len(captions)], how.seconds) for n in range(how.segments)]
+
+
+def _whole(pieces: Iterable[Motion]) -> Motion:
+    return concatenated(*pieces)

@@ -1,0 +1,233 @@
+"""The obedience run: every check's prompt on several seeds, and the tables that come out of it.
+
+Generation comes in as a function, so that a fake one can be tested and any prior measured. What was done is kept in one
+JSON file after every prompt; a run that was stopped goes on with the next one.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from motionloom.errors import MotionloomError
+from motionloom.io.atomic import atomic_path, check_place
+from motionloom.kinematics.physics import Array
+from motionloom.lab.metrics.actions import measure
+from motionloom.lab.metrics.obedience import CHECKS, Check
+
+ENOUGH = 0.9
+"""Share of seeds that must obey for a prompt to count as obeyed."""
+
+
+class Generate(Protocol):
+    """Motions for prompts, row i from seed ``seed + i``."""
+
+    def __call__(self, prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[Array], float]:
+        """One (frames, 22, 3) array in metres per prompt, and their frames per second."""
+        ...
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One generated motion against its check."""
+
+    prompt: str
+    seed: int
+    obeyed: bool
+    measured: dict[str, float]
+    """The numbers that the check bounds."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """All attempts at one check."""
+
+    name: str
+    attempts: tuple[Attempt, ...]
+
+    def of(self, prompt: str) -> tuple[Attempt, ...]:
+        """The attempts at one wording."""
+        return tuple(a for a in self.attempts if a.prompt == prompt)
+
+
+def attempts(check: Check, generate: Generate, prompt: str, *, seeds: int, first_seed: int) -> list[Attempt]:
+    """Generate one prompt on seeds ``first_seed`` to ``first_seed + seeds - 1`` and judge it."""
+    motions, fps = generate([prompt] * seeds, seconds=check.seconds, seed=first_seed)
+    if len(motions) != seeds:
+        raise MotionloomError(
+            f"asked for {seeds} motions of {prompt!r} and got {len(motions)}; generate one per prompt"
+        )
+    found = []
+    for row, positions in enumerate(motions):
+        numbers = measure(positions, fps)
+        kept = {bound.measure: numbers[bound.measure] for bound in check.bounds}
+        found.append(Attempt(prompt, first_seed + row, check.obeyed(numbers), kept))
+    return found
+
+
+def run(
+    generate: Generate,
+    checks: Sequence[Check] = CHECKS,
+    *,
+    seeds: int = 10,
+    first_seed: int = 0,
+    paraphrases: bool = False,
+    settings: dict[str, Any] | None = None,
+    folder: Path | None = None,
+    progress: Callable[[str], None] = lambda line: None,
+) -> list[Result]:
+    """Every check, resumed from ``folder/obedience.json`` where the settings are the same; writes it as it goes."""
+    if not 1 <= seeds <= 10_000:
+        raise MotionloomError(f"the number of seeds must be from 1 to 10000; got {seeds}")
+    asked = {**(settings or {}), "seeds": seeds, "first_seed": first_seed, "checks": fingerprint(checks)}
+    done = _read(check_report(folder / "obedience.json"), asked) if folder else {}
+    for check in checks:
+        for prompt in (check.prompt, *(check.paraphrases if paraphrases else ())):
+            if any(a.prompt == prompt for a in done.get(check.name, ())):
+                continue
+            found = attempts(check, generate, prompt, seeds=seeds, first_seed=first_seed)
+            done.setdefault(check.name, []).extend(found)
+            progress(f"{sum(a.obeyed for a in found):3d}/{seeds}  {prompt}")
+            if folder:
+                write_json(folder / "obedience.json", summary(_results(checks, done), checks, settings=asked))
+    return _results(checks, done)
+
+
+def fingerprint(checks: Sequence[Check]) -> str:
+    """Changes whenever a prompt or a bound changes: results of other checks are not mixed in."""
+    said = repr([(c.name, c.seconds, [(b.measure, b.low, b.high) for b in c.bounds]) for c in checks])
+    return hashlib.sha256(said.encode()).hexdigest()[:16]
+
+
+def _results(checks: Sequence[Check], done: dict[str, list[Attempt]]) -> list[Result]:
+    return [Result(check.name, tuple(done[check.name])) for check in checks if check.name in done]
+
+
+def _read(path: Path, settings: dict[str, Any]) -> dict[str, list[Attempt]]:
+    if not path.is_file():
+        return {}
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        if kept["settings"] != settings:
+            raise MotionloomError(f"{path} was made with other settings; name another --out folder or delete it")
+        return {str(check["name"]): [_attempt(a) for a in check["attempts"]] for check in kept["checks"]}
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        if isinstance(error, MotionloomError):
+            raise
+        raise MotionloomError(f"{path} is not a result of this command ({error!r}); delete it to begin again") from None
+
+
+def _attempt(found: dict[str, Any]) -> Attempt:
+    measured = {str(name): float(value) for name, value in found["measured"].items()}
+    return Attempt(str(found["prompt"]), int(found["seed"]), bool(found["obeyed"]), measured)
+
+
+def summary(results: Sequence[Result], checks: Sequence[Check] = CHECKS, *, settings: dict[str, Any]) -> dict[str, Any]:
+    """Everything as plain data for JSON."""
+    by_name = {check.name: check for check in checks}
+    listed = []
+    for result in results:
+        check = by_name[result.name]
+        own = result.of(check.prompt)
+        listed.append(
+            {
+                "name": check.name,
+                "prompt": check.prompt,
+                "seconds": check.seconds,
+                "obeyed": sum(a.obeyed for a in own),
+                "of": len(own),
+                "wanted": [bound.wanted() for bound in check.bounds],
+                "paraphrases": {p: sum(a.obeyed for a in result.of(p)) for p in check.paraphrases if result.of(p)},
+                "attempts": [a.__dict__ for a in result.attempts],
+            }
+        )
+    return {"settings": settings, "totals": totals(results, checks), "checks": listed}
+
+
+def totals(results: Sequence[Result], checks: Sequence[Check] = CHECKS) -> dict[str, float]:
+    """Share of seeds that obey, prompts obeyed, and the share for the other wordings."""
+    prompts = {check.name: check.prompt for check in checks}
+    own = [r.of(prompts[r.name]) for r in results]
+    tried = [a for row in own for a in row]
+    other = [a for r in results for a in r.attempts if a.prompt != prompts[r.name]]
+    found = {
+        "prompts": len(own),
+        "prompts_obeyed": sum(sum(a.obeyed for a in row) >= ENOUGH * len(row) for row in own if row),
+        "seeds_obeyed_share": round(sum(a.obeyed for a in tried) / max(1, len(tried)), 4),
+    }
+    if other:
+        found["paraphrases_obeyed_share"] = round(sum(a.obeyed for a in other) / len(other), 4)
+    return found
+
+
+def table(
+    results: Sequence[Result], checks: Sequence[Check] = CHECKS, *, real: dict[str, Any] | None = None
+) -> list[list[str]]:
+    """Rows of text, the heading first: prompt, seeds, other wordings, real clips, the bounds with the median seen."""
+    by_name = {check.name: check for check in checks}
+    rows = [["prompt", "seeds", "reworded", "real held-out", "real all", "median seen, of what is wanted"]]
+    for result in results:
+        check = by_name[result.name]
+        own = result.of(check.prompt)
+        other = [a for a in result.attempts if a.prompt != check.prompt]
+        seen = "; ".join(
+            f"{_median([a.measured.get(b.measure, float('nan')) for a in own]):g} of {b.wanted()}" for b in check.bounds
+        )
+        known = (real or {}).get(check.name, {})
+        rows.append(
+            [
+                check.prompt,
+                f"{sum(a.obeyed for a in own)}/{len(own)}",
+                f"{sum(a.obeyed for a in other)}/{len(other)}" if other else "",
+                known.get("held_out", ""),
+                known.get("all", ""),
+                seen,
+            ]
+        )
+    return rows
+
+
+def _median(values: Sequence[float]) -> float:
+    ordered = sorted(values)
+    return ordered[len(ordered) // 2] if ordered else float("nan")
+
+
+def markdown(rows: Sequence[Sequence[str]]) -> str:
+    """A table for a report."""
+    head, *body = [[cell.replace("|", "/") for cell in row] for row in rows]
+    return "\n".join("| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *body])
+
+
+def plain(rows: Sequence[Sequence[str]]) -> str:
+    """The same in columns for a terminal."""
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    )
+
+
+def check_report(path: Path) -> Path:
+    """The path, its folders made, if a report can be written there: ask before long work."""
+    try:
+        os.makedirs(path.parent, exist_ok=True)
+    except OSError as error:
+        raise MotionloomError(
+            f"cannot write {path}: the folder {path.parent} cannot be made ({error.strerror or error}); name another"
+        ) from None
+    check_place(path)
+    return path
+
+
+def write_json(path: Path, value: Any) -> Path:
+    """Whole or not at all, the folders made."""
+    return write_text(path, json.dumps(value, indent=1) + "\n")
+
+
+def write_text(path: Path, value: str) -> Path:
+    """Whole or not at all, the folders made."""
+    with atomic_path(check_report(path)) as temp:
+        temp.write_text(value, encoding="utf-8")
+    return path

@@ -1,0 +1,285 @@
+"""How good predicted futures are: the tables of stochastic motion prediction, on data that somebody has.
+
+Rows: the real futures, both baselines that need no model, the weights as they are sampled by default and with many
+steps, and the same weights by the published recipe (`lab.papers.humanmac`). Every number is a mean over windows; see
+`motionloom.lab.metrics.prediction` for what each is. What others published stands apart (`published_rows`).
+"""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.lab.metrics import prediction as metrics
+from motionloom.lab.metrics.prediction import METRICS, Singles
+from motionloom.lab.papers.humanmac import published_futures
+from motionloom.lab.report import report as reports
+from motionloom.lab.report.published_rows import published
+from motionloom.lab.report.report import REAL, SAME, Column, Report, Row, Value
+from motionloom.lab.suites import prediction_trial as trials
+from motionloom.lab.suites.parts import Parts, fingerprint
+from motionloom.lab.suites.prediction_trial import Array, Trial, Way
+from motionloom.tasks.completion import SOLVER, SPACING, STEPS, futures
+from motionloom.weights.predictor import Predictor, find_predictor
+
+ZERO, CONSTANT = "zero velocity", "constant velocity"
+KINDS = ("real", "zero", "constant", "ours", "ours-many", "published")
+"""Rows of the table."""
+SHOWN = ("apd", "ade", "fde", "mmade", "mmfde", "cmd", "apde", "mae", "stretch", "jitter", "jerk", "seam_velocity",
+         "seam_acceleration", "root_ade", "root_fde", "seconds")  # fmt: skip
+MEANINGS = {
+    "apd": "variety: mean distance of two futures of one past; of the real row: of the futures of similar pasts",
+    "ade": "mean distance of the flattened pose from what came, of the nearest future",
+    "fde": "the same in the last frame",
+    "mmade": "ADE against every future of a similar past, mean",
+    "mmfde": "FDE against every future of a similar past, mean",
+    "apde": "how far the variety is from that of real futures, windows with more than one",
+    "mae": "error of the angles between limbs, of the nearest future",
+    "stretch": "limbs longer or shorter than the real ones, mean",
+    "jitter": "change of limb length from frame to frame, mean",
+    "jerk": "third derivative of the joints' places from the root, mean",
+    "seam_velocity": "largest jump of velocity where the future sets in, mean over joints",
+    "seam_acceleration": "largest jump of acceleration there, mean over joints",
+}
+FURTHER = (
+    Column("cmd", "CMD m", "down", "motion that dies down or grows lively: mean speed per frame against its class's"),
+    Column("root_ade", "root ADE m", "down", "mean distance of the root's way through the world, nearest future", 3),
+    Column("root_fde", "root FDE m", "down", "the same in the last frame", 3),
+    Column("seconds", "s per past", "", "wall time of all futures of one past, on the machine that measured", 3),
+)
+SHORT = {"seam_velocity": "seam m/s", "seam_acceleration": "seam m/s²", "jerk": "jerk m/s³", "stretch": "stretch %",
+         "jitter": "jitter %", "mae": "MAE °", "apd": "APD"}  # fmt: skip
+WHOLE = {"h36m": ("Human3.6M", 5168), "humaneva": ("HumanEva-I", None), "amass": ("AMASS", 12727)}
+"""Data sets whose published figures share our data if all of it is there: their names there and test windows."""
+
+
+@dataclass(frozen=True)
+class How:
+    """How it is measured."""
+
+    samples: int = 50
+    windows: int | None = None
+    """Evenly chosen test windows; None: all."""
+    steps: int = STEPS
+    guidance: float = 1.0
+    singles: Singles = "all"
+    published_steps: int = 100
+    """Steps of the published recipe, and of our own with many."""
+    replications: int = 1
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        whole = {"samples": self.samples, "steps": self.steps, "published_steps": self.published_steps,
+                 "replications": self.replications}  # fmt: skip
+        for name, value in whole.items():
+            if not 1 <= value <= 1000:
+                raise MotionloomError(f"{name.replace('_', ' ')} must be from 1 to 1000; got {value}")
+        if self.singles not in get_args(Singles) or not np.isfinite(self.guidance) or not 0 <= self.seed < 2**31:
+            raise MotionloomError(f"singles, guidance or seed cannot be {self.singles}, {self.guidance}, {self.seed}")
+
+
+QUICK = How(samples=6, windows=6, published_steps=20)
+
+
+def run(
+    weights: str | Path = "predictor",
+    *,
+    data: Path | str | None,
+    name: str | None = None,
+    how: How | None = None,
+    kinds: Sequence[str] = KINDS,
+    with_published: bool = True,
+    folder: Path | None = None,
+    device: str = "cpu",
+    command: str = "",
+    progress: Callable[[str], None] = lambda line: None,
+) -> Report:
+    """Measure weights (a shipped name or a file) on the test part of ``data``; ``name``: which data set that is.
+
+    ``folder`` keeps rows that are done, so that the same call goes on after a stop. The report is not written here.
+    """
+    how = how or How()
+    if not kinds or not set(kinds) <= set(KINDS):
+        raise MotionloomError(f"the rows are {', '.join(KINDS)}; got {', '.join(kinds)[:200] or 'none'}")
+    if data is None:
+        raise MotionloomError("futures are compared with what came, and no recordings are shipped; name some: --data")
+    predictor = Predictor.load(weights, device=device)
+    check_steps(predictor, how.steps, how.published_steps)
+    protocol = trials.read_test(data, name, say=progress)
+    trials.check_fit(predictor, protocol)
+    digest = hashlib.sha256(find_predictor(weights).read_bytes()).hexdigest()[:12]
+    found = measure(
+        predictor, trials.prepare(protocol, count=how.windows, singles=how.singles), how, kinds,
+        label=Path(weights).stem, with_published=with_published, folder=folder, command=command, progress=progress,
+        about={"weights file": digest, "device": device},
+    )  # fmt: skip
+    return found
+
+
+def check_steps(predictor: Predictor, *steps: int) -> None:
+    """Raise MotionloomError where weights cannot be walked in so many steps."""
+    for one in steps:
+        if not 1 <= one < predictor.schedule.steps:
+            raise MotionloomError(
+                f"{one} steps cannot be taken; these weights take 1 to {predictor.schedule.steps - 1}"
+            )
+
+
+def measure(
+    predictor: Predictor,
+    trial: Trial,
+    how: How,
+    kinds: Sequence[str] = KINDS,
+    *,
+    label: str = "predictor",
+    with_published: bool = True,
+    folder: Path | None = None,
+    command: str = "",
+    about: Mapping[str, Any] | None = None,
+    progress: Callable[[str], None] = lambda line: None,
+) -> Report:
+    """The report of a predictor on a trial."""
+    said = protocol_of(trial, how, predictor) | dict(about or {})
+    parts = Parts(folder, fingerprint({**said, **asdict(how), "windows chosen": _identity(trial)}))
+    rows = []
+    for title, way, repeats in _ways(predictor, trial, how, kinds, label=label):
+        numbers = []
+        for k in range(repeats):
+            kept = parts.find(f"{title} {k}")
+            if kept is None:
+                progress(f"{title}: {len(trial.windows)} windows")
+                kept = trials.score(
+                    trial, way(how.seed + k) if way else None, samples=how.samples,
+                    root=predictor.layout.root or title in (ZERO, CONSTANT),
+                    say=lambda line, t=title: progress(f"{t}: {line}"),
+                )  # fmt: skip
+                parts.keep(f"{title} {k}", kept)
+            numbers.append(kept)
+        rows.append(Row(title, {c: Value.of([n[c] for n in numbers]) for c in SHOWN if c in numbers[0]}))
+    shown = columns()
+    others = _published(trial, how, [c.name for c in shown]) if with_published else ()
+    return Report(
+        "prediction", "Prediction: many futures of what was seen", command, said, shown, (*rows, *others), _notes(trial)
+    )  # fmt: skip
+
+
+def columns() -> tuple[Column, ...]:
+    """Of the table, in order."""
+    by_name = {c.name: c for c in FURTHER}
+    for m in METRICS:
+        if m.name in SHOWN:
+            said, digits = f"{MEANINGS[m.name]} ({m.unit})", 1 if m.name == "jerk" else 3
+            by_name[m.name] = Column(m.name, SHORT.get(m.name, m.label), m.better, said, digits)
+    return tuple(by_name[name] for name in SHOWN)
+
+
+def drawn(
+    predictor: Predictor,
+    seed: int,
+    *,
+    samples: int,
+    steps: int,
+    guidance: float = 1.0,
+    solver: str = SOLVER,
+    spacing: str = SPACING,
+) -> Way:
+    """Our own way of predicting."""
+    return lambda past: futures(
+        predictor, past, count=samples, seed=seed, steps=steps, guidance=guidance, rows=trials.ROWS,
+        solver=solver, spacing=spacing,
+    )  # fmt: skip
+
+
+def as_published(predictor: Predictor, seed: int, *, samples: int, steps: int) -> Way:
+    """The published recipe; every past alone, since noise there goes by the number of a past in its call."""
+    how = {"count": samples, "seed": seed, "steps": steps, "rows": trials.ROWS}
+    return lambda past: np.concatenate([published_futures(predictor, one[None], **how) for one in past])
+
+
+def by_rule(rule: Callable[[np.ndarray, int], Array], frames: int) -> Way:
+    """A baseline of `motionloom.lab.metrics.prediction`, root included."""
+    return lambda past: np.stack([rule(one, frames) for one in past])
+
+
+def _ways(
+    predictor: Predictor, trial: Trial, how: How, kinds: Sequence[str], *, label: str
+) -> list[tuple[str, Callable[[int], Way] | None, int]]:
+    """Name, the way of each seed (None: real futures), and how often it is measured."""
+    frames, many = trial.protocol.future, how.published_steps
+    few, again = {"samples": how.samples, "guidance": how.guidance}, how.replications
+    found: dict[str, tuple[str, Callable[[int], Way] | None, int]] = {
+        "real": (REAL, None, 1),
+        "zero": (ZERO, lambda seed: by_rule(metrics.zero_velocity, frames), 1),
+        "constant": (CONSTANT, lambda seed: by_rule(metrics.constant_velocity, frames), 1),
+        "ours": (f"{label}, {how.steps} steps", lambda s: drawn(predictor, s, steps=how.steps, **few), again),
+        "ours-many": (f"{label}, {many} steps", lambda s: drawn(predictor, s, steps=many, **few), again),
+        "published": (
+            f"{label}, published sampler, {many} steps",
+            lambda s: as_published(predictor, s, samples=how.samples, steps=many), again,
+        ),
+    }  # fmt: skip
+    same = how.steps == many
+    return [found[kind] for kind in KINDS if kind in kinds and not (same and kind == "ours-many" and "ours" in kinds)]
+
+
+def protocol_of(trial: Trial, how: How, predictor: Predictor) -> dict[str, Any]:
+    """What stands with every table."""
+    p = trial.protocol
+    classes = {recording.action for recording, _ in trial.windows}
+    return {
+        "data": p.name, "licence": p.licence, "split": "test", "recordings": len(p.split("test")),
+        "test windows": len(trial.every), "windows measured": len(trial.windows),
+        "windows with more than one future": trial.several,
+        "similar pasts": f"last poses nearer than {p.threshold:g} m",
+        "windows with one future": how.singles.replace("_", " "), "frames per second": p.fps,
+        "frames": f"{p.observed} seen, {p.future} predicted",
+        "representation": f"places of {p.layout.joints - 1} joints from the root, metres, axes of the world",
+        "statistics": "those of the weights", "trained on": predictor.card.data, "manner": predictor.manner,
+        "bones": "ours: as long as the past's; published sampler: as drawn",
+        "CMD": f"{len(classes)} classes, speeds {'published' if classes <= p.speeds.keys() else 'of the real futures'}",
+        "samples": how.samples, "sampler": f"{SOLVER}, {SPACING} spacing", "steps": how.steps,
+        "many steps": how.published_steps, "guidance": how.guidance, "seed": how.seed,
+        "replications": how.replications, "interval": "1.96 sigma / sqrt(replications)",
+    }  # fmt: skip
+
+
+def _identity(trial: Trial) -> str:
+    digest = hashlib.sha256()
+    for number, (recording, start) in enumerate(trial.windows):
+        digest.update(f"{recording.name} {start} {len(trial.alike[number])} ".encode())
+        digest.update(trial.future(number).astype(np.float32).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _notes(trial: Trial) -> tuple[str, ...]:
+    all_, several = len(trial.windows), trial.several
+    return (
+        "APD to MMFDE are distances of the whole flattened pose, not means over joints: numbers by the other "
+        "convention are about 15 times smaller, so compare zero velocity first.",
+        f"{several} of {all_} windows have more than one future; for the other {all_ - several} MMADE would be ADE.",
+    )
+
+
+def _published(trial: Trial, how: How, names: Sequence[str]) -> tuple[Row, ...]:
+    """What others published, marked where it was measured on what was measured here."""
+    called, windows = WHOLE.get(trial.protocol.name, ("", None))
+    whole = len(trial.windows) == len(trial.every) and windows in (None, len(trial.every))
+    same = bool(called) and whole and how.samples == 50 and how.singles == "all"
+    rows = published("prediction", names)
+    return tuple(
+        replace(row, measured_on=SAME + row.measured_on) if same and row.measured_on.startswith(called) else row
+        for row in rows
+    )
+
+
+def printed(report: Report) -> str:
+    """For a terminal: what was measured here, then every block of published rows as a table of its own."""
+    here = [reports.plain(replace(report, rows=tuple(row for row in report.rows if not row.measured_on)))]
+    for place in dict.fromkeys(row.measured_on for row in report.rows if row.measured_on):
+        rows = tuple(replace(row, measured_on="") for row in report.rows if row.measured_on == place)
+        here.append(reports.plain(replace(report, title=reports.origin(place), rows=rows, notes=())))
+    return "\n\n".join(here)

@@ -1,0 +1,261 @@
+"""What a predictor does over long times, with parts held, and on the way to a target: studies of given weights.
+
+Every function takes a predictor, a protocol with a test part and a budget, and gives columns, rows and what to say of
+the settings; `prediction_studies` writes them.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from motionloom.data.prediction import Protocol
+from motionloom.diffusion import row_seed
+from motionloom.errors import MotionloomError
+from motionloom.features.positions import SMPL_LAYOUT, Layout
+from motionloom.goals.hold import HeldPart, Hold
+from motionloom.kinematics import physics
+from motionloom.kinematics.ik import motion_from_positions
+from motionloom.lab.metrics import prediction as metrics
+from motionloom.lab.metrics.prediction_body import seam
+from motionloom.lab.report.report import REAL, Column, Row, Value
+from motionloom.lab.suites import prediction_trial as trials
+from motionloom.lab.suites.prediction_trial import Array, Trial, from_root
+from motionloom.motion import Motion
+from motionloom.skeleton import SMPL22
+from motionloom.tasks.completion import STEPS, TEMPERATURE, Known, next_frames
+from motionloom.tasks.predict import predict, switch
+from motionloom.tasks.windows import Pen
+from motionloom.weights.predictor import Predictor
+
+Found = tuple[list[Column], list[Row], dict[str, Any]]
+Say = Callable[[str], None]
+POSES = 3000
+"""Training poses that others are compared with."""
+GROUPS = ("left_arm", "right_arm", "left_leg", "right_leg", "torso", "lower_body", "upper_body")
+TRANSITIONS = (0.5, 1.0, 2.0)
+
+
+def horizon(
+    predictor: Predictor, protocol: Protocol, *, windows: int, samples: int, seed: int, seconds: float, say: Say
+) -> Found:
+    """Futures that go on from themselves, second by second: do they freeze, do they drift."""
+    trial = trials.prepare(protocol, count=windows)
+    made = long_futures(predictor, trial, samples=samples, seed=seed, seconds=seconds, say=say)
+    known = _known_poses(protocol)
+    real = np.stack([trial.future(k) for k in range(len(trial.windows))])
+    rows = [_row(REAL, _lively(real, protocol, known) | {"spread": _spread(real[None], protocol.layout)})]
+    second = round(protocol.fps)
+    for start in range(0, made.shape[2] - second + 1, second):
+        part = made[:, :, start : start + second]
+        numbers = _lively(part.reshape(-1, *part.shape[2:]), protocol, known)
+        spread = {"spread": _spread(part, protocol.layout)} if samples > 1 else {}
+        rows.append(_row(f"second {start // second + 1}", numbers | spread))
+    columns = [
+        Column("speed", "joint speed m/s", "real", "of joints from the root, mean"),
+        Column("root_speed", "root speed m/s", "real", "along the ground, mean"),
+        Column("jerk", "jerk m/s³", "real", "third derivative of the joints' places from the root, mean", 1),
+        Column("height", "root height m", "real", "mean"),
+        Column("nearest", "nearest pose m", "real", "distance per joint to the nearest of the training poses, mean"),
+        Column("spread", "spread m", "", "distance per joint between futures of one past; real: between windows"),
+    ]
+    return columns, rows, {"weights": predictor.card.name, "seconds": seconds, "training poses": len(known)}
+
+
+def long_futures(
+    predictor: Predictor, trial: Trial, *, samples: int, seed: int, seconds: float, say: Say = lambda line: None
+) -> Array:
+    """(windows, samples, frames, joints, 3): every future goes on from its own end, as `tasks.predict` does."""
+    count, fps = len(trial.windows), predictor.fps
+    person = np.repeat(trial.pasts(0, count), samples, axis=0)
+    turns, made = int(np.ceil(seconds * fps / (predictor.frames - predictor.observed) - 1e-9)), []
+    pen = Pen(predictor, STEPS, 1.0, TEMPERATURE, True)
+    for turn, new in enumerate(pen.windows(person, [(seed, i) for i in range(len(person))], None, turns)):
+        say(f"window {turn + 1} of {turns}")
+        made.append(new)
+    whole = np.concatenate(made, axis=1)[:, : round(seconds * fps)]
+    return whole.reshape(count, samples, *whole.shape[1:])
+
+
+def _lively(motions: Array, protocol: Protocol, known: Array) -> dict[str, float]:
+    """Of motions (rows, frames, joints, 3)."""
+    body, fps = from_root(motions), protocol.fps
+    poses = own_poses(motions[:, ::5].reshape(-1, *motions.shape[2:]), protocol.layout)
+    return {
+        "speed": float(np.linalg.norm(np.diff(body, axis=1), axis=-1).mean() * fps),
+        "root_speed": float(np.linalg.norm(np.diff(motions[:, :, 0, [0, 2]], axis=1), axis=-1).mean() * fps),
+        "jerk": float(np.mean([physics.jerk(one, fps).mean for one in body])),
+        "height": float(motions[:, :, 0, 1].mean()),
+        "nearest": float(_nearest(poses, known).mean()),
+    }
+
+
+def own_poses(positions: Array, layout: Layout) -> Array:
+    """(poses, joints, 3) to (poses, 3 (joints - 1)): each from its own root and in its own facing."""
+    turned = layout.place(positions).into(positions[:, None])[:, 0]
+    return from_root(turned).reshape(len(positions), -1)
+
+
+def _known_poses(protocol: Protocol) -> Array:
+    recordings = protocol.split("train") or protocol.split("test")
+    places = np.concatenate([r.positions for r in recordings])
+    chosen = np.linspace(0, len(places) - 1, min(POSES, len(places))).round().astype(int)
+    return own_poses(places[chosen].astype(np.float64), protocol.layout)
+
+
+def _nearest(poses: Array, known: Array) -> Array:
+    """(poses,) metres per joint, root of the mean square."""
+    least = []
+    for first in range(0, len(poses), 1000):
+        own = poses[first : first + 1000]
+        square = np.square(own).sum(1)[:, None] + np.square(known).sum(1) - 2 * own @ known.T
+        least.append(np.sqrt(np.maximum(square, 0).min(1)))
+    return np.concatenate(least) / np.sqrt(poses.shape[1] / 3)
+
+
+def _spread(motions: Array, layout: Layout) -> float:
+    """Of (pasts, futures, frames, joints, 3): metres per joint between two futures of one past, mean."""
+    pasts, count, frames = motions.shape[:3]
+    poses = own_poses(motions[:, :, ::5].reshape(-1, *motions.shape[3:]), layout).reshape(
+        pasts, count, len(range(0, frames, 5)), -1
+    )
+    apart = [np.linalg.norm(poses[:, a] - poses[:, b], axis=-1).mean() for a in range(count) for b in range(a)]
+    return float(np.mean(apart) / np.sqrt(poses.shape[-1] / 3)) if apart else 0.0
+
+
+def hold(
+    predictor: Predictor, protocol: Protocol, *, windows: int, samples: int, seed: int, seconds: float, say: Say
+) -> Found:
+    """Each group of joints given in all of the future: how much nearer the others come, how they vary."""
+    _need_person(predictor)
+    trial = trials.prepare(protocol, count=windows)
+    rows = []
+    for group in GROUPS:
+        say(f"hold {group}: {len(trial.windows)} windows")
+        rows.append(_row(group, held_numbers(predictor, trial, group, samples=samples, seed=seed)))
+    columns = [
+        Column("free", "ADE without m", "", "of the joints that are free, of the nearest future, nothing given"),
+        Column("given", "ADE with m", "down", "the same with the group given"),
+        Column("apd_free", "APD without m", "", "variety of the free joints, nothing given"),
+        Column("apd_given", "APD with m", "up", "the same with the group given"),
+        Column("held", "held error m", "down", "largest error of a given place, as the network's window comes out", 6),
+        Column("rotations", "held rotations off", "down", "largest difference of a held local rotation (quaternion) in"
+               " what is written, 3 windows", 9),
+    ]  # fmt: skip
+    return columns, rows, {"weights": predictor.card.name, "given": "as in the real future"}
+
+
+def held_numbers(predictor: Predictor, trial: Trial, group: str, *, samples: int, seed: int) -> dict[str, float]:
+    """Means over windows, largest errors; joints of a group of the 22."""
+    joints = sorted(SMPL22.groups[group])
+    free = [j - 1 for j in range(1, 22) if j not in joints]
+    mask = np.zeros((trial.protocol.future, predictor.layout.parts), dtype=np.float32)
+    mask[:, [predictor.layout.part(j) for j in joints]] = 1
+    seeds = [row_seed(seed, i) for i in range(samples)]
+    rows: list[tuple[float, ...]] = []
+    for number in range(len(trial.windows)):
+        past, truth = trial.pasts(number, number + 1).repeat(samples, 0), trial.future(number)
+        without = next_frames(predictor, past, seeds=seeds, exact=False)
+        given = next_frames(predictor, past, seeds=seeds, known=Known(truth, mask), exact=False)
+        real, a, b = from_root(truth), from_root(without), from_root(given)
+        off = np.abs(b - real)[:, :, [j - 1 for j in joints if j]].max(initial=0.0)
+        off = max(off, np.abs(given[:, :, 0] - truth[:, 0]).max() if 0 in joints else 0.0)
+        rows.append((
+            metrics.ade(a[:, :, free], real[:, free]), metrics.ade(b[:, :, free], real[:, free]),
+            metrics.apd(a[:, :, free]), metrics.apd(b[:, :, free]), float(off),
+            held_rotations(predictor, trial, number, group, seed=seed) if number < 3 else 0.0,
+        ))  # fmt: skip
+    means, most = np.mean(rows, axis=0), np.max(rows, axis=0)
+    return dict(zip(("free", "given", "apd_free", "apd_given"), means.tolist())) | {
+        "held": float(most[4]),
+        "rotations": float(most[5]),
+    }
+
+
+def held_rotations(predictor: Predictor, trial: Trial, number: int, group: str, *, seed: int) -> float:
+    """Largest difference between a held rotation in the motion that `predict` gives and the one it was held to."""
+    seen, joints = trial.protocol.observed, [j for j in SMPL22.groups[group] if j]
+    whole = motion_from_positions(
+        np.concatenate([trial.pasts(number, number + 1)[0], trial.future(number)]), predictor.fps
+    )
+    source = whole.frames(seen, len(whole))
+    held = Hold(source, (HeldPart((group,)),), align=False)
+    seconds = len(source) / predictor.fps
+    (made,) = predict(predictor, whole.frames(0, seen), count=1, seconds=seconds, seed=seed, hold=held)
+    got, wanted = made.rotations[seen:, joints], source.rotations[:, joints]
+    return float(np.minimum(np.abs(got - wanted).max(-1), np.abs(got + wanted).max(-1)).max())
+
+
+SWITCHED = (
+    Column("start_velocity", "seam m/s, start", "real", "jump of velocity where the past ends, mean over joints"),
+    Column("start_acceleration", "seam m/s², start", "real", "jump of acceleration there", 1),
+    Column("end_velocity", "seam m/s, end", "real", "jump of velocity where the target sets in, mean over joints"),
+    Column("end_acceleration", "seam m/s², end", "real", "jump of acceleration there", 1),
+    Column("target", "target off m", "down", "largest difference of the target's first pose, each in its facing", 6),
+    Column("speed", "joint speed m/s", "real", "of joints from the root in between, mean"),
+)
+
+
+def arrive(
+    predictor: Predictor, protocol: Protocol, *, windows: int, samples: int, seed: int, seconds: float, say: Say
+) -> Found:
+    """The way from one recording to another, for transitions of several lengths."""
+    _need_person(predictor)
+    trial = trials.prepare(protocol, count=windows)
+    count = len(trial.windows)
+    if count < 2:
+        raise MotionloomError("a switch leads from one window to another; measure two or more")
+    clips = [motion_from_positions(np.concatenate([trial.pasts(k, k + 1)[0], trial.future(k)]), predictor.fps)
+             for k in range(count)]  # fmt: skip
+    seen, pairs = protocol.observed, [(k, (k + count // 2) % count) for k in range(count)]
+    rows = [_row(REAL, _mean([_ends(c.positions(), seen, seen + protocol.future // 2, predictor.fps) for c in clips]))]
+    cut = []
+    for a, b in pairs:
+        p, q = clips[a].positions()[:seen], clips[b].positions()[seen:]
+        p, q = protocol.layout.place(p[-1]).into(p), protocol.layout.place(q[0]).into(q)
+        cut.append(_seam(np.concatenate([p, q]), seen, predictor.fps, "start"))
+    rows.append(_row("cut", _mean(cut)))
+    for length in TRANSITIONS:
+        say(f"switch in {length:g} s: {len(pairs)} pairs")
+        found = [
+            switched(predictor, clips[a].frames(0, seen), clips[b].frames(seen, len(clips[b])), seconds=length,
+                     seed=seed + i)
+            for a, b in pairs for i in range(samples)
+        ]  # fmt: skip
+        rows.append(_row(f"{length:g} s", _mean(found)))
+    return list(SWITCHED), rows, {"weights": predictor.card.name, "pairs": len(pairs)}
+
+
+def switched(predictor: Predictor, past: Motion, target: Motion, *, seconds: float, seed: int) -> dict[str, float]:
+    """Numbers of one transition."""
+    (made,) = switch(predictor, past, target, count=1, seconds=seconds, seed=seed)
+    places, first, fps = made.positions(), len(made) - len(target), predictor.fps
+    own = own_poses(np.stack([places[first], target.positions()[0]]), SMPL_LAYOUT)
+    return _ends(places, len(past), first, fps) | {"target": float(np.abs(own[0] - own[1]).max())}
+
+
+def _ends(places: Array, start: int, end: int, fps: float) -> dict[str, float]:
+    between = from_root(places[start - 1 : end + 1])
+    speed = float(np.linalg.norm(np.diff(between, axis=0), axis=-1).mean() * fps)
+    return _seam(places, start, fps, "start") | _seam(places, end, fps, "end") | {"speed": speed}
+
+
+def _seam(places: Array, at: int, fps: float, name: str) -> dict[str, float]:
+    found = seam(from_root(places[:at]), from_root(places[at:])[None], fps)
+    return {f"{name}_velocity": found.velocity, f"{name}_acceleration": found.acceleration}
+
+
+def _mean(found: list[dict[str, float]]) -> dict[str, float]:
+    return {key: float(np.mean([one[key] for one in found])) for key in found[0]}
+
+
+def _need_person(predictor: Predictor) -> None:
+    if predictor.layout.names != SMPL_LAYOUT.names or not predictor.layout.root:
+        raise MotionloomError("this study needs weights that see the 22 joints and their way, such as the shipped ones")
+
+
+def _row(name: str, numbers: dict[str, float]) -> Row:
+    return Row(name, {key: Value(value) for key, value in numbers.items()})
+
+
+STUDIES: dict[str, Callable[..., Found]] = {"horizon": horizon, "hold": hold, "switch": arrive}

@@ -1,0 +1,240 @@
+"""The studies of motion prediction, each one command: what in a predictor matters, on data that somebody has.
+
+Some train small networks that differ in one thing (Chen et al. 2023, HumanMAC, tables 2 to 5 and 7), some look at given
+weights: steps, and those of `prediction_behaviour`. Each writes ``NAME.md``, ``NAME.json`` and ``NAME.png`` into a
+folder. A network that is finished is found again there, one that was stopped goes on.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from motionloom.data.prediction import Protocol
+from motionloom.diffusion import SCHEDULES
+from motionloom.errors import MotionloomError
+from motionloom.lab.papers.benchmarks import find_protocol
+from motionloom.lab.report import plots
+from motionloom.lab.report import report as reports
+from motionloom.lab.report.report import REAL, Column, Report, Row, Value
+from motionloom.lab.suites import obey, prediction, prediction_behaviour
+from motionloom.lab.suites import prediction_trial as trials
+from motionloom.lab.suites.prediction_trial import Trial
+from motionloom.tasks.completion import SOLVER, SPACING, STEPS
+from motionloom.train.loop import changed
+from motionloom.train.predictor import train_predictor
+from motionloom.train.recipe import Recipe
+from motionloom.weights.predictor import Predictor, load_predictor
+
+BASE = {"kept": 24, "layers": 4, "width": 128, "heads": 4, "dropout": 0.1}
+"""The small network that studies change one thing of."""
+STUDIED: dict[str, tuple[str, tuple[Any, ...]]] = {
+    "coefficients": ("kept", (6, 12, 24, 45)),
+    "layers": ("layers", (2, 4, 6, 8)),
+    "schedules": ("schedule", tuple(SCHEDULES)),
+    "noising": ("levels", (100, 1000)),
+    "dct": ("dct", (True, False)),
+}
+"""What each training study changes, and to what."""
+TITLES = {
+    "coefficients": "Number of cosine coefficients", "layers": "Layers", "schedules": "Noise schedules",
+    "noising": "Noise levels in training, and sampling steps", "dct": "With and without the cosine transform",
+    "steps": "Sampling steps, solvers and spacings", "horizon": "A long horizon: window after window",
+    "hold": "Parts of the body held", "switch": "Arriving at another motion",
+}  # fmt: skip
+WALKS = (2, 3, 4, 5, 8, 10, 20, 50, 100)
+SPREADS = ("index", "early", "snr")
+SHOWN = ("apd", "ade", "fde", "mmade", "mmfde", "jerk", "seam_velocity", "seconds")
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How much is measured."""
+
+    windows: int
+    samples: int
+    train_steps: int = 1000
+    seed: int = 0
+    seconds: float = 20.0
+    """Of a long horizon."""
+    walks: tuple[int, ...] = WALKS
+
+
+@dataclass(frozen=True, eq=False)
+class Lab:
+    """What a study works with."""
+
+    protocol: Protocol
+    budget: Budget
+    weights: Callable[[], Predictor]
+    keep: Path
+    """Where trained networks lie."""
+    device: str = "cpu"
+    progress: Callable[[str], None] = lambda line: None
+
+
+def budget(
+    name: str,
+    *,
+    quick: bool = False,
+    windows: int | None = None,
+    samples: int | None = None,
+    train_steps: int | None = None,
+    seed: int = 0,
+) -> Budget:
+    """The usual budget of a study with what was said; raises MotionloomError for what cannot be."""
+    usual = {"steps": Budget(16, 10), "horizon": Budget(16, 4), "hold": Budget(16, 8), "switch": Budget(24, 1)}
+    found = Budget(4, 2, 20, seconds=4.0, walks=(2, 4)) if quick else usual.get(name, Budget(64, 20))
+    said = {"windows": windows, "samples": samples, "train_steps": train_steps, "seed": seed}
+    for key, value in said.items():
+        if value is not None and not (key == "seed" or 1 <= value <= 1_000_000):
+            raise MotionloomError(f"{key.replace('_', ' ')} must be from 1 to 1000000; got {value}")
+    return replace(found, **{key: value for key, value in said.items() if value is not None})
+
+
+def run(
+    name: str,
+    weights: str | Path = "predictor",
+    *,
+    data: Path | str,
+    protocol: str | None = None,
+    folder: Path,
+    keep: Path,
+    budget: Budget,
+    device: str = "cpu",
+    command: str = "",
+    progress: Callable[[str], None] = lambda line: None,
+) -> Report:
+    """Do a study and write its table and picture; raises MotionloomError before any work if it cannot be done."""
+    if name not in TITLES:
+        raise MotionloomError(f"there is no study {name!r}; the studies are {', '.join(TITLES)}")
+    obey.check_report(folder / f"{name}.json")
+    trained = name in STUDIED
+    predictor = None if trained else Predictor.load(weights, device=device)
+    if trained or name == "horizon":
+        read = find_protocol(data, name=protocol, splits=("train", "val", "test") if trained else ("train", "test"),
+                             say=progress)  # fmt: skip
+    else:
+        read = trials.read_test(data, protocol, say=progress)
+    if predictor is not None:
+        trials.check_fit(predictor, read)
+    lab = Lab(read, budget, lambda: predictor or Predictor.load(weights, device=device), keep, device, progress)
+    found = replace(study(name, lab), command=command)
+    write(found, name, folder)
+    return found
+
+
+def study(name: str, lab: Lab) -> Report:
+    """The report of a study."""
+    if name in prediction_behaviour.STUDIES:
+        b = lab.budget
+        columns, rows, said = prediction_behaviour.STUDIES[name](
+            lab.weights(), lab.protocol, windows=b.windows, samples=b.samples, seed=b.seed, seconds=b.seconds,
+            say=lab.progress,
+        )  # fmt: skip
+    elif name == "steps":
+        columns, rows, said = _steps(lab)
+    else:
+        columns, rows, said = _trained(name, lab)
+    p, b = lab.protocol, lab.budget
+    about = {
+        "data": p.name, "licence": p.licence, "split": "test", "frames": f"{p.observed} seen, {p.future} predicted",
+        "frames per second": p.fps, "windows": b.windows, "samples": b.samples, "seed": b.seed, **said,
+    }  # fmt: skip
+    return Report(f"study-{name}", TITLES[name], "", about, tuple(columns), tuple(rows))
+
+
+def write(report: Report, name: str, folder: Path) -> None:
+    """``NAME.png``, ``NAME.md`` and ``NAME.json``, each whole or not at all."""
+    path = obey.check_report(folder / f"{name}.json")
+    plots.study(report, folder / f"{name}.png")
+    obey.write_text(folder / f"{name}.md", reports.markdown(report) + f"\n![{report.title}]({name}.png)\n")
+    obey.write_json(path, reports.encode(report))
+
+
+# Networks that differ in one thing
+
+
+def _trained(name: str, lab: Lab) -> tuple[list[Column], list[Row], dict[str, Any]]:
+    setting, values = STUDIED[name]
+    trial = trials.prepare(lab.protocol, count=lab.budget.windows)
+    rows = [_row(trial, REAL, trials.score(trial, None))]
+    for value in values:
+        if setting == "kept" and value > lab.protocol.frames:
+            continue
+        predictor = network(lab, setting, value)
+        size = sum(p.numel() for p in predictor.net.parameters())
+        for steps in (10, 50) if name == "noising" else (STEPS,):
+            told = f"{setting} {value}" if name != "noising" else f"{value} levels, {steps} steps"
+            lab.progress(f"{told}: {len(trial.windows)} windows")
+            way = prediction.drawn(predictor, lab.budget.seed, samples=lab.budget.samples, steps=steps)
+            scored = trials.score(trial, way, samples=lab.budget.samples, say=lab.progress)
+            rows.append(_row(trial, told, scored | {"parameters": size / 1e6}))
+    size = Column("parameters", "M parameters", "", "millions", 2)
+    about = {"networks": f"width {BASE['width']}, {BASE['layers']} layers, {BASE['kept']} coefficients unless said",
+             "training": f"{lab.budget.train_steps} steps of 64 windows, seed {lab.budget.seed}",
+             "sampler": f"{SOLVER}, {SPACING} spacing, {STEPS} steps unless said"}  # fmt: skip
+    return [*_columns(SHOWN), size], rows, about
+
+
+def network(lab: Lab, setting: str, value: Any) -> Predictor:
+    """The small network with one thing changed: trained, trained further, or as it lies in ``lab.keep``."""
+    net = (
+        BASE
+        | ({setting: value} if setting in BASE else {})
+        | ({} if (setting, value) != ("dct", False) else {"dct": False})
+    )
+    net["kept"] = min(net["kept"], lab.protocol.frames)
+    other = {setting: value} if setting in ("schedule", "levels") else {}
+    schedule, levels = other.get("schedule", "cosine"), other.get("levels", 1000)
+    dct = "dct" if net.get("dct", True) else "frames"
+    name = f"{dct}{net['kept']}-layers{net['layers']}-{schedule}-{levels}-steps{lab.budget.train_steps}"
+    steps = lab.budget.train_steps
+    recipe = Recipe(
+        name=name, steps=steps, batch=64, warmup=min(100, steps // 5), cooldown=0.4, ema=0.99, schedule=schedule,
+        levels=levels, seed=lab.budget.seed, save_every=200, predictor=net,
+    )  # fmt: skip
+    folder = lab.keep / name
+    if changed(folder, recipe):
+        raise MotionloomError(f"{folder} holds a network of other settings; name another folder with --keep")
+    place = folder / f"{name}.safetensors"
+    if not place.is_file() or load_predictor(place).card.notes.get("steps") != steps:
+        train_predictor(
+            recipe, lab.protocol, folder, device=lab.device, say=lambda line: lab.progress(f"{name}: {line}")
+        )
+    return load_predictor(place).to(lab.device)
+
+
+# Given weights
+
+
+def _steps(lab: Lab) -> tuple[list[Column], list[Row], dict[str, Any]]:
+    trial, predictor = trials.prepare(lab.protocol, count=lab.budget.windows), lab.weights()
+    walks = [n for n in lab.budget.walks if n < predictor.schedule.steps]
+    rows = [_row(trial, REAL, trials.score(trial, None))]
+    for solver in ("ddim", "dpm2m"):
+        for spacing in SPREADS:
+            found: dict[int, dict[str, float]] = {}
+            for steps in reversed(walks):
+                lab.progress(f"{solver}, {spacing}, {steps} steps")
+                way = prediction.drawn(
+                    predictor, lab.budget.seed, samples=lab.budget.samples, steps=steps, solver=solver, spacing=spacing
+                )
+                found[steps] = trials.score(trial, way, samples=lab.budget.samples, say=lab.progress)
+            most = found[max(walks)]
+            for steps in walks:
+                ratios = {f"{k}_ratio": found[steps][k] / most[k] for k in ("ade", "fde", "jerk") if most[k] > 0}
+                rows.append(_row(trial, f"{solver}, {spacing}, {steps} steps", found[steps] | ratios))
+    said = f"over {max(walks)} steps of the same solver and spacing"
+    ratios = [
+        Column(f"{k}_ratio", f"{k.upper() if k != 'jerk' else k} ratio", "", said) for k in ("ade", "fde", "jerk")
+    ]
+    return [*_columns(SHOWN), *ratios], rows, {"weights": predictor.card.name}
+
+
+def _columns(names: Sequence[str]) -> list[Column]:
+    return [c for c in prediction.columns() if c.name in names]
+
+
+def _row(trial: Trial, name: str, numbers: dict[str, float]) -> Row:
+    return Row(name, {key: Value(value) for key, value in numbers.items() if key in SHOWN or key not in trials.KNOWN})

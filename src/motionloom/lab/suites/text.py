@@ -1,0 +1,410 @@
+"""The text-to-motion suite: does a motion go with its words, does it look like real ones, what does it cost.
+
+Generation comes in as a function, so that a made-up one can be tested and any prior measured. Every replication of
+every row is kept in a small file as it is done; a run that was stopped goes on with the next one.
+"""
+
+import hashlib
+import json
+import re
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol as Interface
+from typing import cast
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import FPS, WIDTH
+from motionloom.kinematics.physics import Array
+from motionloom.lab.evaluator import own
+from motionloom.lab.evaluator.evaluators import Caption, Evaluator, load_evaluator
+from motionloom.lab.metrics.frechet import fid, fid_bias
+from motionloom.lab.metrics.retrieval import diversity, matching_distance, multimodality_of, r_precision
+from motionloom.lab.report import published_rows
+from motionloom.lab.report.report import REAL, Column, Report, Row, Value
+from motionloom.lab.suites import text_reference
+from motionloom.lab.suites.items import fitting, pick, read_items, spread
+from motionloom.lab.suites.parts import Parts, fingerprint
+from motionloom.lab.suites.protocol import Protocol, Selection
+from motionloom.lab.suites.text_reference import PHYSICAL, TextReference
+from motionloom.tasks.text import sample_features
+from motionloom.weights.prior import Prior, find_weights
+
+DIVERSITY_PAIRS, MULTIMODAL_PAIRS = 300, 10
+CHANCE_ROWS = 500
+"""Captions at most whose distances to all motions of others are averaged."""
+SHUFFLED, CHANCE = "real, captions shuffled", "chance"
+
+COLUMNS: tuple[Column, ...] = (
+    Column("r1", "R@1", "up", "share of captions whose own motion is the nearest in its batch"),
+    Column("r2", "R@2", "up", "among the two nearest"),
+    Column("r3", "R@3", "up", "among the three nearest: the papers' R-precision"),
+    Column("r3_same", "R@3, same words", "up", "the same where any motion of a caption with the same words is a hit; "
+           "the published count takes it for a miss"),
+    Column("fid", "FID", "down", "Fréchet distance of the motion embeddings to the real ones", 4),
+    Column("mm_dist", "MM-Dist", "down", "mean distance between a caption and its motion"),
+    Column("diversity", "Diversity", "real", "mean distance of random pairs of motions, at most 300"),
+    Column("multimodality", "MultiModality", "up", "mean distance of pairs of different motions of one caption"),
+    Column("skate_share", "skate %", "down", "frames in which a toe below 5 cm moves more than 2.5 cm (GMD)", 2),
+    Column("skate_speed", "skate cm/s", "down", "mean speed of the toes below 5 cm (Kimodo)", 2),
+    Column("skate_slide", "skate mm/frame", "down", "step of a toe at contact (Motius)", 2),
+    Column("penetration", "penetration cm", "down", "the lowest joint under the floor, mean over frames", 2),
+    Column("jerk", "jerk m/s³", "real", "third derivative of the joints' places, mean", 1),
+    Column("bone_error", "bone error mm", "down", "bones against their median in the motion, mean", 2),
+    Column("ms", "ms per motion", "", "wall time of sampling alone, on the machine that measured", 0),
+    Column("per_second", "motions/s", "", "its inverse", 2),
+    Column("memory", "peak MB", "", "resident memory of a process that generates eight motions of 9.8 s", 0),
+)  # fmt: skip
+
+
+class Draw(Interface):
+    """Features (frames, 263), not standardised, one per prompt, row i from its own seed."""
+
+    def __call__(
+        self, prompts: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int
+    ) -> list[np.ndarray]:
+        """Motion i has ``frames[i]`` frames at 20 per second."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Everything that a row is measured with."""
+
+    draw: Draw
+    evaluator: Evaluator
+    real: TextReference
+    protocol: Protocol
+    texts: tuple[Array, ...]
+    """For each item (captions, width): its captions as they are."""
+    read: tuple[Array, ...]
+    """The same as they are read beside generated motions, see `Protocol.caption_length`."""
+
+    def shuffle(self, replication: int) -> tuple[list[int], np.ndarray, np.random.Generator]:
+        """For one replication: a caption for each item, the order of the items, and what is drawn after that."""
+        rng = np.random.default_rng((self.protocol.seed, replication))
+        chosen = pick(self.real.captions, rng)
+        return chosen, rng.permutation(len(chosen)), rng
+
+    def said(self, chosen: Sequence[int]) -> list[str]:
+        """The chosen captions in words."""
+        return [several[k].text for several, k in zip(self.real.captions, chosen, strict=True)]
+
+
+def prepare(draw: Draw, evaluator: Evaluator, real: TextReference, protocol: Protocol) -> Trial:
+    """Choose the items and embed their captions; MotionloomError where that cannot be done as asked."""
+    chosen = real.chosen(protocol)
+    flat = [caption for several in chosen.captions for caption in several]
+    cuts = np.cumsum([len(several) for several in chosen.captions])[:-1]
+    texts = tuple(np.split(evaluator.texts(flat), cuts))
+    read = texts
+    if protocol.caption_length == "published":
+        read = tuple(np.split(_as_published(evaluator, flat), cuts))
+    return Trial(draw, evaluator, chosen, protocol, texts, read)
+
+
+def _as_published(evaluator: Evaluator, captions: Sequence[Caption]) -> Array:
+    other = getattr(evaluator, "with_caption_length", None)
+    if other is None:
+        raise MotionloomError(
+            f"the evaluator {evaluator.name!r} pads no captions, so it has no published caption length; use true"
+        )
+    return cast(Callable[[str], Evaluator], other)("published").texts(captions)
+
+
+# ---- the numbers of one replication ----------------------------------------------------------------------------------
+
+
+def matched(trial: Trial, texts: Array, motions: Array, said: Sequence[str]) -> dict[str, float]:
+    """How well (items, width) texts and motions in one order go together."""
+    batch = trial.protocol.batch
+    r1, r2, r3 = r_precision(texts, motions, top=3, batch=batch)
+    return {
+        "r1": float(r1),
+        "r2": float(r2),
+        "r3": float(r3),
+        "r3_same": same_words_precision(texts, motions, said, top=3, batch=batch),
+        "mm_dist": matching_distance(texts, motions, batch=batch),
+    }
+
+
+def same_words_precision(texts: Array, motions: Array, said: Sequence[str], *, top: int, batch: int | None) -> float:
+    """Share of texts with a motion of a caption of the same words among the ``top`` nearest of its batch.
+
+    Batches as in `r_precision`. A motion of other words exactly as near goes before: equal embeddings are no hits.
+    """
+    words = np.array([" ".join(re.findall(r"\w+", text.lower())) for text in said])
+    size = batch or len(texts)
+    hits = []
+    for row in range(len(texts) // size * size):
+        part = slice(row // size * size, row // size * size + size)
+        distance = np.linalg.norm(motions[part] - texts[row], axis=1)  # a row at a time: the set may be one batch
+        same = words[part] == words[row]
+        hits.append((~same & (distance <= distance[same].min())).sum() < top)
+    return float(np.mean(hits))
+
+
+def of_real(trial: Trial, replication: int, *, shuffled: bool = False) -> dict[str, float]:
+    """Real motions with their captions, or with anybody's: the captions then are dealt out anew over all items."""
+    chosen, order, rng = trial.shuffle(replication)
+    texts = np.stack([several[k] for several, k in zip(trial.texts, chosen, strict=True)])
+    motions, said = trial.real.motions, trial.said(chosen)
+    if shuffled:
+        dealt = rng.permutation(len(texts))
+        return matched(trial, texts[dealt][order], motions[order], [said[k] for k in dealt[order]])
+    found = matched(trial, texts[order], motions[order], [said[k] for k in order])
+    physical = text_reference.averaged(trial.real.physical, trial.real.frames)
+    return {**found, "fid": fid(motions, trial.real.motions), "diversity": _diversity(motions, replication), **physical}
+
+
+def of_generated(trial: Trial, replication: int, steps: int) -> dict[str, float]:
+    """One motion per item, measured; the time goes to sampling alone."""
+    chosen, order, _ = trial.shuffle(replication)
+    said, frames = trial.said(chosen), trial.real.frames
+    start = time.perf_counter()
+    drawn = _drawn(trial, said, frames, seeds=trial.protocol.seeds(replication, len(said)), steps=steps)
+    seconds = time.perf_counter() - start
+    motions = _embedded(trial.evaluator, drawn)
+    texts = np.stack([several[k] for several, k in zip(trial.read, chosen, strict=True)])
+    found = matched(trial, texts[order], motions[order], [said[k] for k in order])
+    found["fid"], found["diversity"] = fid(motions, trial.real.motions), _diversity(motions, replication)
+    numbers = np.array([list(text_reference.physical(features).values()) for features in drawn])
+    found |= text_reference.averaged(numbers, frames)
+    found |= {"ms": 1000 * seconds / len(said), "per_second": len(said) / max(seconds, 1e-9)}
+    captions, samples = trial.protocol.multimodality
+    if captions and replication < trial.protocol.multimodal_replications:
+        found["multimodality"] = _several(trial, replication, steps, captions=captions, samples=samples)
+    return found
+
+
+def _drawn(
+    trial: Trial, said: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int
+) -> list[np.ndarray]:
+    """Motions of the wanted lengths, cut to them where they are generated longer."""
+    padded = trial.protocol.lengths == "padded"
+    asked = [trial.real.selection.longest] * len(said) if padded else list(frames)
+    drawn = trial.draw(said, asked, seeds=seeds, steps=steps)
+    if [len(features) for features in drawn] != asked:
+        raise ValueError("the generator gave other lengths than asked for")
+    return [features[:length] for features, length in zip(drawn, frames, strict=True)]
+
+
+def _embedded(evaluator: Evaluator, drawn: Sequence[np.ndarray]) -> Array:
+    size = text_reference.CHUNK
+    return np.concatenate([evaluator.motions(drawn[k : k + size]) for k in range(0, len(drawn), size)])
+
+
+def _several(trial: Trial, replication: int, steps: int, *, captions: int, samples: int) -> float:
+    """MultiModality of different motions of one caption: unlike the published draw, none is paired with itself."""
+    chosen, order, rng = trial.shuffle(replication)
+    items = order[:captions]
+    said, frames = trial.said(chosen), trial.real.frames
+    seeds = trial.protocol.seeds(replication, len(items) * samples, after=len(said))
+    drawn = _drawn(
+        trial, [said[k] for k in items for _ in range(samples)], [frames[k] for k in items for _ in range(samples)],
+        seeds=seeds, steps=steps,
+    )  # fmt: skip
+    motions = _embedded(trial.evaluator, drawn).reshape(len(items), samples, -1)
+    pairs = min(MULTIMODAL_PAIRS, samples // 2)
+    mixed = rng.permutation(samples)
+    return multimodality_of(motions, mixed[:pairs], mixed[pairs : 2 * pairs])
+
+
+def _diversity(motions: Array, replication: int) -> float:
+    return diversity(motions, pairs=min(DIVERSITY_PAIRS, len(motions)), seed=replication)
+
+
+def of_chance(trial: Trial) -> dict[str, float]:
+    """What an evaluator that knows nothing would find: k of the batch, and captions against all other motions."""
+    size = trial.protocol.batch or len(trial.texts)
+    motions = trial.real.motions
+    rows = spread(CHANCE_ROWS, len(motions))
+    apart = [np.linalg.norm(trial.texts[k][0] - np.delete(motions, k, axis=0), axis=1).mean() for k in rows]
+    return {"r1": 1 / size, "r2": 2 / size, "r3": 3 / size, "mm_dist": float(np.mean(apart))}
+
+
+# ---- the run ---------------------------------------------------------------------------------------------------------
+
+
+def measure(
+    trial: Trial,
+    *,
+    label: str = "default",
+    parts: Parts | None = None,
+    memory: Callable[[int], float] | None = None,
+    command: str = "",
+    progress: Callable[[str], None] = lambda line: None,
+) -> Report:
+    """All rows. ``memory`` tells the peak in MB of generating with so many steps; ``label`` names the weights."""
+    parts = parts or Parts(None, "")
+    protocol, count = trial.protocol, range(trial.protocol.replications)
+    rows = [
+        _row(REAL, [of_real(trial, r) for r in count]),
+        _row(SHUFFLED, [of_real(trial, r, shuffled=True) for r in count]),
+        _row(CHANCE, [of_chance(trial)]),
+    ]
+    for steps in protocol.steps:
+        found = [_kept(trial, parts, r, steps, progress=progress) for r in count]
+        values = dict(_row("", found).values)
+        if memory is not None:
+            values["memory"] = Value(_memory(parts, steps, memory))
+        rows.append(Row(f"{label}, {steps} steps", values))
+    return Report(
+        "text",
+        f"Text to motion: {label}",
+        command,
+        protocol.described(
+            trial.real.selection, data=trial.real.data, items=len(trial.texts), evaluator=trial.evaluator.name
+        ),
+        COLUMNS,
+        (*rows, *published_rows.published("text", [column.name for column in COLUMNS])),
+        _notes(trial),
+    )
+
+
+def _kept(
+    trial: Trial, parts: Parts, replication: int, steps: int, *, progress: Callable[[str], None]
+) -> dict[str, float]:
+    name = f"{steps} steps {replication}"
+    found = parts.find(name)
+    if found is None:
+        found = of_generated(trial, replication, steps)
+        parts.keep(name, found)
+        progress(
+            f"{steps} steps, replication {replication + 1} of {trial.protocol.replications}: "
+            f"R@3 {found['r3']:.3f}, FID {found['fid']:.3f}, {found['ms']:.0f} ms per motion"
+        )
+    return found
+
+
+def _memory(parts: Parts, steps: int, memory: Callable[[int], float]) -> float:
+    name = f"{steps} steps memory"
+    found = parts.find(name)
+    if found is None:
+        found = {"memory": memory(steps)}
+        parts.keep(name, found)
+    return found["memory"]
+
+
+def _row(name: str, found: Sequence[Mapping[str, float]]) -> Row:
+    """Means and intervals over replications; a number that never changes has no interval."""
+    names = [c.name for c in COLUMNS if any(c.name in numbers for numbers in found)]
+    samples = {column: [numbers[column] for numbers in found if column in numbers] for column in names}
+    fixed = (*PHYSICAL, "fid") if name == REAL else ()
+    return Row(name, {k: Value(v[0]) if k in fixed else Value.of(v) for k, v in samples.items()})
+
+
+def _notes(trial: Trial) -> tuple[str, ...]:
+    real, protocol = trial.real, trial.protocol
+    half = len(real.motions) // 2
+    bias = fid_bias(real.motions, half, repeats=10, seed=protocol.seed)
+    said = [" ".join(re.findall(r"\w+", c.text.lower())) for several in real.captions for c in several]
+    return (
+        f"FID compares {len(real.motions)} generated with {len(real.motions)} real motions in {real.motions.shape[1]} "
+        f"dimensions, and so few make it large: two random halves of the real motions ({half} each) are {bias:.3f} "
+        "apart. Compare it only with FIDs of the same count.",
+        f"{len(said)} captions, {len(said) - len(set(said))} of them in words that another has too: R@1 to R@3 count a "
+        "motion of such a caption as a miss, as the published code does; the column 'same words' counts it as a hit.",
+        f"{SHUFFLED.capitalize()}: captions dealt out anew over all items. {CHANCE.capitalize()}: k of the batch, and "
+        "the mean distance of a caption to motions of others.",
+        *_about(trial.evaluator),
+        "Time and memory depend on the machine and on what else it does.",
+    )
+
+
+def _about(evaluator: Evaluator) -> tuple[str, ...]:
+    said = "; ".join(f"{name}: {text}" for name, text in evaluator.about.items())
+    return (f"Evaluator {evaluator.name}. {said}",) if said else ()
+
+
+def run(
+    weights: str = "default",
+    *,
+    evaluator: str = "own",
+    data: Path | str | None = None,
+    selection: Selection | None = None,
+    protocol: Protocol | None = None,
+    folder: Path | None = None,
+    device: str = "cpu",
+    memory: Callable[[int], float] | None = None,
+    command: str = "",
+    progress: Callable[[str], None] = lambda line: None,
+) -> Report:
+    """Measure weights (a shipped name or a file) against the shipped reference, or real motions in ``data``.
+
+    ``folder`` keeps what is done, so that the same call goes on after a stop. The report is not written here.
+    """
+    protocol = protocol or Protocol()
+    draw = drawer(Prior.load(weights, device=device), protocol)  # what is quickly seen to be wrong goes first
+    judge = load_evaluator(evaluator)
+    if protocol.caption_length == "published":
+        _as_published(judge, [text_reference.SENTENCE])
+    trial = prepare(draw, judge, reference(judge, data, selection, progress), protocol)
+    settings = {
+        **protocol.drawn(),
+        "weights": _digest(find_weights(weights)),
+        "evaluator": [judge.name, dict(judge.about), _judge_file(evaluator)],
+        "real": _identity(trial.real),
+        "device": device,
+    }
+    label = weights if find_weights(weights) != Path(weights) else Path(weights).stem
+    return measure(
+        trial, label=label, parts=Parts(folder, fingerprint(settings)), memory=memory, command=command,
+        progress=progress,
+    )  # fmt: skip
+
+
+def reference(
+    judge: Evaluator, data: Path | str | None, selection: Selection | None, progress: Callable[[str], None]
+) -> TextReference:
+    """Real motions: those of ``data``, or the shipped numbers, which nobody can select from."""
+    if data is not None:
+        selection = fitting(data, selection)
+        return text_reference.measure(read_items(data, selection), judge, selection, progress)
+    if selection is not None:
+        raise MotionloomError("splits, sources and lengths are selected from real motions; name them with --data")
+    if not text_reference.shipped().is_file():
+        raise MotionloomError("this copy ships no reference of real motions; name some with --data")
+    return text_reference.load(text_reference.shipped(), judge)
+
+
+def drawer(prior: Prior, protocol: Protocol) -> Draw:
+    """A prior as `Draw`; MotionloomError for one that does not draw HumanML3D features at 20 frames per second."""
+    if len(prior.mean) != WIDTH or prior.fps != FPS:
+        raise MotionloomError(
+            f"these weights draw {len(prior.mean)} numbers at {prior.fps:g} frames per second; the evaluators read "
+            f"{WIDTH} at {FPS:g}"
+        )
+    if max(protocol.steps) > prior.schedule.steps:
+        raise MotionloomError(
+            f"{max(protocol.steps)} steps cannot be taken; these weights take 1 to {prior.schedule.steps}"
+        )
+
+    def draw(prompts: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int) -> list[np.ndarray]:
+        drawn = sample_features(
+            prior, prompts, frames, seeds=seeds, guidance=protocol.guidance, steps=steps, solver=protocol.solver,
+            spacing=protocol.spacing,
+        )  # fmt: skip
+        return [features.numpy().astype(np.float64) for features in drawn]
+
+    return draw
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+
+
+def _judge_file(evaluator: str) -> str:
+    """Digest of the evaluator's file; empty where it has none."""
+    path = own.evaluators().get(own.SHIPPED) if evaluator == "own" else Path(evaluator)
+    return _digest(path) if path and path.is_file() else ""
+
+
+def _identity(real: TextReference) -> str:
+    """Changes with the items; not with the embeddings, whose last digits depend on the number of threads."""
+    said = json.dumps([real.names, [[c.text for c in several] for several in real.captions], real.frames])
+    return hashlib.sha256(said.encode() + real.physical.astype(np.float32).tobytes()).hexdigest()[:16]

@@ -1,0 +1,362 @@
+"""The suite of long motion: how good the middles of its segments are, and how smooth the transitions between them.
+
+Rows and columns of PriorMDM's tables 1 and 2 (Shafir et al. 2024) with FlowMDM's jerk (Barquero et al. 2024), foot
+skate and speed. A way to make a long motion comes in as a function (`long_baselines.Method`). Every replication of
+every way is kept in a small file as it is done; a run that was stopped goes on with the next one.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import FPS, WIDTH
+from motionloom.kinematics.physics import Array
+from motionloom.lab.evaluator.evaluators import Caption, Evaluator, load_evaluator
+from motionloom.lab.metrics.frechet import fid, fid_bias
+from motionloom.lab.metrics.retrieval import diversity, matching_distance, r_precision
+from motionloom.lab.metrics.transitions import (
+    JERK_HUMANML3D,
+    area_under_jerk,
+    jerk_curve,
+    sequence_jerk,
+    transition_distance,
+)
+from motionloom.lab.report import published_rows
+from motionloom.lab.report.report import REAL, Column, Report, Row, Value
+from motionloom.lab.suites import text_reference
+from motionloom.lab.suites.items import fitting, read_items
+from motionloom.lab.suites.long_baselines import Long, Method, methods, titled
+from motionloom.lab.suites.parts import Parts, fingerprint
+from motionloom.lab.suites.protocol import Selection, Transitions
+from motionloom.lab.suites.real_seams import Crops, Shipped, averaged, jerks, load_shipped
+from motionloom.lab.suites.text import _digest, _identity, _judge_file
+from motionloom.lab.suites.text_reference import TextReference
+from motionloom.weights.prior import Prior, find_weights
+
+DIVERSITY_PAIRS = 300
+LEAST_INSIDE = 8
+"""Frames: what is left of a segment between its transitions is measured from so many on."""
+
+COLUMNS: tuple[Column, ...] = (
+    Column("r3", "R@3", "up", "share of captions whose own segment is among the three nearest of its long motion"),
+    Column("mm_dist", "MM-Dist", "down", "mean distance between a caption and its segment"),
+    Column("fid", "FID", "down", "of the segments without their handshakes, against real motions", 4),
+    Column("diversity", "Diversity", "real", "of the segments: mean distance of random pairs, at most 300"),
+    Column("transition_fid", "FID, transitions", "down", "of the windows around the seams, against real windows", 4),
+    Column("transition_diversity", "Diversity, transitions", "real", "of these windows"),
+    Column("pj", "peak jerk m/frame³", "real", "the largest value of the mean jerk curve of the windows (FlowMDM)", 4),
+    Column("auj", "AUJ m/frame³", "down", "area between that curve and the mean jerk of the real windows here", 3),
+    Column("auj_humanml3d", "AUJ, HumanML3D", "down", "the same against the published mean of HumanML3D's", 3),
+    Column("auj_own", "AUJ, own", "down", "the same against the mean of the same motions outside the windows: what the "
+           "seams alone add, however smooth the rest", 3),
+    Column("step", "step mm", "real", "mean over joints of the step across the seam; real: across any two frames", 1),
+    Column("seam_share", "skate %, transitions", "down", "frames with a sliding toe (GMD), in the windows", 2),
+    Column("inside_share", "skate %, inside", "down", "the same outside the windows", 2),
+    Column("seam_speed", "skate cm/s, transitions", "down", "speed of low toes (Kimodo), in the windows", 2),
+    Column("inside_speed", "skate cm/s, inside", "down", "the same outside the windows", 2),
+    Column("seam_slide", "skate mm/frame, transitions", "down", "step of toes at contact (Motius), in the windows", 2),
+    Column("inside_slide", "skate mm/frame, inside", "down", "the same outside the windows", 2),
+    Column("seam_jerk", "jerk m/s³, transitions", "real", "third derivative of the places, in the windows", 1),
+    Column("inside_jerk", "jerk m/s³, inside", "real", "the same outside the windows", 1),
+    Column("cost", "s per s", "", "seconds of computing for a second of motion, on the machine that measured", 3),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Everything that a way is measured with."""
+
+    evaluator: Evaluator
+    real: TextReference
+    how: Transitions
+    mean_jerk: float
+    """m/frame³ of the real windows."""
+    crops: Crops | None
+    """Windows of real motion; None where only the shipped numbers are at hand."""
+    shipped: Shipped | None = None
+
+    def asked(self, replication: int) -> Iterator[tuple[list[int], list[Caption], list[int]]]:
+        """For each long motion of a replication: its items, their captions, and the visible frames."""
+        rng = np.random.default_rng((self.how.seed, replication))
+        order = rng.permutation(len(self.real.names))
+        for unfolding in range(self.how.unfoldings):
+            items = order[unfolding * self.how.intervals : (unfolding + 1) * self.how.intervals].tolist()
+            several = [self.real.captions[k] for k in items]
+            said = [captions[int(rng.integers(len(captions)))] for captions in several]
+            frames = [min(max(self.real.frames[k], self.how.shortest), self.how.longest) for k in items]
+            yield items, said, frames
+
+
+def prepare(
+    evaluator: Evaluator, real: TextReference, how: Transitions, crops: Crops | None, shipped: Shipped | None = None
+) -> Trial:
+    """Checks that there is enough real motion; MotionloomError where there is not."""
+    need = how.unfoldings * how.intervals
+    if how.intervals < 4:
+        raise MotionloomError(f"{how.intervals} intervals are too few for R@3; ask for at least 4")
+    if need > len(real.names):
+        raise MotionloomError(
+            f"{how.unfoldings} unfoldings of {how.intervals} intervals need {need} real items and there are "
+            f"{len(real.names)}; ask for fewer, or name more data"
+        )
+    if crops is not None and len(crops.embeddings) < max(2, how.seams):
+        raise MotionloomError(
+            f"there are {len(crops.embeddings)} real stretches of {how.window} frames and {how.seams} transitions are "
+            "compared with them; ask for fewer intervals, or name more data"
+        )
+    if crops is None and shipped is None:
+        raise MotionloomError("this copy ships no numbers of real transitions; name real motions with --data")
+    mean = crops.mean_jerk if crops is not None else shipped.mean_jerk  # type: ignore[union-attr]
+    return Trial(evaluator, real, how, mean, crops, shipped)
+
+
+# ---- one replication -------------------------------------------------------------------------------------------------
+
+
+def cut(frames: Sequence[int], margin: int) -> list[slice]:
+    """Of each interval what lies at least ``margin`` frames from its seams; its open ends are kept."""
+    ends = np.cumsum(frames).tolist()
+    starts, last = [0, *ends[:-1]], len(frames) - 1
+    return [
+        slice(start + (margin if row > 0 else 0), end - (margin if row < last else 0))
+        for row, (start, end) in enumerate(zip(starts, ends, strict=True))
+    ]
+
+
+def windows(frames: Sequence[int], size: int) -> list[slice]:
+    """``size`` frames around each seam: from ``size`` // 2 before it on."""
+    return [slice(seam - size // 2, seam - size // 2 + size) for seam in np.cumsum(frames)[:-1].tolist()]
+
+
+def of_method(trial: Trial, method: Method, replication: int) -> dict[str, float]:
+    """All columns for one way; the time goes to making the motions alone."""
+    how = trial.how
+    middles, seams, said, around, inside, steps = [], [], [], [], [], []
+    spent = total = 0.0
+    for unfolding, (_, captions, frames) in enumerate(trial.asked(replication)):
+        start = time.perf_counter()
+        made = method([caption.text for caption in captions], frames, how.first_seed(replication, unfolding))
+        spent, total = spent + time.perf_counter() - start, total + sum(frames) / FPS
+        _check(made, sum(frames))
+        said += captions
+        middles += [made.features[part] for part in cut(frames, how.handshake // 2)]
+        parts = windows(frames, how.window)
+        seams += [made.features[part] for part in parts]
+        around += [made.positions[part] for part in parts]
+        inside += [made.positions[p] for p in cut(frames, how.window // 2) if p.stop - p.start >= LEAST_INSIDE]
+        steps += transition_distance(made.positions, np.cumsum(frames)[:-1].tolist()).tolist()
+    found = _matched(trial, said, _embedded(trial.evaluator, middles), replication)
+    found |= _around(trial, seams, np.stack(around), replication)
+    found |= {"step": 1000 * float(np.mean(steps)), "cost": spent / total}
+    if inside:
+        found |= {f"inside_{name}": value for name, value in averaged(inside).items()}
+        own = np.concatenate([sequence_jerk(part[None])[0] for part in inside]).mean()
+        found["auj_own"] = area_under_jerk(jerk_curve(np.stack(around)), float(own))
+    return found
+
+
+def of_real(trial: Trial, replication: int) -> dict[str, float]:
+    """Real motions with their own captions; other random windows of real motion in place of transitions."""
+    rows = [item for items, _, _ in trial.asked(replication) for item in items]
+    said = [caption for _, captions, _ in trial.asked(replication) for caption in captions]
+    found = _matched(trial, said, trial.real.motions[rows], replication)
+    numbers = text_reference.averaged(trial.real.physical, trial.real.frames)
+    names = {"skate_share": "share", "skate_speed": "speed", "skate_slide": "slide", "jerk": "jerk"}
+    found |= {f"inside_{short}": numbers[long] for long, short in names.items()}
+    if trial.crops is not None:
+        other = trial.crops.again(trial.how.seams, seed=(trial.how.seed, replication, 1))
+        found |= _around(trial, other.features, other.positions, replication)
+        found["step"] = 1000 * other.step
+    elif trial.shipped is not None:
+        found |= trial.shipped.row(trial.how)
+    if "auj" in found:
+        found["auj_own"] = found["auj"]  # real windows are windows like any other
+    return found
+
+
+def _matched(trial: Trial, said: Sequence[Caption], motions: Array, replication: int) -> dict[str, float]:
+    """Segments (segments, width), whatever is said of them."""
+    texts = trial.evaluator.texts(said)
+    return {
+        "r3": float(r_precision(texts, motions, top=3, batch=trial.how.intervals)[2]),
+        "mm_dist": matching_distance(texts, motions, batch=trial.how.intervals),
+        "fid": fid(motions, trial.real.motions),
+        "diversity": _diversity(motions, replication),
+    }
+
+
+def _around(trial: Trial, features: Sequence[np.ndarray], positions: np.ndarray, replication: int) -> dict[str, float]:
+    """Numbers of windows: features of each, and positions (windows, frames, 22, 3)."""
+    found = {
+        **jerks(positions, trial.mean_jerk),
+        **{f"seam_{name}": value for name, value in averaged(list(positions)).items()},
+    }
+    if trial.crops is not None:
+        embeddings = _embedded(trial.evaluator, features)
+        found["transition_fid"] = fid(embeddings, trial.crops.embeddings)
+        found["transition_diversity"] = _diversity(embeddings, replication)
+    return found
+
+
+def _check(made: Long, frames: int) -> None:
+    if made.features.shape != (frames, WIDTH) or made.positions.shape != (frames, 22, 3):
+        raise ValueError(f"a method gave {made.features.shape} and {made.positions.shape} for {frames} frames")
+    if not (np.isfinite(made.features).all() and np.isfinite(made.positions).all()):
+        raise MotionloomError("a method drew numbers that are not finite; these weights cannot be measured so")
+
+
+def _embedded(evaluator: Evaluator, motions: Sequence[np.ndarray]) -> Array:
+    size = text_reference.CHUNK
+    return np.concatenate([evaluator.motions(motions[k : k + size]) for k in range(0, len(motions), size)])
+
+
+def _diversity(motions: Array, replication: int) -> float:
+    return diversity(motions, pairs=min(DIVERSITY_PAIRS, len(motions)), seed=replication)
+
+
+# ---- the run ---------------------------------------------------------------------------------------------------------
+
+
+def measure(
+    trial: Trial,
+    ways: Mapping[str, Method],
+    *,
+    label: str = "default",
+    parts: Parts | None = None,
+    command: str = "",
+    progress: Callable[[str], None] = lambda line: None,
+) -> Report:
+    """All rows: real motion, then every way by the name it was given."""
+    parts, how = parts or Parts(None, ""), trial.how
+    rows = [_row(REAL, [of_real(trial, r) for r in range(how.replications)])]
+    for name, method in ways.items():
+        found = [_kept(trial, parts, name, method, r, progress=progress) for r in range(how.replications)]
+        rows.append(_row(titled(name, how.steps), found))
+    said = {
+        "data": trial.real.data,
+        **trial.real.selection.described(),
+        "items": len(trial.real.names),
+        "evaluator": trial.evaluator.name,
+        "representation": "HumanML3D at 20 frames per second, positions as the network draws them (not finished)",
+        **how.described(),
+    }
+    return Report(
+        "transitions", f"Long motion and its transitions: {label}", command, said, COLUMNS,
+        (*rows, *published_rows.published("long", [column.name for column in COLUMNS])), _notes(trial),
+    )  # fmt: skip
+
+
+def _kept(
+    trial: Trial, parts: Parts, name: str, method: Method, replication: int, *, progress: Callable[[str], None]
+) -> dict[str, float]:
+    piece = f"{name} {replication}"
+    found = parts.find(piece)
+    if found is None:
+        found = of_method(trial, method, replication)
+        parts.keep(piece, found)
+        progress(
+            f"{name}, replication {replication + 1} of {trial.how.replications}: AUJ {found['auj']:.3f}, peak jerk "
+            f"{found['pj']:.4f}, FID {found['fid']:.3f}, {found['cost']:.2f} s per second"
+        )
+    return found
+
+
+def _row(name: str, found: Sequence[Mapping[str, float]]) -> Row:
+    """Means and intervals; a number that was only looked up has none."""
+    kept = {c.name: [numbers[c.name] for numbers in found if c.name in numbers] for c in COLUMNS}
+    fixed = name == REAL
+    return Row(
+        name,
+        {k: Value(v[0]) if fixed and len(set(v)) == 1 else Value.of(v) for k, v in kept.items() if v},
+    )
+
+
+def _notes(trial: Trial) -> tuple[str, ...]:
+    how, segments = trial.how, trial.how.unfoldings * trial.how.intervals
+    half = len(trial.real.motions) // 2
+    bias = fid_bias(trial.real.motions, min(half, segments), other=half, repeats=10, seed=how.seed)
+    notes = [
+        f"A replication makes {how.unfoldings} long motions of {how.intervals} captions: {segments} segments and "
+        f"{how.seams} transitions of {how.window} frames. Their FIDs are large because they are few: "
+        f"{min(half, segments)} real motions against {half} others are {bias:.3f} apart. The row of real motion has "
+        "its segments among those it is compared with.",
+        f"AUJ sums |mean curve - reference| over {how.window - 3} frames and has a floor, since a mean of "
+        f"{how.seams} windows is not flat: read it beside the real row, which has as many. Reference: "
+        f"{trial.mean_jerk:.6f} m/frame³, the mean of the real windows here; HumanML3D's published one is "
+        f"{JERK_HUMANML3D}. A way that moves more smoothly than real people everywhere scores badly on it without any "
+        "seam: AUJ, own, takes the motion's own mean instead.",
+        "Segments are judged without half a handshake at each seam; what is called inside lies at least half a window "
+        "from every seam. SLERP's row is measured on positions of constant bones and on features made of them; "
+        "of the other rows what the network draws is measured.",
+    ]
+    if trial.crops is None:
+        notes.append(
+            "Without --data there are no real windows for the evaluator, so that FID and Diversity of the transitions "
+            "are left out; the real row's other numbers are the shipped ones."
+        )
+    return (*notes, "Time depends on the machine and on what else it does.")
+
+
+def run(
+    weights: str = "default",
+    *,
+    evaluator: str = "own",
+    data: Path | str | None = None,
+    selection: Selection | None = None,
+    how: Transitions | None = None,
+    names: Sequence[str] | None = None,
+    folder: Path | None = None,
+    device: str = "cpu",
+    command: str = "",
+    progress: Callable[[str], None] = lambda line: None,
+) -> Report:
+    """Measure weights (a shipped name or a file) by the named ways (default `long_baselines.DEFAULT`).
+
+    ``folder`` keeps what is done, so that the same call goes on after a stop. The report is not written here.
+    """
+    how = how or Transitions()
+    prior = Prior.load(weights, device=device)
+    if len(prior.mean) != WIDTH or prior.fps != FPS or how.steps > prior.schedule.steps:
+        raise MotionloomError(
+            f"these weights draw {len(prior.mean)} numbers at {prior.fps:g} frames per second in at most "
+            f"{prior.schedule.steps} steps; the suite reads {WIDTH} at {FPS:g} and takes {how.steps} steps"
+        )
+    ways = methods(prior, how, names)
+    judge = load_evaluator(evaluator)
+    trial = real_motion(judge, data, selection, how, progress)
+    settings = {
+        **how.drawn(),
+        "weights": _digest(find_weights(weights)),
+        "evaluator": [judge.name, dict(judge.about), _judge_file(evaluator)],
+        "real": _identity(trial.real),
+        "windows": trial.crops is not None,
+        "device": device,
+    }
+    label = weights if find_weights(weights) != Path(weights) else Path(weights).stem
+    kept = Parts(folder, fingerprint(settings))
+    return measure(trial, ways, label=label, parts=kept, command=command, progress=progress)
+
+
+def real_motion(
+    judge: Evaluator,
+    data: Path | str | None,
+    selection: Selection | None,
+    how: Transitions,
+    progress: Callable[[str], None],
+) -> Trial:
+    """Real motions out of ``data``, or the shipped numbers, which nobody can select from."""
+    if data is None:
+        if selection is not None:
+            raise MotionloomError("splits, sources and lengths are selected from real motions; name them with --data")
+        if not text_reference.shipped().is_file():
+            raise MotionloomError("this copy ships no reference of real motions; name some with --data")
+        return prepare(judge, text_reference.load(text_reference.shipped(), judge), how, None, load_shipped())
+    chosen = fitting(data, selection)
+    items = read_items(data, chosen)
+    real = text_reference.measure(items, judge, chosen, progress)
+    crops = Crops.of([item.features for item in items], how.window, judge, seed=how.seed)
+    return prepare(judge, real, how, crops)

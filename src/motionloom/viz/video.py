@@ -1,0 +1,217 @@
+"""Pictures and films of motions: a contact sheet as PNG, a film as MP4 or GIF. No display is needed.
+
+Orange is the person's left, blue the right, grey the middle; a bone that stands on the floor is green.
+The floor's tiles are half a metre wide and stay in the world, so a sliding foot shows.
+"""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from motionloom.errors import MotionloomError
+from motionloom.io.atomic import atomic_path
+from motionloom.motion import Motion
+from motionloom.viz import draw
+from motionloom.viz.draw import Camera
+from motionloom.viz.figure import Figure, figure
+from motionloom.viz.film import MAX_PIXELS, caption, film_rate, film_size, font, shorten, suffixed, write_film
+from motionloom.viz.scene import smoothed
+
+Array = NDArray[np.float64]
+CELL = (176, 236)  # one pose on a sheet, pixels
+TITLE = 46  # height of a row's caption, pixels
+
+
+# --- contact sheets -----------------------------------------------------------------------------------------------
+
+
+def draw_sheet(
+    motions: Sequence[Motion], path: str | Path, *, captions: Sequence[str] | None = None, columns: int = 8
+) -> Path:
+    """Write a PNG with one row per motion: caption, poses over time in one three-quarter view, and a map of the path.
+
+    Errors: no motions, captions of another count, fewer than two columns, or a path that cannot be written.
+    """
+    texts = _captions(motions, captions)
+    if not 2 <= columns <= 40:
+        raise MotionloomError(f"a contact sheet has 2 to 40 columns; got {columns}")
+    width, height = CELL[0] * columns + CELL[1], TITLE + CELL[1]
+    if len(motions) * width * height > 16 * MAX_PIXELS:
+        raise MotionloomError(f"{len(motions)} motions are too many for one contact sheet; draw fewer at a time")
+    sheet = Image.new("RGB", (width, height * len(motions)), draw.PAPER)
+    for row, (motion, text) in enumerate(zip(motions, texts)):
+        sheet.paste(_row(figure(motion), text, columns), (0, row * height))
+    with atomic_path(suffixed(path, (".png",))) as temp:
+        sheet.save(temp, format="PNG", optimize=False)
+    return Path(path)
+
+
+def _row(shape: Figure, text: str, columns: int) -> Image.Image:
+    row = Image.new("RGB", (CELL[0] * columns + CELL[1], TITLE + CELL[1]), draw.PAPER)
+    frames = np.unique(np.linspace(0, len(shape) - 1, columns).round().astype(int))
+    camera = _fit(shape, frames, CELL)
+    for column, frame in enumerate(frames.tolist()):
+        target = np.array([shape.path[frame, 0], camera.target[1], shape.path[frame, 2]])
+        tile = _scene(shape, frame, Camera(target, CELL, camera.span, camera.azimuth, camera.elevation))
+        ImageDraw.Draw(tile).text((8, CELL[1] - 20), f"{frame / shape.fps:.1f} s", fill=draw.QUIET, font=font(13))
+        row.paste(tile, (CELL[0] * column, TITLE))
+    row.paste(_map(shape, CELL[1]), (CELL[0] * columns, TITLE))
+    pen = ImageDraw.Draw(row)
+    pen.line([(0, 0), (row.width, 0)], fill=draw.LINE)
+    pen.text((10, 7), shorten(text, 18, row.width - 20), fill=draw.INK, font=font(18))
+    pen.text((10, 29), _summary(shape), fill=draw.QUIET, font=font(13))
+    return row
+
+
+def _summary(shape: Figure) -> str:
+    steps = np.linalg.norm(np.diff(shape.path, axis=0), axis=-1).sum()
+    away = np.linalg.norm(shape.path[-1] - shape.path[0])
+    turned = np.degrees(shape.heading()[-1])
+    way = f"turned {abs(turned):.0f}° {'left' if turned > 0 else 'right'}" if abs(turned) > 10 else "did not turn"
+    return (
+        f"{shape.seconds:.1f} s at {shape.fps:g} fps   path {steps:.1f} m, ends {away:.1f} m away   {way}   "
+        f"(orange: left, blue: right, green: on the floor)"
+    )
+
+
+def _facing(shape: Figure) -> float:
+    """Azimuth of the motion's first facing, radians."""
+    return float(np.arctan2(shape.forward[0, 0], shape.forward[0, 2]))
+
+
+def _fit(shape: Figure, frames: NDArray[np.int_], size: tuple[int, int]) -> Camera:
+    """A three-quarter camera whose span holds every one of the poses, each centred on its pelvis."""
+    around = shape.places[frames] - shape.path[frames, None]
+    around = around[:, [bone[1] for bone in shape.bones] or [0]]
+    top = max(float(around[..., 1].max()) + 0.14 * shape.height, 0.6 * shape.height)
+    low = min(float(around[..., 1].min()), 0.0)
+    trial = Camera(np.zeros(3), size, 1.0, _facing(shape) - 0.75)
+    wide = 2 * float(np.abs(around @ trial.axes()[0]).max()) + 0.15 * shape.height
+    span = max(1.04 * (top - low) * np.cos(trial.elevation) + 0.2 * shape.height, wide * size[1] / size[0])
+    middle = shape.floor + (top + low) / 2 - 0.03 * span
+    return Camera(np.array([0.0, middle, 0.0]), size, span, trial.azimuth, trial.elevation)
+
+
+def _map(shape: Figure, side: int) -> Image.Image:
+    """The way from above, first facing up: path, facing every half second, start (ring) and end (dot)."""
+    big = side * draw.SMOOTH
+    picture = Image.new("RGB", (big, big), (255, 255, 255))
+    pen = ImageDraw.Draw(picture)
+    angle = _facing(shape)
+    right, ahead = np.array([-np.cos(angle), np.sin(angle)]), np.array([np.sin(angle), np.cos(angle)])
+    plane = np.stack([right, ahead])
+    way = (shape.path[:, [0, 2]] - shape.path[0, [0, 2]]) @ plane.T
+    middle = (way.min(axis=0) + way.max(axis=0)) / 2
+    span = max(float(np.ptp(way, axis=0).max()) * 1.25, 1.6 * shape.height)
+    scale = big / span
+
+    def put(points: Array) -> list[tuple[float, float]]:
+        return [(big / 2 + x * scale, big / 2 - y * scale) for x, y in (points - middle).tolist()]
+
+    metre = 10.0 ** max(0, int(np.floor(np.log10(max(span / 2, 1.0)))))
+    for k in range(int(np.floor((middle - span).min() / metre)), int(np.ceil((middle + span).max() / metre)) + 1):
+        (x, _), (_, y) = put(np.array([[k * metre, 0.0], [0.0, k * metre]]))
+        pen.line([(x, 0), (x, big)], fill=draw.TILE, width=2)
+        pen.line([(0, y), (big, y)], fill=draw.TILE, width=2)
+    if len(way) > 1:
+        pen.line(put(way), fill=draw.PATH, width=5, joint="curve")
+    step = max(1, round(shape.fps * max(0.5, shape.seconds / 16)))
+    for frame in range(0, len(way), step):
+        nose = way[frame] + 0.11 * span * plane @ shape.forward[frame, [0, 2]]
+        pen.line(put(np.stack([way[frame], nose])), fill=draw.mix(draw.PATH, draw.PAPER, 0.35), width=3)
+    for point, fill in ((way[0], draw.PAPER), (way[-1], draw.PATH)):
+        (x, y) = put(point[None])[0]
+        pen.ellipse((x - 11, y - 11, x + 11, y + 11), fill=fill, outline=draw.PATH, width=4)
+    small = picture.reduce(draw.SMOOTH)
+    pen = ImageDraw.Draw(small)
+    pen.text((8, side - 20), f"from above, grid {metre:g} m", fill=draw.QUIET, font=font(13))
+    pen.rectangle((0, 0, side - 1, side - 1), outline=draw.LINE)
+    return small
+
+
+# --- films --------------------------------------------------------------------------------------------------------
+
+
+def draw_video(
+    motions: Sequence[Motion],
+    path: str | Path,
+    *,
+    captions: Sequence[str] | None = None,
+    size: tuple[int, int] = (960, 540),
+    fps: float | None = None,
+) -> Path:
+    """Film motions as .mp4 (H.264) or .gif, side by side; `overlay.draw_scene` shows people in one scene.
+
+    ``fps`` is the film's frame rate (default: the fastest motion's, halved until at most 60; a GIF at most 25);
+    time in the film is time in the motion, and a shorter motion holds its last pose.
+    Errors: no motions, captions of another count, sizes below 64 or above 4K, a path that cannot be written.
+    """
+    texts = _captions(motions, captions)
+    rate = film_rate(path, max(m.fps for m in motions), fps)
+    panel = film_size(size)
+    count = max(1, *(round((len(m) - 1) / m.fps * rate) + 1 for m in motions))
+
+    def frames() -> Iterator[Image.Image]:
+        return _film([figure(m.resample(rate)) for m in motions], texts, panel, count)
+
+    return write_film(frames, path, panel, rate=rate, count=count)
+
+
+def _film(shapes: Sequence[Figure], texts: Sequence[str], size: tuple[int, int], count: int) -> Iterator[Image.Image]:
+    """The film's pictures, one after the other."""
+    columns = len(shapes) if len(shapes) <= 3 else int(np.ceil(np.sqrt(len(shapes))))
+    rows = -(-len(shapes) // columns)
+    panel = (size[0] // columns, size[1] // rows)
+    cameras = [_follow(shape, panel) for shape in shapes]
+    seconds = max(s.seconds for s in shapes)
+    for k in range(count):
+        picture = Image.new("RGB", size, draw.PAPER)
+        for i, shape in enumerate(shapes):
+            frame = min(k, len(shape) - 1)
+            tile = _scene(shape, frame, cameras[i][frame])
+            _title(tile, texts[i])
+            picture.paste(tile, (panel[0] * (i % columns), panel[1] * (i // columns)))
+        clock = f"{k / shapes[0].fps:.1f} / {seconds:.1f} s"
+        pen = ImageDraw.Draw(picture)
+        pen.text((size[0] - 12, size[1] - 10), clock, fill=draw.QUIET, font=font(15), anchor="rs")
+        yield picture
+
+
+def _title(tile: Image.Image, text: str) -> None:
+    big = 18 if tile.width > 400 else 13
+    if text:
+        line = shorten(text, big, tile.width - 24)
+        ImageDraw.Draw(tile).text((12, 10), line, fill=draw.INK, font=font(big))
+
+
+def _follow(shape: Figure, panel: tuple[int, int]) -> list[Camera]:
+    """Cameras, one per frame, that glide after a person."""
+    camera = _fit(shape, np.unique(np.linspace(0, len(shape) - 1, 60).round().astype(int)), panel)
+    glide = smoothed(shape.path, 0.6 * shape.fps)
+    lag = float(np.linalg.norm(glide - shape.path, axis=-1).max())
+    span = max(camera.span, 2.0 * lag * panel[1] / panel[0] + 1.1 * shape.height)
+    return [Camera(np.array([x, camera.target[1], z]), panel, span, camera.azimuth) for x, _, z in glide]
+
+
+def _scene(person: Figure, now: int, camera: Camera) -> Image.Image:
+    """One picture: floor, path, shadow and body."""
+    big = (camera.size[0] * draw.SMOOTH, camera.size[1] * draw.SMOOTH)
+    picture = Image.new("RGB", big, draw.PAPER)
+    pen = ImageDraw.Draw(picture)
+    draw.paint_floor(pen, camera, person.floor)
+    draw.paint_path(pen, camera, person.path[now:], draw.mix(draw.PATH, draw.PAPER, 0.72), 0.014)
+    draw.paint_path(pen, camera, person.path[: now + 1], draw.PATH, 0.02)
+    draw.paint_shadow(picture, camera, person, now)
+    draw.paint_body(pen, camera, person, now)
+    return picture.reduce(draw.SMOOTH)
+
+
+def _captions(motions: Sequence[Motion], captions: Sequence[str] | None) -> list[str]:
+    if not motions:
+        raise MotionloomError("there is no motion to draw; give at least one")
+    if captions is not None and len(captions) != len(motions):
+        raise MotionloomError(f"{len(motions)} motions need as many captions; got {len(captions)}")
+    return [caption(c) for c in captions] if captions is not None else [""] * len(motions)

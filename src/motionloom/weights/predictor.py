@@ -1,0 +1,221 @@
+"""`Predictor`: a network that completes motion from what is known of it, and the weight file it lives in.
+
+It sees a window of ``frames`` joint places (`features.positions`), the first ``observed`` of them usually known, as the
+lowest frequencies of their cosine transform. Two manners:
+
+`published`: HumanMAC (Chen et al. 2023). Metres as they are; the network guesses the noise and is told the spectrum of
+the observation padded with its last pose. Published checkpoints are of this manner.
+
+`told`: ours. Everything is relative to the last observed pose and standardised frequency by frequency; the network
+guesses the clean spectrum, and is told what is known, which joints in which frames that is, and the pose itself.
+"""
+
+import json
+import math
+from dataclasses import asdict, dataclass, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal
+
+import torch
+from safetensors.torch import save_file
+from torch import Tensor
+
+from motionloom.diffusion import SCHEDULES, Basis, Dct, Denoiser, Frames, Schedule, State, from_noise
+from motionloom.errors import MotionloomError
+from motionloom.features.positions import Layout
+from motionloom.io.atomic import atomic_path
+from motionloom.nets.predictor import NetConfig, TransLinear
+from motionloom.weights.container import fill, is_signed
+from motionloom.weights.prior import Card, find_device, read_tensors
+
+FORMAT = 1
+LONGEST_WINDOW = 2000
+
+
+@dataclass(frozen=True, eq=False)
+class Predictor:
+    """A diffusion model of short windows of motion, ready to complete them."""
+
+    net: TransLinear
+    schedule: Schedule
+    layout: Layout
+    basis: Basis
+    """From the window's frames to the state's tokens."""
+    observed: int
+    """Frames at the beginning of the window that are usually known."""
+    fps: float
+    manner: Literal["published", "told"]
+    mean: Tensor
+    """(kept, channels) of the state; zeros for the published manner."""
+    std: Tensor
+    """(kept, channels); ones for the published manner."""
+    pose: Tensor
+    """(2, channels) mean and spread of last observed poses."""
+    card: Card
+
+    @property
+    def frames(self) -> int:
+        """Frames of the window."""
+        return self.basis.frames
+
+    @staticmethod
+    def load(weights: str | Path = "predictor", *, device: str | torch.device = "cpu") -> "Predictor":
+        """Read a weight file: a path, or the name of one that ships with the package (``predictor``).
+
+        Raises `MotionloomError` for a file that is missing, damaged or of another kind, and for a device there is not.
+        """
+        place = find_device(device)
+        return load_predictor(find_predictor(weights)).to(place)
+
+    def to(self, device: str | torch.device) -> "Predictor":
+        """The same predictor on another device."""
+        moved = {name: getattr(self, name).to(device) for name in ("mean", "std", "pose")}
+        return replace(self, net=self.net.to(device), **moved)
+
+    # Between windows of features (rows, frames, channels) and states (rows, kept, channels)
+
+    def to_state(self, features: Tensor, pose: Tensor) -> State:
+        """Windows as states; ``pose`` (rows, channels) is the last observed one."""
+        x = features - pose[:, None] if self.manner == "told" else features
+        return (self.basis.to_spectrum(x) - self.mean) / self.std
+
+    def to_features(self, state: State, pose: Tensor) -> Tensor:
+        """The inverse of `to_state`, without the frequencies that were dropped."""
+        x = self.basis.to_time(state * self.std + self.mean)
+        return x + pose[:, None] if self.manner == "told" else x
+
+    def tell(self, features: Tensor, mask: Tensor, pose: Tensor) -> Tensor:
+        """What the network is told of windows (rows, frames, channels) known where ``mask`` (rows, frames, parts) is 1.
+
+        Unknown numbers are those of ``pose`` (rows, channels), the last observed one.
+        """
+        mask = mask.to(features)
+        each = mask.repeat_interleave(3, dim=-1)
+        known = each * (features - pose[:, None])
+        if self.manner == "published":
+            return self.basis.to_spectrum(known + pose[:, None])
+        spectrum = self.basis.to_spectrum(known) / self.std
+        shares = self.basis.to_spectrum(mask) / math.sqrt(self.frames)
+        rows = torch.cat([spectrum, shares], dim=-1)
+        last = torch.zeros_like(rows[:, :1])
+        last[..., : pose.shape[-1]] = ((pose - self.pose[0]) / self.pose[1])[:, None]
+        return torch.cat([rows, last], dim=1)
+
+    def denoiser(self, told: Tensor | None, keep: Tensor | None = None) -> Denoiser:
+        """The network's guess of the clean state, told something or nothing; ``keep`` (rows,): which rows are told."""
+
+        def guess(x: State, level: int) -> State:
+            return self.net(x, torch.full((len(x),), level - 1, device=x.device), told, keep)
+
+        return from_noise(guess, self.schedule) if self.manner == "published" else guess
+
+
+def told_shape(layout: Layout, kept: int) -> tuple[int, int]:
+    """Rows and channels of what a network of the manner `told` is told."""
+    return kept + 1, layout.channels + layout.parts
+
+
+def shipped_predictors() -> dict[str, Path]:
+    """Names and places of the predictors inside the package."""
+    folder = Path(str(resources.files("motionloom"))) / "weights" / "prediction"
+    return {path.stem: path for path in sorted(folder.glob("*.safetensors"))}
+
+
+def find_predictor(weights: str | Path) -> Path:
+    """The file for a shipped name or a path."""
+    names = shipped_predictors()
+    if str(weights) in names:
+        return names[str(weights)]
+    path = Path(weights)
+    if not path.is_file():
+        listed = ", ".join(names) or "none"
+        raise MotionloomError(
+            f"no predictor {str(weights)!r}: there is no such file, and the shipped ones are {listed}"
+        )
+    return path
+
+
+def save_predictor(predictor: Predictor, path: Path | str, *, half: bool = True) -> Path:
+    """Write a predictor as a .safetensors file and give the path back; as float16 unless ``half`` is False."""
+    path = Path(path)
+    if path.suffix != ".safetensors":
+        raise MotionloomError(f"weights are written as .safetensors; {path.name} has another suffix")
+    kind = torch.float16 if half else torch.float32
+    tensors = {f"net.{k}": v.detach().cpu().to(kind).contiguous() for k, v in predictor.net.state_dict().items()}
+    tensors |= {name: getattr(predictor, name).detach().cpu().float().clone() for name in ("mean", "std", "pose")}
+    about = {
+        "format": FORMAT,
+        "net": asdict(predictor.net.config),
+        "schedule": {"name": predictor.schedule.name, "steps": predictor.schedule.steps},
+        "layout": predictor.layout.plain(),
+        "frames": predictor.frames,
+        "observed": predictor.observed,
+        "dct": isinstance(predictor.basis, Dct),
+        "fps": predictor.fps,
+        "manner": predictor.manner,
+        "card": asdict(predictor.card),
+    }
+    with atomic_path(path) as temp:
+        save_file(tensors, temp, metadata={"motionloom-predictor": json.dumps(about)})
+    return path
+
+
+def is_predictor(path: Path) -> bool:
+    """True for a file of `save_predictor`, damaged or not, by what its head says."""
+    return is_signed(path, "motionloom-predictor")
+
+
+def load_predictor(path: Path) -> Predictor:
+    """Read a predictor; raises MotionloomError where the file is damaged, of another kind or of a newer format."""
+    tensors, metadata = read_tensors(path)
+    if "motionloom-predictor" not in metadata:
+        kind = "a prior" if "motionloom" in metadata else "something else"
+        raise MotionloomError(f"{path} is {kind}, not a predictor; name a file that 'motionloom train predictor' wrote")
+    try:
+        about = json.loads(metadata["motionloom-predictor"])
+        if about["format"] != FORMAT:
+            raise MotionloomError(f"{path} has format {about['format']}; this motionloom reads {FORMAT}: update it")
+        config, layout = NetConfig.parse(about["net"]), Layout.parse(about["layout"])
+        basis = _basis(config.kept, about["frames"], about["dct"])
+        levels, name = about["schedule"]["steps"], about["schedule"]["name"]
+        fps, observed, manner, card = float(about["fps"]), about["observed"], about["manner"], Card(**about["card"])
+        told = {"told": told_shape(layout, config.kept), "published": None}
+        good = (
+            name in SCHEDULES and isinstance(levels, int) and 1 <= levels <= 100_000
+            and math.isfinite(fps) and 1 <= fps <= 1000 and isinstance(observed, int) and 2 <= observed < basis.frames
+            and layout.channels == config.channels and config.told == told[manner]
+            and all(isinstance(text, str) for text in (card.name, card.licence, card.data))
+            and isinstance(card.notes, dict)
+        )  # fmt: skip
+        if not good:
+            raise ValueError("values that do not fit together")
+    except MotionloomError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
+        raise MotionloomError(f"{path} does not describe a predictor ({error!r}); name a file that does") from None
+    with torch.device("meta"):  # what a file only claims to hold takes no memory
+        net = TransLinear(config)
+    fill(net, {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}, str(path))
+    mean, std, pose = (_usable(path, tensors, key) for key in ("mean", "std", "pose"))
+    shape = (config.kept, config.channels)
+    fits = mean.shape == shape and std.shape == shape and pose.shape == (2, config.channels)
+    if not fits or std.min() <= 0 or pose[1].min() <= 0:
+        raise MotionloomError(f"{path} lacks usable statistics; fetch the weights again")
+    return Predictor(
+        net.eval().requires_grad_(False), SCHEDULES[name](levels), layout, basis, observed, fps, manner,
+        mean, std, pose, card,
+    )  # fmt: skip
+
+
+def _basis(kept: int, frames: Any, dct: Any) -> Basis:
+    if not isinstance(frames, int) or not kept <= frames <= LONGEST_WINDOW or (dct is not True and kept != frames):
+        raise ValueError(f"{kept} of {frames!r} frequencies")
+    return Dct(frames, kept) if dct is True else Frames(frames)
+
+
+def _usable(path: Path, tensors: dict[str, Tensor], name: str) -> Tensor:
+    values = tensors.get(name, torch.empty(0)).float()
+    if not values.numel() or not bool(values.isfinite().all()):
+        raise MotionloomError(f"{path} lacks usable statistics ({name}); fetch the weights again")
+    return values

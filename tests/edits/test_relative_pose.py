@@ -1,0 +1,300 @@
+"""Two people who stay together: a planted drift goes away, in halves, and nobody who is given is moved."""
+
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from motionloom.edits import relative_pose as duet_places
+from motionloom.edits.relative_pose import Places, leader
+from motionloom.features import pair as two
+from motionloom.features.pair import PUBLISHED_CODE
+from motionloom.nets.pair import PairNet, join
+from motionloom.tasks.pair import generate_pair, known_state, pair_draw, pair_features
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
+from tests.nets import tiny
+from tests.tasks.two_people import block as block_of
+
+FRAMES = 100
+SAID = ["a person walks", "a person turns left"]
+BESIDE = torch.tensor([[1.0, 0.0, 0.0, 0.0], [-0.8, 0.6, 0.3, 1.0]])
+
+
+@pytest.fixture(scope="module")
+def prior() -> Prior:
+    return tiny.prior()
+
+
+@pytest.fixture(scope="module")
+def block(prior: Prior) -> PairBlock:
+    return block_of(prior)
+
+
+class Told:
+    """A network that always says that two people stand to each other as in `BESIDE`."""
+
+    def __init__(self, net: PairNet) -> None:
+        self.net, self.talk = net, net.talk
+        self.shown: list[tuple[Tensor, Tensor]] = []
+
+    def __call__(self, x: Tensor, level: int, bound) -> Tensor:
+        self.shown.append((x, bound.lengths))
+        places = self.talk.config.places.encode(BESIDE).repeat(len(x) // 2, 1)
+        return join(places, x[:, 1:])
+
+
+def drifting(prior: Prior) -> Tensor:
+    """Features (2, frames, 263) of people who turn and go their own ways."""
+    features = torch.randn(2, FRAMES, 263, generator=torch.Generator().manual_seed(1)) * 0.01
+    features[0, :, :3] += torch.tensor([0.004, 0.01, 0.02])
+    features[1, :, :3] += torch.tensor([-0.006, -0.01, 0.015])
+    return features * (prior.std > 0) + torch.where(prior.std > 0, 0.0, prior.mean)
+
+
+def led(prior: Prior, block: PairBlock, places: Places, weight: float = 1.0) -> tuple[Tensor, Tensor, Told]:
+    """Ways (2, frames, 4) in the world before and after."""
+    net, spread = block.net(prior), torch.where(prior.std > 0, prior.std, 1.0)
+    told, code, before = Told(net), net.talk.config.places, drifting(prior)
+    guess = join(code.encode(BESIDE), (before - prior.mean) / spread)
+    made = places.led(
+        prior, told, net.bind(prior.condition(SAID)), state=guess, guess=guess, level=25, weight=weight  # type: ignore
+    )  # fmt: skip
+    assert torch.equal(made[:, 0], guess[:, 0])
+    after = made[:, 1:] * spread + prior.mean
+    torch.testing.assert_close(after[..., 3:], before[..., 3:], rtol=0, atol=1e-5)
+    ways = [two.compose(BESIDE[:, None], two.along(one)) for one in (before, after)]
+    return ways[0], ways[1], told
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.0], ids=["led", "free"])
+def test_a_drift_is_gone_at_the_knots(prior: Prior, block: PairBlock, weight: float) -> None:
+    before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2), weight)
+    expected = two.seen(BESIDE[0], BESIDE[1])
+    for knot in (40, 80):
+        away = (two.seen(before[0, knot], before[1, knot]) - expected).abs().max()
+        error = (two.seen(after[0, knot], after[1, knot]) - expected).abs().max()
+        assert away > 0.3
+        assert (error < 1e-4) if weight else (error - away).abs() < 1e-4
+    torch.testing.assert_close(after[:, 0], before[:, 0])
+
+
+def test_half_led_is_half_of_the_way(prior: Prior, block: PairBlock) -> None:
+    """At the knots, from one to the other on the ground and in how they face."""
+    places = Places.of([1, 2], FRAMES, [0], [False] * 2)
+    free, half, whole = (led(prior, block, places, weight)[1][:, [40, 80]] for weight in (0.0, 0.5, 1.0))
+    way = [(one[1] - one[0])[:, 2:] for one in (free, half, whole)]
+    assert (way[2] - way[0]).norm(dim=-1).min() > 0.2
+    torch.testing.assert_close(way[1], (way[0] + way[2]) / 2, rtol=0, atol=1e-4)
+    for person in (0, 1):
+        torch.testing.assert_close(
+            two.seen(free[person], half[person])[:, :2], two.seen(half[person], whole[person])[:, :2], rtol=0, atol=1e-4
+        )
+
+
+def test_each_goes_half_of_the_way(prior: Prior, block: PairBlock) -> None:
+    before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2))
+    moved = (after - before)[..., 2:]
+    assert moved.abs().max() > 0.2
+    torch.testing.assert_close(moved[0], -moved[1], rtol=0, atol=1e-4)
+    turned = [two.seen(before[i], after[i])[:, 1] for i in (0, 1)]
+    assert turned[0].abs().max() > 0.2
+    torch.testing.assert_close(turned[0], -turned[1], rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize("given", [0, 1])
+def test_nobody_given_is_moved_and_the_other_goes_the_whole_way(prior: Prior, block: PairBlock, given: int) -> None:
+    before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [given == 0, given == 1]))
+    torch.testing.assert_close(after[given], before[given], rtol=0, atol=1e-5)
+    expected = two.seen(BESIDE[0], BESIDE[1])
+    torch.testing.assert_close(two.seen(after[0, 80], after[1, 80])[:2], expected[:2], rtol=0, atol=1e-4)
+    assert (after[1 - given] - before[1 - given])[80, 2:].norm() > 0.3
+
+
+def test_frames_before_the_beginning_stay(prior: Prior, block: PairBlock) -> None:
+    before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [30], [False] * 2))
+    torch.testing.assert_close(after[:, :31], before[:, :31], rtol=0, atol=1e-4)
+    torch.testing.assert_close(two.seen(after[0, 80], after[1, 80]), two.seen(BESIDE[0], BESIDE[1]), rtol=0, atol=1e-4)
+
+
+def test_the_network_is_shown_crops_that_begin_at_the_knots(prior: Prior, block: PairBlock) -> None:
+    _, _, told = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2))
+    [(x, lengths)] = told.shown
+    motion = (drifting(prior) - prior.mean) / torch.where(prior.std > 0, prior.std, 1.0)
+    assert lengths.tolist() == [60, 60, 20, 20]
+    torch.testing.assert_close(x[:2, 1:], motion[:, 40:100])
+    torch.testing.assert_close(x[2:, 1:21], motion[:, 80:])
+
+
+def test_what_a_change_costs_is_spread_without_jumps() -> None:
+    spread = duet_places._spread([10, 50, 90], 101).numpy()
+    np.testing.assert_allclose(spread[[5, 10, 50, 90, 100]], [[0, 0], [0, 0], [1, 0], [0, 1], [0, 1]], atol=1e-6)
+    assert np.abs(np.diff(spread[11:90], axis=0)).max() < 2 / duet_places.SPACING
+    assert np.abs(np.diff(spread[11:90], 2, axis=0)).max() < 0.2 / duet_places.SPACING  # nor a bend, as of lines
+
+
+def test_no_more_than_sixty_frames_are_shown() -> None:
+    motion = torch.arange(100.0).repeat(2, 1)[..., None]
+    crops, lengths = duet_places._crops(motion, [0, 1, 1], [0, 39, 50])
+    assert (crops.shape, lengths.tolist()) == ((3, 60, 1), [60, 60, 50])
+    assert crops[:, 0, 0].tolist() == [0, 39, 50]
+    assert not crops[2, 50:].any()
+
+
+def test_what_places_are_asked_with_is_not_what_the_duet_begins_as() -> None:
+    noise = Places.of([1, 2], 200, [0], [False] * 2).noise
+    assert noise.shape == (10, 4)
+    assert not torch.isin(noise, pair_draw([1, 2])(torch.zeros(2, 201, 263))).any()
+
+
+def test_exchanged_people_stay_together_exchanged(prior: Prior, block: PairBlock) -> None:
+    net, shared = block.net(prior), {"steps": 3}
+    one, _ = pair_features(prior, net, SAID, 70, seeds=[1, 2], **shared)
+    other, _ = pair_features(prior, net, SAID[::-1], 70, seeds=[2, 1], **shared)
+    free, _ = pair_features(prior, net, SAID, 70, seeds=[1, 2], together=0.0, **shared)
+    torch.testing.assert_close(one[0], other[0].flip(0), rtol=0, atol=1e-3)
+    assert (one - free).abs().max() > 1e-3
+    many, _ = pair_features(prior, net, SAID * 2, 70, seeds=[1, 2, 3, 4], **shared)
+    torch.testing.assert_close(many[0], one[0], rtol=0, atol=1e-3)
+
+
+def test_what_is_known_stays_known(prior: Prior, block: PairBlock) -> None:
+    net, first = block.net(prior), drifting(prior)[:, :20]
+    state, mask = known_state(prior, net, first, BESIDE, 90)
+    made, _ = pair_features(prior, net, SAID, 90, seeds=[1, 2], known=state, mask=mask, steps=2)
+    torch.testing.assert_close(made[0, :, :20], first, rtol=0, atol=1e-5)
+
+
+def test_a_fresh_block_leads_nobody(prior: Prior) -> None:
+    fresh = block_of(prior, fresh=True)
+    made = [generate_pair(prior, fresh, SAID[0], seconds=4, steps=2, clean=False, together=w)[0] for w in (0.0, 1.0)]
+    for free, held in zip(*made, strict=True):
+        assert np.array_equal(free.positions(), held.positions())
+
+
+# What is asked, and who is led
+
+
+class Asked(Told):
+    """Keeps everything that it is shown."""
+
+    def __call__(self, x: Tensor, level, bound) -> Tensor:
+        self.state, self.level, self.bound = x, level, bound
+        return super().__call__(x, level, bound)
+
+
+def test_every_question_is_of_its_own_pair_at_its_own_level_and_told_the_noised_guess(
+    prior: Prior, block: PairBlock
+) -> None:
+    """Two pairs, with knots at frames 40 and 80, and at 80."""
+    net, said = block.net(prior), [*SAID, "a person jumps", "a person sits down"]
+    bound, told = net.bind(prior.condition(said)), Asked(net)
+    drift, spread = drifting(prior), torch.where(prior.std > 0, prior.std, 1.0)
+    guess = join(net.talk.config.places.encode(BESIDE).repeat(2, 1), ((drift - prior.mean) / spread).repeat(2, 1, 1))
+    state = torch.randn(guess.shape, generator=torch.Generator().manual_seed(2))
+    places = Places.of([1, 2, 3, 4], FRAMES, [0, 40], [False] * 4)
+    level = torch.tensor([7, 7, 30, 30])
+    made = places.led(prior, told, bound, state=state, guess=guess, level=level, weight=1.0)  # type: ignore
+    asked = [(row, frame) for frame in (40, 80) for row in (0, 1)] + [(2, 80), (3, 80)]
+    assert torch.as_tensor(told.level).tolist() == [7, 7, 7, 7, 30, 30]
+    assert told.bound.lengths.tolist() == [min(60, FRAMES - frame) for _, frame in asked]
+    ways = two.compose(BESIDE[:, None], two.along(drift))
+    for number, (row, frame) in enumerate(asked):
+        length, own = min(60, FRAMES - frame), int(level[row])
+        torch.testing.assert_close(told.state[number, 1 : 1 + length], state[row, 1 + frame : 1 + frame + length])
+        assert torch.equal(told.bound.text[number], bound.text[row])
+        there = two.seen(ways[row % 2, frame], ways[1 - row % 2, frame])  # the other, as seen from there
+        signal, noise = prior.schedule.at(own)
+        torch.testing.assert_close(told.state[number, 0, :4], signal * there + noise * places.noise[number])
+    # what is asked of the one pair changes nothing of the other
+    for pair, (begin, kept) in enumerate(((0, slice(0, 4)), (40, slice(4, 6)))):
+        rows = slice(2 * pair, 2 * pair + 2)
+        alone = Places.of([[1, 2], [3, 4]][pair], FRAMES, [begin], [False] * 2)
+        assert torch.equal(alone.noise, places.noise[kept])
+        one = alone.led(
+            prior, Told(net), net.bind(prior.condition(said[rows])), state=state[rows], guess=guess[rows],  # type: ignore
+            level=level[rows], weight=1.0,
+        )  # fmt: skip
+        torch.testing.assert_close(made[rows], one, rtol=0, atol=1e-5)
+    assert places.noise.unique().numel() == places.noise.numel()  # nothing is drawn twice
+
+
+def test_who_is_moved_differs_from_pair_to_pair(prior: Prior, block: PairBlock) -> None:
+    net = block.net(prior)
+    drift, spread = drifting(prior), torch.where(prior.std > 0, prior.std, 1.0)
+    guess = join(net.talk.config.places.encode(BESIDE).repeat(2, 1), ((drift - prior.mean) / spread).repeat(2, 1, 1))
+    places = Places.of([1, 2, 3, 4], FRAMES, [0, 0], [True, False, False, True])
+    made = places.led(
+        prior, Told(net), net.bind(prior.condition(SAID * 2)), state=guess, guess=guess, level=25, weight=1.0  # type: ignore
+    )  # fmt: skip
+    moved = (made - guess).abs().amax((1, 2))
+    assert moved[[0, 3]].max() < 1e-5
+    assert moved[[1, 2]].min() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("begin", "frames", "knots"),
+    [(0, 39, ()), (0, 40, (20,)), (0, 60, (40,)), (0, 61, (20, 41)), (0, 100, (40, 80)), (10, 100, (45, 80)),
+     (0, 120, (33, 67, 100)), (10, 110, (50, 90)), (60, 99, ()), (60, 100, (80,))],
+)  # fmt: skip
+def test_knots_stand_evenly_up_to_twenty_frames_before_the_end(begin: int, frames: int, knots: tuple[int, ...]) -> None:
+    assert Places.of([1, 2], frames, [begin], [False] * 2).knots == (knots,)
+
+
+def leads(prior: Prior, block: PairBlock, mask: Tensor, still=(False, False)) -> tuple[Tensor, Tensor, Told]:
+    """A guess before and after `leader`'s lead, where ``mask`` (2, 1 + frames) tells what is known."""
+    net, spread = block.net(prior), torch.where(prior.std > 0, prior.std, 1.0)
+    told = Told(net)
+    guess = join(net.talk.config.places.encode(BESIDE), (drifting(prior) - prior.mean) / spread)
+    known = mask[..., None].expand(guess.shape)
+    lead = leader(prior, told, net.bind(prior.condition(SAID)), seeds=[1, 2], mask=known, still=still)  # type: ignore
+    return guess, lead(guess, guess, 25), told
+
+
+Spans: TypeAlias = tuple[tuple[int, int], ...]
+KNOWN: dict[str, tuple[tuple[Spans, Spans], list[int] | None, list[bool]]] = {
+    "nothing": (((), ()), [60, 60, 20, 20], [True, True]),
+    "a beginning of both": ((((0, 21),), ((0, 21),)), [20, 20], [True, True]),
+    "too long a beginning": ((((0, 23),), ((0, 23),)), None, [False, False]),
+    "beginnings of two lengths": ((((0, 31),), ((0, 11),)), [20, 20], [True, True]),
+    "a beginning and an end": ((((0, 11), (90, 101)), ((0, 11), (90, 101))), [20, 20], [True, True]),
+    "the first": ((((0, 101),), ()), [60, 60, 20, 20], [False, True]),
+    "the second": (((), ((1, 101),)), [60, 60, 20, 20], [True, False]),
+    "both": ((((0, 101),), ((0, 101),)), None, [False, False]),
+}
+"""Slots that are known of both people (slot 0 is D), frames shown from each knot on, and who is moved. 100 frames: from
+0 on knots are at 40 and 80, 40 frames behind 20 or 10 known ones there is one at 80, behind 22 there is none."""
+
+
+@pytest.mark.parametrize("case", list(KNOWN))
+def test_knots_begin_two_seconds_behind_the_common_beginning_and_known_numbers_stay(
+    case: str, prior: Prior, block: PairBlock
+) -> None:
+    spans, lengths, moves = KNOWN[case]
+    mask = torch.zeros(2, FRAMES + 1, dtype=torch.bool)
+    for row, some in enumerate(spans):
+        for first, last in some:
+            mask[row, first:last] = True
+    before, after, told = leads(prior, block, mask)
+    assert [one.tolist() for _, one in told.shown] == ([lengths] if lengths else [])
+    assert torch.equal(after[mask], before[mask])
+    assert [bool((row > 0.01).any()) for row in (after - before).abs()] == moves
+
+
+@pytest.mark.parametrize("away", [0, 1])
+def test_whom_others_move_is_not_led(prior: Prior, block: PairBlock, away: int) -> None:
+    nothing = torch.zeros(2, FRAMES + 1, dtype=torch.bool)
+    before, after, _ = leads(prior, block, nothing, still=(away == 0, away == 1))
+    off = (after - before).abs().amax((1, 2))
+    assert off[away] < 1e-5
+    assert off[1 - away] > 0.1
+
+
+def test_places_of_the_world_lead_nobody(prior: Prior, block: PairBlock) -> None:
+    of_world = replace(block, config=replace(block.config, places=PUBLISHED_CODE))
+    before, after, told = leads(prior, of_world, torch.zeros(2, FRAMES + 1, dtype=torch.bool))
+    assert torch.equal(before, after)
+    assert not told.shown

@@ -1,0 +1,53 @@
+"""A prior as a function: the network's own drawing, or what is exported."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+import torch
+
+from motionloom.diffusion import cosine
+from motionloom.features import humanml
+from motionloom.kinematics.physics import bone_length_error
+from motionloom.lab.suites.generator import generator
+from motionloom.nets.prior import NetConfig, PriorNet
+from motionloom.nets.text import TextEmbedding
+from motionloom.weights.prior import Card, Prior
+from tests.kinematics.people import walking
+
+
+class Words:
+    """A text encoder that says the same about everything."""
+
+    name, width = "same", 8
+
+    def encode(self, texts: Sequence[str]) -> TextEmbedding:
+        rows = len(texts)
+        return TextEmbedding(torch.ones(rows, 3, 8), torch.ones(rows, 3, dtype=torch.bool), torch.ones(rows, 8))
+
+
+@pytest.fixture
+def prior() -> Prior:
+    """An untrained network around the features of a walk: people that tremble."""
+    torch.manual_seed(0)
+    net = PriorNet(NetConfig(manner="modulated", width=16, layers=1, heads=2, hidden=16, text=8, patch=4))
+    features = torch.from_numpy(humanml.encode(walking(1.0), heading="corrected"))
+    return Prior(
+        net.eval().requires_grad_(False), cosine(50), features.mean(0), features.std(0) + 0.01, Words(), Card("tiny")
+    )
+
+
+def test_row_i_comes_from_seed_plus_i_and_has_the_length_asked_for(prior: Prior) -> None:
+    make = generator(prior, steps=2)
+    both, fps = make(["a", "a"], seconds=2.0, seed=3)
+    (second,), _ = make(["a"], seconds=2.0, seed=4)
+    assert fps == 20
+    assert [p.shape for p in both] == [(40, 22, 3)] * 2
+    assert np.allclose(both[1], second, atol=1e-4)
+    assert not np.allclose(both[0], both[1], atol=1e-2)
+
+
+def test_finished_motions_have_constant_bones_and_drawn_ones_need_not(prior: Prior) -> None:
+    (drawn,), _ = generator(prior, steps=2)(["a"], seconds=2.0, seed=0)
+    (finished,), _ = generator(prior, steps=2, finished=True)(["a"], seconds=2.0, seed=0)
+    assert bone_length_error(finished) < 1e-9 < bone_length_error(drawn)

@@ -1,0 +1,333 @@
+"""Predictors: their windows, what the network is told, the weight file, published checkpoints, hostile files."""
+
+import json
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from safetensors import safe_open
+from safetensors.torch import save_file
+from torch import Tensor
+
+from motionloom.diffusion import SCHEDULES, Frames
+from motionloom.errors import MotionloomError
+from motionloom.lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT
+from motionloom.lab.papers.humanmac_checkpoint import import_humanmac, is_humanmac
+from motionloom.nets.predictor import NetConfig, TransLinear
+from motionloom.weights.predictor import Predictor, load_predictor, save_predictor
+from motionloom.weights.prior import save_prior
+from tests.lab.papers.test_mdm import Bomb
+from tests.nets import tiny
+from tests.nets.tiny_predictor import predictor
+
+MANNERS = ["told", "published"]
+
+
+def some(*shape: int, seed: int = 0) -> Tensor:
+    return torch.randn(shape, generator=torch.Generator().manual_seed(seed))
+
+
+# Windows and states
+
+
+@pytest.mark.parametrize("manner", MANNERS)
+def test_motion_that_the_basis_holds_comes_back_from_its_state(manner: str) -> None:
+    made, pose = predictor(manner), some(3, predictor(manner).layout.channels, seed=1)
+    features = made.basis.to_time(some(3, 8, made.layout.channels))
+    torch.testing.assert_close(made.to_features(made.to_state(features, pose), pose), features, atol=1e-5, rtol=1e-5)
+    state = some(3, 8, made.layout.channels, seed=2)
+    torch.testing.assert_close(made.to_state(made.to_features(state, pose), pose), state, atol=1e-5, rtol=1e-5)
+
+
+def test_standing_still_in_the_last_pose_is_minus_mean_over_std() -> None:
+    made, pose = predictor(), some(2, 12)
+    state = made.to_state(pose[:, None].expand(-1, made.frames, -1), pose)
+    torch.testing.assert_close(state, (-made.mean / made.std).expand(2, -1, -1), atol=1e-5, rtol=1e-5)
+
+
+def test_a_published_state_is_the_spectrum_in_metres() -> None:
+    made, features = predictor("published"), some(2, 20, 9)
+    torch.testing.assert_close(made.to_state(features, some(2, 9)), made.basis.matrix.float() @ features)
+
+
+# What the network is told
+
+
+def test_published_networks_are_told_the_spectrum_of_the_padded_observation() -> None:
+    made, features = predictor("published"), some(2, 20, 9)
+    mask = torch.zeros(2, 20, 3)
+    mask[:, :5] = 1
+    padded = torch.cat([features[:, :5], features[:, 4:5].expand(-1, 15, -1)], dim=1)
+    torch.testing.assert_close(made.tell(features, mask, features[:, 4]), made.basis.to_spectrum(padded))
+
+
+def test_ours_is_told_what_is_known_where_and_from_which_pose() -> None:
+    made, features = predictor(), some(2, 20, 12)
+    pose, mask = features[:, 4], torch.zeros(2, 20, 4)
+    mask[:, :5], mask[0, 12:, 2] = 1, 1
+    told = made.tell(features, mask, pose)
+    assert told.shape == (2, *(made.net.config.told or ()))
+    seen = told[:, :8, :12] * made.std  # known numbers from the pose, zero elsewhere
+    offset = features - pose[:, None]
+    for part in range(4):
+        known = offset[..., 3 * part : 3 * part + 3] * mask[..., part : part + 1]
+        torch.testing.assert_close(
+            seen[..., 3 * part : 3 * part + 3], made.basis.to_spectrum(known), atol=1e-5, rtol=1e-5
+        )
+    torch.testing.assert_close(told[:, :8, 12:], made.basis.to_spectrum(mask) / 20**0.5)
+    torch.testing.assert_close(told[:, 8, :12] * made.pose[1] + made.pose[0], pose, atol=1e-5, rtol=1e-5)
+    assert torch.equal(told[:, 8, 12:], torch.zeros(2, 4))
+
+
+def test_all_known_has_a_share_of_one() -> None:
+    made = predictor()
+    told = made.tell(some(1, 20, 12), torch.ones(1, 20, 4), some(1, 12))
+    assert told[0, :8, 12:].flatten().tolist() == pytest.approx([1.0] * 4 + [0.0] * 28, abs=1e-6)
+
+
+@pytest.mark.parametrize("manner", MANNERS)
+@pytest.mark.parametrize("fill", [7.0, -3.0])
+def test_numbers_that_are_not_known_are_not_told(manner: str, fill: float) -> None:
+    made = predictor(manner)
+    features, mask = some(2, 20, made.layout.channels), torch.zeros(2, 20, made.layout.parts)
+    mask[:, :5] = 1
+    other = features.clone()
+    other[:, 5:] = fill
+    assert torch.equal(made.tell(features, mask, features[:, 4]), made.tell(other, mask, features[:, 4]))
+
+
+@pytest.mark.parametrize("level", [1, 500, 1000])
+def test_a_published_guess_is_clean_where_its_noise_is_right(level: int) -> None:
+    """x = a clean + b noise, and published networks count levels from 0 and name the noise."""
+    made, x = predictor("published"), some(2, 8, 9)
+    a, b = made.schedule.at(level)
+    noise = made.net(x, torch.full((2,), level - 1))
+    torch.testing.assert_close(a * made.denoiser(None)(x, level) + b * noise, x, atol=1e-5, rtol=1e-5)
+    ours, y = predictor(), some(2, 8, 12)
+    assert torch.equal(ours.denoiser(None)(y, level), ours.net(y, torch.full((2,), level - 1)))
+
+
+@pytest.mark.parametrize("manner", MANNERS)
+def test_who_is_not_told_is_as_one_who_hears_nothing(manner: str) -> None:
+    made, x = predictor(manner), some(3, 8, predictor(manner).layout.channels)
+    told = some(3, *made.net.config.told_shape, seed=1)
+    every, nobody = made.denoiser(told)(x, 9), made.denoiser(None)(x, 9)
+    assert (every - nobody).abs().amax((1, 2)).min() > 1e-3
+    some_of_them = made.denoiser(told, torch.tensor([1.0, 0.0, 1.0]))(x, 9)
+    torch.testing.assert_close(some_of_them, torch.stack([every[0], nobody[1], every[2]]), atol=1e-5, rtol=1e-5)
+
+
+def test_all_numbers_go_to_another_device() -> None:
+    made = predictor().to("meta")
+    assert {x.device.type for x in (made.mean, made.std, made.pose, *made.net.parameters())} == {"meta"}
+
+
+# The weight file
+
+
+@pytest.mark.parametrize("manner", MANNERS)
+@pytest.mark.parametrize("half", [False, True])
+def test_a_saved_predictor_comes_back(tmp_path: Path, manner: str, half: bool) -> None:
+    made = predictor(manner)
+    back = Predictor.load(save_predictor(made, tmp_path / "a.safetensors", half=half))
+    assert (back.layout, back.basis, back.observed, back.fps, back.manner) == (
+        made.layout, made.basis, made.observed, made.fps, made.manner,
+    )  # fmt: skip
+    assert (back.card, back.net.config, back.schedule.name) == (made.card, made.net.config, made.schedule.name)
+    x, told = some(2, 8, made.layout.channels), some(2, *made.net.config.told_shape)
+    near = 2e-2 if half else 0
+    torch.testing.assert_close(back.denoiser(told)(x, 9), made.denoiser(told)(x, 9), atol=near, rtol=near)
+    assert all(torch.equal(getattr(back, name), getattr(made, name)) for name in ("mean", "std", "pose"))
+
+
+def test_schedules_and_windows_of_every_kind_come_back(tmp_path: Path) -> None:
+    """Another schedule of fewer levels; a window whose tokens are its frames."""
+    made = replace(predictor(kept=20), schedule=SCHEDULES["sqrt"](100), basis=Frames(20))
+    back = Predictor.load(save_predictor(made, tmp_path / "a.safetensors"))
+    assert (back.schedule.name, back.schedule.steps) == ("sqrt", 100)
+    assert torch.equal(back.schedule.alpha_bar, SCHEDULES["sqrt"](100).alpha_bar)
+    features, pose = some(2, 20, 12), some(2, 12, seed=1)
+    expected = (features - pose[:, None] - made.mean) / made.std
+    torch.testing.assert_close(back.to_state(features, pose), expected, atol=1e-6, rtol=1e-5)
+
+
+def test_predictors_are_written_as_safetensors_only(tmp_path: Path) -> None:
+    with pytest.raises(MotionloomError, match="safetensors"):
+        save_predictor(predictor(), tmp_path / "a.pt")
+    assert not list(tmp_path.iterdir())
+
+
+def test_files_that_are_missing_or_of_another_kind_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(MotionloomError, match="no predictor"):
+        Predictor.load(tmp_path / "absent.safetensors")
+    with pytest.raises(MotionloomError, match="not a predictor"):
+        load_predictor(save_prior(tiny.prior(), tmp_path / "prior.safetensors"))
+    (tmp_path / "text.safetensors").write_text("no weights")
+    with pytest.raises(MotionloomError, match="whole safetensors"):
+        load_predictor(tmp_path / "text.safetensors")
+
+
+Tensors, About = dict[str, Tensor], dict
+
+
+def changed(folder: Path, change: Callable[[Tensors, About], object]) -> Path:
+    """A saved predictor with something in it made otherwise."""
+    path = save_predictor(predictor(), folder / "whole.safetensors")
+    with safe_open(path, framework="pt") as file:
+        tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+        about = json.loads(file.metadata()["motionloom-predictor"])
+    change(tensors, about)
+    save_file(tensors, folder / "changed.safetensors", metadata={"motionloom-predictor": json.dumps(about)})
+    return folder / "changed.safetensors"
+
+
+def test_the_unchanged_copy_is_read(tmp_path: Path) -> None:
+    load_predictor(changed(tmp_path, lambda tensors, about: None))
+
+
+@pytest.mark.parametrize(
+    "key", ["format", "net", "schedule", "layout", "frames", "observed", "dct", "fps", "manner", "card"]
+)
+@pytest.mark.parametrize(
+    "value", [None, [], {}, "x", -1, 0, 1e300, float("nan"), 10**30, [[[]]], {"name": []}], ids=str
+)
+def test_descriptions_that_make_no_sense_are_refused(tmp_path: Path, key: str, value: object) -> None:
+    with pytest.raises(MotionloomError) as caught:
+        load_predictor(changed(tmp_path, lambda tensors, about: about.update({key: value})))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("part", "key", "value"),
+    [("net", "layers", 4), ("net", "width", 8192), ("net", "channels", 8190), ("net", "kept", 7), ("net", "told", None),
+     ("net", "beside", False), ("net", "extra", 1), ("schedule", "steps", 10**9), ("schedule", "steps", 0),
+     ("schedule", "name", "x"), ("schedule", "name", []), ("layout", "parents", [-1, 0, 0, 5]),
+     ("layout", "parents", [-1, 1, 0, 0]), ("layout", "names", ["a"] * 300), ("layout", "pairs", [0, 1, 2, 9]),
+     ("layout", "root", False), ("layout", "across", [[1, 9]]), ("layout", "z_up", True), ("card", "name", 3),
+     ("card", "licence", None), ("card", "notes", 3), ("card", "extra", 3)],
+    ids=lambda value: str(value)[:20],
+)  # fmt: skip
+def test_descriptions_that_do_not_fit_the_weights_are_refused(
+    tmp_path: Path, part: str, key: str, value: object
+) -> None:
+    with pytest.raises(MotionloomError) as caught:
+        load_predictor(changed(tmp_path, lambda tensors, about: about[part].update({key: value})))
+    assert "\n" not in str(caught.value)
+
+
+def test_sizes_that_are_only_claimed_take_no_memory(tmp_path: Path) -> None:
+    """8 layers of width 8192 would take some 20 GB."""
+
+    def claim(tensors: Tensors, about: About) -> None:
+        about["net"].update(layers=8, width=8192)
+
+    with pytest.raises(MotionloomError, match="does not hold"):
+        load_predictor(changed(tmp_path, claim))
+
+
+@pytest.mark.parametrize("name", ["mean", "std", "pose", "net.out.weight", "net.sequence_embedding"])
+@pytest.mark.parametrize("how", ["missing", "nan", "infinite", "longer", "scalar", "empty", "turned"])
+def test_tensors_that_are_wrong_are_refused(tmp_path: Path, name: str, how: str) -> None:
+    def change(tensors: Tensors, about: About) -> None:
+        value = tensors.pop(name).clone()
+        if how in ("nan", "infinite"):
+            value.view(-1)[0] = float("nan" if how == "nan" else "inf")
+        shapes = {"longer": torch.cat([value, value]), "scalar": value.new_zeros(()), "empty": value[:0]}
+        made = shapes.get(how, value.mT.contiguous() if how == "turned" else value)
+        tensors.update({} if how == "missing" else {name: made})
+
+    with pytest.raises(MotionloomError) as caught:
+        load_predictor(changed(tmp_path, change))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["std", "pose"])
+@pytest.mark.parametrize("value", [0.0, -1.0])
+def test_spreads_that_are_not_positive_are_refused(tmp_path: Path, name: str, value: float) -> None:
+    def change(tensors: Tensors, about: About) -> None:
+        tensors[name][1, 2] = value
+
+    with pytest.raises(MotionloomError, match="statistics"):
+        load_predictor(changed(tmp_path, change))
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_mutated_files_give_one_kind_of_error_or_are_read(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    path = save_predictor(predictor(), tmp_path_factory.mktemp("mutated") / "a.safetensors")
+    content = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, min(4000, len(content) - 1)))] = data.draw(st.integers(0, 255))
+    path.write_bytes(content[: data.draw(st.sampled_from([len(content), len(content) // 2]))])
+    with suppress(MotionloomError):
+        load_predictor(path)
+
+
+# Published checkpoints
+
+
+def checkpoint(folder: Path, channels: int = 48, kept: int = 20, layers: int = 2, width: int = 16) -> Path:
+    """Written as the published code does: a plain state dict."""
+    net = TransLinear(NetConfig(channels=channels, kept=kept, layers=layers, width=width))
+    with torch.no_grad():
+        for value in net.parameters():
+            value.normal_(0, 0.1)
+    torch.save(net.state_dict(), folder / "ckpt_ema_550.pt")
+    return folder / "ckpt_ema_550.pt"
+
+
+@pytest.mark.parametrize(
+    ("channels", "kept", "layout", "fps", "observed", "frames"),
+    [(48, 20, H36M_LAYOUT, 50, 25, 125), (42, 10, HUMANEVA_LAYOUT, 60, 15, 75)],
+    ids=["human3.6m", "humaneva"],
+)
+def test_a_published_checkpoint_is_a_predictor_of_its_data_set(
+    tmp_path: Path, channels: int, kept: int, layout: object, fps: float, observed: int, frames: int
+) -> None:
+    path = checkpoint(tmp_path, channels, kept)
+    made = import_humanmac(path, licence="research only")
+    assert (made.layout, made.fps, made.observed, made.frames, made.manner) == (
+        layout, fps, observed, frames, "published",
+    )  # fmt: skip
+    assert (made.card.name, made.card.licence) == ("ckpt_ema_550", "research only")
+    assert (made.schedule.name, made.schedule.steps) == ("cosine", 1000)
+    state = torch.load(path, weights_only=True)
+    assert is_humanmac(state)
+    assert all(torch.equal(value, state[key]) for key, value in made.net.state_dict().items())
+    back = Predictor.load(save_predictor(made, tmp_path / "a.safetensors"))
+    assert (back.layout, back.frames, back.manner) == (layout, frames, "published")
+
+
+@pytest.mark.parametrize("how", ["missing", "unknown", "shape", "nan", "channels", "kept", "odd", "flat", "nothing"])
+def test_checkpoints_that_are_not_whole_are_refused(tmp_path: Path, how: str) -> None:
+    sizes = {"channels": {"channels": 63}, "kept": {"kept": 126}}
+    path = checkpoint(tmp_path, **sizes.get(how, {}))
+    state = torch.load(path, weights_only=True)
+    changes: dict[str, Callable[[], object]] = {
+        "missing": lambda: state.pop("time_embed.2.bias"),
+        "unknown": lambda: state.update(extra=torch.zeros(2)),
+        "shape": lambda: state.update({"out.bias": torch.zeros(47)}),
+        "nan": lambda: state["out.bias"].fill_(float("nan")),
+        "odd": lambda: [state.pop(key) for key in list(state) if "blocks.1." in key],
+        "flat": lambda: state.update({"out.weight": torch.zeros(48)}),
+        "nothing": lambda: state.clear(),
+    }
+    changes.get(how, lambda: None)()
+    torch.save(state, path)
+    with pytest.raises(MotionloomError) as caught:
+        import_humanmac(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_code_in_a_checkpoint_is_not_run(tmp_path: Path) -> None:
+    torch.save({"sequence_embedding": Bomb(tmp_path / "was run")}, tmp_path / "a.pt")
+    with pytest.raises(MotionloomError, match="not opened"):
+        import_humanmac(tmp_path / "a.pt")
+    assert not (tmp_path / "was run").exists()
