@@ -1,0 +1,97 @@
+"""Measure the house: lines per room, and functions with many parameters, of high complexity, or long.
+
+python tools/measure_house.py [--json]
+
+Parameters: of public functions and methods, without self and cls, over `PARAMETERS`. Complexity: cyclomatic with
+boolean operators and comprehensions, over `COMPLEXITY` (ruff's C901 counts neither, and finds nothing over 16).
+"""
+
+import ast
+import json
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCE = ROOT / "src" / "motionloom"
+PARAMETERS, COMPLEXITY = 8, 20
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+def lines() -> dict[str, int]:
+    """Lines per room; rooms of the laboratory are lab/ROOM."""
+    count: Counter[str] = Counter()
+    for path in SOURCE.rglob("*.py"):
+        parts = path.relative_to(SOURCE).parts
+        room = "(top)" if len(parts) == 1 else "/".join(parts[:2]) if parts[0] == "lab" and len(parts) > 2 else parts[0]
+        count[room] += path.read_text().count("\n")
+    return dict(count.most_common())
+
+
+def functions() -> Iterator[tuple[str, Function]]:
+    """Every function with its place."""
+    for path in sorted(SOURCE.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, Function):
+                yield f"{path.relative_to(SOURCE)}:{node.lineno} {node.name}", node
+
+
+def parameters(node: Function) -> int:
+    """How many arguments a call may give."""
+    given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+    return len([argument for argument in given if argument.arg not in ("self", "cls")])
+
+
+def complexity(node: Function) -> int:
+    """Cyclomatic complexity with boolean operators and comprehensions, inner functions counted too (as radon counts)."""
+    count = 1
+    for part in ast.walk(node):
+        if isinstance(part, ast.BoolOp):
+            count += len(part.values) - 1
+        elif isinstance(part, ast.comprehension):
+            count += 1 + len(part.ifs)
+        elif isinstance(part, ast.For | ast.While):
+            count += 1 + bool(part.orelse)
+        elif isinstance(part, ast.If | ast.IfExp | ast.ExceptHandler | ast.Assert | ast.Lambda | ast.match_case):
+            count += 1
+    return count
+
+
+def measured() -> dict[str, object]:
+    """Everything, by name."""
+    rooms, every = lines(), list(functions())
+    lab = sum(count for room, count in rooms.items() if room.startswith("lab"))
+    many = [(parameters(node), place) for place, node in every if not node.name.startswith("_")]
+    long = [((node.end_lineno or node.lineno) - node.lineno + 1, place) for place, node in every]
+    return {
+        "lines": rooms,
+        "product and training": sum(rooms.values()) - lab,
+        "laboratory": lab,
+        f"public functions with more than {PARAMETERS} parameters": sorted(
+            (one for one in many if one[0] > PARAMETERS), reverse=True
+        ),
+        f"complexity over {COMPLEXITY}": sorted(
+            (one for one in ((complexity(node), place) for place, node in every) if one[0] > COMPLEXITY), reverse=True
+        ),
+        "longest functions": sorted(long, reverse=True)[:5],
+    }
+
+
+def main() -> None:
+    """Print what was measured."""
+    found = measured()
+    if "--json" in sys.argv[1:]:
+        print(json.dumps(found, indent=1))
+        return
+    for name, value in found.items():
+        if isinstance(value, dict):
+            print(f"{name}:", *(f"  {count:6} {room}" for room, count in value.items()), sep="\n")
+        elif isinstance(value, list):
+            print(f"{name}: {len(value)}", *(f"  {count:6} {place}" for count, place in value), sep="\n")
+        else:
+            print(f"{name}: {value}")
+
+
+if __name__ == "__main__":
+    main()
