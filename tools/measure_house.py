@@ -44,7 +44,7 @@ def parameters(node: Function) -> int:
 
 
 def complexity(node: Function) -> int:
-    """Cyclomatic complexity with boolean operators and comprehensions, inner functions counted too (as radon counts)."""
+    """Cyclomatic complexity with boolean operators and comprehensions, inner functions too (as radon counts)."""
     count = 1
     for part in ast.walk(node):
         if isinstance(part, ast.BoolOp):

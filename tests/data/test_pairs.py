@@ -10,11 +10,12 @@ import pytest
 from motionloom.data import pairs as dp
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
+from motionloom.features import pair as two
 from motionloom.io import save
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.lab.metrics import pair as mp
-from motionloom.lab.papers import threedpw
+from motionloom.lab.papers import readers, threedpw
 from motionloom.skeleton import HUMANML_BONE_LENGTHS
 from tests.kinematics import people
 from tests.shared import shared
@@ -170,7 +171,7 @@ def test_people_of_other_legs_keep_their_distances_up_to_one_factor():
     uniform = [hml.uniform(person) for person in large]
     own = float(sum(HUMANML_BONE_LENGTHS[j] for j in (4, 7)))
     legs = [1.2 * own, 0.8 * own]
-    together = dp.one_world(uniform, legs)
+    together = two.one_world(uniform, legs)
     before = np.linalg.norm((large[1] - large[0])[:, 0, [0, 2]], axis=-1)
     np.testing.assert_allclose(mp.distance(together), before, rtol=5e-3)  # the mean leg is the uniform one
     apart = mp.distance(np.stack(uniform))
@@ -180,13 +181,13 @@ def test_people_of_other_legs_keep_their_distances_up_to_one_factor():
 
 def test_people_of_equal_legs_are_not_moved():
     pair = walkers()
-    np.testing.assert_array_equal(dp.one_world(list(pair), [0.7, 0.7]), pair)
+    np.testing.assert_array_equal(two.one_world(list(pair), [0.7, 0.7]), pair)
 
 
 def test_a_pair_on_another_place_of_the_world_is_the_same_pair():
     pair = walkers() * np.array([1.1, 0.9])[:, None, None, None]
     there = pair + np.array([30.0, 0.0, -20.0])
-    first, second = (dp.one_world([hml.uniform(p) for p in both], [1.1, 0.9]) for both in (pair, there))
+    first, second = (two.one_world([hml.uniform(p) for p in both], [1.1, 0.9]) for both in (pair, there))
     np.testing.assert_allclose(mp.distance(first), mp.distance(second), atol=0.01)
 
 
@@ -354,7 +355,7 @@ def test_a_3dpw_sequence_comes_upright_at_20_frames_with_its_places(tmp_path, tu
     np.testing.assert_allclose(mp.distance(pair.positions), mp.distance(expected), atol=5e-3)
     np.testing.assert_allclose(np.cos(ph.heading(pair.positions[0])), -1 if turn is Y_DOWN else 1, atol=1e-5)
     assert np.abs(pair.positions[..., 10:12, 1].min(axis=(1, 2))).max() < 0.02
-    assert dp.find_pairs(tmp_path)[0].name == "dance_00"
+    assert readers.find_pairs(tmp_path)[0].name == "dance_00"
 
 
 def test_drift_that_the_camera_shares_is_taken_from_both_alike():

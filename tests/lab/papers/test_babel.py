@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from motionloom.data.build import build, read_clip
-from motionloom.data.sources import find_takes
 from motionloom.errors import MotionloomError
 from motionloom.features import babel as codec
 from motionloom.features.babel import decode
 from motionloom.lab.papers import babel
 from motionloom.lab.papers.babel import Recording, Segment
+from motionloom.lab.papers.readers import find_takes
 from motionloom.motion import Motion
 
 PLACE = "CMU/CMU/01/01_01_poses.npz"
@@ -369,7 +369,7 @@ def test_the_builder_reads_a_babel_folder(tmp_path: Path) -> None:
     folder(root, [label("walk", 0, 4), label("transition", 4, 5), label("sit", 5, 9)])
     takes = find_takes(root)
     assert [(t.name, t.source, t.split) for t in takes] == [("babel_12", "babel", "train")]
-    build([root], tmp_path / "set", workers=1, mixed=0, progress=lambda line: None)
+    build([root], tmp_path / "set", workers=1, mixed=0, find=find_takes, progress=lambda line: None)
     clip = read_clip(tmp_path / "set" / "clips" / "babel_12.safetensors")
     written = [(n.first, n.last, n.texts) for n in clip.notes if n.kind == "human"]
     assert written == [(0, len(clip.features), ("walk around",)), (0, 80, ("walk",)), (100, 180, ("sit",))]
