@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 
 from motionloom.data.words import sentence
-from motionloom.metrics import physics as ph
-from motionloom.metrics.physics import Array
+from motionloom.kinematics import physics as ph
+from motionloom.kinematics.physics import Array
 
 Kind = Literal["cycle", "change", "once", "state"]
 PREFIX = "action:"

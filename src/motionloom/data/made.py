@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from motionloom import limbs
 from motionloom.data.words import sentence
-from motionloom.metrics import physics as ph
-from motionloom.metrics.physics import Array
+from motionloom.kinematics import physics as ph
+from motionloom.kinematics.physics import Array
+from motionloom.retarget import limbs
 
 _ARMS = {"left": (16, 18, 20, 1.0), "right": (17, 19, 21, -1.0)}
 """Shoulder, elbow, wrist, and the sign of outward along +X."""
