@@ -1,11 +1,13 @@
 """What training is shown of a built set."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import torch
 
 from motionloom.data.build import Clip, Note, write_clip
-from motionloom.data.sets import Batches, load_set
+from motionloom.data.sets import Batches, _starts, load_set
 from motionloom.features import humanml as hml
 from tests.kinematics import people
 
@@ -28,7 +30,7 @@ def kicking(folder: Path) -> Path:
 def starts(batches: Batches, kind: str) -> set[int]:
     """Where the items of a kind begin that a window of 48 frames is taken from."""
     data = batches.data
-    return {data.items[i].start for group in batches._pools[48][kind].values() for i in group}
+    return {data.items[i].start for group, _ in batches._pools[48][kind].values() for i in group}
 
 
 def test_a_caption_that_names_an_event_is_shown_with_the_event(tmp_path: Path) -> None:
@@ -38,8 +40,50 @@ def test_a_caption_that_names_an_event_is_shown_with_the_event(tmp_path: Path) -
 
 def test_events_are_shown_whole_and_states_in_part(tmp_path: Path) -> None:
     batches = Batches(load_set(kicking(tmp_path / "set")), windows=(32, 48), shares=(0.5, 0.5))
-    small = {batches.data.items[i].group for group in batches._pools[32]["label"].values() for i in group}
+    small = {batches.data.items[i].group for group, _ in batches._pools[32]["label"].values() for i in group}
     assert small == {"walk"}
     assert starts(batches, "label") == {0, 20, 100}
     lengths = batches.draw(0, 1, 64).lengths
     np.testing.assert_array_equal(np.unique(lengths), [32] if lengths.max() == 32 else [48])
+
+
+def described(folder: Path, *notes: Note, kind: str = "capture", frames: int = 10) -> Path:
+    """A built set of one walk of so many seconds with these notes."""
+    features = hml.encode(hml.canonical(people.walking(1.0, float(frames))), heading="corrected")
+    (folder / "clips").mkdir(parents=True, exist_ok=True)
+    write_clip(folder / "clips", Clip(f"one_{kind}", "cmu", "free", "train", "plain", notes, features, kind))
+    (folder / "set.json").write_text("{}")
+    return folder
+
+
+def test_every_window_of_a_change_holds_the_change(tmp_path: Path) -> None:
+    note = Note(0, 190, "action:sit down", ("a person sits down",), (90, 120))
+    batches = Batches(load_set(described(tmp_path / "set", note)), windows=(48,), shares=(1.0,))
+    item = batches.data.items[0]
+    low, high = _starts(item, 48)
+    assert (low, high) == (120 - 48, 90 + 1)
+    marked = replace(batches.data, features=torch.arange(190.0)[:, None].expand(-1, 263))
+    drawn = Batches(marked, windows=(48,), shares=(1.0,)).draw(0, 3, 400).features
+    assert set(drawn[:, 0, 0].int().tolist()) == set(range(low, high))
+
+
+def test_a_change_longer_than_the_window_is_not_shown(tmp_path: Path) -> None:
+    note = Note(0, 190, "action:sit down", ("a person sits down",), (10, 120))
+    data = load_set(described(tmp_path / "set", note, Note(0, 190, "walk")))
+    batches = Batches(data, windows=(48, 120), shares=(0.5, 0.5))
+    assert "action" not in batches._pools[48]
+    assert "action" in batches._pools[120]
+
+
+def test_actions_are_drawn_evenly_and_captures_more_often_than_keyed_clips(tmp_path: Path) -> None:
+    folder = tmp_path / "set"
+    described(folder, *[Note(i, i + 100, "action:drink", ("a person drinks",)) for i in range(9)])
+    described(folder, Note(0, 100, "action:drink", ("an animated person drinks",)), kind="keyed")
+    described(folder, Note(0, 100, "action:bow", ("a person bows",)), kind="made")
+    batches = Batches(load_set(folder), windows=(48,), shares=(1.0,))
+    said = np.array([batches.data.texts[i] for i in batches.draw(0, 0, 4000).texts.tolist()])
+    assert abs((said == "a person bows").mean() - 0.5) < 0.04
+    keyed = (said == "an animated person drinks").sum() / np.isin(
+        said, ["an animated person drinks", "a person drinks"]
+    ).sum()
+    assert abs(keyed - 0.4 / 9.4) < 0.02

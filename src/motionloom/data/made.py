@@ -41,10 +41,11 @@ def _read() -> dict[str, Gesture]:
     table: dict[str, dict[str, Any]] = tomllib.loads(
         (resources.files("motionloom.data") / "gestures.toml").read_text(encoding="utf-8")
     )
-    lists = {
-        name: {k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()} for name, entry in table.items()
+    values: dict[str, dict[str, Any]] = {
+        name: {key: tuple(part) if isinstance(part, list) else part for key, part in entry.items()}
+        for name, entry in table.items()
     }
-    return {name: Gesture(name, **entry) for name, entry in lists.items()}
+    return {name: Gesture(name, **entry) for name, entry in values.items()}
 
 
 GESTURES: dict[str, Gesture] = _read()
@@ -83,7 +84,10 @@ def _move_arm(
     # the elbow's way out is blended as well, so that it does not jump where the gesture begins
     along = (body[:, shoulder] + body[:, wrist]) / 2
     pole = weight * pole + (1 - weight) * (body[:, elbow] - along) / 0.1
-    target = weight * target + (1 - weight) * body[:, wrist]
+    # a hand that goes far swings round in front instead of through its own shoulder
+    far = np.clip(np.linalg.norm(target - body[:, wrist], axis=-1, keepdims=True) - 0.35, 0, 0.6)
+    round_it = ph.turned(np.broadcast_to(np.array([0.12, 0.0, 0.5]) * own, local.shape), angle[:, 0])
+    target = weight * target + (1 - weight) * body[:, wrist] + 4 * weight * (1 - weight) * far * round_it
     body[:, elbow], body[:, wrist] = limbs.bend(body[:, shoulder], target, pole, upper=upper, lower=lower)
 
 

@@ -1,0 +1,69 @@
+"""Which captions name which action, and which part of a recording shows a change."""
+
+import numpy as np
+import pytest
+
+from motionloom.data.actions import ACTIONS, action_of, core, sentences, side_of
+from motionloom.data.words import mirror_text
+from tests.metrics import people
+
+
+@pytest.mark.parametrize(
+    ("captions", "name"),
+    [
+        (("a person sits down on a chair", "a standing person takes a seat"), "sit down"),
+        (("someone stands up", "a person stands up from a chair"), "stand up"),
+        (("a person sits down on a chair and stands up again, several times",), "sit down and stand up"),
+        (("a person gets up from lying on the back",), "get up"),
+        (("a person lies down on the back",), "lie down"),
+        (("a person walks, turns around and walks back",), "walk turn around"),
+        (("a person runs and stops",), "stop running"),
+        (("a person walks and then stops",), "stop walking"),
+        (("a person crawls backwards on hands and knees",), "crawl backward"),
+        (("a person crawls forward on hands and knees",), "crawl"),
+        (("a person picks up a box from the floor",), "pick up"),
+        (("a person walks up to a box and picks it up",), "walk and pick up"),
+        (("a person kicks a ball with their right foot.",), "soccer"),
+        (("a person kicks with the left leg",), "kick"),
+        (("a person picks something up from the floor",), "pick up"),
+        (("a person throws right punches from a boxing stance",), "punch"),
+    ],
+)
+def test_captions_name_the_action_that_people_read_in_them(captions: tuple[str, ...], name: str) -> None:
+    found = action_of(captions)
+    assert found is not None
+    assert found.name == name
+
+
+def test_one_caption_among_many_does_not_name_the_action() -> None:
+    assert action_of(("a person claps", "a person looks at the wall", "he looks away")) is None
+
+
+def test_reverse_actions_are_each_others() -> None:
+    for action in ACTIONS.values():
+        if action.reverse:
+            assert ACTIONS[action.reverse].reverse == action.name
+
+
+def test_sides_are_said_only_where_the_captions_agree_and_mirror_with_them() -> None:
+    kick = ACTIONS["kick"]
+    assert side_of(("a person kicks with the left leg", "a left kick")) == "left"
+    assert side_of(("left then right",)) == ""
+    with_side = sentences(kick, ("a person kicks with the left leg",))
+    assert any("left" in text for text in with_side)
+    assert not any("right" in text for text in with_side)
+    assert not any("left" in text or "right" in text for text in sentences(kick))
+    assert {mirror_text(text) for text in with_side} == set(sentences(kick, ("a person kicks with the right leg",)))
+
+
+def test_the_core_of_a_change_is_where_it_changes() -> None:
+    high = np.repeat(people.standing(0.1)[:1], 140, axis=0)
+    amount = np.clip((np.arange(140) - 60) / 20, 0, 1)[:, None, None]
+    positions = high * (1 - 0.4 * amount * [0, 1, 0])
+    first, last = core(positions, 20.0)
+    assert 45 <= first <= 66
+    assert 74 <= last <= 95
+
+
+def test_the_core_of_somebody_who_never_changes_is_everything() -> None:
+    assert core(np.repeat(people.standing(0.1)[:1], 50, axis=0), 20.0) == (0, 50)
