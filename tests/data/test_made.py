@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from motionloom.metrics import physics as ph
 
 from motionloom.data import augment
 from motionloom.data.made import GESTURES, hands_up, lower_arms, perform
-from motionloom.metrics import physics as ph
 from motionloom.skeleton import SMPL22
 from tests.metrics import people
 
