@@ -240,12 +240,25 @@ class Batches:
         return Batch(features, torch.tensor(lengths), torch.tensor(texts))
 
 
+BEFORE = 0.3
+"""Share of what a window shows besides a change that lies before it: people begin soon after they are told to."""
+
+
 def _starts(item: Item, length: int) -> tuple[int, int]:
-    """Where a window of so many frames may begin, half-open: within the item, with its core inside."""
+    """Where a window of so many frames may begin, half-open: within the item, with its core inside.
+
+    The core lies at about the same place of every window (`BEFORE`, give or take a tenth of the window): were it
+    anywhere, the average over what a window may show would be a person who stays halfway, and a small network under
+    much noise draws averages.
+    """
     low, high = item.start, item.start + item.frames - length
-    if item.core:
-        low, high = max(low, min(item.core[1] - length, high)), min(high, max(item.core[0], low))
-    return low, max(low, high) + 1
+    if item.core is None:
+        return low, high + 1
+    first, end = item.core
+    low, high = max(low, min(end - length, high)), min(high, max(first, low))
+    wanted, free = first - round(BEFORE * (length - (end - first))), max(2, length // 10)
+    begin, last = max(low, min(wanted - free, high)), min(high, max(wanted + free, low))
+    return begin, max(begin, last) + 1
 
 
 def summary(folder: Path | str) -> dict:
