@@ -188,10 +188,13 @@ def others(trial: Trial, clips: Iterable[RealClip]) -> Iterator[RealClip]:
 
 
 def standing_and_walking(clips: Sequence[RealClip], seconds: float) -> tuple[Array | None, Array | None]:
-    """Two deceivers out of real clips: the first frame of somebody who stands, held; the longest straight walk."""
+    """Two deceivers out of real clips: the first frame of somebody who stands, held; a straight walk of middling pace."""
     frames = round(seconds * FPS)
     stands = next((c for c in clips if re.search(STANDING, text_of(c))), None)
-    walks = max((c for c in clips if re.search(WALKING, text_of(c))), key=lambda c: len(c.positions), default=None)
+    walkers = sorted(
+        (c for c in clips if re.search(WALKING, text_of(c))), key=lambda c: ph.speed(c.positions, FPS).mean()
+    )
+    walks = walkers[len(walkers) // 2] if walkers else None
     return (
         None if stands is None else np.repeat(stands.positions[:1], frames, axis=0),
         None if walks is None else walks.positions[:frames],

@@ -273,7 +273,7 @@ CHECKS = (
             at_most("pelvis", 0.35, "the hips begin on the floor"),
             at_most("chest", 0.5, "the chest begins near the floor"),
             at_least("trunk", 55, "the trunk begins level"),
-            at_least("end", 0.95, "it ends standing"),
+            at_least("end", 0.86, "it ends on the feet"),
             at_most("upright", 45, "upright"),
         ),
     ),
