@@ -188,7 +188,7 @@ def others(trial: Trial, clips: Iterable[RealClip]) -> Iterator[RealClip]:
 
 
 def standing_and_walking(clips: Sequence[RealClip], seconds: float) -> tuple[Array | None, Array | None]:
-    """Two deceivers out of real clips: the first frame of somebody who stands, held; a straight walk of middling pace."""
+    """Two deceivers out of real clips: the first frame of somebody who stands, held; a walk ahead of middling pace."""
     frames = round(seconds * FPS)
     stands = next((c for c in clips if re.search(STANDING, text_of(c))), None)
     walkers = sorted(
