@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
+    from motionloom.checkpoint import Prior
     from motionloom.motion import Motion
 
 MAX_CHARACTERS = 20_000
@@ -118,6 +119,24 @@ def check_prompt(prompt: str) -> None:
         fail("a prompt is empty; say in words what the person does")
     if len(prompt) > MAX_CHARACTERS:
         fail(f"a prompt has {len(prompt):,} characters; say it in fewer than {MAX_CHARACTERS:,}")
+
+
+def remark_unknown(prior: "Prior", prompts: Sequence[str]) -> list[str]:
+    """Say on stderr, a line each, which prompts are like nothing that these weights have learned; and give the lines.
+
+    Nothing is said for weights whose file has no table of what they know.
+    """
+    import sys
+
+    from motionloom.nets.text.known import nearest
+
+    asked = [prompt for prompt in dict.fromkeys(prompts) if prompt.strip()]
+    if prior.known is None or not asked:
+        return []
+    remarks = [found.remark() for found in nearest(prior.known, asked, prior.text) if not found.near]
+    for line in remarks:
+        print(f"motionloom: {line}", file=sys.stderr)
+    return remarks
 
 
 @contextmanager

@@ -37,6 +37,7 @@ def add(subparsers) -> None:
     parser.add_argument(
         "weights", nargs="?", metavar="NAME|FILE", help="a shipped name or a file (default: list the shipped)"
     )
+    parser.add_argument("--actions", action="store_true", help="list what a prior has learned, with seconds of each")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(run=_weights)
 
@@ -139,6 +140,9 @@ def _weights(arguments: argparse.Namespace) -> None:
     from motionloom.weights.predictor import shipped_predictors
     from motionloom.weights.prior import find_weights, shipped
 
+    if arguments.actions:
+        _actions(arguments)
+        return
     names = blocks() | shipped_predictors() | shipped()
     if arguments.weights is None:
         described = [describe(path, name) for name, path in names.items()]
@@ -153,6 +157,26 @@ def _weights(arguments: argparse.Namespace) -> None:
     asked = str(arguments.weights)
     about = describe(names.get(asked) or find_weights(asked), asked if asked in names else None)
     print(json.dumps(about, indent=1) if arguments.json else _card(about))
+
+
+def _actions(arguments: argparse.Namespace) -> None:
+    """Print what a prior has learned; raises MotionloomError for weights that do not say."""
+    from motionloom.checkpoint import Prior
+    from motionloom.errors import MotionloomError
+
+    known = Prior.load(arguments.weights or "default").known
+    if known is None:
+        raise MotionloomError(
+            f"the weights {arguments.weights or 'default'!r} do not say what they have learned: they are older than "
+            "such tables; their card says which recordings they know"
+        )
+    if arguments.json:
+        about = {"seconds": dict(known.seconds), "sentences": list(known.sentences)}
+        print(json.dumps(about, indent=1, ensure_ascii=False))
+        return
+    for action, seconds in known.seconds.items():
+        print(f"{seconds:9.1f} s  {action}")
+    print(f"{len(known.sentences):,} sentences for them are in the file; --json lists them")
 
 
 def describe(path: Path, name: str | None = None) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """`Prior`: everything one weight file holds, and the file itself.
 
 One safetensors file: tensors ``net.*`` (float16 or float32), ``mean``, ``std``, optionally ``text.*`` (the embedded
-text encoder), and JSON metadata under ``motionloom``: version, network sizes, schedule, features, text encoder,
-licence, provenance. Nothing in it is ever executed.
+text encoder) and ``known.*`` (a table of training sentences), and JSON metadata under ``motionloom``: version, network
+sizes, schedule, features, text encoder, licence, provenance, known sentences. Nothing in it is ever executed.
 """
 
 import json
@@ -22,6 +22,7 @@ from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.nets.prior import Condition, NetConfig, PriorNet, condition
 from motionloom.nets.text import MiniLM, TextEncoder
+from motionloom.nets.text.known import Known, pack_known, unpack_known
 from motionloom.nets.text.published import TEXTS, PublishedText
 from motionloom.weights.container import fill, is_signed
 
@@ -54,6 +55,8 @@ class Prior:
     text: TextEncoder
     card: Card
     fps: float = 20.0
+    known: Known | None = None
+    """What it has learned, in words; None: its file does not say."""
 
     @staticmethod
     def load(weights: str | Path = "default", *, device: str | torch.device = "cpu") -> "Prior":
@@ -129,6 +132,9 @@ def save_prior(prior: Prior, path: Path | str, *, half: bool = True) -> Path:
         "fps": prior.fps,
         "card": asdict(prior.card),
     }
+    if prior.known is not None:
+        table, about["known"] = pack_known(prior.known)
+        tensors |= table
     with atomic_path(path) as temp:
         save_file(tensors, temp, metadata={"motionloom": json.dumps(about)})
     return path
@@ -165,6 +171,7 @@ def load_prior(path: Path, device: str | torch.device = "cpu") -> Prior:
     prior = Prior(
         net.eval().requires_grad_(False), schedule, tensors["mean"].float(), tensors["std"].float(),
         _text(path, about["text"], tensors), Card(**about["card"]), float(about["fps"]),
+        _known(path, about.get("known"), tensors, config.text),
     )  # fmt: skip
     if prior.text.width != config.text:
         raise MotionloomError(
@@ -208,3 +215,12 @@ def _text(path: Path, name: str, tensors: dict[str, Tensor]) -> TextEncoder:
     if name in TEXTS:
         return PublishedText(name)
     raise MotionloomError(f"{path} wants the text encoder {name!r}, which this motionloom does not have")
+
+
+def _known(path: Path, about: Any, tensors: dict[str, Tensor], width: int) -> Known | None:
+    if about is None:  # files of before there were tables
+        return None
+    try:
+        return unpack_known(tensors, about, width=width)
+    except ValueError as error:
+        raise MotionloomError(f"{path} is damaged: {error}; fetch the weights again") from None
