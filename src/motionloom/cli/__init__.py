@@ -18,6 +18,7 @@ FAMILIES = (
     "duet",
     "files",
     "data",
+    "teach",
     "train",
     "evaluate",
     "bench",

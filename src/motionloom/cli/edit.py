@@ -11,7 +11,9 @@ from motionloom.cli.sampling import (
     check_count,
     check_outs,
     check_prompt,
+    load_prior,
     places,
+    remark_unknown,
     report,
     take_text_anywhere,
     write,
@@ -19,6 +21,7 @@ from motionloom.cli.sampling import (
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
+    from motionloom.weights.prior import Prior
 
 
 def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -63,7 +66,9 @@ def run_edit(arguments: argparse.Namespace) -> None:
     captions = [arguments.text or arguments.clip.stem] * arguments.count
     files = places(outs, arguments.count)
     clip, unit, orders = read_clip(arguments, arguments.clip)
-    motions, seconds = _make(arguments, crop(clip, arguments))
+    prior = load_prior(arguments)
+    remarks = remark_unknown(prior, [arguments.text or ""])
+    motions, seconds = _make(arguments, prior, crop(clip, arguments))
     if arguments.skeleton == "smpl":
         unit, orders = None, {}
     written = []
@@ -77,19 +82,18 @@ def run_edit(arguments: argparse.Namespace) -> None:
         "prompt": arguments.text,
         "seeds": [arguments.seed + i for i in range(arguments.count)],
         "weights": str(arguments.weights),
+        "remarks": remarks,
     }
     report(arguments, about, written, seconds)
     note_rate(arguments, [arguments.clip])
 
 
-def _make(arguments: argparse.Namespace, clip: "Motion") -> "tuple[list[Motion], float]":
+def _make(arguments: argparse.Namespace, prior: "Prior", clip: "Motion") -> "tuple[list[Motion], float]":
     import time
 
     from motionloom.tasks.edit import edit
     from motionloom.tasks.text import STEPS
-    from motionloom.weights.prior import Prior
 
-    prior = Prior.load(arguments.weights, device=arguments.device)
     began = time.perf_counter()
     with bar("editing") as progress:
         motions = edit(

@@ -79,10 +79,10 @@ def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float
         motion, unit, orders = file.motion, file.unit, dict(file.orders)
     else:
         motion = io.load(path, fps=arguments.source_fps, asf=arguments.asf, unit=arguments.unit)
-    return (_stand_up(motion) if arguments.up == "z" else motion), unit, orders
+    return (stand_up(motion) if arguments.up == "z" else motion), unit, orders
 
 
-def _stand_up(motion: "Motion") -> "Motion":
+def stand_up(motion: "Motion") -> "Motion":
     """From Z up to Y up: a quarter turn of everything about X."""
     from dataclasses import replace
 

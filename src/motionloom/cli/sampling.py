@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
-    from motionloom.checkpoint import Prior
     from motionloom.motion import Motion
+    from motionloom.weights.prior import Prior
 
 MAX_CHARACTERS = 20_000
 MAX_COUNT = 1000
@@ -24,10 +24,29 @@ def add_sampling(parser: argparse.ArgumentParser, *, own_rate: str = "the model'
     parser.add_argument(
         "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
     )
+    add_adapters(parser)
     parser.add_argument("--fps", type=float, help=f"frame rate of the files (default: {own_rate})")
     parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
+
+
+def add_adapters(parser: argparse.ArgumentParser) -> None:
+    """``--adapter``: what was taught from clips."""
+    parser.add_argument(
+        "--adapter", action="append", default=[], metavar="FILE[:FACTOR]",
+        help="what 'motionloom teach' made of clips, repeatable; a factor says how much of it (default 1)",
+    )  # fmt: skip
+
+
+def load_prior(arguments: argparse.Namespace) -> "Prior":
+    """The weights that the line names, with its adapters in them."""
+    from motionloom.goals.adapters import parse_adapter
+    from motionloom.tasks.adapting import adapt
+    from motionloom.weights.prior import Prior
+
+    adapters = [parse_adapter(word) for word in arguments.adapter]
+    return adapt(Prior.load(arguments.weights, device=arguments.device), adapters)
 
 
 def take_text_anywhere(parser: argparse.ArgumentParser) -> None:

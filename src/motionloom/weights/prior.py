@@ -7,6 +7,7 @@ sizes, schedule, features, text encoder, licence, provenance, known sentences. N
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -22,8 +23,9 @@ from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.nets.prior import Condition, NetConfig, PriorNet, condition
 from motionloom.nets.text import MiniLM, TextEncoder
-from motionloom.nets.text.known import Known, pack_known, unpack_known
+from motionloom.nets.text.known import Known, pack_known, unpack_known, with_sentences
 from motionloom.nets.text.published import TEXTS, PublishedText
+from motionloom.weights.adapter import Adapter, merged, origin
 from motionloom.weights.container import fill, is_signed
 
 FORMAT = 1
@@ -57,6 +59,8 @@ class Prior:
     fps: float = 20.0
     known: Known | None = None
     """What it has learned, in words; None: its file does not say."""
+    origin: str = ""
+    """The fingerprint of the network that adapters were merged into; empty where none were."""
 
     @staticmethod
     def load(weights: str | Path = "default", *, device: str | torch.device = "cpu") -> "Prior":
@@ -70,6 +74,20 @@ class Prior:
     def to(self, device: str | torch.device) -> "Prior":
         """The same prior with its network and statistics on another device."""
         return replace(self, net=self.net.to(device), mean=self.mean.to(device), std=self.std.to(device))
+
+    def with_adapters(self, adapters: Sequence[tuple[Adapter, float]]) -> "Prior":
+        """The same prior with adapters of `motionloom teach` merged into its weights, each times its factor.
+
+        Several add up, in whatever order they are merged. Adapters for control still belong to the result, as does a
+        two-person block. Raises `MotionloomError` for adapters of another kind or prior and for factors out of range.
+        """
+        if not adapters:
+            return self
+        for adapter, _ in adapters:
+            adapter.check_prior(self)
+        said = [text for adapter, factor in adapters if factor > 0 for text in adapter.captions]
+        known = with_sentences(self.known, said, self.text) if self.known is not None and said else self.known
+        return replace(self, net=merged(self.net, adapters), origin=origin(self), known=known)
 
     def condition(self, prompts: list[str], lengths: list[int] | None = None) -> Condition:
         """Encode prompts, one row each; an empty prompt asks for nothing in particular."""
