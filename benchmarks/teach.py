@@ -93,10 +93,9 @@ def squat(p: Array, fps: float) -> bool:
     """The pelvis comes down to two thirds of its height over planted feet, the trunk upright, and comes up again."""
     height = (p[:, 0, 1] - p[:, [7, 8], 1].min(axis=1)) / leg_length(p)
     lowest = int(height.argmin())
-    return bool(
-        height[lowest] < 0.68 and height[lowest:].max() > 0.88 and height[: lowest + 1].max() > 0.88
-        and np.linalg.norm(p[:, 0, [0, 2]] - p[0, 0, [0, 2]], axis=-1).max() < 0.8 and p[lowest, 15, 1] > p[lowest, 0, 1] + 0.25
-    )  # fmt: skip
+    tall = min(height[: lowest + 1].max(), height[lowest:].max())
+    stays = np.linalg.norm((p[:, 0] - p[0, 0])[:, [0, 2]], axis=-1).max() < 0.8
+    return bool(height[lowest] < 0.68 and tall > 0.88 and stays and p[lowest, 15, 1] > p[lowest, 0, 1] + 0.25)
 
 
 def roll(p: Array, fps: float) -> bool:
@@ -115,7 +114,7 @@ ACTIONS = (
            r"cartwheel", r"like start|frisbee", cartwheel),
     Action("squat", "a person does deep squats", ("a person does deep squats", "someone squats all the way down"),
            r"\bsquats?\b", r"gate|ready|position with|lunge|crawl|jump", squat),
-    Action("roll", "a person does a roll on the ground", ("a person does a roll on the ground", "someone rolls forward"),
+    Action("roll", "a person does a roll on the ground", ("a person does a roll on the ground", "someone rolls over"),
            r"\bforward roll|rolls (?:sideways|diagonally|forward)|roll on the ground", r"body", roll, 3.0),
 )  # fmt: skip
 

@@ -29,9 +29,6 @@ MOST_FRAMES = 20 * 300
 """Frames that are learned from in one clip."""
 MAX_CAPTION, MAX_CAPTIONS = 300, 64
 MAX_BYTES = 1 << 20
-SWAY = 0.008
-"""Metres that the head of a held pose moves from side to side and to the front, while the feet stay."""
-SWAY_SECONDS = (3.7, 5.1)
 ONE_SIDED = re.compile(r"\b(salut|violin|guitar|handshak|shak\w+ hands|writ(?:es|ing)|steering)", re.IGNORECASE)
 """What people do with a certain hand although nobody says so: not mirrored."""
 
@@ -175,7 +172,7 @@ def _example(motion: Motion, told: Told) -> Example:
     if looped is not None:
         return Example(name, told.captions, looped, (0, len(looped)), looped=True)
     more = LENGTH - count
-    longer = np.concatenate([held(positions[::-1], more)[::-1], positions, held(positions, more)])
+    longer = augment.held(positions, more, more, fps=FPS, seed=0)
     return Example(name, told.captions, hml.encode(longer, heading="corrected"), (more, more + count))
 
 
@@ -184,19 +181,3 @@ def _goes_on(positions: Array) -> bool:
     way = np.linalg.norm(np.diff(positions[:, 0][:, [0, 2]], axis=0), axis=-1) * FPS
     third = max(1, len(way) // 3)
     return bool(min(way[:third].mean(), way[-third:].mean()) > 0.25)
-
-
-def held(positions: Array, frames: int) -> Array:
-    """``frames`` more of the pose that a motion (n, joints, 3) ends with, at 20 per second: it comes to rest within
-    0.3 s and then sways by millimetres, the feet in their places."""
-    last = positions[-1]
-    time = np.arange(1, frames + 1)[:, None, None] / FPS
-    rest = 0.1
-    speed = (positions[-1] - positions[-2]) * FPS if len(positions) > 1 else np.zeros_like(last)
-    speed = speed * np.minimum(1, 1 / np.maximum(np.linalg.norm(speed, axis=-1, keepdims=True), 1e-9))
-    settled = last + rest * (1 - np.exp(-time / rest)) * speed
-    height = np.clip(last[:, 1] - last[:, 1].min(), 0, None) / 1.5
-    waves = [np.sin(2 * np.pi * time[..., 0] / period) * np.minimum(1, time[..., 0]) for period in SWAY_SECONDS]
-    settled[..., 0] += SWAY * height * waves[0]
-    settled[..., 2] += SWAY * height * waves[1]
-    return settled

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from motionloom.data.actions import PREFIX
 from motionloom.data.sets import MotionSet
 from motionloom.features.layout import FPS
 from motionloom.nets.text import TextEncoder
@@ -14,14 +15,15 @@ WRITTEN = {"human": "captions that people wrote", "index": "descriptions of the 
 def known_table(motions: MotionSet, encoder: TextEncoder) -> Known:
     """The table of a set's sentences and of the seconds of each of its actions (groups of items).
 
-    Each action is in the table with at least one sentence. Frames that several items of an action share count once;
-    mirrored and other made copies count as what they are, more motion.
+    A named action and a measured label of one name are one action. Each is in the table with at least one sentence.
+    Frames that several items of an action share count once; mirrored and other made copies count as more motion.
     """
     frames: dict[str, list[tuple[int, int]]] = {}
     texts: dict[str, dict[int, None]] = {}
     for item in motions.items:
-        frames.setdefault(item.group, []).append((item.start, item.start + item.frames))
-        texts.setdefault(item.group, {}).update(dict.fromkeys(item.texts))
+        name = item.group.removeprefix(PREFIX)
+        frames.setdefault(name, []).append((item.start, item.start + item.frames))
+        texts.setdefault(name, {}).update(dict.fromkeys(item.texts))
     seconds = {group: _covered(spans) / FPS for group, spans in frames.items()}
     listed = sorted(seconds, key=lambda group: (group in WRITTEN, -seconds[group], group))
     numbers = dict.fromkeys(number for group in listed for number in texts[group])

@@ -22,7 +22,7 @@ from motionloom.nets.prior import Condition
 from motionloom.nets.text.known import bare
 from motionloom.tasks.text import sample_features
 from motionloom.train.loop import Average, World, train
-from motionloom.train.objectives import WEIGHTS, WordBank, displacement_error, masked_error
+from motionloom.train.objectives import WEIGHTS, Conditioned, WordBank, displacement_error, masked_error
 from motionloom.train.recipe import Recipe
 from motionloom.weights.adapter import TAUGHT, Adapter, AdapterNet, origin, tensors_of
 from motionloom.weights.prior import Prior
@@ -83,7 +83,8 @@ def teach(
     lesson = lesson or Lesson()
     if len(prior.mean) != WIDTH or prior.fps != FPS:
         raise MotionloomError(
-            f"these weights make {len(prior.mean)} numbers a frame; {WIDTH} at {FPS:g} fps are taught"
+            f"these weights make {len(prior.mean)} numbers a frame at {prior.fps:g} fps; those of {WIDTH} at {FPS:g} "
+            "fps can be taught"
         )
     if not examples:
         raise MotionloomError("there is no clip; give at least one to learn from")
@@ -101,14 +102,8 @@ def teach(
         cooldown=0.5, ema=0.99, decay=0.0, save_every=lesson.steps,
     )  # fmt: skip
     with TemporaryDirectory(prefix="motionloom-teach-") as folder:
-        average = train(
-            objective,
-            recipe,
-            folder,
-            world=World(device=str(prior.mean.device)),
-            wrap=Plain,
-            on_step=_progress(lesson, say),
-        )
+        world = World(device=str(prior.mean.device))
+        average = train(objective, recipe, folder, world=world, wrap=_wrap, on_step=_progress(lesson, say))
     return _adapter(prior, examples, captions, lesson, average)
 
 
@@ -125,9 +120,7 @@ def known_prompts(prior: Prior, captions: Sequence[str], seed: int) -> list[str]
     like = (torch.nn.functional.normalize(vectors, dim=1) @ torch.nn.functional.normalize(asked, dim=1).T).amax(1)
     order = [int(i) for i in like.argsort(descending=True, stable=True) if like[i] < SAME]
     if not order:
-        raise MotionloomError(
-            "the prior knows no other sentences than those to be taught; describe the clips otherwise"
-        )
+        raise MotionloomError("these weights know no other sentences than the captions; describe the clips otherwise")
     rest = rng.permutation(order[LIKE:])
     chosen = [*order[:LIKE], *rest.tolist()]
     chosen = [chosen[i % len(chosen)] for i in range(DRAWS)]
@@ -140,17 +133,6 @@ def wordings(caption: str) -> tuple[str, ...]:
     if action == " ".join(caption.lower().split()).strip(" .!?"):  # its subject, if any, is part of what is taught
         return (caption,)
     return (caption, caption, f"a person {action}", f"someone {action}", f"a man {action}", action, imperative(action))
-
-
-class Plain(nn.Module):
-    """A network in training that binds its condition in the same call."""
-
-    def __init__(self, net: nn.Module) -> None:
-        super().__init__()
-        self.net = net
-
-    def forward(self, x: Tensor, level: Tensor, cond: Condition) -> Tensor:
-        return self.net(x, level, self.net.bind(cond))  # type: ignore[operator]
 
 
 class Teaching:
@@ -197,10 +179,11 @@ class Teaching:
         cond = self.words.condition(torch.tensor(texts), torch.tensor(lengths)).choose(speaks)
         cond = Condition(*(part.to(self.device) for part in cond))
         level, noised = level.to(self.device), self.schedule.noised(clean, level.to(self.device), noise)
-        guess = net(noised, level, cond)
-        with torch.no_grad():
-            old = Condition(*(part[rows - kept :] for part in cond))
-            before = self.base(noised[rows - kept :], level[rows - kept :], self.base.bind(old))
+        guess, before = net(noised, level, cond), clean[rows - kept :]
+        if kept:
+            with torch.no_grad():
+                old = Condition(*(part[rows - kept :] for part in cond))
+                before = self.base(noised[rows - kept :], level[rows - kept :], self.base.bind(old))
         return self._error(guess, clean, before, cond.lengths, rows - kept)
 
     def _rows(self, rng: np.random.Generator, window: int, rows: int, kept: int) -> tuple[Tensor, list[int], list[int]]:
@@ -240,6 +223,11 @@ def _first(example: Example, window: int, rng: np.random.Generator) -> int:
         return int(rng.integers(begin, max(end - window, begin) + 1))
     low, high = max(0, end - window), min(begin, frames - window)
     return int(rng.integers(low, max(low, high) + 1)) if frames > window else 0
+
+
+def _wrap(net: nn.Module) -> nn.Module:
+    assert isinstance(net, AdapterNet)
+    return Conditioned(net)
 
 
 def _progress(lesson: Lesson, say: Say) -> Callable[[int, float, float], None]:
