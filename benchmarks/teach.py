@@ -24,22 +24,22 @@ from typing import Any
 import numpy as np
 import torch
 
-from motionloom.checkpoint import Prior
 from motionloom.data.examples import Told, make_examples, uniform_positions
 from motionloom.data.paths import inside
 from motionloom.data.sources import find_takes
 from motionloom.errors import MotionloomError
-from motionloom.evaluation import obey
 from motionloom.io import load
 from motionloom.io.atomic import atomic_path
-from motionloom.io.video import draw_sheet
-from motionloom.metrics import physics as ph
-from motionloom.metrics.gestures import leg_length
-from motionloom.metrics.physics import Array
+from motionloom.kinematics import physics as ph
+from motionloom.kinematics.gestures import leg_length
+from motionloom.kinematics.physics import Array
+from motionloom.lab.suites import obey
 from motionloom.motion import Motion
 from motionloom.tasks.adapting import adapt
 from motionloom.tasks.text import generate
 from motionloom.train.teach import Lesson, teach
+from motionloom.viz.video import draw_sheet
+from motionloom.weights.prior import Prior
 
 FIRST_SEED = 7000
 CLIPS = 3

@@ -7,10 +7,10 @@ import pytest
 
 from motionloom.data.clip_check import check_clip, check_file
 from motionloom.errors import MotionloomError
-from motionloom.features.ik import motion_from_positions
+from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
-from tests.metrics import people
+from tests.kinematics import people
 
 
 def motion(positions: np.ndarray) -> Motion:

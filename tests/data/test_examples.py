@@ -11,9 +11,9 @@ from motionloom import io
 from motionloom.data.examples import LENGTH, MOST_CLIPS, Told, find_examples, make_examples
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
-from motionloom.features.ik import motion_from_positions
+from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
-from tests.metrics import people
+from tests.kinematics import people
 
 
 def motion(positions: np.ndarray) -> Motion:

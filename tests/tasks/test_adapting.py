@@ -8,12 +8,14 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionloom.checkpoint import Prior
 from motionloom.errors import MotionloomError
-from motionloom.nets.adapter import MOST_FACTOR, TAUGHT, Adapter, AdapterNet, fingerprint, origin, tensors_of
-from motionloom.tasks.adapting import KEPT, AdaptedPriors, adapt, parse_adapter
-from motionloom.tasks.long import Segment, long_features, with_loaded
+from motionloom.goals.adapters import MOST_FACTOR, parse_adapter
+from motionloom.goals.segment import Segment
+from motionloom.tasks.adapting import KEPT, AdaptedPriors, adapt
+from motionloom.tasks.long import long_features, with_loaded
 from motionloom.tasks.text import sample_features
+from motionloom.weights.adapter import TAUGHT, Adapter, AdapterNet, fingerprint, origin, tensors_of
+from motionloom.weights.prior import Prior
 from tests.nets import tiny
 
 

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.checkpoint import Prior
 from motionloom.data.examples import Example, Told, make_examples
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
-from motionloom.features.ik import motion_from_positions
-from motionloom.nets.adapter import Adapter, AdapterNet
+from motionloom.kinematics.ik import motion_from_positions
 from motionloom.nets.text.known import known_sentences
 from motionloom.train import teach as module
 from motionloom.train.objectives import Conditioned
 from motionloom.train.teach import Lesson, Teaching, known_prompts, teach, wordings
-from tests.metrics import people
+from motionloom.weights.adapter import Adapter, AdapterNet
+from motionloom.weights.prior import Prior
+from tests.kinematics import people
 from tests.nets import tiny
 from tests.tasks.test_edit import person
 

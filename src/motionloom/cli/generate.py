@@ -78,7 +78,7 @@ def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str) -> "Ti
     import sys
 
     from motionloom.features.layout import FPS, WIDTH
-    from motionloom.tasks import timeline
+    from motionloom.goals import timeline
     from motionloom.tasks.text import frames_in
 
     seconds = SECONDS if arguments.seconds is None else arguments.seconds

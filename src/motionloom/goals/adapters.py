@@ -15,12 +15,13 @@ Applied: TypeAlias = tuple[Any, float]
 
 def parse_adapter(word: str) -> tuple[Path, float]:
     """``FILE`` or ``FILE:FACTOR``, such as ``zombie.safetensors:0.8``. Raises `MotionloomError` for other words."""
-    name, colon, tail = word.rpartition(":")
+    name, _, tail = word.rpartition(":")
     try:
         factor = float(tail)
     except ValueError:
-        colon = ""
-    if not colon:
+        factor = 1.0
+        name = word
+    if ":" not in word:
         name, factor = word, 1.0
     if not name.strip() or not abs(factor) <= MOST_FACTOR:
         raise MotionloomError(

@@ -11,9 +11,9 @@ from motionloom.data.sets import Batch, Batches
 from motionloom.diffusion import Schedule
 from motionloom.features.humanml import displacements
 from motionloom.features.layout import FEET, LAYOUT
-from motionloom.nets.adapter import AdapterNet
 from motionloom.nets.prior import Condition, PriorNet, condition
 from motionloom.nets.text import TextEncoder
+from motionloom.weights.adapter import AdapterNet
 
 WEIGHTS = {
     "yaw_velocity": 6.0,
