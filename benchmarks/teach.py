@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from motionloom.data.examples import Told, make_examples, uniform_positions
+from motionloom.data.examples import CaptionedClip, make_examples, uniform_positions
 from motionloom.data.paths import inside
 from motionloom.data.sources import find_takes
 from motionloom.errors import MotionloomError
@@ -188,7 +188,7 @@ def measure(action: Action, rows: list[dict[str, Any]], prior: Prior, arguments:
     """Teach one action and say what came of it."""
     chosen = of_action(action, rows)[:CLIPS]
     print(f"{action.name}: {', '.join(row['clip'] for row in chosen)}", flush=True)
-    examples = [e for row in chosen for e in make_examples(read(row), Told(row["file"], (action.caption,)))]
+    examples = [e for row in chosen for e in make_examples(read(row), CaptionedClip(row["file"], (action.caption,)))]
     before, first = obeyed(prior, action, arguments.seeds)
     began = time.perf_counter()
     settings = {"steps": arguments.steps} if arguments.steps else {}

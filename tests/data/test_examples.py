@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionloom import io
-from motionloom.data.examples import LENGTH, MOST_CLIPS, Told, find_examples, make_examples
+from motionloom.data.examples import LENGTH, MOST_CLIPS, CaptionedClip, find_examples, make_examples
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from motionloom.kinematics.ik import motion_from_positions
@@ -43,7 +43,7 @@ def clips(tmp_path: Path) -> Path:
 
 
 def captions(places: list[Path], caption: str = "") -> list[tuple[str, ...]]:
-    return [told.captions for told in find_examples(places, caption)]
+    return [captioned.captions for captioned in find_examples(places, caption)]
 
 
 def test_one_caption_is_for_all(clips: Path) -> None:
@@ -67,8 +67,8 @@ def test_the_file_beside_a_clip_goes_before_everything(clips: Path) -> None:
 
 
 def test_clips_in_order_and_once(clips: Path) -> None:
-    told = find_examples([clips / "two.bvh", clips, clips / "two.bvh"], "a zombie")
-    assert [one.path.name for one in told] == ["two.bvh", "one.bvh"]
+    captioned = find_examples([clips / "two.bvh", clips, clips / "two.bvh"], "a zombie")
+    assert [one.path.name for one in captioned] == ["two.bvh", "one.bvh"]
 
 
 def test_what_cannot_be_learned_from_is_refused(clips: Path, tmp_path: Path) -> None:
@@ -100,18 +100,18 @@ def test_whatever_stands_in_captions_it_is_read_or_refused(tmp_path_factory: pyt
     (folder / "one.bvh").write_text("x")
     (folder / "captions.txt").write_text(text, encoding="utf-8", errors="surrogatepass")
     try:
-        told = find_examples([folder / "one.bvh"], "a zombie")
+        captioned = find_examples([folder / "one.bvh"], "a zombie")
     except MotionloomError:
         return
-    assert all(caption.strip() for one in told for caption in one.captions)
+    assert all(caption.strip() for one in captioned for caption in one.captions)
 
 
-TOLD = Told(Path("x/zombie.bvh"), ("a person walks to the left",))
+CAPTIONED = CaptionedClip(Path("x/zombie.bvh"), ("a person walks to the left",))
 
 
 def test_a_short_walk_goes_on() -> None:
     """A loop: the person goes on at 1.2 m/s for the ten seconds that a window may take."""
-    example = make_examples(walk(3.0), TOLD, mirror=False)[0]
+    example = make_examples(walk(3.0), CAPTIONED, mirror=False)[0]
     assert example.looped
     assert example.shown == (0, LENGTH)
     way = hml.decode_positions(example.features.astype(np.float64))[:, 0]
@@ -120,7 +120,7 @@ def test_a_short_walk_goes_on() -> None:
 
 def test_a_short_change_is_held_at_both_ends() -> None:
     """What was recorded is in the middle, and before and behind it nearly nothing moves."""
-    example = make_examples(bend(), TOLD, mirror=False)[0]
+    example = make_examples(bend(), CAPTIONED, mirror=False)[0]
     first, end = example.shown
     assert not example.looped
     assert end - first == 29  # 1.5 s are 30 frames, and features are one fewer
@@ -133,11 +133,11 @@ def test_a_short_change_is_held_at_both_ends() -> None:
 
 
 def test_a_mirror_image_has_mirrored_words() -> None:
-    plain, mirrored = make_examples(walk(), TOLD)
+    plain, mirrored = make_examples(walk(), CAPTIONED)
     assert mirrored.captions == ("a person walks to the right",)
     assert np.allclose(hml.mirror(mirrored.features), plain.features, atol=1e-4)
 
 
 def test_what_is_done_with_a_certain_hand_is_not_mirrored() -> None:
-    assert len(make_examples(walk(), Told(Path("a.bvh"), ("a soldier salutes",)))) == 1
-    assert len(make_examples(walk(), TOLD, mirror=False)) == 1
+    assert len(make_examples(walk(), CaptionedClip(Path("a.bvh"), ("a soldier salutes",)))) == 1
+    assert len(make_examples(walk(), CAPTIONED, mirror=False)) == 1

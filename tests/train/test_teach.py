@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.data.examples import Example, Told, make_examples
+from motionloom.data.examples import CaptionedClip, Example, make_examples
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.kinematics.ik import motion_from_positions
@@ -43,7 +43,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="module")
 def examples() -> list[Example]:
     motion = motion_from_positions(people.walking(1.2, 3.0), people.FPS)
-    return make_examples(motion, Told(Path("zombie.bvh"), ("a person walks to the left",)))
+    return make_examples(motion, CaptionedClip(Path("zombie.bvh"), ("a person walks to the left",)))
 
 
 def taught(prior: Prior, examples: list[Example], **lesson) -> Adapter:

@@ -10,7 +10,7 @@ from motionloom.cli.reading import as_rate, as_unit, stand_up
 from motionloom.cli.sampling import fail
 
 if TYPE_CHECKING:
-    from motionloom.data.examples import Example, Told
+    from motionloom.data.examples import CaptionedClip, Example
     from motionloom.motion import Motion
 
 READS = (".bvh", ".amc", ".glb", ".npz")
@@ -61,19 +61,19 @@ def run_teach(arguments: argparse.Namespace) -> int:
         fail(f"adapters are written as .safetensors; {out.name} has another suffix")
     if not arguments.check:
         check_place(out)
-    told = find_examples(places, caption)
-    motions, findings = _read(arguments, told)
+    captioned = find_examples(places, caption)
+    motions, findings = _read(arguments, captioned)
     if arguments.check:
-        return _report_check(arguments, told, findings)
-    _refuse(told, findings)
+        return _report_check(arguments, captioned, findings)
+    _refuse(captioned, findings)
     from motionloom.data.examples import make_examples
 
     examples = [
         example
-        for one, motion in zip(told, motions, strict=True)
+        for one, motion in zip(captioned, motions, strict=True)
         for example in make_examples(motion, one, mirror=not arguments.no_mirror)
     ]
-    _teach(arguments, examples, out, told)
+    _teach(arguments, examples, out, captioned)
     return 0
 
 
@@ -88,14 +88,14 @@ def _words(words: list[str]) -> tuple[str, list[str]]:
     return caption, places
 
 
-def _read(arguments: argparse.Namespace, told: "list[Told]") -> "tuple[list[Motion], list[list[Any]]]":
+def _read(arguments: argparse.Namespace, captioned: "list[CaptionedClip]") -> "tuple[list[Motion], list[list[Any]]]":
     """The clips, and what is wrong with each."""
     from motionloom.data.clip_check import check_file
     from motionloom.errors import MotionloomError
     from motionloom.io import load
 
     motions, findings = [], []
-    for one in told:
+    for one in captioned:
         found: Motion | MotionloomError
         try:
             unit = arguments.unit if one.path.suffix.lower() in (".bvh", ".amc") else None
@@ -108,7 +108,7 @@ def _read(arguments: argparse.Namespace, told: "list[Told]") -> "tuple[list[Moti
     return motions, findings
 
 
-def _report_check(arguments: argparse.Namespace, told: "list[Told]", findings: list[list[Any]]) -> int:
+def _report_check(arguments: argparse.Namespace, captioned: "list[CaptionedClip]", findings: list[list[Any]]) -> int:
     """Print what is wrong with which clip; the exit code is 2 where something cannot be learned from."""
     fatal = sum(any(one.fatal for one in found) for found in findings)
     if arguments.json:
@@ -117,28 +117,30 @@ def _report_check(arguments: argparse.Namespace, told: "list[Told]", findings: l
                 "clip": str(one.path), "captions": list(one.captions),
                 "wrong": [f.sentence for f in found if f.fatal], "remarks": [f.sentence for f in found if not f.fatal],
             }
-            for one, found in zip(told, findings, strict=True)
+            for one, found in zip(captioned, findings, strict=True)
         ]  # fmt: skip
-        print(json.dumps({"clips": rows, "usable": len(told) - fatal}, indent=1, ensure_ascii=False))
+        print(json.dumps({"clips": rows, "usable": len(captioned) - fatal}, indent=1, ensure_ascii=False))
         return 2 if fatal else 0
-    for one, found in zip(told, findings, strict=True):
+    for one, found in zip(captioned, findings, strict=True):
         print(f"{one.path}: {'; '.join(one.captions)}")
         for finding in found:
             print(f"  {'wrong' if finding.fatal else 'remark'}: {finding.sentence}")
-    print(f"{len(told) - fatal} of {len(told)} clips can be learned from")
+    print(f"{len(captioned) - fatal} of {len(captioned)} clips can be learned from")
     return 2 if fatal else 0
 
 
-def _refuse(told: "list[Told]", findings: list[list[Any]]) -> None:
+def _refuse(captioned: "list[CaptionedClip]", findings: list[list[Any]]) -> None:
     """Raise MotionloomError for the first clip that nothing can be learned from; say what else there is."""
-    for one, found in zip(told, findings, strict=True):
+    for one, found in zip(captioned, findings, strict=True):
         for finding in found:
             if finding.fatal:
                 fail(f"{one.path}: {finding.sentence}; leave it out or mend it ('motionloom teach --check' lists all)")
             print(f"motionloom: {one.path}: {finding.sentence}", file=sys.stderr)
 
 
-def _teach(arguments: argparse.Namespace, examples: "list[Example]", out: Path, told: "list[Told]") -> None:
+def _teach(
+    arguments: argparse.Namespace, examples: "list[Example]", out: Path, captioned: "list[CaptionedClip]"
+) -> None:
     import time
 
     import torch
@@ -160,11 +162,11 @@ def _teach(arguments: argparse.Namespace, examples: "list[Example]", out: Path, 
     adapter.save(out)
     about = {
         "file": str(out), "megabytes": round(out.stat().st_size / 1e6, 2), "captions": list(adapter.captions),
-        "clips": [str(one.path) for one in told], "licence": adapter.licence, "base": adapter.base,
+        "clips": [str(one.path) for one in captioned], "licence": adapter.licence, "base": adapter.base,
         "seconds": round(time.perf_counter() - began, 1),
     }  # fmt: skip
     if arguments.json:
         print(json.dumps(about, indent=1, ensure_ascii=False))
         return
-    print(f"wrote {out}: {about['megabytes']} MB, {len(told)} clips, taught in {about['seconds']:.0f} s")
+    print(f"wrote {out}: {about['megabytes']} MB, {len(captioned)} clips, taught in {about['seconds']:.0f} s")
     print(f"try: motionloom generate {adapter.captions[0]!r} --adapter {out}")

@@ -34,7 +34,7 @@ ONE_SIDED = re.compile(r"\b(salut|violin|guitar|handshak|shak\w+ hands|writ(?:es
 
 
 @dataclass(frozen=True)
-class Told:
+class CaptionedClip:
     """A clip's file and what is said of it."""
 
     path: Path
@@ -57,7 +57,7 @@ class Example:
 # Which clips, and what they show
 
 
-def find_examples(places: Sequence[Path | str], caption: str = "") -> list[Told]:
+def find_examples(places: Sequence[Path | str], caption: str = "") -> list[CaptionedClip]:
     """The clips among files and folders, in order, with what is said of each.
 
     Of a clip speaks, first come first served: ``NAME.txt`` beside it, a caption on each line; lines ``NAME: caption``
@@ -85,7 +85,7 @@ def find_examples(places: Sequence[Path | str], caption: str = "") -> list[Told]
             )
     if not files:
         raise MotionloomError("there is no clip; give 1 to 20 motion files, or folders of them")
-    return [Told(path, _captions_of(path, caption, in_folder=found)) for path, found in files.items()]
+    return [CaptionedClip(path, _captions_of(path, caption, in_folder=found)) for path, found in files.items()]
 
 
 def _captions_of(path: Path, caption: str, *, in_folder: bool) -> tuple[str, ...]:
@@ -137,17 +137,17 @@ def _check_caption(words: str, place: str) -> str:
 # A clip as features
 
 
-def make_examples(motion: Motion, told: Told, *, mirror: bool = True) -> list[Example]:
+def make_examples(motion: Motion, captioned: CaptionedClip, *, mirror: bool = True) -> list[Example]:
     """A clip as one example, or as two with its mirror image.
 
     motion: anybody's, on a humanoid skeleton, in metres. The mirror image is left out where ``mirror`` is False or a
     caption names what is done with a certain hand; left and right change places in its captions. Raises
     `MotionloomError` for a skeleton that is no person's.
     """
-    plain = _example(motion, told)
-    if not mirror or any(ONE_SIDED.search(caption) for caption in told.captions):
+    plain = _example(motion, captioned)
+    if not mirror or any(ONE_SIDED.search(caption) for caption in captioned.captions):
         return [plain]
-    captions = tuple(mirror_text(caption) for caption in told.captions)
+    captions = tuple(mirror_text(caption) for caption in captioned.captions)
     return [
         plain,
         Example("M" + plain.name, captions, hml.mirror(plain.features), plain.shown, plain.looped),
@@ -161,19 +161,19 @@ def uniform_positions(motion: Motion) -> Array:
     return at_origin(hml.uniform(hml.resample_positions(person.positions(), person.fps)))
 
 
-def _example(motion: Motion, told: Told) -> Example:
+def _example(motion: Motion, captioned: CaptionedClip) -> Example:
     positions = uniform_positions(motion)[: MOST_FRAMES + 1]
-    name = told.path.stem
+    name = captioned.path.stem
     count = len(positions) - 1
     if count >= LENGTH:
-        return Example(name, told.captions, hml.encode(positions, heading="corrected"), (0, count))
+        return Example(name, captioned.captions, hml.encode(positions, heading="corrected"), (0, count))
     features = hml.encode(positions, heading="corrected")
     looped = augment.loop(features, LENGTH) if _goes_on(positions) else None
     if looped is not None:
-        return Example(name, told.captions, looped, (0, len(looped)), looped=True)
+        return Example(name, captioned.captions, looped, (0, len(looped)), looped=True)
     more = LENGTH - count
     longer = augment.held(positions, more, more, fps=FPS, seed=0)
-    return Example(name, told.captions, hml.encode(longer, heading="corrected"), (more, more + count))
+    return Example(name, captioned.captions, hml.encode(longer, heading="corrected"), (more, more + count))
 
 
 def _goes_on(positions: Array) -> bool:
