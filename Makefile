@@ -3,14 +3,18 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
-PIP := $(BIN)/python -m pip install --no-input -qq --disable-pip-version-check -c constraints.txt
+SECONDS ?= 600
+SEED ?= 0
+PIP := $(BIN)/python -m pip install --no-input -qq --disable-pip-version-check --no-deps
+# Only files whose hashes stand in constraints*.txt; the lists are whole, so nothing else is looked for.
+LOCKED := $(PIP) --require-hashes -r
 RELEASE = benchmarks/releases/$(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
 PROMPT ?= a person walks forward and waves
 SUFFIXES := bvh glb npz mp4 png
 # One thread per test process: JOBS processes times torch's own threads would fight for the same cores.
 ONE_THREAD := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help demo test check lint format types imports install dev pictures measure compare tables wheel clean
+.PHONY: help demo test fuzz check lint format types imports install dev pins pictures measure compare tables wheel clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -24,6 +28,9 @@ demo: $(VENV)/.runtime  ## install, run the main job on the shipped weights, wri
 
 test: $(VENV)/.dev  ## install the dev extras, run every test, those of the README and the examples too
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -n $(JOBS) --dist loadfile $(PYTEST_FLAGS)
+
+fuzz: $(VENV)/.dev  ## mutated files for every reader (SECONDS=3600, SEED=1); those that fail go to out/fuzz
+	$(ONE_THREAD) $(BIN)/python -m tests.fuzz --seconds $(SECONDS) --seed $(SEED)
 
 check: lint types imports  ## everything but the tests
 
@@ -42,6 +49,10 @@ imports: $(VENV)/.dev
 install: $(VENV)/.runtime  ## only the virtual environment and the package
 
 dev: $(VENV)/.dev  ## the same with what tests and checks need
+
+pins: $(VENV)/.dev  ## renew versions and hashes in constraints*.txt (UPGRADE=1: newer versions)
+	$(BIN)/python -m pip install --no-input -qq --disable-pip-version-check --target out/uv 'uv>=0.9'
+	PATH="$(CURDIR)/out/uv/bin:$$PATH" $(BIN)/python tools/pins.py $(if $(UPGRADE),--upgrade)
 
 pictures: $(VENV)/.runtime  ## draw the README's pictures anew, with the shipped weights
 	$(BIN)/python tools/make_pictures.py
@@ -70,17 +81,19 @@ wheel: $(VENV)/.runtime  ## build dist/motionloom-*.whl, weights inside
 	$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --no-build-isolation -w dist .
 
 # The stamps make a second `make` free; the package is installed in place, so edits to src/ need no reinstall.
-$(VENV)/.runtime: pyproject.toml constraints.txt
+$(VENV)/.runtime: pyproject.toml constraints-runtime.txt constraints-cuda.txt
 	@test -n "$(PYTHON)" || { echo "No python3.11 found; say where it is: make $(MAKECMDGOALS) PYTHON=/path/to/python3.11" >&2; exit 2; }
 	@echo "Installing the pinned packages into $(VENV) (PyTorch is large; this happens once) ..."
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@$(PIP) setuptools
+	@$(LOCKED) constraints-runtime.txt
+	@if $(BIN)/python -c "import importlib.metadata as m; exit(not any(r.startswith('nvidia') for r in m.requires('torch')))"; \
+	then $(LOCKED) constraints-cuda.txt; fi
 	@$(PIP) --no-build-isolation -e .
 	@touch $@
 
-$(VENV)/.dev: $(VENV)/.runtime
+$(VENV)/.dev: $(VENV)/.runtime constraints.txt
 	@echo "Installing the test tools into $(VENV) ..."
-	@$(PIP) --no-build-isolation -e '.[dev]'
+	@$(LOCKED) constraints.txt
 	@touch $@
 
 clean:  ## remove the environment, the outputs and every cache

@@ -11,15 +11,15 @@ import gzip
 import hashlib
 import importlib.metadata
 import json
-import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load_file
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
+from motionloom.io.tensors import save_tensors
 from motionloom.nets.text.bert import from_huggingface
 from motionloom.nets.text.minilm import LENGTH, pack
 from motionloom.nets.text.wordpiece import SPECIALS, make_tokenizer
@@ -111,9 +111,7 @@ def main() -> int:
     except (MotionloomError, OSError, KeyError, json.JSONDecodeError) as error:
         print(f"Could not make the encoder: {error}", file=sys.stderr)
         return 2
-    partial = options.out.with_name(options.out.name + ".part")
-    save_file(tensors, partial, metadata={"text": json.dumps(metadata)})  # one entry: their order is not fixed
-    os.replace(partial, options.out)
+    save_tensors(tensors, options.out, metadata={"text": json.dumps(metadata)})  # one entry: their order is not fixed
     print(f"{options.out}: {options.out.stat().st_size / 1e6:.2f} MB, {metadata['changes']}")
     return 0
 

@@ -5,5 +5,22 @@ class MotionloomError(ValueError):
     """A mistake in what came from outside: a file, a prompt, an option.
 
     The message is one sentence (what was wrong, what was there, what to do); the command line prints it
-    to stderr and exits with 2. Programming errors stay ordinary exceptions.
+    to stderr and exits with 2. Programming errors stay ordinary exceptions. Whatever names and values it tells of, it
+    is shown as one line of at most `LONGEST_MESSAGE` characters.
     """
+
+    def __str__(self) -> str:
+        return one_line(super().__str__())
+
+
+LONGEST_MESSAGE = 800
+
+
+def one_line(message: str) -> str:
+    """A message as a terminal may show it: what would break the line or steer the terminal is written out."""
+    if len(message) > LONGEST_MESSAGE:
+        half = LONGEST_MESSAGE // 2 - 3
+        message = f"{message[:half]} ... {message[-half:]}"
+    if message.isprintable():
+        return message
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in message)

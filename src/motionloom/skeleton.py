@@ -4,7 +4,8 @@ The *rest pose* is what forward kinematics gives when every rotation is the iden
 +Y is up, a person in rest pose faces +Z and has the left side at +X.
 """
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -12,6 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
+
+LONGEST_NAME = 1000
+"""Characters of a joint's name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +42,11 @@ class Skeleton:
                 f"got {len(self.names)}, {len(self.parents)} and {len(offsets)}"
             )
         if len(set(self.names)) != len(self.names):
-            twice = sorted({n for n in self.names if self.names.count(n) > 1})
-            raise MotionloomError(f"joint names must be unique; {', '.join(twice)} appear more than once")
+            twice = sorted(name for name, count in Counter(self.names).items() if count > 1)
+            raise MotionloomError(f"joint names must be unique; {_some(twice)} appear more than once")
+        longest = max(map(len, self.names))
+        if longest > LONGEST_NAME:
+            raise MotionloomError(f"a joint's name has {longest} characters; {LONGEST_NAME} are the most")
         if self.parents[0] != -1 or any(not 0 <= p < j for j, p in enumerate(self.parents[1:], start=1)):
             raise MotionloomError("the first joint must be the only root and parents must come before children")
         if not np.isfinite(offsets).all():
@@ -60,7 +67,7 @@ class Skeleton:
     def index(self, name: str) -> int:
         """Number of the joint called ``name``; an error lists the joints there are."""
         if name not in self.names:
-            raise MotionloomError(f"no joint {name!r}; the joints are {', '.join(self.names)}")
+            raise MotionloomError(f"no joint {name[:80]!r}; the joints are {_some(self.names)}")
         return self.names.index(name)
 
     def children(self, joint: int) -> tuple[int, ...]:
@@ -96,13 +103,19 @@ class Skeleton:
 
     def mirror_pairs(self) -> tuple[int, ...]:
         """For each joint the joint on the other side (itself on the middle line), found by name."""
-        return tuple(self.names.index(m) if (m := _other_side(n, self.names)) else j for j, n in enumerate(self.names))
+        numbers = {name: number for number, name in enumerate(self.names)}
+        return tuple(numbers[m] if (m := _other_side(n, numbers)) else j for j, n in enumerate(self.names))
 
 
 _SIDES = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"))
 
 
-def _other_side(name: str, names: tuple[str, ...]) -> str | None:
+def _some(names: Sequence[str]) -> str:
+    """Names for a message: all of a person's, the first ones of very many."""
+    return ", ".join(names[:40]) + (f" and {len(names) - 40} more" if len(names) > 40 else "")
+
+
+def _other_side(name: str, names: Collection[str]) -> str | None:
     candidates = [name.replace(a, b, 1) for x, y in _SIDES for a, b in ((x, y), (y, x)) if a in name]
     for a, b in (("l", "r"), ("r", "l"), ("L", "R"), ("R", "L")):
         if name.startswith(a):

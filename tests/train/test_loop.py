@@ -35,7 +35,7 @@ def start(data: Path, out: Path, steps: int, *, processes: int = 1) -> subproces
     program = [sys.executable, "-m"]
     if processes > 1:
         program += ["torch.distributed.run", "--standalone", f"--nproc-per-node={processes}", "-m"]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": f"{ROOT / 'src'}{os.pathsep}{ROOT}"}
     return subprocess.Popen(
         [*program, "tests.train.runs", str(data), str(out), str(steps)],
         cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
@@ -127,11 +127,12 @@ def test_a_crash_while_writing_leaves_the_old_state(tmp_path: Path, monkeypatch:
     net, average, optimizer = parts()
     save_state(tmp_path, net, average, optimizer, step=7, recipe=runs.recipe())
 
-    def half(tensors, place, metadata) -> None:
-        Path(place).write_bytes(b"half a")
+    def half(place: Path, content: bytes) -> None:
+        with place.open("wb") as file:
+            file.write(content[: len(content) // 2])
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(loop, "save_file", half)
+    monkeypatch.setattr(Path, "write_bytes", half)
     with pytest.raises(KeyboardInterrupt):
         save_state(tmp_path, net, average, optimizer, step=8, recipe=runs.recipe())
     assert [p.name for p in tmp_path.iterdir()] == [loop.STATE]

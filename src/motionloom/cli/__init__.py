@@ -7,7 +7,8 @@ import sys
 import warnings
 from collections.abc import Sequence
 
-from motionloom.errors import MotionloomError
+from motionloom.errors import MotionloomError, one_line
+from motionloom.interruption import interruptible, was_interrupted
 
 FAMILIES = (
     "generate",
@@ -29,7 +30,7 @@ FAMILIES = (
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> None:  # type: ignore[override]
         """One sentence and exit code 2, without the page of usage."""
-        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
+        self.exit(2, f"{one_line(f'{self.prog}: {message}')}; see {self.prog} --help\n")
 
     def parse_known_args(self, args=None, namespace=None):  # type: ignore[override]
         """What a command does not know is its own mistake, not the whole program's: its --help is the one to read."""
@@ -52,20 +53,34 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; 0 done, 2 a mistake in what was asked or given, 130 interrupted."""
+    """Run one command; 0 done, 2 a mistake in what was asked or given, 130 interrupted (also by SIGTERM, SIGHUP)."""
     try:  # from here on: a Ctrl-C while the commands are still being imported is one too
+        with interruptible():
+            return _told(argv)
+    except KeyboardInterrupt:  # while the end was being told
+        return 130
+
+
+def _told(argv: Sequence[str] | None) -> int:
+    """Run one command, and say in one line why it ended if it did not end well."""
+    code = 2
+    try:
         return _run(argv)
     except MotionloomError as error:
-        print(f"motionloom: {error}", file=sys.stderr)
+        problem = str(error)
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        print(f"motionloom: {error.strerror or error}: {error.filename or ''}".rstrip(": "), file=sys.stderr)
+        problem = one_line(f"{error.strerror or error}: {error.filename or ''}".rstrip(": "))
     except KeyboardInterrupt:
-        print("motionloom: interrupted", file=sys.stderr)
-        return 130
-    return 2
+        problem, code = "interrupted", 130
+    except Exception:  # a library that was interrupted may end in an error of its own
+        if not was_interrupted():
+            raise
+        problem, code = "interrupted", 130
+    print(f"motionloom: {problem}", file=sys.stderr)
+    return code
 
 
 def _run(argv: Sequence[str] | None) -> int:

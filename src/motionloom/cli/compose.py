@@ -128,14 +128,16 @@ def _make(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline", s
 def _write(pieces: Iterable["Motion"], streams: Sequence["Stream"], fps: float | None) -> None:
     from contextlib import ExitStack
 
+    from motionloom.interruption import held_back
     from motionloom.io.stream import resampled
 
     with ExitStack() as stack:
         for stream in streams:
             stack.enter_context(stream)
         for piece in pieces if fps is None else resampled(pieces, fps):
-            for stream in streams:
-                stream.write(piece)
+            with held_back():  # all files end with the same piece
+                for stream in streams:
+                    stream.write(piece)
 
 
 def _pieces(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline") -> Generator["Motion", None, None]:

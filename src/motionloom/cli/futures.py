@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.cli.sampling import fail, numbered
+from motionloom.interruption import held_back
 
 if TYPE_CHECKING:
     from motionloom.io.stream import Stream
@@ -163,8 +164,9 @@ class Long:
                         streams = self._open(number, piece, folders)
                         for _, stream in streams:
                             stack.enter_context(stream)
-                    for _, stream in streams:
-                        stream.write(piece)
+                    with held_back():
+                        for _, stream in streams:
+                            stream.write(piece)
                     shown += self._shown(piece, at) if number < SHOWN else []
                     at += len(piece)
         finally:

@@ -1,6 +1,9 @@
 """`motionloom generate`: words to motion files."""
 
 import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +20,7 @@ from motionloom.cli.sampling import (
     report,
     write,
 )
+from motionloom.interruption import held_back
 
 if TYPE_CHECKING:
     from motionloom.goals.timeline import Timeline
@@ -51,7 +55,7 @@ def add(subparsers) -> None:
     parser.set_defaults(run=_generate)
 
 
-def _generate(arguments: argparse.Namespace) -> None:
+def _generate(arguments: argparse.Namespace) -> int:
     prompts = _prompts(arguments)
     outs = check_outs(arguments)
     check_count(arguments, most=MAX_MOTIONS)
@@ -62,21 +66,62 @@ def _generate(arguments: argparse.Namespace) -> None:
     prior = load_prior(arguments)
     timelines = {prompt: _timeline(arguments, prior, prompt) for prompt in prompts}
     remarks = remark_unknown(prior, [segment.text for found in timelines.values() for segment in found.segments])
-    motions, seconds = _make(arguments, prior, [timelines[caption] for caption in captions])
-    written = [path for several in files for path in write(motions, several, captions)]
-    made = [
+    made = _Made(files, captions)
+    interrupted = _make(arguments, prior, [timelines[caption] for caption in captions], made)
+    motions = [
         {"prompt": caption, "seed": arguments.seed + i, "segments": _segments(timelines[caption])}
-        for i, caption in enumerate(captions)
+        for i, caption in enumerate(captions[: made.count])
     ]
     length = SECONDS if arguments.seconds is None else arguments.seconds
-    about = {"motions": made, "seconds": length, "weights": str(arguments.weights), "remarks": remarks}
-    report(arguments, about, written, seconds)
+    about = {"motions": motions, "seconds": length, "weights": str(arguments.weights), "remarks": remarks}
+    report(arguments, about, made.written, made.sampling)
+    if interrupted:
+        print(f"motionloom: interrupted; {made.count} of {len(captions)} motions were finished", file=sys.stderr)
+        return 130
+    return 0
+
+
+@dataclass(eq=False)
+class _Made:
+    """Motions that are written as they are finished; a picture that shows several is drawn at the end."""
+
+    files: Sequence[Sequence[Path]]
+    """For each ``--out`` a file per motion, or one that shows them all."""
+    captions: Sequence[str]
+    count: int = 0
+    """Motions that are finished."""
+    sampling: float = 0.0
+    """Seconds of drawing."""
+    _files: dict[Path, None] = field(default_factory=dict)
+    _shown: "list[Motion]" = field(default_factory=list)
+
+    @property
+    def written(self) -> list[Path]:
+        """Files that are in their places, by ``--out``."""
+        return [file for several in self.files for file in several if file in self._files]
+
+    def add(self, motions: "Sequence[Motion]") -> None:
+        """Write the motions that come next, all of them, before an interruption is heard."""
+        with held_back():
+            first, self.count = self.count, self.count + len(motions)
+            self._shown += motions if any(len(several) == 1 for several in self.files) else ()
+            for several in self.files:
+                if len(several) == 1:
+                    continue
+                write(motions, several[first : self.count], self.captions[first : self.count])
+                self._files |= dict.fromkeys(several[first : self.count])
+
+    def finish(self) -> None:
+        """Draw what shows several motions, those that are finished."""
+        with held_back():
+            for several in self.files:
+                if len(several) == 1 and self.count:
+                    write(self._shown, several, self.captions[: self.count])
+                    self._files[several[0]] = None
 
 
 def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str) -> "Timeline":
     """What a prompt asks, one segment or several; says so where there are several."""
-    import sys
-
     from motionloom.features.layout import FPS, WIDTH
     from motionloom.goals import timeline
     from motionloom.tasks.text import frames_in
@@ -124,34 +169,68 @@ def _lines(file: Path) -> list[str]:
     return [line.strip() for line in text.splitlines() if line.strip()]
 
 
-def _make(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timeline]") -> "tuple[list[Motion], float]":
-    """The motions, each from its own seed; those of one action are drawn together."""
+def _make(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timeline]", made: _Made) -> bool:
+    """Draw and write the motions; true if that was interrupted after some were finished."""
     import time
+
+    try:
+        began = time.perf_counter()
+        for motion in _drawn(arguments, prior, timelines):
+            made.sampling += time.perf_counter() - began
+            made.add([motion if arguments.fps is None else motion.resample(arguments.fps)])
+            began = time.perf_counter()
+    except KeyboardInterrupt:
+        if not made.count:
+            raise
+        made.finish()
+        return True
+    made.finish()
+    return False
+
+
+def _drawn(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timeline]") -> "Iterator[Motion]":
+    """The motions in order, each from its own seed, as they are finished; those of one action are drawn together."""
     from itertools import groupby
 
     from motionloom.tasks.long import compose
     from motionloom.tasks.splice import concatenated
-    from motionloom.tasks.text import generate
+    from motionloom.tasks.text import generate_each
 
     given = {"steps": arguments.steps, "guidance": arguments.guidance}
     options: dict[str, Any] = {name: value for name, value in given.items() if value is not None} | {
         "clean": not arguments.raw
     }
     solver = {} if arguments.solver is None else {"solver": arguments.solver}
-    began, motions = time.perf_counter(), []
+    count = 0
     with bar("generating") as progress:
         for single, run in groupby(timelines, lambda timeline: len(timeline.segments) == 1):
             segments = [timeline.segments for timeline in run]
-            seed = arguments.seed + len(motions)
+            seed = arguments.seed + count
+            count += len(segments)
             if single:
-                motions += generate(
-                    prior, [one.text for (one,) in segments], seconds=[one.seconds for (one,) in segments], seed=seed,
-                    progress=progress, **options, **solver,
-                )  # fmt: skip
+                yield from _in_order(
+                    generate_each(
+                        prior,
+                        [one.text for (one,) in segments],
+                        seconds=[one.seconds for (one,) in segments],
+                        seed=seed,
+                        progress=progress,
+                        **options,
+                        **solver,
+                    )  # fmt: skip
+                )
                 continue
             for number, several in enumerate(segments):
-                motions.append(concatenated(*compose(prior, several, seed=seed + number, **options)))
-                progress(len(motions), len(timelines))
-    if arguments.fps is not None:
-        motions = [motion.resample(arguments.fps) for motion in motions]
-    return motions, time.perf_counter() - began
+                yield concatenated(*compose(prior, several, seed=seed + number, **options))
+                progress(seed - arguments.seed + number + 1, len(timelines))
+
+
+def _in_order(made: "Iterator[tuple[int, Motion]]") -> "Iterator[Motion]":
+    """Motions by their numbers, which those of other lengths are made before."""
+    waiting: dict[int, Motion] = {}
+    number = 0
+    for found, motion in made:
+        waiting[found] = motion
+        while number in waiting:
+            yield waiting.pop(number)
+            number += 1

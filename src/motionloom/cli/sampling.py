@@ -111,12 +111,12 @@ def places(outs: Sequence[Path], count: int, *, sheets: bool = True) -> list[lis
     return several
 
 
-def write(motions: "list[Motion]", files: Sequence[Path], captions: Sequence[str]) -> list[Path]:
+def write(motions: "Sequence[Motion]", files: Sequence[Path], captions: Sequence[str]) -> list[Path]:
     """Motions into the files of one ``--out``."""
     from motionloom.io import save
 
     if len(files) == 1:
-        return [save(motions, files[0], captions=captions)]
+        return [save(list(motions), files[0], captions=captions)]
     return [save(one, file, captions=[said]) for one, file, said in zip(motions, files, captions, strict=True)]
 
 

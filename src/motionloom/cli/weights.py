@@ -117,22 +117,12 @@ def _import_evaluator(arguments: argparse.Namespace) -> None:
 
 def _numbers(path: Path) -> "np.ndarray":
     """A small .npy array of numbers, without pickle."""
-    import numpy as np
-
     from motionloom.errors import MotionloomError
+    from motionloom.io.npz import read_array
 
     if not path.is_file():
         raise MotionloomError(f"there is no file {path}; name the Mean.npy and Std.npy published with the data set")
-    try:
-        if path.stat().st_size > 1 << 20:
-            raise ValueError("it is larger than 1 MiB")
-        values = np.load(path, allow_pickle=False, mmap_mode="r")  # a declared size beyond the file's is refused
-        if not isinstance(values, np.ndarray):
-            raise ValueError("it is an archive")
-        return np.array(values)
-    except (OSError, ValueError, EOFError, SyntaxError) as error:
-        reason = " ".join(str(error).split())[:120]
-        raise MotionloomError(f"{path} is not a .npy array of numbers ({reason})") from None
+    return read_array(path, max_bytes=1 << 20)
 
 
 def _weights(arguments: argparse.Namespace) -> None:

@@ -6,7 +6,12 @@ or not at all, so a build that was stopped goes on where it was.
 """
 
 import json
+import multiprocessing
+import multiprocessing.connection
+import os
 import re
+import signal
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -16,7 +21,6 @@ from pathlib import Path
 
 import numpy as np
 from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save_file
 
 from motionloom.data import augment
 from motionloom.data.actions import ACTIONS, PREFIX, Action, action_of, core, sentences, side_of
@@ -27,7 +31,8 @@ from motionloom.data.words import LABELS, mirror_text, sentence
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
-from motionloom.io.atomic import atomic_path
+from motionloom.io.atomic import atomic_path, finished, sweep
+from motionloom.io.tensors import save_tensors
 from motionloom.kinematics.physics import Array
 from motionloom.skeleton import SMPL22
 
@@ -376,8 +381,11 @@ def _positions(clip: Clip, note: Note) -> Array:
 def write_clip(folder: Path, clip: Clip) -> None:
     """One file ``folder/NAME.safetensors``, whole or not at all."""
     about = {k: v for k, v in asdict(clip).items() if k != "features"}
-    with atomic_path(folder / f"{clip.name}.safetensors") as temp:
-        save_file({"features": np.ascontiguousarray(clip.features)}, temp, metadata={"clip": json.dumps(about)})
+    save_tensors(
+        {"features": np.ascontiguousarray(clip.features)},
+        folder / f"{clip.name}.safetensors",
+        metadata={"clip": json.dumps(about)},
+    )
 
 
 def read_clip(path: Path) -> Clip:
@@ -467,6 +475,7 @@ def build(
     jobs = list(_jobs(folders, captions, out, find=find, progress=progress))
     for part in ("clips", "done"):
         (out / part).mkdir(parents=True, exist_ok=True)
+        sweep(out / part)
     left = [job for job in jobs if not (out / "done" / job[2]).exists()]
     progress(f"{len(left)} takes to do, {len(jobs) - len(left)} already done")
     for number, (name, reason) in enumerate(_run(left, workers), start=1):
@@ -499,12 +508,28 @@ def _jobs(
             yield str(folder), str(captions or ""), take.name, str(out), find
 
 
+def _begin_worker() -> None:
+    """A worker leaves interruptions to the process that started it, and does not outlive that one."""
+    for name in ("SIGINT", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def _end_with(sentinel: int) -> None:
+    multiprocessing.connection.wait([sentinel])
+    os._exit(1)
+
+
 def _run(jobs: Sequence[Job], workers: int) -> Iterator[tuple[str, str]]:
     if workers == 1 or len(jobs) < 2:
         yield from map(_prepare, jobs)
         return
     try:
-        with ProcessPoolExecutor(max_workers=workers) as pool:
+        with ProcessPoolExecutor(max_workers=workers, initializer=_begin_worker) as pool:
             yield from pool.map(_prepare, jobs, chunksize=4)
     except BrokenProcessPool:
         raise MotionloomError(
@@ -514,7 +539,7 @@ def _run(jobs: Sequence[Job], workers: int) -> Iterator[tuple[str, str]]:
 
 
 def _finish(out: Path, mixed: int, progress: Callable[[str], None]) -> Path:
-    clips = [read_clip(path) for path in sorted((out / "clips").glob("*.safetensors")) if not _DERIVED.match(path.stem)]
+    clips = [read_clip(path) for path in finished(out / "clips", "*.safetensors") if not _DERIVED.match(path.stem)]
     frames = sum(len(clip.features) for clip in clips)
     for seed, licence in enumerate(sorted({clip.licence for clip in clips})):
         same = [c for c in clips if c.licence == licence]
@@ -524,13 +549,12 @@ def _finish(out: Path, mixed: int, progress: Callable[[str], None]) -> Path:
                 for both in _with_mirror(clip) if derive is not mixed_clips else (clip,):
                     write_clip(out / "clips", both)
                     clips.append(both)
-    for old in {p.stem for p in (out / "clips").glob("*.safetensors") if _DERIVED.match(p.stem)} - {
-        c.name for c in clips
-    }:
+    derived = {path.stem for path in finished(out / "clips", "*.safetensors") if _DERIVED.match(path.stem)}
+    for old in derived - {clip.name for clip in clips}:
         (out / "clips" / f"{old}.safetensors").unlink()  # of a build that was asked for more of them
     if not clips:
         raise MotionloomError(f"no take could be used; the reasons stand in {out / 'done'}")
-    dropped = {p.name: text for p in sorted((out / "done").iterdir()) if (text := p.read_text(encoding="utf-8"))}
+    dropped = {p.name: text for p in finished(out / "done", "*") if (text := p.read_text(encoding="utf-8"))}
     frames = np.concatenate([c.features for c in clips if c.split == "train"] or [np.zeros((1, 263), np.float32)])
     counts = Counter(f"{c.source}/{c.split}/{c.way}" for c in clips)
     labels = Counter(n.kind for c in clips for n in c.notes if c.split == "train")

@@ -25,6 +25,8 @@ from motionloom.data.words import mirror_text
 from motionloom.errors import MotionloomError
 from motionloom.features.pair import together
 from motionloom.io import load
+from motionloom.io.atomic import finished
+from motionloom.io.text import read_utf8
 from motionloom.kinematics.physics import Array
 from motionloom.skeleton import SMPL22
 
@@ -100,7 +102,7 @@ def read_pack_pairs(folder: Path | str, *, say: Callable[[str], None] = lambda l
         for first, second in couples:
             say(f"reading {first['clip']} and {second['clip']}")
             pairs.append(_pack_pair(folder, first, second))
-    except (OSError, KeyError, TypeError, ValueError, AttributeError, CsvError) as error:
+    except (OSError, KeyError, TypeError, ValueError, AttributeError, OverflowError, CsvError) as error:
         reason = " ".join(str(error).split())[:120]
         raise MotionloomError(f"{manifest} has no pairs that can be read ({type(error).__name__}: {reason})") from None
     if not pairs:
@@ -152,7 +154,7 @@ def _split(number: int) -> str:
 
 def _pair_files(folder: Path) -> dict[str, tuple[Path, Path]]:
     found: dict[str, dict[str, Path]] = {}
-    for path in sorted([*folder.glob("*.bvh"), *folder.glob("*/*.bvh")]):
+    for path in finished(folder, "*.bvh", "*/*.bvh"):
         if path.parent == folder and (match := re.fullmatch(r"(.+)_([ab])", path.stem)):
             name, person = match.groups()
         elif path.parent != folder and path.stem in ("a", "b"):
@@ -187,9 +189,9 @@ def _captions(folder: Path, names: set[str], *, needed: bool) -> dict[str, tuple
     try:
         if path.stat().st_size > _MAX_CAPTIONS:
             raise MotionloomError(f"{path} is larger than 1 MiB; it takes one short line for each caption")
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise MotionloomError(f"{path} is not text in UTF-8 ({type(error).__name__}); save it again as text") from None
+        lines = read_utf8(path, max_bytes=_MAX_CAPTIONS, empty=True).splitlines()
+    except OSError as error:
+        raise MotionloomError(f"{path} cannot be read ({error.strerror}); save it again as text") from None
     said: dict[str, tuple[str, ...]] = {}
     for number, line in enumerate(lines, start=1):
         if line.strip() and not line.lstrip().startswith("#"):

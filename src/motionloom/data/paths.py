@@ -6,8 +6,11 @@ from motionloom.errors import MotionloomError
 
 
 def inside(folder: Path, relative: str) -> Path:
-    """``folder/relative``; raises MotionloomError where that leads out of the folder."""
-    path = (folder / relative).resolve()
-    if not path.is_relative_to(folder.resolve()):
-        raise MotionloomError(f"{relative!r} leads out of {folder}; paths must stay inside the data folder")
+    """``folder/relative``; raises MotionloomError where that leads out of the folder, or is no path at all."""
+    try:
+        path, base = (folder / relative).resolve(), folder.resolve()
+    except (OSError, ValueError, RuntimeError) as error:  # NUL, a name too long, links that lead to each other
+        raise MotionloomError(f"{relative[:80]!r} is no path of a file in {folder} ({error})") from None
+    if not path.is_relative_to(base):
+        raise MotionloomError(f"{relative[:80]!r} leads out of {folder}; paths must stay inside the data folder")
     return path

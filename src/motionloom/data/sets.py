@@ -1,6 +1,5 @@
 """A built set in memory, and the training batches drawn from it."""
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,8 @@ from motionloom.data.build import MADE, STATES, Clip, Note, read_clip
 from motionloom.data.words import phrases, sentence
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import LAYOUT
+from motionloom.io.atomic import finished
+from motionloom.io.text import parse_json, read_utf8
 
 WORDINGS = 48
 """Sentences made per measured label."""
@@ -58,6 +59,7 @@ EVENTS = {
     "cartwheel": "cartwheel",
 }  # fmt: skip
 """Measured labels of something that happens at one moment, and how captions speak of it."""
+_MAX_SUMMARY = 64 << 20
 MOMENTS = 3
 """Windows shown for a caption that names an event."""
 
@@ -101,7 +103,7 @@ def read_clips(folder: Path | str, *, sources: Sequence[str] = (), splits: Seque
         raise MotionloomError(
             f"{folder} is not a built set (it has no set.json); make one with 'motionloom data build'"
         )
-    clips = (read_clip(path) for path in sorted((folder / "clips").glob("*.safetensors")))
+    clips = (read_clip(path) for path in finished(folder / "clips", "*.safetensors"))
     kept = [c for c in clips if c.split in splits and (not sources or c.source.startswith(tuple(sources)))]
     if not kept:
         raise MotionloomError(f"{folder} holds no clips of source {', '.join(sources) or 'any'} in {', '.join(splits)}")
@@ -281,5 +283,9 @@ def _starts(item: Item, length: int) -> tuple[int, int]:
 
 
 def summary(folder: Path | str) -> dict:
-    """What ``set.json`` says."""
-    return json.loads((Path(folder) / "set.json").read_text(encoding="utf-8"))
+    """What ``set.json`` says; raises MotionloomError where there is none or it is damaged."""
+    path = Path(folder) / "set.json"
+    about = parse_json(read_utf8(path, max_bytes=_MAX_SUMMARY), path)
+    if not isinstance(about, dict):
+        raise MotionloomError(f"{path} is not what 'motionloom data build' writes; build the set again")
+    return about

@@ -2,8 +2,8 @@
 
 import csv
 import gzip
-import json
 import re
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,9 @@ from motionloom.data.paths import inside
 from motionloom.data.words import describe_index
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import WIDTH
-from motionloom.io import load
+from motionloom.io import load, text
+from motionloom.io.atomic import finished
+from motionloom.io.npz import read_array
 from motionloom.kinematics.physics import Array
 from motionloom.retarget import to_smpl22
 
@@ -22,6 +24,13 @@ CMU_LICENCE = "CMU mocap: free for research and commercial use; acknowledge moca
 BANDAI_LICENCE = "Bandai-Namco-Research-Motiondataset, CC BY-NC 4.0: non-commercial use only"
 UNKNOWN_LICENCE = "not stated: as the owner of the recordings allows"
 HUMANML3D_LICENCE = "HumanML3D / AMASS: research use under the licences of AMASS and its subsets"
+
+LATEST = 1e6
+"""Seconds: nothing that is told of a recording begins later."""
+_MAX_LIST = 64 << 20
+_MAX_LINE = 1 << 20
+_PACKED = 32
+"""How many times its size a packed file of captions may unfold to; text packs to a tenth."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +42,10 @@ class Span:
     texts: tuple[str, ...]
     kind: str
     """``human`` (a caption somebody wrote) or ``index`` (the collection's own description)."""
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.start_s <= LATEST and self.end_s >= 0):  # also what is no number; the end may be infinity
+            raise ValueError(f"a stretch goes from {self.start_s:g} to {self.end_s:g} seconds")
 
 
 @dataclass(frozen=True)
@@ -80,12 +93,12 @@ def _pack(folder: Path) -> Iterator[Take]:
         for row in _json_lines(captions) if captions.is_file() else ():
             span = Span(float(row["start_s"]), float(row["end_s"]), tuple(map(str, row["captions"])), "human")
             written.setdefault(row["clip"], []).append(span)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise _unusable(captions, error, "mend it") from None
     with open(manifest, newline="", encoding="utf-8") as lines:
         try:
             yield from (_pack_take(folder, row, written) for row in csv.DictReader(lines))
-        except (KeyError, TypeError, ValueError, AttributeError, csv.Error) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError, csv.Error) as error:
             raise _unusable(manifest, error, "mend it") from None
 
 
@@ -111,20 +124,20 @@ def _licence(source: str) -> str:
 def _cmu(folder: Path, captions: Path | None) -> Iterator[Take]:
     """A CMU download: NN/NN_MM.amc beside NN/NN.asf (120 frames/s), or BVH files; index text and captions if there."""
     index: dict[str, str] = {}
-    for path in sorted(folder.rglob("*index*.txt")):
-        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+    for path in finished(folder, "**/*index*.txt"):
+        for line in text.read_bytes(path, max_bytes=_MAX_LIST).decode("utf-8", "replace").splitlines():
             if match := re.match(r"\s*(\d+_\d+)\s+(.+)", line):
                 index[match.group(1)] = match.group(2).strip()
-    rows: dict[str, list[dict]] = {}
+    spoken: dict[str, list[Span]] = {}
+    kinds: dict[str, set[str]] = {}
     try:
         for row in _json_lines(captions) if captions else ():
             if (match := re.search(r"CMU/\d+/(\d+_\d+)_poses", row["amass_path"])) and not row["mirrored"]:
-                rows.setdefault(match.group(1), []).append(row)
-        spoken = {number: [_amass_span(row) for row in several] for number, several in rows.items()}
-        kinds = {number: {row["split"] for row in several} for number, several in rows.items()}
-    except (KeyError, TypeError, ValueError) as error:
+                spoken.setdefault(match.group(1), []).append(_amass_span(row))
+                kinds.setdefault(match.group(1), set()).add(str(row["split"]))
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise _unusable(captions, error, "name HumanML3D's captions") from None
-    for path in sorted([*folder.rglob("*.amc"), *folder.rglob("*.bvh")]):
+    for path in finished(folder, "**/*.amc", "**/*.bvh"):
         number = "_".join(part.zfill(2) for part in path.stem.split("_"))
         spans = [span for span in spoken.get(number, []) if span.texts]
         phrases = describe_index(index.get(number, index.get(path.stem, "")))
@@ -138,7 +151,7 @@ def _cmu(folder: Path, captions: Path | None) -> Iterator[Take]:
 
 def _amass_span(row: dict) -> Span:
     end = float("inf") if row["end_s"] is None else float(row["end_s"])
-    texts = tuple(c["text"] for c in row["captions"] if not c["from_s"] and not c["to_s"])
+    texts = tuple(str(c["text"]) for c in row["captions"] if not c["from_s"] and not c["to_s"])
     return Span(float(row["start_s"] or 0.0), end, texts, "human")
 
 
@@ -148,7 +161,9 @@ def _humanml3d(folder: Path) -> Iterator[Take]:
         listed = folder / f"{split}.txt"
         if not listed.is_file():
             raise MotionloomError(f"{listed} is missing; a HumanML3D folder has train.txt, val.txt and test.txt")
-        for name in listed.read_text(encoding="utf-8").split():
+        for name in text.read_utf8(listed, max_bytes=_MAX_LIST, empty=True).split():
+            if not re.fullmatch(r"[\w.-]{1,80}", name):
+                raise MotionloomError(f"{listed} lists {name[:40]!r}, which is not a name; mend it")
             if name.startswith("M"):
                 continue  # mirrored copies are made here
             path = inside(folder, f"new_joint_vecs/{name}.npy")
@@ -165,15 +180,16 @@ def _humanml3d(folder: Path) -> Iterator[Take]:
 def _texts(path: Path) -> Iterator[Span]:
     if not path.is_file():
         return
-    for line in path.read_text(encoding="utf-8").splitlines():
+    for line in text.read_utf8(path, max_bytes=_MAX_LIST, empty=True).splitlines():
         parts = line.split("#")
         if len(parts) != 4:
             continue
         try:
             start, end = (float(p) if p not in ("", "nan") else 0.0 for p in parts[2:])
+            span = Span(start, end if end > start else float("inf"), (parts[0].strip(),), "human")
         except ValueError:
-            raise MotionloomError(f"{path} has a line whose times are not numbers: {line[:60]!r}") from None
-        yield Span(start, end if end > start else float("inf"), (parts[0].strip(),), "human")
+            raise MotionloomError(f"{path} has a line whose times are no seconds: {line[:60]!r}; mend it") from None
+        yield span
 
 
 def _reader(path: Path, *, fps: float | None, unit: float | None) -> Callable[[], tuple[Array, float]]:
@@ -186,13 +202,13 @@ def _reader(path: Path, *, fps: float | None, unit: float | None) -> Callable[[]
 
 def _features(path: Path) -> Callable[[], np.ndarray]:
     def read() -> np.ndarray:
-        try:
-            features = np.load(path, allow_pickle=False, mmap_mode="r")  # a size beyond the file's is refused
-            if not isinstance(features, np.ndarray) or features.ndim != 2 or features.shape[1] != WIDTH:
-                raise ValueError(f"its shape is {np.shape(features)} and not (frames, {WIDTH})")
-            return np.array(features, dtype=np.float32)
-        except (OSError, ValueError, TypeError, EOFError, SyntaxError) as error:
-            raise MotionloomError(f"{path} is not an array of features ({error})") from error
+        features = read_array(path)
+        if features.ndim != 2 or features.shape[1] != WIDTH or features.dtype.kind != "f":
+            raise MotionloomError(
+                f"{path} is not an array of features: it is {features.dtype} of the shape {features.shape} "
+                f"and not (frames, {WIDTH})"
+            )
+        return np.array(features, dtype=np.float32)
 
     return read
 
@@ -200,12 +216,19 @@ def _features(path: Path) -> Callable[[], np.ndarray]:
 def _json_lines(path: Path) -> Iterator[dict]:
     if not path.is_file():
         raise MotionloomError(f"there is no caption file {path}")
-    with gzip.open(path, "rt", encoding="utf-8") if path.suffix == ".gz" else path.open(encoding="utf-8") as lines:
-        for number, line in enumerate(lines, start=1):
-            try:
-                yield json.loads(line)
-            except json.JSONDecodeError as error:
-                raise MotionloomError(f"{path}, line {number} is not JSON ({error})") from error
+    packed = path.suffix == ".gz"
+    left = max(_MAX_LIST, _PACKED * path.stat().st_size if packed else text.MAX_BYTES)
+    try:
+        with gzip.open(path, "rb") if packed else path.open("rb") as lines:
+            number = 0
+            while line := lines.readline(_MAX_LINE):
+                number += 1
+                left -= len(line)
+                if left < 0 or len(line) == _MAX_LINE:
+                    raise MotionloomError(f"{path} has a line of 1 MB or more, or unfolds far beyond its size")
+                yield text.parse_json(line, f"{path}, line {number}")
+    except (OSError, EOFError, zlib.error) as error:  # damaged, cut short
+        raise MotionloomError(f"{path} cannot be read ({' '.join(str(error).split())[:120]}); fetch it again") from None
 
 
 def _unusable(path: Path | None, error: Exception, advice: str) -> MotionloomError:

@@ -5,6 +5,7 @@ it (chapter 7). Styles, percentages and units other than the drawing's own are n
 """
 
 import re
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,11 @@ _FINE = 48
 """Straight pieces per curve."""
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _BLANK = re.compile(r"[\s,]*")
-_TRANSFORM = re.compile(r"\s*,?\s*(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)")
+_TRANSFORM = re.compile(  # possessive, so that a long run of blanks costs no time
+    r"\s*+,?\s*+(matrix|translate|scale|rotate|skewX|skewY)\s*+\(([^()]*+)\)"
+)
+MAX_TRANSFORMS = 1000
+"""Steps of all transforms around a shape."""
 _TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 
 
@@ -92,8 +97,11 @@ def _first_shape(data: bytes, path: Path | str) -> tuple[str, dict[str, str], Ar
     name, attributes, transforms = found[0]
     matrix = np.eye(2, 3)
     try:
-        for said in transforms:
-            matrix = _chained(matrix, _transform(said))
+        steps = [step for said in transforms for step in _transform(said)]
+        if len(steps) > MAX_TRANSFORMS:
+            raise _BadShape(f"more than {MAX_TRANSFORMS} transforms around it")
+        for kind, values in steps:
+            matrix = _chained(matrix, _one_transform(kind, values))
     except _BadShape as error:
         raise MotionloomError(f"{path}: the <{name}> has {error}") from None
     return name, attributes, matrix
@@ -103,15 +111,15 @@ def _chained(outer: Array, inner: Array) -> Array:
     return np.column_stack([outer[:, :2] @ inner[:, :2], outer[:, :2] @ inner[:, 2] + outer[:, 2]])
 
 
-def _transform(said: str) -> Array:
-    """A ``transform`` attribute as one 2 x 3 matrix."""
-    matrix, at = np.eye(2, 3), 0
-    while said[at:].strip():
+def _transform(said: str) -> Iterator[tuple[str, list[float]]]:
+    """The steps of a ``transform`` attribute: what each does, and its numbers."""
+    said, at = said.strip(), 0
+    while at < len(said):
         match = _TRANSFORM.match(said, at)
         if match is None:
-            raise _BadShape(f"a transform that cannot be read: {text.shown(said[at:])}")
-        matrix, at = _chained(matrix, _one_transform(match[1], _list(match[2]))), match.end()
-    return matrix
+            raise _BadShape(f"a transform that cannot be read: {text.shown(said[at : at + 100])}")
+        yield match[1], _list(match[2], most=6)
+        at = match.end()
 
 
 def _one_transform(kind: str, v: list[float]) -> Array:
@@ -131,10 +139,10 @@ def _one_transform(kind: str, v: list[float]) -> Array:
     return np.array([[c, -s, x - c * x + s * y], [s, c, y - s * x - c * y]])
 
 
-def _list(said: str) -> list[float]:
-    """Numbers parted by blanks or commas."""
+def _list(said: str, *, most: int) -> list[float]:
+    """Numbers parted by blanks or commas; one more than ``most`` where there are more."""
     values, at = [], _BLANK.match(said).end()  # type: ignore[union-attr]
-    while at < len(said):
+    while at < len(said) and len(values) <= most:
         value, at = _number(said, at)
         values.append(value)
         at = _BLANK.match(said, at).end()  # type: ignore[union-attr]
@@ -158,8 +166,10 @@ def _attribute(attributes: dict[str, str], name: str) -> float:
 
 
 def _polyline(attributes: dict[str, str]) -> list[complex]:
-    values = _list(attributes.get("points", ""))
-    if len(values) < 4 or len(values) % 2 or len(values) > 2 * MAX_PIECES:
+    values = _list(attributes.get("points", ""), most=2 * MAX_PIECES)
+    if len(values) > 2 * MAX_PIECES:
+        raise _BadShape(f"it has more than {MAX_PIECES} points")
+    if len(values) < 4 or len(values) % 2:
         raise _BadShape(f"its points are {len(values)} numbers; 2 to {MAX_PIECES} pairs are read")
     return [complex(x, y) for x, y in zip(values[::2], values[1::2], strict=True)]
 

@@ -11,6 +11,7 @@ bones start at one point, each that can turn has a joint ``"<bone> start"`` ther
 """
 
 import re
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io import text
+from motionloom.io.atomic import finished
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
 
@@ -81,7 +83,7 @@ def read_asf(path: Path | str) -> Asf:
     if len(bones) > MAX_BONES:
         raise MotionloomError(f"{path} has {len(bones)} bones; at most {MAX_BONES} are read")
     if len(set(names)) != len(names):
-        twice = next(n for n in names if names.count(n) > 1)
+        twice = Counter(names).most_common(1)[0][0]
         raise MotionloomError(f"{path}: the bone {text.shown(twice)} appears twice")
     order, parents = _tree(sections["hierarchy"], names, path)
     return Asf(tuple(bones[i] for i in order), parents, unit, degrees)
@@ -215,7 +217,8 @@ def _tree(lines: list[Line], names: list[str], path: Path | str) -> tuple[list[i
         order.append(stack.pop())
         stack += reversed(children.get(order[-1], []))
     if len(order) != len(names):
-        lost = next(n for i, n in enumerate(names) if i not in set(order))
+        there = set(order)
+        lost = next(n for i, n in enumerate(names) if i not in there)
         raise MotionloomError(
             f"{path}: the bone {text.shown(lost)} does not hang on the root; the hierarchy is cyclic or incomplete"
         )
@@ -369,7 +372,7 @@ def _skeleton(asf: Asf, unit: float) -> Skeleton:
 def _assemble(asf: Asf, values: dict[str, Array], degrees: bool, fps: float, unit: float) -> Motion:
     skeleton, turns = _skeleton(asf, unit), _layout(asf)[3]
     frames = len(next(iter(values.values())))
-    text.check_poses(frames, len(turns), "the motion")
+    text.check_poses(frames, len(turns), "the motion", numbers=sum(v.size for v in values.values()))
     scale = np.pi / 180 if degrees else 1.0
     rotations = np.tile(rot.IDENTITY, (frames, len(turns), 1))
     for j, b in enumerate(turns):
@@ -388,7 +391,7 @@ def find_asf(amc: Path | str) -> Path:
     """The skeleton beside an AMC file: of the same name, of the subject (``39_01.amc``: ``39.asf``) or the only one."""
     amc = Path(amc)
     stems = (amc.stem, re.split(r"[_-]", amc.stem)[0])
-    beside = sorted(p for p in amc.parent.glob("*") if p.suffix.lower() == ".asf") if amc.parent.is_dir() else []
+    beside = [p for p in finished(amc.parent, "*") if p.suffix.lower() == ".asf"] if amc.parent.is_dir() else []
     for stem in stems:
         for path in beside:
             if path.stem == stem:

@@ -67,7 +67,7 @@ def read_bvh(path: Path | str, *, fps: float | None = None, unit: float | None =
         raise MotionloomError(f"{path} has no MOTION part; the file is cut off or not a BVH file")
     joints = _hierarchy(data[: split.start()], path)
     rate, values = _frames(data, split.end(), sum(len(j.channels) for j in joints), path)
-    text.check_poses(len(values), len(joints), path)
+    text.check_poses(len(values), len(joints), path, numbers=values.size)
     return _assemble(joints, values, rate if fps is None else fps, unit)
 
 
@@ -175,13 +175,13 @@ def _check_joints(joints: list[_Joint], path: Path | str) -> None:
         if joint.offset is None and not joint.end:
             raise MotionloomError(f"{path}, line {joint.line}: the joint {text.shown(joint.name)} has no OFFSET")
         taken |= set() if joint.end else {joint.name}
+    copies: dict[str, int] = {}
     for joint in joints:
         if joint.end:
-            base, copy = end_name(joints[joint.parent].name), 1
-            joint.name = base
+            base = joint.name = end_name(joints[joint.parent].name)
             while joint.name in taken:
-                copy += 1
-                joint.name = f"{base} {copy}"
+                copies[base] = copies.get(base, 1) + 1
+                joint.name = f"{base} {copies[base]}"
             taken.add(joint.name)
 
 

@@ -1,14 +1,13 @@
 """Several files that appear together in a folder: all of them or none."""
 
 import os
-import secrets
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from motionloom.errors import MotionloomError
-from motionloom.io.atomic import check_place
+from motionloom.interruption import held_back
+from motionloom.io.atomic import check_place, new_part
 
 
 def check_folder(path: Path | str) -> Path:
@@ -22,7 +21,7 @@ def check_folder(path: Path | str) -> Path:
             if path.exists():
                 raise MotionloomError(f"cannot write to {path}: it is a file; name a folder")
             return check_place(path)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: links that lead to each other
         if isinstance(error, MotionloomError):
             raise
         raise MotionloomError(f"cannot write to {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
@@ -41,19 +40,25 @@ def atomic_folder(path: Path | str) -> Iterator[Path]:
     """
     target = check_folder(path)
     there = target.is_dir()
-    temporary = (target if there else target.parent) / f".{secrets.token_hex(6)}.part"
+    temporary: Path | None = None
     try:
-        temporary.mkdir()
+        with new_part(target if there else target.parent, is_folder=True) as temporary:
+            yield temporary
+            with held_back():  # all of them or none
+                _put(temporary, target, there=there)
+    except MotionloomError as error:  # of a file in the hidden folder: name the one that was asked for
+        if temporary is None or str(temporary) not in str(error):
+            raise
+        raise MotionloomError(str(error).replace(str(temporary), str(path))) from error
     except OSError as error:
-        raise MotionloomError(f"cannot write to {path}: {error.strerror or error}") from None
-    try:
-        yield temporary
-        try:
-            _put(temporary, target, there=there)
-        except OSError as error:
+        if temporary is None or _within(error.filename, temporary):
             raise MotionloomError(f"cannot write to {path}: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        raise
+
+
+def _within(name: object, folder: Path) -> bool:
+    """Whether a system's error is about the hidden folder (or names nothing): its message must not name that one."""
+    return name is None or (isinstance(name, str | Path) and Path(name).is_relative_to(folder))
 
 
 def _put(temporary: Path, target: Path, *, there: bool) -> None:

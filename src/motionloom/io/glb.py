@@ -4,7 +4,7 @@ import base64
 import binascii
 import json
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,8 @@ class Document:
     """For messages."""
     json: dict[str, Any]
     buffers: tuple[bytes, ...]
+    _checked: dict[str, list[dict[str, Any]]] = field(default_factory=dict, compare=False)
+    """Lists of the JSON that were found to be lists of objects: they are asked for again and again."""
 
     def bad(self, what: str) -> MotionloomError:
         """The error for this file."""
@@ -38,9 +40,13 @@ class Document:
 
     def items(self, key: str, owner: dict[str, Any] | None = None) -> list[dict[str, Any]]:
         """A list of objects, such as all nodes; empty where there is none."""
+        if owner is None and key in self._checked:
+            return self._checked[key]
         found = (self.json if owner is None else owner).get(key, [])
         if not isinstance(found, list) or not all(isinstance(item, dict) for item in found):
             raise self.bad(f"its {key} are not a list of objects")
+        if owner is None:
+            self._checked[key] = found
         return found
 
     def index(self, value: Any, count: int, what: str) -> int:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.glb import Document, read_document
-from motionloom.io.gltf_curves import Curves, channels_of, clock, read_curves, sample, unit_quaternions
+from motionloom.io.gltf_curves import Curve, Curves, channels_of, clock, read_curves, sample, unit_quaternions
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
 
@@ -228,14 +228,18 @@ def _settle(
     nodes: list[_Node], joints: frozenset[int], curves: Curves, *, parents: list[int], kept: Collection[int]
 ) -> tuple[list[_Node], frozenset[int], Curves]:
     """Let go of armature objects over the skeleton that are keyed but never move: they become fixed transforms."""
-    nodes = list(nodes)
+    nodes, kept = list(nodes), set(kept)
+    by_node: dict[int, dict[str, Curve]] = {}
+    for (node, path), curve in curves.items():
+        by_node.setdefault(node, {})[path] = curve
+    root = next(n for n in joints if parents[n] not in joints)
+    gone: set[int] = set()
     while True:
-        root = next(n for n in joints if parents[n] not in joints)
         inside = [c for c in nodes[root].children if c in joints]
-        own = {path: curve for (node, path), curve in curves.items() if node == root}
+        own = by_node.get(root, {})
         still = all(np.ptp(c.values, axis=0).max() < 1e-6 * max(1.0, np.abs(c.values).max()) for c in own.values())
         if root in kept or len(inside) != 1 or not still:
-            return nodes, joints, curves
+            return nodes, joints - gone, {key: curve for key, curve in curves.items() if key[0] not in gone}
         held = {path: curve.values[0] for path, curve in own.items()}
         nodes[root] = replace(
             nodes[root],
@@ -243,8 +247,8 @@ def _settle(
             turn=rot.normalize(held.get("rotation", nodes[root].turn)),
             scale=held.get("scale", nodes[root].scale),
         )
-        joints = joints - {root}
-        curves = {key: curve for key, curve in curves.items() if key[0] != root}
+        gone.add(root)
+        root = inside[0]
 
 
 def _body(root: int, wanted: set[int], nodes: list[_Node], *, whole: bool) -> frozenset[int]:

@@ -25,8 +25,10 @@ import tokenize
 import warnings
 import zipfile
 import zlib
-from collections.abc import Container
+from collections.abc import Container, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO, cast
 
 import numpy as np
 
@@ -39,10 +41,14 @@ from motionloom.skeleton import SMPL22, Skeleton
 VERSION = 1
 MAX_JOINTS = 10_000
 _POSITIONS = ("positions", "joints", "motion", "arr_0")
-_BROKEN = (
+SPARE_NUMBERS, NUMBERS_PER_BYTE = 8_000_000, 16
+"""What a packed file may unfold to: so many numbers, or so many for each byte of the file, if that is more. Motion that
+people make packs to a byte for each number or two; somebody who does not move at all, for forty minutes, is let in."""
+BROKEN = (
     zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, SyntaxError, ValueError, TypeError, KeyError,
     OSError, EOFError, NotImplementedError, RuntimeError, OverflowError, MemoryError, IndexError,
 )  # fmt: skip
+"""What damaged archives and arrays raise in zipfile and NumPy."""
 
 
 def save_npz(motion: Motion, path: Path | str) -> Path:
@@ -86,7 +92,33 @@ def read_arrays(
 ) -> dict[str, np.ndarray]:
     """All arrays of an archive, with sizes checked before anything is unpacked; objects (pickle) are refused.
 
-    ``only``: names of the arrays that are wanted; the others are never looked at.
+    Args:
+        path: An .npz file, its members stored or packed with deflate.
+        max_bytes: Most bytes of the file, and of its arrays together. A small file may not unfold to very many numbers
+            either: at most `SPARE_NUMBERS`, or `NUMBERS_PER_BYTE` for each of its bytes.
+        only: Names of the arrays that are wanted; the others are never looked at.
+
+    Raises:
+        MotionloomError: It is missing, too large, damaged or no such archive.
+    """
+    with opened(path, max_bytes=max_bytes) as (archive, members, most):
+        wanted = {n: m for n, m in members.items() if only is None or n in only}
+        found: dict[str, np.ndarray] = {}
+        for name, member in wanted.items():
+            with archive.open(member) as stream:
+                what = f"{path}: the array {text.shown(name)}"
+                found[name] = _read_array(cast(BinaryIO, stream), member.file_size, most=most, what=what)
+            most -= _numbers(found[name])
+        return found
+
+
+@contextmanager
+def opened(
+    path: Path | str, *, max_bytes: int = text.MAX_BYTES
+) -> Iterator[tuple[zipfile.ZipFile, dict[str, zipfile.ZipInfo], int]]:
+    """An .npz archive, its members by the names of their arrays, and how many numbers may be read out of it.
+
+    Raises `MotionloomError`, also for whatever the block meets in damaged members.
     """
     data = text.read_bytes(path, max_bytes=max_bytes)
     if not data.startswith(b"PK"):
@@ -99,35 +131,68 @@ def read_arrays(
                 raise MotionloomError(
                     f"{path} unpacks to more than 1000 arrays or {max_bytes / 1e9:.1f} GB; it is not read"
                 )
-            named = {m.filename.removesuffix(".npy"): m for m in members}
-            return {n: _unpack(archive, m, path) for n, m in named.items() if only is None or n in only}
+            if any(m.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for m in members):
+                raise MotionloomError(f"{path} is packed in a way that NumPy does not use; save it with NumPy")
+            yield archive, {m.filename.removesuffix(".npy"): m for m in members}, most_numbers(len(data))
     except MotionloomError:
         raise
-    except _BROKEN as error:
+    except BROKEN as error:
         raise MotionloomError(f"{path} is a damaged NPZ archive ({type(error).__name__})") from None
 
 
-def _unpack(archive: zipfile.ZipFile, member: zipfile.ZipInfo, path: Path | str) -> np.ndarray:
-    with archive.open(member) as stream:
-        file = io.BytesIO(stream.read(member.file_size))
-    version = np.lib.format.read_magic(file)
+def most_numbers(size: int) -> int:
+    """How many numbers a packed file of so many bytes may unfold to."""
+    return max(SPARE_NUMBERS, NUMBERS_PER_BYTE * size)
+
+
+def read_array(path: Path | str, *, max_bytes: int = text.MAX_BYTES) -> np.ndarray:
+    """The numbers or texts of a .npy file; objects (pickle) are refused.
+
+    Raises `MotionloomError` for a file that is missing, larger than ``max_bytes``, damaged, or of another kind.
+    """
+    data = text.read_bytes(path, max_bytes=max_bytes)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return _read_array(io.BytesIO(data), len(data), most=len(data) + 1, what=f"{path}: the array")
+    except MotionloomError:
+        raise
+    except BROKEN as error:
+        raise MotionloomError(f"{path} is a damaged .npy file ({type(error).__name__})") from None
+
+
+def read_header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype]:
+    """Shape, whether columns come first, and type of the .npy that begins where the stream is; raises `BROKEN`."""
+    version = np.lib.format.read_magic(stream)
     reader = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
-    shape, fortran, dtype = reader(file)
-    name = text.shown(member.filename.removesuffix(".npy"))
+    shape, fortran, dtype = reader(stream)
+    if len(shape) > 32 or not all(type(n) is int and 0 <= n < 2**62 for n in shape):
+        raise ValueError("it has no shape")
+    return shape, fortran, dtype
+
+
+def _numbers(array: np.ndarray) -> int:
+    return max(array.size, array.nbytes // 8)
+
+
+def _read_array(stream: BinaryIO, size: int, *, most: int, what: str) -> np.ndarray:
+    """The array of ``size`` bytes, head and all, of at most so many numbers; nothing is unpacked before it is sized."""
+    shape, fortran, dtype = read_header(stream)
     if dtype.kind not in "fiubU":
-        raise MotionloomError(
-            f"{path}: the array {name} holds {dtype}, not numbers or text; pickled objects are never read"
-        )
-    left = file.getbuffer().nbytes - file.tell()
-    if any(n < 0 for n in shape) or math.prod(shape) * dtype.itemsize != left:
-        raise MotionloomError(f"{path}: the array {name} says {shape} but holds {left} bytes; the archive is damaged")
-    flat = np.frombuffer(file.getbuffer()[file.tell() :], dtype=dtype) if left else np.empty(0, dtype)
-    if dtype.kind == "U" and left:
+        raise MotionloomError(f"{what} holds {dtype}, not numbers or text; pickled objects are never read")
+    wanted, left = math.prod(shape) * dtype.itemsize, size - stream.tell()
+    if wanted != left:
+        raise MotionloomError(f"{what} says {shape} but holds {left} bytes; it is damaged")
+    if max(math.prod(shape), wanted // 8) > most:
+        raise MotionloomError(f"{what} has the shape {shape}, far more numbers than so small a file may hold")
+    data = stream.read(wanted)
+    if len(data) != wanted:
+        raise MotionloomError(f"{what} says {shape} but holds {len(data)} bytes; it is damaged")
+    flat = np.frombuffer(data, dtype=dtype) if wanted else np.empty(0, dtype)
+    if dtype.kind == "U" and wanted:
         codes = flat.view(np.dtype(np.uint32).newbyteorder(dtype.byteorder))
         if ((codes > 0x10FFFF) | ((codes >= 0xD800) & (codes < 0xE000))).any():
-            raise MotionloomError(
-                f"{path}: the array {name} holds characters that do not exist; the archive is damaged"
-            )
+            raise MotionloomError(f"{what} holds characters that do not exist; it is damaged")
     return flat.reshape(shape[::-1]).T if fortran else flat.reshape(shape)
 
 
@@ -146,9 +211,16 @@ def _array(
     if not same or found.dtype.kind not in kinds:
         wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
         raise MotionloomError(f"{path}: '{name}' must have the shape {wanted}; it is {found.shape} of {found.dtype}")
-    if kinds != "U" and not (np.abs(found.astype(np.float64)) <= text.LIMIT).all():
+    if kinds != "U" and not _small(found):
         raise MotionloomError(f"{path}: '{name}' has numbers that are not finite (NaN or infinity) or above 1e9")
     return found
+
+
+def _small(found: np.ndarray) -> bool:
+    """Whether all numbers are finite and within the limit, without a copy of them all."""
+    if not found.size:
+        return True
+    return bool(found.min() >= -text.LIMIT and found.max() <= text.LIMIT)  # NaN is neither
 
 
 def _motion(arrays: dict[str, np.ndarray], fps: float, path: Path | str) -> Motion:

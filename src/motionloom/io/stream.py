@@ -14,6 +14,7 @@ from types import TracebackType
 import numpy as np
 
 from motionloom.errors import MotionloomError
+from motionloom.interruption import held_back
 from motionloom.io import check_output, save
 from motionloom.io.atomic import atomic_path
 from motionloom.io.bvh_writer import GrowingBvh
@@ -63,12 +64,13 @@ class Stream(ABC):
         """Put the file in its place and give its path; None, and no file, if nothing was written."""
         if self._closed:
             return self.path if self.saved else None
-        self._closed = True
-        if not self.frames:
-            self._drop()
-            return None
-        self._finish()
-        self.saved = True
+        with held_back():
+            self._closed = True
+            if not self.frames:
+                self._drop()
+                return None
+            self._finish()
+            self.saved = True
         return self.path
 
     def __enter__(self) -> "Stream":

@@ -1,7 +1,9 @@
 """Reading text files of numbers from strangers: size, binary junk, bad numbers, all with the line in the message."""
 
+import json
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,8 @@ MAX_BYTES = 2 * 1024**3
 """Files above this size (2 GB) are refused."""
 LIMIT = 1e9
 """Numbers beyond this are no lengths or angles of anybody, and are refused with NaN and infinity."""
+FREE_POSES = 2_000_000
+"""Frames times joints of which a file need not say anything."""
 _CHUNK = 16 * 1024**2
 
 
@@ -60,6 +64,28 @@ def read_text(path: Path | str, *, max_bytes: int = MAX_BYTES) -> bytes:
     return data.removeprefix(b"\xef\xbb\xbf")
 
 
+def read_utf8(path: Path | str, *, max_bytes: int, empty: bool = False) -> str:
+    """The text of a file in UTF-8, line ends and byte-order mark as in `read_text`; ``empty`` ones only if allowed."""
+    try:
+        if empty and Path(path).stat().st_size == 0:
+            return ""
+        return read_text(path, max_bytes=max_bytes).decode("utf-8")
+    except UnicodeDecodeError:
+        raise MotionloomError(f"{path} is not UTF-8 text; save it as UTF-8") from None
+
+
+def parse_json(data: bytes | str, what: Path | str) -> Any:
+    """What JSON says, with finite numbers only; raises `MotionloomError` that begins with ``what``."""
+
+    def constant(name: str) -> float:
+        raise ValueError(f"{name} is no number")
+
+    try:
+        return json.loads(data, parse_constant=constant)
+    except (ValueError, RecursionError) as error:  # also what is not UTF-8, and endless digits
+        raise MotionloomError(f"{what} is not JSON ({' '.join(str(error).split())[:120]})") from None
+
+
 def word(raw: bytes) -> str:
     """Bytes as text that is safe to print: UTF-8 where it is, Latin-1 where it is not."""
     try:
@@ -86,10 +112,17 @@ def number(raw: bytes | str) -> float | None:
     return value if abs(value) <= LIMIT else None
 
 
-def check_poses(frames: int, joints: int, path: Path | str) -> None:
-    """Refuse what would not fit into memory: a small file may claim very many of both."""
-    if frames * joints > MAX_POSES:
-        raise MotionloomError(f"{path} has {frames} frames of {joints} joints; at most {MAX_POSES:,} together are read")
+def check_poses(frames: int, joints: int, path: Path | str, *, numbers: int) -> None:
+    """Refuse what would not fit into memory: a small file may claim very many of both.
+
+    numbers: how many the file really holds. A pose takes one at least, but for `FREE_POSES` that need none.
+    """
+    most = min(MAX_POSES, FREE_POSES + 2 * numbers)
+    if frames * joints > most:
+        raise MotionloomError(
+            f"{path} has {frames} frames of {joints} joints, most of which it says nothing about; at most {most:,} "
+            "together are read"
+        )
 
 
 def numbers(data: bytes, *, path: Path | str, first_line: int) -> NDArray[np.float64]:

@@ -49,7 +49,7 @@ class NetConfig:
         if self.manner not in ("published", "modulated"):
             raise MotionloomError(f"no network manner {self.manner!r}; there are published and modulated")
         if (
-            any(not isinstance(n, int) or not 0 < n <= 65536 for n in numbers)
+            any(type(n) is not int or not 0 < n <= 65536 for n in numbers)
             or self.layers > 256
             or self.width % self.heads
             or not isinstance(self.flags, bool)

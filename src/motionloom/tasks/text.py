@@ -4,7 +4,7 @@ A prompt becomes word vectors once; noise is drawn per motion from its own seed;
 features with the guided network as its denoiser; features become positions, positions a person with constant bones.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import torch
@@ -48,12 +48,33 @@ def sample_features(
 
     The network sees at most `ROWS` motions at once, of equal length, so that memory does not grow with their number.
     """
+    made = _sampled(
+        prior, prompts, frames, seeds=seeds, guidance=guidance, steps=steps, solver=solver, spacing=spacing,
+        progress=progress,
+    )  # fmt: skip
+    result = dict(made)
+    return [result[row] for row in range(len(prompts))]
+
+
+@torch.inference_mode()
+def _sampled(
+    prior: Prior,
+    prompts: Sequence[str],
+    frames: Sequence[int],
+    *,
+    seeds: Sequence[int],
+    guidance: float,
+    steps: int,
+    solver: str,
+    spacing: str = SPACING,
+    progress: Progress | None,
+) -> Iterator[tuple[int, Tensor]]:
+    """`sample_features` row by row, each as soon as it is finished: the row's number and its features."""
     check(prior, prompts, steps=steps, guidance=guidance, solver=solver)
     if not all(0 <= seed < 2 * LARGEST_SEED for seed in seeds):
         raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {min(seeds)}")
     way = levels(prior.schedule, steps, spacing=spacing)  # type: ignore[arg-type]
     groups = _groups(frames)
-    result: dict[int, Tensor] = {}
     for number, rows in enumerate(groups):
         cond = prior.condition([prompts[row] for row in rows])
         denoise = guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), guidance)
@@ -67,9 +88,7 @@ def sample_features(
         finished = state * prior.std + prior.mean
         if prior.net.config.patch > 1:
             finished = smooth(finished)
-        for row, features in zip(rows, finished.cpu(), strict=True):
-            result[row] = features
-    return [result[row] for row in range(len(prompts))]
+        yield from zip(rows, finished.cpu(), strict=True)
 
 
 def generate(
@@ -93,6 +112,31 @@ def generate(
     skeleton.
     Raises `MotionloomError` for what cannot be asked. (Tevet et al. 2023; guidance: Ho & Salimans 2022.)
     """
+    made = generate_each(
+        prior, prompts, seconds=seconds, count=count, seed=seed, guidance=guidance, steps=steps, solver=solver,
+        clean=clean, progress=progress,
+    )  # fmt: skip
+    motions = dict(made)
+    return [motions[row] for row in range(len(motions))]
+
+
+def generate_each(
+    prior: Prior,
+    prompts: Sequence[str] | str,
+    *,
+    seconds: float | Sequence[float] = 5.0,
+    count: int = 1,
+    seed: int = 0,
+    guidance: float = GUIDANCE,
+    steps: int = STEPS,
+    solver: str = SOLVER,
+    clean: bool = True,
+    progress: Progress | None = None,
+) -> Iterator[tuple[int, Motion]]:
+    """The motions of `generate`, each with its number as soon as it is finished; arguments and errors as there.
+
+    Those of equal length come in order, `ROWS` of them at a time.
+    """
     check_features(prior)
     said = [prompts] if isinstance(prompts, str) else list(prompts)
     lengths = [float(s) for s in np.atleast_1d(np.asarray(seconds, dtype=np.float64))]
@@ -108,11 +152,12 @@ def generate(
     frames = [frames_in(length, prior.fps) for length in lengths for _ in range(count)]
     if not 0 <= seed < LARGEST_SEED:
         raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {seed}")
-    made = sample_features(
+    made = _sampled(
         prior, said, frames, seeds=[seed + i for i in range(len(said))],
         guidance=guidance, steps=steps, solver=solver, progress=progress,
     )  # fmt: skip
-    return [finish(prior, features, clean=clean) for features in made]
+    for row, features in made:
+        yield row, finish(prior, features, clean=clean)
 
 
 def smooth(features: Tensor) -> Tensor:

@@ -4,11 +4,13 @@ Everything random in a step follows from (seed, step, rank), and the state file 
 killed at any moment goes on with the losses it would have had.
 """
 
+import hashlib
 import json
 import math
 import os
 import time
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -16,12 +18,11 @@ from typing import Any
 
 import torch
 import torch.distributed as dist
-from safetensors.torch import save_file
 from torch import Tensor, nn
 from torch.nn.attention import SDPBackend, sdpa_kernel
 
 from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
+from motionloom.io.tensors import save_tensors
 from motionloom.train.objectives import Objective
 from motionloom.train.recipe import Recipe
 from motionloom.weights.prior import read_tensors
@@ -94,27 +95,83 @@ def save_state(
     for number, state in optimizer.state_dict()["state"].items():
         tensors |= {f"optimizer.{number}.{k}": torch.as_tensor(v) for k, v in state.items()}
     tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
-    with atomic_path(folder / STATE) as temp:
-        save_file(tensors, temp, metadata={"step": str(step), "recipe": json.dumps(asdict(recipe))})
+    metadata = {"step": str(step), "recipe": json.dumps(asdict(recipe))}
+    metadata["checksum"] = _checksum(tensors, metadata)
+    save_tensors(tensors, folder / STATE, metadata=metadata)
+
+
+def _checksum(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str:
+    """Of all that a state file says, so that a byte that turned over is noticed."""
+    found = hashlib.blake2b(digest_size=32)
+    for key in ("step", "recipe"):
+        found.update(f"{key}={metadata[key]};".encode())
+    for name in sorted(tensors):
+        value = tensors[name].contiguous()
+        found.update(f"{name} {value.dtype} {tuple(value.shape)};".encode())
+        found.update(value.reshape(-1).view(torch.uint8).numpy().data)
+    return found.hexdigest()
 
 
 def load_state(path: Path, net: nn.Module, average: Average, optimizer: torch.optim.Optimizer) -> int:
-    """Fill the run's parts from a state file; returns the number of steps done."""
+    """Fill the run's parts from a state file; returns the number of steps done.
+
+    Raises MotionloomError, and fills nothing, where the file is damaged or of another recipe.
+    """
     tensors, metadata = read_tensors(path)
+    if not {"step", "recipe"} <= metadata.keys():
+        raise MotionloomError(f"{path} is no state of a training run; train into another folder")
+    if "checksum" not in metadata:
+        warnings.warn(f"{path} was saved without a checksum by an older version; it is taken as it is", stacklevel=2)
+    elif metadata["checksum"] != _checksum(tensors, metadata):
+        raise MotionloomError(f"{path} is damaged: its checksum is another; train into another folder")
     try:
-        net.load_state_dict({k[4:]: v for k, v in tensors.items() if k.startswith("net.")})
+        step = _step_count(metadata["step"])
+        _check_state(tensors, net, average, optimizer)
+        net.load_state_dict(_part(tensors, "net."))
         for key, value in average.weights.items():
             value.copy_(tensors[f"average.{key}"])
         state: dict[int, dict[str, Tensor]] = {}
-        for key, value in tensors.items():
-            if key.startswith("optimizer."):
-                _, number, name = key.split(".", 2)
-                state.setdefault(int(number), {})[name] = value
+        for key, value in _part(tensors, "optimizer.").items():
+            number, _, name = key.partition(".")
+            state.setdefault(int(number), {})[name] = value
         optimizer.load_state_dict({"state": state, "param_groups": optimizer.state_dict()["param_groups"]})
-        return int(metadata["step"])
-    except (KeyError, RuntimeError, ValueError) as error:
+        return step
+    except (KeyError, RuntimeError, ValueError, TypeError) as error:
         reason = " ".join(str(error).split())[:200]
         raise MotionloomError(f"{path} does not belong to this recipe ({reason}); train into another folder") from None
+
+
+def _part(tensors: Mapping[str, Tensor], beginning: str) -> dict[str, Tensor]:
+    return {key.removeprefix(beginning): value for key, value in tensors.items() if key.startswith(beginning)}
+
+
+def _step_count(said: str) -> int:
+    if not (said.isascii() and said.isdigit() and len(said) <= 10):
+        raise ValueError(f"its step is {said[:20]!r}")
+    return int(said)
+
+
+def _check_state(
+    tensors: Mapping[str, Tensor], net: nn.Module, average: Average, optimizer: torch.optim.Optimizer
+) -> None:
+    """Raise ValueError unless every tensor is finite, and has the shape and kind of what it is to fill."""
+    wanted = {f"net.{k}": v for k, v in net.state_dict().items()}
+    wanted |= {f"average.{k}": v for k, v in average.weights.items()}
+    places = [p for group in optimizer.param_groups for p in group["params"]]
+    moments = {"exp_avg": places, "exp_avg_sq": places, "step": [torch.tensor(0.0)] * len(places)}
+    for key in _part(tensors, "optimizer."):
+        number, _, name = key.partition(".")
+        if not (number.isascii() and number.isdigit() and int(number) < len(places) and name in moments):
+            raise ValueError(f"the optimiser has no {key[:40]}")
+        wanted |= {f"optimizer.{number}.{each}": values[int(number)] for each, values in moments.items()}
+    lacking = sorted(wanted.keys() - tensors.keys()) or sorted(tensors.keys() - wanted.keys())
+    if lacking:
+        raise ValueError(f"{lacking[0][:80]} is {'missing' if lacking[0] in wanted else 'not needed'}")
+    for key, value in tensors.items():
+        if value.shape != wanted[key].shape or value.dtype != wanted[key].dtype:
+            raise ValueError(f"{key} is {value.dtype} of the shape {tuple(value.shape)}")
+        if value.is_floating_point() and not bool(value.isfinite().all()):
+            raise ValueError(f"{key} has numbers that are not finite")
 
 
 def changed(folder: Path, recipe: Recipe) -> list[str]:
@@ -125,7 +182,7 @@ def changed(folder: Path, recipe: Recipe) -> list[str]:
         before = json.loads(read_tensors(folder / STATE)[1]["recipe"])
         now = asdict(recipe)
         return [f"{key} is now {now[key]!r} and was {before.get(key)!r}" for key in now if before.get(key) != now[key]]
-    except (KeyError, ValueError, AttributeError):
+    except (KeyError, ValueError, AttributeError, RecursionError):
         return []
 
 

@@ -71,6 +71,8 @@ class Settings:
         shares = 0 <= settings.untold < 1 and 0 <= settings.smoothed <= 1
         if settings.manner not in ("published", "told") or not shares:
             raise MotionloomError("[predictor] manner is 'published' or 'told', untold and smoothed are shares")
+        if not 1 <= settings.kept <= 8192:
+            raise MotionloomError("[predictor] kept is a number of frequencies, from 1 to the frames of a window")
         return settings
 
 
@@ -205,6 +207,8 @@ class Completion:
 def new_predictor(protocol: Protocol, settings: Settings, windows: Windows, *, schedule: str, levels: int) -> Predictor:
     """An untrained predictor for a protocol's windows, with their statistics."""
     layout, frames = protocol.layout, protocol.frames
+    if settings.dct and settings.kept > frames:
+        raise MotionloomError(f"[predictor] kept is {settings.kept}, and a window has {frames} frames; keep fewer")
     basis = Dct(frames, settings.kept) if settings.dct else Frames(frames)
     kept = basis.kept
     told = told_shape(layout, kept) if settings.manner == "told" else None

@@ -8,7 +8,12 @@ from typing import Any, get_type_hints
 
 from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
+from motionloom.io.text import read_utf8
 from motionloom.nets.prior import NetConfig
+
+MAX_BYTES = 1 << 16
+MAX_DOTS = 200
+"""Of one line."""
 
 
 @dataclass(frozen=True)
@@ -85,11 +90,13 @@ class Recipe:
 def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Recipe:
     """Read a recipe; ``changes`` replace entries. Raises MotionloomError for unknown keys and unusable values."""
     path = Path(path)
+    if not path.exists():
+        raise MotionloomError(f"there is no recipe {path}")
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise MotionloomError(f"there is no recipe {path}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        values = _parsed(read_utf8(path, max_bytes=MAX_BYTES))
+    except MotionloomError:
+        raise
+    except (ValueError, RecursionError) as error:  # not TOML, or a number of thousands of digits
         raise MotionloomError(f"{path} is not TOML: {error}") from None
     values = _merged(values, changes or {})
     hints = get_type_hints(Recipe)
@@ -102,7 +109,7 @@ def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Reci
         if kind is float and isinstance(value, int) and not isinstance(value, bool):
             values[key] = float(value)
         elif not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-            raise MotionloomError(f"{path}: {key} must be of kind {kind.__name__}; got {value!r}")
+            raise MotionloomError(f"{path}: {key} must be of kind {kind.__name__}; got {_shown(value)}")
     recipe = Recipe(**values)
     _check(path, recipe)
     return recipe
@@ -112,7 +119,11 @@ def _check(path: Path, recipe: Recipe) -> None:
     lists = {"sources": str, "prompts": str, "windows": int, "shares": int | float}
     for key, kind in lists.items():
         if not all(isinstance(value, kind) and not isinstance(value, bool) for value in getattr(recipe, key)):
-            raise MotionloomError(f"{path}: an entry of {key} is of the wrong kind: {getattr(recipe, key)!r}")
+            raise MotionloomError(f"{path}: an entry of {key} is of the wrong kind: {_shown(getattr(recipe, key))}")
+    for label, value in recipe.favour.items():
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not 0 <= value <= 1e6:
+            raise MotionloomError(f"{path}: favour.{label} must be a number from 0 to 1e6; got {_shown(value)}")
     if not re.fullmatch(r"\w[\w.-]{0,63}", recipe.name):
         raise MotionloomError(f"{path}: the name {recipe.name!r} becomes a file's; use letters, digits, _ - .")
     limits = {
@@ -129,7 +140,7 @@ def _check(path: Path, recipe: Recipe) -> None:
     }
     for key, limit in limits.items():
         if not 0 <= getattr(recipe, key) <= limit:
-            raise MotionloomError(f"{path}: {key} must be from 0 to {limit:g}; got {getattr(recipe, key)!r}")
+            raise MotionloomError(f"{path}: {key} must be from 0 to {limit:g}; got {_shown(getattr(recipe, key))}")
     good = (
         recipe.steps > 0 < recipe.batch and recipe.rank > 0 < recipe.rate
         and 0 <= recipe.ema < 1 and 0 <= recipe.drop_text < 1 and 0 <= recipe.early <= 1
@@ -154,10 +165,28 @@ def changes(pairs: list[str]) -> dict[str, Any]:
         if not found:
             raise MotionloomError(f"{pair!r} is not of the form KEY=VALUE, such as steps=20000")
         try:
-            result = _merged(result, tomllib.loads(f"{key} = {value}"))
-        except (tomllib.TOMLDecodeError, RecursionError):
+            result = _merged(result, _parsed(f"{key} = {value}"))
+        except (ValueError, RecursionError):
             result[key] = value
     return result
+
+
+def _parsed(said: str) -> dict[str, Any]:
+    """TOML as a dictionary; raises ValueError or RecursionError for anything else.
+
+    Keys of keys are counted first: the time that the parser takes grows with the square of their number.
+    """
+    if any(line.count(".") > MAX_DOTS for line in said.splitlines()):
+        raise ValueError(f"a line has more than {MAX_DOTS} dots")
+    return tomllib.loads(said)
+
+
+def _shown(value: object) -> str:
+    """A value as messages tell it; one of thousands of digits has no decimal text at all."""
+    try:
+        return repr(value)[:80]
+    except ValueError:
+        return "a number beyond all bounds"
 
 
 def _merged(values: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

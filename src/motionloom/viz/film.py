@@ -72,7 +72,9 @@ def _write_mp4(frames: Iterator[Image.Image], path: Path, size: tuple[int, int],
         "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", f"file:{path.absolute()}",
     ]  # fmt: skip
     with tempfile.TemporaryFile() as log:
-        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log)
+        process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log, start_new_session=True
+        )  # in a session of its own: a Ctrl-C is for us, who may be about to finish the film
         assert process.stdin is not None
         try:
             for frame in frames:

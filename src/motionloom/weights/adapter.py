@@ -22,12 +22,12 @@ from typing import Any, NamedTuple, Protocol
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
+from motionloom.io.atomic import finished
+from motionloom.io.tensors import save_tensors
 from motionloom.nets.prior import Bound, Condition, NetConfig, PriorNet
 from motionloom.weights.container import check, is_signed
 
@@ -141,8 +141,7 @@ class Adapter:
             raise MotionloomError(f"adapters are written as .safetensors; {path.name} has another suffix")
         about = {key: getattr(self, key) for key in _TEXTS} | {"format": FORMAT, "rank": self.rank, "notes": self.notes}
         tensors = {k: v.detach().cpu().to(torch.float16).contiguous() for k, v in self.tensors.items()}
-        with atomic_path(path) as temp:
-            save_file(tensors, temp, metadata={KEY: json.dumps(about)})
+        save_tensors(tensors, path, metadata={KEY: json.dumps(about)})
         return path
 
 
@@ -152,7 +151,7 @@ _TEXTS = ("name", "control", "base", "fingerprint", "licence", "data")
 def adapters() -> dict[str, Path]:
     """Names and places of the adapters inside the package, for the prior ``default``."""
     folder = Path(str(resources.files("motionloom"))) / "weights" / "control"
-    return {path.stem: path for path in sorted(folder.glob("*.safetensors"))}
+    return {path.stem: path for path in finished(folder, "*.safetensors")}
 
 
 def is_adapter(path: Path) -> bool:

@@ -13,12 +13,12 @@ from typing import Any, Protocol
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor
 
 from motionloom.diffusion import Schedule
 from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
+from motionloom.io.atomic import finished
+from motionloom.io.tensors import save_tensors
 from motionloom.nets.pair import PairConfig, PairNet, Talk
 from motionloom.nets.prior import PriorNet
 from motionloom.weights.adapter import origin
@@ -95,8 +95,7 @@ class PairBlock:
             raise MotionloomError("the block has weights that are not finite, and is not written; train it again")
         about = {key: getattr(self, key) for key in _TEXTS}
         about |= {"format": FORMAT, "config": asdict(self.config), "notes": self.notes}
-        with atomic_path(path) as temp:
-            save_file(tensors, temp, metadata={KEY: json.dumps(about)})
+        save_tensors(tensors, path, metadata={KEY: json.dumps(about)})
         return path
 
     def net(self, prior: HasNet) -> PairNet:
@@ -110,7 +109,7 @@ class PairBlock:
 def blocks() -> dict[str, Path]:
     """Names and places of the two-person blocks inside the package, for the prior ``default``."""
     folder = Path(str(resources.files("motionloom"))) / "weights" / "pair"
-    return {path.stem: path for path in sorted(folder.glob("*.safetensors"))}
+    return {path.stem: path for path in finished(folder, "*.safetensors")}
 
 
 def is_block(path: Path) -> bool:

@@ -18,13 +18,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 import torch
-from safetensors.torch import save_file
 from torch import Tensor
 
 from motionloom.diffusion import SCHEDULES, Basis, Dct, Denoiser, Frames, Schedule, State, from_noise
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import Layout
-from motionloom.io.atomic import atomic_path
+from motionloom.io.atomic import finished
+from motionloom.io.tensors import save_tensors
 from motionloom.nets.predictor import NetConfig, TransLinear
 from motionloom.weights.container import fill, is_signed
 from motionloom.weights.prior import Card, find_device, read_tensors
@@ -119,7 +119,7 @@ def told_shape(layout: Layout, kept: int) -> tuple[int, int]:
 def shipped_predictors() -> dict[str, Path]:
     """Names and places of the predictors inside the package."""
     folder = Path(str(resources.files("motionloom"))) / "weights" / "prediction"
-    return {path.stem: path for path in sorted(folder.glob("*.safetensors"))}
+    return {path.stem: path for path in finished(folder, "*.safetensors")}
 
 
 def find_predictor(weights: str | Path) -> Path:
@@ -156,8 +156,7 @@ def save_predictor(predictor: Predictor, path: Path | str, *, half: bool = True)
         "manner": predictor.manner,
         "card": asdict(predictor.card),
     }
-    with atomic_path(path) as temp:
-        save_file(tensors, temp, metadata={"motionloom-predictor": json.dumps(about)})
+    save_tensors(tensors, path, metadata={"motionloom-predictor": json.dumps(about)})
     return path
 
 
@@ -182,8 +181,8 @@ def load_predictor(path: Path) -> Predictor:
         fps, observed, manner, card = float(about["fps"]), about["observed"], about["manner"], Card(**about["card"])
         told = {"told": told_shape(layout, config.kept), "published": None}
         good = (
-            name in SCHEDULES and isinstance(levels, int) and 1 <= levels <= 100_000
-            and math.isfinite(fps) and 1 <= fps <= 1000 and isinstance(observed, int) and 2 <= observed < basis.frames
+            name in SCHEDULES and type(levels) is int and 1 <= levels <= 100_000
+            and math.isfinite(fps) and 1 <= fps <= 1000 and type(observed) is int and 2 <= observed < basis.frames
             and layout.channels == config.channels and config.told == told[manner]
             and all(isinstance(text, str) for text in (card.name, card.licence, card.data))
             and isinstance(card.notes, dict)
@@ -209,7 +208,7 @@ def load_predictor(path: Path) -> Predictor:
 
 
 def _basis(kept: int, frames: Any, dct: Any) -> Basis:
-    if not isinstance(frames, int) or not kept <= frames <= LONGEST_WINDOW or (dct is not True and kept != frames):
+    if type(frames) is not int or not kept <= frames <= LONGEST_WINDOW or (dct is not True and kept != frames):
         raise ValueError(f"{kept} of {frames!r} frequencies")
     return Dct(frames, kept) if dct is True else Frames(frames)
 

@@ -15,12 +15,12 @@ from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor
 
 from motionloom.diffusion import SCHEDULES, Schedule
 from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
+from motionloom.io.atomic import finished
+from motionloom.io.tensors import save_tensors
 from motionloom.nets.prior import Condition, NetConfig, PriorNet, condition
 from motionloom.nets.text import MiniLM, TextEncoder
 from motionloom.nets.text.known import Known, pack_known, unpack_known, with_sentences
@@ -114,7 +114,7 @@ def find_device(name: str | torch.device) -> torch.device:
 def shipped() -> dict[str, Path]:
     """Names and places of the priors inside the package."""
     folder = Path(str(resources.files("motionloom"))) / "weights"
-    return {path.stem: path for path in sorted(folder.glob("*.safetensors")) if is_signed(path, "motionloom")}
+    return {path.stem: path for path in finished(folder, "*.safetensors") if is_signed(path, "motionloom")}
 
 
 def find_weights(weights: str | Path) -> Path:
@@ -153,8 +153,7 @@ def save_prior(prior: Prior, path: Path | str, *, half: bool = True) -> Path:
     if prior.known is not None:
         table, about["known"] = pack_known(prior.known)
         tensors |= table
-    with atomic_path(path) as temp:
-        save_file(tensors, temp, metadata={"motionloom": json.dumps(about)})
+    save_tensors(tensors, path, metadata={"motionloom": json.dumps(about)})
     return path
 
 
@@ -166,7 +165,9 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
             raise MotionloomError(f"{path} is {size / 2**30:.1f} GiB large; weight files of at most 2 GiB are read")
         with safe_open(path, framework="pt") as file:
             return {key: file.get_tensor(key) for key in file.keys()}, dict(file.metadata() or {})  # noqa: SIM118
-    except SafetensorError as error:
+    except (SafetensorError, OSError, ValueError, TypeError, KeyError, RuntimeError, AttributeError) as error:
+        if isinstance(error, MotionloomError):
+            raise
         raise MotionloomError(
             f"{path} is not a whole safetensors file ({error}); published .pt files come in through 'motionloom import'"
         ) from None
@@ -208,11 +209,11 @@ def _about(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
                 f"{path} has format {about['format']}; this motionloom reads format {FORMAT}: update it"
             )
         steps = about["schedule"]["steps"]
-        known = about["schedule"]["name"] in SCHEDULES and isinstance(steps, int) and 1 <= steps <= 100_000
+        known = about["schedule"]["name"] in SCHEDULES and type(steps) is int and 1 <= steps <= 100_000
         kinds = {"name": str, "licence": str, "data": str, "notes": dict}
         card = about["card"]
         good_card = "name" in card and all(isinstance(card.get(k, kind()), kind) for k, kind in kinds.items())
-        good_rate = isinstance(about["fps"], int | float) and math.isfinite(about["fps"]) and 1 <= about["fps"] <= 1000
+        good_rate = type(about["fps"]) in (int, float) and math.isfinite(about["fps"]) and 1 <= about["fps"] <= 1000
         if not (
             known and good_card and good_rate and isinstance(about["net"], dict) and isinstance(about["text"], str)
         ):

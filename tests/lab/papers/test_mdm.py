@@ -3,7 +3,6 @@
 import json
 import pickle
 import sys
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,6 @@ from hypothesis import strategies as st
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
-from motionloom.lab.papers import mdm as published
 from motionloom.lab.papers.mdm import describe, from_published, own_name, read_published
 from motionloom.nets.text.published import PublishedText
 
@@ -183,18 +181,6 @@ def test_mutated_files_give_one_kind_of_error(tmp_path_factory: pytest.TempPathF
     path.write_bytes(content)
     with pytest.raises(MotionloomError):
         from_published(read_published(path).state)
-
-
-def test_a_small_file_that_unfolds_to_a_huge_one_is_not_unfolded(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(published, "MAX_BYTES", 1 << 20)
-    path = tmp_path / "model.pt"
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("model/data/0", bytes((1 << 20) + 1))
-    assert path.stat().st_size < 1 << 16
-    with pytest.raises(MotionloomError, match="unfolds"):
-        read_published(path)
 
 
 @pytest.mark.parametrize(

@@ -147,6 +147,11 @@ HOSTILE = {
     "holds-itself": b"(lp0\ng0\na.",
     "array-in-itself": NDARRAY + b"p0\n(I1\n(I1\ntcnumpy\ndtype\n(S'O8'\nI0\nI1\ntRI00\n(lp1\ng0\natb.",
     "list-as-key": b"}]Ns.",
+    "names-by-a-doubling-list": b"\x80\x04]q\x00" + b"(h\x00h\x00e" * 40 + b"h\x00\x93.",
+    "names-by-a-deep-list": b"\x80\x04" + b"]" * 5000 + b"a" * 4999 + b"N\x93.",
+    "names-by-lists-of-lists": b"\x80\x04]q\x00"
+    + b"".join(b"](h%ch%ceq%c" % (n, n, n + 1) for n in range(60))
+    + b"N\x93.",
     "deep": b"]" * (MAX_DEPTH + 3) + b"a" * (MAX_DEPTH + 2) + b".",
     "very-deep": b"(" * 100_000 + b"t" * 100_000 + b".",
     "many-operations": b"]" + b"Na" * (1 << 19) + b".",

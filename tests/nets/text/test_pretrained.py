@@ -11,7 +11,8 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from motionloom.errors import MotionloomError
-from motionloom.nets.text import ClipText, DistilBert, TextEncoder, hub
+from motionloom.lab.papers import text_model
+from motionloom.nets.text import ClipText, DistilBert, TextEncoder
 
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 CLIP_PIECES = [*LETTERS, *(f"{letter}</w>" for letter in LETTERS), ".</w>", "<|startoftext|>", "<|endoftext|>"]
@@ -150,9 +151,9 @@ def test_pickled_weights_are_converted_not_loaded(clip_folder: Path, tmp_path: P
         if file.suffix != ".safetensors":
             (tmp_path / file.name).write_bytes(file.read_bytes())
     torch.save(load_file(clip_folder / "model.safetensors"), tmp_path / "pytorch_model.bin")
-    with pytest.raises(MotionloomError, match=r"nets\.text\.hub"):
+    with pytest.raises(MotionloomError, match=r"papers\.text_model"):
         ClipText.open(tmp_path)
-    hub.convert(tmp_path)
+    text_model.convert(tmp_path)
     expected = ClipText.open(clip_folder).encode("a cab")
     torch.testing.assert_close(ClipText.open(tmp_path).encode("a cab").pooled, expected.pooled)
 
@@ -171,6 +172,6 @@ def test_hostile_pickles_are_refused_and_never_run(
 ) -> None:
     (tmp_path / "pytorch_model.bin").write_bytes(content)
     with pytest.raises(MotionloomError, match=r"pytorch_model\.bin"):
-        hub.convert(tmp_path)
+        text_model.convert(tmp_path)
     assert "a pickle ran" not in capsys.readouterr().out
     assert not (tmp_path / "model.safetensors").exists()

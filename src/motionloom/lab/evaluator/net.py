@@ -15,14 +15,13 @@ from pathlib import Path
 import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT, WIDTH
-from motionloom.io.atomic import atomic_path
+from motionloom.io.tensors import save_tensors
 from motionloom.nets.text import MiniLM, TextEncoder
 from motionloom.weights.container import check, shapes
 
@@ -263,8 +262,7 @@ def save_embedder(embedder: Embedder, path: Path | str) -> Path:
         "text": text_digest(embedder.text),
         "card": embedder.card,
     }
-    with atomic_path(path) as temp:
-        save_file(tensors, temp, metadata={KEY: json.dumps(about)})
+    save_tensors(tensors, path, metadata={KEY: json.dumps(about)})
     return Path(path)
 
 

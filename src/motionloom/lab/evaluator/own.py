@@ -19,6 +19,7 @@ from motionloom.data.words import mirror_text, phrases
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS
+from motionloom.io.atomic import finished
 from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Caption, Evaluator
 from motionloom.lab.evaluator.net import Embedder, is_embedder, load_embedder
@@ -90,7 +91,7 @@ def evaluators() -> dict[str, Path]:
     from importlib import resources
 
     folder = Path(str(resources.files("motionloom"))) / "weights"
-    return {path.stem: path for path in sorted(folder.glob("*.safetensors")) if is_embedder(path)}
+    return {path.stem: path for path in finished(folder, "*.safetensors") if is_embedder(path)}
 
 
 def is_own(path: Path) -> bool:

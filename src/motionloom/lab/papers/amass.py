@@ -19,6 +19,7 @@ from motionloom.data.prediction import Protocol, Recording, checked
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import SMPL_LAYOUT
 from motionloom.io import npz, text
+from motionloom.io.atomic import finished
 from motionloom.lab.papers import babel
 
 AMASS_LAYOUT = replace(SMPL_LAYOUT, across=(), root=False, z_up=True)
@@ -57,7 +58,7 @@ def set_name(folder: str) -> str | None:
 
 def is_amass(folder: Path) -> bool:
     """Whether a folder (or ``amass`` in it) has folders of AMASS's data sets with arrays in them."""
-    return any(next(place.rglob("*.np[yz]"), None) is not None for _, place in _set_folders(folder))
+    return any(finished(place, "**/*.np[yz]") for _, place in _set_folders(folder))
 
 
 def read_amass(
@@ -130,7 +131,7 @@ def _zarr(folder: Path) -> str:
 
 def _recordings(name: str, place: Path, say: Callable[[str], None]) -> Iterator[tuple[Recording, bool]]:
     files: dict[str, Path] = {}
-    for path in sorted(place.rglob("*.np[yz]"), key=lambda p: (p.suffix == ".npy", p)):  # .npy last: it wins
+    for path in sorted(finished(place, "**/*.np[yz]"), key=lambda p: (p.suffix == ".npy", p)):  # .npy last: it wins
         if not path.stem.endswith("_stagei") and path.stem != "shape":  # files of persons, not of motions
             files[path.relative_to(place).with_suffix("").as_posix()] = path
     for key in sorted(files):
@@ -170,13 +171,7 @@ def _given(path: Path) -> tuple[np.ndarray, float]:
         if rate.size != 1 or rate.dtype.kind not in "fiu":
             raise MotionloomError(f"{path} has a frame rate that is no number")
         return places, float(rate.reshape(()))
-    try:
-        if path.stat().st_size > text.MAX_BYTES:
-            raise ValueError("it is larger than 2 GB")
-        return np.array(np.load(path, allow_pickle=False, mmap_mode="r")), AMASS_FPS
-    except (OSError, ValueError, EOFError, SyntaxError, TypeError) as error:
-        reason = " ".join(str(error).split())[:120]
-        raise MotionloomError(f"{path} is not a .npy array of numbers ({reason})") from None
+    return npz.read_array(path), AMASS_FPS
 
 
 def _members(path: Path) -> set[str]:

@@ -10,7 +10,6 @@ the collection, which not every way of unpacking makes, may be single.
 Pairs are made as for PriorMDM's BABEL models ("separate pairs"): see `pairs` and `items`.
 """
 
-import json
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -40,6 +39,8 @@ BRIEFEST = 0.5
 _RELEASE = "babel_v1.0_release"
 _MAX_JSON = 1 << 28
 _MAX_LABELS = 1000
+_MAX_PAIRS = 20_000
+_LATEST = 1e6
 _POSES = {"t pose", "a pose", "tpose", "apose"}
 
 
@@ -134,9 +135,9 @@ def find_recordings(folder: Path | str, *, splits: Sequence[str] = ("train", "va
 def read_labels(path: Path, split: str) -> list[Recording]:
     """One label file; raises MotionloomError, naming the sequence, for anything but BABEL's form."""
     try:
-        whole = json.loads(text.read_bytes(path, max_bytes=_MAX_JSON))
-    except (ValueError, RecursionError) as error:
-        raise MotionloomError(f"{path} is not JSON ({error}); fetch BABEL's label files again") from None
+        whole = text.parse_json(text.read_bytes(path, max_bytes=_MAX_JSON), path)
+    except MotionloomError as error:
+        raise MotionloomError(f"{error}; fetch BABEL's label files again") from None
     if not isinstance(whole, dict):
         raise MotionloomError(f"{path} must hold an object with one entry per sequence, as BABEL's label files do")
     result = []
@@ -180,7 +181,7 @@ def _text(label: dict[str, Any]) -> str:
 
 def _segment(label: dict[str, Any]) -> Segment:
     start, end = float(label["start_t"]), float(label["end_t"])
-    if not (math.isfinite(start) and math.isfinite(end) and start >= 0):
+    if not (0 <= start <= _LATEST and math.isfinite(end)):
         raise ValueError(f"a label goes from {start} to {end} seconds")
     acts = label.get("act_cat") or []
     if not isinstance(acts, list) or not all(isinstance(a, str) for a in acts):
@@ -254,7 +255,8 @@ def pairs(segments: Sequence[Segment]) -> list[Pair]:
 
     Two actions make a pair where one ends within the other, or a frame apart: their overlap is the transition. And they
     make one where a stretch labelled as a transition begins at or within the first and ends at or within the second.
-    A stretch that lies within another is not followed by it and makes none.
+    A stretch that lies within another is not followed by it and makes none. Raises MotionloomError for more pairs than
+    anybody labels.
     """
     known = [s for s in segments if not s.is_calibration]
     actions = [s for s in known if not s.is_transition]
@@ -267,6 +269,8 @@ def pairs(segments: Sequence[Segment]) -> list[Pair]:
     for t in (s for s in known if s.is_transition):
         before = [a for a in actions if a.start < t.start <= a.end + TOUCH and a.end <= t.end]
         after = [b for b in actions if t.start <= b.start <= t.end + TOUCH and b.end > t.end]
+        if len(made) + len(before) * len(after) > _MAX_PAIRS:
+            raise MotionloomError(f"a recording's labels make more than {_MAX_PAIRS:,} pairs; fetch the file again")
         made += [
             Pair((a.text, b.text), (a.start, t.start), (t.start, t.end), (t.end, b.end))
             for a, b in product(before, after)

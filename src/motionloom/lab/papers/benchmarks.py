@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from motionloom.data.prediction import Protocol, Recording, checked, read_cmu, read_folder
 from motionloom.errors import MotionloomError
 from motionloom.io import text
+from motionloom.io.atomic import finished
 from motionloom.lab.papers.amass import is_amass, read_amass
 from motionloom.lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT
 from motionloom.lab.papers.pickled import Tables, read_tables
@@ -73,7 +74,8 @@ def read_h36m(
 
 def h36m_class(action: str) -> str:
     """``Walking 1`` is ``Walking``; the data set's own longer names are the benchmark's."""
-    name = re.sub(r"[ _]?\d*$", "", action)
+    name = action.rstrip("0123456789")
+    name = name[:-1] if name.endswith((" ", "_")) else name
     return _ALIASES.get(name, name)
 
 
@@ -191,7 +193,7 @@ def _recognised(path: Path, name: str | None) -> tuple[str, Path]:
 
 
 def _npz_files(folder: Path, kind: str) -> list[Path]:
-    return [p for p in sorted(folder.glob(f"data_3d_{kind}*.npz")) if not p.stem.endswith("_test")]
+    return [p for p in finished(folder, f"data_3d_{kind}*.npz") if not p.stem.endswith("_test")]
 
 
 def _file_kind(path: Path) -> str:

@@ -15,11 +15,10 @@ from typing import Any, Literal
 import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
+from motionloom.io.tensors import save_tensors
 from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Caption
 from motionloom.lab.papers.guo_nets import UNIT, GuoNets, from_state_dict, read_guo
@@ -226,8 +225,7 @@ def save_guo(evaluator: GuoEvaluator, path: Path | str) -> Path:
         tensors |= {"words.vectors": torch.from_numpy(np.ascontiguousarray(evaluator.words.vectors, dtype=np.float32))}
         special = None if evaluator.words.special is None else dict(evaluator.words.special)
     about = {"format": FORMAT, "kind": KIND, "card": dict(evaluator.card), "special": special}
-    with atomic_path(path) as temp:
-        save_file(tensors, temp, metadata={"motionloom": json.dumps(about)})
+    save_tensors(tensors, path, metadata={"motionloom": json.dumps(about)})
     return path
 
 

@@ -5,7 +5,6 @@ snippet), and a text and a motion encoder (bidirectional GRUs with a learned fir
 Their sizes are read from the weights, so HumanML3D (259 channels), KIT (247) and BABEL (135) fit alike.
 """
 
-import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -16,7 +15,7 @@ from torch import Tensor, nn
 from torch.nn.utils.rnn import pack_padded_sequence
 
 from motionloom.errors import MotionloomError
-from motionloom.lab.papers.mdm import MAX_BYTES
+from motionloom.lab.papers.torch_file import read_torch_file
 from motionloom.weights.container import fill
 
 UNIT = 4
@@ -161,19 +160,13 @@ def _sizes(state: Mapping[str, Tensor]) -> GuoSizes:
 def read_guo(path: Path | str) -> dict[str, Tensor]:
     """The weights of a published ``finest.tar`` by full name; optimisers and counters in the file are left out.
 
-    Read with torch's weights-only reader. Raises MotionloomError for a file that is missing, larger than 2 GiB (also
+    Read as `read_torch_file` does. Raises MotionloomError for a file that is missing, larger than 2 GiB (also
     unpacked), damaged, of another kind, or that holds anything but plain values.
     """
     path = Path(path)
     if not path.is_file():
         raise MotionloomError(f"there is no checkpoint {path}")
-    try:
-        if _unfolded(path) > MAX_BYTES:
-            raise ValueError("it unfolds to more than 2 GiB")
-        loaded = torch.load(path, map_location="cpu", weights_only=True)
-    except Exception as error:  # whatever torch meets in a file from outside
-        reason = " ".join(str(error).split())[:120]
-        raise MotionloomError(f"{path} holds more than tensors or is damaged, and is not opened ({reason})") from None
+    loaded = read_torch_file(path)
     missing = [part for part in PARTS if not isinstance(loaded, dict) or not isinstance(loaded.get(part), dict)]
     if missing:
         raise MotionloomError(f"{path} has no {missing[0]}; name the finest.tar of text_mot_match, which has all three")
@@ -182,13 +175,6 @@ def read_guo(path: Path | str) -> dict[str, Tensor]:
         if not isinstance(value, Tensor) or not _plain(value):
             raise MotionloomError(f"{path}: {key} is not an ordinary array of floating-point numbers; it is not read")
     return state
-
-
-def _unfolded(path: Path) -> int:
-    if not zipfile.is_zipfile(path):
-        return path.stat().st_size
-    with zipfile.ZipFile(path) as archive:  # a small file may unfold to a huge one
-        return max(path.stat().st_size, sum(entry.file_size for entry in archive.infolist()))
 
 
 def _plain(value: Tensor) -> bool:

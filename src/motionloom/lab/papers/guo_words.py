@@ -17,6 +17,7 @@ from typing import Any, cast
 import numpy as np
 
 from motionloom.errors import MotionloomError
+from motionloom.io import npz
 from motionloom.lab.papers.plain_pickle import read_plain_file
 
 TAGS = (
@@ -171,17 +172,10 @@ def _literal_lists(text: str) -> dict[str, object]:
 
 def read_array(path: Path | str) -> np.ndarray:
     """A .npy array of finite floating-point numbers, without pickle; raises MotionloomError for anything else."""
-    path = Path(path)
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise ValueError("it is larger than 1 GiB")
-        values = np.load(path, allow_pickle=False, mmap_mode="r")  # a declared size beyond the file's is refused
-        if not isinstance(values, np.ndarray) or values.dtype.kind != "f" or not np.isfinite(values).all():
-            raise ValueError("it holds something else than finite floating-point numbers")
-        return np.array(values)
-    except (OSError, ValueError, EOFError, SyntaxError, TypeError) as error:
-        reason = " ".join(str(error).split())[:120]
-        raise MotionloomError(f"{path} is not a .npy array of numbers ({reason})") from None
+    values = npz.read_array(path, max_bytes=MAX_BYTES)
+    if values.dtype.kind != "f" or not np.isfinite(values).all():
+        raise MotionloomError(f"{path} holds something else than finite floating-point numbers; fetch it again")
+    return values
 
 
 def read_flat(path: Path | str) -> list[Any] | dict[Any, Any]:

@@ -4,7 +4,6 @@ Keys and shapes: MDM's ``trans_enc`` (HumanML3D 263, KIT 251, BABEL 135 with or 
 """
 
 import json
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,12 +12,14 @@ import torch
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
+from motionloom.io.text import read_bytes
+from motionloom.lab.papers.torch_file import read_torch_file
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.weights.container import fill
 
-MAX_BYTES = 2 << 30
 _IGNORED = ("clip_model.", "sequence_pos_encoder.pe", "embed_timestep.sequence_pos_encoder.pe", "t_pos_encoder.pe")
 _HEADS = 4
+_MAX_OPTIONS = 1 << 20
 
 _NAMES = {
     "input_process.poseEmbedding": "embed",
@@ -94,22 +95,11 @@ def from_published(state: dict[str, Tensor]) -> PriorNet:
 
 
 def read_published(path: Path | str) -> Published:
-    """Read ``model*.pt`` with torch's weights-only reader, and ``args.json`` beside it if it is there."""
+    """Read ``model*.pt`` (as `read_torch_file`), and ``args.json`` beside it if it is there."""
     path = Path(path)
     if not path.is_file():
         raise MotionloomError(f"there is no checkpoint {path}")
-    if path.stat().st_size > MAX_BYTES:
-        raise MotionloomError(f"{path} is larger than 2 GiB; published checkpoints are far smaller")
-    try:
-        if zipfile.is_zipfile(path):
-            with zipfile.ZipFile(path) as archive:  # a small file may unfold to a huge one
-                unfolded = sum(entry.file_size for entry in archive.infolist())
-            if unfolded > MAX_BYTES:
-                raise ValueError(f"it unfolds to {unfolded / 2**30:.1f} GiB")
-        loaded = torch.load(path, map_location="cpu", weights_only=True)
-    except Exception as error:  # whatever torch meets in a file from outside
-        reason = " ".join(str(error).split())[:120]
-        raise MotionloomError(f"{path} holds more than tensors or is damaged, and is not opened ({reason})") from None
+    loaded = read_torch_file(path)
     averaged = isinstance(loaded, dict) and "model_avg" in loaded
     state = loaded["model_avg"] if averaged else loaded.get("model", loaded) if isinstance(loaded, dict) else None
     if not isinstance(state, dict) or not all(isinstance(k, str) and isinstance(v, Tensor) for k, v in state.items()):
@@ -131,7 +121,9 @@ def _options(path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     try:
-        options = json.loads(path.read_text(encoding="utf-8"))
+        options = json.loads(read_bytes(path, max_bytes=_MAX_OPTIONS))
+    except MotionloomError:
+        raise
     except (ValueError, RecursionError) as error:
         raise MotionloomError(f"{path} is not JSON ({error}); mend it or move it away") from None
     if not isinstance(options, dict):

@@ -18,13 +18,12 @@ from typing import Any
 import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from motionloom.diffusion import Dct
 from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
+from motionloom.io.tensors import save_tensors
 from motionloom.nets.prior import sinusoids
 
 KEY = "motionloom-mrt"
@@ -195,8 +194,7 @@ class MrtFile:
             raise MotionloomError(f"weights are written as .safetensors; {path.name} has another suffix")
         about = {"config": asdict(self.net.config), "licence": self.licence, "data": self.data, "notes": self.notes}
         tensors = {k: v.detach().float().cpu().contiguous() for k, v in self.net.state_dict().items()}
-        with atomic_path(path) as temp:
-            save_file(tensors, temp, metadata={KEY: json.dumps(about, default=dict)})
+        save_tensors(tensors, path, metadata={KEY: json.dumps(about, default=dict)})
         return path
 
     @staticmethod

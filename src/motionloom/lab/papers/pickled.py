@@ -4,26 +4,18 @@ The usual files of Human3.6M and HumanEva-I hold one object: a dictionary of dic
 program, so it is not run: `lab.papers.plain_pickle` reads what plain values and arrays it writes down.
 """
 
-import io
-import struct
-import tokenize
-import warnings
-import zipfile
-import zlib
 from pathlib import Path
+from typing import BinaryIO, cast
 
 import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.io import text
+from motionloom.io.npz import opened, read_header
 from motionloom.lab.papers.plain_pickle import read_plain
 
 MAX_ARRAYS = 20_000
 Tables = dict[str, dict[str, np.ndarray]]
-_BROKEN = (
-    zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, SyntaxError, ValueError, TypeError, LookupError,
-    OSError, EOFError, NotImplementedError, RuntimeError, OverflowError, MemoryError, AttributeError,
-)  # fmt: skip
 
 
 def read_tables(path: Path | str, name: str) -> Tables:
@@ -31,36 +23,25 @@ def read_tables(path: Path | str, name: str) -> Tables:
 
     Raises MotionloomError, naming the file, for a file that is missing, damaged, too large or holds anything else.
     """
+    with opened(path) as (archive, members, most):
+        if name not in members:
+            listed = ", ".join(text.shown(n) for n in list(members)[:8]) or "nothing"
+            raise MotionloomError(f"{path} is not read (it has no {name}, but {listed}); fetch it again")
+        with archive.open(members[name]) as stream:
+            shape, _, dtype = read_header(cast(BinaryIO, stream))
+            if dtype.kind != "O" or shape != ():
+                raise MotionloomError(
+                    f"{path} is not read ({name} is an array of {dtype} of the shape {shape} and no dictionary); "
+                    "fetch it again"
+                )
+            if members[name].file_size > 8 * most:
+                raise MotionloomError(f"{path} is not read (it unfolds far beyond its size); fetch it again")
+            data = stream.read(members[name].file_size)
+    value = read_plain(data, limit=text.MAX_BYTES, name=str(path))
     try:
-        with warnings.catch_warnings(), zipfile.ZipFile(io.BytesIO(_zip_bytes(path))) as archive:
-            warnings.simplefilter("ignore")
-            members = archive.infolist()
-            if len(members) > 1000 or sum(m.file_size for m in members) > text.MAX_BYTES:
-                raise ValueError("it unpacks to more than 1000 arrays or 2 GB")
-            found = {m.filename.removesuffix(".npy"): m for m in members}
-            if name not in found:
-                listed = ", ".join(text.shown(n) for n in list(found)[:8]) or "nothing"
-                raise ValueError(f"it has no {name}, but {listed}")
-            with archive.open(found[name]) as stream:
-                file = io.BytesIO(stream.read(found[name].file_size))
-        version = np.lib.format.read_magic(file)
-        readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-        shape, _, dtype = readers[version](file)
-        if dtype.kind != "O" or shape != ():
-            raise ValueError(f"{name} is an array of {dtype} of the shape {shape} and no dictionary")
-        return _tables(read_plain(file.read(), limit=text.MAX_BYTES, name=str(path)))
-    except MotionloomError:
-        raise
-    except _BROKEN as error:
-        reason = " ".join(str(error).split())[:160]
-        raise MotionloomError(f"{path} is not read ({reason or type(error).__name__}); fetch it again") from None
-
-
-def _zip_bytes(path: Path | str) -> bytes:
-    data = text.read_bytes(path)
-    if not data.startswith(b"PK"):
-        raise ValueError("it is not an NPZ archive")
-    return data
+        return _tables(value)
+    except ValueError as error:
+        raise MotionloomError(f"{path} is not read ({error}); fetch it again") from None
 
 
 def _tables(value: object) -> Tables:

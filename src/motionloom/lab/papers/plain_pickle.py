@@ -28,6 +28,9 @@ MAX_OPERATIONS = 1 << 21
 MAX_DEPTH = 64
 """Containers within containers."""
 
+_SPARE = 16 << 20
+"""Bytes that arrays and decoded texts may hold beyond twice the pickle's own: a few that are shared."""
+
 _OPERATIONS = {operation.code: operation for operation in pickletools.opcodes}
 _PUSHES = {
     "BINUNICODE", "SHORT_BINUNICODE", "BINUNICODE8", "UNICODE", "STRING", "BINSTRING", "SHORT_BINSTRING",
@@ -41,7 +44,7 @@ _RECALLS = {"BINGET", "LONG_BINGET", "GET"}
 _TUPLES = {"TUPLE1": 1, "TUPLE2": 2, "TUPLE3": 3}
 _IGNORED = {"PROTO", "FRAME"}
 
-_NAMES = {
+NAMES: Mapping[tuple[str, str], str] = {
     ("numpy", "ndarray"): "ndarray",
     ("numpy", "dtype"): "dtype",
     ("_codecs", "encode"): "encode",
@@ -51,11 +54,12 @@ _NAMES = {
     **{(f"numpy.{core}.multiarray", "scalar"): "scalar" for core in ("core", "_core")},
     **{(f"numpy.{core}.numeric", "_frombuffer"): "_frombuffer" for core in ("core", "_core")},
 }
+"""The words that plain pickles may say."""
 _DTYPE = re.compile(r"[|<>=]?(b1|[iu][1248]|f[248]|c8|c16|[SU][1-9][0-9]{0,4}|O8?)")
 
 
 @dataclass(frozen=True)
-class _Name:
+class Name:
     """One of the words of numpy's pickles; never the thing it names."""
 
     word: str
@@ -99,7 +103,8 @@ def read_plain(data: bytes, *, limit: int, name: str = "the pickle") -> object:
 
     Args:
         data: The whole pickle, protocols 0 to 5 without out-of-band buffers.
-        limit: Most bytes of the pickle, of all its arrays together, and of texts in it that are decoded to bytes.
+        limit: Most bytes of the pickle, of all its arrays together, and of texts in it that are decoded to bytes. Of
+            the latter two it is 16 MiB and twice the pickle, if that is less.
         name: What errors call it.
 
     Returns:
@@ -114,28 +119,44 @@ def read_plain(data: bytes, *, limit: int, name: str = "the pickle") -> object:
     try:
         if len(data) > limit:
             raise ValueError(f"it holds {len(data)} bytes, more than {limit}")
-        return _Machine(limit).run(data)
-    except (ValueError, IndexError, KeyError, TypeError, AttributeError, OverflowError, MemoryError) as error:
+        stream = io.BytesIO(data)
+        value = Machine(min(limit, _SPARE + 2 * len(data))).run(stream)
+        if stream.read(1):
+            raise ValueError("it does not hold exactly one value")
+        return value
+    except BROKEN as error:
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise MotionloomError(f"{name} is not a pickle of plain values and is not opened ({reason})") from None
 
 
+BROKEN = (ValueError, IndexError, KeyError, TypeError, AttributeError, OverflowError, MemoryError, RecursionError)
+"""What a damaged pickle raises in a `Machine`."""
+
+
 @dataclass
-class _Machine:
+class Machine:
+    """Carries out the operations of one pickle; `lab.papers.torch_file` teaches it the few names of torch's files."""
+
     limit: int
+    """Most bytes of all arrays together, and of all texts that are made bytes."""
+    names: Mapping[tuple[str, str], str] = field(default_factory=lambda: NAMES)
+    """The words that the file may say, by module and name."""
     stack: list[Any] = field(default_factory=list)
     below: list[list[Any]] = field(default_factory=list)  # the stacks under each open mark
     memo: dict[int, Any] = field(default_factory=dict)
     made: Counter[str] = field(default_factory=Counter)  # bytes of arrays, and of texts made bytes
 
-    def run(self, data: bytes) -> object:
-        stream = io.BytesIO(data)
+    def run(self, stream: io.BytesIO) -> object:
+        """The value of the pickle that begins where the stream is; the stream is left behind it.
+
+        Raises one of `BROKEN` for whatever is wrong with it.
+        """
         for _ in range(MAX_OPERATIONS):
             operation = _OPERATIONS.get(stream.read(1).decode("latin-1"))
             if operation is None:
                 raise ValueError("it is damaged or cut short")
             if operation.name == "STOP":
-                return self._result(stream)
+                return self._result()
             if operation.name == "STRING":
                 value = _quoted(stream.readline())  # pickletools' own reader admits ASCII only
             else:
@@ -143,10 +164,10 @@ class _Machine:
             self._step(operation.name, value)
         raise ValueError(f"it has more than {MAX_OPERATIONS} operations")
 
-    def _result(self, stream: io.BytesIO) -> object:
-        if self.below or len(self.stack) != 1 or stream.read(1):
+    def _result(self) -> object:
+        if self.below or len(self.stack) != 1:
             raise ValueError("it does not hold exactly one value")
-        return _Finished().of(self.stack[0], 0)[0]
+        return Finished().of(self.stack[0], 0)[0]
 
     def _step(self, name: str, value: Any) -> None:
         stack = self.stack
@@ -187,17 +208,17 @@ class _Machine:
     def _numpy_step(self, name: str, value: Any) -> None:
         if name == "GLOBAL":
             module, _, word = value.partition(" ")
-            self.stack.append(_named(module, word))
+            self.stack.append(self._named(module, word))
         elif name == "STACK_GLOBAL":
-            self.stack.append(_named(*self._take(2)))
+            self.stack.append(self._named(*self._take(2)))
         elif name == "REDUCE":
             called, arguments = self._take(2)
-            if not isinstance(called, _Name) or not isinstance(arguments, tuple):
+            if not isinstance(called, Name) or not isinstance(arguments, tuple):
                 raise ValueError("it calls something")
-            self.stack.append(self._made(called.word, arguments))
+            self.stack.append(self.made_of(called.word, arguments))
         elif name == "BUILD":
             (state,) = self._take(1)
-            self._build(self.stack[-1], state)
+            self.build(self.stack[-1], state)
         elif name not in _IGNORED:
             raise ValueError(f"it asks for {name}")
 
@@ -208,15 +229,23 @@ class _Machine:
         del self.stack[-count:]
         return values
 
-    def _made(self, word: str, arguments: tuple[Any, ...]) -> object:
+    def _named(self, module: object, word: object) -> Name:
+        if not isinstance(module, str) or not isinstance(word, str):  # whose text might be endless
+            raise ValueError("it names something by other than two words")
+        if (module, word) not in self.names:
+            raise ValueError(f"it names {module[:40]}.{word[:40]}")
+        return Name(self.names[module, word])
+
+    def made_of(self, word: str, arguments: tuple[Any, ...]) -> object:
+        """What a word of the file makes of its arguments."""
         if word == "dtype" and isinstance(arguments[0], str) and _DTYPE.fullmatch(arguments[0]):
             return _Dtype(arguments[0])
-        if word == "_reconstruct" and isinstance(arguments[0], _Name) and arguments[0].word == "ndarray":
+        if word == "_reconstruct" and isinstance(arguments[0], Name) and arguments[0].word == "ndarray":
             return _Array()
         if word == "_frombuffer":
             data, dtype, shape, order = arguments
             array = _Array()
-            self._build(array, (1, shape, dtype, order == "F", data))
+            self.build(array, (1, shape, dtype, order == "F", data))
             return array
         if word == "scalar" and len(arguments) == 2:
             return self._values(arguments[1], arguments[0], ())[()]
@@ -228,7 +257,8 @@ class _Machine:
             return b""
         raise ValueError(f"its {word} cannot be read")
 
-    def _build(self, made: object, state: object) -> None:
+    def build(self, made: object, state: object) -> None:
+        """Fill what was made before with what the file says of it."""
         if not isinstance(state, tuple) or len(state) < 5:
             raise ValueError("its array is incomplete")
         if isinstance(made, _Dtype) and made.order is None and state[1] in ("<", ">", "|", "="):
@@ -276,7 +306,7 @@ class _Machine:
             raise ValueError(f"its {what} hold more than {self.limit} bytes")
 
 
-class _Finished:
+class Finished:
     """The values with their arrays in place; shared values stay shared, and cycles are refused."""
 
     def __init__(self) -> None:
@@ -286,7 +316,7 @@ class _Finished:
     def of(self, value: Any, depth: int) -> tuple[Any, int]:
         """The finished value and how many items it unfolds to."""
         if not isinstance(value, list | dict | tuple | _Array):
-            if isinstance(value, _Name | _Dtype):
+            if isinstance(value, Name | _Dtype):
                 raise ValueError("it holds a name and no value")
             return value, 1
         if id(value) in self.open or depth > MAX_DEPTH:
@@ -317,12 +347,6 @@ class _Finished:
                 array[place] = item
             return array.reshape(value.shape), size
         return (tuple(finished) if isinstance(value, tuple) else finished), size
-
-
-def _named(module: object, word: object) -> _Name:
-    if not isinstance(module, str) or not isinstance(word, str) or (module, word) not in _NAMES:
-        raise ValueError(f"it names {str(module)[:40]}.{str(word)[:40]}")
-    return _Name(_NAMES[module, word])
 
 
 def _bytes(data: object) -> bytes:

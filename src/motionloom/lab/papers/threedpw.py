@@ -23,6 +23,8 @@ from motionloom.data.pairs import Pair
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from motionloom.features.pair import checked, one_world
+from motionloom.io.atomic import finished
+from motionloom.io.text import read_utf8
 from motionloom.kinematics.physics import ANKLES, TOES, Array, J, smooth, velocity
 from motionloom.lab.papers.plain_pickle import read_plain_file
 from motionloom.retarget.floor import level
@@ -39,7 +41,7 @@ _PLANTED_SPEED, _PLANTED_HEIGHT = 0.4, 0.06
 
 def is_3dpw(folder: Path) -> bool:
     """Whether ``folder`` (or its ``sequenceFiles``) has sequences in train, validation or test."""
-    return any(next((_root(folder) / split).glob("*.pkl"), None) for split in SPLITS)
+    return any(finished(_root(folder) / split, "*.pkl") for split in SPLITS)
 
 
 def read_3dpw(
@@ -70,7 +72,7 @@ def read_3dpw(
     spoken = folder / "text" if texts is None else Path(texts)
     pairs = []
     for split in splits:
-        for path in sorted((_root(folder) / split).glob("*.pkl")):
+        for path in finished(_root(folder) / split, "*.pkl"):
             sequence = read_sequence(path)
             if len(sequence) != 2:
                 say(f"left out {path.name}: {len(sequence)} person")
@@ -149,8 +151,15 @@ def _camera(content: dict, frames: int, path: Path) -> Array | None:
         return None
     poses = _numbers(content["cam_poses"], (4, 4), path)
     valid = content.get("campose_valid", [])
-    flags = [np.asarray(one) for one in (valid if isinstance(valid, list) else [valid])]
-    if len(poses) != frames or any(flag.shape != (frames,) or flag.dtype.kind not in "biuf" for flag in flags):
+    try:
+        flags = [np.asarray(one) for one in (valid if isinstance(valid, list) else [valid])]
+    except ValueError:  # lists of several lengths
+        flags = [np.empty(0)]
+    if (
+        flags is None
+        or len(poses) != frames
+        or any(flag.shape != (frames,) or flag.dtype.kind not in "biuf" for flag in flags)
+    ):
         raise MotionloomError(f"{path} is no 3DPW sequence: its camera has not one pose for each of {frames} frames")
     places = -np.einsum("fji,fj->fi", poses[:, :3, :3], poses[:, :3, 3])
     good = np.flatnonzero(np.all([flag.astype(bool) for flag in flags], axis=0)) if flags else np.arange(frames)
@@ -173,11 +182,9 @@ def _captions(folder: Path, name: str) -> tuple[str, ...]:
     if path is None:
         return ()
     try:
-        if path.stat().st_size > 1 << 16:
-            raise ValueError("it is larger than 64 KiB")
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, ValueError) as error:
-        reason = " ".join(str(error).split())[:80]
+        lines = read_utf8(path, max_bytes=1 << 16, empty=True).splitlines()
+    except MotionloomError as error:
+        reason = str(error)[:200]
         raise MotionloomError(f"{path} holds no captions ({reason}); it has one on each line") from None
     said = (" ".join(line.partition("#")[0].split()) for line in lines)
     return tuple(text for text in said if text and text.isprintable())

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from motionloom.errors import MotionloomError
+from motionloom.io.atomic import finished
 from motionloom.lab.report import report as reports
 from motionloom.lab.report.report import REAL, Column, Report, Row, Value
 
@@ -171,7 +172,7 @@ def load(path: Path | str) -> dict[str, Report]:
     """Reports by suite: of a file, of a folder with ``report.json``, of a release's or a run's folder."""
     path = Path(path)
     if path.is_dir() and not (path / "report.json").is_file():
-        inside = sorted({*path.glob("*.json"), *path.glob("*/report.json")})
+        inside = finished(path, "*.json", "*/report.json")
         if not inside:
             raise MotionloomError(f"{path} holds no reports; name a report.json or a folder of SUITE.json files")
         found = [reports.read(one) for one in inside]

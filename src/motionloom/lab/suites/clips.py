@@ -8,6 +8,7 @@ from motionloom.data.build import Clip, clips_of, read_clip
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS
+from motionloom.io.atomic import finished
 from motionloom.kinematics.physics import Array
 from motionloom.lab.papers.readers import find_takes
 
@@ -50,7 +51,7 @@ def real_clips(folder: Path | str) -> Iterator[RealClip]:
 
 
 def _built(folder: Path) -> Iterator[Clip]:
-    for path in sorted((folder / "clips").glob("*.safetensors")):
+    for path in finished(folder / "clips", "*.safetensors"):
         if path.stem.endswith(("_looped", "_reversed")) or path.stem.startswith(("M", "mixed_")):
             continue
         clip = read_clip(path)

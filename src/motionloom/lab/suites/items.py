@@ -14,6 +14,9 @@ import numpy as np
 from motionloom.data.build import Clip, clips_of, read_clip
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
+from motionloom.io.atomic import finished
+from motionloom.io.npz import read_array
+from motionloom.io.text import read_utf8
 from motionloom.lab.evaluator.evaluators import Caption
 from motionloom.lab.papers.readers import find_takes
 from motionloom.lab.suites.protocol import MOST_ITEMS, Selection
@@ -21,6 +24,7 @@ from motionloom.lab.suites.protocol import MOST_ITEMS, Selection
 SPARE = 4
 """Frames above the longest length that are cut off; a stretch that is longer still is left out."""
 _MADE_UP = ("_looped", "_reversed")
+_MAX_TEXT = 64 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +116,7 @@ def _wanted(clip: Clip, selection: Selection) -> bool:
 
 
 def _built(folder: Path) -> Iterator[Clip]:
-    for path in sorted((folder / "clips").glob("*.safetensors")):
+    for path in finished(folder / "clips", "*.safetensors"):
         if not path.stem.endswith(_MADE_UP) and not path.stem.startswith("mixed_"):
             yield read_clip(path)
 
@@ -172,21 +176,18 @@ def _spoken(name: str, split: str, features: np.ndarray, text: str) -> Iterator[
 
 
 def _features(path: Path) -> np.ndarray:
-    try:
-        found = np.load(path, allow_pickle=False, mmap_mode="r")  # a size beyond the file's is refused
-        if not isinstance(found, np.ndarray) or found.ndim != 2 or found.shape[1] != WIDTH or found.dtype.kind != "f":
-            raise ValueError(f"its shape is {np.shape(found)} and not (frames, {WIDTH})")
-        features = np.array(found, dtype=np.float32)
-        if not np.isfinite(features).all():
-            raise ValueError("it holds numbers that are not finite")
-        return features
-    except (OSError, ValueError, TypeError, EOFError, SyntaxError) as error:
-        raise MotionloomError(f"{path} is not an array of features ({error}); fetch it again") from None
+    found = read_array(path)
+    if found.ndim != 2 or found.shape[1] != WIDTH or found.dtype.kind != "f" or not np.isfinite(found).all():
+        raise MotionloomError(
+            f"{path} is not an array of finite features (frames, {WIDTH}), but {found.dtype} of the shape "
+            f"{found.shape}; fetch it again"
+        )
+    return np.array(found, dtype=np.float32)
 
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        said = getattr(error, "strerror", None) or "it is not text"
+        return read_utf8(path, max_bytes=_MAX_TEXT, empty=True)
+    except (OSError, MotionloomError) as error:
+        said = getattr(error, "strerror", None) or str(error)
         raise MotionloomError(f"cannot read {path} ({said}); a HumanML3D folder has lists and texts") from None

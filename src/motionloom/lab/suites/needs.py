@@ -7,6 +7,7 @@ from pathlib import Path
 
 from motionloom.data.pairs import Pair
 from motionloom.errors import MotionloomError
+from motionloom.io.atomic import finished
 from motionloom.lab.papers.readers import find_pairs
 
 
@@ -41,7 +42,8 @@ def has_pairs(folder: Path) -> bool:
             return True  # it cannot be read, which is another matter
     if is_3dpw(folder):
         return True
-    return any(re.fullmatch(r".+_[ab]", path.stem) for path in folder.glob("*.bvh")) or any(folder.glob("*/[ab].bvh"))
+    beside = any(re.fullmatch(r".+_[ab]", path.stem) for path in finished(folder, "*.bvh"))
+    return beside or bool(finished(folder, "*/[ab].bvh"))
 
 
 def need_pairs(data: Path) -> None:
@@ -66,5 +68,5 @@ def need_recordings(data: Path) -> None:
     from motionloom.lab.suites.prediction_trial import CMU_TEST
 
     clips = data / "clips"
-    if clips.is_dir() and not any(path.stem.split("_")[0] in CMU_TEST for path in clips.glob("*.safetensors")):
+    if clips.is_dir() and not any(path.stem.split("_")[0] in CMU_TEST for path in finished(clips, "*.safetensors")):
         raise NoData(f"{data} has no recordings of the people whose futures are predicted")

@@ -18,6 +18,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS
 from motionloom.features.positions import SMPL_LAYOUT
+from motionloom.io.atomic import finished
 from motionloom.lab.metrics import prediction as metrics
 from motionloom.lab.papers.benchmarks import find_protocol
 from motionloom.weights.predictor import Predictor
@@ -81,7 +82,7 @@ def read_test(data: Path | str, name: str | None = None, *, say: Callable[[str],
     if name not in (None, "cmu") or not clips.is_dir():
         return find_protocol(data, name=name, splits=("test",), say=say)
     found = []
-    for path in sorted(clips.glob("*.safetensors")):
+    for path in finished(clips, "*.safetensors"):
         plain = path.stem.split("_")[0] in CMU_TEST and not path.stem.endswith(("_looped", "_reversed"))
         clip = read_clip(path) if plain else None
         if clip and clip.source == "cmu" and clip.way == "plain":

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save_file
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS, WIDTH
-from motionloom.io.atomic import atomic_path, check_place
+from motionloom.io.atomic import check_place
+from motionloom.io.tensors import save_tensors
 from motionloom.kinematics import physics
 from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Caption, Evaluator
@@ -155,8 +155,7 @@ def save(reference: TextReference, path: Path | str) -> Path:
         "physical": PHYSICAL,
         "source": SOURCE if chosen.sources == ("cmu",) else "ask whoever gave you this file",
     }
-    with atomic_path(path) as temp:
-        save_file(tensors, temp, metadata={"reference": json.dumps(about)})
+    save_tensors(tensors, path, metadata={"reference": json.dumps(about)})
     return path
 
 

@@ -1,24 +1,14 @@
 """Open a published Hugging Face text model from a folder or from the hub's local cache; never downloads.
 
-    python -m motionloom.nets.text.hub FOLDER
-
-turns a folder's pytorch_model.bin into the model.safetensors that is wanted here.
+`lab.papers.text_model` turns a folder's pytorch_model.bin into the model.safetensors that is wanted here.
 """
 
-import argparse
 import importlib
-import os
-import pickle
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import torch
-from safetensors.torch import save_file
-from torch import Tensor
 
 from motionloom.errors import MotionloomError
 
@@ -56,7 +46,7 @@ def open_pretrained(model_class: str, place: Path | str, *, extra: str) -> Pretr
             raise MotionloomError(
                 f"The text encoder {place} could not be opened ({reason}); fetch it once with `hf download {place}` "
                 "or name a folder with its config.json, tokenizer files and model.safetensors (made from a "
-                "pytorch_model.bin by `python -m motionloom.nets.text.hub FOLDER`)."
+                "pytorch_model.bin by `python -m motionloom.lab.papers.text_model FOLDER`)."
             ) from error
     if report["missing_keys"]:
         missing = sorted(report["missing_keys"])
@@ -79,37 +69,3 @@ def _quiet(transformers: Any) -> Iterator[None]:
         logging.set_verbosity(level)
         if bar:
             logging.enable_progress_bar()
-
-
-def convert(folder: Path) -> Path:
-    """Write folder/model.safetensors with the tensors of folder/pytorch_model.bin, which is read without pickle code.
-
-    Raises MotionloomError where the file is missing or is not a plain dictionary of tensors.
-    """
-    source, target = folder / "pytorch_model.bin", folder / "model.safetensors"
-    try:
-        state = torch.load(source, map_location="cpu", weights_only=True)
-    except (OSError, RuntimeError, EOFError, ValueError, pickle.UnpicklingError) as error:
-        reason = " ".join(str(error).split())[:160]
-        raise MotionloomError(f"{source} could not be read as weights ({reason}); fetch it again.") from error
-    if not isinstance(state, dict) or not all(isinstance(value, Tensor) for value in state.values()):
-        raise MotionloomError(f"{source} is not a plain dictionary of tensors; fetch the published file again.")
-    partial = target.with_name(target.name + ".part")
-    save_file({str(name): value.clone().contiguous() for name, value in state.items()}, partial, {"format": "pt"})
-    os.replace(partial, target)
-    return target
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m motionloom.nets.text.hub", description=__doc__)
-    parser.add_argument("folder", type=Path)
-    try:
-        print(convert(parser.parse_args().folder))
-    except MotionloomError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -1,0 +1,99 @@
+"""A short run of the fuzzer over every reader, and that it notices what it is there to notice."""
+
+import os
+import re
+import signal
+from pathlib import Path
+
+import pytest
+
+from motionloom.errors import MotionloomError
+from tests.fuzz import machine, readers
+from tests.fuzz.machine import fuzz
+from tests.fuzz.readers import READERS, Reader
+
+
+def test_every_reader_answers_damaged_files_with_a_value_or_one_sentence() -> None:
+    """A few files of each; `make fuzz` is for longer runs."""
+    result = fuzz(seconds=600.0, files=6 * len(READERS), seed=20)
+    assert not result.failures, result.report()
+    assert result.tried.keys() == {reader.name for reader in READERS}
+    assert sum(result.tried.values()) == 6 * len(READERS)
+
+
+@pytest.fixture
+def one(monkeypatch: pytest.MonkeyPatch):
+    """The fuzzer with one reader, whose way of reading is given."""
+
+    def run(read, files: int = 3) -> machine.Result:
+        made = Reader(
+            "x", lambda folder: (folder / "a").write_bytes(b"one 2 three\n"), {"a": "text"}, _good_first(read)
+        )
+        monkeypatch.setattr(readers, "READERS", [made])
+        return fuzz(seconds=600.0, files=files, seed=1)
+
+    return run
+
+
+def _good_first(read):
+    """The good file is read before anything is damaged, in the process that watches: the fault must not be there."""
+    home = os.getpid()
+    return lambda folder: None if os.getpid() == home else read(folder)
+
+
+def fail(error: BaseException):
+    def read(folder: Path) -> None:
+        raise error
+
+    return read
+
+
+def test_what_is_right_is_counted_and_no_failure(one) -> None:
+    result = one(lambda folder: (folder / "a").read_bytes())
+    assert (result.tried["x"], result.read["x"], result.failures) == (3, 3, [])
+    assert one(fail(MotionloomError("a is damaged"))).read["x"] == 0
+    assert "3 files tried, 0 failures" in result.report()
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (ValueError("x"), "ValueError: x"),
+        (RecursionError("x"), "RecursionError"),
+        (MotionloomError(""), "no sentence"),
+        (MotionloomError("a file is damaged (MemoryError)"), "MemoryError behind a sentence"),
+        (SystemExit(2), "SystemExit"),
+    ],
+    ids=["another error", "depth", "no words", "memory behind a sentence", "exit"],
+)
+def test_other_answers_are_failures(one, error: BaseException, said: str) -> None:
+    result = one(fail(error))
+    assert len(result.failures) == 3
+    assert all(said in what for _, _, what in result.failures)
+
+
+def endless(folder: Path) -> None:
+    """Outside of Python: no handler of Python's would be heard."""
+    re.match(r"(a*)*b", "a" * 40)
+
+
+def test_what_hangs_is_ended_and_the_run_goes_on(one, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(machine, "ALARM", 0.2)
+    result = one(endless, files=2)
+    assert [what for _, _, what in result.failures] == ["no answer within 0.2 s"] * 2
+
+
+def test_a_process_that_dies_is_a_failure(one) -> None:
+    result = one(lambda folder: os.kill(os.getpid(), signal.SIGKILL), files=2)
+    assert [what for _, _, what in result.failures] == [f"the process died ({-signal.SIGKILL})"] * 2
+
+
+def test_more_than_a_gigabyte_is_a_failure(one) -> None:
+    result = one(lambda folder: bytearray(machine.MEMORY + (64 << 20)), files=1)
+    assert "MemoryError" in result.failures[0][2]
+    assert not one(lambda folder: bytearray(machine.MEMORY // 2), files=1).failures
+
+
+def test_the_same_seed_tries_the_same_files(one) -> None:
+    seen = [str(one(fail(ValueError(str(seed)))).failures) for seed in (1, 1)]
+    assert seen[0] == seen[1]
