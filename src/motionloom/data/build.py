@@ -33,6 +33,7 @@ from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
 from motionloom.io.atomic import atomic_path, finished, sweep
 from motionloom.io.tensors import save_tensors
+from motionloom.io.text import plain_json
 from motionloom.kinematics.physics import Array
 from motionloom.skeleton import SMPL22
 
@@ -392,7 +393,7 @@ def read_clip(path: Path) -> Clip:
     """The inverse of `write_clip`; raises MotionloomError for a damaged file."""
     try:
         with safe_open(path, framework="numpy") as file:
-            about = json.loads(file.metadata()["clip"])
+            about = plain_json(file.metadata()["clip"])
             features = file.get_tensor("features")
         notes = tuple(
             Note(n["first"], n["last"], n["kind"], tuple(n["texts"]), tuple(n["core"]) if n.get("core") else None)

@@ -2,6 +2,7 @@
 
 import json
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ LIMIT = 1e9
 """Numbers beyond this are no lengths or angles of anybody, and are refused with NaN and infinity."""
 FREE_POSES = 2_000_000
 """Frames times joints of which a file need not say anything."""
+MAX_DEPTH = 64
+"""Lists and mappings within each other."""
 _CHUNK = 16 * 1024**2
 
 
@@ -76,14 +79,38 @@ def read_utf8(path: Path | str, *, max_bytes: int, empty: bool = False) -> str:
 
 def parse_json(data: bytes | str, what: Path | str) -> Any:
     """What JSON says, with finite numbers only; raises `MotionloomError` that begins with ``what``."""
+    try:
+        return plain_json(data, finite=True)
+    except ValueError as error:
+        raise MotionloomError(f"{what} is not JSON ({' '.join(str(error).split())[:120]})") from None
+
+
+def plain_json(data: bytes | str, *, finite: bool = False) -> Any:
+    """What JSON says, lying in each other at most `MAX_DEPTH` deep; ``finite``: without NaN and infinity.
+
+    Raises ValueError for anything else: what is not UTF-8, endless digits, and depths at which whoever copies or shows
+    the values runs out of stack.
+    """
 
     def constant(name: str) -> float:
-        raise ValueError(f"{name} is no number")
+        if finite:
+            raise ValueError(f"{name} is no number")
+        return float(name.replace("Infinity", "inf"))
 
     try:
-        return json.loads(data, parse_constant=constant)
-    except (ValueError, RecursionError) as error:  # also what is not UTF-8, and endless digits
-        raise MotionloomError(f"{what} is not JSON ({' '.join(str(error).split())[:120]})") from None
+        value = json.loads(data, parse_constant=constant)
+    except RecursionError:
+        raise ValueError("its values lie in each other too deep") from None
+    layer = [value]
+    for _ in range(MAX_DEPTH):
+        layer = [inner for outer in layer for inner in _inside(outer)]
+        if not layer:
+            return value
+    raise ValueError("its values lie in each other too deep")
+
+
+def _inside(value: Any) -> Iterable[Any]:
+    return value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
 
 
 def word(raw: bytes) -> str:

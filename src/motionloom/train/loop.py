@@ -23,6 +23,7 @@ from torch.nn.attention import SDPBackend, sdpa_kernel
 
 from motionloom.errors import MotionloomError
 from motionloom.io.tensors import save_tensors
+from motionloom.io.text import plain_json
 from motionloom.train.objectives import Objective
 from motionloom.train.recipe import Recipe
 from motionloom.weights.prior import read_tensors
@@ -179,7 +180,7 @@ def changed(folder: Path, recipe: Recipe) -> list[str]:
     if not (folder / STATE).is_file():
         return []
     try:
-        before = json.loads(read_tensors(folder / STATE)[1]["recipe"])
+        before = plain_json(read_tensors(folder / STATE)[1]["recipe"])
         now = asdict(recipe)
         return [f"{key} is now {now[key]!r} and was {before.get(key)!r}" for key in now if before.get(key) != now[key]]
     except (KeyError, ValueError, AttributeError, RecursionError):

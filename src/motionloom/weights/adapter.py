@@ -28,6 +28,7 @@ from torch.nn import functional as F
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import finished
 from motionloom.io.tensors import save_tensors
+from motionloom.io.text import plain_json
 from motionloom.nets.prior import Bound, Condition, NetConfig, PriorNet
 from motionloom.weights.container import check, is_signed
 
@@ -351,7 +352,7 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
         if path.stat().st_size > MAX_BYTES:
             raise MotionloomError(f"{path} is larger than an adapter can be ({MAX_BYTES >> 20} MiB)")
         with safe_open(path, framework="pt") as file:
-            about = json.loads((file.metadata() or {})[KEY])
+            about = plain_json((file.metadata() or {})[KEY])
             if not isinstance(about, dict):
                 raise ValueError("no description")
             return about, {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118

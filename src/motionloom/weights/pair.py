@@ -19,6 +19,7 @@ from motionloom.diffusion import Schedule
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import finished
 from motionloom.io.tensors import save_tensors
+from motionloom.io.text import plain_json
 from motionloom.nets.pair import PairConfig, PairNet, Talk
 from motionloom.nets.prior import PriorNet
 from motionloom.weights.adapter import origin
@@ -127,7 +128,7 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
         if path.stat().st_size > MAX_BYTES:
             raise MotionloomError(f"{path} is larger than a two-person block can be ({MAX_BYTES >> 20} MiB)")
         with safe_open(path, framework="pt") as file:
-            about = json.loads((file.metadata() or {})[KEY])
+            about = plain_json((file.metadata() or {})[KEY])
             if not isinstance(about, dict):
                 raise ValueError("no description")
             return about, {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118

@@ -25,6 +25,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features.positions import Layout
 from motionloom.io.atomic import finished
 from motionloom.io.tensors import save_tensors
+from motionloom.io.text import plain_json
 from motionloom.nets.predictor import NetConfig, TransLinear
 from motionloom.weights.container import fill, is_signed
 from motionloom.weights.prior import Card, find_device, read_tensors
@@ -172,7 +173,7 @@ def load_predictor(path: Path) -> Predictor:
         kind = "a prior" if "motionloom" in metadata else "something else"
         raise MotionloomError(f"{path} is {kind}, not a predictor; name a file that 'motionloom train predictor' wrote")
     try:
-        about = json.loads(metadata["motionloom-predictor"])
+        about = plain_json(metadata["motionloom-predictor"])
         if about["format"] != FORMAT:
             raise MotionloomError(f"{path} has format {about['format']}; this motionloom reads {FORMAT}: update it")
         config, layout = NetConfig.parse(about["net"]), Layout.parse(about["layout"])

@@ -21,6 +21,7 @@ from motionloom.diffusion import SCHEDULES, Schedule
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import finished
 from motionloom.io.tensors import save_tensors
+from motionloom.io.text import plain_json
 from motionloom.nets.prior import Condition, NetConfig, PriorNet, condition
 from motionloom.nets.text import MiniLM, TextEncoder
 from motionloom.nets.text.known import Known, pack_known, unpack_known, with_sentences
@@ -203,7 +204,7 @@ def _about(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
     if "motionloom" not in metadata:  # such as an evaluator's or an adapter's
         raise MotionloomError(f"{path} does not describe a motionloom prior; name a file that does")
     try:
-        about = json.loads(metadata["motionloom"])
+        about = plain_json(metadata["motionloom"])
         if about["format"] != FORMAT:
             raise MotionloomError(
                 f"{path} has format {about['format']}; this motionloom reads format {FORMAT}: update it"

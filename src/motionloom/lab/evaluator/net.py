@@ -22,6 +22,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT, WIDTH
 from motionloom.io.tensors import save_tensors
+from motionloom.io.text import plain_json
 from motionloom.nets.text import MiniLM, TextEncoder
 from motionloom.weights.container import check, shapes
 
@@ -303,7 +304,7 @@ def _read(path: Path) -> tuple[dict, dict[str, Tensor]]:
         if path.stat().st_size > MAX_BYTES:
             raise MotionloomError(f"{path} is larger than {MAX_BYTES >> 20} MiB; evaluators are not")
         with safe_open(path, framework="pt") as file:
-            about = json.loads((file.metadata() or {})[KEY])
+            about = plain_json((file.metadata() or {})[KEY])
             tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
         if about["format"] != FORMAT:
             raise MotionloomError(f"{path} has format {about['format']}; this motionloom reads {FORMAT}: update it")

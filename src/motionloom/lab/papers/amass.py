@@ -5,7 +5,6 @@ Reads AMASS as distributed, or joint places that somebody made of it with the bo
 
 import csv
 import io
-import json
 import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -20,6 +19,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features.positions import SMPL_LAYOUT
 from motionloom.io import npz, text
 from motionloom.io.atomic import finished
+from motionloom.io.text import plain_json
 from motionloom.lab.papers import babel
 
 AMASS_LAYOUT = replace(SMPL_LAYOUT, across=(), root=False, z_up=True)
@@ -215,7 +215,7 @@ def _rows(path: Path) -> list[tuple[str, int]]:
     """``data set/recording`` and first observed frame of each window that a list names."""
     data = text.read_text(path, max_bytes=_MAX_LIST).decode("utf-8", "replace")
     try:
-        pairs = json.loads(data) if path.suffix == ".json" else list(_csv_rows(data))
+        pairs = plain_json(data) if path.suffix == ".json" else list(_csv_rows(data))
         rows = [(str(file), int(first)) for file, first in pairs]
         if not rows or any(first < 0 for _, first in rows):
             raise ValueError("it has no windows, or one that begins before its recording")

@@ -19,6 +19,7 @@ from torch import Tensor
 
 from motionloom.errors import MotionloomError
 from motionloom.io.tensors import save_tensors
+from motionloom.io.text import plain_json
 from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Caption
 from motionloom.lab.papers.guo_nets import UNIT, GuoNets, from_state_dict, read_guo
@@ -236,7 +237,7 @@ def is_guo(path: Path | str) -> bool:
         return path.suffix == ".tar"
     try:
         with safe_open(path, framework="pt") as file:
-            about = json.loads((file.metadata() or {}).get("motionloom", "{}"))
+            about = plain_json((file.metadata() or {}).get("motionloom", "{}"))
         return isinstance(about, dict) and about.get("kind") == KIND
     except (SafetensorError, OSError, ValueError, RecursionError):
         return False
@@ -261,7 +262,7 @@ def load_guo(path: Path | str, *, cap_len: CapLen = "true") -> GuoEvaluator:
 
 def _about(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
     try:
-        about = json.loads(metadata["motionloom"])
+        about = plain_json(metadata["motionloom"])
         if about["kind"] != KIND or about["format"] != FORMAT:
             raise ValueError("another kind or format")
         special = about["special"]

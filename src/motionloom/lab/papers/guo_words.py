@@ -7,7 +7,6 @@ or from JSON.
 """
 
 import ast
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,6 +17,7 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.io import npz
+from motionloom.io.text import plain_json
 from motionloom.lab.papers.plain_pickle import read_plain_file
 
 TAGS = (
@@ -137,7 +137,7 @@ def read_special(path: Path | str) -> dict[str, str]:
         if path.stat().st_size > 1 << 20:
             raise ValueError("it is larger than 1 MiB")
         text = path.read_text(encoding="utf-8")
-        table = json.loads(text) if path.suffix == ".json" else _literal_lists(text)
+        table = plain_json(text) if path.suffix == ".json" else _literal_lists(text)
         if not isinstance(table, dict) or not set(table) <= set(SPECIAL):
             raise ValueError(f"the classes are {', '.join(SPECIAL)}")
         found: dict[str, str] = {}

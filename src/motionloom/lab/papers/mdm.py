@@ -3,7 +3,6 @@
 Keys and shapes: MDM's ``trans_enc`` (HumanML3D 263, KIT 251, BABEL 135 with or without transition flags).
 """
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import torch
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
-from motionloom.io.text import read_bytes
+from motionloom.io.text import plain_json, read_bytes
 from motionloom.lab.papers.torch_file import read_torch_file
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.weights.container import fill
@@ -121,7 +120,7 @@ def _options(path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     try:
-        options = json.loads(read_bytes(path, max_bytes=_MAX_OPTIONS))
+        options = plain_json(read_bytes(path, max_bytes=_MAX_OPTIONS))
     except MotionloomError:
         raise
     except (ValueError, RecursionError) as error:

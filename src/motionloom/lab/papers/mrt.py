@@ -24,6 +24,7 @@ from torch.nn import functional as F
 from motionloom.diffusion import Dct
 from motionloom.errors import MotionloomError
 from motionloom.io.tensors import save_tensors
+from motionloom.io.text import plain_json
 from motionloom.nets.prior import sinusoids
 
 KEY = "motionloom-mrt"
@@ -207,7 +208,7 @@ class MrtFile:
             if path.stat().st_size > MAX_BYTES:
                 raise ValueError("too large")
             with safe_open(path, framework="pt") as file:
-                about = json.loads((file.metadata() or {})[KEY])
+                about = plain_json((file.metadata() or {})[KEY])
                 tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
             with torch.device("meta"):
                 net = Mrt(MrtConfig(**about["config"]))

@@ -4,7 +4,6 @@ Every suite ends in the same value, so that one writer, one table, one plot and 
 disk a report is a folder: ``report.json`` (everything), ``report.md`` (to be read) and PNG plots.
 """
 
-import json
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 from motionloom.errors import MotionloomError
+from motionloom.io.text import plain_json
 from motionloom.lab.suites.obey import check_report, write_json, write_text
 from motionloom.lab.suites.obey import markdown as table
 from motionloom.lab.suites.obey import plain as columns_of_text
@@ -130,7 +130,7 @@ def read(path: Path | str) -> Report:
         said = getattr(error, "strerror", None) or error
         raise MotionloomError(f"cannot read {path}: {said}; name a report.json or its folder") from None
     try:
-        return decode(json.loads(text, parse_constant=_no_constant))
+        return decode(plain_json(text, finite=True))
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         said = error if isinstance(error, MotionloomError) else repr(error)
         raise MotionloomError(f"{path} is not a report of motionloom evaluate ({said}); measure again") from None
@@ -290,10 +290,6 @@ def _finite(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(k): _finite(v) for k, v in value.items()}
     return [_finite(v) for v in value] if isinstance(value, (list, tuple)) else value
-
-
-def _no_constant(name: str) -> float:
-    raise MotionloomError(f"it holds {name}, which is no number")
 
 
 def _plain(value: Any, depth: int = 0) -> Any:

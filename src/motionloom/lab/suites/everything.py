@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from motionloom.errors import MotionloomError
+from motionloom.io.text import plain_json
 from motionloom.lab.report import report as reports
 from motionloom.lab.report.report import Report
 from motionloom.lab.suites import obey
@@ -122,7 +123,7 @@ def _files(folder: Path) -> str:
 def _finished(folder: Path, mark: str) -> Report | None:
     """The report of a finished run of these settings; anything else, damaged files too, is measured anew."""
     try:
-        done = json.loads((folder / "done.json").read_text(encoding="utf-8"))
+        done = plain_json((folder / "done.json").read_text(encoding="utf-8"))
         if isinstance(done, dict) and done.get("fingerprint") == mark:
             return reports.read(folder / "report.json")
     except (OSError, ValueError, RecursionError):

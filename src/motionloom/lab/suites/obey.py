@@ -14,6 +14,7 @@ from typing import Any, Protocol
 
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path, check_place
+from motionloom.io.text import plain_json
 from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics.everyday.check import Everyday
 from motionloom.lab.metrics.obedience import CHECKS, Check
@@ -114,7 +115,7 @@ def _read(path: Path, settings: dict[str, Any]) -> dict[str, list[Attempt]]:
     if not path.is_file():
         return {}
     try:
-        kept = json.loads(path.read_text(encoding="utf-8"))
+        kept = plain_json(path.read_text(encoding="utf-8"))
         if kept["settings"] != settings:
             raise MotionloomError(f"{path} was made with other settings; name another --out folder or delete it")
         return {str(check["name"]): [_attempt(a) for a in check["attempts"]] for check in kept["checks"]}

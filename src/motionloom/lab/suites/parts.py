@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from motionloom.errors import MotionloomError
+from motionloom.io.text import plain_json
 from motionloom.lab.suites.obey import write_json
 
 LARGEST = 1 << 20
@@ -44,7 +45,7 @@ class Parts:
         try:
             if path.stat().st_size > LARGEST:
                 raise ValueError("it is too large")
-            found = json.loads(path.read_text(encoding="utf-8"))
+            found = plain_json(path.read_text(encoding="utf-8"))
             settings, numbers = str(found["settings"]), {str(k): float(v) for k, v in found["numbers"].items()}
             if not all(map(math.isfinite, numbers.values())):
                 raise ValueError("it holds numbers that are not finite")

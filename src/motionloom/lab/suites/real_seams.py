@@ -4,7 +4,6 @@
 made by ``motionloom evaluate transitions --make-reference FILE --data SET``.
 """
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ import numpy as np
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS
+from motionloom.io.text import plain_json
 from motionloom.kinematics import physics
 from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Evaluator
@@ -173,7 +173,7 @@ def load_shipped(path: Path | None = None) -> Shipped | None:
     try:
         if path.stat().st_size > LARGEST_FILE:
             raise ValueError("it is too large")
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = plain_json(path.read_text(encoding="utf-8"))
         if found["format"] != FORMAT:
             raise ValueError("it has another format")
         seams = {name: _number(found["physical"][name]) for name in (*PHYSICAL, "step")}

@@ -19,6 +19,7 @@ from motionloom.features import humanml
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.io.atomic import check_place
 from motionloom.io.tensors import save_tensors
+from motionloom.io.text import plain_json
 from motionloom.kinematics import physics
 from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Caption, Evaluator
@@ -173,7 +174,7 @@ def load(path: Path | str, evaluator: Evaluator) -> TextReference:
         if path.stat().st_size > LARGEST_FILE:
             raise ValueError(f"it has more than {LARGEST_FILE >> 20} MiB")
         with safe_open(path, framework="numpy") as file:
-            about = json.loads((file.metadata() or {})["reference"])
+            about = plain_json((file.metadata() or {})["reference"])
             if set(file.keys()) != set(_KINDS):
                 raise ValueError("its tensors have other names")
             found = {name: file.get_tensor(name) for name in _KINDS}
