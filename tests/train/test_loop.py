@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pytest
 import torch
+from safetensors import safe_open
 from torch import nn
 
 from motionloom.errors import MotionloomError
+from motionloom.io.tensors import save_tensors
 from motionloom.train import loop
 from motionloom.train.loop import Average, load_state, make_optimizer, rate_at, save_state
 from motionloom.train.objectives import masked_error
@@ -185,3 +187,41 @@ def test_weights_are_written_though_the_run_was_stopped_just_before(tmp_path: Pa
     )  # fmt: skip
     assert saved == [5]
     assert steps == []
+
+
+def spoiled_states(path: Path) -> dict[str, tuple[dict, dict]]:
+    """What a state file says, changed: tensors and metadata by what is wrong."""
+    with safe_open(path, framework="pt") as file:
+        about = file.metadata()
+        tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+    bare = {key: value for key, value in about.items() if key != "checksum"}
+    moment = next(key for key in tensors if key.endswith("exp_avg"))
+    return {
+        "an optimiser's entry is missing": ({k: v for k, v in tensors.items() if k != moment}, about),
+        "a byte turned over": (tensors | {"net.weight": -tensors["net.weight"]}, about),
+        "step 10^30": (tensors, bare | {"step": "1" + "0" * 30}),
+        "another step": (tensors, about | {"step": "8"}),
+        "broadcast averages": (tensors | {"average.weight": torch.zeros(1, 1)}, bare),
+        "a moment of another shape": (tensors | {moment: torch.zeros(1)}, bare),
+        "a moment without its others": ({k: v for k, v in tensors.items() if k != moment}, bare),
+        "not finite": (tensors | {"net.weight": tensors["net.weight"] * float("nan")}, bare),
+        "a tensor too many": (tensors | {"optimizer.99.exp_avg": torch.zeros(1)}, bare),
+        "no step": (tensors, {key: value for key, value in about.items() if key != "step"}),
+    }
+
+
+@pytest.mark.filterwarnings("ignore:.*without a checksum")
+def test_a_damaged_state_is_refused_and_fills_nothing(tmp_path: Path) -> None:
+    net, average, optimizer = parts()
+    net(torch.ones(3)).sum().backward()
+    optimizer.step()
+    save_state(tmp_path, net, average, optimizer, step=7, recipe=runs.recipe())
+    path = tmp_path / loop.STATE
+    assert load_state(path, *parts()) == 7
+    for what, (tensors, about) in spoiled_states(path).items():
+        save_tensors(tensors, path, metadata=about)
+        fresh = parts()
+        before = {key: value.clone() for key, value in fresh[0].state_dict().items()}
+        with pytest.raises(MotionloomError):
+            load_state(path, *fresh)
+        assert all(torch.equal(value, before[key]) for key, value in fresh[0].state_dict().items()), what

@@ -108,3 +108,28 @@ def test_any_values_give_a_recipe_or_one_kind_of_error(tmp_path_factory: pytest.
         assert isinstance(load(tmp_path_factory.getbasetemp(), "", **values), Recipe)
     except MotionloomError as error:
         assert str(error)  # noqa: PT017
+
+
+@pytest.mark.parametrize(
+    "said", ["a." * 200_000 + "a = 1", "steps = " + "9" * 5000, "favour.walk = nan", "favour.walk = -1",
+             "favour.walk = true", "favour.walk = 'x'", "x" * 70_000],
+    ids=lambda said: said[:20],
+)  # fmt: skip
+def test_hostile_recipes_are_refused_at_once(tmp_path, said):
+    (tmp_path / "a.toml").write_text(said)
+    with pytest.raises(MotionloomError) as caught:
+        load_recipe(tmp_path / "a.toml")
+    assert len(str(caught.value)) < 900
+    assert "\n" not in str(caught.value)
+
+
+def test_a_key_of_very_many_parts_on_the_line_is_no_key():
+    assert changes(["a." * 200_000 + "a=1"]) == {"a." * 200_000 + "a": "1"}
+
+
+@pytest.mark.parametrize("kept", [0, -1, 99_999])
+def test_frequencies_beyond_a_window_are_refused(kept):
+    from motionloom.train.predictor import Settings
+
+    with pytest.raises(MotionloomError, match="kept"):
+        Settings.parse({"kept": kept})

@@ -6,7 +6,7 @@ it (chapter 7). Styles, percentages and units other than the drawing's own are n
 
 import re
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
@@ -97,7 +97,7 @@ def _first_shape(data: bytes, path: Path | str) -> tuple[str, dict[str, str], Ar
     name, attributes, transforms = found[0]
     matrix = np.eye(2, 3)
     try:
-        steps = [step for said in transforms for step in _transform(said)]
+        steps = list(islice((step for said in transforms for step in _transform(said)), MAX_TRANSFORMS + 1))
         if len(steps) > MAX_TRANSFORMS:
             raise _BadShape(f"more than {MAX_TRANSFORMS} transforms around it")
         for kind, values in steps:

@@ -1,0 +1,155 @@
+"""Commands that are ended at random moments by SIGINT, SIGTERM and SIGKILL: see `tests.kills.programs`.
+
+``KILLS=200 make test PYTEST_FLAGS=tests/kills`` tries as many moments of each.
+"""
+
+import json
+import os
+import shutil
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionloom import io
+from motionloom.data.build import read_clip
+from motionloom.io.atomic import finished
+from motionloom.weights.prior import save_prior
+from tests.data import people as made
+from tests.kills.programs import SIGNALS, Ended, moments, parts, run
+from tests.nets import tiny
+from tests.train import runs
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs forks and signals")
+SEED = 7
+
+
+def kills(usual: int) -> int:
+    return int(os.environ.get("KILLS", usual))
+
+
+@pytest.fixture(scope="module")
+def weights(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return str(save_prior(tiny.prior(), tmp_path_factory.mktemp("weights") / "tiny.safetensors"))
+
+
+def ended_by(number: int, ended: Ended) -> bool:
+    """Whether the command ended as this signal ends commands, with one sentence."""
+    if number == signal.SIGKILL:
+        return ended.code == -signal.SIGKILL
+    return ended.code == 130 and ended.said.count("\n") <= 1 and "Traceback" not in ended.said
+
+
+@pytest.mark.parametrize("number", SIGNALS, ids=lambda number: number.name)
+def test_compose_keeps_what_was_finished_and_shows_nothing_half_written(weights: str, tmp_path: Path, number) -> None:
+    """SIGINT and SIGTERM end it alike: the file has the frames that were finished, the same as without them."""
+    words = ["compose", "walk", "jump", "sit", "turn", "--seconds", "1", "--steps", "3", "--weights", weights,
+             "--out", "a.bvh", "--out", "b.npz"]  # fmt: skip
+    _, chosen = moments(words, tmp_path / "whole", kills(10), seed=SEED)
+    right = {name: io.load(tmp_path / "whole" / name) for name in ("a.bvh", "b.npz")}
+    some = 0
+    for at in chosen:
+        folder = tmp_path / f"at {at}"
+        ended = run(words, folder, at=at, number=number)
+        assert ended_by(number, ended), (at, ended)
+        for name in {path.name for path in finished(folder, "*")}:
+            found = io.load(folder / name)
+            assert 0 < len(found) <= len(right[name])
+            np.testing.assert_allclose(found.positions(), right[name].positions()[: len(found)], atol=3e-6)
+            some += len(found) < len(right[name])
+        if number != signal.SIGKILL:
+            assert len(finished(folder, "*")) in (0, 2), at
+            assert parts(folder) == [], at
+            assert ("what was finished" in ended.said) <= (len(finished(folder, "*")) == 2)
+            continue
+        assert run(words, folder).code == 0  # and what a killed one left is gone after the next
+        assert sorted(path.name for path in folder.iterdir()) == ["a.bvh", "b.npz"]
+    assert some or number == signal.SIGKILL, "no interruption came between the first piece and the last"
+
+
+@pytest.mark.parametrize("number", SIGNALS, ids=lambda number: number.name)
+def test_generate_keeps_the_motions_that_were_finished(weights: str, tmp_path: Path, number) -> None:
+    """Thirty motions, eight at a time: those of the batches that were finished are there, bit for bit."""
+    words = ["generate", "a person walks", "--count", "30", "--seconds", "0.5", "--steps", "3", "--weights", weights,
+             "--out", "m.npz"]  # fmt: skip
+    _, chosen = moments(words, tmp_path / "whole", kills(8), seed=SEED)
+    for at in chosen:
+        folder = tmp_path / f"at {at}"
+        ended = run(words, folder, at=at, number=number)
+        assert ended_by(number, ended), (at, ended)
+        found = finished(folder, "*")
+        for path in found:
+            right = io.load(tmp_path / "whole" / path.name)
+            assert np.array_equal(io.load(path).rotations, right.rotations)
+        if number != signal.SIGKILL:
+            assert len(found) in (0, 8, 16, 24, 30), at
+            assert parts(folder) == []
+            assert (f"{len(found)} of 30 motions" in ended.said) == (len(found) > 0) or len(found) == 30
+        shutil.rmtree(folder)
+
+
+def test_an_interruption_at_a_sixth_keeps_the_first_motions(weights: str, tmp_path: Path) -> None:
+    words = ["generate", "a person walks", "--count", "30", "--seconds", "0.5", "--steps", "3", "--weights", weights,
+             "--out", "m.npz"]  # fmt: skip
+    whole = run(words, tmp_path / "whole")
+    ended = run(words, tmp_path / "cut", at=whole.marks * 2 // 5, number=signal.SIGTERM)
+    assert ended.code == 130
+    assert len(finished(tmp_path / "cut", "*.npz")) >= 8
+    assert "motions were finished" in ended.said
+
+
+@pytest.fixture(scope="module")
+def pack(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    clips = {
+        "go": (made.walker(seconds=2.0), "train", "walk"),
+        "back": (made.walker(-1.0, seconds=2.0), "train", ""),
+        "kept": (made.walker(0.9, seconds=2.0), "val", "walk"),
+        "blink": (made.walker(seconds=0.6), "train", ""),
+    }
+    return made.write_pack(tmp_path_factory.mktemp("pack") / "pack", clips, {"go": "a person walks"})
+
+
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_data_build_goes_on_where_it_was_killed(pack: Path, tmp_path: Path, workers: str) -> None:
+    """The set is the one of an uninterrupted build, and nothing of the killed ones is taken for a clip, or stays."""
+    words = ["data", "build", str(pack), "--out", "set", "--workers", workers, "--mixed", "2"]
+    _, chosen = moments(words, tmp_path / "whole", kills(4), seed=SEED)
+    right = json.loads((tmp_path / "whole" / "set" / "set.json").read_text())
+    folder = tmp_path / "killed"
+    for turn, at in enumerate(chosen):
+        number = (signal.SIGKILL, signal.SIGTERM, signal.SIGKILL, signal.SIGINT)[turn % 4]
+        ended = run(words, folder, at=at, number=number)
+        assert ended_by(number, ended), (at, ended)
+        for path in finished(folder / "set" / "clips", "*"):
+            read_clip(path)
+        if turn % 2:  # every second time it goes on twice
+            continue
+        assert run(words, folder).code == 0
+        assert json.loads((folder / "set" / "set.json").read_text()) == right
+        assert parts(folder) == []
+        shutil.rmtree(folder)
+    assert run(words, folder).code == 0
+    assert json.loads((folder / "set" / "set.json").read_text()) == right
+    assert parts(folder) == []
+
+
+def test_training_goes_on_bit_for_bit(tmp_path: Path) -> None:
+    """Ended at random moments, again and again: the losses and the last state are those of an uninterrupted run."""
+    data = runs.write_set(tmp_path / "data")
+    words = ["losses", str(data), "run", "14"]
+    whole, _ = moments(words, tmp_path / "whole", 2, seed=SEED)
+    right = dict(line.split() for line in whole.out.splitlines())
+    state = (tmp_path / "whole" / "run" / "state.safetensors").read_bytes()
+    for turn in range(kills(4)):
+        folder = tmp_path / f"killed {turn}"
+        rng = np.random.default_rng((SEED, turn))
+        for number in (signal.SIGKILL, signal.SIGTERM, signal.SIGKILL):
+            ended = run(words, folder, at=int(rng.integers(1, whole.marks)), number=number)
+            assert ended.code in (0, 130, -signal.SIGKILL), ended
+            seen = dict(line.split() for line in ended.out.splitlines() if len(line.split()) == 2)
+            assert seen.items() <= right.items()
+        ended = run(words, folder)
+        assert ended.code == 0, ended.said
+        assert (folder / "run" / "state.safetensors").read_bytes() == state
+        assert parts(folder) == []

@@ -1,0 +1,40 @@
+"""What "the same seed, the same motion" means, on the shipped weights: docs/trust.md."""
+
+import numpy as np
+import pytest
+import torch
+
+from motionloom.tasks.text import generate
+from motionloom.weights.prior import Prior
+
+FEW = {"seconds": 2.0, "steps": 6}
+PROMPT = "a person walks forward and waves"
+
+
+@pytest.fixture(scope="module")
+def prior() -> Prior:
+    return Prior.load()
+
+
+@pytest.fixture(autouse=True)
+def threads():
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+def test_alone_a_seed_makes_the_same_motion_bit_for_bit(prior: Prior) -> None:
+    first, again = (generate(prior, PROMPT, seed=4, **FEW)[0] for _ in range(2))
+    assert np.array_equal(first.root, again.root)
+    assert np.array_equal(first.rotations, again.rotations)
+    assert not np.array_equal(first.rotations, generate(prior, PROMPT, seed=5, **FEW)[0].rotations)
+
+
+@pytest.mark.parametrize("count", [2, 3, 8])
+def test_in_any_company_it_is_equal_to_three_micrometres(prior: Prior, count: int) -> None:
+    """The last of `count` motions that are made together against the same seed alone."""
+    alone = generate(prior, PROMPT, seed=4, **FEW)[0].positions()
+    together = generate(prior, PROMPT, seed=4 - (count - 1) if count <= 5 else 4, count=count, **FEW)
+    same = together[count - 1 if count <= 5 else 0].positions()
+    assert np.abs(same - alone).max() <= 3e-6
