@@ -108,11 +108,15 @@ def _make(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline", s
     from contextlib import closing
 
     from motionloom.errors import MotionloomError
+    from motionloom.interruption import held_back
 
     try:
         with closing(_pieces(arguments, prior, timeline)) as pieces:  # the bar is gone before anything is said
             _write(pieces, streams, arguments.fps)
     except KeyboardInterrupt:
+        with held_back():  # it may have come just before they were closed
+            for stream in streams:
+                stream.close()
         if not _saved(streams):
             raise
         return True

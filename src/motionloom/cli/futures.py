@@ -169,6 +169,11 @@ class Long:
                             stream.write(piece)
                     shown += self._shown(piece, at) if number < SHOWN else []
                     at += len(piece)
+        except KeyboardInterrupt:
+            with held_back():  # it may have come just before they were closed
+                for _, stream in streams:
+                    stream.close()
+            raise
         finally:
             self.finished += [(place, stream.seconds) for place, stream in streams if stream.saved]
         return _joined(shown)

@@ -1,5 +1,6 @@
 """Paths that a data set's own files name."""
 
+from contextlib import suppress
 from pathlib import Path
 
 from motionloom.errors import MotionloomError
@@ -9,6 +10,8 @@ def inside(folder: Path, relative: str) -> Path:
     """``folder/relative``; raises MotionloomError where that leads out of the folder, or is no path at all."""
     try:
         path, base = (folder / relative).resolve(), folder.resolve()
+        with suppress(FileNotFoundError, NotADirectoryError):
+            path.lstat()
     except (OSError, ValueError, RuntimeError) as error:  # NUL, a name too long, links that lead to each other
         raise MotionloomError(f"{relative[:80]!r} is no path of a file in {folder} ({error})") from None
     if not path.is_relative_to(base):

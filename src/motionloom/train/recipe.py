@@ -1,5 +1,6 @@
 """Recipes: what to train, on what, how. A recipe is a small TOML file; unknown keys are errors."""
 
+import math
 import re
 import tomllib
 from dataclasses import dataclass, field, fields
@@ -107,7 +108,7 @@ def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Reci
             )
         kind = getattr(hints[key], "__origin__", hints[key])
         if kind is float and isinstance(value, int) and not isinstance(value, bool):
-            values[key] = float(value)
+            values[key] = float(value) if abs(value) < 1e300 else math.inf
         elif not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
             raise MotionloomError(f"{path}: {key} must be of kind {kind.__name__}; got {_shown(value)}")
     recipe = Recipe(**values)
@@ -144,9 +145,10 @@ def _check(path: Path, recipe: Recipe) -> None:
     good = (
         recipe.steps > 0 < recipe.batch and recipe.rank > 0 < recipe.rate
         and 0 <= recipe.ema < 1 and 0 <= recipe.drop_text < 1 and 0 <= recipe.early <= 1
-        and recipe.levels > 1 and 0 <= recipe.cooldown <= 1 and recipe.clip > 0 and recipe.save_every > 0
+        and recipe.levels > 1 and 0 <= recipe.cooldown <= 1 and 0 < recipe.clip <= 1e6 and recipe.save_every > 0
+        and 0 <= recipe.warmup <= 10**9
         and len(recipe.windows) == len(recipe.shares) > 0 and 0 < min(recipe.windows) <= max(recipe.windows) <= 10_000
-        and min(recipe.shares) >= 0 < sum(recipe.shares)
+        and 0 <= min(recipe.shares) <= max(recipe.shares) <= 1e6 and sum(recipe.shares) > 0
         and recipe.amp in ("bf16", "none") and recipe.schedule in SCHEDULES
         and recipe.spacing in ("index", "early")
     )  # fmt: skip
