@@ -152,7 +152,8 @@ def _cmu(folder: Path, captions: Path | None) -> Iterator[Take]:
 def _amass_span(row: dict) -> Span:
     end = float("inf") if row["end_s"] is None else float(row["end_s"])
     texts = tuple(str(c["text"]) for c in row["captions"] if not c["from_s"] and not c["to_s"])
-    return Span(float(row["start_s"] or 0.0), end, texts, "human")
+    start = 0.0 if row["start_s"] is None else float(row["start_s"])
+    return Span(start, end, texts, "human")
 
 
 def _humanml3d(folder: Path) -> Iterator[Take]:
