@@ -1,37 +1,27 @@
-"""Rotations on numpy arrays: unit quaternions ``(w, x, y, z)``, matrices, angles; the mathematics is `roma`'s.
+"""Rotations on numpy arrays: unit quaternions ``(w, x, y, z)``, matrices, angles.
 
-Every function takes any leading axes and computes in float64. Names are arrows: ``a_from_b`` or ``b_to_a``
-as in `roma`; a quaternion named ``world_from_joint`` turns joint coordinates into world coordinates.
+Every function takes any leading axes and computes in float64. Names are arrows: ``a_from_b`` or ``b_to_a``;
+a quaternion named ``world_from_joint`` turns joint coordinates into world coordinates. Rotations that tensors
+must be differentiated through are written where they are needed (`features.humanml`); nothing here imports torch.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-import roma
-import torch
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 IDENTITY: Array = np.array([1.0, 0.0, 0.0, 0.0])
-
-
-def _call(function: Callable[..., torch.Tensor], *arrays: np.ndarray) -> Array:
-    tensors = (torch.from_numpy(np.array(a, dtype=np.float64)) for a in arrays)
-    return function(*tensors).numpy()
-
-
-def _xyzw(q: np.ndarray) -> Array:
-    return np.roll(np.asarray(q, dtype=np.float64), -1, axis=-1)
-
-
-def _wxyz(q: np.ndarray) -> Array:
-    return np.roll(q, 1, axis=-1)
+_NEARLY_LOCKED = 1e-7
+"""Radians from the poles within which Euler angles are not unique."""
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> Array:
     """Quaternion product ``a b``: first turn by b, then by a."""
-    a, b = np.broadcast_arrays(np.asarray(a, dtype=np.float64), b)
-    return _wxyz(_call(roma.quat_product, _xyzw(a), _xyzw(b)))
+    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    aw, bw, av, bv = a[..., :1], b[..., :1], a[..., 1:], b[..., 1:]
+    scalar = aw * bw - (av * bv).sum(-1, keepdims=True)
+    return np.concatenate([scalar, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
 
 
 def inverse(q: np.ndarray) -> Array:
@@ -56,22 +46,55 @@ def normalize(q: np.ndarray) -> Array:
 
 def quat_to_matrix(q: np.ndarray) -> Array:
     """Unit quaternions to matrices ``(..., 3, 3)``."""
-    return _call(roma.unitquat_to_rotmat, _xyzw(q))
+    w, x, y, z = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
+    rows = (
+        (x * x - y * y - z * z + w * w, 2 * (x * y - z * w), 2 * (x * z + y * w)),
+        (2 * (x * y + z * w), -x * x + y * y - z * z + w * w, 2 * (y * z - x * w)),
+        (2 * (x * z - y * w), 2 * (y * z + x * w), -x * x - y * y + z * z + w * w),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def matrix_to_quat(m: np.ndarray) -> Array:
-    """Rotation matrices ``(..., 3, 3)`` to unit quaternions."""
-    return _wxyz(_call(roma.rotmat_to_unitquat, m))
+    """Rotation matrices ``(..., 3, 3)`` to unit quaternions.
+
+    Each of four vectors is the quaternion times four times one of its parts; the longest is made a unit vector
+    (Markley, "Unit Quaternion from Rotation Matrix", 2008).
+    """
+    m = np.asarray(m, dtype=np.float64)
+    x, y, z = (m[..., i, i] for i in range(3))
+    xy, yz, zx = (m[..., i, j] + m[..., j, i] for i, j in ((0, 1), (1, 2), (2, 0)))
+    wx, wy, wz = (m[..., i, j] - m[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0)))
+    rows = (
+        (1 + x + y + z, wx, wy, wz),
+        (wx, 1 + x - y - z, xy, zx),
+        (wy, xy, 1 + y - z - x, yz),
+        (wz, zx, yz, 1 + z - x - y),
+    )
+    four = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    longest = np.diagonal(four, axis1=-2, axis2=-1).argmax(-1)
+    q = np.take_along_axis(four, longest[..., None, None], axis=-2)[..., 0, :]
+    return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
 def rotvec_to_quat(v: np.ndarray) -> Array:
     """Rotation vectors (radians) to unit quaternions."""
-    return _wxyz(_call(roma.rotvec_to_unitquat, v))
+    v = np.asarray(v, dtype=np.float64)
+    half = np.linalg.norm(v, axis=-1, keepdims=True) / 2
+    return np.concatenate([np.cos(half), _ratio(np.sin(half), half) / 2 * v], axis=-1)
 
 
 def quat_to_rotvec(q: np.ndarray) -> Array:
     """Unit quaternions to rotation vectors (radians), the shorter way round."""
-    return _call(roma.unitquat_to_rotvec, _xyzw(q))
+    q = np.asarray(q, dtype=np.float64)
+    q = q * np.where(q[..., :1] > 0, 1.0, -1.0)
+    half = np.arctan2(np.linalg.norm(q[..., 1:], axis=-1, keepdims=True), q[..., :1])
+    return 2 * _ratio(half, np.sin(half)) * q[..., 1:]
+
+
+def _ratio(a: Array, b: Array) -> Array:
+    """``a / b`` of two lengths that vanish together, 1 where they do."""
+    return np.divide(a, b, out=np.ones_like(a), where=b != 0)
 
 
 def euler_to_quat(order: str, angles: np.ndarray) -> Array:
@@ -88,10 +111,24 @@ def euler_to_quat(order: str, angles: np.ndarray) -> Array:
 
 
 def quat_to_euler(order: str, q: np.ndarray) -> Array:
-    """Unit quaternions to intrinsic Euler angles (radians) in three distinct axes such as ``"ZXY"``."""
-    angles = roma.unitquat_to_euler(order.upper(), torch.from_numpy(_xyzw(q).copy()), as_tuple=False)
-    assert isinstance(angles, torch.Tensor)
-    return angles.numpy()
+    """Unit quaternions to intrinsic Euler angles (radians) in three distinct axes such as ``"ZXY"``.
+
+    The middle angle is within a quarter turn; where it is one, only a sum of the others is known, and the last is 0.
+    (Bernardes & Viollet, "Quaternion to Euler angles conversion", 2022.)
+    """
+    k, j, i = ("XYZ".index(axis) for axis in order.upper())
+    sign = (i - j) * (j - k) * (k - i) // 2
+    q = np.asarray(q, dtype=np.float64)
+    w, vector = q[..., 0], q[..., 1:]
+    a, b = w - vector[..., j], vector[..., i] + vector[..., k] * sign
+    c, d = vector[..., j] + w, vector[..., k] * sign - vector[..., i]
+    middle = 2 * np.arctan2(np.hypot(c, d), np.hypot(a, b))
+    low, high = middle <= _NEARLY_LOCKED, np.abs(middle - np.pi) <= _NEARLY_LOCKED
+    total, rest = np.arctan2(b, a), np.arctan2(d, c)
+    first = np.where(low, 2 * total, np.where(high, 2 * rest, total + rest)) * sign
+    last = np.where(low | high, 0.0, total - rest)
+    angles = np.stack([first, middle - np.pi / 2, last], axis=-1)
+    return angles - 2 * np.pi * ((angles > np.pi).astype(np.float64) - (angles < -np.pi))
 
 
 def shortest_arc(a: np.ndarray, b: np.ndarray) -> Array:

@@ -1,6 +1,7 @@
 """What the commands that make motions share: options, the checks of them, a progress bar."""
 
 import argparse
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -161,11 +162,12 @@ def remark_unknown(prior: "Prior", prompts: Sequence[str]) -> list[str]:
 @contextmanager
 def bar(label: str) -> Iterator[Callable[[int, int], None]]:
     """A progress bar on a terminal's stderr, and a function that moves it: (done, of how many)."""
+    if not sys.stderr.isatty():  # the bar would leave an empty line, and rich costs a tenth of a second
+        yield lambda done, total: None
+        return
     from rich.console import Console
     from rich.progress import Progress
 
-    screen = Console(stderr=True)
-    shown = screen.is_terminal  # elsewhere the bar would leave an empty line
-    with Progress(console=screen, transient=True, disable=not shown) as progress:
+    with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(label, total=None)
         yield lambda done, total: progress.update(task, completed=done, total=total)

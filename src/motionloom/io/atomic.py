@@ -6,7 +6,6 @@ is killed leaves such a part behind, unlocked: `finished` never lists it, and th
 
 import os
 import re
-import secrets
 import shutil
 import stat
 from collections.abc import Iterator
@@ -97,7 +96,7 @@ def _remove(part: Path, file: int, *, is_folder: bool) -> None:
 
 def _made(folder: Path, suffix: str, *, is_folder: bool) -> tuple[Path, int]:
     while True:
-        part = folder / f".{secrets.token_hex(6)}.part{suffix}"
+        part = folder / f".{os.urandom(6).hex()}.part{suffix}"
         if is_folder:
             part.mkdir()
             file = os.open(part, os.O_RDONLY)
