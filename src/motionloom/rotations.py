@@ -21,7 +21,7 @@ def multiply(a: np.ndarray, b: np.ndarray) -> Array:
     a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
     aw, bw, av, bv = a[..., :1], b[..., :1], a[..., 1:], b[..., 1:]
     scalar = aw * bw - (av * bv).sum(-1, keepdims=True)
-    return np.concatenate([scalar, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
+    return np.concatenate([scalar, aw * bv + bw * av + cross(av, bv)], axis=-1)
 
 
 def inverse(q: np.ndarray) -> Array:
@@ -29,12 +29,19 @@ def inverse(q: np.ndarray) -> Array:
     return np.asarray(q, dtype=np.float64) * np.array([1.0, -1.0, -1.0, -1.0])
 
 
+def cross(a: np.ndarray, b: np.ndarray) -> Array:
+    """Cross product of vectors ``(..., 3)``; NumPy's own spends more on its axes than on the product."""
+    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    ax, ay, az, bx, by, bz = a[..., 0], a[..., 1], a[..., 2], b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
 def rotate(q: np.ndarray, v: np.ndarray) -> Array:
     """Turn vectors ``(..., 3)`` by unit quaternions ``(..., 4)``."""
     q = np.asarray(q, dtype=np.float64)
     v = np.asarray(v, dtype=np.float64)
-    t = 2.0 * np.cross(q[..., 1:], v)
-    return v + q[..., :1] * t + np.cross(q[..., 1:], t)
+    t = 2.0 * cross(q[..., 1:], v)
+    return v + q[..., :1] * t + cross(q[..., 1:], t)
 
 
 def normalize(q: np.ndarray) -> Array:
@@ -137,11 +144,11 @@ def shortest_arc(a: np.ndarray, b: np.ndarray) -> Array:
     b = np.asarray(b, dtype=np.float64) / np.linalg.norm(b, axis=-1, keepdims=True).clip(1e-12)
     a, b = np.broadcast_arrays(a, b)
     w = 1.0 + (a * b).sum(-1, keepdims=True)
-    q = np.concatenate([w, np.cross(a, b)], axis=-1)
+    q = np.concatenate([w, cross(a, b)], axis=-1)
     opposite = w[..., 0] < 1e-8
     if opposite.any():
         other = np.where(np.abs(a[..., :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
-        q = np.where(opposite[..., None], np.concatenate([0 * w, np.cross(a, other)], axis=-1), q)
+        q = np.where(opposite[..., None], np.concatenate([0 * w, cross(a, other)], axis=-1), q)
     return normalize(q)
 
 

@@ -1,11 +1,13 @@
 """The command line: turns words into calls, nothing else. Heavy libraries are imported by the commands, not here."""
 
 import argparse
+import gc
 import importlib
 import os
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from motionloom.errors import MotionloomError, one_line
 from motionloom.interruption import interruptible, was_interrupted
@@ -40,8 +42,8 @@ class _Parser(argparse.ArgumentParser):
         return found, unknown
 
 
-def parser() -> argparse.ArgumentParser:
-    """The whole command line as one parser."""
+def parser(command: str | None = None) -> argparse.ArgumentParser:
+    """The command line as one parser: the whole, or no more than is needed to know ``command``."""
     top = _Parser(
         prog="motionloom", description="Human motion from words: generate, export, look at, train and measure it."
     )
@@ -49,6 +51,8 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(title="commands", metavar="COMMAND", parser_class=_Parser)
     for family in FAMILIES:
         importlib.import_module(f"motionloom.cli.{family}").add(commands)
+        if command in commands.choices:
+            break
     return top
 
 
@@ -84,8 +88,9 @@ def _told(argv: Sequence[str] | None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    top = parser()
-    arguments = top.parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    top = parser(words[0] if words else None)
+    arguments = top.parse_args(words)
     if arguments.version:
         from importlib.metadata import version
 
@@ -94,9 +99,20 @@ def _run(argv: Sequence[str] | None) -> int:
     if not hasattr(arguments, "run"):
         top.print_help(sys.stderr)
         return 2
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), _seldom_collected():
         warnings.showwarning = _warn
         return arguments.run(arguments) or 0
+
+
+@contextmanager
+def _seldom_collected() -> Iterator[None]:
+    """Look for garbage in cycles less often: importing torch makes many objects, and all of them are needed."""
+    before = gc.get_threshold()
+    gc.set_threshold(100_000, *before[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
 
 
 def _warn(message: Warning | str, *_: object) -> None:

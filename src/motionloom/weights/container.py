@@ -39,8 +39,13 @@ def check(weights: Mapping[str, Tensor], wanted: Mapping[str, Sequence[int]], wh
             f"not {right.get(key, 'absent')}; fetch or train it again"
         )
     for key, value in weights.items():
-        if not value.is_floating_point() or not bool(value.isfinite().all()):
+        if not value.is_floating_point() or not _finite(value):
             raise MotionloomError(f"{what} has numbers that are not finite floats, in {key}; fetch or train it again")
+
+
+def _finite(values: Tensor) -> bool:
+    """Whether no number is infinite or NaN, which both ends of the range tell without a mask as large as the tensor."""
+    return not values.numel() or all(bool(end.isfinite()) for end in values.aminmax())
 
 
 def fill(net: nn.Module, weights: Mapping[str, Tensor], what: str) -> None:

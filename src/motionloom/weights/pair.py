@@ -22,6 +22,7 @@ from motionloom.io.tensors import save_tensors
 from motionloom.io.text import plain_json
 from motionloom.nets.pair import PairConfig, PairNet, Talk
 from motionloom.nets.prior import PriorNet
+from motionloom.nets.unfilled import unfilled
 from motionloom.weights.adapter import origin
 from motionloom.weights.container import check, is_signed, shapes
 
@@ -81,7 +82,7 @@ class PairBlock:
                 f"the two-person block {path.name} belongs to the weights {found.base!r}, and these are others; "
                 "use those weights, or train a block for these"
             )
-        with torch.device("meta"):
+        with unfilled():
             check(found.tensors, shapes(Talk(found.config, prior.net.config)), str(path))
         return found
 

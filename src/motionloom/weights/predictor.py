@@ -27,6 +27,7 @@ from motionloom.io.atomic import finished
 from motionloom.io.tensors import save_tensors
 from motionloom.io.text import plain_json
 from motionloom.nets.predictor import NetConfig, TransLinear
+from motionloom.nets.unfilled import unfilled
 from motionloom.weights.container import fill, is_signed
 from motionloom.weights.prior import Card, find_device, read_tensors
 
@@ -194,7 +195,7 @@ def load_predictor(path: Path) -> Predictor:
         raise
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         raise MotionloomError(f"{path} does not describe a predictor ({error!r}); name a file that does") from None
-    with torch.device("meta"):  # what a file only claims to hold takes no memory
+    with unfilled():  # what a file only claims to hold takes no memory
         net = TransLinear(config)
     fill(net, {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}, str(path))
     mean, std, pose = (_usable(path, tensors, key) for key in ("mean", "std", "pose"))

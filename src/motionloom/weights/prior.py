@@ -26,6 +26,7 @@ from motionloom.nets.prior import Condition, NetConfig, PriorNet, condition
 from motionloom.nets.text import MiniLM, TextEncoder
 from motionloom.nets.text.known import Known, pack_known, unpack_known, with_sentences
 from motionloom.nets.text.published import TEXTS, PublishedText
+from motionloom.nets.unfilled import unfilled
 from motionloom.weights.adapter import Adapter, merged, origin
 from motionloom.weights.container import fill, is_signed
 
@@ -179,7 +180,7 @@ def load_prior(path: Path, device: str | torch.device = "cpu") -> Prior:
     tensors, metadata = read_tensors(path)
     about = _about(path, metadata)
     config = NetConfig.parse(about["net"])
-    with torch.device("meta"):
+    with unfilled():
         net = PriorNet(config)
     fill(net, {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}, str(path))
     for name in ("mean", "std"):

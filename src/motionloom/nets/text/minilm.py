@@ -14,6 +14,7 @@ from motionloom.nets.text.bert import Bert
 from motionloom.nets.text.protocol import Row, RowCache, TextEmbedding, as_rows, cut, stack_rows
 from motionloom.nets.text.quantise import dequantise, quantise
 from motionloom.nets.text.wordpiece import END, SPECIALS, START, make_tokenizer
+from motionloom.nets.unfilled import unfilled
 
 HEAD_WIDTH = 32
 LENGTH = 64  # word pieces, start and end marks included
@@ -56,7 +57,7 @@ class MiniLM:
                 raise ValueError(f"{places} places of width {width}")
             layers = len({key.split(".")[1] for key in weights if key.startswith("layers.")})
             hidden = weights["layers.0.hidden_in.weight"].shape[0]
-            with torch.device("meta"):  # nothing is drawn at random only to be overwritten
+            with unfilled():
                 net = Bert(
                     vocabulary=len(vocabulary),
                     places=places,
@@ -142,8 +143,10 @@ def _unpack(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
     for name, value in tensors.items():
         if name == VOCABULARY or name.endswith(SCALE):
             continue
-        weights[name] = dequantise(value, tensors[name + SCALE]) if value.dtype == torch.int8 else value.float()
-        if not weights[name].isfinite().all():
+        packed = value.dtype == torch.int8
+        weights[name] = dequantise(value, tensors[name + SCALE]) if packed else value.float()
+        largest = 128 * tensors[name + SCALE].float() if packed else weights[name]  # a row's largest number, not each
+        if not largest.isfinite().all():
             raise ValueError(f"{name} is not finite")
     return weights
 
