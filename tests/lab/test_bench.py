@@ -11,7 +11,7 @@ from motionloom.cli import main
 from motionloom.diffusion import DDPM, DpmSolver2M, cosine
 from motionloom.errors import MotionloomError
 from motionloom.lab import bench
-from motionloom.lab.bench import long, prediction, speed
+from motionloom.lab.bench import long, prediction, speed, start
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.nets.text import TextEmbedding
 from motionloom.weights.prior import Card, Prior
@@ -45,23 +45,47 @@ def _one_thread():
 
 
 def fake_process(arguments: Sequence[str]) -> bench.Process:
-    return bench.Process(0.25 if arguments[0] == "--help" else 3.0, 800.0)
+    return bench.Process(0.25 if arguments[0] == "--help" else 3.0, 800.0, 4.0)
 
 
 def test_every_number_has_a_target_and_an_explanation(prior: Prior) -> None:
     found = bench.bench(prior, bench.Sampling(steps=5), quick=True, sizes=(64,), run=fake_process)
     names = [entry["name"] for entry in found["entries"]]
-    assert len(names) == len(set(names)) == 7
+    assert len(names) == len(set(names)) == 10
     assert all(e["value"] > 0 and e["target"] and e["note"] and e["unit"] for e in found["entries"])
-    assert len(bench.table(found)) == 8
+    assert len(bench.table(found)) == 11
     assert json.loads(json.dumps(found)) == found
 
 
 def test_commands_compare_seconds_and_megabytes_with_their_targets() -> None:
     good = speed.commands("default", repeats=1, run=fake_process)
-    assert [(e.value, e.passes) for e in good] == [(0.25, True), (3.0, True), (800.0, True)]
-    bad = speed.commands("default", repeats=1, run=lambda arguments: bench.Process(9.0, 1501.0))
+    assert [(e.value, e.passes) for e in good] == [(0.25, True), (800.0, True)]
+    bad = speed.commands("default", repeats=1, run=lambda arguments: bench.Process(9.0, 1501.0, 9.0))
     assert not any(e.passes for e in bad)
+
+
+def test_starts_are_medians_over_an_import_of_torch_without_the_first_round() -> None:
+    """Three rounds of torch 2, 2, 4 s and generate 3, 3, 5 s after a slow one: 3 / 2; info and the others 0.5 / 2."""
+    asked: list[str] = []
+    took = {"-c": [50.0, 2.0, 2.0, 4.0], "generate": [90.0, 3.0, 3.0, 5.0]}
+
+    def run(arguments: Sequence[str]) -> bench.Process:
+        asked.append(arguments[0])
+        times = took.get(arguments[0], [9.0, 0.5, 0.5, 1.0])
+        return bench.Process(times[asked.count(arguments[0]) - 1], 1.0, 1.0)
+
+    entries = start.starts("default", repeats=3, run=run)
+    assert asked == ["-c", "generate", "info", "export", "view"] * 4
+    assert [(e.value, e.passes) for e in entries] == [(1.5, True), (0.25, True), (0.25, True), (0.25, True)]
+    took["generate"] = took["info"] = took["view"] = [9.0, 4.0, 4.0, 4.0]
+    asked.clear()
+    assert [e.passes for e in start.starts("default", repeats=3, run=run)] == [False, False, True, False]
+
+
+def test_python_itself_can_be_timed() -> None:
+    assert bench.process(("-c", "print(1)")).processor > 0
+    with pytest.raises(MotionloomError, match="ZeroDivisionError"):
+        bench.process(("-c", "1 / 0"))
 
 
 def test_flops_of_a_product_are_two_per_multiplication() -> None:
@@ -142,7 +166,7 @@ def test_long_motion_is_measured_at_every_length_with_its_settings() -> None:
 
     def run(arguments: Sequence[str]) -> bench.Process:
         asked.append(arguments)
-        return bench.Process(1.0, 500.0 + len(asked))
+        return bench.Process(1.0, 500.0 + len(asked), 1.0)
 
     found = long.long_motion(long_prior(), bench.Sampling(steps=2), TINY, run=run)
     assert len(found.times) == 3

@@ -1,7 +1,8 @@
 """`motionloom bench`: speed as ratios within one run, so that they mean the same on any machine.
 
 Times are medians of interleaved repeats. Nothing here is a test: a busy machine makes it slower, not wrong.
-`speed` has the tools and what `generate` costs, `long` what `compose` costs, `prediction` what futures cost.
+`speed` has the tools and what `generate` costs, `start` what whole processes take, `long` what `compose` costs,
+`prediction` what futures cost.
 """
 
 import os
@@ -25,6 +26,7 @@ from motionloom.lab.bench.speed import (
     process,
     speed_of_default,
 )
+from motionloom.lab.bench.start import starts
 from motionloom.weights.predictor import Predictor
 from motionloom.weights.prior import Prior
 
@@ -56,6 +58,7 @@ def bench(
         ],
         lambda: [linearity(prior, how, counts=counts, seconds=6.0, repeats=repeats)],
         lambda: commands(weights, repeats=min(repeats, 3), run=run),
+        lambda: starts(weights, repeats=repeats, run=run),
     ]
     found: dict[str, Any] = {"machine": about, "quick": quick, "entries": []}
 
