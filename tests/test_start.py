@@ -1,0 +1,79 @@
+"""What commands import, which is most of what their start costs; no clocks."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CLIP = Path(__file__).parents[1] / "examples" / "clips" / "walk.bvh"
+HEAVY = {
+    "torch._dynamo", "torch._inductor", "torch._functorch.aot_autograd", "torch._decomp.decompositions",
+    "torch.utils.tensorboard", "torch.utils.flop_counter", "scipy", "matplotlib", "roma", "transformers", "pygltflib",
+    "yaml", "PIL", "rich", "imageio_ffmpeg", "motionloom.lab", "motionloom.train",
+}  # fmt: skip
+"""What no sentence needs on its way to a BVH."""
+
+COMMAND = """
+import sys
+from motionloom.cli import main
+code = main(sys.argv[1:])
+print("LOADED", *sorted(sys.modules))
+sys.exit(code)
+"""
+
+
+def loaded(*command: str, code: str = COMMAND) -> set[str]:
+    """The modules that a fresh process has imported at the end of a command."""
+    done = subprocess.run(
+        [sys.executable, "-c", code, *command], capture_output=True, text=True, timeout=600, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.rsplit("LOADED", 1)[1].split())
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("info", str(CLIP)),
+        ("export", str(CLIP), "{out}.bvh", "--mirror", "--fps", "20"),
+        ("export", str(CLIP), "{out}.glb", "--skeleton", "smpl22"),
+        ("export", str(CLIP), "{out}.npz", "--start", "0.5"),
+        ("export", str(CLIP), "{out}.gif", "--end", "0.1"),
+        ("view", str(CLIP), "--out", "{out}.png"),
+    ],
+    ids=lambda words: " ".join(words[:1] + words[2:]),
+)
+def test_files_are_read_written_and_drawn_without_torch(words: tuple[str, ...], tmp_path: Path) -> None:
+    """`info`, `export` and `view` start as fast as numpy does."""
+    found = loaded(*(word.replace("{out}", str(tmp_path / "out")) for word in words))
+    assert "motionloom.io" in found
+    assert not found & {"torch", "scipy", "matplotlib", "roma", "rich", "tokenizers", "safetensors"}
+
+
+def test_a_sentence_becomes_a_bvh_without_what_only_others_need(tmp_path: Path) -> None:
+    """`generate` imports what plain torch imports, the tokenizer, and nothing large besides."""
+    out = tmp_path / "walk.bvh"
+    found = loaded("generate", "a person walks", "--seconds", "1", "--steps", "2", "--out", str(out))
+    assert out.stat().st_size
+    assert {"torch", "tokenizers"} <= found
+    plain = loaded(code="import sys, torch; print('LOADED', *sys.modules)")
+    assert not (found - plain) & HEAVY
+    assert not {name for name in found - plain if name.startswith(("torch._dynamo", "torch._inductor", "torch.export"))}
+
+
+def test_importing_the_package_imports_no_library() -> None:
+    """`import motionloom` knows its public names and imports what is behind them when they are asked for."""
+    found = loaded(code="import sys, motionloom; print('LOADED', *sys.modules)")
+    assert not found & {"torch", "numpy", "safetensors", "motionloom.motion"}
+    found = loaded(code="import sys; from motionloom import Motion, SMPL22, load; print('LOADED', *sys.modules)")
+    assert "numpy" in found
+    assert "torch" not in found
+
+
+def test_a_command_sets_up_no_command_behind_it() -> None:
+    """`generate --help` parses with its own family; one that is not known is told all there are."""
+    code = "import sys, contextlib\nfrom motionloom.cli import main\n"
+    code += "with contextlib.suppress(SystemExit): main(sys.argv[1:])\nprint('LOADED', *sys.modules)"
+    assert "motionloom.cli.evaluate" not in loaded("generate", "--help", code=code)
+    assert {"motionloom.cli.evaluate", "motionloom.cli.weights"} <= loaded("nothing", code=code)
