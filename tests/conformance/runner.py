@@ -8,13 +8,16 @@ A test of a group reads
 The numbers lie in `recorded`; those of another folder are compared where MOTIONLOOM_CONFORMANCE names it, or where
 MOTIONLOOM_SHARED names one that has a folder `conformance`: a group it lacks is skipped. Arrays are compared as
 `numpy.asarray(array)`, so torch tensors (CPU) and numbers will do.
+
+A test that is given a case must read every setting of it and compare every output of it: `conftest.py` sees to that,
+and `test_kinds.py` that every recorded kind has such a test.
 """
 
 import functools
 import json
 import os
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -41,18 +44,47 @@ _UNSCALED = ("emb_trans_or_not.weight", "hidden")
 _NORMS = ("norm1.weight", "norm2.weight", "norm.weight", "output_net.1.weight")
 
 
+class Settings(Mapping[str, Any]):
+    """What a case recorded, and which of it was read."""
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        self._values, self.read = values, set[str]()
+
+    def __getitem__(self, key: str) -> Any:
+        self.read.add(key)
+        return self._values[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def unread(self) -> list[str]:
+        """The names that nobody asked for."""
+        return [name for name in self._values if name not in self.read]
+
+
 @dataclass(frozen=True)
 class Case:
     """One recorded run."""
 
     group: str
     name: str
-    config: Mapping[str, Any]
+    config: Settings
     """What was run, and everything needed to rebuild its input."""
     outputs: Mapping[str, Mapping[str, Any]]
     """How each output is stored and how near it must be."""
-    lists: Mapping[str, Any]
+    lists: Settings
     """What a case without numbers lists: `keys` (names and shapes) and counts, or `dims`."""
+    compared: set[str] = field(default_factory=set)
+    """The outputs that were."""
+
+    def left(self) -> list[str]:
+        """What of the case was neither read nor compared."""
+        outputs = [f"output {name}" for name in self.outputs if name not in self.compared]
+        settings = [f"config {name}" for name in self.config.unread() if name != "kind"]
+        return outputs + settings + [f"list {name}" for name in self.lists.unread() if name != "note"]
 
     def expected(self, output: str) -> np.ndarray:
         """The stored elements of an output: every `stride`-th one of the flattened array."""
@@ -117,6 +149,7 @@ def weights(
 
 def compare(case: Case, output: str, array: Any) -> None:
     """Assert that `array` is the recorded output: shape, stored elements, and mean, std, abs_sum of the whole."""
+    case.compared.add(output)
     spec, actual = case.outputs[output], np.asarray(array)
     what = f"{case.group}/{case.name}/{output}"
     assert list(actual.shape) == spec["shape"], f"{what}: shape {list(actual.shape)}, recorded {spec['shape']}"
@@ -138,8 +171,8 @@ def _near(what: str, actual: float, expected: float, atol: float, rtol: float) -
 
 def _case(group: str, record: Mapping[str, Any]) -> Case:
     own = ("name", "config", "outputs")
-    lists = {key: value for key, value in record.items() if key not in own}
-    return Case(group, record["name"], record["config"], dict(record.get("outputs") or {}), lists)
+    lists = Settings({key: value for key, value in record.items() if key not in own})
+    return Case(group, record["name"], Settings(record["config"]), dict(record.get("outputs") or {}), lists)
 
 
 @functools.cache

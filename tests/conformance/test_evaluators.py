@@ -50,7 +50,7 @@ def test_published_encoders_give_the_recorded_embeddings(recorded: Case) -> None
 
 @pytest.mark.parametrize("recorded", cases("evaluators", kind="state_dict"))
 def test_published_names_and_shapes_are_read_whole(recorded: Case) -> None:
-    part = getattr(nets(1801), recorded.name.removeprefix("state_dict_"))
+    part = getattr(nets(seed=1), recorded.name.removeprefix("state_dict_"))
     assert {key: list(value.shape) for key, value in part.state_dict().items()} == recorded.lists["keys"]
     assert len(part.state_dict()) == recorded.lists["n_entries"]
     assert sum(p.numel() for p in part.parameters()) == recorded.lists["n_parameters"]

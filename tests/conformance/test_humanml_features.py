@@ -35,6 +35,7 @@ def formula_joints(case: Case) -> np.ndarray:
 @pytest.mark.parametrize("case", cases("humanml_features", kind="features"))
 def test_encoding_gives_the_recorded_numbers(case: Case) -> None:
     joints = formula_joints(case)
+    assert case.config["contact_threshold"] == humanml.CONTACT_THRESHOLD
     compare(case, "joints", joints)
     if case.config["mirror"]:
         joints = (joints * np.float32([-1, 1, 1]))[:, SMPL22.mirror_pairs()]

@@ -28,8 +28,9 @@ def test_weights_follow_plain_string_order_and_leave_out_tables():
     np.testing.assert_array_equal(filled["hidden"], normal(rng, (2,)))
 
 
-@pytest.mark.parametrize("recorded", cases("sampling", kind="sampling"))
-def test_a_wrong_number_is_caught_at_every_stored_element_and_in_the_sums(recorded):
+@pytest.mark.parametrize("name", [param.id for param in cases("sampling", kind="sampling")])
+def test_a_wrong_number_is_caught_at_every_stored_element_and_in_the_sums(name):
+    recorded = case("sampling", name)
     if recorded.outputs["sample"]["stride"] > 1:
         pytest.skip("only whole arrays can be handed back")
     right = recorded.expected("sample").reshape(recorded.outputs["sample"]["shape"])
@@ -43,6 +44,18 @@ def test_a_wrong_number_is_caught_at_every_stored_element_and_in_the_sums(record
     outputs = {"sample": {**recorded.outputs["sample"], "abs_sum": recorded.outputs["sample"]["abs_sum"] * 1.01}}
     with pytest.raises(AssertionError, match="abs_sum"):
         compare(dataclasses.replace(recorded, outputs=outputs), "sample", right)
+
+
+def test_what_a_test_left_aside_of_its_case_is_listed():
+    recorded = case("sampling", "dummy_plain")
+    assert {"output sample", "config seed", "config guidance"} <= set(recorded.left())
+    assert "config kind" not in recorded.left()
+    assert recorded.config["seed"] > 0
+    assert recorded.config.get("guidance") is None
+    compare(recorded, "sample", recorded.expected("sample").reshape(recorded.outputs["sample"]["shape"]))
+    assert not {"output sample", "config seed", "config guidance"} & set(recorded.left())
+    assert set(recorded.config.unread()) < set(dict(recorded.config))
+    assert not recorded.left()
 
 
 def test_a_case_is_found_by_name_and_lists_what_it_recorded():

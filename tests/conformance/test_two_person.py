@@ -14,9 +14,21 @@ from motionloom.diffusion import DDPM, Denoiser, chain, cosine, inpaint, observe
 from motionloom.lab.papers.commdm import from_published_pair
 from motionloom.nets.pair import PairNet
 from motionloom.nets.prior import condition
-from tests.conformance.runner import KNOWN, MOTION, NOISE, TEXT, Case, case, cases, compare, normal, stream, weights
+from tests.conformance.runner import (
+    KNOWN,
+    MOTION,
+    NOISE,
+    TEXT,
+    Case,
+    Settings,
+    case,
+    cases,
+    compare,
+    normal,
+    stream,
+    weights,
+)
 
-CHANNELS = 263
 GIVEN = 21
 """Slots of a given prefix: the place and one second."""
 
@@ -37,16 +49,21 @@ def table(layers: int, split: int) -> dict[str, list[int]]:
     return result
 
 
-def net_of(config: dict) -> PairNet:
+def channels_of(recorded: Case) -> int:
+    return next(iter(recorded.outputs.values()))["shape"][1]
+
+
+def net_of(recorded: Case) -> PairNet:
+    config, channels = recorded.config, channels_of(recorded)
     filled = weights(table(config["layers"], config["split"]), config["seed"])
     adds = {"in_both_out_cur": "all", "in_both_out_cond": "condition"}[config["function"]]
     state = {name: torch.from_numpy(array) for name, array in filled.items()}
     prior, block = from_published_pair(state, adds=adds)  # type: ignore[arg-type]
-    return PairNet(prior, block, cosine(1000), mean=torch.zeros(CHANNELS), std=torch.ones(CHANNELS)).eval()
+    return PairNet(prior, block, cosine(1000), mean=torch.zeros(channels), std=torch.ones(channels)).eval()
 
 
-def bound_of(net: PairNet, config: dict, batch: int):
-    text = torch.from_numpy(normal(stream(config["seed"], TEXT), (batch, 512)))
+def bound_of(net: PairNet, config: Settings):
+    text = torch.from_numpy(normal(stream(config["seed"], TEXT), (config["batch"], 512)))
     text = torch.zeros_like(text) if config["unconditional"] else text
     return net.bind(condition(text.repeat_interleave(2, dim=0)))
 
@@ -60,8 +77,9 @@ def person(state: Tensor, k: int) -> np.ndarray:
     return state[k::2].numpy().swapaxes(1, 2)[:, :, None]
 
 
-def drawn(config: dict, k: int) -> Iterator[Tensor]:
-    rng, shape = stream(config["seed"], k), (config["batch"], CHANNELS, 1, config["frames"] + 1)
+def drawn(recorded: Case, k: int) -> Iterator[Tensor]:
+    config = recorded.config
+    rng, shape = stream(config["seed"], k), (config["batch"], channels_of(recorded), 1, config["frames"] + 1)
     while True:
         yield pairs(normal(rng, shape), normal(rng, shape))
 
@@ -69,11 +87,11 @@ def drawn(config: dict, k: int) -> Iterator[Tensor]:
 @pytest.mark.parametrize("recorded", cases("two_person", kind="two_person_forward"))
 @torch.inference_mode()
 def test_both_answers_of_one_call_are_the_published_ones(recorded: Case):
-    config = dict(recorded.config)
-    net = net_of(config)
-    state = next(drawn(config, MOTION))
+    config = recorded.config
+    net = net_of(recorded)
+    state = next(drawn(recorded, MOTION))
     level = torch.tensor(config["timesteps"]).repeat_interleave(2) + 1
-    guess = net(state, level, bound_of(net, config, config["batch"]))
+    guess = net(state, level, bound_of(net, config))
     compare(recorded, "out", person(guess, 0))
     compare(recorded, "out_swapped", person(guess, 1))
 
@@ -92,10 +110,10 @@ def test_a_block_has_the_published_weights_and_no_others(recorded: Case):
 @pytest.mark.parametrize("recorded", cases("two_person", kind="two_person_sampling"))
 @torch.inference_mode()
 def test_whole_runs_of_two_people_give_the_published_samples(recorded: Case):
-    config = dict(recorded.config)
-    net, schedule = net_of(config), cosine(config["steps"])
-    bound = bound_of(net, config, config["batch"])
-    noise, count = drawn(config, NOISE), 0
+    config = recorded.config
+    net, schedule = net_of(recorded), cosine(config["steps"])
+    bound = bound_of(net, config)
+    noise, count = drawn(recorded, NOISE), 0
 
     def draw(like: Tensor) -> Tensor:
         nonlocal count
@@ -108,7 +126,7 @@ def test_whole_runs_of_two_people_give_the_published_samples(recorded: Case):
     told: Denoiser = denoise
     constraints, start = [], None
     if config["prefix"]:
-        known = next(drawn(config, KNOWN))
+        known = next(drawn(recorded, KNOWN))
         mask = torch.zeros_like(known, dtype=torch.bool)
         mask[:, :GIVEN] = True
         told = inpaint(denoise, known, mask)
