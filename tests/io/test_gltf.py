@@ -4,7 +4,6 @@ import json
 import os
 import shutil
 import subprocess
-import time
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from motionloom.io.gltf import load_glb, save_glb
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
 from tests.io.gltf_files import person, random_motion
+from tests.work import work
 
 QUICK = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -60,14 +60,18 @@ def test_several_people_keep_their_own_tree_length_and_rate(tmp_path: Path, seed
         load_glb(path, person=len(people))
 
 
-def test_ten_minutes_are_written_and_read_in_under_two_seconds_each(tmp_path: Path) -> None:
+def test_ten_minutes_are_written_and_read_with_the_work_of_two_seconds(tmp_path: Path) -> None:
+    """Arrays go into the file and out of it whole; nothing is done frame by frame."""
+
+    def counted(frames: int) -> tuple[int, int]:
+        motion = person(frames)
+        path = save_glb([motion], tmp_path / "x.glb")
+        assert len(load_glb(path)) == frames
+        return work(lambda: save_glb([motion], path)), work(lambda: load_glb(path))
+
+    assert counted(18_000) == pytest.approx(counted(60), rel=0.05)
     motion = person(18_000)
-    start = time.process_time()
-    path = save_glb([motion], tmp_path / "x.glb")
-    middle = time.process_time()
-    back = load_glb(path)
-    assert max(middle - start, time.process_time() - middle) < 2
-    assert len(back) == 18_000
+    back = load_glb(save_glb([motion], tmp_path / "x.glb"))
     np.testing.assert_allclose(back.root, motion.root, atol=1e-4)
 
 

@@ -217,7 +217,7 @@ def _drawn(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timel
                         progress=progress,
                         **options,
                         **solver,
-                    )  # fmt: skip
+                    )
                 )
                 continue
             for number, several in enumerate(segments):
