@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from motionloom.cli import main
-from motionloom.data.build import Clip, Note, write_clip
+from motionloom.data.clips import Clip, Note, write_clip
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.lab.report.report import Column, Report, Row, Value, encode, read

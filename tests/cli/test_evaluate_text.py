@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from motionloom.cli import main
-from motionloom.data.build import Clip, Note, write_clip
+from motionloom.data.clips import Clip, Note, write_clip
 from motionloom.lab.suites import text_reference
 from motionloom.lab.suites.protocol import Selection
 from motionloom.weights.prior import save_prior

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from motionloom.data import build as building
-from motionloom.data.build import Clip, Note, build, join_spans, mixed_clips, read_clip, write_clip
+from motionloom.data.build import build, join_spans
+from motionloom.data.clips import Clip, Note, read_clip, write_clip
+from motionloom.data.derived import mixed_clips
 from motionloom.data.sets import Batches, load_set, read_clips
 from motionloom.data.sources import BANDAI_LICENCE, CMU_LICENCE, UNKNOWN_LICENCE, find_takes
 from motionloom.errors import MotionloomError

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from motionloom.data.build import Clip, Note, write_clip
+from motionloom.data.clips import Clip, Note, write_clip
 from motionloom.data.sets import Batches, _starts, load_set
 from motionloom.features import humanml as hml
 from tests.kinematics import people

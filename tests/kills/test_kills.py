@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from motionloom import io
-from motionloom.data.build import read_clip
+from motionloom.data.clips import read_clip
 from motionloom.io.atomic import finished
 from motionloom.weights.prior import save_prior
 from tests.data import people as made

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import torch
 
-from motionloom.data.build import Clip, Note, write_clip
+from motionloom.data.clips import Clip, Note, write_clip
 from motionloom.data.sets import Batches, load_set
 from motionloom.diffusion import SCHEDULES
 from motionloom.features import humanml as hml

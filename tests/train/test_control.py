@@ -174,7 +174,7 @@ def test_held_out_errors_are_told_beside_the_base_networks(data, start, tmp_path
     for path in (data / "clips").iterdir():
         (tmp_path / "set" / "clips" / path.name).symlink_to(path)
     (tmp_path / "set" / "set.json").write_text("{}")
-    from motionloom.data.build import read_clip, write_clip
+    from motionloom.data.clips import read_clip, write_clip
 
     clip = read_clip(next((data / "clips").iterdir()))
     write_clip(tmp_path / "set" / "clips", replace(clip, name="held", split="val"))

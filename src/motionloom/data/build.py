@@ -16,82 +16,42 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from safetensors import SafetensorError, safe_open
 
 from motionloom.data import augment
-from motionloom.data.actions import ACTIONS, PREFIX, Action, action_of, core, sentences, side_of
-from motionloom.data.made import GESTURES, hands_up, lower_arms, perform, words_for
+from motionloom.data.actions import PREFIX, action_of, core, sentences
+from motionloom.data.clips import SHORTEST, STATES, Clip, Note, read_clip, write_clip
+from motionloom.data.derived import (
+    LOOPED,
+    SEATED,
+    at_origin,
+    joined_clips,
+    laid_down,
+    lengthened,
+    made_clips,
+    mixed_clips,
+)
+from motionloom.data.made import hands_up
 from motionloom.data.sources import Span, Take, find_takes
 from motionloom.data.windows import label_clip
-from motionloom.data.words import LABELS, mirror_text, sentence
+from motionloom.data.words import mirror_text
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
-from motionloom.features.layout import FPS, LAYOUT, WIDTH
+from motionloom.features.layout import FPS
 from motionloom.io.atomic import atomic_path, finished, sweep
-from motionloom.io.tensors import save_tensors
-from motionloom.io.text import plain_json
 from motionloom.kinematics.physics import Array
 from motionloom.skeleton import SMPL22
 
 _DERIVED = re.compile(r"M?(mixed|joined|made)_\d")
 _NAME = re.compile(r"\w[\w.+ -]{0,120}")
-SHORTEST = 20
-LOOPED = 200
 BENDS = (0.35, 0.75, 1.0)
 """Radians per second: a wide turn, and circles in 8.4 and 6.3 seconds."""
 _MIRROR = list(SMPL22.mirror_pairs())
 LONG = 60
 """Frames from which on the part of a described change that matters is looked for."""
-POSTURES = ("sit down", "stand up", "sit down and stand up", "lie down", "get up", "kneel", "crouch", "bow", "fall")
-"""Actions that end (and begin) in a posture which people keep, though many a recording is cut a moment before."""
-SEATED = ("sit down", "stand up", "sit down and stand up")
-THEN, MADE = "then", "made "
-"""Groups of notes besides those of `data.actions`: one action and then another; gestures of `data.made`."""
-STATES = ("walk", "walk slow", "walk fast", "jog", "run", "walk backward", "jog backward", "stand", "dance",
-           "circle left", "circle right", "run circle", "balance", "sidestep left", "sidestep right",
-          "sit")  # fmt: skip
-"""Labels that stay true however long a window of them is: neighbouring windows join."""
-
-
-@dataclass(frozen=True)
-class Note:
-    """Frames ``first`` to ``last`` (half-open) of a clip and the words for them."""
-
-    first: int
-    last: int
-    kind: str
-    """``human``, ``index``, ``action:`` and a name of `data.actions`, or the measured label."""
-    texts: tuple[str, ...] = ()
-    """Sentences or verb phrases; empty for measured labels, whose wordings stand in `data.words`."""
-    core: tuple[int, int] | None = None
-    """Frames (first, end) of the clip that a training window must hold whole; None: any part shows what is said."""
-
-
-@dataclass(frozen=True)
-class Clip:
-    """One entry of a built set."""
-
-    name: str
-    source: str
-    licence: str
-    split: str
-    way: str
-    """``plain``, ``looped``, ``bent``, ``reversed``, ``held``, ``joined``, ``made`` or ``mixed``; mirrored copies begin
-    with M in their name."""
-    notes: tuple[Note, ...]
-    features: np.ndarray
-    """(frames, 263) float32, not standardised."""
-    kind: str = "capture"
-    """``capture``, ``keyed`` (animated by hand) or ``made`` (arms moved by rule on a recorded body)."""
-
-
-def at_origin(positions: Array) -> Array:
-    """The published canonical start (origin, facing +Z), with the floor left where planted feet say it is."""
-    return hml.canonical(positions) + np.array([0.0, positions[..., 1].min(), 0.0])
 
 
 def clips_of(take: Take) -> Iterator[Clip]:
@@ -165,153 +125,6 @@ def _action_notes(span: Span, features: np.ndarray, first: int, last: int) -> li
     return [Note(first, last, PREFIX + action.name, (*written, *texts), kept)]
 
 
-def lengthened(take: Take, clip: Clip, positions: Array) -> Iterator[Clip]:
-    """Short examples of an action at the lengths that are asked for: cycles go on, ends that can be held are held."""
-    seed = int.from_bytes(take.name.encode(), "little") % 2**32
-    for number, note in enumerate(n for n in clip.notes if n.kind.startswith(PREFIX)):
-        action, frames = ACTIONS[note.kind.removeprefix(PREFIX)], note.last - note.first
-        if frames > LOOPED - 40:
-            continue
-        if action.kind == "cycle" and frames < 160:
-            longer = augment.loop(clip.features[note.first : note.last], LOOPED, limit=0.12)
-            if longer is not None:
-                yield _derived(clip, longer, "looped", (replace(note, first=0, last=len(longer), core=None),))
-                continue
-        first, last = note.core or (note.first, note.last)
-        cut = positions[first : last + 1]
-        for reverse in (False, True)[: 1 + bool(action.reverse)]:
-            shown = augment.reversed_in_time(cut) if reverse else cut
-            texts = sentences(ACTIONS[action.reverse]) if reverse else note.texts
-            name = action.reverse if reverse else action.name
-            if name in SEATED and hands_up(shown):
-                lowered, said = lower_arms(shown), sentences(ACTIONS[name])
-                yield from _held(clip, lowered, PREFIX + name, said, seed=seed + 2 * number + reverse + 7)
-                if reverse:
-                    continue
-            yield from _held(clip, shown, PREFIX + name, texts, seed=seed + 2 * number + reverse)
-
-
-def _held(clip: Clip, shown: Array, kind: str, texts: tuple[str, ...], *, seed: int) -> Iterator[Clip]:
-    posture = kind.removeprefix(PREFIX) in POSTURES
-    fastest = 1.2 if posture else 0.45
-    start, end = (augment.can_hold(shown, FPS, end=at_end, fastest=fastest) for at_end in (False, True))
-    if not (start or end) or len(shown) < SHORTEST:
-        return
-    rng = np.random.default_rng(seed)
-    room = max(150 - len(shown), 30)
-    before = int(rng.integers(8, min(55, room))) if start else 0
-    after = max(room - before, 25) if end else 0
-    longer = augment.held(shown, before, after, fps=FPS, seed=seed)
-    features = hml.encode(at_origin(hml.uniform(longer)), heading="corrected")
-    whole = (max(before - 3, 0), min(before + len(shown) + 2, len(features)))
-    yield _derived(clip, features, "held", (Note(0, len(features), kind, texts, whole),))
-
-
-def _derived(clip: Clip, features: np.ndarray, way: str, notes: tuple[Note, ...]) -> Clip:
-    return replace(clip, name=f"{clip.name}_{way}", way=way, notes=notes, features=features.astype(np.float32))
-
-
-def laid_down(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
-    """From standing to lying, out of a crouch and of lying down from one, and the same film backwards: getting up."""
-    parts = {
-        name: [
-            (c, n)
-            for c in clips
-            for n in c.notes
-            if n.kind == PREFIX + name and c.way == "plain" and c.split == "train"
-        ]
-        for name in ("crouch", "lie down")
-    }
-    rng, made = np.random.default_rng(seed), 0
-    pairs = [(a, b) for a in parts["crouch"] for b in parts["lie down"]]
-    for number in rng.permutation(len(pairs)):
-        if made >= count:
-            return
-        first, second = (_core_positions(clip, note, rng) for clip, note in pairs[number])
-        first = first[: int(first[:, 0, 1].argmin()) + 1]
-        both = augment.joined(first, second, blend=14, limit=0.3)
-        if both is None or not 30 <= len(both) <= 180:
-            continue
-        clip = pairs[number][1][0]
-        for name, shown in (("lie down", both), ("get up", augment.reversed_in_time(both))):
-            texts = sentences(ACTIONS[name])
-            for longer in _held(clip, shown, PREFIX + name, texts, seed=seed * 100_003 + int(number)):
-                yield replace(longer, name=f"joined_{seed}_{name.replace(' ', '_')}{made}", way="joined")
-        made += 1
-
-
-def joined_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
-    """One action and then another, where the poses in between agree; training clips of one licence."""
-    rng = np.random.default_rng(seed)
-    pool: dict[str, list[tuple[Clip, Note]]] = {}
-    for clip in clips:
-        for note in clip.notes:
-            if note.kind.startswith(PREFIX) and clip.split == "train" and clip.way in ("plain", "held"):
-                pool.setdefault(note.kind.removeprefix(PREFIX), []).append((clip, note))
-    names, made = sorted(pool), 0
-    for number in range(60 * count if names else 0):
-        if made == count:
-            return
-        pair = [ACTIONS[names[i]] for i in rng.integers(len(names), size=2)]
-        if pair[0] is pair[1] or not all(action.says for action in pair):
-            continue
-        picked = [pool[action.name][rng.integers(len(pool[action.name]))] for action in pair]
-        parts = [_core_positions(clip, note, rng) for clip, note in picked]
-        both = augment.joined(*parts)
-        if both is None or not 40 <= len(both) <= 180:
-            continue
-        said = [_phrases(action, note) for action, (_, note) in zip(pair, picked)]
-        texts = tuple(
-            sentence(f"{a} {link} {b}", rng)
-            for link in ("and then", "and", "then") for a, b in [(rng.choice(said[0]), rng.choice(said[1]))]
-        )  # fmt: skip
-        name = f"joined_{seed}_{made:04d}"
-        keyed = "keyed" if any(clip.kind == "keyed" for clip, _ in picked) else "capture"
-        base = Clip(
-            name, picked[0][0].source, picked[0][0].licence, "train", "joined", (), picked[0][0].features, keyed
-        )
-        for clip in _held(base, both, PREFIX + THEN, texts, seed=seed * 100_003 + number):
-            made += 1
-            yield replace(clip, name=name, way="joined")
-
-
-def _phrases(action: Action, note: Note) -> list[str]:
-    side = side_of(note.texts)
-    return [*action.says, *(phrase.format(side=side) for phrase in action.sided if side)]
-
-
-def _core_positions(clip: Clip, note: Note, rng: np.random.Generator) -> Array:
-    first, last = note.core or (note.first, note.last)
-    if note.core is None and last - first > 70:
-        first += int(rng.integers(last - first - 60))
-        last = first + 60
-    return hml.decode_positions(clip.features[first:last].astype(np.float64))
-
-
-def made_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
-    """Gestures of the arms (`data.made`) on people who stand, sit or walk; training clips of one licence."""
-    rng = np.random.default_rng(seed)
-    bodies = _labelled(clips, ("stand", "walk", "sit"))
-    leads = {"stand": "", "walk": "walks", "sit": "sits"}
-    for number in range(count if bodies.get("stand") else 0):
-        gesture = GESTURES[sorted(GESTURES)[number % len(GESTURES)]]
-        where = str(rng.choice([k for k in ("stand", "stand", "stand", "walk", "sit") if k in bodies]))
-        below, note = bodies[where][rng.integers(len(bodies[where]))]
-        length = min(note.last - note.first, int(rng.integers(70, 160)))
-        first = note.first + int(rng.integers(note.last - note.first - length + 1))
-        side = str(rng.choice(["left", "right"]))
-        body = hml.decode_positions(below.features[first : first + length].astype(np.float64))
-        positions = perform(body, gesture, side, fps=FPS, rng=rng)
-        features = hml.encode(positions, heading="corrected")
-        texts = words_for(gesture, side, leads[where], rng)
-        if texts:
-            group = PREFIX + MADE + gesture.name
-            notes = (Note(0, len(features), group, texts, (0, min(30, len(features)))),)
-            yield Clip(
-                f"made_{seed}_{number:04d}", below.source, below.licence, "train", "made", notes, features, "made"
-            )
-
-
 def join_spans(spans: Sequence[tuple[int, int, str]]) -> list[tuple[int, int, str]]:
     """Overlapping windows of a label that is a state become one span; single events keep their windows."""
     result = [s for s in spans if s[2] not in STATES]
@@ -339,96 +152,6 @@ def _with_mirror(clip: Clip) -> Iterator[Clip]:
         for n in clip.notes
     )
     yield replace(clip, name="M" + clip.name, notes=notes, features=hml.mirror(clip.features))
-
-
-def mixed_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
-    """Arms of a gesture on the body of a gait, both from training clips of one licence."""
-    rng = np.random.default_rng(seed)
-    bodies = _labelled(
-        clips,
-        ("walk", "walk slow", "jog", "walk backward", "circle left", "circle right", "sidestep left", "sidestep right"),
-    )
-    arms = _labelled(clips, ("wave", "arms up", "punch"))
-    for number in range(count if bodies and arms else 0):
-        body_label, gesture = rng.choice(sorted(bodies)), rng.choice(sorted(arms))
-        below, note = bodies[body_label][rng.integers(len(bodies[body_label]))]
-        above, gesture_note = arms[gesture][rng.integers(len(arms[gesture]))]
-        if below.licence != above.licence:
-            continue
-        worn = augment.wear_arms(_positions(below, note), _positions(above, gesture_note))
-        features = hml.encode(worn, heading="corrected")
-        features[:, LAYOUT["root_height"]] = below.features[
-            note.first : note.first + len(features), LAYOUT["root_height"]
-        ]
-        yield Clip(
-            f"mixed_{seed}_{number:04d}", below.source, below.licence, "train", "mixed",
-            (Note(0, len(features), f"{body_label}+{gesture}"),), features,
-        )  # fmt: skip
-
-
-def _labelled(clips: Sequence[Clip], labels: Sequence[str]) -> dict[str, list[tuple[Clip, Note]]]:
-    found: dict[str, list[tuple[Clip, Note]]] = {}
-    for clip in clips:
-        for note in clip.notes:
-            if note.kind in labels and clip.split == "train" and note.last - note.first >= 50:
-                found.setdefault(note.kind, []).append((clip, note))
-    return found
-
-
-def _positions(clip: Clip, note: Note) -> Array:
-    return hml.decode_positions(clip.features[note.first : note.last].astype(np.float64))
-
-
-def write_clip(folder: Path, clip: Clip) -> None:
-    """One file ``folder/NAME.safetensors``, whole or not at all."""
-    about = {k: v for k, v in asdict(clip).items() if k != "features"}
-    save_tensors(
-        {"features": np.ascontiguousarray(clip.features)},
-        folder / f"{clip.name}.safetensors",
-        metadata={"clip": json.dumps(about)},
-    )
-
-
-def read_clip(path: Path) -> Clip:
-    """The inverse of `write_clip`; raises MotionloomError for a damaged file."""
-    try:
-        with safe_open(path, framework="numpy") as file:
-            about = plain_json(file.metadata()["clip"])
-            features = file.get_tensor("features")
-        notes = tuple(
-            Note(n["first"], n["last"], n["kind"], tuple(n["texts"]), tuple(n["core"]) if n.get("core") else None)
-            for n in about.pop("notes")
-        )
-        clip = Clip(**about, notes=notes, features=features)
-        _check_clip(clip)
-        return clip
-    except (SafetensorError, KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise MotionloomError(
-            f"{path} is not a clip of a built set ({error}); delete it and its name in done/, and build again"
-        ) from error
-
-
-def _check_clip(clip: Clip) -> None:
-    features = clip.features
-    if (
-        features.dtype != np.float32
-        or features.ndim != 2
-        or features.shape[1] != WIDTH
-        or not np.isfinite(features).all()
-    ):
-        raise ValueError(f"its features are not finite float32 numbers of shape (frames, {WIDTH})")
-    if not all(isinstance(v, str) for v in (clip.name, clip.source, clip.licence, clip.split, clip.way)):
-        raise ValueError("its name, source, licence, split or way is not text")
-    for note in clip.notes:
-        if not 0 <= note.first < note.last <= len(features):
-            raise ValueError(f"a note spans frames {note.first} to {note.last} of {len(features)}")
-        written = note.kind in ("human", "index") or note.kind.startswith(PREFIX)
-        if note.core and not note.first <= note.core[0] < note.core[1] <= note.last:
-            raise ValueError(f"what a window must hold, frames {note.core}, is not within {note.first} to {note.last}")
-        if not all(isinstance(t, str) for t in note.texts) or (written and not note.texts):
-            raise ValueError(f"a note of kind {note.kind} lacks its texts")
-        if not written and not all(label in LABELS for label in note.kind.split("+", 1)):
-            raise ValueError(f"there is no label {note.kind!r}")
 
 
 Finder = Callable[..., list[Take]]

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from motionloom.data import augment
-from motionloom.data.build import at_origin
+from motionloom.data.derived import at_origin
 from motionloom.data.words import mirror_text
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml

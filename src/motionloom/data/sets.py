@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from motionloom.data.actions import PREFIX
-from motionloom.data.build import MADE, STATES, Clip, Note, read_clip
+from motionloom.data.clips import MADE, STATES, Clip, Note, read_clip
 from motionloom.data.words import phrases, sentence
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import LAYOUT

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.data.build import Clip, Note, write_clip
+from motionloom.data.clips import Clip, Note, write_clip
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from motionloom.lab.evaluator import own

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motionloom.data.build import build, read_clip
+from motionloom.data.build import build
+from motionloom.data.clips import read_clip
 from motionloom.errors import MotionloomError
 from motionloom.features import babel as codec
 from motionloom.features.babel import decode

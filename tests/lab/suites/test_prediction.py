@@ -251,7 +251,7 @@ def test_bad_input_ends_with_a_sentence(
 
 
 def test_a_built_sets_held_out_clips_are_a_test_part_too(tmp_path: Path) -> None:
-    from motionloom.data.build import Clip, write_clip
+    from motionloom.data.clips import Clip, write_clip
     from motionloom.features import humanml
     from tests.kinematics.people import FPS as SLOW
     from tests.kinematics.people import walking

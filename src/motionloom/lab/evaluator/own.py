@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.data.build import Clip
+from motionloom.data.clips import Clip
 from motionloom.data.sets import read_clips
 from motionloom.data.words import mirror_text, phrases
 from motionloom.errors import MotionloomError

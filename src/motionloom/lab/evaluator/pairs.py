@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom.data.build import STATES
+from motionloom.data.clips import STATES
 from motionloom.data.sets import Item, MotionSet, load_set, read_clips
 from motionloom.data.words import mirror_text
 from motionloom.features import humanml

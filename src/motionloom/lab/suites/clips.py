@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from motionloom.data.build import Clip, clips_of, read_clip
+from motionloom.data.build import clips_of
+from motionloom.data.clips import Clip, read_clip
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from motionloom.data.build import Clip, clips_of, read_clip
+from motionloom.data.build import clips_of
+from motionloom.data.clips import Clip, read_clip
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.io.atomic import finished

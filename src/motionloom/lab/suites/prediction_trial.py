@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.data.build import read_clip
+from motionloom.data.clips import read_clip
 from motionloom.data.prediction import CMU_TEST, Protocol, Recording, checked
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
