@@ -66,6 +66,12 @@ def read_name(name: str) -> tuple[str, str]:
     return side, "" if numbers else "".join(kept)
 
 
+def read_word(name: str) -> str:
+    """The word of a joint's name without side and number: ``DEF-spine.003`` -> ``spine``."""
+    _, tokens = _side(_tokens(name))
+    return "".join(t for t in tokens if not t.isdigit() and t not in _NOISE)
+
+
 def parts_by_name(skeleton: Skeleton) -> Parts:
     """The parts whose joints the names tell, sided ones as ``left_knee``; what is not named is left out."""
     found: dict[tuple[str, str], int] = {}
@@ -78,17 +84,24 @@ def parts_by_name(skeleton: Skeleton) -> Parts:
         if joint is not None:
             parts[part] = joint
     for side in ("left", "right"):
-        parts.update(_sided(side, found))
+        parts.update(_sided(skeleton, side, found))
     return parts
 
 
-def _sided(side: str, found: dict[tuple[str, str], int]) -> Parts:
+def _carries(skeleton: Skeleton, joint: int) -> bool:
+    return any(child not in skeleton.ends for child in skeleton.children(joint))
+
+
+def _sided(skeleton: Skeleton, side: str, found: dict[tuple[str, str], int]) -> Parts:
     here = {word: j for (s, word), j in found.items() if s == side}
     limb = {part: next((here[w] for w in words if w in here), None) for part, words in _SIDED.items()}
     if limb["foot"] is not None and limb["foot"] == limb["ankle"]:
         limb["foot"] = None  # "foot" is the toe joint only where an "ankle" stands above it
     if limb["collar"] is not None and limb["collar"] == limb["shoulder"]:
         limb["collar"] = None  # "shoulder" is the collar bone only where an upper arm hangs on it
+    wrist, hand = here.get("wrist"), here.get("hand")
+    if wrist is not None and hand is not None and skeleton.parents[hand] == wrist and _carries(skeleton, hand):
+        limb["wrist"] = hand  # a wrist that only ends the forearm: the hand is what turns
     if limb["hip"] is None and "leg" in here and "knee" in here:
         limb["hip"], limb["knee"] = here["leg"], here["knee"]
     return {f"{side}_{part}": j for part, j in limb.items() if j is not None}
