@@ -70,6 +70,12 @@ class Hero:
         self.json["accessors"].append(accessor | {"type": form} | more)
         return len(self.json["accessors"]) - 1
 
+    def values(self, number: int, width: int) -> np.ndarray:
+        """(count, width) of an accessor of floats."""
+        view = self.json["bufferViews"][self.json["accessors"][number]["bufferView"]]
+        data = self.data[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
+        return np.frombuffer(bytes(data), "<f4").reshape(-1, width)
+
     def _mesh(self) -> None:
         points, joints = [], []
         for j, p in enumerate(SMPL22.parents):

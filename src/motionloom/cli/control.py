@@ -15,6 +15,7 @@ from motionloom.cli.sampling import (
     report,
     write,
 )
+from motionloom.cli.skeletons import put_all
 
 if TYPE_CHECKING:
     from motionloom.goals.goal import Goal
@@ -67,19 +68,19 @@ def run_control(arguments: argparse.Namespace) -> None:
 
         print(SCHEMA.read_text(encoding="utf-8"), end="")
         return
-    outs = check_outs(arguments)
+    outs, target = check_outs(arguments)
     check_count(arguments)
     if arguments.prompt is None:
         fail("no prompt; say what the person does, such as: motionloom control 'a person walks' --goal goal.json")
     check_prompt(arguments.prompt)
-    files = places(outs, arguments.count)
+    files = places(outs, arguments.count, target=target)
     goal = _goal(arguments)
     made, seconds = _make(arguments, goal)
-    motions = [one.motion for one in made]
+    motions = put_all(target, [one.motion for one in made])
     if arguments.fps is not None:
         motions = [motion.resample(arguments.fps) for motion in motions]
     captions = [arguments.prompt] * arguments.count
-    written = [write(motions, several, captions) for several in files]
+    written = [write(motions, several, captions, target) for several in files]
     _report(arguments, made, written, seconds)
 
 

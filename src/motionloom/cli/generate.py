@@ -14,6 +14,7 @@ from motionloom.cli.sampling import (
     report,
     write,
 )
+from motionloom.cli.skeletons import put_all
 
 MAX_PROMPTS = 1000
 MAX_MOTIONS = 10_000
@@ -37,14 +38,15 @@ def add(subparsers) -> None:
 
 def _generate(arguments: argparse.Namespace) -> None:
     prompts = _prompts(arguments)
-    outs = check_outs(arguments)
+    outs, target = check_outs(arguments)
     check_count(arguments, most=MAX_MOTIONS)
     if len(prompts) * arguments.count > MAX_MOTIONS:
         fail(f"{len(prompts)} prompts, {arguments.count} of each, are too many; at most {MAX_MOTIONS:,} in one call")
     captions = [prompt for prompt in prompts for _ in range(arguments.count)]
-    files = places(outs, len(captions))
+    files = places(outs, len(captions), target=target)
     motions, seconds = _make(arguments, prompts)
-    written = [path for several in files for path in write(motions, several, captions)]
+    motions = put_all(target, motions)
+    written = [path for several in files for path in write(motions, several, captions, target)]
     made = [{"prompt": caption, "seed": arguments.seed + i} for i, caption in enumerate(captions)]
     about = {"motions": made, "seconds": arguments.seconds, "weights": str(arguments.weights)}
     report(arguments, about, written, seconds)

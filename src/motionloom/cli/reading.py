@@ -19,6 +19,9 @@ def add_reading(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--up", choices=("y", "z"), default="y", help="the axis that is up in the file (default y)")
     command.add_argument(
+        "--clip", metavar="NAME|NUMBER", help="animation of a .glb, .gltf or .vrm (default: the first)"
+    )
+    command.add_argument(
         "--asf", type=Path, metavar="FILE", help="skeleton of an AMC file (default: the one beside it)"
     )
     command.add_argument("--source-fps", type=as_rate, metavar="N", help="take this rate for the file's (AMC: 120)")
@@ -78,7 +81,8 @@ def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float
         file = read_bvh(path, fps=arguments.source_fps, unit=arguments.unit)
         motion, unit, orders = file.motion, file.unit, dict(file.orders)
     else:
-        motion = io.load(path, fps=arguments.source_fps, asf=arguments.asf, unit=arguments.unit)
+        clip = arguments.clip if path.suffix.lower() in io.GLTF else None
+        motion = io.load(path, fps=arguments.source_fps, asf=arguments.asf, unit=arguments.unit, clip=clip)
     return (_stand_up(motion) if arguments.up == "z" else motion), unit, orders
 
 

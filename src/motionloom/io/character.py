@@ -22,7 +22,8 @@ from motionloom.io.gltf_nodes import Node, upwards
 from motionloom.io.gltf_read import OpenedGlb, open_glb, settled
 from motionloom.io.gltf_rig import Rig, Worlds, parents_first, read_rig, worlds
 from motionloom.motion import Motion
-from motionloom.retarget import joint_map
+from motionloom.retarget.joint_map import JointMap, Override
+from motionloom.retarget.joint_map import joint_map as find_joints
 from motionloom.retarget.topology import ancestors
 from motionloom.skeleton import Skeleton
 
@@ -40,6 +41,7 @@ class Character:
     file: OpenedGlb
     nodes: list[Node]
     rig: Rig
+    joints: JointMap
 
     @property
     def skeleton(self) -> Skeleton:
@@ -83,7 +85,7 @@ class Character:
     def _keys(self, motion: Motion) -> list[tuple[int, str, Array]]:
         """Node, path and values (frames, width) of every channel."""
         rig, parents = self.rig, self.file.parents
-        driven = {d for d in joint_map(self.skeleton).drivers(self.skeleton) if d is not None}
+        driven = {d for d in self.joints.drivers(self.skeleton) if d is not None}
         above_driven = {a for d in driven for a in ancestors(self.skeleton, d)}
         slots = {n: k for k, n in enumerate(rig.nodes)}
         above = upwards(rig.nodes[0], parents)[:0:-1]
@@ -119,8 +121,11 @@ class Character:
         return free
 
 
-def load_character(path: str | Path) -> Character:
-    """Read the humanoid of a .glb, .vrm or .gltf file; raises `MotionloomError` if it holds none."""
+def load_character(path: str | Path, *, joint_map: Override | None = None) -> Character:
+    """Read the humanoid of a .glb, .vrm or .gltf file; raises `MotionloomError` if it holds none.
+
+    ``joint_map`` says which joints are which where names do not, as in `motionloom.retarget.joint_map`.
+    """
     path = Path(path)
     file = open_glb(path)
     problem: MotionloomError | None = None
@@ -128,11 +133,11 @@ def load_character(path: str | Path) -> Character:
         nodes, joints, _ = settled(file, person, {})
         rig = read_rig(file.document, nodes, file.parents, joints=joints, tips=frozenset())
         try:
-            joint_map(rig.skeleton)
+            found = find_joints(rig.skeleton, joint_map)
         except MotionloomError as error:
             problem = problem or error
         else:
-            return Character(path, file, nodes, rig)
+            return Character(path, file, nodes, rig, found)
     assert problem is not None
     raise MotionloomError(f"{path}: {problem}")
 

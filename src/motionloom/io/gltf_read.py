@@ -58,6 +58,22 @@ class OpenedGlb:
         """The names of the animations, ``""`` where one has none."""
         return [printable(animation.get("name")) for animation in self.document.items("animations")]
 
+    @property
+    def lengths(self) -> list[tuple[str, float]]:
+        """Name and seconds of each animation."""
+        found = []
+        for name, animation in zip(self.clips, self.document.items("animations")):
+            ends = [self._end(sampler) for sampler in self.document.items("samplers", animation)]
+            found.append((name, max(ends, default=0.0)))
+        return found
+
+    def _end(self, sampler: dict[str, Any]) -> float:
+        """When the keys of a sampler end, as its accessor says."""
+        accessors = self.document.items("accessors")
+        bounds = accessors[self.document.index(sampler.get("input"), len(accessors), "accessors")].get("max")
+        right = isinstance(bounds, list) and len(bounds) == 1 and isinstance(bounds[0], int | float)
+        return float(bounds[0]) if isinstance(bounds, list) and right else 0.0
+
     def chosen(self, clip: int | str | None, person: int) -> int | None:
         """The number, from 0, of the animation to read; None where nothing moves the person."""
         clips = self.clips

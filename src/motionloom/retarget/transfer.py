@@ -18,9 +18,13 @@ from motionloom.retarget.floor import Stance, read_stance
 from motionloom.retarget.joint_map import Override, joint_map
 from motionloom.retarget.limbs import bend
 from motionloom.retarget.measured import frames_of_positions, mean_rotation
+from motionloom.retarget.root import RootMode, place_root
 from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
+_LEG = 0.82
+_LEGS = (0.2, 2.5)
+"""Metres of thigh and shin: of the uniform person, and of bodies whose feet are looked at as they are."""
 
 
 def joints22(motion: Motion, override: Override | None = None) -> Array:
@@ -40,25 +44,41 @@ def to_smpl22(motion: Motion, override: Override | None = None) -> Motion:
     return retarget(motion, SMPL22, source_map=override)
 
 
-def from_smpl22(motion: Motion, target: Skeleton, override: Override | None = None) -> Motion:
+def from_smpl22(
+    motion: Motion, target: Skeleton, override: Override | None = None, *, root: RootMode | None = None
+) -> Motion:
     """A motion of the uniform person on a user's skeleton: their hierarchy, offsets and rest pose.
 
     Joints that the uniform person lacks (fingers, eyes, twist bones) keep their rest pose.
     """
-    return retarget(motion, target, target_map=override)
+    return retarget(motion, target, target_map=override, root=root)
 
 
 def retarget(
-    motion: Motion, target: Skeleton, *, source_map: Override | None = None, target_map: Override | None = None
+    motion: Motion,
+    target: Skeleton,
+    *,
+    source_map: Override | None = None,
+    target_map: Override | None = None,
+    root: RootMode | None = None,
 ) -> Motion:
     """The motion on another humanoid skeleton.
 
     The world keeps its axes (one that is Z-up is turned to Y-up), the path shrinks or grows with the length of the
     legs, and the floor (where the source's planted toes are) becomes y = 0. Bones keep the target's lengths exactly;
-    bones of the source that change length count by where they end. Raises `MotionloomError` if either skeleton is no
+    bones of the source that change length count by where they end. Joints above the hips go along with them rigidly,
+    or as ``root`` says (`place_root`), with places that change. Raises `MotionloomError` if either skeleton is no
     humanoid.
     """
     source, body = read_body(motion.skeleton, source_map), read_body(target, target_map)
+    if not _LEGS[0] < source.leg < _LEGS[1]:  # of another unit, or a giant: what counts here is how it moves
+        motion = motion.scaled(_LEG / source.leg)
+        source = read_body(motion.skeleton, source_map)
+    if not _LEGS[0] < body.leg < _LEGS[1]:
+        size = _LEG / body.leg
+        small = replace(target, offsets=target.offsets * size)
+        made = retarget(motion, small, source_map=source_map, target_map=target_map, root=root).scaled(1 / size)
+        return replace(made, skeleton=target)
     pose = _read_pose(_y_up(motion, source), source)
     stance = read_stance(pose.places, motion.fps)
     if source.on_floor:
@@ -67,7 +87,8 @@ def retarget(
     if source.broad or body.broad:
         out = body.broad - source.broad * body.leg / source.leg
         goals = _spread(goals, out * _smooth_left(pose, motion.fps))
-    return _place(_orient(pose, body), goals, body, motion.fps)
+    made = _place(_orient(pose, body), goals, body, motion.fps)
+    return made if root is None else place_root(made, body, root)
 
 
 # 1. Read -------------------------------------------------------------------------------------------------------------
