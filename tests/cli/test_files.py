@@ -183,7 +183,7 @@ def small() -> Skeleton:
 
 
 MISTAKES = [
-    (["export", "walk.bvh"], "arguments are required: OUT"),
+    (["export", "walk.bvh"], "one file to write is needed"),
     (["export", "walk.bvh", "walk.fbx"], "its name must end in .bvh, .glb"),
     (["export", "no.bvh", "a.glb"], "cannot read no.bvh: No such file"),
     (["export", "a.glb", "walk.bvh"], "cannot read a.glb"),

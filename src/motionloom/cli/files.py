@@ -1,10 +1,21 @@
 """Commands about motion files: export, view, info."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.cli.reading import RATE_ASSUMED, add_reading, as_rate, as_unit, crop, note_rate, rate_assumed, read_clip
+from motionloom.cli.reading import (
+    RATE_ASSUMED,
+    add_reading,
+    as_rate,
+    as_unit,
+    check_size,
+    crop,
+    note_rate,
+    rate_assumed,
+    read_clip,
+)
 from motionloom.cli.skeletons import add_skeleton, read_target
 
 if TYPE_CHECKING:
@@ -57,6 +68,8 @@ def run_export(arguments: argparse.Namespace) -> None:
     skin = read_target(arguments, [target])
     io.check_output(target, own=skin and skin.suffix)
     motion, unit, orders = read_clip(arguments, arguments.input)
+    if skin is None:
+        check_size(arguments, arguments.input, motion)
     motion = crop(motion, arguments)
     if arguments.mirror:
         motion = motion.mirror()
@@ -71,9 +84,12 @@ def run_export(arguments: argparse.Namespace) -> None:
         _only_bvh(arguments, target)
         skin.save(motion, target, caption=arguments.input.stem)
     elif target.suffix.lower() == ".bvh":
-        from motionloom.io.bvh import save_bvh
+        from motionloom.io.bvh import save_bvh, unit_that_reads_back
 
-        save_bvh(motion, target, order=arguments.order or orders, unit=arguments.out_unit or unit or 1.0)
+        chosen = arguments.out_unit or unit_that_reads_back(motion, unit or 1.0)
+        if unit_that_reads_back(motion, chosen) != chosen:
+            print(f"note: give --unit {chosen:g} to read {target} at this size: bones do not tell it", file=sys.stderr)
+        save_bvh(motion, target, order=arguments.order or orders, unit=chosen)
     else:
         _only_bvh(arguments, target)
         io.save(motion, target)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.futures import FORMATS, Long, Manner, targets, write_futures
 from motionloom.cli.futures import Target as Files
-from motionloom.cli.reading import add_reading, as_seconds, crop, note_rate, read_clip
+from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import bar, check_count, fail
 from motionloom.cli.skeletons import Target, add_skeleton, read_target
 
@@ -246,6 +246,7 @@ def _caption(arguments: argparse.Namespace) -> str:
 
 def _read_past(arguments: argparse.Namespace, skin: Target | None) -> "tuple[Motion, Manner]":
     whole, unit, orders = read_clip(arguments, arguments.past)
+    check_size(arguments, arguments.past, whole)
     past = crop(whole, arguments)
     if len(past) < 2:
         fail(f"{arguments.past} has one frame here, and a past has at least two; only they say where the person goes")

@@ -119,6 +119,11 @@ def read_body(skeleton: Skeleton, override: Override | None = None) -> Body:
     _check_legs(skeleton, found, rest)
     tips = _missing_toes(rest)
     rest = rest + tips
+    if override is None and _on_four_legs(rest):
+        raise MotionloomError(
+            "the skeleton is no person but an animal on four legs: at rest its spine lies along the ground and its "
+            "arms reach it; name its joints in a joint map to read it as a person all the same"
+        )
     axes = _rest_axes(rest)
     drivers = found.drivers(skeleton)
     if axes is not None:
@@ -128,6 +133,13 @@ def read_body(skeleton: Skeleton, override: Override | None = None) -> Body:
     known = _is_bandai(skeleton)
     frames = _bandai_frames(rest) if known else _odd_frames(rest)
     return Body(skeleton, points, drivers, rest, frames, known, np.eye(3)[1], 0.0, tips)
+
+
+def _on_four_legs(rest: Array) -> bool:
+    """Whether arms hang down beside the legs from a spine that is level."""
+    legs, arms = (rest[[7, 8]] - rest[[1, 2]]).sum(axis=0), (rest[[20, 21]] - rest[[16, 17]]).sum(axis=0)
+    spine = rest[12] - rest[0]
+    return float(_unit(legs) @ _unit(arms)) > 0.8 and abs(float(_unit(legs) @ _unit(spine))) < 0.5
 
 
 def _missing_toes(rest: Array) -> Array:

@@ -4,6 +4,8 @@ Rokoko, Perception Neuron, Xsens, VRM, SMPL and their relatives; plain spelling 
 
 import re
 
+import numpy as np
+
 from motionloom.skeleton import Skeleton
 
 Parts = dict[str, int]
@@ -85,6 +87,21 @@ def parts_by_name(skeleton: Skeleton) -> Parts:
             parts[part] = joint
     for side in ("left", "right"):
         parts.update(_sided(skeleton, side, found))
+    return _apart(skeleton, parts)
+
+
+def _apart(skeleton: Skeleton, parts: Parts) -> Parts:
+    """The parts with hips that are two: where both begin in one place, the next joint of that name is the hip."""
+    hips = [parts.get(f"{side}_hip") for side in ("left", "right")]
+    rest = skeleton.rest_positions()
+    if None in hips or np.abs(rest[hips[0]] - rest[hips[1]]).max() > 1e-6:
+        return parts
+    for part, joint in zip(("left_hip", "right_hip"), hips):
+        assert joint is not None
+        alike = [
+            j for j in skeleton.children(joint) if read_name(skeleton.names[j]) == read_name(skeleton.names[joint])
+        ]
+        parts[part] = alike[0] if alike else joint
     return parts
 
 
