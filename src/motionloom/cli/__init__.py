@@ -6,7 +6,9 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
+from motionloom.cli.newcomers import suggestion, with_command, with_options
 from motionloom.errors import MotionloomError
 
 FAMILIES = (
@@ -22,19 +24,23 @@ FAMILIES = (
     "evaluate",
     "bench",
     "weights",
+    "completion",
 )
 
 
 class _Parser(argparse.ArgumentParser):
+    def __init__(self, *args: Any, **more: Any) -> None:
+        super().__init__(*args, **({"allow_abbrev": False} | more))  # --out must never mean --out-unit
+
     def error(self, message: str) -> None:  # type: ignore[override]
         """One sentence and exit code 2, without the page of usage."""
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
 
     def parse_known_args(self, args=None, namespace=None):  # type: ignore[override]
         """What a command does not know is its own mistake, not the whole program's: its --help is the one to read."""
-        found, unknown = super().parse_known_args(args, namespace)
+        found, unknown = super().parse_known_args(None if args is None else with_options(self, args), namespace)
         if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{suggestion(self, unknown)}")
         return found, unknown
 
 
@@ -69,7 +75,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> int:
     top = parser()
-    arguments = top.parse_args(argv)
+    commands = next(a.choices for a in top._actions if isinstance(a, argparse._SubParsersAction))
+    arguments = top.parse_args(with_command(sys.argv[1:] if argv is None else argv, commands))
     if arguments.version:
         from importlib.metadata import version
 

@@ -6,6 +6,7 @@ from collections.abc import Generator, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.sampling import add_sampling, bar, check_outs, fail
 from motionloom.cli.skeletons import Target, open_target
 
@@ -53,6 +54,7 @@ def _compose(arguments: argparse.Namespace) -> int:
     if arguments.check:
         _report(arguments, timeline, seconds=timeline.seconds, streams=[])
         return 0
+    check_overwriting(arguments, outs)
     streams = _open(outs, timeline, arguments.fps, target)
     interrupted = _make(arguments, timeline, streams)
     seconds = max(stream.seconds for stream in streams) if interrupted else timeline.seconds

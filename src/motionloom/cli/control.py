@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionloom.cli.newcomers import check_overwriting, one_sentence
 from motionloom.cli.sampling import (
     add_sampling,
     bar,
@@ -30,7 +31,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         help="make motions from words that keep to a path, a hand, poses",
         description="Make motions that do what PROMPT says and meet goals: see docs/control.md.",
     )
-    parser.add_argument("prompt", nargs="?", metavar="PROMPT", help="what the person does, such as 'a person walks'")
+    parser.add_argument("prompt", nargs="*", metavar="PROMPT", help="what the person does, such as 'a person walks'")
     parser.add_argument(
         "--goal", type=Path, action="append", default=[], metavar="FILE",
         help="a JSON file of paths, joints and poses, repeatable",
@@ -70,11 +71,15 @@ def run_control(arguments: argparse.Namespace) -> None:
         return
     outs, target = check_outs(arguments)
     check_count(arguments)
+    if len(one_sentence(arguments.prompt)) > 1:
+        fail(f"one prompt is needed; got {len(arguments.prompt)}: {', '.join(arguments.prompt)[:200]}")
+    arguments.prompt = next(iter(one_sentence(arguments.prompt)), None)
     if arguments.prompt is None:
         fail("no prompt; say what the person does, such as: motionloom control 'a person walks' --goal goal.json")
     check_prompt(arguments.prompt)
     files = places(outs, arguments.count, target=target)
     goal = _goal(arguments)
+    check_overwriting(arguments, [file for several in files for file in several])
     made, seconds = _make(arguments, goal)
     motions = put_all(target, [one.motion for one in made])
     if arguments.fps is not None:

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
 from motionloom.cli.sampling import bar, check_count, check_prompt, fail, places, report, take_text_anywhere
 from motionloom.cli.skeletons import Target, add_skeleton, put_all, read_target
@@ -19,7 +20,7 @@ MAX_SECONDS = 3600.0
 """Of a timeline."""
 SECONDS, ADDED = 6.0, 3.0
 """Length of a duet, and what is added to a past, unless asked otherwise."""
-SINGLE = (".bvh", ".npz")
+SINGLE = (".bvh", ".npz", ".vrma")
 """Files of one person each."""
 
 
@@ -77,6 +78,7 @@ def run_duet(arguments: argparse.Namespace) -> None:
     _check(arguments)
     outs, skin = _check_outs(arguments)
     files = places(outs, arguments.count, sheets=False, target=skin)
+    check_overwriting(arguments, [file for several in files for file in several])
     timeline = _timeline(arguments) if arguments.timeline else None
     goal = _goal(arguments) if arguments.path else None
     given, manners = _read(arguments)

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import add_reading, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
     add_sampling,
@@ -66,6 +67,7 @@ def run_edit(arguments: argparse.Namespace) -> None:
     files = places(outs, arguments.count, target=target)
     clip, unit, orders = read_clip(arguments, arguments.clip)
     check_size(arguments, arguments.clip, clip)
+    check_overwriting(arguments, [file for several in files for file in several])
     motions, seconds = _make(arguments, crop(clip, arguments), "smpl" if uniform else "own")
     motions = put_all(target, motions)
     if uniform:

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import (
     RATE_ASSUMED,
     add_reading,
@@ -67,6 +68,7 @@ def run_export(arguments: argparse.Namespace) -> None:
     target = _output(arguments)
     skin = read_target(arguments, [target])
     io.check_output(target, own=skin and skin.suffix)
+    check_overwriting(arguments, [target])
     motion, unit, orders = read_clip(arguments, arguments.input)
     if skin is None:
         check_size(arguments, arguments.input, motion)

@@ -1,8 +1,10 @@
 """`motionloom generate`: words to motion files."""
 
 import argparse
+import sys
 from pathlib import Path
 
+from motionloom.cli.newcomers import check_overwriting, one_sentence
 from motionloom.cli.sampling import (
     add_sampling,
     bar,
@@ -24,7 +26,9 @@ def add(subparsers) -> None:
     """Register `generate`."""
     parser = subparsers.add_parser("generate", help="make motions from words")
     parser.add_argument("prompts", nargs="*", metavar="PROMPT", help="what the person does, such as 'a person walks'")
-    parser.add_argument("--from", dest="file", type=Path, metavar="FILE", help="a text file with one prompt per line")
+    parser.add_argument(
+        "--from", dest="file", type=Path, metavar="FILE", help="a text file with one prompt per line, - for stdin"
+    )
     parser.add_argument("--seconds", type=float, default=5.0, help="length of each motion (default 5)")
     parser.add_argument(
         "--seed", type=int, default=0, help="the first motion's seed, the next have the next (default 0)"
@@ -44,6 +48,7 @@ def _generate(arguments: argparse.Namespace) -> None:
         fail(f"{len(prompts)} prompts, {arguments.count} of each, are too many; at most {MAX_MOTIONS:,} in one call")
     captions = [prompt for prompt in prompts for _ in range(arguments.count)]
     files = places(outs, len(captions), target=target)
+    check_overwriting(arguments, [file for several in files for file in several])
     motions, seconds = _make(arguments, prompts)
     motions = put_all(target, motions)
     written = [path for several in files for path in write(motions, several, captions, target)]
@@ -52,14 +57,24 @@ def _generate(arguments: argparse.Namespace) -> None:
     report(arguments, about, written, seconds)
 
 
+LONGEST = 30.0
+"""Seconds of one sentence above which a long motion is meant."""
+
+
 def _prompts(arguments: argparse.Namespace) -> list[str]:
-    prompts = [*arguments.prompts, *(_lines(arguments.file) if arguments.file else ())]
+    prompts = [*one_sentence(arguments.prompts), *(_lines(arguments.file) if arguments.file else ())]
     if not prompts:
         fail("no prompt; say what the person does, such as: motionloom generate 'a person walks forward'")
     if len(prompts) > MAX_PROMPTS:
         fail(f"{len(prompts)} prompts are too many for one call; give at most {MAX_PROMPTS}")
     for prompt in prompts:
         check_prompt(prompt)
+    if arguments.seconds > LONGEST:
+        print(
+            f"note: {arguments.seconds:g} s are long for one sentence; several that follow each other are made with: "
+            "motionloom compose 'a person walks' 'a person sits down'",
+            file=sys.stderr,
+        )
     return prompts
 
 
@@ -67,7 +82,8 @@ def _lines(file: Path) -> list[str]:
     from motionloom.io.text import read_text
 
     try:
-        text = read_text(file, max_bytes=16_000_000).decode("utf-8")
+        read = sys.stdin.buffer.read(16_000_000) if str(file) == "-" else read_text(file, max_bytes=16_000_000)
+        text = read.decode("utf-8")
     except UnicodeDecodeError:
         fail(f"{file} is not UTF-8 text; save it as UTF-8 with one prompt per line")
     return [line.strip() for line in text.splitlines() if line.strip()]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.futures import FORMATS, Long, Manner, targets, write_futures
 from motionloom.cli.futures import Target as Files
+from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import bar, check_count, fail
 from motionloom.cli.skeletons import Target, add_skeleton, read_target
@@ -119,6 +120,7 @@ def run_predict(arguments: argparse.Namespace) -> int:
     own = skin and skin.suffix
     formats = arguments.format or [own[1:] if own else "bvh"]
     wanted = targets(outs, arguments.count, formats, pictures=not arguments.no_picture, own=own)
+    check_overwriting(arguments, [file for one in wanted for file in one.files])
     past, manner = _read_past(arguments, skin)
     horizon = round(arguments.seconds * past.fps)
     _check_size(arguments, past, horizon, wanted)
@@ -153,6 +155,7 @@ def run_switch(arguments: argparse.Namespace) -> int:
     for out in outs:
         check_output(out, own=own)  # files, and no folder
     wanted = targets(outs, arguments.count, [], pictures=False, own=own)
+    check_overwriting(arguments, [file for one in wanted for file in one.files])
     past, manner = _read_past(arguments, skin)
     _check_size(arguments, past, round(arguments.seconds * past.fps), wanted)
     target = _like_past(arguments, arguments.target, past)

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from motionloom.cli.newcomers import one_sentence, suggestion, with_options
 from motionloom.cli.skeletons import Target, add_skeleton, read_target
 
 if TYPE_CHECKING:
@@ -41,11 +42,13 @@ def take_text_anywhere(parser: argparse.ArgumentParser) -> None:
     """Let TEXT stand behind options too: argparse gives up on an optional word once it has passed its place."""
 
     def parse(args=None, namespace=None):
-        found, unknown = argparse.ArgumentParser.parse_known_args(parser, args, namespace)
-        if found.text is None and len(unknown) == 1 and not unknown[0].startswith("-"):
-            found.text, unknown = unknown[0], []
+        given = None if args is None else with_options(parser, args)
+        found, unknown = argparse.ArgumentParser.parse_known_args(parser, given, namespace)
+        words = [*([] if found.text is None else [found.text]), *unknown]
+        if not any(word.startswith("-") for word in unknown) and len(one_sentence(words)) == 1:
+            found.text, unknown = one_sentence(words)[0], []
         if unknown:
-            parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+            parser.error(f"unrecognized arguments: {' '.join(unknown)}{suggestion(parser, unknown)}")
         return found, unknown
 
     parser.parse_known_args = parse  # type: ignore[method-assign]

@@ -19,8 +19,8 @@ ROOTS = ("motion", "hips", "in-place")
 def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform person's") -> None:
     """``--skeleton`` and what goes with it; ``own`` is whose skeleton motions have without it, in words."""
     parser.add_argument(
-        "--skeleton", metavar="FILE|smpl22",
-        help="put the motion on this skeleton; a .glb or .vrm character is written as that file with one more "
+        "--skeleton", metavar="FILE|NAME",
+        help="put the motion on this skeleton, or on smpl22, mixamo, unreal, vrm or rigify; a .glb or .vrm character is written as that file with one more "
         f"animation (default: {own})",
     )  # fmt: skip
     parser.add_argument(
@@ -30,6 +30,7 @@ def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform per
     )  # fmt: skip
     parser.add_argument("--clip-name", metavar="NAME", help="name of the animation in the character's file")
     parser.add_argument("--replace", action="store_true", help="leave only this animation in the character's file")
+    parser.add_argument("--force", action="store_true", help="write over files without saying so")
     parser.add_argument("--target-map", type=Path, metavar="JSON", help="which joints are which, of the --skeleton")
 
 
@@ -107,7 +108,7 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
 def _find(arguments: argparse.Namespace) -> Target:
     from motionloom import io
     from motionloom.errors import MotionloomError
-    from motionloom.skeleton import SMPL22
+    from motionloom.retarget.named import NAMED, named_skeleton
 
     name, path = arguments.skeleton, Path(arguments.skeleton)
     suffix = path.suffix.lower()
@@ -115,8 +116,8 @@ def _find(arguments: argparse.Namespace) -> Target:
         "root": arguments.root or "motion", "joint_map": arguments.target_map,
         "clip_name": arguments.clip_name, "replace": arguments.replace,
     }  # fmt: skip
-    if name.lower() == "smpl22":
-        return Target(name, SMPL22, **options)
+    if name.lower() in NAMED and not path.exists():
+        return Target(name, named_skeleton(name.lower()), **options)
     if suffix == ".bvh":
         from motionloom.io.bvh import read_bvh
 
@@ -126,13 +127,15 @@ def _find(arguments: argparse.Namespace) -> Target:
         from motionloom.io.asf import load_skeleton
 
         return Target(name, load_skeleton(path), **options)
-    if suffix in io.GLTF:
+    if suffix in io.GLTF and suffix != ".vrma":
         from motionloom.io.character import load_character
 
         character = load_character(path, joint_map=arguments.target_map)
         return Target(name, character.skeleton, character=character, **options)
     if suffix not in io.READS:
-        raise MotionloomError(f"--skeleton needs smpl22 or a file (.asf, {', '.join(io.READS)}); got {name!r}")
+        raise MotionloomError(
+            f"--skeleton needs {', '.join(NAMED)} or a file (.asf, {', '.join(io.READS)}); got {name!r}"
+        )
     return Target(name, io.load(path).skeleton, **options)
 
 

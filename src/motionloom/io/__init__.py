@@ -8,10 +8,10 @@ from motionloom.errors import MotionloomError
 from motionloom.io.atomic import check_place
 from motionloom.motion import Motion
 
-READS = (".bvh", ".amc", ".glb", ".gltf", ".vrm", ".npz")
-GLTF = (".glb", ".gltf", ".vrm")
-WRITES = (".bvh", ".glb", ".npz", ".mp4", ".gif", ".png")
-_ONE_PERSON = (".bvh", ".npz")
+READS = (".bvh", ".amc", ".glb", ".gltf", ".vrm", ".vrma", ".npz")
+GLTF = (".glb", ".gltf", ".vrm", ".vrma")
+WRITES = (".bvh", ".glb", ".vrma", ".npz", ".mp4", ".gif", ".png")
+_ONE_PERSON = (".bvh", ".npz", ".vrma")
 _OWN = "that is written for a character of such a file: --skeleton hero{0} --out moving{0}; else write a .glb"
 _BLENDER = "Blender turns it into a .glb (docs/blender.md)"
 _WAYS_OUT = {
@@ -114,6 +114,10 @@ def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequ
         from motionloom.io.npz import save_npz
 
         return save_npz(several[0], path)
+    if suffix == ".vrma":
+        from motionloom.io.vrma import save_vrma
+
+        return save_vrma(several[0], path)
     if suffix == ".glb":
         from motionloom.io.gltf import save_glb
 
