@@ -68,10 +68,10 @@ def run_export(arguments: argparse.Namespace) -> None:
     target = _output(arguments)
     skin = read_target(arguments, [target])
     io.check_output(target, own=skin and skin.suffix)
-    check_overwriting(arguments, [target])
     motion, unit, orders = read_clip(arguments, arguments.input)
     if skin is None:
         check_size(arguments, arguments.input, motion)
+    check_overwriting(arguments, [target])
     motion = crop(motion, arguments)
     if arguments.mirror:
         motion = motion.mirror()

@@ -20,8 +20,8 @@ def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform per
     """``--skeleton`` and what goes with it; ``own`` is whose skeleton motions have without it, in words."""
     parser.add_argument(
         "--skeleton", metavar="FILE|NAME",
-        help="put the motion on this skeleton, or on smpl22, mixamo, unreal, vrm or rigify; a .glb or .vrm character is written as that file with one more "
-        f"animation (default: {own})",
+        help="put motions on this skeleton, or on smpl22, mixamo, unreal, vrm or rigify; a .glb or .vrm character is "
+        f"written as that file with one more animation (default: {own})",
     )  # fmt: skip
     parser.add_argument(
         "--root", choices=ROOTS,
