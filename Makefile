@@ -47,8 +47,9 @@ pictures: $(VENV)/.runtime  ## draw the README's pictures anew, with the shipped
 	$(BIN)/python tools/make_pictures.py
 
 measure: $(VENV)/.runtime  ## measure the shipped weights anew (DATA=built set); fills README, docs/results.md, benchmarks/
-	rm -rf benchmarks/obedience benchmarks/realism benchmarks/realism_finished
+	rm -rf benchmarks/obedience benchmarks/everyday benchmarks/realism benchmarks/realism_finished
 	$(BIN)/motionloom evaluate obedience --out benchmarks/obedience
+	$(BIN)/motionloom evaluate obedience --set everyday --out benchmarks/everyday
 	$(BIN)/motionloom evaluate realism $(if $(DATA),--data $(DATA)) --out benchmarks/realism
 	$(BIN)/motionloom evaluate realism $(if $(DATA),--data $(DATA)) --finished --out benchmarks/realism_finished
 	$(BIN)/motionloom bench --json benchmarks/speed.json > benchmarks/speed.txt

@@ -83,6 +83,7 @@ def test_a_timeline_says_everything_and_the_line_has_the_last_word(weights, aske
             {"begin": 5.0, "end": 7.0, "text": "jump"},
             {"begin": 7.0, "end": 8.0, "text": "sit down"},
         ],
+        "remarks": [],
     }
     assert compose(weights, "three.yaml", "--seed", "0", "--guidance", "0", "--raw", "--steps", "3") == 0
     assert [asked[key] for key in ("seed", "guidance", "clean", "steps")] == [0, 0, False, 3]
@@ -152,7 +153,9 @@ def test_check_reads_and_makes_nothing(weights, asked, capsys):
 
 def test_the_schema_is_printed_as_json(capsys):
     assert main(["compose", "--schema"]) == 0
-    assert set(json.loads(capsys.readouterr().out)["$defs"]) == {"text", "guidance", "transition", "goal", "segment"}
+    assert set(json.loads(capsys.readouterr().out)["$defs"]) == {
+        "text", "guidance", "transition", "adapter", "goal", "segment",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(

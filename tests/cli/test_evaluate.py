@@ -58,6 +58,33 @@ def test_obedience_of_one_check_as_json(capsys: pytest.CaptureFixture[str]) -> N
     assert len(one["attempts"]) == 9
 
 
+def test_everyday_prompts_are_a_set_of_their_own_with_themes_and_a_sheet(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    only = ["--only", "walk and stop", "--only", "bow"]
+    out, sheet = tmp_path / "out", tmp_path / "all.png"
+    typed = ["evaluate", "obedience", "--set", "everyday", *only, "--seeds", "2", "--out", str(out)]
+    assert main([*typed, "--sheet", str(sheet)]) == 0
+    said = capsys.readouterr().out
+    assert "0 of 2 prompts obeyed" in said
+    assert "gaits, starts and stops" in said
+    kept = json.loads((out / "obedience.json").read_text())
+    assert kept["settings"]["first_seed"] == 100
+    assert [c["seconds"] for c in kept["checks"]] == [5.0, 4.0]
+    assert sheet.stat().st_size < 200_000
+    sheet.unlink()
+    assert main([*typed, "--sheet", str(sheet)]) == 0  # everything is measured already, and drawn all the same
+    assert sheet.is_file()
+
+
+def test_checks_are_tried_on_real_clips(built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main(["evaluate", "checks", "--data", str(built), "--only", "bow", "--out", str(out), "--misses"]) == 0
+    assert "0 of 1 checks are sound" in capsys.readouterr().out  # nobody bows there
+    assert "no example" in (out / "checks.md").read_text()
+    assert json.loads((out / "checks.json").read_text())["checks"]["bow"]["shown"] == [0, 0]
+
+
 def test_realism_against_a_built_set(built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["evaluate", "realism", "--data", str(built), "--out", str(tmp_path / "r")]) == 0
     assert "within 1.5 times of real" in capsys.readouterr().out
@@ -81,6 +108,10 @@ def test_reference_of_a_built_set(built: Path, tmp_path: Path, capsys: pytest.Ca
     "words",
     [
         ["obedience", "--only", "fly"],
+        ["obedience", "--set", "weekend"],
+        ["obedience", "--sheet", "all.jpg"],
+        ["checks", "--data", "nowhere"],
+        ["checks", "--data", "nowhere", "--only", "walk forward"],
         ["obedience", "--seeds", "0"],
         ["obedience", "--seeds", "many"],
         ["realism", "--count", "-1"],

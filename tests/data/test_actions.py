@@ -5,7 +5,7 @@ import pytest
 
 from motionloom.data.actions import ACTIONS, action_of, core, sentences, side_of
 from motionloom.data.words import mirror_text
-from tests.metrics import people
+from tests.kinematics import people
 
 
 @pytest.mark.parametrize(

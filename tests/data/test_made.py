@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from motionloom.metrics import physics as ph
 
 from motionloom.data import augment
 from motionloom.data.made import GESTURES, hands_up, lower_arms, perform
+from motionloom.kinematics import physics as ph
 from motionloom.skeleton import SMPL22
-from tests.metrics import people
+from tests.kinematics import people
 
 BONES = [(p, j) for j, p in enumerate(SMPL22.parents) if p >= 0]
 

@@ -343,6 +343,7 @@ def test_the_document_explains_every_key_with_an_example_that_is_read(tmp_path):
     example = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)[0]
     (tmp_path / "t.yaml").write_text(example)
     io.save(Motion(SMPL22, 20.0, np.zeros((3, 3)), np.tile(IDENTITY, (3, 22, 1))), tmp_path / "walk.bvh")
+    (tmp_path / "zombie.safetensors").touch()
     assert read_timeline(tmp_path / "t.yaml").frames == 100 + 50 + 80 + 100
     plain = yaml.safe_load(example)
     assert set(plain) == set(KEYS)

@@ -15,6 +15,7 @@ from safetensors.torch import save_file
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
+from motionloom.nets.text.known import Known, known_sentences
 from motionloom.nets.text.published import PublishedText
 from motionloom.weights.prior import Prior, find_device, find_weights, load_prior, save_prior
 from tests.nets import tiny
@@ -219,3 +220,25 @@ def test_only_safetensors_are_written_and_a_failed_write_leaves_nothing(tmp_path
     with pytest.raises(MotionloomError):
         save_prior(tiny.prior(), tmp_path / "absent" / "a.safetensors")
     assert not list(tmp_path.iterdir())
+
+
+def known() -> Known:
+    encoder = tiny.text()
+    return known_sentences(["a person walks", "a person turns left"], {"walk": 4.5}, encoder)
+
+
+def test_what_a_prior_knows_comes_back(tmp_path: Path, file: Path) -> None:
+    made = replace(tiny.prior(), known=known())
+    again = load_prior(save_prior(made, tmp_path / "a.safetensors")).known
+    assert again is not None
+    assert again.sentences == ("walks", "turns left")
+    assert again.seconds == {"walk": 4.5}
+    assert load_prior(file).known is None  # files without the table are read as they were
+
+
+def test_a_damaged_table_of_what_is_known_is_refused(tmp_path: Path) -> None:
+    made = save_prior(replace(tiny.prior(), known=known()), tmp_path / "a.safetensors")
+    tensors, about = parts(made)
+    del tensors["known.vectors"]
+    with pytest.raises(MotionloomError, match="lacks its vectors; fetch the weights again"):
+        load_prior(write(tmp_path / "b.safetensors", tensors, about))

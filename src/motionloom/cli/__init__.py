@@ -20,6 +20,7 @@ FAMILIES = (
     "duet",
     "files",
     "data",
+    "teach",
     "train",
     "evaluate",
     "bench",

@@ -7,14 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.newcomers import check_overwriting
-from motionloom.cli.sampling import add_sampling, bar, check_outs, fail
+from motionloom.cli.sampling import add_sampling, bar, check_outs, fail, load_prior, remark_unknown
 from motionloom.cli.skeletons import Target, open_target
 
 if TYPE_CHECKING:
     from motionloom.goals.timeline import Timeline
     from motionloom.io.stream import Stream
     from motionloom.motion import Motion
+    from motionloom.weights.prior import Prior
 
+REMARKED = 200
+"""Segments whose texts are looked up among what the weights know."""
 SHOWN = 40
 """Segments listed at the end; --json lists all."""
 
@@ -49,16 +52,23 @@ def _compose(arguments: argparse.Namespace) -> int:
 
         print(SCHEMA.read_text(encoding="utf-8"), end="")
         return 0
+    from dataclasses import replace
+
     outs, target = ([], None) if arguments.check else check_outs(arguments)
     timeline = _timeline(arguments)
     if arguments.check:
         _report(arguments, timeline, seconds=timeline.seconds, streams=[])
         return 0
+    from motionloom.tasks.long import with_loaded
+
     check_overwriting(arguments, outs)
+    prior = load_prior(arguments)
+    remarks = remark_unknown(prior, [segment.text for segment in timeline.segments[:REMARKED]])
+    timeline = replace(timeline, segments=with_loaded(prior, timeline.segments))
     streams = _open(outs, timeline, arguments.fps, target)
-    interrupted = _make(arguments, timeline, streams)
+    interrupted = _make(arguments, prior, timeline, streams)
     seconds = max(stream.seconds for stream in streams) if interrupted else timeline.seconds
-    _report(arguments, timeline, seconds=seconds, streams=_saved(streams))
+    _report(arguments, timeline, seconds=seconds, streams=_saved(streams), remarks=remarks)
     if interrupted:
         print(f"motionloom: interrupted; {_kept(streams)} of {timeline.seconds:.2f} s", file=sys.stderr)
         return 130
@@ -100,14 +110,14 @@ def _open(outs: Sequence[Path], timeline: "Timeline", fps: float | None, target:
     return sorted(streams, key=lambda stream: stream.path.suffix.lower() == ".bvh")
 
 
-def _make(arguments: argparse.Namespace, timeline: "Timeline", streams: Sequence["Stream"]) -> bool:
+def _make(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline", streams: Sequence["Stream"]) -> bool:
     """Write the motion; true if it was interrupted after something was finished."""
     from contextlib import closing
 
     from motionloom.errors import MotionloomError
 
     try:
-        with closing(_pieces(arguments, timeline)) as pieces:  # the bar is gone before anything is said
+        with closing(_pieces(arguments, prior, timeline)) as pieces:  # the bar is gone before anything is said
             _write(pieces, streams, arguments.fps)
     except KeyboardInterrupt:
         if not _saved(streams):
@@ -135,14 +145,12 @@ def _write(pieces: Iterable["Motion"], streams: Sequence["Stream"], fps: float |
                 stream.write(piece)
 
 
-def _pieces(arguments: argparse.Namespace, timeline: "Timeline") -> Generator["Motion", None, None]:
+def _pieces(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline") -> Generator["Motion", None, None]:
     from motionloom.io import load
     from motionloom.tasks import long
     from motionloom.tasks.text import GUIDANCE, STEPS
-    from motionloom.weights.prior import Prior
 
     start = None if timeline.start is None else load(timeline.start)
-    prior = Prior.load(arguments.weights, device=arguments.device)
     steps = STEPS if arguments.steps is None else arguments.steps
     done = 0
     with bar("composing") as move:
@@ -173,7 +181,12 @@ def _kept(streams: Sequence["Stream"]) -> str:
 
 
 def _report(
-    arguments: argparse.Namespace, timeline: "Timeline", *, seconds: float, streams: Sequence["Stream"]
+    arguments: argparse.Namespace,
+    timeline: "Timeline",
+    *,
+    seconds: float,
+    streams: Sequence["Stream"],
+    remarks: Sequence[str] = (),
 ) -> None:
     """Print what was made and where each segment lies in it, as far as it was made."""
     begins = [frame / 20 for frame in timeline.begins]
@@ -187,6 +200,7 @@ def _report(
 
         files = [str(stream.path) for stream in streams]
         about = {"seconds": seconds, "of": timeline.seconds, "files": files, "segments": rows}
+        about |= {"remarks": list(remarks)}
         print(json.dumps(about, indent=1))
         return
     for stream in streams:

@@ -12,7 +12,9 @@ from motionloom.cli.sampling import (
     check_outs,
     check_prompt,
     fail,
+    load_prior,
     places,
+    remark_unknown,
     report,
     write,
 )
@@ -80,13 +82,15 @@ def run_control(arguments: argparse.Namespace) -> None:
     files = places(outs, arguments.count, target=target)
     goal = _goal(arguments)
     check_overwriting(arguments, [file for several in files for file in several])
-    made, seconds = _make(arguments, goal)
+    prior = load_prior(arguments)
+    remarks = remark_unknown(prior, [arguments.prompt])
+    made, seconds = _make(arguments, prior, goal)
     motions = put_all(target, [one.motion for one in made])
     if arguments.fps is not None:
         motions = [motion.resample(arguments.fps) for motion in motions]
     captions = [arguments.prompt] * arguments.count
     written = [write(motions, several, captions, target) for several in files]
-    _report(arguments, made, written, seconds)
+    _report(arguments, made, written, seconds=seconds, remarks=remarks)
 
 
 def _goal(arguments: argparse.Namespace) -> "Goal":
@@ -130,14 +134,12 @@ def _goal(arguments: argparse.Namespace) -> "Goal":
     return whole
 
 
-def _make(arguments: argparse.Namespace, goal: "Goal") -> "tuple[list[Controlled], float]":
+def _make(arguments: argparse.Namespace, prior: "Prior", goal: "Goal") -> "tuple[list[Controlled], float]":
     import time
 
     from motionloom.tasks.control import control
     from motionloom.tasks.text import STEPS
-    from motionloom.weights.prior import Prior
 
-    prior = Prior.load(arguments.weights, device=arguments.device)
     began = time.perf_counter()
     with bar("controlling") as progress:
         made = control(
@@ -161,7 +163,14 @@ def _adapters(names: list[str], prior: "Prior") -> "Adapters":
     return [Adapter.load(name, prior) for name in names]
 
 
-def _report(arguments: argparse.Namespace, made: "list[Controlled]", written: list[list[Path]], seconds: float) -> None:
+def _report(
+    arguments: argparse.Namespace,
+    made: "list[Controlled]",
+    written: list[list[Path]],
+    *,
+    seconds: float,
+    remarks: list[str],
+) -> None:
     import sys
 
     for number, one in enumerate(made):
@@ -180,6 +189,7 @@ def _report(arguments: argparse.Namespace, made: "list[Controlled]", written: li
             "motions": motions,
             "seconds": len(made[0].motion) / made[0].motion.fps,
             "weights": str(arguments.weights),
+            "remarks": remarks,
         }
         report(arguments, about, [path for several in written for path in several], seconds)
         return

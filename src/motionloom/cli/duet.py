@@ -6,7 +6,17 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
-from motionloom.cli.sampling import bar, check_count, check_prompt, fail, places, report, take_text_anywhere
+from motionloom.cli.sampling import (
+    add_adapters,
+    bar,
+    check_count,
+    check_prompt,
+    fail,
+    load_prior,
+    places,
+    report,
+    take_text_anywhere,
+)
 from motionloom.cli.skeletons import Target, add_skeleton, put_all, read_target
 
 if TYPE_CHECKING:
@@ -64,6 +74,7 @@ def _add_sampling(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--steps", type=int, help="network calls per duet: fewer is faster (default 24)")
     parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="the prior (default: default)")
+    add_adapters(parser)
     parser.add_argument("--fps", type=float, help="frame rate of the files (default 20, or that of the motions given)")
     parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
@@ -137,6 +148,7 @@ def _composed(
     shared: dict[str, Any],
 ) -> "list[Motion]":
     from motionloom.tasks.duet import compose_pair
+    from motionloom.tasks.long import with_loaded
     from motionloom.tasks.splice import concatenated
     from motionloom.tasks.text import STEPS
 
@@ -150,9 +162,10 @@ def _composed(
         done += more
         progress(done, total)
 
+    segments = with_loaded(prior, timeline.segments)
     blocks = list(
         compose_pair(
-            prior, block, timeline.segments, seed=seed, path=timeline.path, person=arguments.person - 1,
+            prior, block, segments, seed=seed, path=timeline.path, person=arguments.person - 1,
             progress=told, **shared,
         )
     )  # fmt: skip
@@ -164,9 +177,8 @@ def _composed(
 
 def _load(arguments: argparse.Namespace) -> "tuple[Prior, PairBlock]":
     from motionloom.weights.pair import PairBlock
-    from motionloom.weights.prior import Prior
 
-    prior = Prior.load(arguments.weights, device=arguments.device)
+    prior = load_prior(arguments)
     return prior, PairBlock.load(arguments.block, prior)
 
 

@@ -12,7 +12,9 @@ from motionloom.cli.sampling import (
     check_count,
     check_outs,
     check_prompt,
+    load_prior,
     places,
+    remark_unknown,
     report,
     take_text_anywhere,
     write,
@@ -21,6 +23,7 @@ from motionloom.cli.skeletons import put_all
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
+    from motionloom.weights.prior import Prior
 
 
 def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -68,7 +71,9 @@ def run_edit(arguments: argparse.Namespace) -> None:
     clip, unit, orders = read_clip(arguments, arguments.clip)
     check_size(arguments, arguments.clip, clip)
     check_overwriting(arguments, [file for several in files for file in several])
-    motions, seconds = _make(arguments, crop(clip, arguments), "smpl" if uniform else "own")
+    prior = load_prior(arguments)
+    remarks = remark_unknown(prior, [arguments.text or ""])
+    motions, seconds = _make(arguments, prior, crop(clip, arguments), "smpl" if uniform else "own")
     motions = put_all(target, motions)
     if uniform:
         unit, orders = None, {}
@@ -83,21 +88,20 @@ def run_edit(arguments: argparse.Namespace) -> None:
         "prompt": arguments.text,
         "seeds": [arguments.seed + i for i in range(arguments.count)],
         "weights": str(arguments.weights),
+        "remarks": remarks,
     }
     report(arguments, about, written, seconds)
     note_rate(arguments, [arguments.clip])
 
 
 def _make(
-    arguments: argparse.Namespace, clip: "Motion", skeleton: "Literal['own', 'smpl']"
+    arguments: argparse.Namespace, prior: "Prior", clip: "Motion", skeleton: "Literal['own', 'smpl']"
 ) -> "tuple[list[Motion], float]":
     import time
 
     from motionloom.tasks.edit import edit
     from motionloom.tasks.text import STEPS
-    from motionloom.weights.prior import Prior
 
-    prior = Prior.load(arguments.weights, device=arguments.device)
     began = time.perf_counter()
     with bar("editing") as progress:
         motions = edit(

@@ -7,8 +7,8 @@ from pathlib import Path
 from motionloom.cli.measuring import say
 
 PARTS = (
-    "evaluate_text", "evaluate_transitions", "evaluate_control", "evaluate_prediction", "evaluate_duet",
-    "evaluate_evaluator", "evaluate_all",
+    "evaluate_checks", "evaluate_text", "evaluate_transitions", "evaluate_control", "evaluate_prediction",
+    "evaluate_duet", "evaluate_evaluator", "evaluate_all",
 )  # fmt: skip
 """Modules beside this one that register further commands."""
 
@@ -23,16 +23,19 @@ def add(subparsers) -> None:
 
 
 def _physical(commands) -> None:
-    obedience = commands.add_parser(
-        "obedience", help="20 everyday prompts, each with a physical check, on several seeds"
-    )
-    _sampling(obedience)
+    obedience = commands.add_parser("obedience", help="everyday prompts, each with a physical check, on several seeds")
+    _sampling(obedience, seeds="default 0 for the basic set, 100 for the others")
+    obedience.add_argument(
+        "--set", default="basic", metavar="basic|everyday|all", dest="prompts",
+        help="the twenty prompts of old, those of everyday life, or both (default basic)",
+    )  # fmt: skip
     obedience.add_argument("--seeds", type=int, default=10, help="seeds per prompt (default 10)")
     obedience.add_argument("--paraphrases", action="store_true", help="also try the same wishes in other words")
     obedience.add_argument(
         "--only", action="append", metavar="CHECK", help="only this check, such as 'walk forward' (repeatable)"
     )
-    obedience.set_defaults(run=_obedience)
+    obedience.add_argument("--sheet", type=Path, metavar="FILE.png", help="also draw the first draw of every prompt")
+    obedience.set_defaults(run=_obedience, seed=None)
 
     realism = commands.add_parser("realism", help="foot skate, penetration, jerk, bones and speed against real clips")
     _sampling(realism)
@@ -48,9 +51,9 @@ def _physical(commands) -> None:
     reference.set_defaults(run=_reference)
 
 
-def _sampling(parser: argparse.ArgumentParser) -> None:
+def _sampling(parser: argparse.ArgumentParser, *, seeds: str = "default 0") -> None:
     parser.add_argument("--weights", default="default", help="shipped name or file (default: default)")
-    parser.add_argument("--seed", type=int, default=0, help="first seed (default 0)")
+    parser.add_argument("--seed", type=int, default=0, help=f"first seed ({seeds})")
     parser.add_argument("--steps", type=int, help="sampler steps (default: as generate)")
     parser.add_argument("--guidance", type=float, help="strength of the text (default: as generate)")
     parser.add_argument("--solver", help="solver name (default: as generate)")
@@ -82,32 +85,49 @@ def _settings(arguments: argparse.Namespace) -> dict:
 def _obedience(arguments: argparse.Namespace) -> None:
     import json
 
-    from motionloom.lab.metrics.obedience import CHECKS, check
-    from motionloom.lab.suites import obey
+    from motionloom.lab.metrics.everyday.sets import chosen
+    from motionloom.lab.suites import everyday, obey
     from motionloom.lab.suites.reference import known
+    from motionloom.viz.film import suffixed
 
-    checks = [check(name) for name in arguments.only] if arguments.only else list(CHECKS)
+    checks = chosen(arguments.prompts, arguments.only)
+    if arguments.sheet:
+        obey.check_report(suffixed(arguments.sheet, (".png",)))
+    seed = _first_seed(arguments)
     settings = _settings(arguments)
+    generate = everyday.FirstDraws(_generator(arguments))
     results = obey.run(
-        _generator(arguments), checks, seeds=arguments.seeds, first_seed=arguments.seed,
+        generate, checks, seeds=arguments.seeds, first_seed=seed,
         paraphrases=arguments.paraphrases, settings=settings, folder=arguments.out, progress=say,
     )  # fmt: skip
-    rows = obey.table(results, checks, real=known()["checks"])
+    rows = obey.table(results, checks, real=known()["checks"] if arguments.prompts != "everyday" else None)
+    themes = everyday.themes(results)
     found = obey.totals(results, checks)
     said = (
-        f"{found['prompts_obeyed']} of {found['prompts']} prompts obeyed on at least {obey.ENOUGH:.0%} of the seeds; "
+        f"{found['prompts_obeyed']} of {found['prompts']} prompts obeyed on at least {obey.ENOUGH:.0%} of the seeds, "
+        f"{found['prompts_mostly_obeyed']} on at least {obey.MOSTLY:.0%}; "
         f"{found['seeds_obeyed_share']:.1%} of all seeds"
     )
     if "paraphrases_obeyed_share" in found:
         said += f"; {found['paraphrases_obeyed_share']:.1%} in other words"
     if arguments.out:
-        obey.write_text(
-            arguments.out / "report.md", f"# Obedience of {arguments.weights}\n\n{said}.\n\n{obey.markdown(rows)}\n"
-        )
+        parts = [obey.markdown(themes)] if len(themes) > 1 else []
+        text = "\n\n".join([f"# Obedience of {arguments.weights}", f"{said}.", *parts, obey.markdown(rows)])
+        obey.write_text(arguments.out / "report.md", text + "\n")
+    if arguments.sheet:
+        generate.draw(checks, arguments.sheet, seed=seed)
     if arguments.json:
         print(json.dumps(obey.summary(results, checks, settings=settings), indent=1))
     else:
-        print(f"{obey.plain(rows)}\n\n{said}")
+        tables = [obey.plain(rows), *([obey.plain(themes)] if len(themes) > 1 else [])]
+        print("\n\n".join([*tables, said]))
+
+
+def _first_seed(arguments: argparse.Namespace) -> int:
+    """What was said; else 0 for the twenty of old, and 100 where seeds should be ones that nothing was chosen by."""
+    if arguments.seed is not None:
+        return arguments.seed
+    return 0 if arguments.prompts == "basic" else 100
 
 
 def _realism(arguments: argparse.Namespace) -> None:

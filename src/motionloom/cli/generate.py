@@ -3,6 +3,7 @@
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.newcomers import check_overwriting, one_sentence
 from motionloom.cli.sampling import (
@@ -12,12 +13,21 @@ from motionloom.cli.sampling import (
     check_outs,
     check_prompt,
     fail,
+    load_prior,
     places,
+    remark_unknown,
     report,
     write,
 )
 from motionloom.cli.skeletons import put_all
 
+if TYPE_CHECKING:
+    from motionloom.goals.timeline import Timeline
+    from motionloom.motion import Motion
+    from motionloom.weights.prior import Prior
+
+SECONDS = 5.0
+"""Length of one action where nothing is said of it."""
 MAX_PROMPTS = 1000
 MAX_MOTIONS = 10_000
 
@@ -29,7 +39,13 @@ def add(subparsers) -> None:
     parser.add_argument(
         "--from", dest="file", type=Path, metavar="FILE", help="a text file with one prompt per line, - for stdin"
     )
-    parser.add_argument("--seconds", type=float, default=5.0, help="length of each motion (default 5)")
+    parser.add_argument(
+        "--seconds", type=float,
+        help="length of each motion (default 5; of several actions in a sentence what they take)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--as-one", action="store_true", help="do not part 'A, then B' into actions that follow each other"
+    )
     parser.add_argument(
         "--seed", type=int, default=0, help="the first motion's seed, the next have the next (default 0)"
     )
@@ -49,12 +65,47 @@ def _generate(arguments: argparse.Namespace) -> None:
     captions = [prompt for prompt in prompts for _ in range(arguments.count)]
     files = places(outs, len(captions), target=target)
     check_overwriting(arguments, [file for several in files for file in several])
-    motions, seconds = _make(arguments, prompts)
+    prior = load_prior(arguments)
+    timelines = {prompt: _timeline(arguments, prior, prompt) for prompt in prompts}
+    remarks = remark_unknown(prior, [segment.text for found in timelines.values() for segment in found.segments])
+    motions, seconds = _make(arguments, prior, [timelines[caption] for caption in captions])
     motions = put_all(target, motions)
     written = [path for several in files for path in write(motions, several, captions, target)]
-    made = [{"prompt": caption, "seed": arguments.seed + i} for i, caption in enumerate(captions)]
-    about = {"motions": made, "seconds": arguments.seconds, "weights": str(arguments.weights)}
+    made = [
+        {"prompt": caption, "seed": arguments.seed + i, "segments": _segments(timelines[caption])}
+        for i, caption in enumerate(captions)
+    ]
+    length = SECONDS if arguments.seconds is None else arguments.seconds
+    about = {"motions": made, "seconds": length, "weights": str(arguments.weights), "remarks": remarks}
     report(arguments, about, written, seconds)
+
+
+def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str) -> "Timeline":
+    """What a prompt asks, one segment or several; says so where there are several."""
+    from motionloom.features.layout import FPS, WIDTH
+    from motionloom.goals import timeline
+    from motionloom.tasks.text import frames_in
+
+    seconds = SECONDS if arguments.seconds is None else arguments.seconds
+    frames_in(seconds, prior.fps)
+    parted = not arguments.as_one and seconds >= timeline.SHORTEST
+    if not parted or (len(prior.mean), prior.fps) != (WIDTH, FPS):  # other weights make no long motion
+        return timeline.whole(prompt, seconds)
+    found = timeline.timeline_of(prompt, arguments.seconds)
+    if len(found.segments) > 1:
+        if arguments.solver is not None:
+            fail("--solver is for one action at a time; give --as-one to leave the sentence whole")
+        listed = ", ".join(f"'{segment.text}' {segment.seconds:.1f} s" for segment in found.segments)
+        print(f"motionloom: one after the other: {listed}; --as-one leaves the sentence whole", file=sys.stderr)
+    return found
+
+
+def _segments(timeline: "Timeline") -> list[dict[str, object]]:
+    begins = [frame / 20 for frame in timeline.begins]
+    return [
+        {"begin": begin, "end": end, "text": segment.text}
+        for begin, end, segment in zip(begins, begins[1:], timeline.segments, strict=False)
+    ]
 
 
 LONGEST = 30.0
@@ -69,7 +120,7 @@ def _prompts(arguments: argparse.Namespace) -> list[str]:
         fail(f"{len(prompts)} prompts are too many for one call; give at most {MAX_PROMPTS}")
     for prompt in prompts:
         check_prompt(prompt)
-    if arguments.seconds > LONGEST:
+    if arguments.seconds is not None and arguments.seconds > LONGEST:
         print(
             f"note: {arguments.seconds:g} s are long for one sentence; several that follow each other are made with: "
             "motionloom compose 'a person walks' 'a person sits down'",
@@ -89,21 +140,34 @@ def _lines(file: Path) -> list[str]:
     return [line.strip() for line in text.splitlines() if line.strip()]
 
 
-def _make(arguments: argparse.Namespace, prompts: list[str]):
+def _make(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timeline]") -> "tuple[list[Motion], float]":
+    """The motions, each from its own seed; those of one action are drawn together."""
     import time
+    from itertools import groupby
 
+    from motionloom.tasks.long import compose
+    from motionloom.tasks.splice import concatenated
     from motionloom.tasks.text import generate
-    from motionloom.weights.prior import Prior
 
-    prior = Prior.load(arguments.weights, device=arguments.device)
-    given = {"steps": arguments.steps, "solver": arguments.solver}
-    options = {name: value for name, value in given.items() if value is not None}
-    began = time.perf_counter()
+    given = {"steps": arguments.steps, "guidance": arguments.guidance}
+    options: dict[str, Any] = {name: value for name, value in given.items() if value is not None} | {
+        "clean": not arguments.raw
+    }
+    solver = {} if arguments.solver is None else {"solver": arguments.solver}
+    began, motions = time.perf_counter(), []
     with bar("generating") as progress:
-        motions = generate(
-            prior, prompts, seconds=arguments.seconds, count=arguments.count, seed=arguments.seed,
-            guidance=arguments.guidance, clean=not arguments.raw, progress=progress, **options,
-        )  # fmt: skip
+        for single, run in groupby(timelines, lambda timeline: len(timeline.segments) == 1):
+            segments = [timeline.segments for timeline in run]
+            seed = arguments.seed + len(motions)
+            if single:
+                motions += generate(
+                    prior, [one.text for (one,) in segments], seconds=[one.seconds for (one,) in segments], seed=seed,
+                    progress=progress, **options, **solver,
+                )  # fmt: skip
+                continue
+            for number, several in enumerate(segments):
+                motions.append(concatenated(*compose(prior, several, seed=seed + number, **options)))
+                progress(len(motions), len(timelines))
     if arguments.fps is not None:
         motions = [motion.resample(arguments.fps) for motion in motions]
     return motions, time.perf_counter() - began

@@ -11,6 +11,7 @@ from motionloom.cli.skeletons import Target, add_skeleton, read_target
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
+    from motionloom.weights.prior import Prior
 
 MAX_CHARACTERS = 20_000
 MAX_COUNT = 1000
@@ -31,11 +32,30 @@ def add_sampling(
     parser.add_argument(
         "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
     )
+    add_adapters(parser)
     parser.add_argument("--fps", type=float, help=f"frame rate of the files (default: {own_rate})")
     parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
     add_skeleton(parser, own=own_skeleton)
+
+
+def add_adapters(parser: argparse.ArgumentParser) -> None:
+    """``--adapter``: what was taught from clips."""
+    parser.add_argument(
+        "--adapter", action="append", default=[], metavar="FILE[:FACTOR]",
+        help="what 'motionloom teach' made of clips, repeatable; a factor says how much of it (default 1)",
+    )  # fmt: skip
+
+
+def load_prior(arguments: argparse.Namespace) -> "Prior":
+    """The weights that the line names, with its adapters in them."""
+    from motionloom.goals.adapters import parse_adapter
+    from motionloom.tasks.adapting import adapt
+    from motionloom.weights.prior import Prior
+
+    adapters = [parse_adapter(word) for word in arguments.adapter]
+    return adapt(Prior.load(arguments.weights, device=arguments.device), adapters)
 
 
 def take_text_anywhere(parser: argparse.ArgumentParser) -> None:
@@ -134,6 +154,24 @@ def check_prompt(prompt: str) -> None:
         fail("a prompt is empty; say in words what the person does")
     if len(prompt) > MAX_CHARACTERS:
         fail(f"a prompt has {len(prompt):,} characters; say it in fewer than {MAX_CHARACTERS:,}")
+
+
+def remark_unknown(prior: "Prior", prompts: Sequence[str]) -> list[str]:
+    """Say on stderr, a line each, which prompts are like nothing that these weights have learned; and give the lines.
+
+    Nothing is said for weights whose file has no table of what they know.
+    """
+    import sys
+
+    from motionloom.nets.text.known import nearest
+
+    asked = [prompt for prompt in dict.fromkeys(prompts) if prompt.strip()]
+    if prior.known is None or not asked:
+        return []
+    remarks = [found.remark() for found in nearest(prior.known, asked, prior.text) if not found.near]
+    for line in remarks:
+        print(f"motionloom: {line}", file=sys.stderr)
+    return remarks
 
 
 @contextmanager

@@ -37,6 +37,7 @@ def add(subparsers) -> None:
     parser.add_argument(
         "weights", nargs="?", metavar="NAME|FILE", help="a shipped name or a file (default: list the shipped)"
     )
+    parser.add_argument("--actions", action="store_true", help="list what a prior has learned, with seconds of each")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(run=_weights)
 
@@ -139,6 +140,9 @@ def _weights(arguments: argparse.Namespace) -> None:
     from motionloom.weights.predictor import shipped_predictors
     from motionloom.weights.prior import find_weights, shipped
 
+    if arguments.actions:
+        _actions(arguments)
+        return
     names = blocks() | shipped_predictors() | shipped()
     if arguments.weights is None:
         described = [describe(path, name) for name, path in names.items()]
@@ -155,12 +159,34 @@ def _weights(arguments: argparse.Namespace) -> None:
     print(json.dumps(about, indent=1) if arguments.json else _card(about))
 
 
+def _actions(arguments: argparse.Namespace) -> None:
+    """Print what a prior has learned; raises MotionloomError for weights that do not say."""
+    from motionloom.errors import MotionloomError
+    from motionloom.weights.prior import Prior
+
+    known = Prior.load(arguments.weights or "default").known
+    if known is None:
+        raise MotionloomError(
+            f"the weights {arguments.weights or 'default'!r} do not say what they have learned: they are older than "
+            "such tables; their card says which recordings they know"
+        )
+    if arguments.json:
+        about = {"seconds": dict(known.seconds), "sentences": list(known.sentences)}
+        print(json.dumps(about, indent=1, ensure_ascii=False))
+        return
+    for action, seconds in known.seconds.items():
+        print(f"{seconds:9.1f} s  {action}")
+    print(f"{len(known.sentences):,} sentences for them are in the file; --json lists them")
+
+
 def describe(path: Path, name: str | None = None) -> dict[str, Any]:
     """What a weight file says and holds; the whole file is read and checked. ``name``: the shipped one."""
+    from motionloom.weights.adapter import is_adapter
     from motionloom.weights.pair import is_block
     from motionloom.weights.predictor import is_predictor
 
-    said = _predictor(path) if is_predictor(path) else _block(path) if is_block(path) else _prior(path)
+    kinds = ((is_predictor, _predictor), (is_block, _block), (is_adapter, _adapter))
+    said = next((read for kind, read in kinds if kind(path)), _prior)(path)
     about = {"name": said["name"], "file": str(path), "megabytes": round(path.stat().st_size / 1e6, 1)} | said
     return about if name is None else about | {"name": name}
 
@@ -218,6 +244,23 @@ def _block(path: Path) -> dict[str, Any]:
         "sizes": {"layers": config.layers, "behind": config.split, "width": config.width, "heads": config.heads},
         "belongs_to": {"name": block.base, "fingerprint": block.fingerprint},
         "notes": block.notes,
+    }
+
+
+def _adapter(path: Path) -> dict[str, Any]:
+    from motionloom.weights.adapter import read_adapter
+
+    adapter = read_adapter(path)
+    return {
+        "name": adapter.name,
+        "kind": "taught adapter" if adapter.taught else "control adapter",
+        "licence": adapter.licence,
+        "data": adapter.data,
+        "manner": "low rank" if adapter.taught else f"low rank, {adapter.control}",
+        "parameters": sum(value.numel() for value in adapter.tensors.values()),
+        "sizes": {"rank": adapter.rank} | ({"given rank": adapter.given_rank} if adapter.sees_given else {}),
+        "belongs_to": {"name": adapter.base, "fingerprint": adapter.fingerprint},
+        "notes": adapter.notes,
     }
 
 

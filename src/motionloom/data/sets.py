@@ -11,14 +11,14 @@ import torch
 from torch import Tensor
 
 from motionloom.data.actions import PREFIX
-from motionloom.data.build import STATES, Clip, Note, read_clip
+from motionloom.data.build import MADE, STATES, Clip, Note, read_clip
 from motionloom.data.words import phrases, sentence
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import LAYOUT
 
 WORDINGS = 48
 """Sentences made per measured label."""
-SHARE = {"action": 0.45, "human": 0.18, "index": 0.05, "label": 0.32}
+SHARE = {"action": 0.62, "human": 0.1, "index": 0.03, "label": 0.25}
 """How often a training sample shows a named action, a written caption, an index description, a measured label."""
 WEIGHT = {"capture": 1.0, "made": 0.7, "keyed": 0.4}
 """How often a stretch is drawn among those of its action: animated by hand it teaches what, not how."""
@@ -27,13 +27,29 @@ FAVOUR: dict[str, float] = {
     **dict.fromkeys(("climb", "kick"), 4.0),
     **dict.fromkeys(("circle left", "jump"), 2.5),
     **dict.fromkeys(("sit down", "stand up", "punch", "jog", "hop", "turn left", "turn right"), 1.5),
-    **dict.fromkeys(("action:then",), 8.0),
-    **dict.fromkeys(("action:sit down", "action:stand up", "action:lie down", "action:get up", "action:crawl"), 1.5),
-    **dict.fromkeys(("action:stop walking", "action:stop running", "action:walk turn around", "action:pick up"), 1.5),
-    **dict.fromkeys(("action:kneel", "action:climb ladder", "action:push-up", "action:throw", "action:clap"), 1.3),
-    **dict.fromkeys(("jog backward", "jumping jacks", "cartwheel", "kick ball"), 0.5),
+    **{
+        f"action:{name}": weight
+        for weight, names in {
+            4.0: ("sit down", "stand up", "lie down", "get up", "kneel", "bow", "pick up", "stop running"),
+            3.0: ("crouch", "sit down and stand up", "stop walking", "walk turn around", "throw", "crawl", "then"),
+            2.0: (
+                "squat",
+                "lunge",
+                "push-up",
+                "climb ladder",
+                "start running",
+                "walk and pick up",
+                "kick",
+                "made clap",
+            ),
+            0.5: ("sword", "basketball", "laugh", "charleston", "wash", "arm back", "rotate arm"),
+        }.items()
+        for name in names
+    },
 }
-"""Labels drawn more often than the others: they came out last. A mixture of two labels is drawn 0.4 times as often."""
+"""Groups drawn more or less often than the others: what came out last, and what is asked for most. A mixture of two
+labels is drawn 0.4 times as often, a made gesture `MADE_SHARE` times."""
+MADE_SHARE = 0.6
 
 EVENTS = {
     "kick": "kick", "kick ball": "kick", "punch": "punch|box", "jump": "jump|leap", "jump forward": "jump|leap",
@@ -211,6 +227,10 @@ class Batches:
             for kind, groups in fitting.items()
         }
 
+    def _favour(self, name: str) -> float:
+        usual = 0.4 if "+" in name else MADE_SHARE if name.startswith(PREFIX + MADE) else 1.0
+        return self.favour.get(name, usual)
+
     def _weights(self, numbers: list[int]) -> np.ndarray:
         """How often each item of a group is drawn, as a cumulative share."""
         total = np.cumsum([self.data.items[number].weight for number in numbers])
@@ -229,7 +249,7 @@ class Batches:
         for row, kind in enumerate(picked):
             groups = pools[kinds[kind]]
             names = list(groups)
-            weights = np.array([self.favour.get(n, 0.4 if "+" in n else 1.0) for n in names])
+            weights = np.array([self._favour(name) for name in names])
             numbers, shares = groups[names[rng.choice(len(names), p=weights / weights.sum())]]
             item = self.data.items[numbers[np.searchsorted(shares, rng.random())]]
             length = min(item.frames, window)
@@ -240,12 +260,24 @@ class Batches:
         return Batch(features, torch.tensor(lengths), torch.tensor(texts))
 
 
+BEFORE = 16
+"""Frames of a window before a change begins: people begin soon after they are told to."""
+
+
 def _starts(item: Item, length: int) -> tuple[int, int]:
-    """Where a window of so many frames may begin, half-open: within the item, with its core inside."""
+    """Where a window of so many frames may begin, half-open: within the item, with its core inside.
+
+    The core begins at about the same time in every window (`BEFORE`, give or take four frames): were it anywhere, the
+    average over what a window may show would be a person who stays halfway, and a small network under much noise draws
+    averages.
+    """
     low, high = item.start, item.start + item.frames - length
-    if item.core:
-        low, high = max(low, min(item.core[1] - length, high)), min(high, max(item.core[0], low))
-    return low, max(low, high) + 1
+    if item.core is None:
+        return low, high + 1
+    first, end = item.core
+    low, high = max(low, min(end - length, high)), min(high, max(first, low))
+    begin, last = max(low, min(first - BEFORE - 4, high)), min(high, max(first - BEFORE + 4, low))
+    return begin, max(begin, last) + 1
 
 
 def summary(folder: Path | str) -> dict:

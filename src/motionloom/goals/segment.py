@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from motionloom.errors import MotionloomError
+from motionloom.goals.adapters import Applied
 from motionloom.goals.goal import FPS, Goal
 
 LONGEST = 60.0
@@ -23,6 +24,8 @@ class Segment:
     """Seconds shared with the next segment, half before and half after the seam."""
     goal: Goal | None = None
     """Wishes for the frames of this segment, seen from where the person stands when it begins (origin, facing +Z)."""
+    adapters: tuple[Applied, ...] = ()
+    """What was taught from clips, for this segment alone: adapters or their files, each with a factor."""
 
     def __post_init__(self) -> None:
         said = f"the segment {self.text[:40]!r}"

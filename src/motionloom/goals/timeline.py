@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 SCHEMA = Path(__file__).parents[1] / "schemas" / "timeline.schema.json"
 KEYS = ("segments", "seed", "guidance", "transition", "start", "path")
-SEGMENT_KEYS = ("text", "seconds", "guidance", "transition", "goal", "goals")
+SEGMENT_KEYS = ("text", "seconds", "guidance", "transition", "goal", "goals", "adapters")
 SECONDS, TRANSITION = 5.0, 1.0
 """A segment's length, and what two neighbours share, where the file does not say."""
 SHORTEST, LONGEST, SHORTEST_TRANSITION = 0.2, 60.0, 0.05
@@ -99,6 +99,42 @@ def plain_timeline(texts: Sequence[str], *, seconds: float = SECONDS, transition
     return Timeline(tuple(Segment(text, seconds, transition=shared) for text in texts))
 
 
+def whole(text: str, seconds: float) -> Timeline:
+    """One segment, of any length that one motion may have."""
+    from motionloom.goals.segment import Segment
+
+    return Timeline((Segment(text, seconds),))
+
+
+def timeline_of(text: str, seconds: float | None = None) -> Timeline:
+    """One sentence as segments, one for each action that follows another (`motionloom.goals.sequence`).
+
+    seconds: of the whole, shared out as the actions' own lengths are; None: those lengths. A sentence that says one
+    thing, or several at once, is one segment of 5 s. Raises `MotionloomError` for what cannot be asked.
+    """
+    from motionloom.goals.segment import Segment
+    from motionloom.goals.sequence import lengths, split_actions
+
+    if problem := _text_problem(text):
+        raise MotionloomError(problem)
+    parts = split_actions(text)
+    if len(parts) == 1:
+        return plain_timeline([text], seconds=SECONDS if seconds is None else seconds)
+    if seconds is not None and not SHORTEST * len(parts) <= seconds <= LONGEST:
+        raise MotionloomError(
+            f"{len(parts)} actions one after the other take {SHORTEST * len(parts):g} to {LONGEST:g} seconds; got "
+            f"{seconds:g}"
+        )
+    shares = lengths(parts, seconds, fps=FPS)
+    shared = [min(TRANSITION, one / 2, other / 2) for one, other in zip(shares, [*shares[1:], shares[-1]], strict=True)]
+    return Timeline(
+        tuple(
+            Segment(part.text, share, transition=overlap)
+            for part, share, overlap in zip(parts, shares, shared, strict=True)
+        )
+    )
+
+
 def _frames(seconds: float) -> int:
     return round(seconds * FPS)
 
@@ -122,6 +158,7 @@ class _Row:
     transition: float | None = None
     transition_line: int = 0
     goals: tuple[Lined, ...] = ()
+    adapters: tuple[tuple[Path, float], ...] = ()
 
 
 class _Reader(LinedFile):
@@ -164,7 +201,28 @@ class _Reader(LinedFile):
             self.number(transition, "transition", low=SHORTEST_TRANSITION, high=LONGEST / 2),
             transition.line if transition else 0,
             self.goals(given),
+            self.adapters(given.get("adapters")),
         )
+
+    def adapters(self, found: Lined | None) -> tuple[tuple[Path, float], ...]:
+        """``FILE`` or ``FILE:FACTOR``, one or a list of them; the files lie in the timeline's folder."""
+        if found is None:
+            return ()
+        from motionloom.goals.adapters import MOST_ADAPTERS, parse_adapter
+
+        given = [found] if isinstance(found.value, str) else self.items(found, "adapters", of="adapter")
+        if len(given) > MOST_ADAPTERS:
+            self.fail(found.line, f"{len(given)} adapters at once are too many; at most {MOST_ADAPTERS}")
+        result = []
+        for one in given:
+            if not isinstance(one.value, str):
+                self.fail(one.line, f"an adapter is written FILE or FILE:FACTOR; got {self.got(one)}")
+            try:
+                name, factor = parse_adapter(one.value)
+                result.append((Field(str(name), "adapters").file(self.path.parent), factor))
+            except MotionloomError as error:
+                self.fail(one.line, str(error))
+        return tuple(result)
 
     def goals(self, given: dict[str, Lined]) -> tuple[Lined, ...]:
         if "goal" in given:
@@ -193,10 +251,11 @@ class _Reader(LinedFile):
     def segments(self, rows: list[_Row], transitions: list[float]) -> tuple[Segment, ...]:
         from motionloom.goals.segment import Segment
 
-        return tuple(
-            Segment(row.text, row.seconds, row.guidance, transition, self.merged(row.goals, _frames(row.seconds)))
-            for row, transition in zip(rows, transitions, strict=True)
-        )
+        def segment(row: _Row, transition: float) -> Segment:
+            goal = self.merged(row.goals, _frames(row.seconds))
+            return Segment(row.text, row.seconds, row.guidance, transition, goal, row.adapters)
+
+        return tuple(map(segment, rows, transitions))
 
     def merged(self, goals: tuple[Lined, ...], frames: int) -> Goal | None:
         if not goals:

@@ -184,6 +184,11 @@ class PairNet(nn.Module):
         """Sizes of the prior's network."""
         return self._base[0].config
 
+    def over(self, net: PriorNet) -> "PairNet":
+        """The same block over another network of these sizes, such as the prior's with adapters in it."""
+        _, mean, std, _ = self._base
+        return PairNet(net, self.talk, self.schedule, mean=mean, std=std).eval()
+
     def bind(self, cond: Condition) -> Bound:
         """See `PriorNet.bind`; a row for each person."""
         return self._base[0].bind(cond)

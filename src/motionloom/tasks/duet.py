@@ -26,13 +26,14 @@ from motionloom.goals.goal import Goal
 from motionloom.goals.segment import LONGEST, Segment
 from motionloom.motion import Motion
 from motionloom.nets.pair import PLACE, PairNet, join, part
+from motionloom.nets.prior import PriorNet
 from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.body import bodies
 from motionloom.tasks.control import moved
 from motionloom.tasks.long import Progress as Moves
-from motionloom.tasks.long import Row, Track, bound_together, chain_rows, in_world
+from motionloom.tasks.long import Row, Track, bound_together, chain_rows, in_world, same_net
 from motionloom.tasks.pair import (
     Duet,
     Seed,
@@ -256,6 +257,8 @@ class _Guess:
     """Stands (2, 4) at the frame of a row with which the next one begins, by row and level of the guess."""
     noise: dict[int, Tensor] = field(default_factory=dict)
     """(2, 4) that each row's D began as."""
+    nets: dict[int, PairNet] = field(default_factory=dict)
+    """The network of each row, with its segment's adapters."""
 
     def __call__(self, numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
         parts = [_parted(state.to(self.prior.mean)) for state in states]
@@ -267,11 +270,9 @@ class _Guess:
                 for places, (motion, _) in zip(shown, parts, strict=True)
             ]
         )
-        cleans = self._guided([row for n in numbers for row in self.rows[n]], x, frames, at)
+        cleans = self._guesses(numbers, x.unflatten(0, (-1, 2)), frames, at)
         made = []
-        for number, count, level, clean, (state, _) in zip(
-            numbers, frames, at, cleans.unflatten(0, (-1, 2)), parts, strict=True
-        ):
+        for number, count, level, clean, (state, _) in zip(numbers, frames, at, cleans, parts, strict=True):
             places, motion = part(clean)
             rows = zip(motion[:, :count], self.rows[number], strict=True)
             motion = torch.stack([row.correct(one, level) for one, row in rows])
@@ -285,15 +286,16 @@ class _Guess:
     def add(self, number: int, row: tuple[Row, ...], *, asked: Sequence[bool], seed: int) -> None:
         """Take in a row of the chain, of both people; ``asked``: who is asked to be somewhere."""
         self.rows[number] = row
+        self.nets[number] = self._net(row[0].net)
         self.leads[number] = leader(
-            self.prior, self.net, bound_together([one.cond for one in row]), seeds=person_seeds(seed, 0),
+            self.prior, self.nets[number], bound_together([one.cond for one in row]), seeds=person_seeds(seed, 0),
             mask=torch.zeros(2, 1 + row[0].length, WIDTH, dtype=torch.bool, device=self.prior.mean.device),
             still=asked, weight=self.together,
         )  # fmt: skip
 
     def drop(self, number: int) -> None:
         """Forget a row that is finished, as its neighbours are."""
-        del self.rows[number], self.leads[number]
+        del self.rows[number], self.leads[number], self.nets[number]
         self.ends = {key: stands for key, stands in self.ends.items() if key[0] != number - 1}
         self.noise.pop(number, None)
 
@@ -319,11 +321,30 @@ class _Guess:
         row, features = self.rows[number][0], motion * self.prior.std + self.prior.mean
         self.ends[number, level] = two.later(features, begin, row.length - max(row.overlap, 1))
 
-    def _guided(self, rows: Sequence[Row], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> Tensor:
+    def _net(self, base: PriorNet) -> PairNet:
+        """The block over the prior's network, or over that network with a segment's adapters in it."""
+        if base is self.prior.net:
+            return self.net
+        known = (self.nets[n] for n, row in self.rows.items() if n in self.nets and row[0].net is base)
+        return next(known, None) or self.net.over(base)
+
+    def _guesses(self, numbers: Sequence[int], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> list[Tensor]:
+        """Guided guesses (2, 1 + frames, numbers) of rows x, one network call for each set of adapters."""
+        cleans: dict[int, Tensor] = {}
+        for places in same_net([self.rows[number][0] for number in numbers]):
+            some = [numbers[i] for i in places]
+            rows = [row for number in some for row in self.rows[number]]
+            made = self._guided(
+                self.nets[some[0]], rows, x[places].flatten(0, 1), [frames[i] for i in places], [at[i] for i in places]
+            )
+            cleans.update(zip(places, made.unflatten(0, (-1, 2)), strict=True))
+        return [cleans[i] for i in range(len(numbers))]
+
+    def _guided(self, net: PairNet, rows: Sequence[Row], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> Tensor:
         """``rows``, and rows of x: a0, b0, a1, b1, ...; frames and levels: one per pair."""
         lengths = torch.tensor(frames, device=x.device).repeat_interleave(2).repeat(2)
         level = torch.tensor(at, device=x.device).repeat_interleave(2).repeat(2)
         bound = bound_together([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
-        conditional, unconditional = self.net(torch.cat([x, x]), level, bound).chunk(2)
+        conditional, unconditional = net(torch.cat([x, x]), level, bound).chunk(2)
         scale = torch.tensor([row.guidance for row in rows]).to(x)[:, None, None]
         return torch.lerp(unconditional, conditional, scale)

@@ -29,7 +29,8 @@ from motionloom.goals.paths import along
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
-from motionloom.nets.prior import Bound
+from motionloom.nets.prior import Bound, PriorNet
+from motionloom.tasks.adapting import AdaptedPriors, loaded
 from motionloom.tasks.body import Places, bodies
 from motionloom.tasks.splice import person_at_20
 from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, STEPS
@@ -60,6 +61,8 @@ class Row:
     cond: Bound
     null: Bound
     correct: Correction
+    net: PriorNet
+    """The prior's network, with the segment's adapters merged into it."""
 
     @property
     def length(self) -> int:
@@ -159,7 +162,7 @@ def long_features(
 def chain_rows(prior: Prior, segments: Iterable[Segment], guidance: float, past: "Past | None") -> Iterator[Row]:
     """The rows of the chain; one segment is read ahead, since the last has no transition behind it."""
     before, number = len(past.known) if past else 0, 0
-    null = prior.net.bind(prior.condition([""]))
+    priors = AdaptedPriors(prior)
     iterator = iter(segments)
     segment = next(iterator, None)
     while segment is not None:
@@ -172,13 +175,22 @@ def chain_rows(prior: Prior, segments: Iterable[Segment], guidance: float, past:
                 "its transitions together; make it longer or the transitions shorter"
             )
         length = before + frames + overlap // 2
-        bound = prior.net.bind(prior.condition([segment.text], [length]))
+        own = priors.of(segment.adapters)
+        bound, null = (own.net.bind(own.condition([text], [length])) for text in (segment.text, ""))
         edits = [past.holder(prior, length)] if past and not number else []
         if segment.goal and not segment.goal.empty:
             edits.append(toward(segment.goal, prior, first=before))
         scale = guidance if segment.guidance is None else segment.guidance
-        yield Row(frames, before, overlap // 2, overlap, scale, bound, null, _one_after_the_other(edits))
+        yield Row(frames, before, overlap // 2, overlap, scale, bound, null, _one_after_the_other(edits), own.net)
         before, segment, number = overlap // 2, following, number + 1
+
+
+def with_loaded(prior: Prior, segments: Sequence[Segment]) -> tuple[Segment, ...]:
+    """The same segments, the files of their adapters read: what is wrong with them shows before anything is made."""
+    return tuple(
+        replace(segment, adapters=loaded(prior, segment.adapters)) if segment.adapters else segment
+        for segment in segments
+    )
 
 
 def _one_after_the_other(edits: Sequence[Correction]) -> Correction:
@@ -214,13 +226,30 @@ def _settled(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequen
 
 
 def _guess(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
-    """Guided guesses of rows of different lengths and levels, as one network call."""
+    """Guided guesses of rows of different lengths and levels, as one network call for each set of adapters."""
+    cleans: dict[int, Tensor] = {}
+    for numbers in same_net(rows):
+        some = [rows[i] for i in numbers]
+        made = _guess_of_one_net(prior, some, [states[i] for i in numbers], [at[i] for i in numbers])
+        cleans.update(zip(numbers, made, strict=True))
+    return [cleans[i] for i in range(len(rows))]
+
+
+def same_net(rows: Sequence[Row]) -> list[list[int]]:
+    """Numbers of rows whose segments have the same network, group by group."""
+    groups: dict[int, list[int]] = {}
+    for number, row in enumerate(rows):
+        groups.setdefault(id(row.net), []).append(number)
+    return list(groups.values())
+
+
+def _guess_of_one_net(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
     frames = [len(state) for state in states]
     x = torch.stack([F.pad(state, (0, 0, 0, max(frames) - len(state))) for state in states]).to(prior.mean)
     lengths = torch.tensor([*frames, *frames], device=x.device)
     bound = bound_together([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
     level = torch.tensor([*at, *at], device=x.device)
-    conditional, unconditional = prior.net(torch.cat([x, x]), level, bound).chunk(2)
+    conditional, unconditional = rows[0].net(torch.cat([x, x]), level, bound).chunk(2)
     scale = torch.tensor([row.guidance for row in rows]).to(x)[:, None, None]
     guided = torch.lerp(unconditional, conditional, scale)
     return [clean[:count] for clean, count in zip(guided, frames, strict=True)]

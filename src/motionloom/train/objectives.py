@@ -13,6 +13,7 @@ from motionloom.features.humanml import displacements
 from motionloom.features.layout import FEET, LAYOUT
 from motionloom.nets.prior import Condition, PriorNet, condition
 from motionloom.nets.text import TextEncoder
+from motionloom.weights.adapter import AdapterNet
 
 WEIGHTS = {
     "yaw_velocity": 6.0,
@@ -137,9 +138,9 @@ class CleanGuess:
 
 
 class Conditioned(nn.Module):
-    """A prior network that binds its condition in the same call, so that wrappers (DDP, compile) see one forward."""
+    """A network that binds its condition in the same call, so that wrappers (DDP, compile) see one forward."""
 
-    def __init__(self, net: PriorNet) -> None:
+    def __init__(self, net: PriorNet | AdapterNet) -> None:
         super().__init__()
         self.net = net
 

@@ -12,6 +12,7 @@ from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.nets.text import MiniLM, TextEncoder
+from motionloom.train.known import known_table
 from motionloom.train.loop import Average, Log, World, changed, train
 from motionloom.train.objectives import CleanGuess, Conditioned, WordBank
 from motionloom.train.recipe import Recipe
@@ -62,10 +63,10 @@ def train_prior(
         f"{len(motions.texts):,} sentences, {motions.minutes:.0f} minutes recorded")  # fmt: skip
     for line in changed(folder, recipe) if world.rank == 0 else ():
         say(f"going on with another recipe than before: {line}")
-    place = folder / f"{recipe.name}.safetensors"
+    place, known = folder / f"{recipe.name}.safetensors", known_table(motions, text)
 
     def export(_: nn.Module, average: Average, step: int) -> None:
-        prior = _prior(recipe, motions, average, step, text)
+        prior = replace(_prior(recipe, motions, average, step, text), known=known)
         save_prior(prior, place)
         if recipe.show_every and step % recipe.show_every == 0:
             _show(prior, recipe, folder / f"step_{step:07d}.png")

@@ -1,6 +1,7 @@
-"""Low-rank changes of a prior's network that teach it one kind of control, and their files.
+"""Low-rank changes of a prior's network that teach it an action, a style or one kind of control, and their files.
 
-A layer's weight W becomes W + U D with thin U and D (LoRA, Hu et al. 2022). An adapter may also add an input: the
+A layer's weight W becomes W + U D with thin U and D (LoRA, Hu et al. 2022). What is taught from a few clips is merged
+into the weights, each adapter with a factor (`merged`). An adapter for control may also add an input: the
 network then sees which numbers are given and what they are, through embed(x) + U_g D_g [given, mask]. In the state
 itself they are scaled by the signal, which is next to nothing at the levels where it is decided what will be shown. The
 published control models are full fine-tunes and have the state alone (Shafir et al. 2024, algorithm 1); those are
@@ -13,7 +14,7 @@ import copy
 import hashlib
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -28,7 +29,7 @@ from torch.nn import functional as F
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.nets.prior import Bound, Condition, NetConfig, PriorNet
-from motionloom.weights.container import check
+from motionloom.weights.container import check, is_signed
 
 KEY = "motionloom-adapter"
 FORMAT = 1
@@ -36,6 +37,10 @@ MAX_BYTES = 64 << 20
 MAX_RANK = 512
 CHANGED = ("embed", "out", "project", "query", "heard", "linear1", "linear2", "change")
 """Last names of the layers that an adapter changes."""
+TAUGHT = "taught"
+"""The ``control`` of an adapter that holds an action or a style learned from clips (`motionloom.train.teach`)."""
+READS = ("words", "text")
+"""Last names of the layers that such an adapter changes besides: those that read the text."""
 GIVEN = "given"
 """The name under which an adapter keeps its input for what is given."""
 
@@ -83,6 +88,11 @@ class Adapter:
     notes: dict[str, Any] = field(default_factory=dict)
 
     @property
+    def taught(self) -> bool:
+        """Whether it holds an action or a style, to be merged into the weights; else it is one for control."""
+        return self.control == TAUGHT
+
+    @property
     def sees_given(self) -> bool:
         """Whether it has an input for what is given."""
         return f"{GIVEN}.down" in self.tensors
@@ -104,15 +114,25 @@ class Adapter:
             raise MotionloomError(
                 f"no adapter {str(adapter)!r}: there is no such file, and the shipped ones are {names}"
             )
-        about, tensors = _read(path)
-        found = _parse(path, about, tensors)
-        if found.fingerprint != fingerprint(prior.net):
+        found = read_adapter(path)
+        found.check_prior(prior, path.name)
+        layers = linears(prior.net, taught=found.taught)
+        check(found.tensors, dict(_shapes(found, prior.net.config, layers)), str(path))
+        return found
+
+    @property
+    def captions(self) -> tuple[str, ...]:
+        """The sentences that it was taught, where it was."""
+        said = self.notes.get("captions", [])
+        return tuple(text for text in said if isinstance(text, str)) if isinstance(said, list) else ()
+
+    def check_prior(self, prior: HasNet, file: str = "") -> None:
+        """Raise `MotionloomError` where it belongs to another prior; ``file``: what the sentence calls it."""
+        if self.fingerprint != origin(prior):
             raise MotionloomError(
-                f"the adapter {path.name} belongs to the weights {found.base!r}, and these are others; "
+                f"the adapter {file or self.name} belongs to the weights {self.base!r}, and these are others; "
                 "use those weights, or train an adapter for these"
             )
-        check(found.tensors, dict(_shapes(found, prior.net.config, linears(prior.net))), str(path))
-        return found
 
     def save(self, path: Path | str) -> Path:
         """Write it as a .safetensors file (float16) and give the path back; the file appears whole or not at all."""
@@ -135,6 +155,16 @@ def adapters() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.safetensors"))}
 
 
+def is_adapter(path: Path) -> bool:
+    """True for a file of `Adapter.save`, damaged or not, by what its head says."""
+    return is_signed(path, KEY)
+
+
+def read_adapter(path: Path) -> Adapter:
+    """What a file holds and says, without a prior to fit it to; raises MotionloomError as `Adapter.load`."""
+    return _parse(path, *_read(path))
+
+
 def fingerprint(net: PriorNet) -> str:
     """A digest of a network's weights as its file holds them (float16)."""
     digest = hashlib.sha256()
@@ -144,13 +174,41 @@ def fingerprint(net: PriorNet) -> str:
     return digest.hexdigest()
 
 
-def linears(net: PriorNet) -> dict[str, nn.Linear]:
-    """The layers of a network that an adapter changes, by name."""
+def origin(prior: HasNet) -> str:
+    """The `fingerprint` of a prior's network as it was before adapters were merged into it."""
+    return getattr(prior, "origin", "") or fingerprint(prior.net)
+
+
+def linears(net: PriorNet, *, taught: bool = False) -> dict[str, nn.Linear]:
+    """The layers of a network that an adapter changes, by name; ``taught``: also those that read the text."""
+    names = (*CHANGED, *READS) if taught else CHANGED
     return {
         name: layer
         for name, layer in net.named_modules()
-        if isinstance(layer, nn.Linear) and name.rsplit(".", 1)[-1] in CHANGED
+        if isinstance(layer, nn.Linear) and name.rsplit(".", 1)[-1] in names
     }
+
+
+def merged(net: PriorNet, adapters: Sequence[tuple[Adapter, float]]) -> PriorNet:
+    """A copy of the network with W + sum of factor * U D for the weights W; as quick as the network itself.
+
+    Raises `MotionloomError` for an adapter for control, which is no change of weights alone, and for a factor that is
+    not finite.
+    """
+    made = copy.deepcopy(net).eval().requires_grad_(False)
+    layers = linears(made, taught=True)
+    for adapter, factor in adapters:
+        if not adapter.taught:
+            raise MotionloomError(
+                f"the adapter {adapter.name!r} is one for control ({adapter.control}); only adapters made by "
+                "'motionloom teach' change what is drawn by words"
+            )
+        if not math.isfinite(factor):
+            raise MotionloomError(f"the adapter {adapter.name!r} has the factor {factor}; give a number such as 0.8")
+        for name, layer in layers.items():
+            down, up = (adapter.tensors[f"{name}.{part}"].to(layer.weight) for part in ("down", "up"))
+            layer.weight += factor * (up @ down)
+    return made
 
 
 class AdaptedNet(nn.Module):
@@ -189,7 +247,7 @@ def show(net: nn.Module, bound: Bound, given: Tensor, mask: Tensor) -> Bound | C
 def adapted(net: PriorNet, adapter: Adapter) -> AdaptedNet:
     """A copy of the network with the adapter merged into its weights: as quick as the network itself."""
     made = copy.deepcopy(net).eval().requires_grad_(False)
-    for name, layer in linears(made).items():
+    for name, layer in linears(made, taught=adapter.taught).items():
         down, up = (adapter.tensors[f"{name}.{part}"].to(layer.weight) for part in ("down", "up"))
         layer.weight = nn.Parameter(layer.weight + up @ down, requires_grad=False)
     if adapter.sees_given:
@@ -241,10 +299,12 @@ class AdapterNet(nn.Module):
     Its parameters and its state are the adapter's tensors alone; the frozen network is not a part of it.
     """
 
-    def __init__(self, net: PriorNet, rank: int, *, given_rank: int, start: Adapter | None = None) -> None:
+    def __init__(
+        self, net: PriorNet, rank: int, *, given_rank: int, start: Adapter | None = None, taught: bool = False
+    ) -> None:
         super().__init__()
         base = copy.deepcopy(net).eval().requires_grad_(False)
-        layers = linears(base)
+        layers = linears(base, taught=taught)
         sizes = {name: (layer.in_features, layer.out_features, rank) for name, layer in layers.items()}
         if given_rank:
             sizes[GIVEN] = (net.config.patch * 2 * net.config.features, net.config.width, given_rank)

@@ -21,7 +21,7 @@ from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.nets.pair import PairConfig, PairNet, Talk
 from motionloom.nets.prior import PriorNet
-from motionloom.weights.adapter import fingerprint
+from motionloom.weights.adapter import origin
 from motionloom.weights.container import check, is_signed, shapes
 
 KEY = "motionloom-pair"
@@ -75,7 +75,7 @@ class PairBlock:
                 f"no two-person block {str(block)!r}: there is no such file, and the shipped ones are {names}"
             )
         found = read_block(path)
-        if found.fingerprint != fingerprint(prior.net):
+        if found.fingerprint != origin(prior):
             raise MotionloomError(
                 f"the two-person block {path.name} belongs to the weights {found.base!r}, and these are others; "
                 "use those weights, or train a block for these"

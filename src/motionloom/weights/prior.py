@@ -1,12 +1,13 @@
 """`Prior`: everything one weight file holds, and the file itself.
 
 One safetensors file: tensors ``net.*`` (float16 or float32), ``mean``, ``std``, optionally ``text.*`` (the embedded
-text encoder), and JSON metadata under ``motionloom``: version, network sizes, schedule, features, text encoder,
-licence, provenance. Nothing in it is ever executed.
+text encoder) and ``known.*`` (a table of training sentences), and JSON metadata under ``motionloom``: version, network
+sizes, schedule, features, text encoder, licence, provenance, known sentences. Nothing in it is ever executed.
 """
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -22,7 +23,9 @@ from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.nets.prior import Condition, NetConfig, PriorNet, condition
 from motionloom.nets.text import MiniLM, TextEncoder
+from motionloom.nets.text.known import Known, pack_known, unpack_known, with_sentences
 from motionloom.nets.text.published import TEXTS, PublishedText
+from motionloom.weights.adapter import Adapter, merged, origin
 from motionloom.weights.container import fill, is_signed
 
 FORMAT = 1
@@ -54,6 +57,10 @@ class Prior:
     text: TextEncoder
     card: Card
     fps: float = 20.0
+    known: Known | None = None
+    """What it has learned, in words; None: its file does not say."""
+    origin: str = ""
+    """The fingerprint of the network that adapters were merged into; empty where none were."""
 
     @staticmethod
     def load(weights: str | Path = "default", *, device: str | torch.device = "cpu") -> "Prior":
@@ -67,6 +74,20 @@ class Prior:
     def to(self, device: str | torch.device) -> "Prior":
         """The same prior with its network and statistics on another device."""
         return replace(self, net=self.net.to(device), mean=self.mean.to(device), std=self.std.to(device))
+
+    def with_adapters(self, adapters: Sequence[tuple[Adapter, float]]) -> "Prior":
+        """The same prior with adapters of `motionloom teach` merged into its weights, each times its factor.
+
+        Several add up, in whatever order they are merged. Adapters for control still belong to the result, as does a
+        two-person block. Raises `MotionloomError` for adapters of another kind or prior and for factors out of range.
+        """
+        if not adapters:
+            return self
+        for adapter, _ in adapters:
+            adapter.check_prior(self)
+        said = [text for adapter, factor in adapters if factor > 0 for text in adapter.captions]
+        known = with_sentences(self.known, said, self.text) if self.known is not None and said else self.known
+        return replace(self, net=merged(self.net, adapters), origin=origin(self), known=known)
 
     def condition(self, prompts: list[str], lengths: list[int] | None = None) -> Condition:
         """Encode prompts, one row each; an empty prompt asks for nothing in particular."""
@@ -129,6 +150,9 @@ def save_prior(prior: Prior, path: Path | str, *, half: bool = True) -> Path:
         "fps": prior.fps,
         "card": asdict(prior.card),
     }
+    if prior.known is not None:
+        table, about["known"] = pack_known(prior.known)
+        tensors |= table
     with atomic_path(path) as temp:
         save_file(tensors, temp, metadata={"motionloom": json.dumps(about)})
     return path
@@ -165,6 +189,7 @@ def load_prior(path: Path, device: str | torch.device = "cpu") -> Prior:
     prior = Prior(
         net.eval().requires_grad_(False), schedule, tensors["mean"].float(), tensors["std"].float(),
         _text(path, about["text"], tensors), Card(**about["card"]), float(about["fps"]),
+        _known(path, about.get("known"), tensors, config.text),
     )  # fmt: skip
     if prior.text.width != config.text:
         raise MotionloomError(
@@ -208,3 +233,12 @@ def _text(path: Path, name: str, tensors: dict[str, Tensor]) -> TextEncoder:
     if name in TEXTS:
         return PublishedText(name)
     raise MotionloomError(f"{path} wants the text encoder {name!r}, which this motionloom does not have")
+
+
+def _known(path: Path, about: Any, tensors: dict[str, Tensor], width: int) -> Known | None:
+    if about is None:  # files of before there were tables
+        return None
+    try:
+        return unpack_known(tensors, about, width=width)
+    except ValueError as error:
+        raise MotionloomError(f"{path} is damaged: {error}; fetch the weights again") from None

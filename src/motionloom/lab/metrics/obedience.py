@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from motionloom.errors import MotionloomError
-from motionloom.lab.metrics.actions import Measures
+from motionloom.kinematics.physics import Array
+from motionloom.lab.metrics.actions import Measures, measure
 
 _INFINITY = float("inf")
 
@@ -55,6 +56,10 @@ class Check:
     """Pattern of captions that say too much or too little to count as a pure example."""
     related: str = r"(?!)"
     """Pattern of captions of clips that may rightly pass as well; they count neither for nor against."""
+
+    def measured(self, positions: Array, fps: float) -> Measures:
+        """All numbers of one motion, (frames, 22, 3) metres, at ``fps`` frames per second."""
+        return measure(positions, fps)
 
     def obeyed(self, measures: Measures) -> bool:
         """True where every bound holds."""

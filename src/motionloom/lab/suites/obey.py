@@ -15,11 +15,15 @@ from typing import Any, Protocol
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path, check_place
 from motionloom.kinematics.physics import Array
-from motionloom.lab.metrics.actions import measure
+from motionloom.lab.metrics.everyday.check import Everyday
 from motionloom.lab.metrics.obedience import CHECKS, Check
 
 ENOUGH = 0.9
 """Share of seeds that must obey for a prompt to count as obeyed."""
+MOSTLY = 0.7
+"""Share of seeds that must obey for a prompt to count as mostly obeyed."""
+Judge = Check | Everyday
+"""What has a prompt and limits, of either set."""
 
 
 class Generate(Protocol):
@@ -53,7 +57,7 @@ class Result:
         return tuple(a for a in self.attempts if a.prompt == prompt)
 
 
-def attempts(check: Check, generate: Generate, prompt: str, *, seeds: int, first_seed: int) -> list[Attempt]:
+def attempts(check: Judge, generate: Generate, prompt: str, *, seeds: int, first_seed: int) -> list[Attempt]:
     """Generate one prompt on seeds ``first_seed`` to ``first_seed + seeds - 1`` and judge it."""
     motions, fps = generate([prompt] * seeds, seconds=check.seconds, seed=first_seed)
     if len(motions) != seeds:
@@ -62,7 +66,7 @@ def attempts(check: Check, generate: Generate, prompt: str, *, seeds: int, first
         )
     found = []
     for row, positions in enumerate(motions):
-        numbers = measure(positions, fps)
+        numbers = check.measured(positions, fps)
         kept = {bound.measure: numbers[bound.measure] for bound in check.bounds}
         found.append(Attempt(prompt, first_seed + row, check.obeyed(numbers), kept))
     return found
@@ -70,7 +74,7 @@ def attempts(check: Check, generate: Generate, prompt: str, *, seeds: int, first
 
 def run(
     generate: Generate,
-    checks: Sequence[Check] = CHECKS,
+    checks: Sequence[Judge] = CHECKS,
     *,
     seeds: int = 10,
     first_seed: int = 0,
@@ -96,13 +100,13 @@ def run(
     return _results(checks, done)
 
 
-def fingerprint(checks: Sequence[Check]) -> str:
+def fingerprint(checks: Sequence[Judge]) -> str:
     """Changes whenever a prompt or a bound changes: results of other checks are not mixed in."""
     said = repr([(c.name, c.seconds, [(b.measure, b.low, b.high) for b in c.bounds]) for c in checks])
     return hashlib.sha256(said.encode()).hexdigest()[:16]
 
 
-def _results(checks: Sequence[Check], done: dict[str, list[Attempt]]) -> list[Result]:
+def _results(checks: Sequence[Judge], done: dict[str, list[Attempt]]) -> list[Result]:
     return [Result(check.name, tuple(done[check.name])) for check in checks if check.name in done]
 
 
@@ -125,7 +129,7 @@ def _attempt(found: dict[str, Any]) -> Attempt:
     return Attempt(str(found["prompt"]), int(found["seed"]), bool(found["obeyed"]), measured)
 
 
-def summary(results: Sequence[Result], checks: Sequence[Check] = CHECKS, *, settings: dict[str, Any]) -> dict[str, Any]:
+def summary(results: Sequence[Result], checks: Sequence[Judge] = CHECKS, *, settings: dict[str, Any]) -> dict[str, Any]:
     """Everything as plain data for JSON."""
     by_name = {check.name: check for check in checks}
     listed = []
@@ -147,15 +151,16 @@ def summary(results: Sequence[Result], checks: Sequence[Check] = CHECKS, *, sett
     return {"settings": settings, "totals": totals(results, checks), "checks": listed}
 
 
-def totals(results: Sequence[Result], checks: Sequence[Check] = CHECKS) -> dict[str, float]:
-    """Share of seeds that obey, prompts obeyed, and the share for the other wordings."""
+def totals(results: Sequence[Result], checks: Sequence[Judge] = CHECKS) -> dict[str, float]:
+    """Share of seeds that obey, prompts obeyed and mostly obeyed, and the share for the other wordings."""
     prompts = {check.name: check.prompt for check in checks}
     own = [r.of(prompts[r.name]) for r in results]
     tried = [a for row in own for a in row]
     other = [a for r in results for a in r.attempts if a.prompt != prompts[r.name]]
     found = {
         "prompts": len(own),
-        "prompts_obeyed": sum(sum(a.obeyed for a in row) >= ENOUGH * len(row) for row in own if row),
+        "prompts_obeyed": _enough(own, ENOUGH),
+        "prompts_mostly_obeyed": _enough(own, MOSTLY),
         "seeds_obeyed_share": round(sum(a.obeyed for a in tried) / max(1, len(tried)), 4),
     }
     if other:
@@ -163,12 +168,18 @@ def totals(results: Sequence[Result], checks: Sequence[Check] = CHECKS) -> dict[
     return found
 
 
+def _enough(rows: Sequence[Sequence[Attempt]], share: float) -> int:
+    return sum(sum(a.obeyed for a in row) >= share * len(row) for row in rows if row)
+
+
 def table(
-    results: Sequence[Result], checks: Sequence[Check] = CHECKS, *, real: dict[str, Any] | None = None
+    results: Sequence[Result], checks: Sequence[Judge] = CHECKS, *, real: dict[str, Any] | None = None
 ) -> list[list[str]]:
-    """Rows of text, the heading first: prompt, seeds, other wordings, real clips, the bounds with the median seen."""
+    """Rows of text, the heading first: prompt, seeds, other wordings, real clips, seconds, the bounds with the median
+    seen. Without ``real``, columns that are empty in every row are left out."""
     by_name = {check.name: check for check in checks}
-    rows = [["prompt", "seeds", "reworded", "real held-out", "real all", "median seen, of what is wanted"]]
+    heading = ["prompt", "seeds", "reworded", "real held-out", "real all", "seconds", "median seen, of what is wanted"]
+    rows = [heading]
     for result in results:
         check = by_name[result.name]
         own = result.of(check.prompt)
@@ -184,10 +195,12 @@ def table(
                 f"{sum(a.obeyed for a in other)}/{len(other)}" if other else "",
                 known.get("held_out", ""),
                 known.get("all", ""),
+                f"{check.seconds:g}",
                 seen,
             ]
         )
-    return rows
+    kept = [k for k in range(len(heading)) if real or any(row[k] for row in rows[1:])]
+    return [[row[k] for k in kept] for row in rows]
 
 
 def _median(values: Sequence[float]) -> float:

@@ -1,0 +1,31 @@
+"""What was taught from clips, as it is asked for: files of adapters, each with a factor."""
+
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from motionloom.errors import MotionloomError
+
+MOST_FACTOR = 4.0
+MOST_ADAPTERS = 16
+"""Adapters that are merged at once."""
+
+Applied: TypeAlias = tuple[Any, float]
+"""An adapter (`motionloom.weights.adapter.Adapter`) or its file (`Path`), and its factor."""
+
+
+def parse_adapter(word: str) -> tuple[Path, float]:
+    """``FILE`` or ``FILE:FACTOR``, such as ``zombie.safetensors:0.8``. Raises `MotionloomError` for other words."""
+    name, _, tail = word.rpartition(":")
+    try:
+        factor = float(tail)
+    except ValueError:
+        factor = 1.0
+        name = word
+    if ":" not in word:
+        name, factor = word, 1.0
+    if not name.strip() or not abs(factor) <= MOST_FACTOR:
+        raise MotionloomError(
+            f"the adapter {word!r} cannot be used; write FILE or FILE:FACTOR with a factor from -{MOST_FACTOR:g} to "
+            f"{MOST_FACTOR:g}, such as zombie.safetensors:0.8"
+        )
+    return Path(name), factor

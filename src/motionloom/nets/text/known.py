@@ -1,0 +1,164 @@
+"""What a prior has learned, in words: a table of training sentences with their text vectors, and seconds per action.
+
+The table answers one question: is anything that was learned near to a prompt? Sentences are compared without their
+subject ("a person", "someone is"), because the subject is most of a short sentence and says nothing of the action.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from motionloom.errors import MotionloomError
+from motionloom.nets.text.protocol import TextEncoder
+from motionloom.nets.text.quantise import dequantise, quantise
+
+NEAR = 0.6
+"""Cosine of two vectors from which on a sentence counts as near to another (figures: docs/words.md)."""
+MOST_SENTENCES = 1500
+MAX_SENTENCES, MAX_CHARACTERS, MAX_ACTIONS = 8192, 1000, 8192
+"""What is read from a file at most."""
+
+_SUBJECT = re.compile(
+    r"^\W*(?:(?:(?:a|an|the|this|one|another|some)\s+)?"
+    r"(?:(?:young|old|tall|small|little|single)\s+)?"
+    r"(?:person|persons|man|woman|human|figure|guy|boy|girl|individual|character|stick figure|somebody|someone"
+    r"|he|she|they|it|people|men|women|you|i)\s+)"
+    r"(?:(?:is|are|was|were|am|appears to be|seems to be)\s+)?",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Training sentences, what they mean to the text encoder, and how long each action was seen."""
+
+    sentences: tuple[str, ...]
+    """As training had them, without subject."""
+    vectors: Tensor
+    """(sentences, width) of unit length, float32."""
+    seconds: Mapping[str, float]
+    """Seconds of training motion per action."""
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """A prompt's nearest known sentences, the nearest first."""
+
+    prompt: str
+    sentences: tuple[str, ...]
+    similarity: float
+    """Cosine of the first of them."""
+
+    @property
+    def near(self) -> bool:
+        """Whether anything like the prompt was learned."""
+        return self.similarity >= NEAR
+
+    def remark(self) -> str:
+        """One line for somebody whose prompt is not near to anything."""
+        said = ", ".join(f"'{sentence}'" for sentence in self.sentences)
+        return f"these weights have seen nothing like '{_short(bare(self.prompt))}'; nearest: {said}"
+
+
+def bare(sentence: str) -> str:
+    """A sentence in lower case without its subject: "A person is walking." becomes "walking"."""
+    plain = " ".join(sentence.lower().split()).strip(" .!?")
+    return _SUBJECT.sub("", plain) or plain
+
+
+def known_sentences(
+    sentences: Sequence[str],
+    seconds: Mapping[str, float],
+    encoder: TextEncoder,
+    *,
+    first: Sequence[str] = (),
+    most: int = MOST_SENTENCES,
+) -> Known:
+    """A table of at most ``most`` of the training sentences, chosen so that every other one is near to a chosen one.
+
+    sentences: of training, with or without subjects. seconds: of motion per action. first: sentences that are in the
+    table in any case, such as one per action. Then come, one after the other, those that are furthest from all chosen
+    ones (farthest-first traversal, Gonzalez 1985). Raises `MotionloomError` where there is no sentence.
+    """
+    sure = list(dict.fromkeys(bare(sentence)[:MAX_CHARACTERS] for sentence in first if sentence.strip()))[:most]
+    plain = list(dict.fromkeys([*sure, *(bare(s)[:MAX_CHARACTERS] for s in sentences if s.strip())]))
+    if not plain:
+        raise MotionloomError("there is no training sentence; a table of what is known needs at least one")
+    vectors = torch.cat([encoder.encode(plain[i : i + 256]).pooled.float().cpu() for i in range(0, len(plain), 256)])
+    vectors = torch.nn.functional.normalize(vectors, dim=1)
+    chosen = sorted(_farthest_first(vectors, max(len(sure), 1), most))
+    return Known(tuple(plain[i] for i in chosen), vectors[chosen], dict(seconds))
+
+
+def nearest(known: Known, prompts: Sequence[str], encoder: TextEncoder, *, count: int = 3) -> list[Nearest]:
+    """For each prompt its ``count`` nearest known sentences. Raises `MotionloomError` as the encoder does."""
+    if not prompts:
+        return []
+    asked = torch.nn.functional.normalize(encoder.encode([bare(p) for p in prompts]).pooled.float().cpu(), dim=1)
+    similar, places = (asked @ known.vectors.T).topk(min(count, len(known.sentences)), dim=1)
+    return [
+        Nearest(prompt, tuple(known.sentences[i] for i in row), float(values[0]))
+        for prompt, row, values in zip(prompts, places.tolist(), similar, strict=True)
+    ]
+
+
+def with_sentences(known: Known, sentences: Sequence[str], encoder: TextEncoder) -> Known:
+    """The table with some more sentences, such as those of an adapter."""
+    more = known_sentences(sentences, {}, encoder)
+    return Known((*known.sentences, *more.sentences), torch.cat([known.vectors, more.vectors]), known.seconds)
+
+
+def _farthest_first(vectors: Tensor, sure: int, most: int) -> list[int]:
+    """Places of at most ``most`` vectors, the first ``sure`` of them in any case."""
+    chosen = list(range(sure))
+    distance = 1 - (vectors @ vectors[:sure].T).amax(dim=1)
+    while len(chosen) < min(most, len(vectors)):
+        place = int(distance.argmax())
+        if distance[place] < 1e-6:  # the rest means the same
+            break
+        chosen.append(place)
+        distance = torch.minimum(distance, 1 - vectors @ vectors[place])
+    return chosen
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+# In a weight file: int8 vectors with a scale each, and plain data
+
+
+def pack_known(known: Known) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """Tensors ``known.vectors`` (int8) and ``known.scale`` (float16), and what goes into the file's description."""
+    values, scale = quantise(known.vectors)
+    seconds = {action: round(float(count), 1) for action, count in known.seconds.items()}
+    return {"known.vectors": values, "known.scale": scale}, {"sentences": list(known.sentences), "seconds": seconds}
+
+
+def unpack_known(tensors: Mapping[str, Tensor], about: Any, *, width: int) -> Known:
+    """The inverse of `pack_known`. Raises ValueError for what is damaged, too large or of another text encoder."""
+    if not isinstance(about, dict) or not isinstance(about.get("sentences"), list):
+        raise ValueError("its table of known sentences has no sentences")
+    sentences, seconds = about["sentences"], about.get("seconds", {})
+    if not 0 < len(sentences) <= MAX_SENTENCES or not all(
+        isinstance(text, str) and len(text) <= MAX_CHARACTERS for text in sentences
+    ):
+        raise ValueError(f"its table of known sentences holds something else, or more than {MAX_SENTENCES}")
+    if (
+        not isinstance(seconds, dict)
+        or len(seconds) > MAX_ACTIONS
+        or not all(isinstance(count, int | float) and 0 <= count < 1e9 for count in seconds.values())
+        or not all(len(action) <= MAX_CHARACTERS for action in seconds)
+    ):
+        raise ValueError("its table of known actions does not hold seconds")
+    values, scale = tensors.get("known.vectors"), tensors.get("known.scale")
+    if values is None or scale is None or values.dtype != torch.int8 or scale.dtype != torch.float16:
+        raise ValueError("its table of known sentences lacks its vectors")
+    if values.shape != (len(sentences), width) or scale.shape != (len(sentences),) or not bool(scale.isfinite().all()):
+        raise ValueError(f"its table of known sentences has vectors of shape {tuple(values.shape)}")
+    vectors = torch.nn.functional.normalize(dequantise(values, scale), dim=1)
+    return Known(tuple(sentences), vectors, {str(action): float(count) for action, count in seconds.items()})

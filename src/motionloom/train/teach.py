@@ -1,0 +1,256 @@
+"""Teaching a prior an action or a style from a few clips: a low-rank adapter, and what was known stays.
+
+A step sees two kinds of rows. Some show a clip, with its caption, and cost what a clip costs in training a prior. The
+others show what the prior itself draws for sentences it knows, some of them without their sentence, and cost what the
+changed network's guess differs from the unchanged one's (learning without forgetting, Li & Hoiem 2016; prior
+preservation, Ruiz et al. 2023). Since nothing is taught without words, guidance strengthens what was taught.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from motionloom.data.examples import Example
+from motionloom.data.words import LABELS, imperative
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import FPS, LAYOUT, WIDTH
+from motionloom.nets.prior import Condition
+from motionloom.nets.text.known import bare
+from motionloom.tasks.text import sample_features
+from motionloom.train.loop import Average, World, train
+from motionloom.train.objectives import WEIGHTS, Conditioned, WordBank, displacement_error, masked_error
+from motionloom.train.recipe import Recipe
+from motionloom.weights.adapter import TAUGHT, Adapter, AdapterNet, origin, tensors_of
+from motionloom.weights.prior import Prior
+
+RANK = 16
+STEPS, BATCH = 700, 16
+RATE = 1e-3
+WINDOWS, SHARES = (60, 100, 160, 196), (0.2, 0.4, 0.25, 0.15)
+"""Frames of the windows that a step sees, and how often."""
+DRAWS, DRAWN_FRAMES, DRAWN_STEPS = 96, 100, 12
+"""Motions that the prior draws of what it knows, their frames and the steps each takes."""
+KEEP = 0.5
+"""Share of the rows that show what the prior drew."""
+KEEP_WEIGHT = 2.0
+"""How much their error counts."""
+SILENT = 0.25
+"""Share of those without their sentence."""
+SAME = 0.9
+"""Cosine of vectors from which on a known sentence says what is taught, and is not kept as it was."""
+LIKE = 16
+"""Known sentences that are likest to what is taught: they are kept in any case."""
+DISPLACEMENT = 0.5
+"""Weight of `displacement_error`, which keeps planted feet in their places."""
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """How something is taught."""
+
+    name: str = "adapter"
+    licence: str = ""
+    """What one may do with the adapter; empty: what the owner of the clips and that of the prior allow."""
+    steps: int = STEPS
+    batch: int = BATCH
+    rank: int = RANK
+    rate: float = RATE
+    keep: float = KEEP
+    """Share of the rows, 0 to 0.9, on what the prior knows already."""
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        limits = (("steps", 1, 100_000), ("batch", 2, 1024), ("rank", 1, 128), ("rate", 1e-6, 0.1), ("keep", 0, 0.9))
+        for key, low, high in limits:
+            if not low <= getattr(self, key) <= high:
+                raise MotionloomError(f"{key} must be {low:g} to {high:g}; got {getattr(self, key)!r}")
+
+
+def teach(
+    prior: Prior, examples: Sequence[Example], lesson: Lesson | None = None, *, say: Say = lambda line: None
+) -> Adapter:
+    """An adapter that makes ``prior`` show what the examples show where their captions are asked for.
+
+    The same seed teaches the same on the same machine with as many threads. Raises `MotionloomError` where there is
+    nothing to learn from, and for a prior that does not draw 263 numbers a frame at 20 per second.
+    """
+    lesson = lesson or Lesson()
+    if len(prior.mean) != WIDTH or prior.fps != FPS:
+        raise MotionloomError(
+            f"these weights make {len(prior.mean)} numbers a frame at {prior.fps:g} fps; those of {WIDTH} at {FPS:g} "
+            "fps can be taught"
+        )
+    if not examples:
+        raise MotionloomError("there is no clip; give at least one to learn from")
+    captions = list(dict.fromkeys(text for example in examples for text in example.captions))
+    kept = known_prompts(prior, captions, lesson.seed)
+    say(f"drawing {len(kept)} motions that are known already")
+    drawn = sample_features(
+        prior, kept, [DRAWN_FRAMES] * len(kept), seeds=[lesson.seed + i for i in range(len(kept))], steps=DRAWN_STEPS
+    )  # fmt: skip
+    torch.manual_seed(lesson.seed)
+    net = AdapterNet(prior.net, lesson.rank, given_rank=0, taught=True)
+    objective = Teaching(net, prior, examples, list(zip(kept, drawn, strict=True)), keep=lesson.keep)
+    recipe = Recipe(
+        name=lesson.name, steps=lesson.steps, batch=lesson.batch, rate=lesson.rate, seed=lesson.seed, warmup=40,
+        cooldown=0.5, ema=0.99, decay=0.0, save_every=lesson.steps,
+    )  # fmt: skip
+    with TemporaryDirectory(prefix="motionloom-teach-") as folder:
+        world = World(device=str(prior.mean.device))
+        average = train(objective, recipe, folder, world=world, wrap=_wrap, on_step=_progress(lesson, say))
+    return _adapter(prior, examples, captions, lesson, average)
+
+
+def known_prompts(prior: Prior, captions: Sequence[str], seed: int) -> list[str]:
+    """`DRAWS` sentences that the prior knows and that do not say what ``captions`` say.
+
+    Those that are likest to the captions come first: from them the new action must be told apart. The sentences are
+    those of the prior's file, or of measured labels where it has none.
+    """
+    rng = np.random.default_rng((seed, 17))
+    pool = list(prior.known.sentences) if prior.known else [phrase for said in LABELS.values() for phrase in said]
+    vectors = prior.text.encode([bare(text) for text in pool]).pooled if not prior.known else prior.known.vectors
+    asked = prior.text.encode([bare(text) for text in captions]).pooled.to(vectors)
+    like = (torch.nn.functional.normalize(vectors, dim=1) @ torch.nn.functional.normalize(asked, dim=1).T).amax(1)
+    order = [int(i) for i in like.argsort(descending=True, stable=True) if like[i] < SAME]
+    if not order:
+        raise MotionloomError("these weights know no other sentences than the captions; describe the clips otherwise")
+    rest = rng.permutation(order[LIKE:])
+    chosen = [*order[:LIKE], *rest.tolist()]
+    chosen = [chosen[i % len(chosen)] for i in range(DRAWS)]
+    return [f"a person {pool[i]}" for i in chosen]
+
+
+def wordings(caption: str) -> tuple[str, ...]:
+    """A caption in a few other words that mean the same: another subject, a command."""
+    action = bare(caption)
+    if action == " ".join(caption.lower().split()).strip(" .!?"):  # its subject, if any, is part of what is taught
+        return (caption,)
+    return (caption, caption, f"a person {action}", f"someone {action}", f"a man {action}", action, imperative(action))
+
+
+class Teaching:
+    """What a step of teaching minimises; see the module. What a step sees follows from (seed, step)."""
+
+    def __init__(
+        self,
+        net: AdapterNet,
+        prior: Prior,
+        examples: Sequence[Example],
+        drawn: Sequence[tuple[str, Tensor]],
+        *,
+        keep: float,
+    ) -> None:
+        self.net, self.schedule, self.base = net, prior.schedule, prior.net
+        self.keep, self.device = keep, prior.mean.device
+        self.mean, self.std = prior.mean, prior.std
+        spread = torch.where(prior.std > 0, prior.std, 1.0)
+        self.examples = examples
+        self.shown = [(torch.from_numpy(e.features).to(prior.mean) - prior.mean) / spread for e in examples]
+        self.drawn = torch.stack([(f.to(prior.mean) - prior.mean) / spread for _, f in drawn])
+        texts = dict.fromkeys(text for e in examples for caption in e.captions for text in wordings(caption))
+        texts |= dict.fromkeys(prompt for prompt, _ in drawn)
+        self.numbers = {text: number for number, text in enumerate(texts)}
+        self.prompts = [self.numbers[prompt] for prompt, _ in drawn]
+        self.words = WordBank(prior.text, tuple(texts), progress=lambda line: None)
+        scale = torch.ones(len(prior.mean))
+        for name, block in LAYOUT.items():
+            scale[block] = WEIGHTS[name]
+        self.scale = (scale / scale.mean()).to(self.device)
+
+    def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
+        """See `motionloom.train.objectives.Objective`."""
+        rng = np.random.default_rng((seed, step))
+        window = int(rng.choice(WINDOWS, p=SHARES))
+        kept = min(round(self.keep * rows), rows - 1)
+        clean, texts, lengths = self._rows(rng, window, rows, kept)
+        generator = torch.Generator().manual_seed(int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0]))
+        even = torch.rand(rows, generator=generator, dtype=torch.float64)
+        level = (self.schedule.steps * (1 - even**2)).ceil().long().clamp(1, self.schedule.steps)  # as samplers go
+        noise = torch.randn(clean.shape, generator=generator).to(clean)
+        speaks = torch.ones(rows, dtype=torch.bool)
+        speaks[rows - kept :] = torch.rand(kept, generator=generator) >= SILENT
+        cond = self.words.condition(torch.tensor(texts), torch.tensor(lengths)).choose(speaks)
+        cond = Condition(*(part.to(self.device) for part in cond))
+        level, noised = level.to(self.device), self.schedule.noised(clean, level.to(self.device), noise)
+        guess, before = net(noised, level, cond), clean[rows - kept :]
+        if kept:
+            with torch.no_grad():
+                old = Condition(*(part[rows - kept :] for part in cond))
+                before = self.base(noised[rows - kept :], level[rows - kept :], self.base.bind(old))
+        return self._error(guess, clean, before, cond.lengths, rows - kept)
+
+    def _rows(self, rng: np.random.Generator, window: int, rows: int, kept: int) -> tuple[Tensor, list[int], list[int]]:
+        """Windows (rows, window, 263), first those of examples, then what the prior drew; their texts and lengths."""
+        clean = torch.zeros(rows, window, self.drawn.shape[2], device=self.device)
+        texts, lengths = [], []
+        for row in range(rows - kept):
+            number = int(rng.integers(len(self.examples)))
+            first = _first(self.examples[number], window, rng)
+            part = self.shown[number][first : first + window]
+            clean[row, : len(part)] = part
+            said = wordings(str(rng.choice(self.examples[number].captions)))
+            texts.append(self.numbers[said[int(rng.integers(len(said)))]])
+            lengths.append(len(part))
+        for row in range(rows - kept, rows):
+            number = int(rng.integers(len(self.drawn)))
+            length = min(window, self.drawn.shape[1])
+            clean[row, :length] = self.drawn[number, :length]
+            texts.append(self.prompts[number])
+            lengths.append(length)
+        return clean, texts, lengths
+
+    def _error(self, guess: Tensor, clean: Tensor, before: Tensor, lengths: Tensor, own: int) -> Tensor:
+        error = masked_error(guess[:own], clean[:own], lengths[:own], self.scale)
+        error = error + DISPLACEMENT * displacement_error(guess[:own], clean[:own], lengths[:own], self.mean, self.std)
+        if own == len(guess):
+            return error
+        changed = masked_error(guess[own:], before.float(), lengths[own:], self.scale)
+        return error + KEEP_WEIGHT * changed
+
+
+def _first(example: Example, window: int, rng: np.random.Generator) -> int:
+    """Where a window begins: anywhere in a loop or a long clip, else so that it shows all of what was recorded."""
+    begin, end = example.shown
+    frames = len(example.features)
+    if end - begin >= window or example.looped:
+        return int(rng.integers(begin, max(end - window, begin) + 1))
+    low, high = max(0, end - window), min(begin, frames - window)
+    return int(rng.integers(low, max(low, high) + 1)) if frames > window else 0
+
+
+def _wrap(net: nn.Module) -> nn.Module:
+    assert isinstance(net, AdapterNet)
+    return Conditioned(net)
+
+
+def _progress(lesson: Lesson, say: Say) -> Callable[[int, float, float], None]:
+    losses: list[float] = []
+
+    def on_step(step: int, loss: float, seconds: float) -> None:
+        losses.append(loss)
+        if (step + 1) % 50 == 0 or step + 1 == lesson.steps:
+            say(f"step {step + 1} of {lesson.steps}  loss {np.mean(losses[-50:]):.4f}  {seconds:.2f} s a step")
+
+    return on_step
+
+
+def _adapter(
+    prior: Prior, examples: Sequence[Example], captions: list[str], lesson: Lesson, average: Average
+) -> Adapter:
+    recorded = [e for e in examples if not e.name.startswith("M")]
+    seconds = sum(e.shown[1] - e.shown[0] for e in recorded if not e.looped) / FPS
+    notes = {
+        "captions": captions[:64], "clips": len(recorded), "seconds": round(seconds, 1), "steps": lesson.steps,
+        "batch": lesson.batch, "rate": lesson.rate, "keep": lesson.keep, "seed": lesson.seed,
+    }  # fmt: skip
+    licence = lesson.licence or f"as the owner of the clips allows, and as the prior's: {prior.card.licence}"
+    data = f"{len(recorded)} clips of the user's own: {'; '.join(captions)[:500]}"
+    tensors = tensors_of({key: value.cpu() for key, value in average.weights.items()})
+    return Adapter(lesson.name, TAUGHT, lesson.rank, tensors, prior.card.name, origin(prior), licence, data, notes)

@@ -1,0 +1,197 @@
+"""teach and --adapter, as a stranger types them, on a tiny prior with random weights."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from motionloom import io
+from motionloom.cli import main
+from motionloom.features import humanml
+from motionloom.kinematics.ik import motion_from_positions
+from motionloom.nets.text.known import known_sentences
+from motionloom.train import teach as module
+from motionloom.weights.adapter import Adapter
+from motionloom.weights.prior import Prior, save_prior
+from tests.cli.said import complaint
+from tests.kinematics import people
+from tests.nets import tiny
+from tests.tasks.test_edit import person
+
+
+@pytest.fixture(scope="module")
+def knowing(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The file of a tiny prior around a walking person that says what it knows."""
+    features = humanml.motion_to_features(person(2.0))
+    std = np.full(263, 0.02, np.float32)
+    made = replace(tiny.prior(), mean=torch.from_numpy(features.mean(0)), std=torch.from_numpy(std))
+    known = known_sentences(["a person walks", "a person turns left"], {"walk": 90.0, "turn left": 4.0}, made.text)
+    return str(save_prior(replace(made, known=known), tmp_path_factory.mktemp("weights") / "tiny.safetensors"))
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Each test runs in a folder of its own that holds two clips; little is drawn of what is known."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(module, "DRAWS", 2)
+    monkeypatch.setattr(module, "DRAWN_STEPS", 1)
+    clips = tmp_path / "clips"
+    clips.mkdir()
+    for name, speed in (("one", 1.0), ("two", 1.3)):
+        io.save(motion_from_positions(people.walking(speed, 2.0), people.FPS), clips / f"{name}.bvh")
+    return tmp_path
+
+
+def teach(weights: str, *words: str) -> int:
+    return main(["teach", *words, "--weights", weights, "--steps", "2", "--rank", "2"])
+
+
+@pytest.fixture(scope="module")
+def zombie(knowing: str, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """An adapter whose every number matters."""
+    from tests.tasks.test_adapting import adapter
+
+    return str(adapter(Prior.load(knowing)).save(tmp_path_factory.mktemp("adapters") / "zombie.safetensors"))
+
+
+def test_clips_become_an_adapter_with_a_card(knowing: str, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("a person turns", "clips/one.bvh", "clips/two.bvh")
+    assert teach(knowing, *words, "--out", "z.safetensors", "--licence", "mine", "--json") == 0
+    about = json.loads(capsys.readouterr().out)
+    assert about["captions"] == ["a person turns"]
+    assert about["clips"] == ["clips/one.bvh", "clips/two.bvh"]
+    adapter = Adapter.load("z.safetensors", Prior.load(knowing))
+    assert (adapter.name, adapter.licence, adapter.notes["clips"]) == ("z", "mine", 2)
+    assert main(["weights", "z.safetensors"]) == 0
+    assert "taught adapter" in capsys.readouterr().out
+
+
+def test_check_says_what_is_wrong_and_writes_nothing(knowing: str, capsys: pytest.CaptureFixture[str]) -> None:
+    io.save(motion_from_positions(people.standing(2.0), people.FPS), "clips/still.bvh")
+    before = sorted(Path().rglob("*"))
+    assert teach(knowing, "a zombie", "clips", "--check") == 2
+    said = capsys.readouterr().out
+    assert "wrong: nothing moves" in said
+    assert "2 of 3 clips can be learned from" in said
+    assert sorted(Path().rglob("*")) == before
+    assert teach(knowing, "a zombie", "clips/one.bvh", "--check", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["usable"] == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["a zombie"], "no clips behind"),
+        (["a zombie", "none.bvh"], "there is no clip"),
+        (["clips/one.bvh"], "nothing is said of"),
+        (["a zombie", "clips/one.bvh", "--out", "z.pt"], "another suffix"),
+        (["a zombie", "clips/one.bvh", "--keep", "2"], "keep must be"),
+        (["a zombie", "clips/one.bvh", "--unit", "mm"], "unit of length is wrong"),
+    ],
+)
+def test_mistakes_are_one_sentence(
+    knowing: str, capsys: pytest.CaptureFixture[str], words: list[str], reason: str
+) -> None:
+    before = sorted(Path().rglob("*"))
+    assert teach(knowing, *words) == 2
+    assert reason in complaint(capsys)
+    assert sorted(Path().rglob("*")) == before
+
+
+def drawn(*words: str) -> np.ndarray:
+    assert main([*words, "--steps", "2", "--out", "a.npz"]) == 0
+    return io.load("a.npz").positions()
+
+
+def test_every_command_that_draws_takes_adapters(knowing: str, zombie: str) -> None:
+    goal = {"path": {"points": [[0, 0], [0, 1.5]]}}
+    Path("goal.json").write_text(json.dumps(goal))
+    Path("zombie.safetensors").write_bytes(Path(zombie).read_bytes())
+    Path("t.yaml").write_text("segments:\n- {text: a person walks, seconds: 2, adapters: zombie.safetensors:0.5}\n")
+    lines = (
+        ["generate", "a person walks", "--seconds", "2"],
+        ["compose", "a person walks", "a person turns", "--seconds", "2"],
+        ["control", "a person walks", "--goal", "goal.json", "--seconds", "2"],
+        ["edit", "clips/one.bvh", "a person turns", "--between", "0.5", "1.5"],
+    )
+    for line in lines:
+        plain = drawn(*line, "--weights", knowing)
+        changed = drawn(*line, "--weights", knowing, "--adapter", zombie)
+        assert np.abs(plain - changed).max() > 1e-3
+        none = drawn(*line, "--weights", knowing, "--adapter", f"{zombie}:1", "--adapter", f"{zombie}:-1")
+        assert np.abs(plain - none).max() < 1e-2
+    half = drawn("compose", "t.yaml", "--weights", knowing)
+    whole = drawn("compose", "a person walks", "--seconds", "2", "--weights", knowing, "--adapter", f"{zombie}:0.5")
+    assert np.abs(half - whole).max() < 1e-3
+
+
+def test_wrong_adapters_are_one_sentence(knowing: str, weights: str, zombie: str, capsys) -> None:
+    for line, reason in (
+        (["--adapter", "none.safetensors"], "no adapter"),
+        (["--adapter", f"{zombie}:9"], "FILE:FACTOR"),
+        (["--adapter", knowing], "is not an adapter"),
+    ):
+        assert main(["generate", "a person walks", "--weights", knowing, *line]) == 2
+        assert reason in complaint(capsys)
+    Path("t.yaml").write_text("segments:\n- {text: a, adapters: [../zombie.safetensors]}\n")
+    assert main(["compose", "t.yaml", "--weights", knowing]) == 2
+    assert "t.yaml" in complaint(capsys)
+
+
+def test_actions_are_listed_with_their_seconds(knowing: str, weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["weights", knowing, "--actions"]) == 0
+    said = capsys.readouterr().out
+    assert "90.0 s  walk\n" in said
+    assert said.index("walk") < said.index("turn left")
+    assert main(["weights", knowing, "--actions", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["sentences"] == ["walks", "turns left"]
+    assert main(["weights", weights, "--actions"]) == 2
+    assert "do not say what they have learned" in complaint(capsys)
+
+
+def test_what_is_unknown_is_remarked_on(knowing: str, capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
+    """The random encoder finds everything near, so what counts as near is set between two sentences."""
+    from motionloom.nets.text import known
+
+    monkeypatch.setattr(known, "NEAR", 0.9999)
+    line = ["--weights", knowing, "--steps", "1", "--seconds", "1", "--json"]
+    assert main(["generate", "a person walks", *line]) == 0
+    said = capsys.readouterr()
+    assert (said.err, json.loads(said.out)["remarks"]) == ("", [])
+    assert main(["generate", "a person turns right then jumps", "--as-one", *line]) == 0
+    said = capsys.readouterr()
+    assert "have seen nothing like 'turns right then jumps'; nearest: " in said.err
+    assert len(json.loads(said.out)["remarks"]) == 1
+
+
+def test_actions_in_a_row_are_parted_unless_they_are_left_whole(
+    knowing: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = [
+        "generate",
+        "a person walks, then sits down",
+        "--weights",
+        knowing,
+        "--steps",
+        "1",
+        "--out",
+        "a.npz",
+        "--json",
+    ]
+    assert main(line) == 0
+    said = capsys.readouterr()
+    assert "one after the other: 'a person walks' 4.0 s, 'a person sits down' 3.0 s; --as-one" in said.err
+    (made,) = json.loads(said.out)["motions"]
+    assert made["segments"] == [
+        {"begin": 0.0, "end": 4.0, "text": "a person walks"},
+        {"begin": 4.0, "end": 7.0, "text": "a person sits down"},
+    ]
+    assert len(io.load("a.npz")) == 140
+    assert main([*line, "--seconds", "5"]) == 0
+    assert len(io.load("a.npz")) == 100
+    assert main([*line, "--as-one"]) == 0
+    assert len(io.load("a.npz")) == 100
+    assert main([*line, "--solver", "ddim"]) == 2

@@ -1,0 +1,157 @@
+"""Sentences of several actions: what follows each other is parted, what happens at once is not."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from motionloom.goals.sequence import MOST_PARTS, SHORTEST, Part, lengths, natural_seconds, split_actions
+
+SEQUENCES = {
+    "a person walks forward, then sits down": ["a person walks forward", "a person sits down"],
+    "a person walks and then waves": ["a person walks", "a person waves"],
+    "a person jumps. Then he kicks": ["a person jumps", "a person kicks"],
+    "someone waves and afterwards bows": ["someone waves", "someone bows"],
+    "a man runs; after that he lies down": ["a man runs", "a man lies down"],
+    "the woman walks, turns around and sits down": ["the woman walks", "the woman turns around", "the woman sits down"],
+    "a person walks, jumps, and waves": ["a person walks", "a person jumps", "a person waves"],
+    "a person walks to a chair and sits down": ["a person walks to a chair", "a person sits down"],
+    "a person stands up and walks away": ["a person stands up", "a person walks away"],
+    "a person walks forward and stops": ["a person walks forward", "a person stops"],
+    "a person sits down and waves": ["a person sits down", "a person waves"],
+    "a person walks forward and turns around": ["a person walks forward", "a person turns around"],
+    "a person turns left and walks": ["a person turns left", "a person walks"],
+    "a person walks and runs": ["a person walks", "a person runs"],
+    "a person runs forward and jumps": ["a person runs forward", "a person jumps"],
+    "a person walks, sits down": ["a person walks", "a person sits down"],
+    "a person walks before sitting down": ["a person walks", "a person sits down"],
+    "before sitting down, a person walks": ["a person walks", "a person sits down"],
+    "a person sits down after walking in a circle": ["a person walks in a circle", "a person sits down"],
+    "after jumping twice, a man bows": ["a man jumps twice", "a man bows"],
+    "a person waves before he turns around": ["a person waves", "a person turns around"],
+    "walk forward and then sit down": ["walk forward", "sit down"],
+    "walk, turn around and sit down": ["walk", "turn around", "sit down"],
+    "a person walked forward then sat down": ["a person walked forward", "a person sat down"],
+    "a person walked forward and sat down": ["a person walked forward", "a person sat down"],
+    "a tall man slowly walks and then quickly sits": ["a tall man slowly walks", "a tall man quickly sits"],
+    "a zombie walks, then falls down": ["a zombie walks", "a zombie falls down"],
+    "a person waves with both hands and then jumps up and down": [
+        "a person waves with both hands",
+        "a person jumps up and down",
+    ],
+    "a person walks while waving and then sits down": ["a person walks while waving", "a person sits down"],
+    "a person picks up a box, walks forward and puts it down": [
+        "a person picks up a box",
+        "a person walks forward",
+        "a person puts it down",
+    ],
+    "a person walks forward then does a handstand": ["a person walks forward", "a person does a handstand"],
+    "a person walks and waves and then sits down": ["a person walks and waves", "a person sits down"],
+    "someone crouches down and stands back up": ["someone crouches down", "someone stands back up"],
+    "a person walks in a circle, followed by sitting down": ["a person walks in a circle", "a person sits down"],
+}
+
+WHOLES = [
+    "a person walks",
+    "a person waves with both hands",
+    "a person jumps up and down",
+    "a person walks back and forth",
+    "a person walks and waves",
+    "a person waves and walks forward",
+    "a person runs with arms and legs moving quickly",
+    "a person stands and waves",
+    "a person sits and claps",
+    "a person nods and waves",
+    "a person jumps and waves",
+    "a person walks forward and turns left",
+    "a person punches and kicks",
+    "a person throws kicks and punches",
+    "a person does squats and lunges",
+    "a person dances and spins",
+    "a person walks while waving",
+    "a person walks, waving the left hand",
+    "a person looks left and right",
+    "a person stands before a door",
+    "a person runs after a ball",
+    "a person waves now and then",
+    "a person walks slowly, with a limp",
+    "a slow, careful walk",
+    "someone moves their arms up, down, left and right",
+    "a person holds a box and walks",
+    "walk and wave",
+    "",
+    "then",
+    "before",
+    "and",
+]
+
+
+@pytest.mark.parametrize("text", SEQUENCES)
+def test_what_follows_each_other_is_parted(text: str) -> None:
+    assert [part.text for part in split_actions(text)] == SEQUENCES[text]
+
+
+@pytest.mark.parametrize("text", WHOLES)
+def test_what_happens_at_once_stays_whole(text: str) -> None:
+    assert [part.text for part in split_actions(text)] == [text]
+
+
+def test_a_whole_sentence_stays_as_it_was_written() -> None:
+    assert split_actions("  A person  Waves. ")[0].text == "  A person  Waves. "
+
+
+def test_a_list_without_end_stays_whole() -> None:
+    assert len(split_actions("a person walks" + ", then jumps" * MOST_PARTS)) == 1
+
+
+@pytest.mark.parametrize(
+    ("shorter", "longer"),
+    [
+        ("a person jumps", "a person jumps three times"),
+        ("a person squats", "a person does five squats"),
+        ("a person walks", "a person walks slowly"),
+        ("a person runs quickly", "a person runs"),
+        ("a person takes two steps", "a person takes six steps"),
+        ("a person jumps", "a person walks in a circle"),
+        ("a person turns around", "a person dances"),
+    ],
+)
+def test_more_takes_longer(shorter: str, longer: str) -> None:
+    assert natural_seconds(shorter) < natural_seconds(longer)
+
+
+def test_seconds_in_words_are_taken() -> None:
+    assert natural_seconds("a person waves for 7 seconds") == 7
+    assert natural_seconds("a person waves for three seconds") == 3
+
+
+def test_lengths_add_up_to_what_is_asked() -> None:
+    """10 s over 4 and 2.5 s: each keeps its least, 1.2 s, and what is free goes as 2.8 to 1.3."""
+    parts = (Part("walks", 4.0), Part("jumps", 2.5))
+    first, second = lengths(parts, 10.0)
+    assert first + second == pytest.approx(10)
+    assert first == pytest.approx(1.2 + 7.6 * 2.8 / 4.1, abs=0.03)
+
+
+def test_natural_lengths_stay_where_nothing_is_asked() -> None:
+    assert lengths((Part("walks", 4.0), Part("jumps", 2.5))) == [4.0, 2.5]
+
+
+@given(st.lists(st.floats(1.2, 12), min_size=1, max_size=9), st.floats(0.5, 60))
+def test_no_part_is_left_without_time(natural: list[float], seconds: float) -> None:
+    parts = [Part("x", length) for length in natural]
+    found = lengths(parts, seconds)
+    assert sum(found) == pytest.approx(seconds, abs=0.026)
+    assert min(found) >= min(SHORTEST, seconds / len(parts)) - 0.051
+
+
+WORDS = "a person walks sits down and then , before after sitting waves . ; while turn 3 times"
+words = st.lists(st.sampled_from(WORDS.split()), max_size=12)
+
+
+@given(words.map(" ".join) | st.text(max_size=60))
+@settings(max_examples=300, deadline=None)
+def test_whatever_is_said_has_parts_with_words_and_time(text: str) -> None:
+    parts = split_actions(text)
+    assert len(parts) >= 1
+    assert len(parts) == 1 or all(part.text.strip() for part in parts)
+    assert all(SHORTEST <= part.seconds <= 60 for part in parts)

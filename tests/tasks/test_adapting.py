@@ -1,0 +1,181 @@
+"""Adapters put into a prior: by file and factor, several at once, segment by segment."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from motionloom.errors import MotionloomError
+from motionloom.goals.adapters import MOST_FACTOR, parse_adapter
+from motionloom.goals.segment import Segment
+from motionloom.tasks.adapting import KEPT, AdaptedPriors, adapt
+from motionloom.tasks.long import long_features, with_loaded
+from motionloom.tasks.text import sample_features
+from motionloom.weights.adapter import TAUGHT, Adapter, AdapterNet, fingerprint, origin, tensors_of
+from motionloom.weights.prior import Prior
+from tests.nets import tiny
+
+
+@pytest.fixture(scope="module")
+def prior() -> Prior:
+    return tiny.prior()
+
+
+def adapter(prior: Prior, seed: int = 1, *, control: str = TAUGHT, size: float = 0.2) -> Adapter:
+    """One whose every number matters."""
+    made = AdapterNet(prior.net, 2, given_rank=0, taught=control == TAUGHT)
+    generator = torch.Generator().manual_seed(seed)
+    with torch.no_grad():
+        for value in made.parameters():
+            value.copy_(size * torch.randn(value.shape, generator=generator))
+    notes = {"captions": [f"caption {seed}"]}
+    tensors = tensors_of(made.state_dict())
+    return Adapter(f"a{seed}", control, 2, tensors, "tiny", fingerprint(prior.net), "free", "numbers", notes)
+
+
+def weights(prior: Prior) -> torch.Tensor:
+    return torch.cat([value.flatten() for value in prior.net.state_dict().values()])
+
+
+@pytest.mark.parametrize(
+    ("word", "found"),
+    [
+        ("a.safetensors", ("a.safetensors", 1.0)),
+        ("a.safetensors:0.8", ("a.safetensors", 0.8)),
+        ("x/a.safetensors:-1", ("x/a.safetensors", -1.0)),
+        ("C:/a.safetensors", ("C:/a.safetensors", 1.0)),
+        ("C:/a.safetensors:.5", ("C:/a.safetensors", 0.5)),
+        ("a:b", ("a:b", 1.0)),
+    ],
+)
+def test_a_factor_stands_behind_the_last_colon(word: str, found: tuple[str, float]) -> None:
+    assert parse_adapter(word) == (Path(found[0]), found[1])
+
+
+@pytest.mark.parametrize("word", ["", ":0.8", "a:1e9", "a:nan", "a:inf", f"a:{MOST_FACTOR + 0.1}"])
+def test_factors_that_make_no_sense_are_refused(word: str) -> None:
+    with pytest.raises(MotionloomError, match="FILE:FACTOR"):
+        parse_adapter(word)
+
+
+@given(st.text(max_size=12))
+def test_every_word_is_read_or_refused(word: str) -> None:
+    try:
+        _, factor = parse_adapter(word)
+    except MotionloomError:
+        return
+    assert abs(factor) <= MOST_FACTOR
+
+
+def test_adapters_add_up(prior: Prior) -> None:
+    """W + 0.5 A + 2 B, in whatever order, and A - A is nothing."""
+    one, two = adapter(prior, 1), adapter(prior, 2)
+    base, a, b = weights(prior), weights(adapt(prior, [(one, 1.0)])), weights(adapt(prior, [(two, 1.0)]))
+    both = weights(adapt(prior, [(one, 0.5), (two, 2.0)]))
+    torch.testing.assert_close(both, base + 0.5 * (a - base) + 2 * (b - base), rtol=0, atol=1e-5)
+    torch.testing.assert_close(both, weights(adapt(prior, [(two, 2.0), (one, 0.5)])), rtol=0, atol=1e-5)
+    torch.testing.assert_close(weights(adapt(prior, [(one, 1.0), (one, -1.0)])), base, rtol=0, atol=1e-6)
+
+
+def test_no_adapter_is_the_prior_itself(prior: Prior) -> None:
+    assert adapt(prior, []) is prior
+
+
+def test_merged_is_as_trained(prior: Prior) -> None:
+    """The network in training, with its change kept apart, guesses what the merged one guesses."""
+    made = AdapterNet(prior.net, 2, given_rank=0, taught=True)
+    with torch.no_grad():
+        for value in made.parameters():
+            value.copy_(0.2 * torch.randn(value.shape, generator=torch.Generator().manual_seed(3)))
+    file = replace(adapter(prior), tensors=tensors_of(made.state_dict()))
+    merged = prior.with_adapters([(file, 1.0)]).net
+    x = torch.randn(2, 10, 263, generator=torch.Generator().manual_seed(4))
+    cond = prior.condition(["a person walks", "a person turns"])
+    with torch.no_grad():
+        torch.testing.assert_close(merged(x, 9, merged.bind(cond)), made(x, 9, made.bind(cond)), rtol=0, atol=1e-4)
+
+
+def test_more_adapters_go_onto_an_adapted_prior(prior: Prior) -> None:
+    """Files belong to the weights as they were before adapters; so does everything else that names them."""
+    once = adapt(prior, [(adapter(prior, 1), 1.0)])
+    assert origin(once) == fingerprint(prior.net) != fingerprint(once.net)
+    twice = adapt(once, [(adapter(prior, 2), 1.0)])
+    torch.testing.assert_close(
+        weights(twice), weights(adapt(prior, [(adapter(prior, 1), 1.0), (adapter(prior, 2), 1.0)])), rtol=0, atol=1e-5
+    )
+
+
+def test_what_does_not_belong_is_refused(prior: Prior, tmp_path: Path) -> None:
+    other = tiny.prior(seed=9)
+    with pytest.raises(MotionloomError, match="belongs to the weights 'tiny', and these are others"):
+        adapt(prior, [(adapter(other), 1.0)])
+    with pytest.raises(MotionloomError, match="is one for control"):
+        adapt(prior, [(adapter(prior, control="any"), 1.0)])
+    with pytest.raises(MotionloomError, match="no adapter"):
+        adapt(prior, [(tmp_path / "none.safetensors", 1.0)])
+    with pytest.raises(MotionloomError, match="too many"):
+        adapt(prior, [(adapter(prior), 1.0)] * 20)
+
+
+def features(prior: Prior, segments: list[Segment], **more) -> list[torch.Tensor]:
+    return list(long_features(prior, segments, **({"steps": 3} | more)))
+
+
+WALK = Segment("a person walks", 2.0)
+
+
+def test_one_segment_of_a_timeline_is_drawn_as_the_adapted_prior_draws_it(prior: Prior) -> None:
+    one = adapter(prior)
+    (alone,) = features(prior, [replace(WALK, adapters=((one, 0.7),))])
+    (whole,) = features(adapt(prior, [(one, 0.7)]), [WALK])
+    torch.testing.assert_close(alone, whole, rtol=0, atol=1e-5)
+    assert (alone - features(prior, [WALK])[0]).abs().max() > 0.01
+
+
+def test_an_adapter_of_one_segment_leaves_far_ones_alone(prior: Prior) -> None:
+    """In three steps a change reaches three rows far, and the first of seven is further away."""
+    plain = [replace(WALK, text=f"a person walks {i}") for i in range(7)]
+    changed = [*plain[:6], replace(plain[6], adapters=((adapter(prior), 1.0),))]
+    before, after = features(prior, plain), features(prior, changed)
+    torch.testing.assert_close(before[0], after[0], rtol=0, atol=1e-5)
+    assert (before[6] - after[6]).abs().max() > 0.01
+
+
+def test_how_many_rows_go_together_changes_nothing(prior: Prior) -> None:
+    segments = [replace(WALK, adapters=((adapter(prior, i % 3), 1.0),) if i % 3 else ()) for i in range(5)]
+    together, apart = (torch.cat(features(prior, segments, together=count)) for count in (8, 1))
+    torch.testing.assert_close(together, apart, rtol=0, atol=2e-4)
+
+
+def test_files_of_segments_are_read_beforehand(prior: Prior, tmp_path: Path) -> None:
+    one = adapter(prior)
+    place = one.save(tmp_path / "a.safetensors")
+    (found,) = with_loaded(prior, [replace(WALK, adapters=((place, 0.5),))])
+    ((read, factor),) = found.adapters
+    assert isinstance(read, Adapter)
+    assert (read.name, factor) == ("a1", 0.5)
+    (tmp_path / "b.safetensors").write_bytes(b"x" * 100)
+    with pytest.raises(MotionloomError, match="is not an adapter"):
+        with_loaded(prior, [replace(WALK, adapters=((tmp_path / "b.safetensors", 0.5),))])
+
+
+def test_merged_networks_are_kept_but_not_without_end(prior: Prior) -> None:
+    priors = AdaptedPriors(prior)
+    one = adapter(prior)
+    first = priors.of(((one, 1.0),))
+    assert priors.of(((one, 1.0),)) is first
+    assert priors.of(()) is prior
+    for number in range(KEPT):
+        priors.of(((one, number / 10),))
+    assert len(priors.made) == KEPT
+
+
+def test_the_same_seed_and_adapters_draw_the_same(prior: Prior) -> None:
+    one = adapter(prior)
+    first, again = (
+        sample_features(adapt(prior, [(one, 0.8)]), ["a person walks"], [40], seeds=[3], steps=3)[0] for _ in range(2)
+    )
+    assert torch.equal(first, again)
