@@ -130,6 +130,15 @@ class Motion:
         moved = None if self.translations is None else lerp(self.translations)
         return replace(self, fps=float(fps), root=lerp(self.root), rotations=turned, translations=moved)
 
+    def scaled(self, size: float) -> "Motion":
+        """The same motion of a body, and over a way, ``size`` times as large."""
+        return replace(
+            self,
+            skeleton=replace(self.skeleton, offsets=self.skeleton.offsets * size),
+            root=self.root * size,
+            translations=None if self.translations is None else self.translations * size,
+        )
+
     def mirror(self) -> "Motion":
         """Left and right exchanged: reflected in the plane x = 0, joint names swapped by side.
 

@@ -32,6 +32,10 @@ class Skeleton:
     """Joints that are mere bone tips (BVH End Sites): they have a place and never a rotation of their own."""
     groups: dict[str, tuple[int, ...]] = field(default_factory=dict)
     """Named sets of joints, such as ``left_arm``."""
+    humanoid: dict[str, str] = field(default_factory=dict)
+    """The joints of body parts where the file names them (VRM): SMPL joint, such as ``left_knee``, to joint name."""
+    on_floor: bool = False
+    """Whether the rest pose stands on the ground y = 0, as modelled characters do; a recording's skeleton need not."""
 
     def __post_init__(self) -> None:
         offsets = np.asarray(self.offsets, dtype=np.float64)
@@ -173,7 +177,7 @@ def _smpl22() -> Skeleton:
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     offsets = np.concatenate([np.zeros((1, 3)), directions * np.array(HUMANML_BONE_LENGTHS)[:, None]])
     offsets[0, 1] = -offsets[[1, 4, 7, 10], 1].sum()  # the toes stand on the floor at rest
-    return Skeleton(names, parents, offsets, groups=_SMPL22_GROUPS)
+    return Skeleton(names, parents, offsets, groups=_SMPL22_GROUPS, on_floor=True)
 
 
 SMPL22: Skeleton = _smpl22()

@@ -109,7 +109,7 @@ def test_a_clip_that_cannot_be_read_is_told(weights: str, clip: str, capsys: pyt
     assert not written()
 
 
-@pytest.mark.parametrize("words", [["walk", "turn"], ["walk", "--bogus"], ["--between", "1"], ["--skeleton", "cat"]])
+@pytest.mark.parametrize("words", [["walk on", "turn"], ["walk", "--bogus"], ["--between", "1"], ["--root", "cat"]])
 def test_what_the_parser_does_not_know_points_to_the_help(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["edit", "clip.bvh", *words])

@@ -61,9 +61,9 @@ def test_bvh_to_bvh_keeps_unit_and_order_unless_told(walk):
     assert largest_distance(walk, file.motion) < 1e-4
 
 
-def test_a_file_can_be_exported_onto_itself(walk):
-    assert main(["export", "walk.bvh", "walk.bvh", "--start", "1"]) == 0
-    assert len(io.load("walk.bvh")) == 30
+def test_a_file_is_not_exported_onto_itself(walk):
+    assert main(["export", "walk.bvh", "walk.bvh", "--start", "1", "--force"]) == 2
+    assert len(io.load("walk.bvh")) == 60
 
 
 def test_fps_start_end_and_mirror_do_what_they_say(walk):
@@ -118,7 +118,7 @@ def test_acclaim_files_are_exported_with_their_skeleton_beside_them(capsys):
     assert main(["export", "a_01.amc", "a.bvh"]) == 0
     assert "120 frames per second are assumed" in capsys.readouterr().err
     assert io.load("a.bvh").fps == 120
-    assert main(["export", "a_01.amc", "a.bvh", "--asf", "a.asf", "--source-fps", "60", "--fps", "30"]) == 0
+    assert main(["export", "a_01.amc", "a.bvh", "--asf", "a.asf", "--source-fps", "60", "--fps", "30", "--force"]) == 0
     assert not capsys.readouterr().err
     assert io.load("a.bvh").fps == 30
     assert len(io.load("a.bvh")) == 1
@@ -183,7 +183,7 @@ def small() -> Skeleton:
 
 
 MISTAKES = [
-    (["export", "walk.bvh"], "arguments are required: OUT"),
+    (["export", "walk.bvh"], "one file to write is needed"),
     (["export", "walk.bvh", "walk.fbx"], "its name must end in .bvh, .glb"),
     (["export", "no.bvh", "a.glb"], "cannot read no.bvh: No such file"),
     (["export", "a.glb", "walk.bvh"], "cannot read a.glb"),
@@ -200,7 +200,7 @@ MISTAKES = [
     (["export", "walk.bvh", "a.bvh", "--start", "1.5", "--end", "0.5"], "cannot crop"),
     (["export", "walk.bvh", "a.bvh", "--end", "5"], "from a motion of 2.000 s"),
     (["export", "walk.bvh", "a.bvh", "--start", "-1"], "0 or more"),
-    (["export", "walk.bvh", "a.bvh", "--skeleton", "smpl"], "needs smpl22 or a file"),
+    (["export", "walk.bvh", "a.bvh", "--skeleton", "smpl"], "--skeleton needs smpl22"),
     (["export", "walk.bvh", "a.bvh", "--skeleton", "no.bvh"], "cannot read no.bvh"),
     (["export", "walk.bvh", "a.bvh", "--asf", "no.asf"], "an ASF file is for AMC files"),
     (["view", "walk.bvh", "--out", "a.jpg"], "a picture ends in .png"),

@@ -85,6 +85,12 @@ def test_rest_rotations_and_matrices_are_honoured(tmp_path: Path) -> None:
         np.testing.assert_allclose(load_glb(file.write(tmp_path)).positions()[0], [[0, 0, 0], [1, 0, 0]], atol=1e-6)
 
 
+def test_a_scale_that_changes_moves_what_hangs_below(tmp_path: Path) -> None:
+    """Squash and stretch: bones change their length with the scale above them."""
+    file = Foreign(copy.deepcopy(CHAIN)).key(0, "scale", [0, 0.04], [[1, 1, 1], [1, 2, 1]])
+    np.testing.assert_allclose(load_glb(file.write(tmp_path)).positions()[:, 1], [[0, -1, 0], [0, -2, 0]], atol=1e-6)
+
+
 def test_whole_number_rotations_are_scaled(tmp_path: Path) -> None:
     half = round(HALF * 32767)
     file = Foreign(copy.deepcopy(CHAIN))

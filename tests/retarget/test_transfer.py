@@ -207,12 +207,25 @@ def test_straight_knees_stay_nearly_straight_and_never_bend_backwards() -> None:
 
 def test_feet_out_of_reach_bring_the_hips_down_instead_of_leaving_their_place() -> None:
     offsets = SMPL22.offsets.copy()
-    offsets[[1, 2], 0] *= 3.0  # hips so wide that straight legs cannot reach the narrow stance from full height
+    offsets[[1, 2], 0] *= 2.2  # hips so wide that straight legs cannot reach the narrow stance from full height
     motion = straight_legs()
     out = from_smpl22(motion, Skeleton(SMPL22.names, SMPL22.parents, offsets)).positions()
     toes, wanted = out[:, [10, 11]], motion.positions()[:, [10, 11]]
     assert np.abs(toes - wanted)[..., [0, 2]].max() < 0.01
     assert np.abs(toes[..., 1]).max() < 0.01
+
+
+def test_feet_of_a_body_that_is_broader_than_people_move_apart() -> None:
+    """A toy's legs hang on hips as wide as they are long: its feet are under them, and its knees stay straight."""
+    offsets = SMPL22.offsets.copy()
+    offsets[[1, 2], 0] *= 6.0
+    motion = straight_legs()
+    out = from_smpl22(motion, Skeleton(SMPL22.names, SMPL22.parents, offsets)).positions()
+    broad = 0.35 * (0.3936 + 0.4256)
+    apart = (out[:, 10] - out[:, 11])[:, 0] - (motion.positions()[:, 10] - motion.positions()[:, 11])[:, 0]
+    np.testing.assert_allclose(apart, 12 * SMPL22.offsets[1, 0] - broad, atol=0.03)
+    for hip, ankle in ((1, 7), (2, 8)):
+        assert np.linalg.norm(out[:, hip] - out[:, ankle], axis=-1).min() > 0.97 * (0.3936 + 0.4256)
 
 
 def test_one_frame_is_enough() -> None:

@@ -8,7 +8,9 @@ import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
+from motionloom.cli.newcomers import COMMANDS, suggestion, with_command, with_options
 from motionloom.errors import MotionloomError, one_line
 from motionloom.interruption import interruptible, was_interrupted
 
@@ -26,19 +28,23 @@ FAMILIES = (
     "evaluate",
     "bench",
     "weights",
+    "completion",
 )
 
 
 class _Parser(argparse.ArgumentParser):
+    def __init__(self, *args: Any, **more: Any) -> None:
+        super().__init__(*args, **({"allow_abbrev": False} | more))  # --out must never mean --out-unit
+
     def error(self, message: str) -> None:  # type: ignore[override]
         """One sentence and exit code 2, without the page of usage."""
         self.exit(2, f"{one_line(f'{self.prog}: {message}')}; see {self.prog} --help\n")
 
     def parse_known_args(self, args=None, namespace=None):  # type: ignore[override]
         """What a command does not know is its own mistake, not the whole program's: its --help is the one to read."""
-        found, unknown = super().parse_known_args(args, namespace)
+        found, unknown = super().parse_known_args(None if args is None else with_options(self, args), namespace)
         if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{suggestion(self, unknown)}")
         return found, unknown
 
 
@@ -88,9 +94,10 @@ def _told(argv: Sequence[str] | None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    words = sys.argv[1:] if argv is None else argv
-    top = parser(words[0] if words else None)
-    arguments = top.parse_args(words)
+    words = list(sys.argv[1:] if argv is None else argv)
+    top = parser(COMMANDS.get(words[0], words[0]) if words else None)
+    commands = next(a.choices for a in top._actions if isinstance(a, argparse._SubParsersAction))
+    arguments = top.parse_args(with_command(words, commands))
     if arguments.version:
         from importlib.metadata import version
 

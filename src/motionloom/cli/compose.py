@@ -6,7 +6,9 @@ from collections.abc import Generator, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.sampling import add_sampling, bar, check_outs, fail, load_prior, remark_unknown
+from motionloom.cli.skeletons import Target, open_target
 
 if TYPE_CHECKING:
     from motionloom.goals.timeline import Timeline
@@ -52,17 +54,18 @@ def _compose(arguments: argparse.Namespace) -> int:
         return 0
     from dataclasses import replace
 
-    outs = [] if arguments.check else check_outs(arguments)
+    outs, target = ([], None) if arguments.check else check_outs(arguments)
     timeline = _timeline(arguments)
     if arguments.check:
         _report(arguments, timeline, seconds=timeline.seconds, streams=[])
         return 0
     from motionloom.tasks.long import with_loaded
 
+    check_overwriting(arguments, outs)
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [segment.text for segment in timeline.segments[:REMARKED]])
     timeline = replace(timeline, segments=with_loaded(prior, timeline.segments))
-    streams = _open(outs, timeline, arguments.fps)
+    streams = _open(outs, timeline, arguments.fps, target)
     interrupted = _make(arguments, prior, timeline, streams)
     seconds = max(stream.seconds for stream in streams) if interrupted else timeline.seconds
     _report(arguments, timeline, seconds=seconds, streams=_saved(streams), remarks=remarks)
@@ -92,13 +95,17 @@ def _timeline(arguments: argparse.Namespace) -> "Timeline":
     return timeline.read_timeline(files[0])
 
 
-def _open(outs: Sequence[Path], timeline: "Timeline", fps: float | None) -> list["Stream"]:
+def _open(outs: Sequence[Path], timeline: "Timeline", fps: float | None, target: Target | None) -> list["Stream"]:
     """The files, those that grow on the disk last: they are closed first, and that is quick."""
-    from motionloom.io.stream import open_stream
+    from motionloom.io.stream import check_length, open_stream
 
     rate = fps or 20.0
     total = int((timeline.frames - 1) / 20 * rate + 1e-6) + 1
     said = "; ".join(" ".join(segment.text.split()) for segment in timeline.segments[:20])
+    if target is not None:
+        for out in outs:
+            check_length(out, total=total, fps=rate, joints=len(target.skeleton))
+        return [open_target(target, out, caption=said) for out in outs]
     streams = [open_stream(out, total=total, fps=rate, caption=said) for out in outs]
     return sorted(streams, key=lambda stream: stream.path.suffix.lower() == ".bvh")
 

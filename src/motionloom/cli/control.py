@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionloom.cli.newcomers import check_overwriting, one_sentence
 from motionloom.cli.sampling import (
     add_sampling,
     bar,
@@ -17,6 +18,7 @@ from motionloom.cli.sampling import (
     report,
     write,
 )
+from motionloom.cli.skeletons import put_all
 
 if TYPE_CHECKING:
     from motionloom.goals.goal import Goal
@@ -31,7 +33,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         help="make motions from words that keep to a path, a hand, poses",
         description="Make motions that do what PROMPT says and meet goals: see docs/control.md.",
     )
-    parser.add_argument("prompt", nargs="?", metavar="PROMPT", help="what the person does, such as 'a person walks'")
+    parser.add_argument("prompt", nargs="*", metavar="PROMPT", help="what the person does, such as 'a person walks'")
     parser.add_argument(
         "--goal", type=Path, action="append", default=[], metavar="FILE",
         help="a JSON file of paths, joints and poses, repeatable",
@@ -69,21 +71,25 @@ def run_control(arguments: argparse.Namespace) -> None:
 
         print(SCHEMA.read_text(encoding="utf-8"), end="")
         return
-    outs = check_outs(arguments)
+    outs, target = check_outs(arguments)
     check_count(arguments)
+    if len(one_sentence(arguments.prompt)) > 1:
+        fail(f"one prompt is needed; got {len(arguments.prompt)}: {', '.join(arguments.prompt)[:200]}")
+    arguments.prompt = next(iter(one_sentence(arguments.prompt)), None)
     if arguments.prompt is None:
         fail("no prompt; say what the person does, such as: motionloom control 'a person walks' --goal goal.json")
     check_prompt(arguments.prompt)
-    files = places(outs, arguments.count)
+    files = places(outs, arguments.count, target=target)
     goal = _goal(arguments)
+    check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [arguments.prompt])
     made, seconds = _make(arguments, prior, goal)
-    motions = [one.motion for one in made]
+    motions = put_all(target, [one.motion for one in made])
     if arguments.fps is not None:
         motions = [motion.resample(arguments.fps) for motion in motions]
     captions = [arguments.prompt] * arguments.count
-    written = [write(motions, several, captions) for several in files]
+    written = [write(motions, several, captions, target) for several in files]
     _report(arguments, made, written, seconds=seconds, remarks=remarks)
 
 

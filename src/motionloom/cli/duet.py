@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
     add_adapters,
@@ -16,6 +17,7 @@ from motionloom.cli.sampling import (
     report,
     take_text_anywhere,
 )
+from motionloom.cli.skeletons import Target, add_skeleton, put_all, read_target
 
 if TYPE_CHECKING:
     from motionloom.goals.goal import Goal
@@ -28,7 +30,7 @@ MAX_SECONDS = 3600.0
 """Of a timeline."""
 SECONDS, ADDED = 6.0, 3.0
 """Length of a duet, and what is added to a past, unless asked otherwise."""
-SINGLE = (".bvh", ".npz")
+SINGLE = (".bvh", ".npz", ".vrma")
 """Files of one person each."""
 
 
@@ -77,6 +79,7 @@ def _add_sampling(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
+    add_skeleton(parser, own="the uniform person's, or those of the motions given")
 
 
 def run_duet(arguments: argparse.Namespace) -> None:
@@ -84,7 +87,9 @@ def run_duet(arguments: argparse.Namespace) -> None:
     import time
 
     _check(arguments)
-    files = places(_check_outs(arguments), arguments.count, sheets=False)
+    outs, skin = _check_outs(arguments)
+    files = places(outs, arguments.count, sheets=False, target=skin)
+    check_overwriting(arguments, [file for several in files for file in several])
     timeline = _timeline(arguments) if arguments.timeline else None
     goal = _goal(arguments) if arguments.path else None
     given, manners = _read(arguments)
@@ -96,7 +101,9 @@ def run_duet(arguments: argparse.Namespace) -> None:
     seconds = time.perf_counter() - began
     if arguments.fps is not None:
         duets = [[motion.resample(arguments.fps) for motion in duet] for duet in duets]
-    written = _write(duets, files, manners, _caption(arguments, timeline))
+    if skin is not None:
+        duets = [put_all(skin, duet) for duet in duets]
+    written = _write(duets, files, manners, _caption(arguments, timeline), skin)
     report(arguments, _about(arguments, duets), written, seconds)
     note_rate(arguments, _inputs(arguments))
 
@@ -278,16 +285,22 @@ def _check_numbers(arguments: argparse.Namespace) -> None:
         fail(f"--fps must be 1 to 1000; got {arguments.fps:g}")
 
 
-def _check_outs(arguments: argparse.Namespace) -> list[Path]:
-    """The files to write: those of one person in twos of a kind, first that of the first person."""
+def _check_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target | None]:
+    """The files to write, those of one person in twos of a kind, first that of the first person; and the skeleton."""
     outs = arguments.out or [Path("duet.glb")]
+    skin = read_target(arguments, outs)
     if len({out.resolve() for out in outs}) != len(outs):
         fail("the same --out is given twice; give each file its own name")
-    for suffix in SINGLE:
+    for suffix in _single(skin):
         own = [out for out in outs if out.suffix.lower() == suffix]
         if len(own) not in (0, 2):
             fail(f"a {suffix} file holds one person: give two, such as --out a{suffix} --out b{suffix}; got {len(own)}")
-    return outs
+    return outs, skin
+
+
+def _single(skin: Target | None) -> tuple[str, ...]:
+    """The suffixes of files that hold one person; a character's own file does."""
+    return (*SINGLE, skin.suffix) if skin is not None and skin.suffix else SINGLE
 
 
 def _check_sizes(
@@ -323,6 +336,7 @@ def _write(
     files: list[list[Path]],
     manners: "list[tuple[float, dict[str, str]]]",
     caption: str,
+    skin: Target | None,
 ) -> list[Path]:
     """All files, duet by duet; a person whose motion came from a BVH file is told in its unit and orders."""
     from motionloom.io import save, save_scene
@@ -333,12 +347,14 @@ def _write(
         seen: dict[str, int] = {}
         for out in (several[number] for several in files):
             suffix = out.suffix.lower()
-            if suffix not in SINGLE:
+            if suffix not in _single(skin):
                 written.append(save_scene(duet, out, names=["first", "second"], captions=[caption] * 2))
                 continue
             person = seen.setdefault(suffix, 0)
             seen[suffix] += 1
-            if suffix == ".bvh" and person < len(manners):
+            if skin is not None:
+                written.append(skin.save(duet[person], out, caption=caption))
+            elif suffix == ".bvh" and person < len(manners):
                 unit, orders = manners[person]
                 written.append(save_bvh(duet[person], out, order=orders, unit=unit))
             else:

@@ -2,9 +2,10 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
-from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
+from motionloom.cli.newcomers import check_overwriting
+from motionloom.cli.reading import add_reading, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
     add_sampling,
     bar,
@@ -18,6 +19,7 @@ from motionloom.cli.sampling import (
     take_text_anywhere,
     write,
 )
+from motionloom.cli.skeletons import put_all
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
@@ -47,11 +49,10 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument(
         "--strength", type=float, default=1.0, help="how far from the clip, above 0 to 1 (default 1: from noise alone)"
     )
-    parser.add_argument("--skeleton", choices=("own", "smpl"), default="own", help="of the result (default own)")
     parser.add_argument("--seed", type=int, default=0, help="the first version's seed (default 0)")
     parser.add_argument("--count", type=int, default=1, help="versions to make (default 1)")
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
-    add_sampling(parser, own_rate="the clip's")
+    add_sampling(parser, own_rate="the clip's", own_skeleton="own, the clip's")
     add_reading(parser)
     take_text_anywhere(parser)
     parser.set_defaults(run=run_edit)
@@ -59,24 +60,29 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
 
 def run_edit(arguments: argparse.Namespace) -> None:
     """``motionloom edit CLIP TEXT``."""
-    outs = check_outs(arguments)
+    uniform = arguments.skeleton in ("smpl", "smpl22")  # made so, rather than put on it afterwards
+    arguments.skeleton = None if uniform or arguments.skeleton == "own" else arguments.skeleton
+    outs, target = check_outs(arguments)
     check_count(arguments)
     if arguments.text is not None:
         check_prompt(arguments.text)
     captions = [arguments.text or arguments.clip.stem] * arguments.count
-    files = places(outs, arguments.count)
+    files = places(outs, arguments.count, target=target)
     clip, unit, orders = read_clip(arguments, arguments.clip)
+    check_size(arguments, arguments.clip, clip)
+    check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [arguments.text or ""])
-    motions, seconds = _make(arguments, prior, crop(clip, arguments))
-    if arguments.skeleton == "smpl":
+    motions, seconds = _make(arguments, prior, crop(clip, arguments), "smpl" if uniform else "own")
+    motions = put_all(target, motions)
+    if uniform:
         unit, orders = None, {}
     written = []
     for several in files:
-        if several[0].suffix.lower() == ".bvh":
+        if several[0].suffix.lower() == ".bvh" and target is None:
             written += [_write_bvh(motion, place, unit, orders) for motion, place in zip(motions, several, strict=True)]
         else:
-            written += write(motions, several, captions)
+            written += write(motions, several, captions, target)
     about = {
         "clip": str(arguments.clip),
         "prompt": arguments.text,
@@ -88,7 +94,9 @@ def run_edit(arguments: argparse.Namespace) -> None:
     note_rate(arguments, [arguments.clip])
 
 
-def _make(arguments: argparse.Namespace, prior: "Prior", clip: "Motion") -> "tuple[list[Motion], float]":
+def _make(
+    arguments: argparse.Namespace, prior: "Prior", clip: "Motion", skeleton: "Literal['own', 'smpl']"
+) -> "tuple[list[Motion], float]":
     import time
 
     from motionloom.tasks.edit import edit
@@ -101,7 +109,7 @@ def _make(arguments: argparse.Namespace, prior: "Prior", clip: "Motion") -> "tup
             keep=[name.strip() for part in arguments.keep for name in part.split(",")],
             loop=arguments.loop, blend=arguments.blend, extend=arguments.extend, strength=arguments.strength,
             count=arguments.count, seed=arguments.seed, guidance=arguments.guidance,
-            steps=STEPS if arguments.steps is None else arguments.steps, skeleton=arguments.skeleton,
+            steps=STEPS if arguments.steps is None else arguments.steps, skeleton=skeleton,
             clean=not arguments.raw, progress=progress,
         )  # fmt: skip
     if arguments.fps is not None:

@@ -1,14 +1,26 @@
 """Commands about motion files: export, view, info."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.cli.reading import RATE_ASSUMED, add_reading, as_rate, as_unit, crop, note_rate, rate_assumed, read_clip
+from motionloom.cli.newcomers import check_overwriting
+from motionloom.cli.reading import (
+    RATE_ASSUMED,
+    add_reading,
+    as_rate,
+    as_unit,
+    check_size,
+    crop,
+    note_rate,
+    rate_assumed,
+    read_clip,
+)
+from motionloom.cli.skeletons import add_skeleton, read_target
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
-    from motionloom.skeleton import Skeleton
 
 
 def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -20,12 +32,12 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "the name of OUT picks the format.",
     )
     export.add_argument("input", metavar="IN", type=Path)
-    export.add_argument("output", metavar="OUT", type=Path)
+    export.add_argument("output", metavar="OUT", type=Path, nargs="?")
+    export.add_argument("--out", type=Path, metavar="NAME", help="the same as OUT")
     add_reading(export)
     export.add_argument("--fps", type=as_rate, metavar="N", help="resample to this frame rate")
-    export.add_argument("--skeleton", metavar="FILE|smpl22", help="put the motion on this skeleton")
-    for side, whose in (("source", "of IN"), ("target", "of the --skeleton")):
-        export.add_argument(f"--{side}-map", type=Path, metavar="JSON", help=f"which joints are which, {whose}")
+    add_skeleton(export, own="IN's")
+    export.add_argument("--source-map", "--joint-map", type=Path, metavar="JSON", help="which joints are which, of IN")
     export.add_argument("--mirror", action="store_true", help="exchange left and right")
     export.add_argument("--out-unit", type=as_unit, metavar="UNIT", help="unit of a BVH written (as read, else m)")
     export.add_argument("--order", metavar="XYZ", help="order of rotations of a BVH written (as read, else ZXY)")
@@ -53,24 +65,35 @@ def run_export(arguments: argparse.Namespace) -> None:
     from motionloom import io
     from motionloom.errors import MotionloomError
 
-    target = io.check_output(arguments.output)
+    target = _output(arguments)
+    skin = read_target(arguments, [target])
+    io.check_output(target, own=skin and skin.suffix)
     motion, unit, orders = read_clip(arguments, arguments.input)
+    if skin is None:
+        check_size(arguments, arguments.input, motion)
+    check_overwriting(arguments, [target])
     motion = crop(motion, arguments)
     if arguments.mirror:
         motion = motion.mirror()
-    if (arguments.source_map or arguments.target_map) and not arguments.skeleton:
-        raise MotionloomError("--source-map and --target-map say which joints are which for a --skeleton; name one")
-    if arguments.skeleton:
-        skeleton, unit, orders = _skeleton(arguments.skeleton)
-        motion = _put_on(motion, skeleton, arguments)
+    if arguments.source_map and not skin:
+        raise MotionloomError("--source-map says which joints are which for a --skeleton; name one")
+    if skin:
+        unit, orders = skin.unit, skin.orders
+        motion = skin.put(motion, source=str(arguments.input), source_map=arguments.source_map)
     if arguments.fps:
         motion = motion.resample(arguments.fps)
-    if target.suffix.lower() == ".bvh":
-        from motionloom.io.bvh import save_bvh
+    if skin and skin.writes(target):
+        _only_bvh(arguments, target)
+        skin.save(motion, target, caption=arguments.input.stem)
+    elif target.suffix.lower() == ".bvh":
+        from motionloom.io.bvh import save_bvh, unit_that_reads_back
 
-        save_bvh(motion, target, order=arguments.order or orders, unit=arguments.out_unit or unit or 1.0)
+        chosen = arguments.out_unit or unit_that_reads_back(motion, unit or 1.0)
+        if unit_that_reads_back(motion, chosen) != chosen:
+            print(f"note: give --unit {chosen:g} to read {target} at this size: bones do not tell it", file=sys.stderr)
+        save_bvh(motion, target, order=arguments.order or orders, unit=chosen)
     else:
-        _only_bvh(arguments)
+        _only_bvh(arguments, target)
         io.save(motion, target)
     print(f"wrote {target}: {_summary(motion)}")
     note_rate(arguments, [arguments.input])
@@ -99,10 +122,12 @@ def run_info(arguments: argparse.Namespace) -> None:
     from motionloom.io.info import describe
 
     motion, unit, _ = read_clip(arguments, arguments.input)
+    clips = _clips(arguments.input)
     info = describe(crop(motion, arguments))
     problems = [*info.problems, *([RATE_ASSUMED] if rate_assumed(arguments, [arguments.input]) else [])]
     if arguments.json:
-        print(json.dumps({"file": str(arguments.input), "unit": unit, **asdict(info), "problems": problems}, indent=2))
+        about = {"file": str(arguments.input), "unit": unit, "clips": clips}
+        print(json.dumps({**about, **asdict(info), "problems": problems}, indent=2))
         return
     low, high = info.lowest, info.highest
     box = " x ".join(f"{h - l:.2f}" for l, h in zip(low, high))
@@ -114,8 +139,18 @@ def run_info(arguments: argparse.Namespace) -> None:
     print(f"  space     {box} m (x, y up, z)")
     if unit is not None:
         print(f"  unit      {unit:g} m in the file{'' if arguments.unit else ', by the length of its bones'}")
+    for number, (name, seconds) in enumerate(clips, start=1):
+        print(f"  {'clips' if number == 1 else '':9} {number:3}  {name or '(without a name)'}, {seconds:.2f} s")
     for problem in problems:
         print(f"  problem   {problem}")
+
+
+def _clips(path: Path) -> list[tuple[str, float]]:
+    """Name and seconds of each animation of a glTF file."""
+    from motionloom.io import GLTF
+    from motionloom.io.gltf_read import open_glb
+
+    return open_glb(path).lengths if path.suffix.lower() in GLTF else []
 
 
 def _summary(motion: "Motion") -> str:
@@ -123,42 +158,18 @@ def _summary(motion: "Motion") -> str:
     return f"{frames}, {motion.seconds:.2f} s at {motion.fps:g} frames per second, {len(motion.skeleton)} joints"
 
 
-def _skeleton(name: str) -> "tuple[Skeleton, float, dict[str, str]]":
-    """A skeleton to put motions on, with the unit and orders of its file."""
-    from motionloom import io
+def _output(arguments: argparse.Namespace) -> Path:
+    """Where to write, whether it is named as OUT or with ``--out``."""
     from motionloom.errors import MotionloomError
-    from motionloom.skeleton import SMPL22
 
-    path = Path(name)
-    if name.lower() == "smpl22":
-        return SMPL22, 1.0, {}
-    if path.suffix.lower() == ".bvh":
-        from motionloom.io.bvh import read_bvh
-
-        file = read_bvh(path)
-        return file.motion.skeleton, file.unit, dict(file.orders)
-    if path.suffix.lower() == ".asf":
-        from motionloom.io.asf import load_skeleton
-
-        return load_skeleton(path), 1.0, {}
-    if path.suffix.lower() not in io.READS:
-        raise MotionloomError(f"--skeleton needs smpl22 or a file (.asf, {', '.join(io.READS)}); got {name!r}")
-    return io.load(path).skeleton, 1.0, {}
+    if (arguments.output is None) == (arguments.out is None):
+        given = "none" if arguments.out is None else f"{arguments.output} and {arguments.out}"
+        raise MotionloomError(f"one file to write is needed, such as: motionloom export IN OUT; got {given}")
+    return arguments.out or arguments.output
 
 
-def _put_on(motion: "Motion", skeleton: "Skeleton", arguments: argparse.Namespace) -> "Motion":
-    from motionloom.errors import MotionloomError
-    from motionloom.retarget import retarget
-
-    try:
-        return retarget(motion, skeleton, source_map=arguments.source_map, target_map=arguments.target_map)
-    except MotionloomError as error:
-        hint = "--source-map or --target-map"
-        raise MotionloomError(f"{arguments.input} onto {arguments.skeleton}: {error} ({hint})") from None
-
-
-def _only_bvh(arguments: argparse.Namespace) -> None:
+def _only_bvh(arguments: argparse.Namespace, target: Path) -> None:
     from motionloom.errors import MotionloomError
 
     if arguments.out_unit or arguments.order:
-        raise MotionloomError(f"--out-unit and --order are for BVH files; {arguments.output} is none")
+        raise MotionloomError(f"--out-unit and --order are for BVH files; {target} is none")

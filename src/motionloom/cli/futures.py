@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.cli.sampling import fail, numbered
+from motionloom.cli.skeletons import Target as Skin
+from motionloom.cli.skeletons import open_target, put_all
 from motionloom.interruption import held_back
 
 if TYPE_CHECKING:
@@ -40,31 +42,34 @@ class Target:
 
 @dataclass(frozen=True)
 class Manner:
-    """How the past's own file says its numbers, if it is a BVH."""
+    """How the past's own file says its numbers, if it is a BVH; and the skeleton that futures are put on instead."""
 
     unit: float = 1.0
     orders: dict[str, str] = field(default_factory=dict)
+    skeleton: Skin | None = None
 
 
-def targets(outs: Sequence[Path], count: int, formats: Sequence[str], *, pictures: bool) -> list[Target]:
-    """The files to write; refuses places that cannot be, before any work."""
+def targets(
+    outs: Sequence[Path], count: int, formats: Sequence[str], *, pictures: bool, own: str | None = None
+) -> list[Target]:
+    """The files to write; refuses places that cannot be, before any work; ``own`` is a character's own suffix."""
     from motionloom.io import check_output
 
     if len({out.resolve() for out in outs}) != len(outs):
         fail("the same --out is given twice; give each its own name")
-    found = [_target(out, count, formats, pictures=pictures) for out in outs]
+    found = [_target(out, count, formats, pictures=pictures, own=own) for out in outs]
     for place in (place for target in found if target.folder.is_dir() for place in target.files):
-        check_output(place)
+        check_output(place, own=own)
     return found
 
 
-def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool) -> Target:
+def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool, own: str | None) -> Target:
     from motionloom.io import WRITES, check_output
     from motionloom.io.folder import check_folder
 
     suffix = out.suffix.lower()
-    if suffix in WRITES and not out.is_dir():
-        check_output(out)
+    if suffix in (*WRITES, own) and not out.is_dir():
+        check_output(out, own=own)
         if suffix in OVERLAYS:
             return Target(out.parent, (), (out.name,))
         return Target(out.parent, (tuple(place.name for place in numbered(out, count)),), ())
@@ -84,12 +89,15 @@ def write_futures(
     from motionloom.io.bvh_writer import save_bvh
     from motionloom.io.folder import atomic_folder
 
+    motions = put_all(manner.skeleton, motions)
     with ExitStack() as stack:
         for target in wanted:
             folder = stack.enter_context(atomic_folder(target.folder))
             for names in target.futures:
                 for motion, name in zip(motions, names, strict=True):
-                    if name.lower().endswith(".bvh"):
+                    if manner.skeleton is not None:
+                        manner.skeleton.save(motion, folder / name, caption=Path(name).stem)
+                    elif name.lower().endswith(".bvh"):
                         save_bvh(motion, folder / name, order=manner.orders, unit=manner.unit)
                     else:
                         save(motion, folder / name, captions=[Path(name).stem])
@@ -185,6 +193,10 @@ class Long:
         found = []
         for target, folder in zip(self.wanted, folders, strict=True):
             for names in target.futures:
+                if self.manner.skeleton is not None:
+                    stream = open_target(self.manner.skeleton, folder / names[number], caption=Path(names[number]).stem)
+                    found.append((target.folder / names[number], stream))
+                    continue
                 stream = open_stream(
                     folder / names[number], total=self.frames, fps=piece.fps, joints=len(piece.skeleton),
                     caption=Path(names[number]).stem, order=self.manner.orders, unit=self.manner.unit,

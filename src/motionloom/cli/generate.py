@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from motionloom.cli.newcomers import check_overwriting, one_sentence
 from motionloom.cli.sampling import (
     add_sampling,
     bar,
@@ -20,6 +21,7 @@ from motionloom.cli.sampling import (
     report,
     write,
 )
+from motionloom.cli.skeletons import Target, put_all
 from motionloom.interruption import held_back
 
 if TYPE_CHECKING:
@@ -37,7 +39,9 @@ def add(subparsers) -> None:
     """Register `generate`."""
     parser = subparsers.add_parser("generate", help="make motions from words")
     parser.add_argument("prompts", nargs="*", metavar="PROMPT", help="what the person does, such as 'a person walks'")
-    parser.add_argument("--from", dest="file", type=Path, metavar="FILE", help="a text file with one prompt per line")
+    parser.add_argument(
+        "--from", dest="file", type=Path, metavar="FILE", help="a text file with one prompt per line, - for stdin"
+    )
     parser.add_argument(
         "--seconds", type=float,
         help="length of each motion (default 5; of several actions in a sentence what they take)",
@@ -57,16 +61,17 @@ def add(subparsers) -> None:
 
 def _generate(arguments: argparse.Namespace) -> int:
     prompts = _prompts(arguments)
-    outs = check_outs(arguments)
+    outs, target = check_outs(arguments)
     check_count(arguments, most=MAX_MOTIONS)
     if len(prompts) * arguments.count > MAX_MOTIONS:
         fail(f"{len(prompts)} prompts, {arguments.count} of each, are too many; at most {MAX_MOTIONS:,} in one call")
     captions = [prompt for prompt in prompts for _ in range(arguments.count)]
-    files = places(outs, len(captions))
+    files = places(outs, len(captions), target=target)
+    check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
     timelines = {prompt: _timeline(arguments, prior, prompt) for prompt in prompts}
     remarks = remark_unknown(prior, [segment.text for found in timelines.values() for segment in found.segments])
-    made = _Made(files, captions)
+    made = _Made(files, captions, target)
     interrupted = _make(arguments, prior, [timelines[caption] for caption in captions], made)
     motions = [
         {"prompt": caption, "seed": arguments.seed + i, "segments": _segments(timelines[caption])}
@@ -88,6 +93,8 @@ class _Made:
     files: Sequence[Sequence[Path]]
     """For each ``--out`` a file per motion, or one that shows them all."""
     captions: Sequence[str]
+    target: Target | None = None
+    """The skeleton that they are put on."""
     count: int = 0
     """Motions that are finished."""
     sampling: float = 0.0
@@ -103,12 +110,13 @@ class _Made:
     def add(self, motions: "Sequence[Motion]") -> None:
         """Write the motions that come next, all of them, before an interruption is heard."""
         with held_back():
+            motions = put_all(self.target, list(motions))
             first, self.count = self.count, self.count + len(motions)
             self._shown += motions if any(len(several) == 1 for several in self.files) else ()
             for several in self.files:
                 if len(several) == 1:
                     continue
-                write(motions, several[first : self.count], self.captions[first : self.count])
+                write(motions, several[first : self.count], self.captions[first : self.count], self.target)
                 self._files |= dict.fromkeys(several[first : self.count])
 
     def finish(self) -> None:
@@ -116,7 +124,7 @@ class _Made:
         with held_back():
             for several in self.files:
                 if len(several) == 1 and self.count:
-                    write(self._shown, several, self.captions[: self.count])
+                    write(self._shown, several, self.captions[: self.count], self.target)
                     self._files[several[0]] = None
 
 
@@ -148,14 +156,24 @@ def _segments(timeline: "Timeline") -> list[dict[str, object]]:
     ]
 
 
+LONGEST = 30.0
+"""Seconds of one sentence above which a long motion is meant."""
+
+
 def _prompts(arguments: argparse.Namespace) -> list[str]:
-    prompts = [*arguments.prompts, *(_lines(arguments.file) if arguments.file else ())]
+    prompts = [*one_sentence(arguments.prompts), *(_lines(arguments.file) if arguments.file else ())]
     if not prompts:
         fail("no prompt; say what the person does, such as: motionloom generate 'a person walks forward'")
     if len(prompts) > MAX_PROMPTS:
         fail(f"{len(prompts)} prompts are too many for one call; give at most {MAX_PROMPTS}")
     for prompt in prompts:
         check_prompt(prompt)
+    if arguments.seconds is not None and arguments.seconds > LONGEST:
+        print(
+            f"note: {arguments.seconds:g} s are long for one sentence; several that follow each other are made with: "
+            "motionloom compose 'a person walks' 'a person sits down'",
+            file=sys.stderr,
+        )
     return prompts
 
 
@@ -163,7 +181,8 @@ def _lines(file: Path) -> list[str]:
     from motionloom.io.text import read_text
 
     try:
-        text = read_text(file, max_bytes=16_000_000).decode("utf-8")
+        read = sys.stdin.buffer.read(16_000_000) if str(file) == "-" else read_text(file, max_bytes=16_000_000)
+        text = read.decode("utf-8")
     except UnicodeDecodeError:
         fail(f"{file} is not UTF-8 text; save it as UTF-8 with one prompt per line")
     return [line.strip() for line in text.splitlines() if line.strip()]

@@ -6,9 +6,12 @@ from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionloom.cli.futures import FORMATS, Long, Manner, Target, targets, write_futures
-from motionloom.cli.reading import add_reading, as_seconds, crop, note_rate, read_clip
+from motionloom.cli.futures import FORMATS, Long, Manner, targets, write_futures
+from motionloom.cli.futures import Target as Files
+from motionloom.cli.newcomers import check_overwriting
+from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import bar, check_count, fail
+from motionloom.cli.skeletons import Target, add_skeleton, read_target
 
 if TYPE_CHECKING:
     from motionloom.goals.hold import Hold
@@ -105,6 +108,7 @@ def _add_sampling(parser: argparse.ArgumentParser, other: str) -> None:
     )
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
+    add_skeleton(parser, own="PAST's")
     add_reading(parser)
 
 
@@ -112,8 +116,12 @@ def run_predict(arguments: argparse.Namespace) -> int:
     """``motionloom predict PAST``."""
     _check(arguments, longest=DAY)
     outs = arguments.out or [Path("futures")]
-    wanted = targets(outs, arguments.count, arguments.format or ["bvh"], pictures=not arguments.no_picture)
-    past, manner = _read_past(arguments)
+    skin = read_target(arguments, [*outs, *(Path(f"future.{one}") for one in arguments.format or ())])
+    own = skin and skin.suffix
+    formats = arguments.format or [own[1:] if own else "bvh"]
+    wanted = targets(outs, arguments.count, formats, pictures=not arguments.no_picture, own=own)
+    check_overwriting(arguments, [file for one in wanted for file in one.files])
+    past, manner = _read_past(arguments, skin)
     horizon = round(arguments.seconds * past.fps)
     _check_size(arguments, past, horizon, wanted)
     hold = _hold(arguments, past, horizon)
@@ -142,10 +150,13 @@ def run_switch(arguments: argparse.Namespace) -> int:
 
     _check(arguments, longest=LONG)
     outs = arguments.out or [Path("switch.bvh")]
+    skin = read_target(arguments, outs)
+    own = skin and skin.suffix
     for out in outs:
-        check_output(out)  # files, and no folder
-    wanted = targets(outs, arguments.count, [], pictures=False)
-    past, manner = _read_past(arguments)
+        check_output(out, own=own)  # files, and no folder
+    wanted = targets(outs, arguments.count, [], pictures=False, own=own)
+    check_overwriting(arguments, [file for one in wanted for file in one.files])
+    past, manner = _read_past(arguments, skin)
     _check_size(arguments, past, round(arguments.seconds * past.fps), wanted)
     target = _like_past(arguments, arguments.target, past)
     _check_poses(arguments, (len(past) + len(target) + round(arguments.seconds * past.fps)) * len(past.skeleton))
@@ -236,12 +247,13 @@ def _caption(arguments: argparse.Namespace) -> str:
     return arguments.past.stem if target is None else f"{arguments.past.stem} to {target.stem}"
 
 
-def _read_past(arguments: argparse.Namespace) -> "tuple[Motion, Manner]":
+def _read_past(arguments: argparse.Namespace, skin: Target | None) -> "tuple[Motion, Manner]":
     whole, unit, orders = read_clip(arguments, arguments.past)
+    check_size(arguments, arguments.past, whole)
     past = crop(whole, arguments)
     if len(past) < 2:
         fail(f"{arguments.past} has one frame here, and a past has at least two; only they say where the person goes")
-    return past, Manner(unit or 1.0, orders)
+    return past, Manner(unit or 1.0, orders, skin)
 
 
 def _like_past(arguments: argparse.Namespace, path: Path, past: "Motion") -> "Motion":
@@ -333,7 +345,7 @@ def _check(arguments: argparse.Namespace, *, longest: float) -> None:
         fail(f"--guidance must be -100 to 100, usually about 1; got {arguments.guidance:g}")
 
 
-def _check_size(arguments: argparse.Namespace, past: "Motion", horizon: int, wanted: list[Target]) -> None:
+def _check_size(arguments: argparse.Namespace, past: "Motion", horizon: int, wanted: list[Files]) -> None:
     """Refuse what no file or memory holds, and less than a frame."""
     from motionloom.io.stream import check_length
 

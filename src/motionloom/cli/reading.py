@@ -17,7 +17,10 @@ def add_reading(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--unit", type=as_unit, metavar="UNIT", help="unit of a BVH or ASF read: m, cm, inch, or metres"
     )
-    command.add_argument("--up", choices=("y", "z"), default="y", help="the axis that is up in the file (default y)")
+    command.add_argument("--up", choices=("y", "z"), help="the axis that is up in the file (default: as people stand)")
+    command.add_argument(
+        "--clip", metavar="NAME|NUMBER", help="animation of a .glb, .gltf or .vrm (default: the first)"
+    )
     command.add_argument(
         "--asf", type=Path, metavar="FILE", help="skeleton of an AMC file (default: the one beside it)"
     )
@@ -78,22 +81,55 @@ def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float
         file = read_bvh(path, fps=arguments.source_fps, unit=arguments.unit)
         motion, unit, orders = file.motion, file.unit, dict(file.orders)
     else:
-        motion = io.load(path, fps=arguments.source_fps, asf=arguments.asf, unit=arguments.unit)
-    return (stand_up(motion) if arguments.up == "z" else motion), unit, orders
+        clip = arguments.clip if path.suffix.lower() in io.GLTF else None
+        motion = io.load(path, fps=arguments.source_fps, asf=arguments.asf, unit=arguments.unit, clip=clip)
+    return _upright(motion, path, arguments), unit, orders
 
 
-def stand_up(motion: "Motion") -> "Motion":
-    """From Z up to Y up: a quarter turn of everything about X."""
-    from dataclasses import replace
+def _upright(motion: "Motion", path: Path, arguments: argparse.Namespace) -> "Motion":
+    """The motion with +Y up, as the line says or as people stand; a remark where the file was turned."""
+    from motionloom.errors import MotionloomError
+    from motionloom.retarget.upright import stood_up, up_axis
 
-    import numpy as np
+    wanted = arguments.up
+    if wanted is None and path.suffix.lower() not in (".bvh", ".amc"):
+        return motion  # these formats say what is up
+    try:
+        found = up_axis(motion, getattr(arguments, "source_map", None))
+    except MotionloomError:
+        return stood_up(motion) if wanted == "z" else motion  # no person: nothing is known
+    if wanted == "z" and found == "y":
+        raise MotionloomError(f"--up z, but the person in {path} stands along Y, which is up then; leave out --up")
+    if wanted is None and found == "z?":
+        raise MotionloomError(
+            f"the person in {path} lies along Z all the time; say --up z if Z is up in the file, --up y if they do lie"
+        )
+    if wanted is None and found == "z":
+        print(f"note: Z is up in {path}, as the person stands; it was turned (--up y leaves it)", file=sys.stderr)
+    return stood_up(motion) if wanted == "z" or (wanted is None and found == "z") else motion
 
-    from motionloom import rotations as rot
 
-    turn = rot.rotvec_to_quat(np.array([-np.pi / 2, 0.0, 0.0]))
-    rotations = motion.rotations.copy()
-    rotations[:, 0] = rot.multiply(turn, rotations[:, 0])
-    return replace(motion, root=rot.rotate(turn, motion.root), rotations=rotations)
+HUMAN_LEGS = (0.5, 1.3)
+"""Metres of thigh and shin."""
+
+
+def check_size(arguments: argparse.Namespace, path: Path, motion: "Motion") -> None:
+    """Ask for the unit where bones are of no human length; a file of our own (.npz) or in a stated unit is believed."""
+    from motionloom.errors import MotionloomError
+    from motionloom.retarget.anatomy import read_body
+
+    if arguments.unit is not None or path.suffix.lower() in (".npz", ".amc"):
+        return
+    try:
+        leg = read_body(motion.skeleton).leg
+    except MotionloomError:
+        return  # no person: no length is known
+    low, high = HUMAN_LEGS if path.suffix.lower() == ".bvh" else (0.2, 3.0)  # characters are dwarfs and giants
+    if not low <= leg <= high:
+        raise MotionloomError(
+            f"the legs of the person in {path} would be {leg:.3g} m long; say which unit the file is in with --unit "
+            "(m, dm, cm, mm, inch, or metres; --unit m takes it as it is)"
+        )
 
 
 def crop(motion: "Motion", arguments: argparse.Namespace) -> "Motion":

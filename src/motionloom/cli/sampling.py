@@ -7,6 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from motionloom.cli.newcomers import one_sentence, suggestion, with_options
+from motionloom.cli.skeletons import Target, add_skeleton, read_target
+
 if TYPE_CHECKING:
     from motionloom.motion import Motion
     from motionloom.weights.prior import Prior
@@ -15,8 +18,13 @@ MAX_CHARACTERS = 20_000
 MAX_COUNT = 1000
 
 
-def add_sampling(parser: argparse.ArgumentParser, *, own_rate: str = "the model's 20") -> None:
-    """``--out``, and how and where motions are sampled; ``own_rate`` is the files' without ``--fps``, in words."""
+def add_sampling(
+    parser: argparse.ArgumentParser, *, own_rate: str = "the model's 20", own_skeleton: str = "the uniform person's"
+) -> None:
+    """``--out``, how and where motions are sampled, and ``--skeleton``.
+
+    ``own_rate`` and ``own_skeleton`` are those of the files without ``--fps`` and ``--skeleton``, in words.
+    """
     parser.add_argument(
         "--out", type=Path, action="append", metavar="NAME",
         help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default motion.bvh)",
@@ -30,6 +38,7 @@ def add_sampling(parser: argparse.ArgumentParser, *, own_rate: str = "the model'
     parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
+    add_skeleton(parser, own=own_skeleton)
 
 
 def add_adapters(parser: argparse.ArgumentParser) -> None:
@@ -54,11 +63,13 @@ def take_text_anywhere(parser: argparse.ArgumentParser) -> None:
     """Let TEXT stand behind options too: argparse gives up on an optional word once it has passed its place."""
 
     def parse(args=None, namespace=None):
-        found, unknown = argparse.ArgumentParser.parse_known_args(parser, args, namespace)
-        if found.text is None and len(unknown) == 1 and not unknown[0].startswith("-"):
-            found.text, unknown = unknown[0], []
+        given = None if args is None else with_options(parser, args)
+        found, unknown = argparse.ArgumentParser.parse_known_args(parser, given, namespace)
+        words = [*([] if found.text is None else [found.text]), *unknown]
+        if not any(word.startswith("-") for word in unknown) and len(one_sentence(words)) == 1:
+            found.text, unknown = one_sentence(words)[0], []
         if unknown:
-            parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+            parser.error(f"unrecognized arguments: {' '.join(unknown)}{suggestion(parser, unknown)}")
         return found, unknown
 
     parser.parse_known_args = parse  # type: ignore[method-assign]
@@ -71,18 +82,19 @@ def fail(message: str) -> NoReturn:
     raise MotionloomError(message)
 
 
-def check_outs(arguments: argparse.Namespace) -> list[Path]:
-    """The files to write; refuses places, names and frame rates that cannot be, before any work."""
+def check_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target | None]:
+    """The files to write and the skeleton; refuses what cannot be, before any work."""
     from motionloom.io import check_output
 
     outs = arguments.out or [Path("motion.bvh")]
+    target = read_target(arguments, outs)
     for out in outs:
-        check_output(out)
+        check_output(out, own=target and target.suffix)
     if len({out.resolve() for out in outs}) != len(outs):
         fail("the same --out is given twice; give each file its own name")
     if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
         fail(f"--fps must be 1 to 1000; got {arguments.fps:g}")
-    return outs
+    return outs, target
 
 
 def check_count(arguments: argparse.Namespace, *, most: int = MAX_COUNT) -> None:
@@ -99,7 +111,7 @@ def numbered(out: Path, count: int) -> list[Path]:
     return [out.with_name(f"{out.stem}_{i:0{width}d}{out.suffix}") for i in range(count)]
 
 
-def places(outs: Sequence[Path], count: int, *, sheets: bool = True) -> list[list[Path]]:
+def places(outs: Sequence[Path], count: int, *, sheets: bool = True, target: Target | None = None) -> list[list[Path]]:
     """The files of ``count`` motions for each ``--out``, refused where nothing can be written.
 
     sheets: a picture shows all motions, and so is one file.
@@ -108,14 +120,18 @@ def places(outs: Sequence[Path], count: int, *, sheets: bool = True) -> list[lis
 
     several = [[out] if sheets and out.suffix.lower() == ".png" else numbered(out, count) for out in outs]
     for place in (place for one in several for place in one):
-        check_output(place)
+        check_output(place, own=target and target.suffix)
     return several
 
 
-def write(motions: "Sequence[Motion]", files: Sequence[Path], captions: Sequence[str]) -> list[Path]:
-    """Motions into the files of one ``--out``."""
+def write(
+    motions: "Sequence[Motion]", files: Sequence[Path], captions: Sequence[str], target: Target | None = None
+) -> list[Path]:
+    """Motions, on the target's skeleton, into the files of one ``--out``."""
     from motionloom.io import save
 
+    if target is not None and len(files) == len(motions):
+        return [target.save(one, file, caption=said) for one, file, said in zip(motions, files, captions, strict=True)]
     if len(files) == 1:
         return [save(list(motions), files[0], captions=captions)]
     return [save(one, file, captions=[said]) for one, file, said in zip(motions, files, captions, strict=True)]

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionloom.cli.reading import as_rate, as_unit, stand_up
+from motionloom.cli.reading import as_rate, as_unit
 from motionloom.cli.sampling import fail
 
 if TYPE_CHECKING:
@@ -93,6 +93,7 @@ def _read(arguments: argparse.Namespace, captioned: "list[CaptionedClip]") -> "t
     from motionloom.data.clip_check import check_file
     from motionloom.errors import MotionloomError
     from motionloom.io import load
+    from motionloom.retarget.upright import stood_up
 
     motions, findings = [], []
     for one in captioned:
@@ -100,7 +101,7 @@ def _read(arguments: argparse.Namespace, captioned: "list[CaptionedClip]") -> "t
         try:
             unit = arguments.unit if one.path.suffix.lower() in (".bvh", ".amc") else None
             found = load(one.path, fps=arguments.source_fps, unit=unit)
-            found = stand_up(found) if arguments.up == "z" else found
+            found = stood_up(found) if arguments.up == "z" else found
             motions.append(found)
         except MotionloomError as error:
             found = error

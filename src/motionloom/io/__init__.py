@@ -1,29 +1,50 @@
 """Motion files, in and out: the suffix picks the format."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import check_place
 from motionloom.motion import Motion
 
-READS = (".bvh", ".amc", ".glb", ".npz")
-WRITES = (".bvh", ".glb", ".npz", ".mp4", ".gif", ".png")
-_ONE_PERSON = (".bvh", ".npz")
+READS = (".bvh", ".amc", ".glb", ".gltf", ".vrm", ".vrma", ".npz")
+GLTF = (".glb", ".gltf", ".vrm", ".vrma")
+WRITES = (".bvh", ".glb", ".vrma", ".npz", ".mp4", ".gif", ".png")
+_ONE_PERSON = (".bvh", ".npz", ".vrma")
+_OWN = "that is written for a character of such a file: --skeleton hero{0} --out moving{0}; else write a .glb"
+_BLENDER = "Blender turns it into a .glb (docs/blender.md)"
+_WAYS_OUT = {
+    ".gltf": _OWN.format(".gltf"),
+    ".vrm": _OWN.format(".vrm"),
+    ".fbx": "write a .glb, which Blender turns into an .fbx (docs/blender.md)",
+    **dict.fromkeys((".usd", ".usdc", ".usdz", ".usda"), "write a .glb, which Blender turns into USD"),
+    ".dae": "write a .glb or .bvh",
+    ".blend": "write a .glb and import it in Blender (docs/blender.md)",
+}
+_WAYS_IN = dict.fromkeys((".fbx", ".dae", ".blend", ".usd", ".usda", ".usdc", ".usdz"), _BLENDER)
 
 
 def load(
-    path: Path | str, *, fps: float | None = None, asf: Path | str | None = None, unit: float | None = None
+    path: Path | str,
+    *,
+    fps: float | None = None,
+    asf: Path | str | None = None,
+    unit: float | None = None,
+    clip: int | str | None = None,
 ) -> Motion:
-    """Read a BVH, AMC (with its ASF), GLB or NPZ file as a `Motion` in metres.
+    """Read a BVH, AMC (with its ASF), GLB, glTF, VRM or NPZ file as a `Motion` in metres.
 
     ``fps`` replaces the rate the file states (AMC files state none: 120), without resampling. ``unit`` is metres per
-    unit of length for BVH and ASF (None: guessed, or what the ASF says). ``asf`` is the skeleton of an AMC file
-    (None: looked for beside it). Raises `MotionloomError` for a file that is missing, damaged or of another kind.
+    unit of length for BVH, ASF and glTF (None: guessed, what the ASF says, metres). ``asf`` is the skeleton of an AMC
+    file (None: looked for beside it). ``clip`` is the number, from 1, or the name of the animation in a glTF file.
+    Raises `MotionloomError` for a file that is missing, damaged or of another kind.
     """
     path = Path(path)
     suffix = path.suffix.lower()
     _check(path, suffix, fps, unit=unit, asf=asf)
+    if clip is not None and suffix not in GLTF:
+        raise MotionloomError(f"{path} holds one motion; a clip is chosen in .glb, .gltf and .vrm files")
     if suffix == ".bvh":
         from motionloom.io.bvh import load_bvh
 
@@ -38,8 +59,9 @@ def load(
         return load_npz(path, fps=fps)
     from motionloom.io.gltf import load_glb
 
-    motion = load_glb(path)
-    return motion if fps is None else Motion(motion.skeleton, fps, motion.root, motion.rotations, motion.translations)
+    motion = load_glb(path, clip=clip)
+    motion = motion if fps is None else replace(motion, fps=fps)
+    return motion if unit is None else motion.scaled(unit)
 
 
 def _check(path: Path, suffix: str, fps: float | None, *, unit: float | None, asf: Path | str | None) -> None:
@@ -48,27 +70,28 @@ def _check(path: Path, suffix: str, fps: float | None, *, unit: float | None, as
     if suffix == ".asf":
         raise MotionloomError(f"{path} is a skeleton without a motion; name the .amc file instead")
     if suffix not in READS:
-        raise MotionloomError(
-            f"{path} cannot be read: its name must end in {', '.join(READS)}; it ends in {suffix or 'none'}"
-        )
+        hint = f"; {_WAYS_IN[suffix]}" if suffix in _WAYS_IN else f"; it ends in {suffix or 'none'}"
+        raise MotionloomError(f"{path} cannot be read: its name must end in {', '.join(READS)}{hint}")
     if fps is not None and not 1e-3 <= fps <= 1e5:
         raise MotionloomError(f"the frame rate must be a number from 0.001 to 100000; got {fps:g}")
     if unit is not None and not 1e-9 < unit < 1e9:
         raise MotionloomError(f"the unit must be a positive number of metres; got {unit:g}")
-    if unit is not None and suffix in (".glb", ".npz"):
-        raise MotionloomError(f"{path} is in metres by its format; a unit is for BVH and ASF files")
+    if unit is not None and suffix == ".npz":
+        raise MotionloomError(f"{path} is in metres by its format; a unit is for BVH, ASF and glTF files")
     if asf is not None and suffix != ".amc":
         raise MotionloomError(f"{path} has its own skeleton; an ASF file is for AMC files")
 
 
-def check_output(path: Path | str) -> Path:
-    """The path, if `save` could write there; ask before long work. Raises `MotionloomError` otherwise."""
+def check_output(path: Path | str, *, own: str | None = None) -> Path:
+    """The path, if `save` could write there; ask before long work. Raises `MotionloomError` otherwise.
+
+    ``own`` is a further suffix that may be written, that of a character's own file.
+    """
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix not in WRITES and not path.is_dir():
-        raise MotionloomError(
-            f"cannot write {path}: its name must end in {', '.join(WRITES)}; it ends in {suffix or 'none'}"
-        )
+    if suffix not in (*WRITES, own) and not path.is_dir():
+        hint = f"; {_WAYS_OUT[suffix]}" if suffix in _WAYS_OUT else f"; it ends in {suffix or 'none'}"
+        raise MotionloomError(f"cannot write {path}: its name must end in {', '.join(WRITES)}{hint}")
     check_place(path)
     return path
 
@@ -91,6 +114,10 @@ def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequ
         from motionloom.io.npz import save_npz
 
         return save_npz(several[0], path)
+    if suffix == ".vrma":
+        from motionloom.io.vrma import save_vrma
+
+        return save_vrma(several[0], path)
     if suffix == ".glb":
         from motionloom.io.gltf import save_glb
 
@@ -150,7 +177,7 @@ def load_scene(path: Path | str) -> list[Motion]:
     """
     path = Path(path)
     _check(path, path.suffix.lower(), None, unit=None, asf=None)
-    if path.suffix.lower() != ".glb":
+    if path.suffix.lower() not in GLTF:
         return [load(path)]
     from motionloom.io.gltf import load_glb_people
 

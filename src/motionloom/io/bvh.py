@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io import text
-from motionloom.io.bvh_writer import SAME_PLACE, end_name, save_bvh
+from motionloom.io.bvh_writer import SAME_PLACE, end_name, moving_offsets, save_bvh
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
 
@@ -328,6 +328,17 @@ def _rotations(joints: list[_Joint], values: Array) -> tuple[Array, dict[str, st
         angles = np.radians(values[:, [columns for _, columns in members]])
         rotations[:, [j for j, _ in members]] = rot.euler_to_quat(order, angles)
     return rotations, {joints[j].name: order for order, members in groups.items() for j, _ in members}
+
+
+def unit_that_reads_back(motion: Motion, unit: float) -> float:
+    """The unit to write a motion in, so that `guess_unit` finds its size again: ``unit``, else metres or another.
+
+    Where no unit does, as for a giant, ``unit`` itself: who reads the file has to be told.
+    """
+    offsets, moving = moving_offsets(motion)
+    lengths = np.where(np.isin(np.arange(len(offsets)), list(moving))[:, None], 0.0, offsets)
+    tries = (unit, 1.0, 0.01, 0.0254, 0.0254 / 0.45, 0.001)
+    return next((u for u in tries if abs(guess_unit(motion.skeleton.parents, lengths / u) / u - 1) < 1e-9), unit)
 
 
 def guess_unit(parents: tuple[int, ...], offsets: Array) -> float:

@@ -66,7 +66,7 @@ class GrowingBvh:
                 raise MotionloomError(f"an order of rotations is made of X, Y and Z, such as ZXY; got {word!r}")
         if not 1e-9 < unit < 1e9:
             raise MotionloomError(f"the unit must be a positive number of metres; got {unit}")
-        offsets, self.moving = _offsets(first)
+        offsets, self.moving = moving_offsets(first)
         sequence = _depth_first(skeleton)
         tips = set(skeleton.ends) - set(skeleton.parents) - self.moving - {0}
         self.turning = [j for j in sequence if j not in tips]
@@ -76,7 +76,9 @@ class GrowingBvh:
         self.file, self.unit, self.frames = file, unit, 0
         self.row = ("%.6f " * sum(6 if j == 0 or j in self.moving else 3 for j in self.turning))[:-1] + "\n"
         self.places = len(str(frames)) if frames else 12
-        lines = _hierarchy(skeleton, sequence, tips, orders=self.orders, moving=self.moving, offsets=offsets / unit)
+        lines = _hierarchy(
+            skeleton, sequence, tips, orders=self.orders, moving=self.moving, offsets=_without_root(offsets) / unit
+        )
         seconds = f"{1 / first.fps:.8f}" if 0.01 < first.fps < 1000 else f"{1 / first.fps:.12g}"
         self.count_at = _put(file, "\n".join([*lines, "MOTION", "Frames: "]).encode())
         self.end = self.count_at + _put(file, f"{0:>{self.places}}\nFrame Time: {seconds}\n".encode())
@@ -111,6 +113,12 @@ class GrowingBvh:
         return np.round(np.concatenate(columns, axis=1), 6) + 0.0  # + 0.0: no minus zero
 
 
+def _without_root(offsets: Array) -> Array:
+    """Offsets (joints, 3) with the root's at zero: its position channels say where it is, and some programs (three.js)
+    add its OFFSET to them while others (Blender) do not."""
+    return np.concatenate([np.zeros((1, 3)), offsets[1:]])
+
+
 def _put(file: FileIO, data: bytes) -> int:
     """Write all of it, however little the system takes at once; gives how much that was."""
     left = memoryview(data)
@@ -119,7 +127,7 @@ def _put(file: FileIO, data: bytes) -> int:
     return len(data)
 
 
-def _offsets(motion: Motion) -> tuple[Array, set[int]]:
+def moving_offsets(motion: Motion) -> tuple[Array, set[int]]:
     """(joints, 3) rest offsets in metres and the joints, root aside, whose place in their parent changes."""
     offsets = motion.skeleton.offsets.copy()
     moving: set[int] = set()

@@ -4,6 +4,7 @@ import base64
 import binascii
 import json
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -84,10 +85,26 @@ class Document:
             raise self.bad(f"{what} holds numbers that are not finite")
         return values
 
+    def matrices(self, number: Any, what: str) -> Array | None:
+        """(count, 3, 3) the linear parts of an accessor of 4 x 4 matrices; None where none can be read."""
+        if number is None:
+            return None
+        accessors = self.items("accessors")
+        view = accessors[self.index(number, len(accessors), "accessors")].get("bufferView")
+        views = self.items("bufferViews")
+        if isinstance(view, int) and 0 <= view < len(views) and compressed(views[view]):
+            return None
+        return self.accessor(number, "MAT4", what).reshape(-1, 4, 4).transpose(0, 2, 1)[:, :3, :3]
+
     def _view(self, accessor: dict[str, Any], dtype: np.dtype, shape: tuple[int, int], what: str) -> np.ndarray:
         """The raw entries of an accessor, checked against the bytes that are really there."""
         views = self.items("bufferViews")
         view = views[self.index(accessor.get("bufferView"), len(views), f"buffer views ({what})")]
+        if compressed(view):
+            raise self.bad(
+                f"{what} are compressed by meshopt, which is not read; export it without compression "
+                "(gltfpack: without -c)"
+            )
         data = self.buffers[self.index(view.get("buffer"), len(self.buffers), "buffers")]
         start, length = self._size(view, "byteOffset", what), self._size(view, "byteLength", what)
         row = dtype.itemsize * shape[1]
@@ -127,11 +144,50 @@ def read_document(path: str | Path) -> Document:
     version = asset.get("version") if isinstance(asset, dict) else None
     if not isinstance(version, str) or not version.startswith("2."):
         raise document.bad(f"it declares version {shown(str(version))}; only glTF 2.x is read")
-    required = content.get("extensionsRequired") or []
-    if isinstance(required, list) and "EXT_meshopt_compression" in required:
-        raise document.bad("its data are compressed; export it without compression")
     buffers = [_buffer(document, i, entry, binary) for i, entry in enumerate(document.items("buffers"))]
     return Document(name, content, tuple(buffers))
+
+
+def compressed(owner: dict[str, Any]) -> bool:
+    """Whether a buffer view or a buffer holds, or stands for, data that meshopt has compressed."""
+    extensions = owner.get("extensions")
+    return isinstance(extensions, dict) and bool(
+        {"EXT_meshopt_compression", "KHR_meshopt_compression"} & extensions.keys()
+    )
+
+
+@dataclass(frozen=True)
+class Chunks:
+    """What a GLB holds beside its JSON."""
+
+    binary: bytes
+    others: tuple[tuple[bytes, bytes], ...]
+    """Kind and content of chunks that are neither JSON nor binary."""
+
+
+def read_document_chunks(path: str | Path) -> Chunks | None:
+    """The binary parts of a .glb; None for a .gltf."""
+    data = read_bytes(path)
+    if data[:4] != b"glTF":
+        return None
+    found, at = [], 12
+    while at + 8 <= len(data):
+        length = struct.unpack_from("<I", data, at)[0]
+        found.append((data[at + 4 : at + 8], data[at + 8 : at + 8 + length]))
+        at += 8 + length
+    binary = next((content for kind, content in found if kind == b"BIN\0"), b"")
+    return Chunks(binary, tuple(chunk for chunk in found if chunk[0] not in (b"JSON", b"BIN\0")))
+
+
+def pack_glb(content: dict[str, Any], binary: bytes, others: Sequence[tuple[bytes, bytes]] = ()) -> bytes:
+    """A GLB of a JSON part, a binary part and further chunks."""
+    text = json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
+    parts = [(b"JSON", text + b" " * (-len(text) % 4))]
+    if binary:
+        parts.append((b"BIN\0", binary + bytes(-len(binary) % 4)))
+    parts += others
+    body = b"".join(struct.pack("<I", len(part)) + kind + part for kind, part in parts)
+    return b"glTF" + struct.pack("<II", 2, 12 + len(body)) + body
 
 
 def _no_constant(word: str) -> float:
@@ -165,6 +221,8 @@ def _chunks(data: bytes, name: str) -> tuple[bytes, bytes | None]:
 
 def _buffer(document: Document, number: int, entry: dict[str, Any], binary: bytes | None) -> bytes:
     uri = entry.get("uri")
+    if uri is None and compressed(entry):
+        return b""  # it stands for what is decompressed
     if uri is None:
         if number != 0 or binary is None:
             raise document.bad(f"buffer {number} has no data")

@@ -72,8 +72,13 @@ def save_glb(
     if names is not None and len(names) != len(motions):
         raise MotionloomError(f"{len(motions)} motions need as many names; got {len(names)}")
     with atomic_path(path) as temp:
-        temp.write_bytes(_assemble(motions, body, names))
+        temp.write_bytes(glb_bytes(motions, body=body, names=names))
     return Path(path)
+
+
+def glb_bytes(motions: Sequence[Motion], *, body: bool = True, names: Sequence[str] | None = None) -> bytes:
+    """What `save_glb` writes."""
+    return _assemble(motions, body, names)
 
 
 def _assemble(motions: Sequence[Motion], with_body: bool, names: Sequence[str] | None) -> bytes:

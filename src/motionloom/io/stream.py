@@ -5,7 +5,7 @@ Either way the file appears whole, at its place, when the stream is closed, also
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -108,7 +108,9 @@ def open_stream(
     path = check_output(path)
     if total is not None:
         check_length(path, total=total, fps=fps, joints=joints)
-    return _Growing(path, total, order, unit) if path.suffix.lower() == ".bvh" else _Kept(path, caption)
+    if path.suffix.lower() == ".bvh":
+        return _Growing(path, total, order, unit)
+    return Kept(path, lambda whole: save(whole, path, captions=[caption]))
 
 
 def check_length(path: Path, *, total: int, fps: float, joints: int = PERSON) -> None:
@@ -159,12 +161,12 @@ class _Dropped(Exception):
     """Nothing was written."""
 
 
-class _Kept(Stream):
-    """Formats that need the whole motion."""
+class Kept(Stream):
+    """A file that needs the whole motion: ``write`` is called with it at the end."""
 
-    def __init__(self, path: Path, caption: str) -> None:
+    def __init__(self, path: Path, write: Callable[[Motion], object]) -> None:
         super().__init__(path)
-        self._caption = caption
+        self._save = write
         self._pieces: list[Motion] = []
 
     def _write(self, piece: Motion) -> None:
@@ -173,7 +175,7 @@ class _Kept(Stream):
 
     def _finish(self) -> None:
         whole, self._pieces = joined(self._pieces), []
-        save(whole, self.path, captions=[self._caption])
+        self._save(whole)
 
     def _drop(self) -> None:
         self._pieces = []

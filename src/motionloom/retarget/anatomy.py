@@ -52,6 +52,8 @@ CHILD: tuple[int | None, ...] = (
     None,
 )
 """The SMPL joint each SMPL joint's bone runs to."""
+BROADEST = 0.35
+"""Human hip joints are at most so far apart, in lengths of the leg."""
 LEGS, FEET, TOES = (1, 2, 4, 5), (7, 8), (10, 11)
 ARMS = (13, 14, 16, 17, 18, 19, 20, 21)
 HEAD = 15
@@ -63,7 +65,7 @@ class Body:
 
     skeleton: Skeleton
     points: Array
-    """(22, joints): SMPL positions = points @ joint positions."""
+    """(22, joints): SMPL positions = points @ joint positions, and `tips` where a joint is missing."""
     drivers: tuple[int | None, ...]
     """Per SMPL joint the skeleton's joint that turns it."""
     rest: Array
@@ -76,11 +78,32 @@ class Body:
     """(3,) up in rest pose; +Y where the rest pose is no standing person."""
     toe_height: float
     """Metres from the ground up to the toe joint on a flat foot."""
+    tips: Array
+    """(22, 3) metres in the frame of the joint that turns it: where a foot without toes has them; 0 elsewhere."""
+
+    @property
+    def on_floor(self) -> bool:
+        """Whether the rest pose is a person who stands on the ground y = 0."""
+        return self.skeleton.on_floor and self.upright and float(self.up[1]) > 0.9
+
+    @property
+    def broad(self) -> float:
+        """Metres by which each hip joint is further out than on any human body; 0 on those."""
+        return max(0.0, float(np.linalg.norm(self.rest[1] - self.rest[2])) - BROADEST * self.leg) / 2
 
     @property
     def leg(self) -> float:
         """Metres of thigh and shin, mean of both sides."""
         return float(np.mean([self.bone(1) + self.bone(4), self.bone(2) + self.bone(5)]))
+
+    def places(self, positions: Array, world: Array) -> Array:
+        """(frames, 22, 3): the SMPL joints, of the joints' positions and world rotations (frames, joints, 3 and 4)."""
+        found = np.einsum("sj,fjc->fsc", self.points, positions)
+        for j in np.flatnonzero(np.abs(self.tips).max(axis=1)):
+            driver = self.drivers[j]
+            assert driver is not None
+            found[:, j] += rot.rotate(world[:, driver], self.tips[j][None])
+        return found
 
     def bone(self, joint: int) -> float:
         """Metres from an SMPL joint to the one its bone runs to."""
@@ -94,13 +117,41 @@ def read_body(skeleton: Skeleton, override: Override | None = None) -> Body:
     points = found.matrix(skeleton)
     rest = points @ skeleton.rest_positions()
     _check_legs(skeleton, found, rest)
+    tips = _missing_toes(rest)
+    rest = rest + tips
+    if override is None and _on_four_legs(rest):
+        raise MotionloomError(
+            "the skeleton is no person but an animal on four legs: at rest its spine lies along the ground and its "
+            "arms reach it; name its joints in a joint map to read it as a person all the same"
+        )
     axes = _rest_axes(rest)
+    drivers = found.drivers(skeleton)
     if axes is not None:
-        height = _toe_height(skeleton, found, rest, axes[1])
-        return Body(skeleton, points, found.drivers(skeleton), rest, _rest_frames(rest, axes), True, axes[1], height)
+        stands = skeleton.on_floor and axes[1][1] > 0.9
+        height = float(rest[list(TOES), 1].mean()) if stands else _toe_height(skeleton, found, rest, axes[1])
+        return Body(skeleton, points, drivers, rest, _rest_frames(rest, axes), True, axes[1], height, tips)
     known = _is_bandai(skeleton)
     frames = _bandai_frames(rest) if known else _odd_frames(rest)
-    return Body(skeleton, points, found.drivers(skeleton), rest, frames, known, np.eye(3)[1], 0.0)
+    return Body(skeleton, points, drivers, rest, frames, known, np.eye(3)[1], 0.0, tips)
+
+
+def _on_four_legs(rest: Array) -> bool:
+    """Whether arms hang down beside the legs from a spine that is level."""
+    legs, arms = (rest[[7, 8]] - rest[[1, 2]]).sum(axis=0), (rest[[20, 21]] - rest[[16, 17]]).sum(axis=0)
+    spine = rest[12] - rest[0]
+    return float(_unit(legs) @ _unit(arms)) > 0.8 and abs(float(_unit(legs) @ _unit(spine))) < 0.5
+
+
+def _missing_toes(rest: Array) -> Array:
+    """(22, 3) from the ankle of a foot without toes to where they would be: ahead of it and a little lower."""
+    tips = np.zeros((22, 3))
+    up = _snap(rest[12] - rest[0])
+    ahead = _unit(np.cross(_snap(rest[1] - rest[2]), up))
+    leg = np.linalg.norm(rest[[4, 5]] - rest[[1, 2]], axis=-1) + np.linalg.norm(rest[[7, 8]] - rest[[4, 5]], axis=-1)
+    for foot, toe in zip(FEET, TOES):
+        if np.linalg.norm(rest[toe] - rest[foot]) < 1e-6:
+            tips[toe] = 0.16 * float(leg.mean()) * ahead - _fall(rest[foot], float(leg.mean())) * up
+    return tips
 
 
 def _check_legs(skeleton: Skeleton, found: JointMap, rest: Array) -> None:
@@ -114,6 +165,11 @@ def _check_legs(skeleton: Skeleton, found: JointMap, rest: Array) -> None:
             )
         if np.linalg.norm(rest[child] - rest[j]) < 1e-6:
             raise MotionloomError(f"the skeleton cannot be retargeted: the bone below {SMPL22.names[j]} has no length")
+
+
+def _fall(ankle: Array, leg: float) -> float:
+    """Metres from an ankle down to toes that nobody modelled; half way to the ground where that is close."""
+    return min(0.05 * leg, 0.5 * float(ankle[1])) if 0 < ankle[1] < 0.5 * leg else 0.05 * leg
 
 
 def frame(first: Array, second: Array) -> Array:

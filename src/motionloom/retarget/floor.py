@@ -34,10 +34,23 @@ class Stance:
     """(2,) rise of the ground per metre along x and z."""
     flat: NDArray[np.bool_]
     """(frames, 2) whether the left and the right foot stands flat: toe planted, ankle still."""
+    airborne: bool = False
+    """Whether the feet are never on the ground, which then is y = 0."""
 
     def ground(self, points: Array) -> Array:
         """(..., 2) height under points (..., 3) at which the left and the right toe joint are planted."""
         return self.levels + (points[..., [0, 2]] @ self.slope)[..., None]
+
+    def on_floor(self, height: float, *, slack: float) -> "Stance":
+        """The stance where the floor is known to be y = 0, on which toes stand at ``height``.
+
+        Feet that never come as low are in the air or on something, and stay there. Where planted feet are lower by
+        more than ``slack``, they are on another floor after all.
+        """
+        if not self.airborne and float(self.levels.min()) < height - slack:
+            return self
+        near = self.levels < height + slack
+        return Stance(np.full(2, height), np.zeros(2), self.flat & near)
 
     def under(self, toes: Array) -> Array:
         """(..., 2) height of the ground under the left and right toe (..., 2, 3)."""
@@ -52,7 +65,7 @@ def read_stance(places: Array, fps: float) -> Stance:
     lowest = float(np.percentile(heights.min(axis=1), 5))
     planted = slow & (heights < lowest + NEAR)
     if lowest > AIRBORNE:
-        return Stance(np.zeros(2), np.zeros(2), planted & False)
+        return Stance(np.zeros(2), np.zeros(2), planted & False, airborne=True)
     if planted.sum() < 3:
         return Stance(np.full(2, lowest), np.zeros(2), planted & flat)
     levels, slope = _plane(toes, planted)

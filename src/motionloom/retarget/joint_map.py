@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
-from motionloom.retarget.names import Parts, parts_by_name
+from motionloom.retarget.names import Parts, parts_by_name, read_word
 from motionloom.retarget.topology import common_ancestor, is_above, parts_by_shape, path_down
 from motionloom.skeleton import SMPL22, Skeleton
 
@@ -66,7 +66,8 @@ def joint_map(skeleton: Skeleton, override: Override | None = None) -> JointMap:
     ``override`` replaces single joints or all of them. Raises `MotionloomError` naming the joints that could not
     be found or that the override names wrongly.
     """
-    given = _read_override(skeleton, override)
+    named = {part: {joint: 1.0} for part, joint in skeleton.humanoid.items() if joint in skeleton.names}
+    given = named | _read_override(skeleton, override)
     if set(given) >= set(SMPL22.names):
         found: dict[str, dict[str, float]] = {}
     else:
@@ -141,23 +142,20 @@ def _shown(skeleton: Skeleton) -> str:
 
 def _missing(skeleton: Skeleton, parts: Parts) -> list[str]:
     """Needed parts that are absent, doubled or not in one line down a limb."""
-    lost = [part for part in _NEEDED if part not in parts]
+    lost = [part for part in _NEEDED if part not in parts and not _palm(skeleton, parts, part)]
     for side in ("left", "right"):
         for limb in (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")):
             for upper, lower in pairwise(limb):
                 a, b = parts.get(f"{side}_{upper}"), parts.get(f"{side}_{lower}")
                 if a is not None and b is not None and not is_above(skeleton, a, b):
                     lost.append(f"{side}_{lower}")
-    for side in ("left", "right"):
-        ankle = parts.get(f"{side}_ankle")
-        if ankle is not None and f"{side}_foot" not in parts and not skeleton.children(ankle):
-            lost.append(f"{side}_foot")
     return lost
 
 
 def _points(skeleton: Skeleton, parts: Parts) -> dict[str, dict[str, float]]:
     name = skeleton.names
-    points = {part: {name[parts[part]]: 1.0} for part in _NEEDED}
+    points = {part: {name[parts[part]]: 1.0} for part in _NEEDED if part in parts}
+    points |= {part: _hand_point(skeleton, parts, part) for part in _NEEDED if part not in parts}
     pelvis, chest, spine, neck, head = _trunk(skeleton, parts)
     points["pelvis"] = {name[pelvis]: 1.0}
     points |= _spine_points(skeleton, pelvis, spine, neck)
@@ -180,6 +178,8 @@ def _trunk(skeleton: Skeleton, parts: Parts) -> tuple[int, int, list[int], int, 
         pelvis = top
     head = parts.get("head", parts.get("neck", chest))
     if not is_above(skeleton, chest, head) or head == chest:
+        head = _spine_top(skeleton, chest)
+    if head == chest:
         raise MotionloomError(
             f"the skeleton is not a humanoid that can be read: no head above {skeleton.names[chest]}, where the arms "
             "begin; name it in a joint map as 'head'"
@@ -188,6 +188,26 @@ def _trunk(skeleton: Skeleton, parts: Parts) -> tuple[int, int, list[int], int, 
     if neck < 0 or not is_above(skeleton, chest, neck) or not is_above(skeleton, neck, head):
         neck = path_down(skeleton, chest, head)[1]
     return pelvis, chest, path_down(skeleton, pelvis, chest)[1:], neck, head
+
+
+def _spine_top(skeleton: Skeleton, chest: int) -> int:
+    """The last joint above the chest that is called as it is, such as ``DEF-spine.006`` over ``DEF-spine.003``."""
+    word, top = read_word(skeleton.names[chest]), chest
+    while on := [j for j in skeleton.children(top) if word and read_word(skeleton.names[j]) == word]:
+        top = on[0]
+    return top
+
+
+def _hand_point(skeleton: Skeleton, parts: Parts, part: str) -> dict[str, float]:
+    """Where no joint is the hand: the middle of what hangs on the forearm, such as the bones of the palm."""
+    below = _palm(skeleton, parts, part)
+    return {skeleton.names[j]: 1.0 / len(below) for j in below}
+
+
+def _palm(skeleton: Skeleton, parts: Parts, part: str) -> list[int]:
+    side, _, kind = part.partition("_")
+    elbow = parts.get(f"{side}_elbow")
+    return list(skeleton.children(elbow)) if kind == "wrist" and elbow is not None else []
 
 
 def _spine_points(skeleton: Skeleton, pelvis: int, spine: list[int], neck: int) -> dict[str, dict[str, float]]:
@@ -206,13 +226,12 @@ def _spine_points(skeleton: Skeleton, pelvis: int, spine: list[int], neck: int) 
 
 
 def _toe(skeleton: Skeleton, parts: Parts, side: str) -> int:
-    """The named toe, else the child of the ankle that lies farthest out."""
+    """The named toe, else the child of the ankle that lies farthest out, else the ankle itself: a foot without toes."""
     ankle = parts[f"{side}_ankle"]
     toe = parts.get(f"{side}_foot")
     if toe is not None and is_above(skeleton, ankle, toe):
         return toe
-    children = skeleton.children(ankle)
-    return max(children, key=lambda j: float(np.linalg.norm(skeleton.offsets[j])))
+    return max(skeleton.children(ankle), default=ankle, key=lambda j: float(np.linalg.norm(skeleton.offsets[j])))
 
 
 def _collar_point(skeleton: Skeleton, parts: Parts, side: str, *, neck: int, chest: int) -> dict[str, float]:

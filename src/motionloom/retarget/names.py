@@ -4,6 +4,8 @@ Rokoko, Perception Neuron, Xsens, VRM, SMPL and their relatives; plain spelling 
 
 import re
 
+import numpy as np
+
 from motionloom.skeleton import Skeleton
 
 Parts = dict[str, int]
@@ -66,6 +68,12 @@ def read_name(name: str) -> tuple[str, str]:
     return side, "" if numbers else "".join(kept)
 
 
+def read_word(name: str) -> str:
+    """The word of a joint's name without side and number: ``DEF-spine.003`` -> ``spine``."""
+    _, tokens = _side(_tokens(name))
+    return "".join(t for t in tokens if not t.isdigit() and t not in _NOISE)
+
+
 def parts_by_name(skeleton: Skeleton) -> Parts:
     """The parts whose joints the names tell, sided ones as ``left_knee``; what is not named is left out."""
     found: dict[tuple[str, str], int] = {}
@@ -78,17 +86,39 @@ def parts_by_name(skeleton: Skeleton) -> Parts:
         if joint is not None:
             parts[part] = joint
     for side in ("left", "right"):
-        parts.update(_sided(side, found))
+        parts.update(_sided(skeleton, side, found))
+    return _apart(skeleton, parts)
+
+
+def _apart(skeleton: Skeleton, parts: Parts) -> Parts:
+    """The parts with hips that are two: where both begin in one place, the next joint of that name is the hip."""
+    hips = [parts.get(f"{side}_hip") for side in ("left", "right")]
+    rest = skeleton.rest_positions()
+    if None in hips or np.abs(rest[hips[0]] - rest[hips[1]]).max() > 1e-6:
+        return parts
+    for part, joint in zip(("left_hip", "right_hip"), hips):
+        assert joint is not None
+        alike = [
+            j for j in skeleton.children(joint) if read_name(skeleton.names[j]) == read_name(skeleton.names[joint])
+        ]
+        parts[part] = alike[0] if alike else joint
     return parts
 
 
-def _sided(side: str, found: dict[tuple[str, str], int]) -> Parts:
+def _carries(skeleton: Skeleton, joint: int) -> bool:
+    return any(child not in skeleton.ends for child in skeleton.children(joint))
+
+
+def _sided(skeleton: Skeleton, side: str, found: dict[tuple[str, str], int]) -> Parts:
     here = {word: j for (s, word), j in found.items() if s == side}
     limb = {part: next((here[w] for w in words if w in here), None) for part, words in _SIDED.items()}
     if limb["foot"] is not None and limb["foot"] == limb["ankle"]:
         limb["foot"] = None  # "foot" is the toe joint only where an "ankle" stands above it
     if limb["collar"] is not None and limb["collar"] == limb["shoulder"]:
         limb["collar"] = None  # "shoulder" is the collar bone only where an upper arm hangs on it
+    wrist, hand = here.get("wrist"), here.get("hand")
+    if wrist is not None and hand is not None and skeleton.parents[hand] == wrist and _carries(skeleton, hand):
+        limb["wrist"] = hand  # a wrist that only ends the forearm: the hand is what turns
     if limb["hip"] is None and "leg" in here and "knee" in here:
         limb["hip"], limb["knee"] = here["leg"], here["knee"]
     return {f"{side}_{part}": j for part, j in limb.items() if j is not None}

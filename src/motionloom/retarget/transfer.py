@@ -18,9 +18,13 @@ from motionloom.retarget.floor import Stance, read_stance
 from motionloom.retarget.joint_map import Override, joint_map
 from motionloom.retarget.limbs import bend
 from motionloom.retarget.measured import frames_of_positions, mean_rotation
+from motionloom.retarget.root import RootMode, place_root
 from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
+_LEG = 0.82
+_LEGS = (0.2, 2.5)
+"""Metres of thigh and shin: of the uniform person, and of bodies whose feet are looked at as they are."""
 
 
 def joints22(motion: Motion, override: Override | None = None) -> Array:
@@ -29,7 +33,10 @@ def joints22(motion: Motion, override: Override | None = None) -> Array:
     Raises `MotionloomError` naming the joints that could not be found; see `joint_map`.
     """
     points = joint_map(motion.skeleton, override)
-    return np.einsum("sj,fjc->fsc", points.matrix(motion.skeleton), motion.positions())
+    places = np.einsum("sj,fjc->fsc", points.matrix(motion.skeleton), motion.positions())
+    if (places[:, FEET] == places[:, TOES]).all(axis=(0, 2)).any():
+        return read_body(motion.skeleton, override).places(motion.positions(), motion.world_rotations())
+    return places
 
 
 def to_smpl22(motion: Motion, override: Override | None = None) -> Motion:
@@ -37,28 +44,51 @@ def to_smpl22(motion: Motion, override: Override | None = None) -> Motion:
     return retarget(motion, SMPL22, source_map=override)
 
 
-def from_smpl22(motion: Motion, target: Skeleton, override: Override | None = None) -> Motion:
+def from_smpl22(
+    motion: Motion, target: Skeleton, override: Override | None = None, *, root: RootMode | None = None
+) -> Motion:
     """A motion of the uniform person on a user's skeleton: their hierarchy, offsets and rest pose.
 
     Joints that the uniform person lacks (fingers, eyes, twist bones) keep their rest pose.
     """
-    return retarget(motion, target, target_map=override)
+    return retarget(motion, target, target_map=override, root=root)
 
 
 def retarget(
-    motion: Motion, target: Skeleton, *, source_map: Override | None = None, target_map: Override | None = None
+    motion: Motion,
+    target: Skeleton,
+    *,
+    source_map: Override | None = None,
+    target_map: Override | None = None,
+    root: RootMode | None = None,
 ) -> Motion:
     """The motion on another humanoid skeleton.
 
     The world keeps its axes (one that is Z-up is turned to Y-up), the path shrinks or grows with the length of the
     legs, and the floor (where the source's planted toes are) becomes y = 0. Bones keep the target's lengths exactly;
-    bones of the source that change length count by where they end. Raises `MotionloomError` if either skeleton is no
+    bones of the source that change length count by where they end. Joints above the hips go along with them rigidly,
+    or as ``root`` says (`place_root`), with places that change. Raises `MotionloomError` if either skeleton is no
     humanoid.
     """
     source, body = read_body(motion.skeleton, source_map), read_body(target, target_map)
+    if not _LEGS[0] < source.leg < _LEGS[1]:  # of another unit, or a giant: what counts here is how it moves
+        motion = motion.scaled(_LEG / source.leg)
+        source = read_body(motion.skeleton, source_map)
+    if not _LEGS[0] < body.leg < _LEGS[1]:
+        size = _LEG / body.leg
+        small = replace(target, offsets=target.offsets * size)
+        made = retarget(motion, small, source_map=source_map, target_map=target_map, root=root).scaled(1 / size)
+        return replace(made, skeleton=target)
     pose = _read_pose(_y_up(motion, source), source)
-    goals = _scale(pose, read_stance(pose.places, motion.fps), ratio=body.leg / source.leg, toe_height=body.toe_height)
-    return _place(_orient(pose, body), goals, body, motion.fps)
+    stance = read_stance(pose.places, motion.fps)
+    if source.on_floor:
+        stance = stance.on_floor(source.toe_height, slack=0.08 * source.leg)
+    goals = _scale(pose, stance, ratio=body.leg / source.leg, toe_height=body.toe_height)
+    if source.broad or body.broad:
+        out = body.broad - source.broad * body.leg / source.leg
+        goals = _spread(goals, out * _smooth_left(pose, motion.fps))
+    made = _place(_orient(pose, body), goals, body, motion.fps)
+    return made if root is None else place_root(made, body, root)
 
 
 # 1. Read -------------------------------------------------------------------------------------------------------------
@@ -70,11 +100,13 @@ class _Pose:
     """(frames, 22, 3) metres."""
     frames: Array
     """(frames, 22, 4) world_from_anatomy."""
+    hips: Array
+    """(frames, 3) metres: the middle between the hip joints."""
 
 
 def _read_pose(motion: Motion, source: Body) -> _Pose:
     world = motion.world_rotations()
-    places = np.einsum("sj,fjc->fsc", source.points, motion.positions())
+    places = source.places(motion.positions(), world)
     axes = source.frames if source.upright else _measured_axes(places, world, source)
     frames = np.empty((len(motion), 22, 4))
     for j, driver in enumerate(source.drivers):
@@ -89,14 +121,23 @@ def _read_pose(motion: Motion, source: Body) -> _Pose:
         if CHILD[j] is not None and j not in (0, *FEET):  # the places have the last word on where a bone points
             bone = places[:, CHILD[j]] - places[:, j]
             frames[:, j] = rot.multiply(_turn(rot.rotate(frames[:, j], np.eye(3)[0]), bone), frames[:, j])
-    return _Pose(places, frames)
+    return _Pose(places, frames, _hips(places, frames, source))
+
+
+def _hips(places: Array, frames: Array, source: Body) -> Array:
+    """(frames, 3) the middle between the hip joints; as it is on the pelvis where legs were pulled out of the hips."""
+    middle = places[:, [1, 2]].mean(axis=1)
+    turn = rot.multiply(frames[:, 0], rot.inverse(source.frames[0]))
+    fixed = places[:, 0] + rot.rotate(turn, (source.rest[[1, 2]].mean(axis=0) - source.rest[0])[None])
+    pulled = source.upright and np.linalg.norm(fixed - middle, axis=-1).max() > 0.06 * source.leg
+    return fixed if pulled else middle
 
 
 def _y_up(motion: Motion, source: Body) -> Motion:
     """The motion turned so that +Y is up, where rest pose and poses agree that another axis was."""
     if source.up[1] > 0.9:
         return motion
-    places = np.einsum("sj,fjc->fsc", source.points, motion.positions())
+    places = source.places(motion.positions(), motion.world_rotations())
     tall = (places[:, HEAD] - places[:, FEET].mean(axis=1)).mean(axis=0)
     if float(tall @ source.up) < 2 * abs(float(tall[1])):
         return motion
@@ -156,7 +197,7 @@ class _Goals:
 def _scale(pose: _Pose, stance: Stance, *, ratio: float, toe_height: float) -> _Goals:
     up = np.array([0.0, 1.0, 0.0])
     lift = toe_height * up
-    toes, ankles, hips = pose.places[:, TOES], pose.places[:, FEET], pose.places[:, [1, 2]].mean(axis=1)
+    toes, ankles, hips = pose.places[:, TOES], pose.places[:, FEET], pose.hips
     under = stance.under(toes)[..., None] * up
     middle = stance.ground(hips).mean(axis=-1, keepdims=True) * up
     facing = np.cross(rot.rotate(pose.frames[:, 0], np.eye(3)[1]), rot.rotate(pose.frames[:, 0], np.eye(3)[0]))
@@ -169,6 +210,26 @@ def _scale(pose: _Pose, stance: Stance, *, ratio: float, toe_height: float) -> _
         forward=facing * np.array([1.0, 0.0, 1.0]),
         poles=_knee_poles(pose),
     )
+
+
+def _spread(goals: _Goals, left: Array) -> _Goals:
+    """The feet moved apart by ``left`` (frames, 3) each, for hips of another breadth than the source's.
+
+    On the ground they move along it, in the air as the pelvis is.
+    """
+    both = np.stack([left, -left], axis=1)
+    both = both * np.concatenate([np.ones_like(goals.low), 1.0 - goals.low, np.ones_like(goals.low)], axis=-1)
+    return replace(goals, ankles=goals.ankles + both, toes=goals.toes + both)
+
+
+def _smooth_left(pose: _Pose, fps: float) -> Array:
+    """(frames, 3) where the left of the pelvis is, so smooth in time that planted feet hardly slide."""
+    left = rot.rotate(pose.frames[:, 0], np.eye(3)[1])
+    reach = max(1, round(0.4 * fps))
+    kernel = np.hanning(2 * reach + 3)[1:-1]
+    padded = np.pad(left, ((reach, reach), (0, 0)), mode="edge")
+    smooth = [np.convolve(padded[:, i], kernel / kernel.sum(), mode="valid") for i in range(3)]
+    return np.asarray(np.stack(smooth, axis=-1), dtype=np.float64)
 
 
 def _near_ground(height: Array) -> Array:
@@ -225,7 +286,7 @@ def _bone_end(body: Body, joint: int) -> int | None:
 
 
 def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
-    places = np.einsum("sj,fjc->fsc", body.points, _positions(body.skeleton, world))
+    places = body.places(_positions(body.skeleton, world), world)
     ankles = goals.toes - (places[:, TOES] - places[:, FEET])
     shift = _make_up(goals, ankles)
     root = goals.hips + shift - places[:, [1, 2]].mean(axis=1)

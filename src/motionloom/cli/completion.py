@@ -1,0 +1,48 @@
+"""`motionloom completion`: what a shell needs to complete commands, options and file names."""
+
+import argparse
+
+_BASH = """_motionloom() {{
+    local word=${{COMP_WORDS[COMP_CWORD]}} command=${{COMP_WORDS[1]}} words=""
+    if [ "$COMP_CWORD" -eq 1 ]; then words="{commands}"; else
+        case $command in
+{cases}
+        esac
+    fi
+    case $word in
+        -*) COMPREPLY=($(compgen -W "$words" -- "$word")) ;;
+        *) if [ "$COMP_CWORD" -eq 1 ]; then COMPREPLY=($(compgen -W "$words" -- "$word"))
+           else COMPREPLY=($(compgen -f -- "$word")); fi ;;
+    esac
+}}
+complete -o filenames -F _motionloom motionloom
+"""
+
+
+def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Register ``completion``."""
+    parser = subparsers.add_parser(
+        "completion",
+        help="print a script that completes commands in your shell",
+        description='Print a completion script: eval "$(motionloom completion bash)", likewise zsh; for fish: '
+        "motionloom completion fish | source",
+    )
+    parser.add_argument("shell", choices=("bash", "zsh", "fish"))
+    parser.set_defaults(run=lambda arguments: print(script(arguments.shell, subparsers.choices), end=""))
+
+
+def script(shell: str, commands: "dict[str, argparse.ArgumentParser]") -> str:
+    """The script for one shell; ``commands`` are the parsers by name."""
+    options = {
+        name: sorted(o for action in parser._actions for o in action.option_strings if o.startswith("--"))
+        for name, parser in commands.items()
+    }
+    if shell == "fish":
+        lines = [f"complete -c motionloom -n __fish_use_subcommand -f -a '{' '.join(commands)}'"]
+        for name, found in options.items():
+            seen = f"'__fish_seen_subcommand_from {name}'"
+            lines += [f"complete -c motionloom -n {seen} -l {option[2:]}" for option in found]
+        return "\n".join(lines) + "\n"
+    cases = "\n".join(f'            {name}) words="{" ".join(found)}" ;;' for name, found in options.items())
+    bash = _BASH.format(commands=" ".join(commands), cases=cases)
+    return "autoload -U +X bashcompinit && bashcompinit\n" + bash if shell == "zsh" else bash

@@ -1,0 +1,104 @@
+"""What people type who have not read the help: other names of commands and options, sentences without quotes."""
+
+import argparse
+import difflib
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+COMMANDS = {"gen": "generate", "convert": "export", "play": "view", "show": "view", "draw": "view", "join": "compose"}
+OPTIONS = {"--length": "--seconds", "--duration": "--seconds", "-o": "--out", "--output": "--out", "-n": "--count"}
+_SEVERAL = {"-s": ("--seconds", "--seed"), "-f": ("--fps", "--from")}
+_PROMPTS = ("prompts", "prompt", "text", "segments")
+
+
+def with_command(words: Sequence[str], commands: Iterable[str]) -> list[str]:
+    """The line with its command under the name it has here; words without one become a suggestion.
+
+    Raises `MotionloomError` where the first word is no command.
+    """
+    from motionloom.errors import MotionloomError
+
+    known, found = list(commands), list(words)
+    if not found or found[0].startswith("-") or found[0] in known:
+        return found
+    if found[0] in COMMANDS:
+        return [COMMANDS[found[0]], *found[1:]]
+    close = difflib.get_close_matches(found[0].lower(), [*known, *COMMANDS], n=1, cutoff=0.7)
+    if close and " " not in found[0]:
+        line = " ".join([COMMANDS.get(close[0], close[0]), *found[1:]])
+        raise MotionloomError(f"there is no command {found[0]!r}; did you mean: motionloom {line}")
+    sentence = " ".join(word for word in found if not word.startswith("-"))
+    if " " in sentence:
+        raise MotionloomError(f'a command comes first; did you mean: motionloom generate "{sentence}"')
+    raise MotionloomError(f"there is no command {found[0]!r}; the commands are {', '.join(known)}")
+
+
+def with_options(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
+    """The words behind a command with its options under the names they have here."""
+    known = option_names(parser)
+    takes_prompt = any(action.dest in _PROMPTS for action in parser._actions)
+    found, plain = [], False
+    for word in words:
+        name, equals, value = word.partition("=")
+        plain = plain or word == "--"
+        if plain or name in known:
+            found.append(word)
+        elif OPTIONS.get(name) in known:
+            found.append(OPTIONS[name] + equals + value)
+        elif name == "--prompt" and takes_prompt:
+            found += [value] if equals else []  # the sentence itself is the next word
+        else:
+            found.append(word)
+    return found
+
+
+def option_names(parser: argparse.ArgumentParser) -> set[str]:
+    """All options of a command, as they are typed."""
+    return {name for action in parser._actions for name in action.option_strings}
+
+
+def suggestion(parser: argparse.ArgumentParser, words: Sequence[str]) -> str:
+    """``, did you mean ...`` for the first option that a command does not have, or nothing."""
+    known = option_names(parser)
+    for word in words:
+        name = word.partition("=")[0]
+        if name in _SEVERAL and set(_SEVERAL[name]) & known:
+            return f", did you mean {' or '.join(n for n in _SEVERAL[name] if n in known)}?"
+        if name.startswith("-") and (close := difflib.get_close_matches(name, sorted(known), n=1, cutoff=0.6)):
+            return f", did you mean {close[0]}?"
+    return ""
+
+
+def one_sentence(words: Sequence[str]) -> list[str]:
+    """Prompts; words that nobody put into quotes are one sentence."""
+    if len(words) < 2 or any(" " in word.strip() for word in words):
+        return list(words)
+    return [" ".join(words)]
+
+
+def check_overwriting(arguments: argparse.Namespace, files: Iterable[Path]) -> None:
+    """Refuse to write over what is read; say so where another file is written over without ``--force``.
+
+    Raises `MotionloomError` naming the file that is both.
+    """
+    from motionloom.errors import MotionloomError
+
+    read = {path.resolve() for path in _inputs(arguments)}
+    for file in files:
+        if not file.exists() or file.is_dir():
+            continue
+        if file.resolve() in read:
+            raise MotionloomError(f"{file} is read and would be written over; give what is made another name")
+        if not arguments.force:
+            print(f"note: {file} was there and is written over (--force says nothing)", file=sys.stderr)
+
+
+def _inputs(arguments: argparse.Namespace) -> list[Path]:
+    """The files that the line names to be read."""
+    found: list[Any] = []
+    for name, value in vars(arguments).items():
+        if name not in ("out", "output"):
+            found += value if isinstance(value, list | tuple) else [value]
+    return [value for value in found if isinstance(value, Path)]

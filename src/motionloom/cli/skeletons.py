@@ -1,0 +1,151 @@
+"""What the commands that write motions share about skeletons: ``--skeleton`` and how a motion is put on it."""
+
+import argparse
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from motionloom.io.character import Character
+    from motionloom.io.stream import Stream
+    from motionloom.motion import Motion
+    from motionloom.retarget import RootMode
+    from motionloom.skeleton import Skeleton
+
+ROOTS = ("motion", "hips", "in-place")
+
+
+def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform person's") -> None:
+    """``--skeleton`` and what goes with it; ``own`` is whose skeleton motions have without it, in words."""
+    parser.add_argument(
+        "--skeleton", metavar="FILE|NAME",
+        help="put motions on this skeleton, or on smpl22, mixamo, unreal, vrm or rigify; a .glb or .vrm character is "
+        f"written as that file with one more animation (default: {own})",
+    )  # fmt: skip
+    parser.add_argument(
+        "--root", choices=ROOTS,
+        help="what carries the way over the ground on a skeleton with a root bone: that bone (motion, the default), "
+        "the hips, or nothing",
+    )  # fmt: skip
+    parser.add_argument("--clip-name", metavar="NAME", help="name of the animation in the character's file")
+    parser.add_argument("--replace", action="store_true", help="leave only this animation in the character's file")
+    parser.add_argument("--force", action="store_true", help="write over files without saying so")
+    parser.add_argument("--target-map", type=Path, metavar="JSON", help="which joints are which, of the --skeleton")
+
+
+@dataclass(frozen=True)
+class Target:
+    """A skeleton that motions are put on, and how its own file says things."""
+
+    name: str
+    skeleton: "Skeleton"
+    unit: float = 1.0
+    orders: dict[str, str] = field(default_factory=dict)
+    character: "Character | None" = None
+    root: "RootMode" = "motion"
+    joint_map: Path | None = None
+    clip_name: str | None = None
+    replace: bool = False
+
+    def put(self, motion: "Motion", *, source: str = "the motion", source_map: Path | None = None) -> "Motion":
+        """The motion on this skeleton; ``source`` names it in an error."""
+        from motionloom.errors import MotionloomError
+        from motionloom.retarget import retarget
+
+        try:
+            return retarget(
+                motion, self.skeleton, source_map=source_map, target_map=self.joint_map, root=self.root
+            )  # fmt: skip
+        except MotionloomError as error:
+            hint = "--source-map or --target-map"
+            raise MotionloomError(f"{source} onto {self.name}: {error} ({hint})") from None
+
+    @property
+    def suffix(self) -> str | None:
+        """How the character's own file ends."""
+        return self.character.path.suffix.lower() if self.character else None
+
+    def writes(self, path: Path) -> bool:
+        """Whether a file of this name is the character's own with one more animation."""
+        return path.suffix.lower() == self.suffix
+
+    def save(self, motion: "Motion", path: Path, *, caption: str | None = None) -> Path:
+        """Write a motion that is `put` on the skeleton; the suffix picks the format."""
+        from motionloom import io
+
+        if self.character is not None and self.writes(path):
+            return self.character.save(motion, path, name=self.clip_name or caption, replace=self.replace)
+        if path.suffix.lower() == ".bvh":
+            from motionloom.io.bvh_writer import save_bvh
+
+            return save_bvh(motion, path, order=self.orders, unit=self.unit)
+        return io.save(motion, path, captions=None if caption is None else [caption])
+
+
+def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target | None:
+    """The skeleton that the line names, if it does; refuses options and files that do not go with it."""
+    from motionloom.errors import MotionloomError
+
+    if arguments.skeleton is None:
+        for name in ("root", "clip_name", "replace", "target_map"):
+            if getattr(arguments, name):
+                raise MotionloomError(f"--{name.replace('_', '-')} goes with a --skeleton; name one")
+        return None
+    found = _find(arguments)
+    if found.character is not None:
+        path = found.character.path
+        if not any(found.writes(out) or not out.suffix for out in outs) and (arguments.clip_name or arguments.replace):
+            raise MotionloomError(f"--clip-name and --replace are for the character's own file, a {path.suffix}")
+        for out in outs:
+            if out.exists() and out.resolve() == path.resolve():
+                raise MotionloomError(f"{out} is the character itself; give the moving one another name with --out")
+    elif arguments.clip_name or arguments.replace:
+        raise MotionloomError(f"--clip-name and --replace are for .glb, .gltf and .vrm characters; got {found.name}")
+    return found
+
+
+def _find(arguments: argparse.Namespace) -> Target:
+    from motionloom import io
+    from motionloom.errors import MotionloomError
+    from motionloom.retarget.named import NAMED, named_skeleton
+
+    name, path = arguments.skeleton, Path(arguments.skeleton)
+    suffix = path.suffix.lower()
+    options = {
+        "root": arguments.root or "motion", "joint_map": arguments.target_map,
+        "clip_name": arguments.clip_name, "replace": arguments.replace,
+    }  # fmt: skip
+    if name.lower() in NAMED and not path.exists():
+        return Target(name, named_skeleton(name.lower()), **options)
+    if suffix == ".bvh":
+        from motionloom.io.bvh import read_bvh
+
+        file = read_bvh(path)
+        return Target(name, file.motion.skeleton, unit=file.unit, orders=dict(file.orders), **options)
+    if suffix == ".asf":
+        from motionloom.io.asf import load_skeleton
+
+        return Target(name, load_skeleton(path), **options)
+    if suffix in io.GLTF and suffix != ".vrma":
+        from motionloom.io.character import load_character
+
+        character = load_character(path, joint_map=arguments.target_map)
+        return Target(name, character.skeleton, character=character, **options)
+    if suffix not in io.READS:
+        raise MotionloomError(
+            f"--skeleton needs {', '.join(NAMED)} or a file (.asf, {', '.join(io.READS)}); got {name!r}"
+        )
+    return Target(name, io.load(path).skeleton, **options)
+
+
+def open_target(target: Target, path: Path, *, caption: str = "") -> "Stream":
+    """A file whose motion is put on the skeleton when all of it is there."""
+    from motionloom.io.stream import Kept
+
+    return Kept(path, lambda whole: target.save(target.put(whole), path, caption=caption))
+
+
+def put_all(target: Target | None, motions: "Iterable[Motion]") -> "list[Motion]":
+    """Motions on the target's skeleton; as they are without one."""
+    return list(motions) if target is None else [target.put(motion) for motion in motions]

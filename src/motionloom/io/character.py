@@ -1,0 +1,206 @@
+"""Somebody's own character: a humanoid in a .glb, .vrm or .gltf file, and that file with one more animation in it.
+
+Everything that the file holds stays as it is: what is new is one animation, its accessors, its buffer view and its
+bytes behind those that were there.
+"""
+
+import base64
+import copy
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.io.atomic import atomic_path
+from motionloom.io.glb import Document, pack_glb, read_document_chunks
+from motionloom.io.gltf_nodes import Node, upwards
+from motionloom.io.gltf_read import OpenedGlb, open_glb, settled
+from motionloom.io.gltf_rig import Rig, Worlds, parents_first, read_rig, worlds
+from motionloom.motion import Motion
+from motionloom.retarget.joint_map import JointMap, Override
+from motionloom.retarget.joint_map import joint_map as find_joints
+from motionloom.retarget.topology import ancestors
+from motionloom.skeleton import Skeleton
+
+Array = NDArray[np.float64]
+SUFFIXES = (".glb", ".vrm", ".gltf")
+_SAME_TURN = 1e-7
+"""One minus the cosine of half a turn below which a bone counts as resting."""
+
+
+@dataclass(frozen=True, eq=False)
+class Character:
+    """A humanoid in a glTF file."""
+
+    path: Path
+    file: OpenedGlb
+    nodes: list[Node]
+    rig: Rig
+    joints: JointMap
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The skeleton that motions must have to be written into the file."""
+        return self.rig.skeleton
+
+    def save(self, motion: Motion, path: str | Path, *, name: str | None = None, replace: bool = False) -> Path:
+        """Write the character's own file with one more animation, or with ``replace`` this one only.
+
+        ``motion`` is on `skeleton`, in metres and +Y up. Keyed are the joints of its body and those between them, and
+        places of those that move against what they hang on; all others keep their rest. ``name`` of the animation
+        (``motion``) gets a number where the file has one of that name. The new file ends as the old one.
+        Raises `MotionloomError` for a motion of another skeleton, another suffix, or a place that cannot be written.
+        """
+        path = Path(path)
+        if motion.skeleton.names != self.skeleton.names or motion.skeleton.parents != self.skeleton.parents:
+            raise MotionloomError(f"the motion is not on the skeleton of {self.path}; retarget it first")
+        if path.suffix.lower() != self.path.suffix.lower():
+            raise MotionloomError(
+                f"the character of {self.path} is written as such a file; name it *{self.path.suffix}, not {path.name}"
+            )
+        document = copy.deepcopy(self.file.document.json)
+        new = _Insertion(document, self.file.document)
+        animation = {"name": self._free_name(name or "motion", replace), "channels": [], "samplers": []}
+        animation["extras"] = {"fps": motion.fps}
+        clock = new.add(np.arange(len(motion))[:, None] / motion.fps, bounds=True)
+        for node, path_, values in self._keys(motion):
+            animation["samplers"].append({"input": clock, "output": new.add(values), "interpolation": "LINEAR"})
+            channel = {"sampler": len(animation["samplers"]) - 1, "target": {"node": node, "path": path_}}
+            animation["channels"].append(channel)
+            _use_parts(document["nodes"][node], self.nodes[node])
+        document["animations"] = [*([] if replace else document.get("animations", [])), animation]
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(new.packed(self.path))
+        return path
+
+    def _free_name(self, name: str, replace: bool) -> str:
+        taken = set() if replace else set(self.file.clips)
+        return name if name not in taken else next(n for k in range(2, 10**6) if (n := f"{name}_{k}") not in taken)
+
+    def _keys(self, motion: Motion) -> list[tuple[int, str, Array]]:
+        """Node, path and values (frames, width) of every channel."""
+        rig, parents = self.rig, self.file.parents
+        driven = {d for d in self.joints.drivers(self.skeleton) if d is not None}
+        above_driven = {a for d in driven for a in ancestors(self.skeleton, d)}
+        slots = {n: k for k, n in enumerate(rig.nodes)}
+        above = upwards(rig.nodes[0], parents)[:0:-1]
+        wanted = rot.multiply(motion.world_rotations(), rig.turns)
+        places, free = motion.positions(), self._free(motion)
+        now = worlds(self.nodes, parents, above, {})
+        keys: list[tuple[int, str, Array]] = []
+        for n in parents_first(frozenset(rig.nodes), parents):
+            k, node, p = slots[n], self.nodes[n], parents[n]
+            turn = wanted[:, k] if p < 0 else rot.multiply(rot.inverse(now.turns[p]), wanted[:, k])
+            turn = rot.unroll(rot.normalize(turn))
+            still = (1 - np.abs(turn @ node.turn) < _SAME_TURN).all()
+            sampled: dict[tuple[int, str], Array] = {}
+            if k in driven or (k in above_driven and not still):
+                sampled[n, "rotation"] = turn
+                keys.append((n, "rotation", np.roll(turn, -1, axis=-1)))
+            if k in free:
+                place = places[:, k] if p < 0 else _inside(now, p, places[:, k])
+                if k == 0 or np.abs(place - node.place).max() > 1e-5 * max(1.0, np.abs(node.place).max()):
+                    sampled[n, "translation"] = place
+                    keys.append((n, "translation", place))
+            now = worlds(self.nodes, parents, [n], sampled, above=now)
+        return keys
+
+    def _free(self, motion: Motion) -> set[int]:
+        """The joints whose places are not what the bones above them say: the root, and those that a control holds."""
+        rig, parents = self.rig, self.file.parents
+        slots = {n: k for k, n in enumerate(rig.nodes)}
+        free = {0} | {k for k, n in enumerate(rig.nodes) if k and slots[parents[n]] != self.skeleton.parents[k]}
+        if motion.translations is not None:
+            apart = np.abs(motion.translations - self.skeleton.offsets).max(axis=(0, 2)) > 1e-5
+            free |= set(np.flatnonzero(apart).tolist())
+        return free
+
+
+def load_character(path: str | Path, *, joint_map: Override | None = None) -> Character:
+    """Read the humanoid of a .glb, .vrm or .gltf file; raises `MotionloomError` if it holds none.
+
+    ``joint_map`` says which joints are which where names do not, as in `motionloom.retarget.joint_map`.
+    """
+    path = Path(path)
+    file = open_glb(path)
+    problem: MotionloomError | None = None
+    for person in range(len(file.people)):
+        nodes, joints, _ = settled(file, person, {})
+        rig = read_rig(file.document, nodes, file.parents, joints=joints, tips=frozenset())
+        try:
+            found = find_joints(rig.skeleton, joint_map)
+        except MotionloomError as error:
+            problem = problem or error
+        else:
+            return Character(path, file, nodes, rig, found)
+    assert problem is not None
+    raise MotionloomError(f"{path}: {problem}")
+
+
+def _inside(now: Worlds, node: int, place: Array) -> Array:
+    """(frames, 3) world places in the frame of a node."""
+    apart, linear = place - now.places[node], now.linear[node]
+    if linear is None:
+        return rot.rotate(rot.inverse(now.turns[node]), apart)
+    solved = np.linalg.solve(np.broadcast_to(linear, (len(apart), 3, 3)), apart[..., None])
+    return np.asarray(solved[..., 0], dtype=np.float64)
+
+
+def _use_parts(entry: dict[str, Any], node: Node) -> None:
+    """An animated node must not have a matrix (glTF 2.0, 3.6.1): it becomes the same place, turn and scale."""
+    if entry.pop("matrix", None) is not None:
+        entry |= {
+            "translation": node.place.tolist(),
+            "rotation": np.roll(node.turn, -1).tolist(),
+            "scale": node.scale.tolist(),
+        }
+
+
+class _Insertion:
+    """Data behind that of a file: in its binary part, else in a buffer of their own."""
+
+    def __init__(self, document: dict[str, Any], file: Document) -> None:
+        self.document, self.file = document, file
+        self.data = bytearray()
+        self.view = len(document.setdefault("bufferViews", []))
+        self.accessors: list[Any] = document.setdefault("accessors", [])
+
+    def add(self, values: Array, *, bounds: bool = False) -> int:
+        """The number of the accessor of values (count, width)."""
+        array = np.ascontiguousarray(values, dtype="<f4")
+        kind = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}[array.shape[1]]
+        accessor: dict[str, Any] = {
+            "bufferView": self.view, "byteOffset": len(self.data),
+            "componentType": 5126, "count": len(array), "type": kind,
+        }  # fmt: skip
+        if bounds:
+            accessor |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
+        self.data += array.tobytes()
+        self.accessors.append(accessor)
+        return len(self.accessors) - 1
+
+    def packed(self, path: Path) -> bytes:
+        """The whole file."""
+        buffers: list[Any] = self.document.setdefault("buffers", [])
+        view = {"byteLength": len(self.data)}
+        chunks = read_document_chunks(path)
+        if chunks is not None and (not buffers or "uri" not in buffers[0]):
+            if not buffers:
+                buffers.append({"byteLength": 0})
+            old = chunks.binary[: buffers[0]["byteLength"]]
+            start = len(old) + -len(old) % 4
+            binary = old + bytes(start - len(old)) + bytes(self.data)
+            buffers[0]["byteLength"] = len(binary)
+            self.document["bufferViews"].append({"buffer": 0, "byteOffset": start} | view)
+            return pack_glb(self.document, binary, chunks.others)
+        uri = "data:application/octet-stream;base64," + base64.b64encode(self.data).decode()
+        buffers.append({"byteLength": len(self.data), "uri": uri})
+        self.document["bufferViews"].append({"buffer": len(buffers) - 1} | view)
+        if chunks is not None:
+            return pack_glb(self.document, chunks.binary, chunks.others)
+        return json.dumps(self.document, allow_nan=False).encode()

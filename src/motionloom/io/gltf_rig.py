@@ -1,0 +1,311 @@
+"""One person's nodes as a skeleton whose rest pose is the file's own: axes along the world's, limbs in one line.
+
+A `Skeleton` is at rest where every rotation is the identity. In a glTF file bones have turned axes, so each joint
+here is its node with the turn taken out that it has at rest, ``world_from_joint = world_from_node * inverse(turn)``;
+so a bone keeps its roll. At rest means as the mesh was bound, or, without a mesh, as the nodes are.
+"""
+
+import heapq
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.io.glb import Document
+from motionloom.io.gltf_curves import Curves, sample
+from motionloom.io.gltf_nodes import Node, upwards
+from motionloom.motion import Motion
+from motionloom.retarget.names import parts_by_name
+from motionloom.skeleton import Skeleton
+
+Array = NDArray[np.float64]
+FAR = 1e6
+"""Metres; nobody is further away."""
+_SAME_TURN = np.radians(0.5)
+_LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """A skeleton and the nodes that it stands for."""
+
+    skeleton: Skeleton
+    nodes: tuple[int, ...]
+    """For each joint the number of its node."""
+    turns: Array
+    """(joints, 4) at rest: world_from_node."""
+
+
+@dataclass(frozen=True, eq=False)
+class Worlds:
+    """Where nodes are in the world, at rest (one frame) or through time."""
+
+    places: dict[int, Array]
+    """(frames or 1, 3) metres."""
+    turns: dict[int, Array]
+    """(frames or 1, 4) world_from_node without its scale."""
+    linear: dict[int, Array | None]
+    """(frames or 1, 3, 3) world_from_node with its scale; None where nothing is scaled."""
+
+
+def worlds(
+    nodes: list[Node],
+    parents: list[int],
+    line: list[int],
+    sampled: Mapping[tuple[int, str], Array],
+    above: Worlds | None = None,
+) -> Worlds:
+    """Forward kinematics of ``line``: nodes, parents first, from the top; ``sampled`` (frames, width) replaces rest.
+
+    They are added to ``above``, where what is over the line is known already.
+    """
+    found = Worlds({}, {}, {}) if above is None else above
+    for n in line:
+        node, p = nodes[n], parents[n]
+        place = sampled.get((n, "translation"), node.place[None])
+        turn = sampled.get((n, "rotation"), node.turn[None])
+        scale = sampled.get((n, "scale"), node.scale[None])
+        stretch = found.linear.get(p)
+        if p in found.places:
+            moved = _apply(stretch, place) if stretch is not None else rot.rotate(found.turns[p], place)
+            place = found.places[p] + moved
+        plain = stretch is None and np.abs(scale - 1.0).max() < 1e-9
+        if not plain:
+            own = rot.quat_to_matrix(turn) * scale[:, None, :]
+            whole = rot.quat_to_matrix(found.turns[p]) if p in found.turns and stretch is None else stretch
+            found.linear[n] = own if whole is None else whole @ own
+        else:
+            found.linear[n] = None
+        found.places[n] = place
+        found.turns[n] = rot.normalize(rot.multiply(found.turns[p], turn)) if p in found.turns else turn
+    return found
+
+
+def _apply(linear: Array, vector: Array) -> Array:
+    return np.einsum("...ab,...b->...a", linear, vector)
+
+
+def read_rig(
+    document: Document, nodes: list[Node], parents: list[int], *, joints: frozenset[int], tips: frozenset[int]
+) -> Rig:
+    """The skeleton of a person's ``joints``, of which ``tips`` are mere bone tips."""
+    order = parents_first(joints, parents)
+    above = upwards(parents[order[0]], parents)[::-1] if parents[order[0]] != -1 else []
+    _check_scales(document, nodes, [*above, *order])
+    rest = worlds(nodes, parents, [*above, *order], {})
+    turns, places = _bound(document, nodes, parents, order, rest)
+    if not all(np.isfinite(p).all() and np.abs(p).max() < FAR for p in places.values()):
+        raise document.bad(f"a joint is more than {FAR:g} m away; check the units")
+    known = humanoid_nodes(document, len(nodes))
+    names = dict(zip(order, unique_names([nodes[n].name for n in order])))
+    hung = _hung(order, parents, names, places, known)
+    order = parents_first(joints, hung)
+    slots = {n: k for k, n in enumerate(order)}
+    offsets = [places[n] - (places[hung[n]] if k else 0.0) for k, n in enumerate(order)]
+    skeleton = Skeleton(
+        tuple(names[n] for n in order),
+        tuple(-1 if k == 0 else slots[hung[n]] for k, n in enumerate(order)),
+        np.array(offsets),
+        frozenset(slots[n] for n in tips if slots[n] > 0),
+        humanoid={part: names[n] for part, n in known.items() if n in names},
+        on_floor=_on_floor(np.array([places[n] for n in order])),
+    )
+    return Rig(skeleton, tuple(order), np.array([turns[n] for n in order]))
+
+
+def posed(
+    rig: Rig, document: Document, nodes: list[Node], parents: list[int], *, curves: Curves, fps: float, times: Array
+) -> Motion:
+    """The rig moved by the curves, sampled at ``times`` (frames,) seconds."""
+    root = rig.nodes[0]
+    line = [*upwards(root, parents)[:0:-1], *parents_first(frozenset(rig.nodes), parents)]
+    sampled = {key: sample(curve, times, fps, turn=key[1] == "rotation") for key, curve in curves.items()}
+    moving = worlds(nodes, parents, line, sampled)
+    frames, joints = len(times), len(rig.nodes)
+    world, places = np.empty((frames, joints, 4)), np.empty((frames, joints, 3))
+    for k, n in enumerate(rig.nodes):
+        world[:, k], places[:, k] = rot.multiply(moving.turns[n], rot.inverse(rig.turns[k])), moving.places[n]
+    if not np.abs(places).max() < FAR:
+        raise document.bad(f"a joint is more than {FAR:g} m away; check the units")
+    above = list(rig.skeleton.parents[1:])
+    rotations, inside = world.copy(), places.copy()
+    if above:
+        back = rot.inverse(world[:, above])
+        rotations[:, 1:] = rot.multiply(back, world[:, 1:])
+        inside[:, 1:] = rot.rotate(back, places[:, 1:] - places[:, above])
+    stretched = np.abs(inside[:, 1:] - rig.skeleton.offsets[1:]).max(initial=0.0) > 1e-5
+    return Motion(rig.skeleton, fps, places[:, 0], rotations, inside if stretched else None)
+
+
+# --- rest ---------------------------------------------------------------------------------------------------------
+
+
+def _check_scales(document: Document, nodes: list[Node], line: list[int]) -> None:
+    size = 1.0
+    for number in line:
+        scale = nodes[number].scale
+        if not (scale > 1e-9).all() or np.ptp(scale) > 0.02 * scale.max():
+            raise document.bad(
+                f"node {number} is scaled by {scale.tolist()}; only one positive scale for all axes is read"
+            )
+        size = max(size, float(scale.max())) if size > 1 else float(scale.max()) * size
+        if not 1e-9 < size < 1e9:
+            raise document.bad("its scales are absurdly large or small")
+
+
+def _on_floor(places: Array) -> bool:
+    """Whether somebody whose joints are there at rest (joints, 3) stands with the soles at y = 0."""
+    low, high = float(places[:, 1].min()), float(places[:, 1].max())
+    return high > 0 and abs(low) < 0.1 * (high - low)
+
+
+def _bound(
+    document: Document, nodes: list[Node], parents: list[int], order: list[int], rest: Worlds
+) -> tuple[dict[int, Array], dict[int, Array]]:
+    """World turns (4,) and places (3,) as the mesh was bound; as the nodes are where no skin says otherwise."""
+    turns = {n: rest.turns[n][0] for n in order}
+    places = {n: rest.places[n][0] for n in order}
+    bound = _bind_turns(document, rest, set(order), len(nodes))
+    if not any(_angle(bound[n], turns[n]) > _SAME_TURN for n in bound):
+        return turns, places
+    for n in order[1:]:
+        p = parents[n]
+        linear = rest.linear[p]
+        size = 1.0 if linear is None else float(np.cbrt(np.linalg.det(linear[0])))
+        places[n] = places[p] + rot.rotate(turns[p], nodes[n].place * size)
+        turns[n] = bound.get(n, rot.multiply(turns[p], nodes[n].turn))
+    return turns, places
+
+
+def _bind_turns(document: Document, rest: Worlds, joints: set[int], count: int) -> dict[int, Array]:
+    """World turns of the joints of skins when their meshes were bound, with the topmost joint as it is at rest."""
+    found: dict[int, Array] = {}
+    for skin in document.items("skins"):
+        numbers = [document.index(j, count, "nodes") for j in skin.get("joints", [])]
+        inverse = document.matrices(skin.get("inverseBindMatrices"), "inverse bind matrices")
+        if inverse is None or len(inverse) < len(numbers) or not numbers:
+            continue
+        binds = dict(zip(numbers, inverse))
+        tops = [n for n in rest.turns if n in binds and n in joints]
+        if not tops:
+            continue
+        whole = rest.linear[tops[0]]
+        linear = rot.quat_to_matrix(rest.turns[tops[0]]) if whole is None else whole
+        shape = _turn_of(linear[0] @ binds[tops[0]])
+        for n in tops:
+            turn = _turn_of(binds[n])
+            if shape is not None and turn is not None:
+                found.setdefault(n, rot.multiply(shape, rot.inverse(turn)))
+    return found
+
+
+def _turn_of(linear: Array) -> Array | None:
+    """(4,) the rotation in a 3 x 3 matrix that scales alike in all directions; None if it does more."""
+    size = np.linalg.norm(linear, axis=0)
+    if not (size > 1e-12).all():
+        return None
+    turn = linear / size
+    if np.abs(turn.T @ turn - np.eye(3)).max() > 0.02 or np.linalg.det(turn) < 0:
+        return None
+    return rot.normalize(rot.matrix_to_quat(turn))
+
+
+def _angle(a: Array, b: Array) -> float:
+    return float(2 * np.arccos(np.clip(abs(float(a @ b)), 0.0, 1.0)))
+
+
+# --- who hangs on whom --------------------------------------------------------------------------------------------
+
+
+def parents_first(joints: frozenset[int], parents: list[int]) -> list[int]:
+    """Parents before children, otherwise in the file's order."""
+    below: dict[int, list[int]] = {}
+    for node in joints:
+        below.setdefault(parents[node], []).append(node)
+    ready = [node for node in joints if parents[node] not in joints]
+    order: list[int] = []
+    while ready:
+        node = heapq.heappop(ready)
+        order.append(node)
+        for child in below.get(node, []):
+            heapq.heappush(ready, child)
+    return order
+
+
+def _hung(
+    order: list[int], parents: list[int], names: dict[int, str], places: dict[int, Array], known: dict[str, int]
+) -> list[int]:
+    """The parents, with feet and hands on their limbs that the file hangs on a control instead."""
+    slots = {n: k for k, n in enumerate(order)}
+    plain = Skeleton(
+        tuple(names[n] for n in order),
+        tuple(-1 if k == 0 else slots[parents[n]] for k, n in enumerate(order)),
+        np.array([places[n] for n in order]),
+    )
+    found = {part: order[k] for part, k in parts_by_name(plain).items()} | {
+        p: n for p, n in known.items() if n in slots
+    }
+    hung = list(parents)
+    for side in ("left", "right"):
+        for limb in _LIMBS:
+            for upper, lower in pairwise(limb):
+                a, b = found.get(f"{side}_{upper}"), found.get(f"{side}_{lower}")
+                if a is not None and b is not None and a not in upwards(b, hung) and b not in upwards(a, hung):
+                    hung[b] = a
+    return hung
+
+
+def humanoid_nodes(document: Document, count: int) -> dict[str, int]:
+    """The nodes of body parts, as a VRM 0, a VRM 1 or a VRM animation names them; empty for other files."""
+    extensions = document.json.get("extensions")
+    if not isinstance(extensions, dict):
+        return {}
+    bones: dict[str, Any] = {}
+    for key in ("VRMC_vrm", "VRMC_vrm_animation", "VRM"):
+        extension = extensions.get(key)
+        humanoid = extension.get("humanoid") if isinstance(extension, dict) else None
+        listed = humanoid.get("humanBones") if isinstance(humanoid, dict) else None
+        if isinstance(listed, list):
+            bones = {b["bone"]: b for b in listed if isinstance(b, dict) and isinstance(b.get("bone"), str)}
+        elif isinstance(listed, dict):
+            bones = {name: bone for name, bone in listed.items() if isinstance(bone, dict)}
+        if bones:
+            break
+    return {
+        part: document.index(bones[bone].get("node"), count, "nodes")
+        for bone, part in VRM_BONES.items()
+        if bone in bones
+    }
+
+
+VRM_BONES = {
+    "hips": "pelvis", "spine": "spine1", "chest": "spine2", "upperChest": "spine3", "neck": "neck", "head": "head",
+    **{
+        f"{side}{bone}": f"{side}_{part}"
+        for side in ("left", "right")
+        for bone, part in (
+            ("UpperLeg", "hip"), ("LowerLeg", "knee"), ("Foot", "ankle"), ("Toes", "foot"), ("Shoulder", "collar"),
+            ("UpperArm", "shoulder"), ("LowerArm", "elbow"), ("Hand", "wrist"),
+        )
+    },
+}  # fmt: skip
+"""VRM's names of the bones that are driven, and the joints of SMPL that they are."""
+
+
+def unique_names(names: list[str]) -> tuple[str, ...]:
+    """The second ``hand`` becomes ``hand_2``."""
+    taken: set[str] = set()
+    counts: dict[str, int] = {}
+    result = []
+    for name in names:
+        unique = name
+        while unique in taken:
+            counts[name] = counts.get(name, 1) + 1
+            unique = f"{name}_{counts[name]}"
+        taken.add(unique)
+        result.append(unique)
+    return tuple(result)

@@ -1,0 +1,47 @@
+"""Which way is up in a recording that does not say so: by gravity, by where feet stand, and by the rest pose."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.motion import Motion
+from motionloom.retarget.anatomy import FEET, HEAD, TOES, read_body
+from motionloom.retarget.joint_map import Override
+
+Array = NDArray[np.float64]
+TALL = 0.8
+"""Cosine between a person and the axis along which they are upright."""
+OFTEN = 0.7
+"""Share of the frames in which they must be."""
+
+
+def up_axis(motion: Motion, override: Override | None = None) -> str:
+    """``"y"`` or ``"z"``, the axis that is up; ``"y?"`` or ``"z?"`` where somebody may as well lie on the floor.
+
+    People are mostly upright, stand on feet that stay at one height, and lie near the ground. Raises
+    `MotionloomError` if the skeleton is no humanoid.
+    """
+    body = read_body(motion.skeleton, override)
+    places = body.places(motion.positions(), motion.world_rotations())
+    tall = places[:, HEAD] - places[:, FEET].mean(axis=1)
+    tall = tall / np.maximum(np.linalg.norm(tall, axis=-1, keepdims=True), 1e-9)
+    along = (np.abs(tall) > TALL).mean(axis=0)
+    if along[2] < OFTEN or tall[:, 2].mean() < 0:
+        return "y" if along[1] >= OFTEN or along[1] > along[2] else "y?"
+    if float(body.up[2]) > 0.9:
+        return "z"
+    heights = places[:, :, 1]
+    if heights.min() > -0.15 * body.leg and heights.max() < 0.7 * body.leg:
+        return "y?"  # it lies on the floor y = 0
+    feet = places[:, TOES, 2].min(axis=1)
+    return "z" if np.ptp(np.percentile(feet, [10, 90])) < 0.15 * body.leg else "z?"
+
+
+def stood_up(motion: Motion) -> Motion:
+    """From Z up to Y up: a quarter turn of everything about X."""
+    turn = rot.rotvec_to_quat(np.array([-np.pi / 2, 0.0, 0.0]))
+    rotations = motion.rotations.copy()
+    rotations[:, 0] = rot.multiply(turn, rotations[:, 0])
+    return replace(motion, root=rot.rotate(turn, motion.root), rotations=rotations)

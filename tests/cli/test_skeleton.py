@@ -1,0 +1,146 @@
+"""`--skeleton`: every command that makes motion puts it on the user's own character."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionloom import io
+from motionloom.cli import main
+from motionloom.io.bvh_writer import save_bvh
+from motionloom.io.gltf import load_glb
+from motionloom.io.gltf_read import open_glb
+from motionloom.motion import Motion
+from motionloom.retarget import to_smpl22
+from motionloom.skeleton import SMPL22, Skeleton
+from tests.cli.predict.clips import tiny_predictor
+from tests.cli.said import complaint
+from tests.io.rigged import Hero, wave
+from tests.io.test_character import check_only_one_animation_is_new
+from tests.tasks.test_edit import person
+
+TINY = ("--steps", "2", "--raw")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Each test runs beside a character with a clip and a walk."""
+    monkeypatch.chdir(tmp_path)
+    Hero().clip("wave", 0.5 * wave(20)).write(tmp_path / "hero.glb")
+    save_bvh(person(2.0, 30.0), "walk.bvh")
+    return tmp_path
+
+
+def check(out: str, name: str) -> None:
+    check_only_one_animation_is_new(Path("hero.glb"), Path(out))
+    assert open_glb(out).clips == ["wave", name]
+
+
+def test_export_puts_a_walk_on_a_character() -> None:
+    assert main(["export", "walk.bvh", "--skeleton", "hero.glb", "--out", "moving.glb"]) == 0
+    check("moving.glb", "walk")
+    assert main(["export", "walk.bvh", "moving.glb", "--skeleton", "hero.glb", "--clip-name", "go", "--replace"]) == 0
+    assert open_glb("moving.glb").clips == ["go"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("generate", "a person walks", "--seconds", "1"),
+        ("compose", "a person walks", "a person turns", "--seconds", "2"),
+        ("control", "a person walks", "--follow", "left_wrist", "--from", "walk.bvh"),
+        ("edit", "walk.bvh", "a person waves", "--between", "0.5", "1.5"),
+    ],
+)
+def test_commands_that_draw_write_the_character(weights: str, words: tuple[str, ...]) -> None:
+    made = [*words, "--weights", weights, *TINY, "--skeleton", "hero.glb", "--clip-name", "ours"]
+    assert main([*made, "--out", "out.glb"]) == 0
+    check("out.glb", "ours")
+
+
+def test_predictions_are_put_on_the_character(tmp_path: Path) -> None:
+    from motionloom.predictor import save_predictor
+
+    weights = str(save_predictor(tiny_predictor(), tmp_path / "tiny.safetensors"))
+    more = ["--weights", weights, "--steps", "2", "--skeleton", "hero.glb", "--clip-name", "ours", "--count", "2"]
+    assert main(["predict", "walk.bvh", "--seconds", "0.5", "--no-picture", "--out", "futures", *more]) == 0
+    for number in (0, 1):
+        check(f"futures/future_0{number}.glb", "ours")
+    assert main(["switch", "walk.bvh", "walk.bvh", "--out", "out.glb", *more]) == 0
+    check("out_1.glb", "ours")
+
+
+def test_the_character_itself_is_not_written_over(capsys: pytest.CaptureFixture[str]) -> None:
+    before = Path("hero.glb").read_bytes()
+    assert main(["export", "walk.bvh", "--skeleton", "hero.glb", "--out", "hero.glb"]) == 2
+    assert "is the character itself" in complaint(capsys)
+    assert Path("hero.glb").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--root", "hips"), "--root goes with a --skeleton"),
+        (("--replace",), "--replace goes with a --skeleton"),
+        (("--skeleton", "walk.bvh", "--replace"), "for .glb, .gltf and .vrm characters"),
+        (("--skeleton", "hero.txt"), "--skeleton needs"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(
+    words: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", "walk.bvh", "out.bvh", *words]) == 2
+    assert said in complaint(capsys)
+    assert not Path("out.bvh").exists()
+
+
+def test_info_lists_clips_and_clip_picks_one(capsys: pytest.CaptureFixture[str]) -> None:
+    Hero().clip("wave", wave(20)).clip("run", wave(30)).write(Path("two.glb"))
+    assert main(["info", "two.glb", "--clip", "run"]) == 0
+    said = capsys.readouterr().out
+    assert "1  wave, 0.63 s" in said
+    assert "30 frames" in said
+    assert main(["export", "two.glb", "two.bvh"]) == 0
+    assert "2 clips" in complaint(capsys)
+
+
+# The root bone -------------------------------------------------------------------------------------------------------
+
+
+def _paths(mode: str) -> tuple[np.ndarray, np.ndarray]:
+    """(frames, 3) of the root bone and of the hips of a walk that is exported with ``--root``."""
+    hero = Hero()
+    hero.json["skins"][0]["joints"].append(22)
+    matrices = hero.values(hero.json["skins"][0]["inverseBindMatrices"], 16)
+    hero.json["skins"][0]["inverseBindMatrices"] = hero.add(np.vstack([matrices, np.eye(4).ravel()]), 5126, "MAT4")
+    hero.write(Path("rooted.glb"))
+    assert main(["export", "walk.bvh", "--skeleton", "rooted.glb", "--root", mode, "--out", "out.glb"]) == 0
+    motion = load_glb("out.glb")
+    places = motion.positions()
+    return places[:, motion.skeleton.index("root")], places[:, motion.skeleton.index("pelvis")]
+
+
+def test_a_root_bone_stays_on_the_ground() -> None:
+    walk = to_smpl22(io.load("walk.bvh")).root
+    way = (walk - [SMPL22.offsets[0, 0], 0, SMPL22.offsets[0, 2]]) * [1, 0, 1]
+    for mode, root, hips in (("motion", way, way), ("hips", 0 * way, way), ("in-place", 0 * way, 0 * way)):
+        bone, pelvis = _paths(mode)
+        np.testing.assert_allclose(bone, root, atol=3e-3)
+        np.testing.assert_allclose(pelvis[:, [0, 2]], hips[:, [0, 2]], atol=3e-3)
+        np.testing.assert_allclose(pelvis[:, 1], walk[:, 1], atol=1e-2)
+
+
+def test_the_same_three_in_a_bvh() -> None:
+    offsets = np.vstack([np.zeros(3), SMPL22.offsets])
+    skeleton = Skeleton(("base", *SMPL22.names), (-1, *(p + 1 for p in SMPL22.parents)), offsets)
+    turns = np.tile([1.0, 0, 0, 0], (1, 23, 1))
+    save_bvh(Motion(skeleton, 30.0, np.zeros((1, 3)), turns), "rooted.bvh")
+    found = {}
+    for mode in ("motion", "hips", "in-place"):
+        assert main(["export", "walk.bvh", "out.bvh", "--skeleton", "rooted.bvh", "--root", mode]) == 0
+        found[mode] = io.load("out.bvh").positions()[:, :2]
+    np.testing.assert_allclose(found["motion"][:, 1], found["hips"][:, 1], atol=1e-5)
+    np.testing.assert_allclose(found["motion"][:, 0, 1], 0, atol=2e-3)
+    np.testing.assert_allclose(np.ptp(found["hips"][:, 0], axis=0), 0, atol=1e-5)
+    assert np.ptp(found["motion"][:, 0, 2]) > 0.5
+    assert np.ptp(found["in-place"][:, 1, 2]) < 1e-5

@@ -1,0 +1,266 @@
+"""A user's own character: its file in, the same file out with one more animation, and the mesh as it should be."""
+
+import copy
+import json
+import struct
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.io.character import load_character
+from motionloom.io.gltf import load_glb
+from motionloom.motion import Motion
+from motionloom.retarget import joint_map, retarget, to_smpl22
+from motionloom.retarget.anatomy import CHILD
+from motionloom.skeleton import SMPL22
+from tests.io.gltf_skin import Scene
+from tests.io.rigged import Hero, wave
+from tests.shared import shared
+
+LIMBS = (1, 2, 4, 5, 16, 17, 18, 19)
+
+
+def parts_of(path: Path) -> tuple[dict, bytes, list[tuple[bytes, bytes]]]:
+    """JSON, binary part and all further chunks."""
+    data, at, found = path.read_bytes(), 12, []
+    while at < len(data):
+        (length,) = struct.unpack_from("<I", data, at)
+        found.append((data[at + 4 : at + 8], data[at + 8 : at + 8 + length]))
+        at += 8 + length
+    binary = next((part for kind, part in found if kind == b"BIN\0"), b"")
+    return json.loads(found[0][1]), binary, [chunk for chunk in found if chunk[0] not in (b"JSON", b"BIN\0")]
+
+
+def check_only_one_animation_is_new(before: Path, after: Path) -> None:
+    """All that was there is there, in the same places; what is behind it belongs to the one new animation."""
+    old, old_data, old_chunks = parts_of(before)
+    new, new_data, new_chunks = parts_of(after)
+    animation = new["animations"][-1]
+    assert new["animations"][:-1] == old.get("animations", [])
+    fresh = {sampler[key] for sampler in animation["samplers"] for key in ("input", "output")}
+    assert fresh == set(range(len(old.get("accessors", [])), len(new["accessors"])))
+    assert {new["accessors"][a]["bufferView"] for a in fresh} == {len(old.get("bufferViews", []))}
+    view = new["bufferViews"][-1]
+    assert view["buffer"] == 0
+    assert view["byteOffset"] >= old["buffers"][0]["byteLength"]
+    stripped = copy.deepcopy(new)
+    del stripped["animations"], stripped["bufferViews"][-1]
+    stripped["accessors"] = stripped["accessors"][: len(old["accessors"])]
+    stripped["buffers"][0]["byteLength"] = old["buffers"][0]["byteLength"]
+    old.pop("animations", None)
+    assert stripped == old
+    assert list(stripped) == list(old)  # even the order of what is in it
+    length = old["buffers"][0]["byteLength"]
+    assert new_data[:length] == old_data[:length]
+    assert new_chunks == old_chunks
+
+
+def onto(path: Path, out: Path, *, clip: str | int | None = None) -> tuple[Motion, Path]:
+    """A file's clip on the uniform person and back onto the file."""
+    motion, character = load_glb(path, clip=clip), load_character(path)
+    made = retarget(to_smpl22(motion), character.skeleton)
+    return motion, character.save(made, out, name="ours")
+
+
+def errors(before: Path, after: Path, clip: int, motion: Motion) -> dict[str, float]:
+    """Percent of the height between vertices, and degrees of twist between limb bones, of the original and ours."""
+    character, a, b = load_character(before), Scene(before), Scene(after)
+    frames = np.unique(np.linspace(0, len(motion) - 1, 12).astype(int))
+    theirs = a.json["animations"][clip]
+    was = a.worlds(theirs, a.span(theirs)[0] + frames / motion.fps)
+    now = b.worlds(b.clip("ours"), frames / motion.fps)
+    parts, skeleton, nodes = joint_map(character.skeleton), character.skeleton, character.rig.nodes
+    drivers = parts.drivers(skeleton)
+    found = {"twist": 0.0}
+    for j in LIMBS:
+        child = skeleton.index(parts.points[CHILD[j] or 0][0][0])
+        k = drivers[j]
+        assert k is not None
+        bone = skeleton.rest_positions()[child] - skeleton.rest_positions()[k]
+        axis = rot.rotate(rot.inverse(character.rig.turns[k]), bone / np.linalg.norm(bone))
+        found["twist"] = max(found["twist"], _twist(was[:, nodes[k]], now[:, nodes[k]], axis))
+    skinned = [i for i, node in enumerate(a.nodes) if "skin" in node and "mesh" in node]
+    if not skinned:
+        return found
+    rest = np.concatenate([v[0] for i, v in a.vertices(a.worlds(None, np.zeros(1))).items() if i in skinned])
+    theirs_at, ours_at = a.vertices(was), b.vertices(now)
+    apart = np.concatenate([np.linalg.norm(theirs_at[i] - ours_at[i], axis=-1) for i in skinned], axis=1)
+    apart = 100 * apart / np.ptp(rest[:, 1])
+    found["all"] = float(apart.mean())
+    for part, joints in (("head", (15,)), ("hands", (20, 21)), ("feet", (7, 8))):
+        below = {skeleton.index(name) for j in joints for name, _ in parts.points[j]}
+        for k, p in enumerate(skeleton.parents):
+            below |= {k} if p in below else set()
+        weight = np.concatenate([a.weight_of(i, {nodes[k] for k in below}) for i in skinned])
+        found[part] = float(apart[:, weight > 0.5].mean()) if (weight > 0.5).any() else 0.0
+    return found
+
+
+def _twist(was: np.ndarray, now: np.ndarray, axis: np.ndarray) -> float:
+    """Degrees by which bones (frames, 4, 4) are turned about their own axis against each other, the largest."""
+    a, b = (rot.matrix_to_quat(m[:, :3, :3] / np.linalg.norm(m[:, :3, :3], axis=1, keepdims=True)) for m in (was, now))
+    along = [rot.rotate(q, np.broadcast_to(axis, (len(q), 3))) for q in (a, b)]
+    swung = rot.multiply(rot.shortest_arc(*along), a)
+    left = rot.multiply(rot.inverse(swung), b)
+    angle = np.degrees(2 * np.arctan2((left[:, 1:] * axis).sum(-1), left[:, 0]))
+    return float(np.abs((angle + 180) % 360 - 180).max())
+
+
+# By hand -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_character_with_turned_bones_moves_as_it_did(tmp_path: Path) -> None:
+    """Whatever way bones are turned at rest, the mesh comes back: nothing is wrung."""
+    for seed in range(3):
+        path = Hero(seed=seed).clip("wave", 0.5 * wave(seed=seed)).write(tmp_path / "hero.glb")
+        motion, out = onto(path, tmp_path / "moving.glb")
+        found = errors(path, out, 0, motion)
+        assert found["all"] < 1.0
+        assert found["twist"] < 1.0
+
+
+def test_the_skeleton_is_at_rest_as_the_file_is(tmp_path: Path) -> None:
+    skeleton = load_character(Hero().write(tmp_path / "hero.glb")).skeleton
+    body = [skeleton.index(name) for name in SMPL22.names]
+    np.testing.assert_allclose(skeleton.rest_positions()[body], SMPL22.rest_positions(), atol=1e-6)
+
+
+def test_nothing_but_one_animation_is_new(tmp_path: Path) -> None:
+    path = Hero().clip("wave", wave()).write(tmp_path / "hero.glb", others=[(b"ABCD", b"1234")])
+    _, out = onto(path, tmp_path / "moving.glb")
+    check_only_one_animation_is_new(path, out)
+    _, twice = onto(out, tmp_path / "twice.glb", clip="wave")
+    check_only_one_animation_is_new(out, twice)
+    assert [a["name"] for a in parts_of(twice)[0]["animations"]] == ["wave", "ours", "ours_2"]
+
+
+def test_a_rig_of_meshes_without_clips_gets_its_first(tmp_path: Path) -> None:
+    path = Hero().write(tmp_path / "hero.glb")
+    character = load_character(path)
+    out = character.save(retarget(load_glb(path), character.skeleton), tmp_path / "out.glb")
+    check_only_one_animation_is_new(path, out)
+
+
+def test_replace_leaves_only_ours(tmp_path: Path) -> None:
+    path = Hero().clip("wave", wave()).write(tmp_path / "hero.glb")
+    character = load_character(path)
+    character.save(retarget(load_glb(path), character.skeleton), tmp_path / "out.glb", name="wave", replace=True)
+    assert [a["name"] for a in parts_of(tmp_path / "out.glb")[0]["animations"]] == ["wave"]
+
+
+def test_bones_that_are_not_driven_keep_their_rest(tmp_path: Path) -> None:
+    path = Hero().clip("wave", wave()).write(tmp_path / "hero.glb")
+    _, out = onto(path, tmp_path / "moving.glb")
+    new = parts_of(out)[0]
+    assert 23 not in {channel["target"]["node"] for channel in new["animations"][-1]["channels"]}
+
+
+def test_feet_on_controls_are_carried_along(tmp_path: Path) -> None:
+    """Feet that hang on the root instead of on their shins, as in rigs made for IK, stay on their legs."""
+    hang = {"left_ankle": "pelvis", "right_ankle": "pelvis"}
+    path = Hero(hang=hang).write(tmp_path / "hero.glb")
+    character = load_character(path)
+    assert character.skeleton.parents[character.skeleton.index("left_ankle")] == character.skeleton.index("left_knee")
+    turns = rot.rotvec_to_quat(wave())
+    time = np.arange(40)[:, None]
+    motion = Motion(SMPL22, 30.0, SMPL22.offsets[0] + 0.01 * time * [0, 0, 1], turns)
+    made = retarget(motion, character.skeleton)
+    out = character.save(made, tmp_path / "out.glb", name="ours")
+    scene = Scene(out)
+    places = scene.worlds(scene.clip("ours"), np.arange(40) / 30.0)[..., :3, 3][:, list(character.rig.nodes)]
+    np.testing.assert_allclose(places, made.positions(), atol=1e-5)
+
+
+def test_where_the_mesh_was_bound_is_the_rest(tmp_path: Path) -> None:
+    """Nodes left in a pose by the last editor: the T-pose is in the inverse bind matrices."""
+    hero = Hero()
+    for j, angle in ((1, 0.7), (16, -1.2), (18, 0.9)):
+        old = np.roll(np.array(hero.json["nodes"][j]["rotation"]), 1)
+        turned = rot.multiply(old, rot.rotvec_to_quat(np.array([angle, 0.3, 0.0])))
+        hero.json["nodes"][j]["rotation"] = np.roll(turned, -1).tolist()
+    skeleton = load_character(hero.write(tmp_path / "hero.glb")).skeleton
+    body = [skeleton.index(name) for name in SMPL22.names]
+    np.testing.assert_allclose(skeleton.rest_positions()[body], SMPL22.rest_positions(), atol=1e-5)
+
+
+def test_clips_are_chosen_by_name_or_number_and_never_silently(tmp_path: Path) -> None:
+    path = Hero().clip("wave", wave()).clip("2", wave(20)).clip("run", wave(30)).write(tmp_path / "hero.glb")
+    assert [len(load_glb(path, clip=clip)) for clip in ("wave", 2, "2", 3, "run")] == [40, 20, 20, 30, 30]
+    with pytest.warns(UserWarning, match="3 clips"):
+        assert len(load_glb(path)) == 40
+    for wrong in ("jump", 0, 4, "9" * 30):
+        with pytest.raises(MotionloomError, match="no clip"):
+            load_glb(path, clip=wrong)
+
+
+def test_a_humanoid_map_is_read_and_not_guessed(tmp_path: Path) -> None:
+    hero = Hero()
+    for node in hero.json["nodes"][:22]:
+        node["name"] = f"bone {node['extras']['number']}"
+    bones = {"hips": 0, "spine": 3, "chest": 6, "neck": 12, "head": 15}
+    for side, first in (("left", 0), ("right", 1)):
+        limbs = {"UpperLeg": 1, "LowerLeg": 4, "Foot": 7, "Toes": 10, "UpperArm": 16, "LowerArm": 18, "Hand": 20}
+        bones |= {side + name: number + first for name, number in limbs.items()}
+    one = {"VRMC_vrm": {"humanoid": {"humanBones": {name: {"node": n} for name, n in bones.items()}}}}
+    zero = {"VRM": {"humanoid": {"humanBones": [{"bone": name, "node": n} for name, n in bones.items()]}}}
+    for extensions in (one, zero):
+        hero.json["extensions"] = extensions
+        skeleton = load_character(hero.write(tmp_path / "hero.vrm")).skeleton
+        assert joint_map(skeleton).names()["right_elbow"] == {"bone 19": 1.0}
+
+
+def test_another_skeleton_and_another_suffix_are_refused(tmp_path: Path) -> None:
+    character = load_character(Hero().write(tmp_path / "hero.glb"))
+    still = Motion(SMPL22, 30.0, np.zeros((1, 3)), np.tile(rot.IDENTITY, (1, 22, 1)))
+    with pytest.raises(MotionloomError, match="not on the skeleton"):
+        character.save(still, tmp_path / "out.glb")
+    with pytest.raises(MotionloomError, match=r"name it \*\.glb"):
+        character.save(retarget(still, character.skeleton), tmp_path / "out.vrm")
+    assert not list(tmp_path.glob("out*"))
+
+
+# Other people's ------------------------------------------------------------------------------------------------------
+
+# The robot's head falls off when it dies; the knight's shoulders leave its body when it swings a sword with both hands.
+RIGS = (
+    (
+        "kaykit_knight.glb",
+        ("Walking_A", "Running_A", "Idle", "PickUp", "Sit_Chair_Idle", "Jump_Full_Short", "Lie_Idle"),
+    ),
+    ("rpm_walk.glb", ("M_Walk_001",)),
+    ("m2m_mixamo.glb", ("Idle", "T-Pose", "Walking")),
+    ("ue_m2m_anim.glb", ("YMCA",)),
+    ("robot_expressive.glb", ("Robot_Walking", "Robot_Running", "Robot_Dance", "Robot_Jump", "Robot_Wave")),
+    ("gdbot.glb", ("Idle", "run", "walk", "jump", "fall", "ground_impact", "simple_punch")),
+    ("sophia.glb", ("EdgeGrab", "Fall", "Idle", "Jump", "Run", "RunTiltL", "RunTiltR", "WallSlide")),
+)
+
+
+@pytest.mark.parametrize(("name", "clip"), [(name, clip) for name, clips in RIGS for clip in clips])
+def test_a_rigs_own_clip_comes_back_from_the_uniform_person(tmp_path: Path, name: str, clip: str) -> None:
+    path = shared(f"rigs/{name}")
+    motion, out = onto(path, tmp_path / "out.glb", clip=clip)
+    found = errors(path, out, [a.get("name") for a in Scene(path).json["animations"]].index(clip), motion)
+    assert found["twist"] < 20
+    assert found.get("all", 0) < 4
+    assert max(found.get(part, 0) for part in ("head", "hands", "feet")) < 6
+    check_only_one_animation_is_new(path, out)
+
+
+@pytest.mark.parametrize("name", ["ue_m2m_skel.glb", "vrm1_example.vrm", "vroid.vrm"])
+def test_rigs_without_a_clip_get_one(tmp_path: Path, name: str) -> None:
+    path = shared(f"rigs/{name}")
+    character = load_character(path)
+    turns = rot.rotvec_to_quat(wave())
+    motion = retarget(Motion(SMPL22, 30.0, np.tile(SMPL22.offsets[0], (40, 1)), turns), character.skeleton)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        out = character.save(motion, tmp_path / f"out{path.suffix}", name="ours")
+    check_only_one_animation_is_new(path, out)
+    scene = Scene(out)
+    places = scene.worlds(scene.clip("ours"), np.arange(40) / 30.0)[..., :3, 3][:, list(character.rig.nodes)]
+    np.testing.assert_allclose(places, motion.positions(), atol=1e-4)
