@@ -129,15 +129,7 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, 
     items, start = [], 0
     for clip in clips:
         for note in clip.notes:
-            if note.kind == "human" or note.kind.startswith(PREFIX):
-                said = tuple(_number(texts, t) for t in note.texts)
-            elif note.kind == "index":
-                said = tuple(dict.fromkeys(_number(texts, sentence(p, rng)) for p in note.texts for _ in range(3)))
-            else:
-                if note.kind not in wordings:
-                    made = {sentence(p, rng) for _ in range(WORDINGS) for p in [rng.choice(list(phrases(note.kind)))]}
-                    wordings[note.kind] = tuple(_number(texts, t) for t in sorted(made))
-                said = wordings[note.kind]
+            said = _worded(note, texts, wordings, rng)
             moments = _moments(clip, note)
             for first, last in ((note.first, note.last), *moments):
                 core = note.core or ((first, last) if moments or _is_event(note) else None)
@@ -151,6 +143,20 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, 
         features, torch.from_numpy(mean), torch.from_numpy(std), tuple(items), tuple(texts),
         tuple(sorted({c.licence for c in clips})), recorded,
     )  # fmt: skip
+
+
+def _worded(
+    note: Note, texts: dict[str, int], wordings: dict[str, tuple[int, ...]], rng: np.random.Generator
+) -> tuple[int, ...]:
+    """Numbers of a note's captions in ``texts``, which grows; ``wordings`` are those of the labels met so far."""
+    if note.kind == "human" or note.kind.startswith(PREFIX):
+        return tuple(_number(texts, text) for text in note.texts)
+    if note.kind == "index":
+        return tuple(dict.fromkeys(_number(texts, sentence(p, rng)) for p in note.texts for _ in range(3)))
+    if note.kind not in wordings:
+        made = {sentence(p, rng) for _ in range(WORDINGS) for p in [rng.choice(list(phrases(note.kind)))]}
+        wordings[note.kind] = tuple(_number(texts, text) for text in sorted(made))
+    return wordings[note.kind]
 
 
 def _is_event(note: Note) -> bool:

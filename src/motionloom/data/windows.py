@@ -6,7 +6,11 @@ clip's own text names the action. They describe training windows only and share 
 `lab.metrics.obedience`, which judges what comes out.
 """
 
+import functools
+import operator
 import re
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +19,6 @@ from motionloom.kinematics.gestures import longest
 from motionloom.kinematics.physics import Array
 
 Measures = dict[str, float]
-_BENT_OTHERWISE = r"danc|climb|cartwheel|dive|snake|fish|whale|crawl|flip|roll"
 _ANKLES, _FEET, _WRISTS, _SHOULDERS, _HIPS = [7, 8], [7, 8, 10, 11], [20, 21], [16, 17], [1, 2]
 
 
@@ -118,107 +121,151 @@ def _swings(signal: Array, amplitude: float) -> int:
     return count
 
 
+class Rule(NamedTuple):
+    """What a window is called where its clip's words and its own measures say so."""
+
+    labels: str
+    """The names it gets, with commas; none where a window like this has no name."""
+    measures: str
+    """Comparisons with commas, all of which must hold: of `_measure`'s numbers and those of `_compared`."""
+    words: tuple[str, ...] = ()
+    """Patterns, each of which the clip's text must hold."""
+    without: str = ""
+    """A pattern that it must not hold."""
+    choice: str = ""
+    """Of the rules of one choice only the first that holds counts; every rule without one is a choice of its own."""
+    closes: tuple[str, ...] = ()
+    """Other choices that are closed by this rule."""
+
+    def holds(self, compared: Measures, words: str) -> bool:
+        """Whether all of it is so. ``words`` are in lower case."""
+        return (
+            all(re.search(pattern, words) for pattern in self.words)
+            and not (self.without and re.search(self.without, words))
+            and all(is_so(compared[name], number) for name, is_so, number in _comparisons(self.measures))
+        )
+
+
+_OPERATORS = {"<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": operator.ge}
+
+
+@functools.cache
+def _comparisons(text: str) -> tuple[tuple[str, Callable[[float, float], bool], float], ...]:
+    parts = (part.split() for part in text.split(",") if part)
+    return tuple((name, _OPERATORS[sign], float(number)) for name, sign, number in parts)
+
+
+_KICK, _KICKED = r"kick|geri|karate|martial", "kick_height > 0.5, foot_speed > 4.4"
+_JUMP, _JUMPED = r"jump|hop|leap|exercise", "jump_rise > 0.2, jump_clearance > 0.16"
+_STAIRS, _SEAT, _UPRIGHT = r"climb|stair|steps|ladder", r"\bsit|seat|chair|stool", ("squat", "crouch", "bend")
+
+ALONE = (
+    Rule("cartwheel", "bend > 70", (r"cartwheel",)),
+    Rule("jumping jacks", "both_over_head > 0.1, flights >= 2", (r"\bjack",)),
+)
+"""The first of these is a window's only label."""
+
+GESTURES = (
+    Rule("punch", "punch_speed > 1.4", (r"punch|strike|boxing|oiduki",)),
+    Rule("kick ball", _KICKED, (_KICK, r"soccer|ball"), choice="kick"),
+    Rule("kick", _KICKED, (_KICK,), choice="kick"),
+    Rule("kick ball", "kick_height > 0.3, foot_speed > 5.0", (r"soccer",), choice="kick"),
+    Rule("hop", "hops >= 3, flights >= 3", (_JUMP, r"hop|one foot|one leg"), choice="jump"),
+    Rule("jump repeatedly", f"{_JUMPED}, flights >= 3, off_place < 0", (_JUMP,), choice="jump"),
+    Rule("jump forward", f"{_JUMPED}, advance > 0.8", (_JUMP,), choice="jump"),
+    Rule("jump", _JUMPED, (_JUMP,), choice="jump"),
+    Rule("wave", "wave_swings >= 4, hand_over_neck > -0.1, travel < 2", (r"wav|traffic|bye",)),
+    Rule("climb", "rise > 0.35", (_STAIRS,)),
+    Rule("descend", "rise < -0.35", (_STAIRS,)),
+    Rule("dance", "mean_stir > 0.45", (r"danc|salsa|ballet|pirouette",)),
+    Rule("balance", "one_leg > 1.5, travel < 1.0", (r"balance|one leg",)),
+    # changes are seen whole: upright before sitting down, crouching and bending, upright behind standing up
+    Rule("sit", "low_share > 0.9, bend < 75", (_SEAT,), choice="sit", closes=_UPRIGHT),
+    Rule(
+        "sit down", "height_first > 0.88, height_last < 0.78, tilt_last < 45", (_SEAT,), choice="sit", closes=_UPRIGHT
+    ),
+    Rule(
+        "stand up", "height_first < 0.78, height_last > 0.88, tilt_first < 45", (_SEAT,), choice="sit", closes=_UPRIGHT
+    ),
+    Rule("squat once", "dips >= 1, dips < 2", (r"squat",), choice="squat"),
+    Rule("squat twice", "dips >= 2, dips < 3", (r"squat",), choice="squat"),
+    Rule("squat three times", "dips >= 3, dips <= 3", (r"squat",), choice="squat"),
+    Rule(
+        "crouch", "pelvis_low < 0.72, knees > 80, height_first > 0.85",
+        without=r"climb|danc|snake|fish|whale|ladder|crawl|sit", choice="crouch",
+    ),
+    Rule(
+        "bend", "bend > 60, pelvis_low > 0.6, tilt_first < 35, tilt_last < 35",
+        without=r"danc|climb|cartwheel|dive|snake|fish|whale|crawl|flip|roll", choice="bend",
+    ),
+    Rule("arms up", "hands_up > 0.6, both_over_head > 0.05", without=r"climb|ladder|danc|hang"),
+)  # fmt: skip
+"""Every choice among these may give labels to one window."""
+
+_ON_THE_SPOT = "speed < 0.25, travel < 0.8, pelvis_low > 0.85"
+_CIRCLE = "winding > 250, gap < 0.5, facing_share > 0.6"
+_STRAIGHT = "turned < 40, winding < 70"
+_SIDEWAYS = "side_share > 0.7, turned < 60"
+_CURVE = "facing_share > 0.5, pace < 1.9"
+
+PATHS = (
+    Rule("stand", "stir < 0.28, travel < 0.15, turned < 25, pelvis_low > 0.9, hand_over_neck < -0.2"),
+    Rule("", "", (r"danc|salsa|climb|playground|acrobat|karate|cartwheel",)),
+    Rule("turn left,turn around", f"{_ON_THE_SPOT}, turn > 135"),
+    Rule("turn left", f"{_ON_THE_SPOT}, turn > 60"),
+    Rule("turn right,turn around", f"{_ON_THE_SPOT}, turn < -135"),
+    Rule("turn right", f"{_ON_THE_SPOT}, turn < -60"),
+    Rule("", "speed < 0.25"),
+    Rule("", "pelvis_low < 0.8"),
+    Rule("run circle", f"{_CIRCLE}, pace > 2"),
+    Rule("circle left", f"{_CIRCLE}, turn > 0"),
+    Rule("circle right", _CIRCLE),
+    Rule("run", f"{_STRAIGHT}, facing_share > 0.75, pace > 2.7"),
+    Rule("jog", f"{_STRAIGHT}, facing_share > 0.75, pace > 2.0"),
+    Rule("walk,walk slow", f"{_STRAIGHT}, facing_share > 0.75, pace < 0.85"),
+    Rule("walk,walk fast", f"{_STRAIGHT}, facing_share > 0.75, pace > 1.5"),
+    Rule("walk", f"{_STRAIGHT}, facing_share > 0.75"),
+    Rule("walk backward", f"{_STRAIGHT}, facing_share < -0.75, pace < 1.7"),
+    Rule("jog backward", f"{_STRAIGHT}, facing_share < -0.75"),
+    Rule("sidestep left", f"{_SIDEWAYS}, left > 0"),
+    Rule("sidestep right", _SIDEWAYS),
+    Rule("walk left turn", f"{_CURVE}, turn > 55, turn < 135"),
+    Rule("walk right turn", f"{_CURVE}, turn < -55, turn > -135"),
+    Rule("turn around", "turned >= 135, winding < 250, facing_share > 0.3, pace < 1.9"),
+)
+"""The first of these names where a window without a gesture goes."""
+
+
 def label_window(positions: Array, fps: float, text: str) -> list[str]:
     """Labels of one window. ``positions`` (frames, 22, 3) metres, floor near 0; ``text``: all the clip's own words."""
-    m = _measure(positions, fps)
-    seconds = len(positions) / fps
-    words = text.lower()
-    gestures = _gestures(m, words, seconds)
-    if gestures:
-        return gestures
-    return _path(m, seconds, words)
+    return labels_of(_measure(positions, fps), len(positions) / fps, text)
 
 
-def _says(words: str, pattern: str) -> bool:
-    return re.search(pattern, words) is not None
+def labels_of(measures: Measures, seconds: float, text: str) -> list[str]:
+    """Labels of a window that measures so and lasts so long, by the rules above."""
+    compared, words = _compared(measures, seconds), text.lower()
+    return _first(ALONE, compared, words) or _every(GESTURES, compared, words) or _first(PATHS, compared, words)
 
 
-def _gestures(m: Measures, words: str, seconds: float) -> list[str]:
+def _compared(m: Measures, seconds: float) -> Measures:
+    """The measures, and what rules need of two of them: degrees of turn, metres per second, metres too far ahead."""
+    off_place = abs(m["advance"]) - 0.15 * seconds
+    return {**m, "turned": abs(m["turn"]), "speed": m["travel"] / seconds, "off_place": off_place}
+
+
+def _first(rules: Sequence[Rule], compared: Measures, words: str) -> list[str]:
+    held = next((rule for rule in rules if rule.holds(compared, words)), None)
+    return held.labels.split(",") if held and held.labels else []
+
+
+def _every(rules: Sequence[Rule], compared: Measures, words: str) -> list[str]:
     found: list[str] = []
-    if _says(words, r"cartwheel") and m["bend"] > 70:
-        return ["cartwheel"]
-    if _says(words, r"\bjack") and m["both_over_head"] > 0.1 and m["flights"] >= 2:
-        return ["jumping jacks"]
-    if _says(words, r"punch|strike|boxing|oiduki") and m["punch_speed"] > 1.4:
-        found.append("punch")
-    if _says(words, r"kick|geri|karate|martial") and m["kick_height"] > 0.5 and m["foot_speed"] > 4.4:
-        found.append("kick ball" if _says(words, r"soccer|ball") else "kick")
-    elif _says(words, r"soccer") and m["kick_height"] > 0.3 and m["foot_speed"] > 5.0:
-        found.append("kick ball")
-    jumpy = _says(words, r"jump|hop|leap|exercise")
-    if jumpy and m["hops"] >= 3 and m["flights"] >= 3 and _says(words, r"hop|one foot|one leg"):
-        found.append("hop")
-    elif jumpy and m["jump_rise"] > 0.2 and m["jump_clearance"] > 0.16:
-        several = m["flights"] >= 3 and abs(m["advance"]) < 0.15 * seconds
-        found.append("jump repeatedly" if several else "jump forward" if m["advance"] > 0.8 else "jump")
-    if _says(words, r"wav|traffic|bye") and m["wave_swings"] >= 4 and m["hand_over_neck"] > -0.1 and m["travel"] < 2:
-        found.append("wave")
-    if _says(words, r"climb|stair|steps|ladder") and abs(m["rise"]) > 0.35:
-        found.append("climb" if m["rise"] > 0 else "descend")
-    if _says(words, r"danc|salsa|ballet|pirouette") and m["mean_stir"] > 0.45:
-        found.append("dance")
-    if _says(words, r"balance|one leg") and m["one_leg"] > 1.5 and m["travel"] < 1.0:
-        found.append("balance")
-    found += _postures(m, words)
-    if m["hands_up"] > 0.6 and m["both_over_head"] > 0.05 and not _says(words, r"climb|ladder|danc|hang"):
-        found.append("arms up")
+    closed: set[str] = set()
+    for rule in rules:
+        if rule.choice not in closed and rule.holds(compared, words):
+            found += rule.labels.split(",")
+            closed |= {rule.choice, *rule.closes} - {""}
     return found
-
-
-def _postures(m: Measures, words: str) -> list[str]:
-    """Changes are seen whole: upright before sitting down, crouching and bending, upright behind standing up."""
-    if _says(words, r"\bsit|seat|chair|stool"):
-        if m["low_share"] > 0.9 and m["bend"] < 75:
-            return ["sit"]
-        if m["height_first"] > 0.88 and m["height_last"] < 0.78 and m["tilt_last"] < 45:
-            return ["sit down"]
-        if m["height_first"] < 0.78 and m["height_last"] > 0.88 and m["tilt_first"] < 45:
-            return ["stand up"]
-    found: list[str] = []
-    squats = ("squat once", "squat twice", "squat three times")
-    if _says(words, r"squat") and 1 <= m["dips"] <= 3:
-        found.append(squats[int(m["dips"]) - 1])
-    deep = (
-        m["pelvis_low"] < 0.72 and m["knees"] > 80 and not _says(words, r"climb|danc|snake|fish|whale|ladder|crawl|sit")
-    )
-    if deep and m["height_first"] > 0.85:
-        found.append("crouch")
-    upright = max(m["tilt_first"], m["tilt_last"]) < 35
-    if m["bend"] > 60 and m["pelvis_low"] > 0.6 and upright and not _says(words, _BENT_OTHERWISE):
-        found.append("bend")
-    return found
-
-
-def _path(m: Measures, seconds: float, words: str) -> list[str]:
-    stays = m["travel"] < 0.15 and abs(m["turn"]) < 25
-    if m["stir"] < 0.28 and stays and m["pelvis_low"] > 0.9 and m["hand_over_neck"] < -0.2:
-        return ["stand"]
-    if _says(words, r"danc|salsa|climb|playground|acrobat|karate|cartwheel"):
-        return []
-    speed = m["travel"] / seconds
-    straight = abs(m["turn"]) < 40 and m["winding"] < 70
-    if m["pelvis_low"] < 0.8 or speed < 0.25:
-        if abs(m["turn"]) > 60 and m["travel"] < 0.8 and m["pelvis_low"] > 0.85:
-            around = abs(m["turn"]) > 135
-            return ["turn left" if m["turn"] > 0 else "turn right"] + (["turn around"] if around else [])
-        return []
-    if m["winding"] > 250 and m["gap"] < 0.5 and m["facing_share"] > 0.6:
-        return ["run circle"] if m["pace"] > 2 else ["circle left" if m["turn"] > 0 else "circle right"]
-    if m["facing_share"] > 0.75 and straight:
-        if m["pace"] > 2.7:
-            return ["run"]
-        if m["pace"] > 2.0:
-            return ["jog"]
-        return ["walk", "walk slow"] if m["pace"] < 0.85 else ["walk", "walk fast"] if m["pace"] > 1.5 else ["walk"]
-    if m["facing_share"] < -0.75 and straight:
-        return ["walk backward"] if m["pace"] < 1.7 else ["jog backward"]
-    if m["side_share"] > 0.7 and abs(m["turn"]) < 60:
-        return ["sidestep left" if m["left"] > 0 else "sidestep right"]
-    if 55 < abs(m["turn"]) < 135 and m["facing_share"] > 0.5 and m["pace"] < 1.9:
-        return ["walk left turn" if m["turn"] > 0 else "walk right turn"]
-    if abs(m["turn"]) >= 135 and m["winding"] < 250 and m["facing_share"] > 0.3 and m["pace"] < 1.9:
-        return ["turn around"]
-    return []
 
 
 def label_clip(

@@ -106,12 +106,8 @@ def _name_parts(
     tops = [j for j in skeleton.children(chest) if j not in (arms[0][0], arms[1][0])]
     if None in leg_joints or None in arm_joints or not tops:
         return None
-    left = _left(rest, [x for x in leg_joints if x])
-    parts: Parts = {"pelvis": pelvis}
-    for chains, names in ((leg_joints, ("hip", "knee", "ankle", "foot")), (arm_joints, ("shoulder", "elbow", "wrist"))):
-        ordered = sorted((c for c in chains if c), key=lambda c: -float(rest[c[0]] @ left))
-        for side, chain in zip(("left", "right"), ordered):
-            parts |= {f"{side}_{name}": j for name, j in zip(names, chain)}
+    found = [chain for chain in leg_joints if chain], [chain for chain in arm_joints if chain]
+    parts: Parts = {"pelvis": pelvis} | _sides(rest, *found)
     for side in ("left", "right"):
         above = skeleton.parents[parts[f"{side}_shoulder"]]
         if above != chest:
@@ -122,6 +118,16 @@ def _name_parts(
         return None
     parts["neck"] = line[0]
     parts["head"] = line[min(1, len(line) - 1)]
+    return parts
+
+
+def _sides(rest: Array, legs: list[list[int]], arms: list[list[int]]) -> Parts:
+    """Joints of the limbs, by their names on the left and on the right."""
+    left, parts = _left(rest, legs), {}
+    for chains, names in ((legs, ("hip", "knee", "ankle", "foot")), (arms, ("shoulder", "elbow", "wrist"))):
+        ordered = sorted(chains, key=lambda chain: -float(rest[chain[0]] @ left))
+        for side, chain in zip(("left", "right"), ordered):
+            parts |= {f"{side}_{name}": joint for name, joint in zip(names, chain)}
     return parts
 
 

@@ -148,21 +148,26 @@ def _check_parts(hold: Hold, seconds: float) -> None:
     if not names or not any(part.spans for part in hold.parts):
         raise MotionloomError(f"nothing to hold: no joint is named; the parts are {', '.join(known)}")
     for begin, end in (span for part in hold.parts for span in part.spans):
-        if not 0 <= begin < end:
-            raise MotionloomError(
-                f"no stretch from {begin:g} to {end:g} s to hold; give a start of 0 or more below the end"
-            )
-        if begin >= min(seconds, len(hold.source) / hold.source.fps):
-            raise MotionloomError(
-                f"nothing to hold from {begin:g} s on: {seconds:g} s are predicted, and the motion that parts are held "
-                f"to is {len(hold.source) / hold.source.fps:g} s long"
-            )
-        if np.isfinite(end) and min(end, seconds) > len(hold.source) / hold.source.fps + 0.5 / hold.source.fps:
-            raise MotionloomError(
-                f"parts are held until {end:g} s and the motion they come from is "
-                f"{len(hold.source) / hold.source.fps:g} s long; hold them for less or give a longer one"
-            )
+        _check_span(begin, end, hold.source, seconds)
     everywhere = [p for p in hold.parts if any(a <= 0 and b >= seconds for a, b in p.spans)]
     joints = set().union(*(_resolved(part)[0] for part in everywhere)) if everywhere else set()
     if len(joints) == len(SMPL22):
         raise MotionloomError("nothing to predict: all joints are held; hold fewer")
+
+
+def _check_span(begin: float, end: float, source: Motion, seconds: float) -> None:
+    long = len(source) / source.fps
+    if not 0 <= begin < end:
+        raise MotionloomError(
+            f"no stretch from {begin:g} to {end:g} s to hold; give a start of 0 or more below the end"
+        )
+    if begin >= min(seconds, long):
+        raise MotionloomError(
+            f"nothing to hold from {begin:g} s on: {seconds:g} s are predicted, and the motion that parts are held "
+            f"to is {long:g} s long"
+        )
+    if np.isfinite(end) and min(end, seconds) > long + 0.5 / source.fps:
+        raise MotionloomError(
+            f"parts are held until {end:g} s and the motion they come from is {long:g} s long; hold them for less or "
+            "give a longer one"
+        )

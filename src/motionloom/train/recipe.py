@@ -3,6 +3,7 @@
 import math
 import re
 import tomllib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -116,6 +117,21 @@ def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Reci
     return recipe
 
 
+LIMITS: Mapping[str, float] = {
+    "steps": 10**9,
+    "batch": 65536,
+    "levels": 100_000,
+    "seed": 2**31,
+    "rate": 10.0,
+    "decay": 10.0,
+    "displacement": 1000.0,
+    "rank": 512,
+    "given_rank": 512,
+    "save_every": 10**9,
+}
+"""The most that a setting may be; all of them are at least 0."""
+
+
 def _check(path: Path, recipe: Recipe) -> None:
     lists = {"sources": str, "prompts": str, "windows": int, "shares": int | float}
     for key, kind in lists.items():
@@ -127,36 +143,38 @@ def _check(path: Path, recipe: Recipe) -> None:
             raise MotionloomError(f"{path}: favour.{label} must be a number from 0 to 1e6; got {_shown(value)}")
     if not re.fullmatch(r"\w[\w.-]{0,63}", recipe.name):
         raise MotionloomError(f"{path}: the name {recipe.name!r} becomes a file's; use letters, digits, _ - .")
-    limits = {
-        "steps": 10**9,
-        "batch": 65536,
-        "levels": 100_000,
-        "seed": 2**31,
-        "rate": 10.0,
-        "decay": 10.0,
-        "displacement": 1000.0,
-        "rank": 512,
-        "given_rank": 512,
-        "save_every": 10**9,
-    }
-    for key, limit in limits.items():
+    for key, limit in LIMITS.items():
         if not 0 <= getattr(recipe, key) <= limit:
             raise MotionloomError(f"{path}: {key} must be from 0 to {limit:g}; got {_shown(getattr(recipe, key))}")
-    good = (
-        recipe.steps > 0 < recipe.batch and recipe.rank > 0 < recipe.rate
-        and 0 <= recipe.ema < 1 and 0 <= recipe.drop_text < 1 and 0 <= recipe.early <= 1
-        and recipe.levels > 1 and 0 <= recipe.cooldown <= 1 and 0 < recipe.clip <= 1e6 and recipe.save_every > 0
-        and 0 <= recipe.warmup <= 10**9
-        and len(recipe.windows) == len(recipe.shares) > 0 and 0 < min(recipe.windows) <= max(recipe.windows) <= 10_000
-        and 0 <= min(recipe.shares) <= max(recipe.shares) <= 1e6 and sum(recipe.shares) > 0
-        and recipe.amp in ("bf16", "none") and recipe.schedule in SCHEDULES
-        and recipe.spacing in ("index", "early")
-    )  # fmt: skip
-    if not good:
+    if not (all(_in_range(recipe)) and all(_windows_fit(recipe))):
         raise MotionloomError(
             f"{path}: a number or a choice is out of its range; see the comments of recipes/default.toml"
         )
     NetConfig.parse(recipe.net)
+
+
+def _in_range(recipe: Recipe) -> Iterator[bool]:
+    """Beyond `LIMITS`."""
+    above_zero = (recipe.steps, recipe.batch, recipe.rank, recipe.rate, recipe.clip, recipe.save_every)
+    yield all(value > 0 for value in above_zero)
+    yield 0 <= recipe.ema < 1
+    yield 0 <= recipe.drop_text < 1
+    yield 0 <= recipe.early <= 1
+    yield 0 <= recipe.cooldown <= 1
+    yield 0 <= recipe.warmup <= 10**9
+    yield recipe.clip <= 1e6
+    yield recipe.levels > 1
+    yield recipe.amp in ("bf16", "none")
+    yield recipe.schedule in SCHEDULES
+    yield recipe.spacing in ("index", "early")
+
+
+def _windows_fit(recipe: Recipe) -> Iterator[bool]:
+    """Lengths in frames, and how often each is drawn."""
+    yield len(recipe.windows) == len(recipe.shares) > 0
+    yield all(0 < frames <= 10_000 for frames in recipe.windows)
+    yield all(0 <= share <= 1e6 for share in recipe.shares)
+    yield sum(recipe.shares) > 0
 
 
 def changes(pairs: list[str]) -> dict[str, Any]:

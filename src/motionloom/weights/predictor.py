@@ -179,18 +179,13 @@ def load_predictor(path: Path) -> Predictor:
             raise MotionloomError(f"{path} has format {about['format']}; this motionloom reads {FORMAT}: update it")
         config, layout = NetConfig.parse(about["net"]), Layout.parse(about["layout"])
         basis = _basis(config.kept, about["frames"], about["dct"])
-        levels, name = about["schedule"]["steps"], about["schedule"]["name"]
-        fps, observed, manner, card = float(about["fps"]), about["observed"], about["manner"], Card(**about["card"])
+        schedule, card = _schedule(about["schedule"]), _card(about["card"])
+        fps, observed, manner = float(about["fps"]), about["observed"], about["manner"]
         told = {"told": told_shape(layout, config.kept), "published": None}
-        good = (
-            name in SCHEDULES and type(levels) is int and 1 <= levels <= 100_000
-            and math.isfinite(fps) and 1 <= fps <= 1000 and type(observed) is int and 2 <= observed < basis.frames
-            and layout.channels == config.channels and config.told == told[manner]
-            and all(isinstance(text, str) for text in (card.name, card.licence, card.data))
-            and isinstance(card.notes, dict)
-        )  # fmt: skip
-        if not good:
-            raise ValueError("values that do not fit together")
+        if not (math.isfinite(fps) and 1 <= fps <= 1000 and type(observed) is int and 2 <= observed < basis.frames):
+            raise ValueError("frames that do not fit together")
+        if layout.channels != config.channels or config.told != told[manner]:
+            raise ValueError("a network that does not fit its layout")
     except MotionloomError:
         raise
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
@@ -198,15 +193,36 @@ def load_predictor(path: Path) -> Predictor:
     with unfilled():  # what a file only claims to hold takes no memory
         net = TransLinear(config)
     fill(net, {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}, str(path))
+    return Predictor(
+        net.eval().requires_grad_(False), schedule, layout, basis, observed, fps, manner,
+        *_statistics(path, tensors, config), card,
+    )  # fmt: skip
+
+
+def _schedule(about: dict[str, Any]) -> Schedule:
+    name, levels = about["name"], about["steps"]
+    if name not in SCHEDULES or type(levels) is not int or not 1 <= levels <= 100_000:
+        raise ValueError(f"a schedule {name!r} of {levels!r} levels")
+    return SCHEDULES[name](levels)
+
+
+def _card(about: dict[str, Any]) -> Card:
+    card = Card(**about)
+    if not all(isinstance(text, str) for text in (card.name, card.licence, card.data)):
+        raise ValueError("a card whose entries are no text")
+    if not isinstance(card.notes, dict):
+        raise ValueError("a card without notes")
+    return card
+
+
+def _statistics(path: Path, tensors: dict[str, Tensor], config: NetConfig) -> tuple[Tensor, Tensor, Tensor]:
+    """Mean and std of the spectra, and the pose's."""
     mean, std, pose = (_usable(path, tensors, key) for key in ("mean", "std", "pose"))
     shape = (config.kept, config.channels)
     fits = mean.shape == shape and std.shape == shape and pose.shape == (2, config.channels)
     if not fits or std.min() <= 0 or pose[1].min() <= 0:
         raise MotionloomError(f"{path} lacks usable statistics; fetch the weights again")
-    return Predictor(
-        net.eval().requires_grad_(False), SCHEDULES[name](levels), layout, basis, observed, fps, manner,
-        mean, std, pose, card,
-    )  # fmt: skip
+    return mean, std, pose
 
 
 def _basis(kept: int, frames: Any, dct: Any) -> Basis:

@@ -273,14 +273,17 @@ class Machine:
             raise ValueError("its array has no shape")
         made.shape = shape
         if isinstance(data, list):
-            if not isinstance(dtype, _Dtype) or dtype.numpy().hasobject is False or (columns and len(shape) > 1):
-                raise ValueError("its array holds objects")
-            self._count("arrays", 8 * len(data))
-            made.values = list(data)
-            if math.prod(shape) != len(data):
-                raise ValueError(f"its array of shape {shape} has {len(data)} values")
+            made.values = self._objects(data, dtype, shape, by_columns=bool(columns))
         else:
             made.values = self._values(data, dtype, shape, "F" if columns else "C")
+
+    def _objects(self, data: list[Any], dtype: object, shape: tuple[int, ...], *, by_columns: bool) -> list[Any]:
+        if not isinstance(dtype, _Dtype) or dtype.numpy().hasobject is False or (by_columns and len(shape) > 1):
+            raise ValueError("its array holds objects")
+        self._count("arrays", 8 * len(data))
+        if math.prod(shape) != len(data):
+            raise ValueError(f"its array of shape {shape} has {len(data)} values")
+        return list(data)
 
     def _values(self, data: object, dtype: object, shape: tuple[int, ...], order: Any = "C") -> np.ndarray:
         kind = dtype.numpy() if isinstance(dtype, _Dtype) else np.dtype(object)

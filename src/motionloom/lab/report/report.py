@@ -221,22 +221,32 @@ def _split(report: Report) -> tuple[list[Row], list[Row]]:
 def _cells(report: Report, rows: Sequence[Row], *, bold: bool = False) -> list[list[str]]:
     """Rows of text, the heading first; a last column counts replications where any number has more than one."""
     shown = [c for c in report.columns if any(c.name in row.values for row in rows)]
-    if len(rows) == 1 and len(shown) > WIDE:  # turned: one long line would be read by nobody
-        (row,) = rows
-        names = [[_line(c.title) + ARROWS[c.better], cell(c, row.values[c.name]), _line(c.meaning)] for c in shown]
-        return [["", _line(row.name), ""], *names]
-    counted = {c.name for c in shown if not c.share}  # a share shows its own count
-    repeated = any(v.count > 1 for row in rows for name, v in row.values.items() if name in counted)
-    best = {c.name: _best(report, c) for c in shown} if bold else {}
-    found = [["", *(_line(c.title) + ARROWS[c.better] for c in shown), *(["count"] if repeated else [])]]
-    for row in rows:
-        cells = [_line(row.name)]
-        for c in shown:
-            text = cell(c, row.values[c.name]) if c.name in row.values else ""
-            cells.append(f"**{text}**" if text and best.get(c.name) == row.name else text)
-        counts = [v.count for name, v in row.values.items() if name in counted]
-        found.append(cells + ([_counts(counts)] if repeated else []))
-    return found
+    if len(rows) == 1 and len(shown) > WIDE:
+        return _turned(rows[0], shown)
+    table = [["", *(_line(c.title) + ARROWS[c.better] for c in shown)]]
+    table += [[_line(row.name), *(_cell(report, row, c, bold=bold) for c in shown)] for row in rows]
+    counts = [_repeats(row, shown) for row in rows]
+    if max((count for row in counts for count in row), default=0) <= 1:
+        return table
+    last = ["count", *(_counts(row) for row in counts)]
+    return [[*line, count] for line, count in zip(table, last)]
+
+
+def _cell(report: Report, row: Row, column: Column, *, bold: bool) -> str:
+    text = cell(column, row.values[column.name]) if column.name in row.values else ""
+    return f"**{text}**" if text and bold and _best(report, column) == row.name else text
+
+
+def _repeats(row: Row, shown: Sequence[Column]) -> list[int]:
+    """How often each number of a row was measured; a share shows its own count."""
+    counted = {c.name for c in shown if not c.share}
+    return [value.count for name, value in row.values.items() if name in counted]
+
+
+def _turned(row: Row, shown: Sequence[Column]) -> list[list[str]]:
+    """A line for each number: one long line would be read by nobody."""
+    names = [[_line(c.title) + ARROWS[c.better], cell(c, row.values[c.name]), _line(c.meaning)] for c in shown]
+    return [["", _line(row.name), ""], *names]
 
 
 def cell(column: Column, value: Value) -> str:
