@@ -165,6 +165,21 @@ def test_tables_are_filled_from_files(tmp_path: Path) -> None:
     assert fill(once, tmp_path) == once
 
 
+def test_a_table_may_be_shown_by_some_of_its_columns(tmp_path: Path) -> None:
+    (tmp_path / "a.md").write_text("# Title\n\nmade\n\n| x | y | z |\n| --- | --- | --- |\n| 1 |  | 3 |\n\nend\n")
+    text = "<!-- filled from a.md: z, x -->\n<!-- end -->\n"
+    assert places(fill(text, tmp_path)) == {"a.md": "made\n\n| z | x |\n| --- | --- |\n| 3 | 1 |\n\nend"}
+    assert fill(fill(text, tmp_path), tmp_path) == fill(text, tmp_path)
+    with pytest.raises(ValueError, match="w"):
+        fill("<!-- filled from a.md: w -->\n<!-- end -->\n", tmp_path)
+
+
+def test_the_readme_is_short_and_shows_five_pictures_and_one_table() -> None:
+    assert len(README.splitlines()) < 200
+    assert len(re.findall(r"!\[.+\]\(docs/pictures/", README)) == 5
+    assert len(places(README)) == 1
+
+
 def test_contributing_fits_one_screen() -> None:
     """CONTRIBUTING.md has at most 50 lines of at most 120 characters."""
     lines = (ROOT / "CONTRIBUTING.md").read_text().splitlines()
