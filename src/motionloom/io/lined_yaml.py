@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-import yaml
-
 from motionloom.errors import MotionloomError
 from motionloom.io.text import read_text, shown
 
@@ -28,7 +26,6 @@ _NOT_FINITE = re.compile(r"[-+]?\.?(?:inf|nan|infinity)", re.IGNORECASE)
 _WORDS = {"": None, "~": None, "null": None, "Null": None, "NULL": None} | {
     word: value for value, name in ((True, "true"), (False, "false")) for word in (name, name.title(), name.upper())
 }
-_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +72,15 @@ def meant(word: str, known: Collection[str]) -> str:
 
 def read_lined(path: Path | str, *, max_bytes: int = 32_000_000) -> Lined:
     """The one document of a YAML file; `MotionloomError` with the line for whatever is wrong with it."""
+    import yaml  # here, since commands that read no such file need not wait for it
+
     data = read_text(path, max_bytes=max_bytes)
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
         fail(path, data.count(b"\n", 0, error.start) + 1, "this is not UTF-8 text; save the file as UTF-8")
     try:
-        return _build(yaml.parse(data, Loader=_LOADER), path)
+        return _build(yaml.parse(data, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)), path)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         fail(path, mark.line + 1 if mark else 1, f"this is not YAML: {' '.join(str(error.problem).split())[:200]}")
@@ -101,6 +100,8 @@ class _Open:
 
 
 def _build(events: Iterator[Any], path: Path | str) -> Lined:
+    import yaml
+
     top: Lined | None = None
     stack: list[_Open] = []
     values = 0
@@ -141,6 +142,8 @@ def _build(events: Iterator[Any], path: Path | str) -> Lined:
 
 
 def _refuse_clever(event: Any, kind: type, path: Path | str, line: int) -> None:
+    import yaml
+
     if kind is yaml.AliasEvent or event.anchor is not None:
         fail(path, line, f"anchors and aliases ({shown('&' + str(event.anchor))}) are not read; write the value out")
     if event.tag is not None:
