@@ -85,6 +85,9 @@ $(VENV)/.runtime: pyproject.toml constraints-runtime.txt constraints-cuda.txt
 	@test -n "$(PYTHON)" || { echo "No python3.11 found; say where it is: make $(MAKECMDGOALS) PYTHON=/path/to/python3.11" >&2; exit 2; }
 	@echo "Installing the pinned packages into $(VENV) (PyTorch is large; this happens once) ..."
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@# A build of torch that pip is pointed to (find-links), such as one for the CPU, goes before the index's.
+	@sed -n '/^torch==/,/[^\\]$$/p' constraints-runtime.txt > $(VENV)/torch.txt
+	@$(LOCKED) $(VENV)/torch.txt --no-index 2>/dev/null || true
 	@$(LOCKED) constraints-runtime.txt
 	@if $(BIN)/python -c "import importlib.metadata as m; exit(not any(r.startswith('nvidia') for r in m.requires('torch')))"; \
 	then $(LOCKED) constraints-cuda.txt; fi
