@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 from motionloom import _moved
 
 if TYPE_CHECKING:
+    from motionloom.bulk.batch import batch
+    from motionloom.bulk.metadata import read_batch
     from motionloom.errors import MotionloomError
     from motionloom.goals.goal import Goal
     from motionloom.goals.hold import HeldPart, Hold
@@ -37,6 +39,8 @@ if TYPE_CHECKING:
 _moved.install()
 
 _PLACES = {
+    "batch": "bulk.batch",
+    "read_batch": "bulk.metadata",
     "Prior": "weights.prior",
     "save_prior": "weights.prior",
     "MotionloomError": "errors",
@@ -81,6 +85,7 @@ __all__ = [
     "Prior",
     "Segment",
     "Skeleton",
+    "batch",
     "complete_pair",
     "compose",
     "compose_pair",
@@ -92,6 +97,7 @@ __all__ = [
     "load",
     "predict",
     "react",
+    "read_batch",
     "retarget",
     "save",
     "save_predictor",

@@ -21,6 +21,7 @@ FAMILIES = (
     "edit",
     "predict",
     "duet",
+    "batch",
     "files",
     "data",
     "teach",

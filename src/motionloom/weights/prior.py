@@ -175,6 +175,15 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
         ) from None
 
 
+def read_card(path: Path) -> Card:
+    """What a weight file says about itself, without its weights; raises MotionloomError as `load_prior` does."""
+    try:
+        with safe_open(path, framework="pt") as file:
+            return Card(**_about(path, dict(file.metadata() or {}))["card"])
+    except SafetensorError as error:
+        raise MotionloomError(f"{path} is not a whole safetensors file ({error}); fetch the weights again") from None
+
+
 def load_prior(path: Path, device: str | torch.device = "cpu") -> Prior:
     """Read a prior; raises MotionloomError where the file is damaged, of another kind or of a newer format."""
     tensors, metadata = read_tensors(path)

@@ -318,3 +318,25 @@ def check(name: str) -> Check:
         if candidate.name == name:
             return candidate
     raise MotionloomError(f"no check called {name!r}; the checks are {', '.join(c.name for c in CHECKS)}")
+
+
+def check_of(prompt: str) -> Check | None:
+    """The one check that a prompt belongs to: by its own words or a paraphrase, else where it names one action alone.
+
+    None for prompts of other actions, of several, and of actions done in a way that no check looks at.
+    """
+    said = " ".join(prompt.lower().split()).rstrip(".!")
+    for candidate in CHECKS:
+        if said in (candidate.prompt, *candidate.paraphrases):
+            return candidate
+    fitting = [candidate for candidate in CHECKS if candidate.role([said]) == "example"]
+    return fitting[0] if len(fitting) == 1 else None
+
+
+def obeys(prompt: str, positions: Array, fps: float) -> bool | None:
+    """Whether a motion does what its prompt says, by the check of `check_of`; None where no check knows the prompt.
+
+    positions: (frames, 22, 3) metres on the uniform person, the floor near y = 0.
+    """
+    found = check_of(prompt)
+    return None if found is None else found.obeyed(found.measured(positions, fps))

@@ -1,0 +1,218 @@
+"""`batch`: rows in, a folder of motions out, each exactly once; the same call goes on with what is missing."""
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from motionloom.bulk.crew import alone, cores
+from motionloom.bulk.folder import Head, Store, digest, open_folder
+from motionloom.bulk.jobs import Jobs, parquet, shard_size
+from motionloom.bulk.maker import FORMATS, Made, Maker, Options
+from motionloom.bulk.measures import Filter
+from motionloom.bulk.metadata import Result, read_batch, result, write_table
+from motionloom.bulk.row import parse
+from motionloom.bulk.shard import Batch, Report, Task
+from motionloom.errors import MotionloomError
+
+Source = Jobs | Path | str | Iterable[Mapping[str, Any]]
+LOCAL = "local"
+"""Ray's address for a cluster of this machine."""
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where a batch runs; what comes out does not depend on it."""
+
+    workers: int | None = None
+    """Processes, or actors on Ray; None: one per core, with CUDA one per GPU."""
+    shard: tuple[int, int] | None = None
+    """(i, n): make shards i, i + n, i + 2n ... alone, beside others who make theirs; 0 <= i < n."""
+    ray: str | None = None
+    """Address of a Ray cluster; `LOCAL`: RAY_ADDRESS, else one on this machine; None: without Ray."""
+
+
+def batch(
+    jobs: Source,
+    out: Path | str | None = None,
+    *,
+    options: Options = Options(),  # noqa: B008
+    where: Where = Where(),
+) -> Iterator[Result]:
+    """Make a motion of every row, and give what became of each, in the job's order.
+
+    jobs: a file (JSON lines, CSV, Parquet), or mappings with the columns of docs/batch.md. out: the folder for the
+    motions; rows that are already in it are not made again, and processes beside this one do the work. Without
+    ``out`` this process makes the motions one after the other and keeps none: each `Result` has its motion.
+    Raises `MotionloomError` for jobs, options and folders that cannot be; what is wrong with a row is in its result.
+    """
+    if out is None:
+        check_options(options)
+        yield from _here(Jobs.of(jobs), options)
+        return
+    for _ in run(Jobs.of(jobs), Path(out), options=options, where=where):
+        pass
+    yield from read_batch(out, motions=False)
+
+
+def run(
+    jobs: Jobs,
+    out: Path,
+    *,
+    options: Options,
+    where: Where,
+    moved: Callable[[int], None] = lambda rows: None,
+    rows: int | None = None,
+) -> Iterator[Report]:
+    """Make what is missing of a batch's folder; a report of each shard when it is whole, those that were at once.
+
+    moved: told how many more rows were made. rows: how many the job has, where that is known.
+    """
+    check_options(options)
+    count = jobs.count() if rows is None else rows
+    check_jobs(jobs, count)
+    manifest = open_folder(out, options, rows=count, shard_rows=shard_size(count))
+    size = int(manifest["shard_rows"])
+    store, shards = Store(out, options.format), -(-count // size)
+    _check_left_over(store, shards)
+    work = Batch(str(out.resolve()), str(jobs.folder.resolve()), manifest["weights"]["sha256"], _found(options))
+    items = _items(jobs, size, store, where.shard or (0, 1))
+    if where.ray is not None:
+        from motionloom.bulk.on_ray import on_ray
+
+        address = None if where.ray == LOCAL else where.ray
+        reports = on_ray(items, work, address=address, workers=where.workers, moved=moved)
+    else:
+        reports = alone(items, work, workers=where.workers or _workers(options), moved=moved)
+    made = 0
+    for report in reports:
+        made += report.made
+        yield report
+    _finish(store, shards, changed=made > 0)
+
+
+def check_options(options: Options) -> None:
+    """Raise `MotionloomError` for options that can be refused without reading anything."""
+    if options.format not in FORMATS:
+        raise MotionloomError(f"no format {options.format!r}; there are {', '.join(FORMATS)}")
+    if options.format == "parquet":
+        parquet()
+    if options.filter is not None:
+        names = Filter(options.filter).names
+        if "obeys" in names and options.judge is None:
+            raise MotionloomError(
+                "the filter asks whether motions obey, and there is no judge; name one in the options"
+            )
+    if options.fps is not None and not 1 <= options.fps <= 1000:
+        raise MotionloomError(f"the frame rate must be 1 to 1000; got {options.fps:g}")
+    if options.skeleton is not None and options.skeleton != "smpl22" and not Path(options.skeleton).is_file():
+        raise MotionloomError(f"there is no file {options.skeleton}; name a skeleton (.bvh, .glb, .asf) or smpl22")
+
+
+def check_jobs(jobs: Jobs, rows: int) -> None:
+    """Raise `MotionloomError` for a job without rows, and for columns that none of its rows may have."""
+    if not rows:
+        raise MotionloomError(f"there is no row in {jobs.path or 'the job'}; give one row per motion")
+    try:
+        parse(next(jobs.read()))
+    except MotionloomError as error:
+        if "unknown column" in str(error):  # so will it be in all others
+            raise MotionloomError(f"{jobs.path or 'the job'}: {error}") from None
+
+
+def array_task(environment: Mapping[str, str] = os.environ) -> tuple[int, int] | None:
+    """(i, n) of a Slurm array's task; None outside of one. Raises `MotionloomError` for an array that is no range."""
+    try:
+        task, count = int(environment["SLURM_ARRAY_TASK_ID"]), int(environment["SLURM_ARRAY_TASK_COUNT"])
+        first = int(environment.get("SLURM_ARRAY_TASK_MIN", 0))
+        step = int(environment.get("SLURM_ARRAY_TASK_STEP", 1)) or 1
+    except KeyError:
+        return None
+    except ValueError:
+        raise MotionloomError("SLURM_ARRAY_TASK_ID and _COUNT must be whole numbers; give --shard i/n") from None
+    number = (task - first) // step
+    if not 0 <= number < count:
+        raise MotionloomError(f"task {task} of an array of {count} has no place in it; give --shard i/n")
+    return number, count
+
+
+def _here(jobs: Jobs, options: Options) -> Iterator[Result]:
+    """Every row made in this process, a few at a time."""
+    maker = Maker(options, folder=jobs.folder)
+    passes = Filter(options.filter) if options.filter else None
+    number = 0
+    for rows in jobs.shards(4 * maker.together):
+        found: dict[int, Result] = {}
+        asked = {}
+        for offset, raw in enumerate(rows):
+            try:
+                asked[number + offset] = maker.sources.ask(parse(raw))
+            except MotionloomError as error:
+                found[number + offset] = result({"row": number + offset, "state": "failed", "error": str(error)})
+        places = {id(one): place for place, one in asked.items()}
+        for one, made in maker.make(list(asked.values())):
+            place = places[id(one)]
+            told = {"row": place, "id": one.id, "key": one.key, "text": one.text, "seed": one.seed}
+            if not isinstance(made, Made):
+                found[place] = result({**told, "state": "failed", "error": made})
+            elif passes is None or passes.holds(made.measures):
+                found[place] = result({**told, "state": "made", **made.measures}, made.motion)
+            else:
+                found[place] = result({**told, "state": "dropped", **made.measures})
+        yield from (found[place] for place in sorted(found))
+        number += len(rows)
+
+
+def _items(jobs: Jobs, size: int, store: Store, share: tuple[int, int]) -> Iterator[Task | Report]:
+    """What is to be made of one's share, and reports of what is there already."""
+    number, of = share
+    for shard, rows in enumerate(jobs.shards(size)):
+        if shard % of != number:
+            continue
+        head = store.head(shard)
+        if head is not None and _is_done(head, rows):
+            yield Report(shard, len(rows), head.counts, 0)
+        else:
+            yield Task(shard, shard * size, rows)
+
+
+def _is_done(head: Head, rows: list[bytes]) -> bool:
+    """Whether a shard holds what these rows ask, as far as the rows alone tell; failed rows are to be tried again."""
+    return not head.names_files and "failed" not in head.counts and head.digest == digest(rows)
+
+
+def _found(options: Options) -> Options:
+    """The options with whole paths: other processes may be elsewhere."""
+    from dataclasses import replace
+
+    def whole(name: str | None) -> str | None:
+        return str(Path(name).resolve()) if name is not None and Path(name).is_file() else name
+
+    return replace(options, weights=whole(options.weights) or "default", skeleton=whole(options.skeleton))
+
+
+def _workers(options: Options) -> int:
+    if options.device == "cuda":
+        import torch
+
+        return max(torch.cuda.device_count(), 1)
+    return cores()
+
+
+def _check_left_over(store: Store, shards: int) -> None:
+    if store.record(shards).exists():
+        raise MotionloomError(
+            f"{store.out} holds more shards than the job has, of rows that it no longer asks for; name another folder"
+        )
+
+
+def _finish(store: Store, shards: int, *, changed: bool) -> None:
+    """When every shard is there, whoever made it: the table of all rows, and no traces of the work."""
+    if not all(store.record(shard).exists() for shard in range(shards)):
+        return
+    if changed or not any((store.out / f"metadata.{kind}").exists() for kind in ("parquet", "jsonl")):
+        write_table(store, shards)
+    work = store.work(0).parent
+    if work.is_dir() and not any(work.iterdir()):
+        work.rmdir()

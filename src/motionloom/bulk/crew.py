@@ -1,0 +1,178 @@
+"""Shards shared out to processes of this machine; one that dies is replaced, and its shard begun again."""
+
+import json
+import os
+import queue
+import shutil
+import subprocess
+import sys
+import threading
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import motionloom
+from motionloom.bulk.folder import Store
+from motionloom.bulk.shard import Batch, Report, Task
+from motionloom.errors import MotionloomError
+
+STILLBORN = 3
+"""Processes in a row that may die before they are ready."""
+
+Moved = Callable[[int], None]
+"""Told how many more rows were made."""
+
+
+def cores() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def too_many_deaths(deaths: int, rows: int) -> bool:
+    """Whether a shard ended so many processes that its rows cannot be the reason alone."""
+    return deaths > 3 * rows + 10
+
+
+@dataclass(eq=False)
+class _Process:
+    """A worker and what it is at."""
+
+    number: int
+    batch: Batch
+    heard: "queue.Queue[tuple[_Process, dict[str, Any] | None]]"
+    task: Task | None = None
+    ready: bool = False
+    popen: "subprocess.Popen[bytes]" = field(init=False)
+
+    def __post_init__(self) -> None:
+        source = str(Path(motionloom.__file__).parents[1])
+        paths = [source, *filter(None, [os.environ.get("PYTHONPATH")])]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+        environment |= dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+        if self.batch.options.device == "cuda":
+            given = [place for place in os.environ.get("CUDA_VISIBLE_DEVICES", "").split(",") if place]
+            environment["CUDA_VISIBLE_DEVICES"] = given[self.number % len(given)] if given else str(self.number)
+        command = [sys.executable, "-P", "-m", "motionloom.bulk.worker"]
+        self.popen = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
+        threading.Thread(target=self._listen, daemon=True).start()
+        self._say(self.batch.to_json())
+
+    def give(self, task: Task) -> None:
+        self.task = task
+        rows = [row.decode("latin-1") for row in task.rows]
+        self._say(json.dumps({"shard": task.shard, "first": task.first, "rows": rows}))
+
+    def end(self) -> None:
+        """Stop it; what it was at stays unmade."""
+        self.popen.kill()
+        self.popen.wait()
+        for stream in (self.popen.stdin, self.popen.stdout):
+            with suppress(OSError):
+                stream.close()  # type: ignore[union-attr]
+        if self.task is not None:
+            store = Store(Path(self.batch.out), self.batch.options.format)
+            shutil.rmtree(store.work(self.task.shard), ignore_errors=True)
+            store.attempts(self.task.shard).unlink(missing_ok=True)
+
+    def _say(self, line: str) -> None:
+        with suppress(OSError):  # it has died: that is heard on the other side
+            self.popen.stdin.write(line.encode() + b"\n")  # type: ignore[union-attr]
+            self.popen.stdin.flush()  # type: ignore[union-attr]
+
+    def _listen(self) -> None:
+        with suppress(OSError, ValueError):
+            for line in self.popen.stdout:  # type: ignore[union-attr]
+                self.heard.put((self, json.loads(line)))
+        self.heard.put((self, None))
+
+
+def alone(items: Iterator[Task | Report], batch: Batch, *, workers: int, moved: Moved) -> Iterator[Report]:
+    """Reports of all shards, in the order in which they are done; ``items`` that are reports are passed on.
+
+    items: read as they are needed, a shard ahead of each process at most.
+    Raises `MotionloomError` where the folder cannot be written or no process can be kept alive.
+    """
+    crew = _Crew(items, batch, workers, moved)
+    try:
+        yield from crew.run()
+    finally:
+        for process in crew.processes:
+            process.end()
+
+
+class _Crew:
+    def __init__(self, items: Iterator[Task | Report], batch: Batch, workers: int, moved: Moved) -> None:
+        self.items, self.batch, self.workers, self.moved = items, batch, workers, moved
+        self.heard: queue.Queue[tuple[_Process, dict[str, Any] | None]] = queue.Queue()
+        self.processes: list[_Process] = []
+        self.again: deque[Task] = deque()
+        self.deaths: dict[int, int] = {}
+        self.stillborn = 0
+        self.warned: set[str] = set()
+
+    def run(self) -> Iterator[Report]:
+        yield from self._fill()
+        while any(process.task for process in self.processes):
+            process, message = self.heard.get()
+            if message is None:
+                self._died(process)
+            elif report := self._understood(process, message):
+                yield report
+            yield from self._fill()
+
+    def _fill(self) -> Iterator[Report]:
+        """A task for each process that has none, and processes for tasks as long as there may be more."""
+        while True:
+            idle = next((process for process in self.processes if process.task is None), None)
+            if idle is None and len(self.processes) >= self.workers:
+                return
+            item = self.again.popleft() if self.again else next(self.items, None)
+            if item is None:
+                return
+            if isinstance(item, Report):
+                yield item
+                continue
+            if idle is None:
+                taken = {process.number for process in self.processes}
+                number = next(n for n in range(self.workers) if n not in taken)
+                idle = _Process(number, self.batch, self.heard)
+                self.processes.append(idle)
+            idle.give(item)
+
+    def _understood(self, process: _Process, message: dict[str, Any]) -> Report | None:
+        if "fatal" in message:
+            raise MotionloomError(message["fatal"])
+        if "ready" in message:
+            process.ready, self.stillborn = True, 0
+        elif "moved" in message:
+            self.moved(message["moved"])
+        elif "warning" in message:
+            if message["warning"] not in self.warned and len(self.warned) < 100:
+                self.warned.add(message["warning"])
+                warnings.warn(message["warning"], stacklevel=2)
+        elif "report" in message:
+            process.task = None
+            return Report(**message["report"])
+        return None
+
+    def _died(self, process: _Process) -> None:
+        if process not in self.processes:
+            return
+        self.processes.remove(process)
+        task, process.task = process.task, None
+        process.end()
+        self.stillborn += not process.ready
+        if self.stillborn >= STILLBORN:
+            raise MotionloomError(
+                f"the processes that make motions end before they begin (exit code {process.popen.returncode}); "
+                "is there enough memory?"
+            )
+        if task is not None:
+            self.deaths[task.shard] = self.deaths.get(task.shard, 0) + 1
+            if too_many_deaths(self.deaths[task.shard], len(task.rows)):
+                raise MotionloomError(f"shard {task.shard} ends every process that makes it; is there enough memory?")
+            self.again.append(task)

@@ -1,0 +1,92 @@
+"""How long a batch will take and how large it will be, from a few of its rows."""
+
+import random
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from motionloom.bulk.jobs import Jobs
+from motionloom.bulk.maker import Made, Maker, Options
+from motionloom.bulk.measures import Filter
+from motionloom.bulk.row import Asked, parse
+from motionloom.bulk.shard import told_of
+from motionloom.bulk.writers import sizes, writer
+from motionloom.errors import MotionloomError
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a batch will be, judged by a sample of its rows."""
+
+    rows: int
+    sampled: int
+    usable: float
+    """Share of the sampled rows that can be made and pass the filter."""
+    seconds_each: float
+    """Of one core for one row."""
+    bytes_each: float
+    """Of the folder for one row that is kept."""
+    workers: int
+
+    @property
+    def hours(self) -> float:
+        """With all workers at work."""
+        return self.rows * self.seconds_each / self.workers / 3600
+
+    @property
+    def gigabytes(self) -> float:
+        """Of the folder, rows without a motion not counted."""
+        return self.rows * self.usable * self.bytes_each / 1e9
+
+
+def estimate(jobs: Jobs, options: Options, *, workers: int, sample: int = 16) -> Estimate:
+    """Make a random sample of the rows once in this process; nothing is kept of it.
+
+    One pass through the job counts its rows and draws the sample. The first call of a network is not counted.
+    """
+    rows, chosen = _sampled(jobs, sample)
+    maker = Maker(options, folder=jobs.folder)
+    asked: list[Asked] = []
+    for raw in chosen:
+        try:
+            asked.append(maker.sources.ask(parse(raw)))
+        except MotionloomError:
+            continue
+    if not asked:
+        raise MotionloomError(f"none of {len(chosen)} rows looked at can be made; see: {_why(chosen[0], maker)}")
+    list(maker.make(asked[:1]))
+    passes = Filter(options.filter) if options.filter else None
+    with tempfile.TemporaryDirectory(prefix="motionloom-") as folder:
+        began, kept = time.perf_counter(), 0
+        file = writer(options.format, Path(folder) / "data")
+        unique = {one.id: one for one in asked}
+        for one, made in maker.make(list(unique.values())):
+            if isinstance(made, Made) and (passes is None or passes.holds(made.measures)):
+                file.add(made.motion, told_of(one, made))
+                kept += 1
+        file.close()
+        seconds, size = time.perf_counter() - began, sizes(Path(folder) / "data")["bytes"]
+    usable = kept / len(unique) * len(asked) / len(chosen)
+    return Estimate(rows, len(chosen), usable, seconds / len(unique), size / max(kept, 1), workers)
+
+
+def _sampled(jobs: Jobs, count: int) -> tuple[int, Sequence[bytes]]:
+    """How many rows there are, and a uniform sample of them (Vitter 1985, algorithm R), the same every time."""
+    dice, chosen, rows = random.Random(0), [], 0
+    for raw in jobs.read():
+        rows += 1
+        if len(chosen) < count:
+            chosen.append(raw)
+        elif (place := dice.randrange(rows)) < count:
+            chosen[place] = raw
+    return rows, chosen
+
+
+def _why(raw: bytes, maker: Maker) -> str:
+    try:
+        maker.sources.ask(parse(raw))
+    except MotionloomError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,201 @@
+"""The folder of a batch: what it is (``manifest.json``), its shards, and one record of each shard's rows.
+
+    manifest.json            version, weights, settings; a few hundred bytes however many rows there are
+    shard-000000.tar         or .parquet, or a folder of single files
+    records/000000.jsonl     a line about the shard, then one per row: made, dropped, failed or repeated, and why
+    metadata.parquet         all rows of all records, at the end; .jsonl without pyarrow
+
+A shard is in the folder when its record is: its data comes first, under its own name in one step, then the record,
+in one step too, which says how large the data are. So a shard is whole or it is not there, whoever is killed when.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from motionloom.bulk.maker import Options, hash_file
+from motionloom.bulk.measures import MEANING
+from motionloom.bulk.row import FORMAT
+from motionloom.bulk.writers import sizes, suffix, sync
+from motionloom.errors import MotionloomError
+from motionloom.io.atomic import atomic_path
+from motionloom.io.folder import check_folder
+from motionloom.weights.prior import find_weights, read_card
+
+MANIFEST, RECORDS, WORK = "manifest.json", "records", ".work"
+KIND = "motionloom batch"
+STATES = ("made", "dropped", "failed", "repeated")
+
+Entry = dict[str, Any]
+"""What a record says of one row."""
+
+
+@dataclass(frozen=True)
+class Head:
+    """The first line of a record."""
+
+    digest: str
+    """Of the rows as they are written in the job."""
+    names_files: bool
+    """Whether a row names other files, which the digest does not cover."""
+    data: dict[str, int]
+    """Files and bytes of the shard's data; no files where no row was kept."""
+    counts: dict[str, int]
+    """Rows by what became of them, one of `STATES`."""
+
+
+@dataclass(frozen=True)
+class Store:
+    """The folder of one batch."""
+
+    out: Path
+    kind: str
+    """The format of its shards."""
+
+    def data(self, shard: int) -> Path:
+        """Where a shard's motions are."""
+        return self.out / f"shard-{shard:06d}{suffix(self.kind)}"
+
+    def record(self, shard: int) -> Path:
+        """Where it is written what became of a shard's rows."""
+        return self.out / RECORDS / f"{shard:06d}.jsonl"
+
+    def work(self, shard: int) -> Path:
+        """Where a shard is made; nobody reads there."""
+        return self.out / WORK / f"{shard:06d}"
+
+    def attempts(self, shard: int) -> Path:
+        """Where it is noted what was begun and not ended: of a shard that was made, nothing."""
+        return self.out / WORK / f"{shard:06d}.attempts"
+
+    def head(self, shard: int) -> Head | None:
+        """What the record says of its shard, if both are whole."""
+        try:
+            with self.record(shard).open(encoding="utf-8") as file:
+                head = Head(**json.loads(file.readline()))
+            whole = sizes(self.data(shard)) == head.data if head.data["files"] else True
+            return head if whole else None
+        except (OSError, ValueError, TypeError, KeyError):
+            return None
+
+    def entries(self, shard: int) -> Iterator[Entry]:
+        """What became of each row of a shard, in their order."""
+        with self.record(shard).open(encoding="utf-8") as file:
+            next(file)
+            for line in file:
+                yield json.loads(line)
+
+    def commit(self, shard: int, data: Path | None, entries: Sequence[Entry], head: Head) -> None:
+        """Put a shard into the folder: ``data`` (None: nothing was kept) and the record of all of its rows."""
+        target = self.data(shard)
+        if data is not None:
+            sync(data)
+        if target.is_dir():
+            target.rename(self.work(shard) / "old")
+        elif data is None:
+            target.unlink(missing_ok=True)
+        if data is not None:
+            os.replace(data, target)
+        self.write_record(shard, entries, head)
+
+    def write_record(self, shard: int, entries: Sequence[Entry], head: Head) -> None:
+        """Write the record, whole or not at all."""
+        with atomic_path(self.record(shard)) as temporary, temporary.open("w", encoding="utf-8") as file:
+            for line in (vars(head), *entries):
+                file.write(json.dumps(line, ensure_ascii=False) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def digest(rows: Sequence[bytes]) -> str:
+    """Hash of rows as they are written in the job."""
+    found = hashlib.sha256()
+    for row in rows:
+        found.update(len(row).to_bytes(8, "little"))
+        found.update(row)
+    return found.hexdigest()
+
+
+def about(options: Options, *, rows: int, shard_rows: int) -> dict[str, Any]:
+    """The manifest of a batch."""
+    weights = find_weights(options.weights)
+    card = read_card(weights)
+    return {
+        "kind": KIND,
+        "format": FORMAT,
+        "version": version("motionloom"),
+        "weights": {"name": card.name, "sha256": hash_file(weights), "licence": card.licence},
+        "motions": options.of_motions(hash_file(weights)),
+        "defaults": {"seconds": options.seconds, "seed": options.seed, "skeleton": _skeleton(options)},
+        "files": options.format,
+        "filter": options.filter,
+        "judge": options.judge,
+        "rows": rows,
+        "shard_rows": shard_rows,
+        "measures": MEANING,
+    }
+
+
+def _skeleton(options: Options) -> str | None:
+    return (
+        None if options.skeleton is None or not Path(options.skeleton).is_file() else hash_file(Path(options.skeleton))
+    )
+
+
+def read_manifest(out: Path) -> dict[str, Any] | None:
+    """What the folder says it is; None where it says nothing. Raises `MotionloomError` if that is no batch."""
+    place = out / MANIFEST
+    if not place.exists():
+        if out.is_dir() and any(one.name != WORK for one in out.iterdir()):
+            raise MotionloomError(f"{out} holds other files and no {MANIFEST}; name a folder of its own for the batch")
+        return None
+    try:
+        found = json.loads(place.read_text(encoding="utf-8"))
+        good = found["kind"] == KIND and int(found["shard_rows"]) >= 1 and found["files"]
+    except (OSError, ValueError, KeyError, TypeError):
+        good, found = False, {}
+    if not good:
+        raise MotionloomError(f"{place} does not describe a batch; name another folder or delete it")
+    if found.get("format") != FORMAT:
+        raise MotionloomError(
+            f"{place} has the format {found.get('format')}; this motionloom makes {FORMAT}: use another folder"
+        )
+    return found
+
+
+def open_folder(out: Path, options: Options, *, rows: int, shard_rows: int) -> dict[str, Any]:
+    """Make the folder, or check that it was made the same way; its manifest, whose ``shard_rows`` counts.
+
+    Raises `MotionloomError` for a folder of something else or of other settings.
+    """
+    found = read_manifest(check_folder(out))
+    wanted = about(options, rows=rows, shard_rows=shard_rows if found is None else int(found["shard_rows"]))
+    if found is not None:
+        for part in ("weights", "motions", "defaults", "files", "filter", "judge"):
+            if found.get(part) != wanted[part]:
+                was, now = _difference(found.get(part), wanted[part])
+                raise MotionloomError(
+                    f"{out} was made with other settings: {part} {was}, not {now}; name another folder"
+                )
+    try:
+        for place in (out, out / RECORDS, out / WORK):
+            place.mkdir(exist_ok=True)
+    except OSError as error:
+        raise MotionloomError(f"cannot write to {out}: {error.strerror or error}") from None
+    if found != wanted:
+        with atomic_path(out / MANIFEST) as temporary:
+            temporary.write_text(json.dumps(wanted, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    return wanted
+
+
+def _difference(was: Any, now: Any) -> tuple[str, str]:
+    """What differs, as briefly as it can be said."""
+    if isinstance(was, dict) and isinstance(now, dict):
+        keys = [key for key in now if was.get(key) != now[key]]
+        return tuple(", ".join(f"{key} {side.get(key)}" for key in keys) for side in (was, now))  # type: ignore[return-value]
+    return str(was), str(now)

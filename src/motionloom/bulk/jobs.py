@@ -1,0 +1,177 @@
+"""The rows of a job, one after the other: JSON lines, CSV, Parquet, prompts times variants, or Python mappings.
+
+Every row is passed on as the bytes of one JSON object, whatever it came from; `row.parse` reads them. Nothing here
+keeps more rows than one shard has.
+"""
+
+import csv
+import importlib
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from motionloom.errors import MotionloomError
+
+READS = (".jsonl", ".ndjson", ".csv", ".parquet")
+MAX_LINE = 4_000_000
+"""Bytes of one row."""
+LARGEST = 1000
+"""Rows of a shard."""
+SMALLEST, SHARDS = 8, 64
+"""A small job is cut into about so many shards, so that every core has something to do until the end."""
+
+
+@dataclass(frozen=True)
+class Jobs:
+    """Where rows come from; they can be read as often as needed."""
+
+    path: Path | None = None
+    """JSON lines, CSV or Parquet; or, with ``variants``, a text file with one prompt per line."""
+    rows: tuple[Mapping[str, Any], ...] = ()
+    """The rows themselves, where there is no file."""
+    variants: int | None = None
+    """Motions per line of a file of prompts; variant i has the seed ``seed + i``."""
+    seed: int = 0
+    """The first variant's seed."""
+
+    @staticmethod
+    def of(source: "Jobs | Path | str | Iterable[Mapping[str, Any]]") -> "Jobs":
+        """A file by its path, or mappings; raises `MotionloomError` for another suffix or a missing file."""
+        if isinstance(source, Jobs):
+            return source
+        if not isinstance(source, str | Path):
+            return Jobs(rows=tuple(source))
+        path = Path(source)
+        if path.suffix.lower() not in READS:
+            raise MotionloomError(
+                f"{path} is no file of jobs: its name must end in {', '.join(READS)}; plain prompts go with --prompts"
+            )
+        return Jobs(_found(path))
+
+    @staticmethod
+    def of_prompts(path: Path | str, *, variants: int = 1, seed: int = 0) -> "Jobs":
+        """``variants`` motions for each line of a text file; variant i has the seed ``seed + i``."""
+        if not 1 <= variants <= 10_000_000:
+            raise MotionloomError(f"variants must be 1 to 10,000,000; got {variants}")
+        return Jobs(_found(Path(path)), variants=variants, seed=seed)
+
+    @property
+    def folder(self) -> Path:
+        """Where the files that rows name lie, or below it."""
+        return Path() if self.path is None else self.path.parent
+
+    def read(self) -> Iterator[bytes]:
+        """Rows in their order, each the bytes of a JSON object (a damaged line of JSON lines as it is)."""
+        if self.path is None:
+            yield from (_json(dict(row)) for row in self.rows)
+        elif self.variants is not None:
+            yield from self._prompts(self.path, self.variants)
+        elif self.path.suffix.lower() == ".csv":
+            yield from _csv(self.path)
+        elif self.path.suffix.lower() == ".parquet":
+            yield from _parquet(self.path)
+        else:
+            yield from _lines(self.path)
+
+    def count(self) -> int:
+        """How many rows there are, in one pass through the file."""
+        if self.path is not None and self.path.suffix.lower() == ".parquet" and self.variants is None:
+            return parquet().ParquetFile(self.path).metadata.num_rows
+        if self.path is not None and self.variants is not None:
+            return self.variants * sum(1 for _ in _lines(self.path))
+        return sum(1 for _ in self.read())
+
+    def shards(self, size: int) -> Iterator[list[bytes]]:
+        """All rows, ``size`` at a time."""
+        rows = self.read()
+        while part := list(islice(rows, size)):
+            yield part
+
+    def _prompts(self, path: Path, variants: int) -> Iterator[bytes]:
+        for line in _lines(path):
+            prompt = line.decode("utf-8", "replace").strip()
+            for variant in range(variants):
+                yield _json({"prompt": prompt, "seed": self.seed + variant})
+
+
+def shard_size(rows: int) -> int:
+    """Rows of a shard of a job of so many rows: the same whoever asks."""
+    size = min(max(-(-rows // SHARDS), SMALLEST), LARGEST)
+    shards = max(-(-rows // size), 1)
+    return max(-(-rows // shards), 1)
+
+
+def arrow(part: str = "pyarrow") -> Any:
+    """The module `pyarrow` or a part of it; raises `MotionloomError` where it is not installed."""
+    try:
+        return importlib.import_module(part)
+    except ImportError:
+        raise MotionloomError("Parquet files need pyarrow: pip install 'motionloom[parquet]'") from None
+
+
+def parquet() -> Any:
+    """The module `pyarrow.parquet`; raises `MotionloomError` where it is not installed."""
+    return arrow("pyarrow.parquet")
+
+
+def _found(path: Path) -> Path:
+    if not path.is_file():
+        raise MotionloomError(f"there is no file {path}; name a file of jobs")
+    return path
+
+
+def _json(row: dict[str, Any]) -> bytes:
+    try:
+        return json.dumps(row, ensure_ascii=False, sort_keys=True).encode("utf-8", "surrogatepass")
+    except (TypeError, ValueError) as error:
+        raise MotionloomError(f"a row of jobs cannot be written as JSON ({error}); give text and numbers") from None
+
+
+def _lines(path: Path) -> Iterator[bytes]:
+    with path.open("rb") as file:
+        first = True
+        while line := file.readline(MAX_LINE):
+            if len(line) == MAX_LINE:
+                raise MotionloomError(f"{path} has a line of more than {MAX_LINE:,} bytes; a row is one short line")
+            line = (line.removeprefix(b"\xef\xbb\xbf") if first else line).strip()
+            first = False
+            if line:
+                yield line
+
+
+def _csv(path: Path) -> Iterator[bytes]:
+    csv.field_size_limit(MAX_LINE)
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            table = csv.DictReader(file, strict=True)
+            for row in table:
+                if None in row or None in row.values():
+                    raise MotionloomError(
+                        f"{path}, line {table.line_num}: {len(table.fieldnames or ())} fields are needed, as in the "
+                        "first line; put quotes around a prompt with a comma"
+                    )
+                yield _json({key.strip(): _value(key.strip(), text) for key, text in row.items() if text.strip()})
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise MotionloomError(f"{path} is not a CSV file in UTF-8 ({error})") from None
+
+
+def _value(column: str, text: str) -> Any:
+    """Numbers of the columns that hold numbers; what is none is told by `row.parse`."""
+    kinds = {"seconds": float, "seed": int}
+    try:
+        return kinds[column](text) if column in kinds else text
+    except ValueError:
+        return text
+
+
+def _parquet(path: Path) -> Iterator[bytes]:
+    try:
+        with parquet().ParquetFile(path) as file:
+            for part in file.iter_batches(batch_size=1024):
+                for row in part.to_pylist():
+                    yield _json({key: value for key, value in row.items() if value is not None and value == value})
+    except arrow().ArrowException as error:
+        raise MotionloomError(f"{path} is not a Parquet file that can be read ({error})") from None

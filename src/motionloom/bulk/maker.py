@@ -1,0 +1,199 @@
+"""Rows to motions: what every process of a batch does, wherever it runs."""
+
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from motionloom.bulk.measures import Judge, find_judge, measure
+from motionloom.bulk.row import Asked, Sources
+from motionloom.bulk.sampling import LEAST, draw_group, groups
+from motionloom.edits.fitting import fit
+from motionloom.errors import MotionloomError
+from motionloom.goals.goal import placement_of
+from motionloom.io.stream import joined
+from motionloom.motion import Motion
+from motionloom.retarget import from_smpl22
+from motionloom.tasks.control import Controlled, judged, moved, steered_features
+from motionloom.tasks.long import compose
+from motionloom.tasks.text import GUIDANCE, SOLVER, STEPS, check, check_features, finish, to_motion
+from motionloom.weights.prior import Prior, find_weights
+
+TOGETHER = {"cpu": 8, "cuda": 128}
+"""Rows of a network call, by the kind of device."""
+FORMATS = ("npz", "bvh", "glb", "webdataset", "parquet")
+
+
+@dataclass(frozen=True)
+class Options:
+    """How the motions of a batch are made, and what becomes of them; all of it plain values."""
+
+    weights: str = "default"
+    """A shipped name or a file."""
+    device: str = "cpu"
+    bf16: bool = False
+    """Let the network compute in bfloat16."""
+    steps: int = STEPS
+    guidance: float = GUIDANCE
+    solver: str = SOLVER
+    raw: bool = False
+    """Leave the feet as the network drew them."""
+    fps: float | None = None
+    """Frames per second of the files; None: the weights' own."""
+    seconds: float = 5.0
+    """Length of rows that do not say."""
+    seed: int = 0
+    """Seed of rows that do not say."""
+    skeleton: str | None = None
+    """A file with the skeleton of rows that name none; None: the 22-joint person."""
+    format: str = "npz"
+    """One of `FORMATS`."""
+    filter: str | None = None
+    """See `motionloom.bulk.measures.Filter`; motions that do not pass are dropped."""
+    judge: str | None = None
+    """``module:function`` that says whether a motion obeys its prompt; see `motionloom.bulk.measures.Judge`."""
+
+    def of_motions(self, weights: str) -> dict[str, Any]:
+        """What determines every motion of the batch; ``weights`` is the hash of their file."""
+        return {
+            "weights": weights, "steps": self.steps, "guidance": self.guidance, "solver": self.solver,
+            "raw": self.raw, "fps": self.fps, "bf16": self.bf16,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """A motion that was made of a row."""
+
+    motion: Motion
+    measures: dict[str, float | bool | None]
+    """`motionloom.bulk.measures.MEANING` of the 22-joint person, before it came onto another skeleton."""
+
+
+def hash_file(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+class Maker:
+    """A prior that is ready to make rows, and what it makes them with.
+
+    ``weights``: the hash that the weights' file must have, where that is known beforehand.
+    Raises `MotionloomError` for options that no motion can be made with.
+    """
+
+    def __init__(self, options: Options, *, folder: Path, weights: str | None = None) -> None:
+        path = find_weights(options.weights)
+        found = hash_file(path)
+        if weights is not None and found != weights:
+            raise MotionloomError(f"{path} differs from the weights that this batch is made with; use the same file")
+        self.options = options
+        self.prior = Prior.load(path, device=options.device)
+        check(self.prior, [], steps=options.steps, guidance=options.guidance, solver=options.solver)
+        check_features(self.prior)
+        self.sources = Sources(
+            folder, options.of_motions(found), fps=self.prior.fps, seconds=options.seconds, seed=options.seed,
+            skeleton=options.skeleton,
+        )  # fmt: skip
+        self.judge: Judge | None = find_judge(options.judge) if options.judge else None
+        self.together = TOGETHER.get(self.prior.mean.device.type, TOGETHER["cpu"])
+
+    def make(
+        self, asked: Sequence[Asked], *, begin: Callable[[Asked], None] | None = None
+    ) -> Iterator[tuple[Asked, Made | str]]:
+        """Each row with its motion, or with a sentence that says why there is none; rows of like lengths first.
+
+        begin: called before each row, which is then made alone. Rows that are made together and fail are tried alone.
+        """
+        for rows in self._shared(asked, alone=begin is not None):
+            if begin is not None:
+                begin(rows[0])
+            yield from self._try(rows)
+
+    def _shared(self, asked: Sequence[Asked], *, alone: bool) -> Iterator[list[Asked]]:
+        """Rows that are made together."""
+        together = 1 if alone else self.together
+        plain = [one for one in asked if one.row.task == "generate"]
+        for numbers in groups(self.prior, [one.frames for one in plain], together):
+            yield [plain[number] for number in numbers]
+        same: dict[int, list[Asked]] = {}
+        for one in asked:
+            if one.row.task == "control":
+                same.setdefault(id(one.goal), []).append(one)
+        for rows in same.values():
+            yield from (rows[at : at + together] for at in range(0, len(rows), together))
+        yield from ([one] for one in asked if one.row.task == "compose")
+
+    def _try(self, rows: list[Asked]) -> Iterator[tuple[Asked, Made | str]]:
+        try:
+            found: list[tuple[Asked, Made | str]] = list(zip(rows, self._made(rows), strict=True))
+        except MotionloomError as error:
+            found = [(rows[0], str(error))]
+        except Exception as error:  # a row that breaks the program breaks itself alone
+            found = [(rows[0], f"it could not be made ({type(error).__name__}: {' '.join(str(error).split())[:200]})")]
+        if len(found) == len(rows):
+            yield from found
+            return
+        for row in rows:
+            yield from self._try([row])
+
+    def _made(self, rows: list[Asked]) -> list[Made]:
+        if rows[0].row.task == "compose":
+            return [self._compose(rows[0])]
+        if rows[0].row.task == "control":
+            return [
+                self._finished(one, made.motion, error=round(made.error, 4), worst=round(made.worst, 4))
+                for one, made in zip(rows, self._control(rows), strict=True)
+            ]
+        options = self.options
+        drawn = draw_group(
+            self.prior, [one.row.prompt for one in rows], [one.frames for one in rows],
+            seeds=[one.seed for one in rows], guidance=options.guidance, steps=options.steps, solver=options.solver,
+            bf16=options.bf16,
+        )  # fmt: skip
+        return [
+            self._finished(one, finish(self.prior, features, clean=not options.raw))
+            for one, features in zip(rows, drawn, strict=True)
+        ]
+
+    def _control(self, rows: list[Asked]) -> list[Controlled]:
+        """As `motionloom.tasks.control.control`, for prompts and seeds that share a goal."""
+        goal = rows[0].goal
+        assert goal is not None
+        self._only_fp32_ddpm(rows[0])
+        place, filled = placement_of(goal), [*rows, *[rows[0]] * (LEAST - len(rows))]
+        drawn = steered_features(
+            self.prior, [one.row.prompt for one in filled], goal.seen_from(place), seeds=[one.seed for one in filled],
+            guidance=self.options.guidance, steps=self.options.steps,
+        )  # fmt: skip
+        clean = not self.options.raw
+        placed = [
+            moved(to_motion(features.numpy().astype(np.float64), self.prior.fps, clean=clean), place)
+            for features in drawn[: len(rows)]
+        ]
+        return [judged(fit(motion, goal), motion, goal) for motion in placed]
+
+    def _compose(self, asked: Asked) -> Made:
+        timeline = asked.timeline
+        assert timeline is not None
+        self._only_fp32_ddpm(asked)
+        guidance = self.options.guidance if timeline.guidance is None else timeline.guidance
+        pieces = compose(
+            self.prior, timeline.segments, seed=asked.seed, guidance=guidance, steps=self.options.steps,
+            start=asked.start, path=timeline.path, clean=not self.options.raw,
+        )  # fmt: skip
+        return self._finished(asked, joined(list(pieces)))
+
+    def _only_fp32_ddpm(self, asked: Asked) -> None:
+        if self.options.bf16 or self.options.solver != SOLVER:
+            raise MotionloomError(f"the task {asked.row.task} is made in float32 with the solver {SOLVER}")
+
+    def _finished(self, asked: Asked, motion: Motion, **measured: float) -> Made:
+        measures = {**measure(motion, asked.text, self.judge), **measured}
+        if asked.target is not None:
+            motion = from_smpl22(motion, asked.target)
+        return Made(motion if self.options.fps is None else motion.resample(self.options.fps), measures)

@@ -1,0 +1,159 @@
+"""What is measured of every motion of a batch, and conditions on it, such as ``skate < 0.2 and obeys``."""
+
+import ast
+import importlib
+import operator
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.kinematics import physics
+from motionloom.motion import Motion
+
+Values = Mapping[str, float | bool | None]
+Judge = Callable[[str, np.ndarray, float], bool | None]
+"""(prompt, positions (frames, 22, 3) metres, fps) to whether the motion does what the words say; None: nobody knows."""
+
+MEANING: dict[str, str] = {
+    "seconds": "length of the motion",
+    "skate": "share of frames in which a foot on the floor slides faster than 0.5 m/s",
+    "skate_speed": "cm/s at which toes slide that are on the floor, on average",
+    "penetration": "metres that the lowest joint is below the floor, on average",
+    "floating": "metres that the lowest joint is above the floor, on average",
+    "jerk": "m/s^3 of all joints, on average",
+    "peak_jerk": "m/s^3, the largest of any joint in any frame",
+    "travel": "metres walked along the path",
+    "speed": "m/s along the path, on average",
+    "turn": "degrees that the body turned, to the left is positive",
+    "error": "metres from the goal on average (rows with a goal)",
+    "worst": "metres from the goal at the most (rows with a goal)",
+    "obeys": "whether it does what its prompt says (prompts that a physical check knows)",
+}
+"""What each measure is."""
+
+
+def measure(motion: Motion, prompt: str, judge: Judge | None = None) -> dict[str, float | bool | None]:
+    """Measures of a motion of the 22-joint person, rounded; None where a measure has no meaning for it."""
+    positions, fps = motion.positions(), motion.fps
+    skate, jerk = physics.foot_skate(positions, fps), physics.jerk(positions, fps)
+    travel = physics.travel(positions, fps)
+    numbers = {
+        "seconds": motion.seconds,
+        "skate": skate.ratio,
+        "skate_speed": skate.contact_speed,
+        "penetration": physics.penetration(positions),
+        "floating": physics.float_height(positions),
+        "jerk": jerk.mean,
+        "peak_jerk": jerk.peak,
+        "travel": travel,
+        "speed": travel / motion.seconds,
+        "turn": float(np.degrees(physics.turn(positions))),
+    }
+    found: dict[str, float | bool | None] = {name: round(float(value), 4) for name, value in numbers.items()}
+    return {**found, "error": None, "worst": None, "obeys": judge(prompt, positions, fps) if judge else None}
+
+
+def find_judge(name: str) -> Judge:
+    """The function ``module:name``; raises `MotionloomError` where there is none."""
+    module, _, function = name.partition(":")
+    try:
+        return getattr(importlib.import_module(module), function)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise MotionloomError(f"no judge {name!r} ({error}); name one as module:function") from None
+
+
+class Filter:
+    """A condition on measures: comparisons, ``and``, ``or``, ``not``, ``+ - * /``, numbers and names of `MEANING`.
+
+    A measure that has no meaning for a motion makes what is said of it unknown, and unknown holds: ``obeys`` lets
+    motions pass whose prompt no check knows.
+    """
+
+    def __init__(self, text: str) -> None:
+        """Raises `MotionloomError` for whatever else stands in the text; nothing of it is ever executed."""
+        self.text = text
+        if len(text) > 1000:
+            raise MotionloomError(f"the filter has {len(text):,} characters; say it in at most 1,000")
+        try:
+            self._tree = ast.parse(text.strip(), mode="eval").body
+        except (SyntaxError, ValueError, MemoryError, RecursionError):
+            raise MotionloomError(
+                f"the filter {text!r} is no condition; write one such as: skate < 0.2 and obeys"
+            ) from None
+        _check(self._tree, text)
+        self.names = frozenset(node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name))
+
+    def holds(self, values: Values) -> bool:
+        """Whether the measures meet the condition; what is unknown does."""
+        found = _value(self._tree, values)
+        return True if found is None else bool(found)
+
+
+_COMPARE: dict[type, Callable[[Any, Any], bool]] = {
+    ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
+    ast.Eq: operator.eq, ast.NotEq: operator.ne,
+}  # fmt: skip
+_COUNT: dict[type, Callable[[Any, Any], float]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+}  # fmt: skip
+
+
+def _check(node: ast.expr, text: str, depth: int = 0) -> None:
+    """Refuse everything but what `_value` knows."""
+    match node:
+        case ast.BoolOp(values=inner):
+            parts = inner
+        case ast.UnaryOp(op=ast.Not() | ast.USub(), operand=inner):
+            parts = [inner]
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _COUNT:
+            parts = [left, right]
+        case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in _COMPARE for op in ops):
+            parts = [left, *others]
+        case ast.Constant(value=bool() | int() | float()):
+            parts = []
+        case ast.Name(id=name):
+            if name not in MEANING:
+                raise MotionloomError(f"the filter {text!r} asks for {name!r}; the measures are {', '.join(MEANING)}")
+            parts = []
+        case _:
+            said = (ast.get_source_segment(text.strip(), node) or "")[:40]
+            raise MotionloomError(
+                f"the filter {text!r} holds {said!r}; it may hold comparisons of measures and numbers, and, or, not"
+            )
+    if depth > 50:
+        raise MotionloomError("the filter is nested too deeply; say it more plainly")
+    for part in parts:
+        _check(part, text, depth + 1)
+
+
+def _value(node: ast.expr, values: Values) -> Any:
+    """The value of a checked expression; None is unknown (as in Kleene's logic of three values)."""
+    match node:
+        case ast.BoolOp(op=op, values=parts):
+            found = [_value(part, values) for part in parts]
+            decisive = isinstance(op, ast.Or)
+            if any(one is not None and bool(one) == decisive for one in found):
+                return decisive
+            return None if None in found else not decisive
+        case ast.UnaryOp(op=op, operand=part):
+            found = _value(part, values)
+            if found is None:
+                return None
+            return not found if isinstance(op, ast.Not) else -found
+        case ast.BinOp(left=left, op=op, right=right):
+            a, b = _value(left, values), _value(right, values)
+            if a is None or b is None or (isinstance(op, ast.Div) and b == 0):
+                return None
+            return _COUNT[type(op)](a, b)
+        case ast.Compare(left=left, ops=ops, comparators=others):
+            found = [_value(part, values) for part in (left, *others)]
+            pairs = list(zip(found, ops, found[1:], strict=False))
+            known = [_COMPARE[type(op)](a, b) for a, op, b in pairs if a is not None and b is not None]
+            return False if not all(known) else None if len(known) < len(pairs) else True
+        case ast.Name(id=name):
+            return values.get(name)
+        case ast.Constant(value=value):
+            return value
+    raise AssertionError("unchecked expression")

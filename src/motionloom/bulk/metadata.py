@@ -1,0 +1,144 @@
+"""All records of a batch as one table, and a batch's motions read back."""
+
+import json
+import tarfile
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from motionloom.bulk.folder import Entry, Store, read_manifest
+from motionloom.bulk.jobs import arrow, parquet
+from motionloom.bulk.writers import parquet_schema
+from motionloom.errors import MotionloomError
+from motionloom.io import load
+from motionloom.motion import Motion
+from motionloom.skeleton import Skeleton
+
+TABLE = "metadata"
+_BLOCK = 10_000
+"""Rows of the table in memory at once."""
+_ABOUT = {"row": "int64", "state": "string", "shard": "int32", "error_text": "string"}
+
+
+def write_table(store: Store, shards: int) -> Path:
+    """Write ``metadata.parquet``, or ``metadata.jsonl`` where pyarrow is not installed; give its path.
+
+    A row for each row of the job, in its order: where it went, what is known of it, or why it is not there.
+    """
+    from motionloom.io.atomic import atomic_path
+
+    try:
+        parquet()
+    except MotionloomError:
+        place = store.out / f"{TABLE}.jsonl"
+        with atomic_path(place) as temporary, temporary.open("w", encoding="utf-8") as file:
+            for entry in _all(store, shards):
+                file.write(json.dumps(entry, ensure_ascii=False) + "\n")
+        return place
+    place = store.out / f"{TABLE}.parquet"
+    with atomic_path(place) as temporary:
+        _write_parquet(temporary, _all(store, shards))
+    return place
+
+
+def _write_parquet(path: Path, entries: Iterator[Entry]) -> None:
+    pa = arrow()
+    known = [field for field in parquet_schema() if not pa.types.is_list(field.type) and field.name != "joints"]
+    schema = pa.schema([*((name, getattr(pa, kind)()) for name, kind in _ABOUT.items()), *known])
+    with parquet().ParquetWriter(path, schema, compression="zstd") as file:
+        while part := list(islice(entries, _BLOCK)):
+            file.write_table(pa.Table.from_pylist(part, schema=schema))
+
+
+def _all(store: Store, shards: int) -> Iterator[Entry]:
+    for shard in range(shards):
+        for entry in store.entries(shard):
+            told = {**entry, "shard": shard}
+            if isinstance(told.get("error"), str):  # of a failed row; of a made one it is a measure
+                told["error_text"] = told.pop("error")
+            yield told
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """One row of a batch, and what became of it."""
+
+    row: int
+    """Number of the row in the job."""
+    state: str
+    """made, dropped (by the filter), failed, or repeated (the same as an earlier row of its shard)."""
+    id: str | None
+    """None where the row could not be read."""
+    why: str
+    """Of a failed or repeated row, in a sentence; else empty."""
+    about: dict[str, Any]
+    """Words, seed, frames, measures."""
+    motion: Motion | None = None
+    """Of a row that was made, where motions are read."""
+
+
+def result(entry: Entry, motion: Motion | None = None) -> Result:
+    """What a record says of a row."""
+    own = ("row", "state", "id")
+    failed = entry["state"] in ("failed", "repeated")
+    about = {key: value for key, value in entry.items() if key not in own and not (failed and key == "error")}
+    return Result(entry["row"], entry["state"], entry.get("id"), entry["error"] if failed else "", about, motion)
+
+
+def read_batch(out: Path | str, *, motions: bool = True) -> Iterator[Result]:
+    """Every row of a batch that is in its folder, in the job's order, with its motion unless ``motions`` is False.
+
+    Memory holds one shard. Raises `MotionloomError` for a folder that is no batch.
+    """
+    folder = Path(out)
+    manifest = read_manifest(folder)
+    if manifest is None:
+        raise MotionloomError(f"{folder} holds no batch; name a folder that 'motionloom batch' made")
+    store = Store(folder, manifest["files"])
+    shards = -(-int(manifest["rows"]) // int(manifest["shard_rows"]))
+    for shard in range(shards):
+        if store.head(shard) is not None:
+            entries = list(store.entries(shard))
+            made = (entry["id"] for entry in entries if entry["state"] == "made")
+            read = _motions(store, shard, made) if motions else {}
+            yield from (result(entry, read.get(entry.get("id"))) for entry in entries)
+
+
+def _motions(store: Store, shard: int, ids: Iterable[str]) -> dict[Any, Motion]:
+    place = store.data(shard)
+    if store.kind == "webdataset":
+        return _from_tar(place) if place.exists() else {}
+    if store.kind == "parquet":
+        return _from_parquet(place) if place.exists() else {}
+    return {name: load(place / f"{name}.{store.kind}") for name in ids}
+
+
+def _from_tar(place: Path) -> dict[Any, Motion]:
+    import io
+
+    from motionloom.io.npz import load_npz
+
+    found = {}
+    with tarfile.open(place) as tar:
+        for member in tar:
+            data = tar.extractfile(member)
+            if member.name.endswith(".npz") and data is not None:
+                found[member.name.removesuffix(".npz")] = load_npz(io.BytesIO(data.read()))  # type: ignore[arg-type]
+    return found
+
+
+def _from_parquet(place: Path) -> dict[Any, Motion]:
+    with parquet().ParquetFile(place) as file:
+        return {row["id"]: _motion(row) for part in file.iter_batches(batch_size=64) for row in part.to_pylist()}
+
+
+def _motion(row: dict[str, Any]) -> Motion:
+    frames, joints = row["frames"], row["joints"]
+    offsets = np.array(row["offsets"], dtype=np.float64).reshape(joints, 3)
+    skeleton = Skeleton(tuple(row["names"]), tuple(row["parents"]), offsets)
+    turns = np.array(row["rotations"], dtype=np.float64).reshape(frames, joints, 4)
+    return Motion(skeleton, row["fps"], np.array(row["root"]).reshape(frames, 3), turns)

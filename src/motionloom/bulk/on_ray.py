@@ -1,0 +1,168 @@
+"""Shards shared out on a Ray cluster: each actor holds a prior; a lost one is replaced, and its shard begun again.
+
+All machines see the same folder. The driver keeps one shard per actor and nothing else, and what is done lies in the
+folder, so a driver that died is replaced by the same command.
+"""
+
+import importlib
+import logging
+import os
+from collections import deque
+from collections.abc import Generator, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from motionloom.bulk.crew import Moved, too_many_deaths
+from motionloom.bulk.shard import Batch, Report, Task
+from motionloom.errors import MotionloomError
+
+PATIENCE = 1.0
+"""Seconds between two looks at what is done."""
+
+
+class Hand:
+    """What an actor does: shards, one after the other."""
+
+    def __init__(self, line: str) -> None:
+        import torch
+
+        from motionloom.bulk.maker import Maker
+
+        torch.set_num_threads(1)
+        self.batch, self.problem = Batch.from_json(line), ""
+        try:
+            self.maker = Maker(self.batch.options, folder=Path(self.batch.folder), weights=self.batch.weights)
+        except MotionloomError as error:
+            self.problem = str(error)
+
+    def ready(self) -> dict[str, Any]:
+        """Nothing, or what keeps it from making anything."""
+        return {"fatal": self.problem} if self.problem else {}
+
+    def make(self, task: Task) -> dict[str, Any]:
+        """A `Report` as plain values, or why none can be had."""
+        from motionloom.bulk.shard import make_shard
+
+        try:
+            return asdict(make_shard(task, self.batch, self.maker))
+        except MotionloomError as error:
+            return {"fatal": str(error)}
+
+
+def on_ray(
+    items: Iterator[Task | Report], batch: Batch, *, address: str | None, workers: int | None, moved: Moved
+) -> Iterator[Report]:
+    """As `motionloom.bulk.crew.alone`, on the cluster at ``address``; None: RAY_ADDRESS, else one of this machine.
+
+    workers: actors; None: one per processor of the cluster, with CUDA one per GPU.
+    Raises `MotionloomError` where Ray is not installed or not there.
+    """
+    ray = _start(address)
+    try:
+        yield from _Crew(ray, items, batch, workers, moved).run()
+    finally:
+        ray.shutdown()
+
+
+def _start(address: str | None) -> Any:
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing is sent to anybody
+    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+    try:
+        ray = importlib.import_module("ray")
+    except ImportError:
+        raise MotionloomError("--ray needs Ray: pip install 'motionloom[ray]'") from None
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+    options: dict[str, Any] = {
+        "log_to_driver": False, "logging_level": logging.CRITICAL, "runtime_env": {"env_vars": threads},
+    }  # fmt: skip
+    try:
+        if address is None and "RAY_ADDRESS" not in os.environ:
+            ray.init(address="local", include_dashboard=False, **options)
+        else:
+            ray.init(address=address, **options)
+    except (ConnectionError, RuntimeError, ValueError, TimeoutError) as error:
+        said = " ".join(str(error).split())[:200]
+        raise MotionloomError(
+            f"there is no Ray cluster at {address or os.environ.get('RAY_ADDRESS')} ({said})"
+        ) from None
+    return ray
+
+
+class _Crew:
+    def __init__(
+        self, ray: Any, items: Iterator[Task | Report], batch: Batch, workers: int | None, moved: Moved
+    ) -> None:
+        self.ray, self.items, self.batch, self.moved = ray, items, batch, moved
+        gpu = batch.options.device == "cuda"
+        found = ray.cluster_resources().get("GPU" if gpu else "CPU", 0)
+        self.workers = workers or max(int(found), 1)
+        self.kind = ray.remote(num_cpus=1, num_gpus=1 if gpu else 0, max_restarts=0)(Hand)
+        self.flight: dict[Any, tuple[Any, Task | None]] = {}
+        """What is waited for: of which actor, and for which task (None: until it is ready)."""
+        self.idle: list[Any] = []
+        self.again: deque[Task] = deque()
+        self.deaths: dict[int, int] = {}
+        self.stillborn = 0
+
+    def run(self) -> Iterator[Report]:
+        task = yield from self._next()
+        while task is not None or any(begun for _, begun in self.flight.values()):
+            if task is not None:
+                self._hire()
+            while task is not None and self.idle:
+                actor = self.idle.pop()
+                self.flight[actor.make.remote(task)] = actor, task
+                task = yield from self._next()
+            done, _ = self.ray.wait(list(self.flight), num_returns=1, timeout=PATIENCE)
+            for reference in done:
+                if report := self._over(reference):
+                    yield report
+            if task is None:
+                task = yield from self._next()
+
+    def _next(self) -> Generator[Report, None, Task | None]:
+        """The next task; reports on the way to it are passed on."""
+        if self.again:
+            return self.again.popleft()
+        for item in self.items:
+            if isinstance(item, Task):
+                return item
+            yield item
+        return None
+
+    def _hire(self) -> None:
+        """As many actors as there may be, where nobody is free."""
+        for _ in range(0 if self.idle else self.workers - len(self.flight)):
+            actor = self.kind.remote(self.batch.to_json())
+            self.flight[actor.ready.remote()] = actor, None
+
+    def _over(self, reference: Any) -> Report | None:
+        actor, task = self.flight.pop(reference)
+        try:
+            answer = self.ray.get(reference)
+        except self.ray.exceptions.RayTaskError as error:
+            raise MotionloomError(f"a worker failed: {' '.join(str(error).split())[-300:]}") from None
+        except self.ray.exceptions.RayError as error:
+            self._lost(task, error)
+            return None
+        if "fatal" in answer:
+            raise MotionloomError(answer["fatal"])
+        self.idle.append(actor)
+        self.stillborn = 0
+        if task is None:
+            return None
+        self.moved(answer["made"])
+        return Report(**answer)
+
+    def _lost(self, task: Task | None, error: Exception) -> None:
+        if task is None:
+            self.stillborn += 1
+            if self.stillborn > 10 + 2 * self.workers:
+                said = " ".join(str(error).split())[:200]
+                raise MotionloomError(f"the workers of the Ray cluster end before they begin ({said})")
+            return
+        self.deaths[task.shard] = self.deaths.get(task.shard, 0) + 1
+        if too_many_deaths(self.deaths[task.shard], len(task.rows)):
+            raise MotionloomError(f"shard {task.shard} ends every worker that makes it; is there enough memory?")
+        self.again.append(task)

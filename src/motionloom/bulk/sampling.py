@@ -1,0 +1,88 @@
+"""Rows of many lengths through the network together, with the same bits whatever rows are beside them.
+
+A motion depends on its prompt and seed alone. In floating point that holds only as far as the sums of a network call
+are made in the same order, and that order follows from the sizes of the call: few rows, or another number of words,
+and it is another one. So words are padded to whole steps, prompts are encoded one by one, calls have at least `LEAST`
+rows, and lengths share a call only where the attention works through as many blocks of tokens
+(docs/decisions/0019-bulk.md has the measurements).
+"""
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from motionloom.diffusion import SOLVERS, guide, levels, row_draw, sample
+from motionloom.nets.prior import Condition, condition
+from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS, check, smooth
+from motionloom.weights.prior import Prior
+
+LEAST = 4
+"""Rows of a network call; a smaller group is filled up with copies."""
+WORDS = 16
+"""Words of a prompt are padded to a multiple of this."""
+TOKENS = 32
+"""Lengths of as many whole and begun blocks of so many tokens may share a call."""
+
+
+def groups(prior: Prior, frames: Sequence[int], together: int) -> list[list[int]]:
+    """Numbers of rows that share a network call, at most ``together``: neighbours in length, to pad little."""
+    patch = prior.net.config.patch
+
+    def kind(row: int) -> int:
+        return -(-frames[row] // (patch * TOKENS)) if prior.net.modulated else frames[row]
+
+    found: list[list[int]] = []
+    for row in sorted(range(len(frames)), key=lambda row: (-frames[row], row)):
+        if found and len(found[-1]) < together and kind(found[-1][0]) == kind(row):
+            found[-1].append(row)
+        else:
+            found.append([row])
+    return found
+
+
+@torch.inference_mode()
+def draw_group(
+    prior: Prior,
+    prompts: Sequence[str],
+    frames: Sequence[int],
+    *,
+    seeds: Sequence[int],
+    guidance: float = GUIDANCE,
+    steps: int = STEPS,
+    solver: str = SOLVER,
+    bf16: bool = False,
+) -> list[Tensor]:
+    """Features (frames, 263 or the prior's), not standardised, on the CPU: of rows that `groups` put together.
+
+    Row i is drawn from ``seeds[i]``. bf16: the network computes in bfloat16, the loop in float32.
+    Raises `MotionloomError` as `motionloom.tasks.text.check` does.
+    """
+    check(prior, prompts, steps=steps, guidance=guidance, solver=solver)
+    device = prior.mean.device
+    chosen = [*range(len(prompts)), *([0] * (LEAST - len(prompts)))]
+    lengths = [frames[row] for row in chosen]
+    cond = _condition(prior, [prompts[row] for row in chosen], lengths)
+    draw = row_draw([seeds[row] for row in chosen], lengths)
+    state = draw(torch.empty(len(chosen), max(lengths), len(prior.mean), device=device))
+    with torch.autocast(device.type, torch.bfloat16, enabled=bf16):
+        denoise = guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), guidance)
+        way = levels(prior.schedule, steps, spacing=SPACING)
+        for snapshot in sample(denoise, state, levels=way, solver=SOLVERS[solver], schedule=prior.schedule, draw=draw):
+            state = snapshot.state
+    finished = (state.float() * prior.std + prior.mean).cpu()
+    rows = [finished[row, : frames[row]] for row in range(len(prompts))]
+    return [smooth(row) for row in rows] if prior.net.config.patch > 1 else rows
+
+
+def _condition(prior: Prior, prompts: Sequence[str], lengths: list[int]) -> Condition:
+    texts = [prior.text.encode([prompt]).to(prior.mean.device) for prompt in prompts]
+    pooled = torch.cat([text.pooled for text in texts])
+    if not prior.net.modulated:
+        return condition(pooled, lengths=lengths)
+    most = max(text.mask.shape[1] for text in texts)
+    most += -most % WORDS
+    tokens = torch.cat([F.pad(text.tokens, (0, 0, 0, most - text.tokens.shape[1])) for text in texts])
+    words = torch.cat([F.pad(text.mask, (0, most - text.mask.shape[1])) for text in texts])
+    return condition(pooled, tokens=tokens, words=words, lengths=lengths)

@@ -1,0 +1,191 @@
+"""One shard's motions as files: a folder of single files, a tar as webdataset reads it, or a Parquet file.
+
+Each writer makes one new thing at the path it is given, and takes over motions from an older one of its kind.
+"""
+
+import io
+import json
+import os
+import shutil
+import tarfile
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from motionloom.bulk.jobs import arrow, parquet
+from motionloom.io import save
+from motionloom.io.npz import save_npz
+from motionloom.motion import Motion
+
+ROWS = 64
+"""Motions of a row group of a Parquet file: how many are in memory at once."""
+NUMBERS = ("error", "worst", "seconds", "skate", "skate_speed", "penetration", "floating", "jerk", "peak_jerk",
+           "travel", "speed", "turn")  # fmt: skip
+
+
+class Writer(ABC):
+    """Motions into one place."""
+
+    suffix = ""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @abstractmethod
+    def add(self, motion: Motion, about: dict[str, Any]) -> None:
+        """One motion; ``about`` has its ``id`` and what is to be known of it."""
+
+    @abstractmethod
+    def carry(self, old: Path, ids: Collection[str]) -> None:
+        """Take over the motions of these ids from an older place of this kind."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Finish what is on the disk."""
+
+
+class Files(Writer):
+    """A folder with a file for each motion."""
+
+    def __init__(self, path: Path, suffix: str) -> None:
+        super().__init__(path)
+        self.kind = suffix
+        path.mkdir()
+
+    def add(self, motion: Motion, about: dict[str, Any]) -> None:
+        save(motion, self.path / f"{about['id']}{self.kind}")
+
+    def carry(self, old: Path, ids: Collection[str]) -> None:
+        for name in ids:
+            shutil.copyfile(old / f"{name}{self.kind}", self.path / f"{name}{self.kind}")
+
+    def close(self) -> None:
+        """Nothing is left to do: each file is whole."""
+
+
+class Tar(Writer):
+    """``id.npz`` and ``id.json``, one after the other: webdataset's layout. The same motions make the same bytes."""
+
+    suffix = ".tar"
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._tar = tarfile.open(path, "w", format=tarfile.USTAR_FORMAT)  # noqa: SIM115
+        self._part = path.with_name(f"{path.name}.npz")
+
+    def add(self, motion: Motion, about: dict[str, Any]) -> None:
+        save_npz(motion, self._part)
+        self._put(f"{about['id']}.npz", self._part.read_bytes())
+        self._put(f"{about['id']}.json", json.dumps(about, ensure_ascii=False, sort_keys=True).encode())
+
+    def carry(self, old: Path, ids: Collection[str]) -> None:
+        with tarfile.open(old) as tar:
+            for member in tar:
+                data = tar.extractfile(member)
+                if data is not None and member.name.partition(".")[0] in ids:
+                    self._put(member.name, data.read())
+
+    def close(self) -> None:
+        self._tar.close()
+        self._part.unlink(missing_ok=True)
+
+    def _put(self, name: str, data: bytes) -> None:
+        member = tarfile.TarInfo(name)
+        member.size = len(data)
+        self._tar.addfile(member, io.BytesIO(data))
+
+
+class Parquet(Writer):
+    """One row per motion: words, measures, positions and rotations as flat lists of float32."""
+
+    suffix = ".parquet"
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._rows: list[dict[str, Any]] = []
+        self._file = parquet().ParquetWriter(path, parquet_schema(), compression="zstd")
+
+    def add(self, motion: Motion, about: dict[str, Any]) -> None:
+        self._rows.append(parquet_row(motion, about))
+        if len(self._rows) == ROWS:
+            self._flush()
+
+    def carry(self, old: Path, ids: Collection[str]) -> None:
+        within = arrow("pyarrow.compute").is_in
+        chosen = arrow().array(sorted(ids))
+        with parquet().ParquetFile(old) as file:
+            for part in file.iter_batches(batch_size=ROWS):
+                kept = part.filter(within(part["id"], value_set=chosen))
+                if len(kept):
+                    self._file.write_batch(kept)
+
+    def close(self) -> None:
+        self._flush()
+        self._file.close()
+
+    def _flush(self) -> None:
+        if self._rows:
+            self._file.write_table(arrow().Table.from_pylist(self._rows, schema=parquet_schema()))
+        self._rows = []
+
+
+def parquet_schema() -> Any:
+    """Columns of a Parquet shard; positions (frames, joints, 3), rotations (frames, joints, 4) and root flat."""
+    pa = arrow()
+    floats = pa.list_(pa.float32())
+    return pa.schema(
+        [
+            *((name, pa.string()) for name in ("id", "key", "task", "text")),
+            ("seed", pa.int64()), ("fps", pa.float64()), ("frames", pa.int32()), ("joints", pa.int32()),
+            ("positions", floats), ("rotations", floats), ("root", floats),
+            ("names", pa.list_(pa.string())), ("parents", pa.list_(pa.int32())), ("offsets", floats),
+            ("obeys", pa.bool_()), *((name, pa.float64()) for name in NUMBERS),
+        ]
+    )  # fmt: skip
+
+
+def parquet_row(motion: Motion, about: dict[str, Any]) -> dict[str, Any]:
+    """A motion as a row of `parquet_schema`."""
+
+    def flat(values: np.ndarray) -> np.ndarray:
+        return np.asarray(values, dtype=np.float32).reshape(-1)
+
+    return {
+        **about,
+        "joints": len(motion.skeleton), "positions": flat(motion.positions()), "rotations": flat(motion.rotations),
+        "root": flat(motion.root), "names": list(motion.skeleton.names), "parents": list(motion.skeleton.parents),
+        "offsets": flat(motion.skeleton.offsets),
+    }  # fmt: skip
+
+
+def writer(kind: str, path: Path) -> Writer:
+    """A writer of one of `motionloom.bulk.maker.FORMATS` at a path where nothing is."""
+    if kind == "webdataset":
+        return Tar(path)
+    return Parquet(path) if kind == "parquet" else Files(path, f".{kind}")
+
+
+def suffix(kind: str) -> str:
+    """How the name of a shard ends: nothing for a folder."""
+    return {"webdataset": Tar.suffix, "parquet": Parquet.suffix}.get(kind, "")
+
+
+def sizes(path: Path) -> dict[str, int]:
+    """What a shard's data must look like to be whole: files and bytes."""
+    places = [path] if path.is_file() else list(_inside(path))
+    return {"files": len(places), "bytes": sum(place.stat().st_size for place in places)}
+
+
+def sync(path: Path) -> None:
+    """Wait until a file or a folder's files are on the disk."""
+    for place in [path] if path.is_file() else list(_inside(path)):
+        with place.open("rb") as file:
+            os.fsync(file.fileno())
+
+
+def _inside(path: Path) -> Iterator[Path]:
+    if path.is_dir():
+        yield from (place for place in path.iterdir() if place.is_file())
