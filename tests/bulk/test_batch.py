@@ -1,0 +1,282 @@
+"""Batches made by processes: the same motions however they are shared out, and whoever is killed."""
+
+import json
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from motionloom.bulk import batch as batch_module
+from motionloom.bulk.batch import Where, array_task, batch, run
+from motionloom.bulk.crew import _Process
+from motionloom.bulk.folder import Store
+from motionloom.bulk.jobs import Jobs
+from motionloom.bulk.maker import Options
+from motionloom.bulk.metadata import Result, read_batch
+from motionloom.errors import MotionloomError
+from tests.bulk.rows import apart, options, positions, rows, written
+
+ONE, TWO = Where(workers=1), Where(workers=2)
+COUNT = 40
+
+
+@pytest.fixture
+def jobs(folder: Path) -> Path:
+    return written(folder / "jobs.jsonl", rows(COUNT))
+
+
+@pytest.fixture(scope="module")
+def exact(weights: str) -> dict[Any, Any]:
+    """Every motion made by this process alone."""
+    found = batch(rows(COUNT), options=options(weights))
+    return {(one.about["text"], one.about["seed"]): one.motion.positions() for one in found if one.motion}
+
+
+def check_whole(out: Path, exact: dict[Any, Any]) -> None:
+    """Every row is there exactly once, and nothing else is."""
+    assert [(one.row, one.state) for one in read_batch(out, motions=False)] == [(i, "made") for i in range(len(exact))]
+    assert apart(positions(out), exact) < 3e-6
+    assert {path.name for path in out.iterdir() if not path.name.startswith("shard-")} == {
+        "manifest.json", "records", _table(out),
+    }  # fmt: skip
+    assert not [path for path in out.rglob("*") if path.name.startswith(".") or ".part" in path.name]
+
+
+def _table(out: Path) -> str:
+    return next(path.name for path in out.glob("metadata.*"))
+
+
+def test_processes_shares_and_another_order_make_the_same_motions(
+    weights: str, jobs: Path, folder: Path, exact: dict[Any, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = options(weights)
+    found = list(batch(jobs, folder / "alone", options=asked, where=TWO))
+    assert [(one.row, one.state) for one in found] == [(i, "made") for i in range(COUNT)]
+    check_whole(folder / "alone", exact)
+
+    for number in (1, 0):
+        list(run(Jobs.of(jobs), folder / "shares", options=asked, where=Where(1, (number, 2))))
+    check_whole(folder / "shares", exact)
+
+    other = random.Random(3).sample(rows(COUNT), COUNT)
+    list(batch(other, folder / "shuffled", options=asked, where=ONE))
+    assert apart(positions(folder / "shuffled"), exact) < 3e-6
+
+    monkeypatch.setattr(batch_module, "alone", _nobody)  # all is done: nobody is started
+    list(batch(jobs, folder / "alone", options=asked, where=TWO))
+
+
+def _nobody(items: Iterator[Any], *_: Any, **__: Any) -> Iterator[Any]:
+    for item in items:
+        assert isinstance(item, batch_module.Report)
+        yield item
+
+
+def test_workers_that_are_killed_are_replaced(
+    weights: str, jobs: Path, folder: Path, exact: dict[Any, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first three to get a shard, each a little later than the one before."""
+    kills, give = [], _Process.give
+
+    def deadly(self: _Process, task: Any) -> None:
+        give(self, task)
+        if len(kills) < 3:
+            kills.append(self.popen.pid)
+            time.sleep(2.0 * len(kills))
+            self.popen.send_signal(signal.SIGKILL)
+
+    monkeypatch.setattr(_Process, "give", deadly)
+    monkeypatch.setattr("motionloom.bulk.crew.STILLBORN", 10)
+    list(batch(jobs, folder / "out", options=options(weights), where=TWO))
+    assert len(kills) == 3
+    check_whole(folder / "out", exact)
+
+
+def start(weights: str, jobs: Path, out: Path, *more: str, **settings: Any) -> "subprocess.Popen[str]":
+    command = ["batch", str(jobs), "--out", str(out), "--weights", weights, "--steps", "2", *more]
+    return subprocess.Popen(
+        [sys.executable, "-m", "motionloom", *command],
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        **settings,
+    )
+
+
+def _not_deaf() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # jobs in the background are started deaf to Ctrl-C
+
+
+def wait_for(what: Callable[[], bool], process: "subprocess.Popen[str]") -> None:
+    for _ in range(1200):
+        if what() or process.poll() is not None:
+            return
+        time.sleep(0.05)
+    pytest.fail("it did not happen in a minute")
+
+
+def workers_of(out: Path) -> list[int]:
+    """Processes of this machine that make motions for that folder."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*"):
+        try:
+            if (
+                b"motionloom.bulk.worker" in (place / "cmdline").read_bytes()
+                and (place / "cwd").resolve() == out.parent
+            ):
+                found.append(int(place.name))
+        except OSError:
+            continue
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="looks at processes as Linux shows them")
+@pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGINT], ids=["killed", "interrupted"])
+def test_the_same_command_goes_on_where_a_driver_ended(
+    weights: str, jobs: Path, folder: Path, exact: dict[Any, Any], blow: signal.Signals
+) -> None:
+    out = folder / "out"
+    first = start(weights, jobs, out, "--workers", "1", start_new_session=True)
+    wait_for(lambda: (out / "records/000000.jsonl").exists(), first)
+    first.send_signal(blow)
+    _, said = first.communicate(timeout=60)
+    assert first.returncode == (130 if blow is signal.SIGINT else -9)
+    assert said.endswith("motionloom: interrupted\n") == (blow is signal.SIGINT)
+    wait_for(lambda: not workers_of(out), first)
+    assert not workers_of(out)  # nobody outlives the driver
+    assert not (out / "metadata.jsonl").exists()
+    before = {path: path.stat().st_mtime_ns for path in (out / "records").iterdir()}
+    second = start(weights, jobs, out, "--workers", "1")
+    assert second.communicate(timeout=120)[0] == f"{COUNT} motions are in {out}\n"
+    assert all(path.stat().st_mtime_ns == when for path, when in before.items())  # nothing was made twice
+    check_whole(out, exact)
+    third = start(weights, jobs, out)
+    assert third.communicate(timeout=60)[0].startswith("nothing was left to make: ")
+
+
+@pytest.mark.slow
+def test_a_disk_that_is_full_ends_the_batch_in_a_sentence(weights: str, folder: Path) -> None:
+    """Of a process that may write no file of more than 100 kB: a shard of all rows is larger, in the middle of one."""
+    jobs, out = written(folder / "jobs.jsonl", rows(COUNT)), folder / "out"
+
+    def limit() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+
+    full = start(weights, jobs, out, "--format", "webdataset", "--workers", "1", preexec_fn=limit)
+    said = full.communicate(timeout=120)
+    assert (full.returncode, said[0]) == (2, "")
+    assert said[1].splitlines()[-1] == f"motionloom: cannot write to {out}: File too large"
+    assert not list(out.glob("shard-*"))
+    assert not list((out / ".work").iterdir())
+    again = start(weights, jobs, out, "--format", "webdataset", "--workers", "1")
+    assert again.communicate(timeout=120)[0] == f"{COUNT} motions are in {out}\n"
+
+
+def test_results_come_without_a_folder_as_they_are_made(weights: str) -> None:
+    found: list[Result] = list(
+        islice(batch([{"prompt": ""}, *rows(3)], options=options(weights, filter="travel < 0")), 4)
+    )
+    assert [(one.row, one.state) for one in found] == [(0, "failed"), (1, "dropped"), (2, "dropped"), (3, "dropped")]
+
+
+@pytest.mark.parametrize(
+    ("environment", "task"),
+    [
+        ({}, None),
+        ({"SLURM_ARRAY_TASK_ID": "3", "SLURM_ARRAY_TASK_COUNT": "4"}, (3, 4)),
+        ({"SLURM_ARRAY_TASK_ID": "4", "SLURM_ARRAY_TASK_COUNT": "4", "SLURM_ARRAY_TASK_MIN": "1"}, (3, 4)),
+        (
+            {"SLURM_ARRAY_TASK_ID": "20", "SLURM_ARRAY_TASK_COUNT": "3", "SLURM_ARRAY_TASK_MIN": "0",
+             "SLURM_ARRAY_TASK_STEP": "10"},
+            (2, 3),
+        ),
+    ],
+)  # fmt: skip
+def test_a_slurm_array_shares_the_shards_out(environment: dict[str, str], task: tuple[int, int] | None) -> None:
+    assert array_task(environment) == task
+
+
+def test_a_list_of_array_tasks_that_is_no_range_is_refused() -> None:
+    with pytest.raises(MotionloomError, match="--shard"):
+        array_task({"SLURM_ARRAY_TASK_ID": "9", "SLURM_ARRAY_TASK_COUNT": "2", "SLURM_ARRAY_TASK_MIN": "1"})
+
+
+def test_a_job_that_grew_keeps_its_shards_and_one_that_shrank_is_refused(weights: str, folder: Path) -> None:
+    asked, out = options(weights), folder / "out"
+    list(batch(rows(16), out, options=asked, where=ONE))
+    first = (out / "records/000000.jsonl").stat().st_mtime_ns
+    assert [one.state for one in batch(rows(20), out, options=asked, where=ONE)] == ["made"] * 20
+    assert (out / "records/000000.jsonl").stat().st_mtime_ns == first
+    with pytest.raises(MotionloomError, match="more shards than the job"):
+        list(batch(rows(8), out, options=asked, where=ONE))
+
+
+@pytest.mark.parametrize(
+    "change", [{"format": "mp4"}, {"filter": "obeys"}, {"fps": 0}, {"skeleton": "absent.bvh"}], ids=str
+)
+def test_options_that_cannot_be_are_refused_before_anything_is_written(
+    weights: str, folder: Path, change: dict[str, Any]
+) -> None:
+    with pytest.raises(MotionloomError):
+        list(batch(rows(2), folder / "out", options=options(weights, **change)))
+    assert not (folder / "out").exists()
+
+
+@pytest.mark.parametrize("change", [{"steps": 0}, {"device": "toaster"}], ids=str)
+def test_what_only_a_process_finds_out_is_told_in_its_sentence(
+    weights: str, folder: Path, change: dict[str, Any]
+) -> None:
+    asked = Options(**{"weights": weights, "steps": 2, **change})
+    with pytest.raises(MotionloomError):
+        list(batch(rows(2), folder / "out", options=asked, where=ONE))
+    assert not list(folder.glob("out/shard-*"))
+
+
+def test_the_table_has_a_row_for_every_row(weights: str, folder: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    out = folder / "out"
+    list(batch([*rows(9), {"prompt": ""}], out, options=options(weights), where=ONE))
+    table = parquet.read_table(out / "metadata.parquet").to_pylist()
+    assert [row["row"] for row in table] == list(range(10))
+    assert [row["state"] for row in table] == ["made"] * 9 + ["failed"]
+    assert "prompt" in table[9]["error_text"]
+    for row in table[:9]:
+        assert (Store(out, "npz").data(row["shard"]) / f"{row['id']}.npz").exists()
+
+
+def test_memory_of_the_driver_does_not_grow_with_the_job(folder: Path) -> None:
+    """A million rows are looked at with no more memory than ten thousand."""
+    code = (
+        "import resource, sys\nfrom motionloom.bulk.jobs import Jobs\n"
+        "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "jobs = Jobs.of_prompts('prompts.txt', variants=int(sys.argv[1]))\n"
+        "print(jobs.count(), sum(len(part) for part in jobs.shards(1000)))\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)\n"
+    )
+    (folder / "prompts.txt").write_text("a person walks\n" * 100)
+    for variants in (100, 5000):
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(variants)], capture_output=True, text=True, check=True, timeout=120,
+            env={**os.environ},
+        )  # fmt: skip
+        counts, grown = done.stdout.splitlines()
+        assert counts == f"{100 * variants} {100 * variants}"
+        assert int(grown) < 8_000  # kB
+
+
+def test_results_are_json_so_that_any_language_reads_them(weights: str, folder: Path) -> None:
+    list(batch(rows(3), folder / "out", options=options(weights), where=ONE))
+    head, *entries = (folder / "out/records/000000.jsonl").read_text().splitlines()
+    assert json.loads(head)["counts"] == {"made": 3}
+    assert [json.loads(entry)["seed"] for entry in entries] == [0, 1, 2]

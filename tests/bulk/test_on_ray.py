@@ -1,0 +1,64 @@
+"""Batches on a real local Ray cluster: the same motions, also when its workers are killed."""
+
+import os
+import signal
+import time
+from pathlib import Path
+from threading import Thread
+
+import pytest
+
+from motionloom.bulk.batch import LOCAL, Where, batch
+from motionloom.bulk.folder import Store
+from tests.bulk.rows import apart, options, positions, rows
+
+pytest.importorskip("ray")
+pytestmark = pytest.mark.slow
+COUNT = 24
+
+
+def actors(parent: int) -> list[int]:
+    """Ray's processes of this machine that hold a prior, below this one."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*"):
+        try:
+            if b"ray::Hand" in (place / "cmdline").read_bytes() and parent in _above(int(place.name)):
+                found.append(int(place.name))
+        except (OSError, IndexError):
+            continue
+    return found
+
+
+def _above(pid: int) -> set[int]:
+    found = set()
+    while pid > 1:
+        found.add(pid)
+        pid = int((Path("/proc") / str(pid) / "stat").read_text().rsplit(")", 1)[1].split()[1])
+    return found
+
+
+def test_ray_makes_the_same_motions_although_workers_are_killed(weights: str, folder: Path) -> None:
+    exact = {
+        (one.about["text"], one.about["seed"]): one.motion.positions()
+        for one in batch(rows(COUNT), options=options(weights))
+        if one.motion
+    }
+    out, kills = folder / "out", []
+
+    def kill() -> None:
+        store = Store(out, "npz")
+        while len(kills) < 2 and not store.record(2).exists():
+            time.sleep(0.2)
+            if living := [pid for pid in actors(os.getpid()) if pid not in kills]:
+                if not kills and not store.record(0).exists():
+                    continue  # at first somebody is to have made something
+                kills.append(living[0])
+                os.kill(living[0], signal.SIGKILL)
+
+    killer = Thread(target=kill)
+    killer.start()
+    found = list(batch(rows(COUNT), out, options=options(weights), where=Where(workers=1, ray=LOCAL)))
+    killer.join()
+    assert kills
+    assert [(one.row, one.state) for one in found] == [(i, "made") for i in range(COUNT)]
+    assert apart(positions(out), exact) < 3e-6

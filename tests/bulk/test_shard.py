@@ -1,0 +1,297 @@
+"""One shard: what is made, what is kept, what is told, and that it is whole or not there."""
+
+import errno
+import json
+import tarfile
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from motionloom.bulk import shard as shard_module
+from motionloom.bulk.folder import Store, open_folder
+from motionloom.bulk.maker import Maker, Options
+from motionloom.bulk.metadata import Result, read_batch
+from motionloom.bulk.shard import CAREFUL, FATAL, Batch, Report, Task, make_shard
+from motionloom.errors import MotionloomError
+from motionloom.io import load
+from tests.bulk.rows import apart, options, positions, rows
+
+OUT = Path("out")
+TIMELINE = "segments: [{text: a person walks, seconds: 1}, {text: a person sits, seconds: 1}]\n"
+
+
+@pytest.fixture(scope="module")
+def ready(weights: str) -> Maker:
+    """A maker that knows no folder but the one that a test is in."""
+    return Maker(options(weights), folder=Path())
+
+
+def make(maker: Maker, found: list[dict[str, Any]], asked: Options | None = None, first: int = 0) -> Report:
+    """The rows as shard 0 of the folder ``out``."""
+    asked = asked or maker.options
+    maker.sources._cache.clear()
+    manifest = open_folder(OUT, asked, rows=len(found), shard_rows=max(len(found), 1))
+    batch = Batch(str(OUT), ".", manifest["weights"]["sha256"], asked)
+    return make_shard(Task(0, first, [json.dumps(row).encode() for row in found]), batch, maker)
+
+
+def results() -> list[Result]:
+    return list(read_batch(OUT))
+
+
+def everything() -> dict[str, bytes]:
+    return {str(path.relative_to(OUT)): path.read_bytes() for path in OUT.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("kind", ["npz", "bvh", "glb", "webdataset", "parquet"])
+def test_what_is_written_is_read_back(ready: Maker, kind: str) -> None:
+    if kind == "parquet":
+        pytest.importorskip("pyarrow")
+    make(ready, rows(5))
+    exact = positions(OUT)
+    OUT.rename("npz")
+    assert make(ready, rows(5), replace(ready.options, format=kind)).counts == {"made": 5}
+    assert [one.row for one in results()] == [0, 1, 2, 3, 4]
+    assert apart(positions(OUT), exact) < 2e-3  # BVH rounds
+
+
+def test_a_tar_is_as_webdataset_reads_it_and_the_same_bytes_again(ready: Maker) -> None:
+    asked = replace(ready.options, format="webdataset")
+    make(ready, [*rows(3), {"prompt": "a person sits", "id": "mine"}], asked)
+    first = everything()
+    with tarfile.open(OUT / "shard-000000.tar") as tar:
+        names = tar.getnames()
+        about = json.loads(tar.extractfile("mine.json").read())  # type: ignore[union-attr]
+    assert names[::2] == [name.replace(".json", ".npz") for name in names[1::2]]
+    assert (about["text"], about["seed"], about["id"]) == ("a person sits", 0, "mine")
+    assert about["key"] != "mine"
+    OUT.rename("before")
+    make(ready, [*rows(3), {"prompt": "a person sits", "id": "mine"}], asked)
+    assert everything() == first
+
+
+def test_a_shard_that_is_there_is_not_made_again(ready: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
+    make(ready, rows(4))
+    before = everything()
+    monkeypatch.setattr(Maker, "_made", lambda *_: pytest.fail("a motion was made"))
+    assert make(ready, rows(4)) == Report(0, 4, {"made": 4}, 0)
+    assert everything() == before
+
+
+@pytest.mark.parametrize("kind", ["npz", "webdataset", "parquet"])
+def test_only_what_is_missing_is_made_in_whatever_order_rows_come(ready: Maker, kind: str) -> None:
+    if kind == "parquet":
+        pytest.importorskip("pyarrow")
+    asked = replace(ready.options, format=kind)
+    make(ready, rows(4), asked)
+    four = positions(OUT)
+    report = make(ready, rows(6)[::-1], asked)
+    assert (report.counts, report.made) == ({"made": 6}, 2)
+    six = positions(OUT)
+    assert apart({key: six[key] for key in four}, four) == 0
+    assert [one.about["seed"] for one in results()] == [5, 4, 3, 2, 1, 0]
+    report = make(ready, rows(2), asked)  # and what is no longer asked for goes
+    assert (report.counts, report.made, len(positions(OUT))) == ({"made": 2}, 0, 2)
+
+
+def test_rows_that_cannot_be_are_listed_with_a_sentence_and_the_others_made(ready: Maker) -> None:
+    found = [{"prompt": ""}, *rows(3), {"prompt": "a", "seconds": 1e9}, {"prompt": "a", "goal": "absent.json"}]
+    report = make(ready, found)
+    assert report.counts == {"made": 3, "failed": 3}
+    failed = [one for one in results() if one.state == "failed"]
+    assert [one.row for one in failed] == [0, 4, 5]
+    assert [word in one.why for one, word in zip(failed, ("prompt", "1e+09", "absent.json"), strict=True)] == [True] * 3
+    assert len(report.problems) == 3
+
+
+def test_a_row_that_breaks_the_program_breaks_itself_alone(ready: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And is tried again, when it may go well; what is there already stays as it is."""
+    finished = Maker._finished
+
+    def poisoned(self: Maker, asked: Any, motion: Any, **more: Any) -> Any:
+        if asked.seed == 2:
+            raise ZeroDivisionError("poison")
+        return finished(self, asked, motion, **more)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Maker, "_finished", poisoned)
+        assert make(ready, rows(5)).counts == {"made": 4, "failed": 1}
+    bad = results()[2]
+    assert (bad.state, bad.motion) == ("failed", None)
+    assert "ZeroDivisionError: poison" in bad.why
+    before = everything()
+    assert make(ready, rows(5)) == Report(0, 5, {"made": 5}, 1)
+    after = everything()
+    assert all(after[name] == data for name, data in before.items() if name.endswith(".npz"))
+
+
+def test_a_row_that_ends_its_process_every_time_is_found_out(ready: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process that dies leaves notes behind; here it dies by an exception that nobody catches."""
+
+    class Killed(BaseException):
+        pass
+
+    finished = Maker._finished
+    tried: Counter[int] = Counter()
+
+    def deadly(self: Maker, asked: Any, motion: Any, **more: Any) -> Any:
+        tried[asked.seed] += 1
+        if asked.seed == 1:
+            raise Killed
+        return finished(self, asked, motion, **more)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Maker, "_finished", deadly)
+        for _ in range(CAREFUL + FATAL):
+            with pytest.raises(Killed):
+                make(ready, rows(3))
+            assert not (OUT / "records/000000.jsonl").exists()
+        assert make(ready, rows(3)).counts == {"made": 2, "failed": 1}
+    assert "ended the process" in results()[1].why
+    assert tried[1] == CAREFUL + FATAL
+    assert make(ready, rows(3)) == Report(0, 3, {"made": 3}, 1)
+
+
+def test_the_same_row_twice_is_one_motion_and_an_id_names_one_row(ready: Maker) -> None:
+    same = rows(1)[0]
+    found = [same, same, same | {"id": "a"}, rows(2)[1] | {"id": "a"}]
+    assert make(ready, found).counts == {"made": 2, "repeated": 1, "failed": 1}
+    states = [(one.state, one.why) for one in results()]
+    assert states[1] == ("repeated", "row 0 of the job is the same")
+    assert states[3] == ("failed", "row 2 has this id")
+    assert len(list((OUT / "shard-000000").iterdir())) == 2
+
+
+def test_a_filter_drops_what_does_not_pass_and_says_what_it_measured(ready: Maker) -> None:
+    make(ready, rows(6))
+    travel = sorted(one.about["travel"] for one in results())
+    OUT.rename("all")
+    condition = f"travel > {travel[2]}"
+    assert make(ready, rows(6), replace(ready.options, filter=condition)).counts == {"made": 3, "dropped": 3}
+    for one in results():
+        assert (one.about["travel"] > travel[2]) == (one.state == "made") == (one.motion is not None)
+    assert make(ready, rows(6), replace(ready.options, filter=condition)).made == 0
+
+
+def test_a_full_disk_leaves_the_folder_as_it_was(ready: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
+    make(ready, rows(3))
+    before = everything()
+    add = shard_module.writer
+
+    def full(kind: str, path: Path) -> Any:
+        made = add(kind, path)
+        monkeypatch.setattr(made, "add", lambda *_: (_ for _ in ()).throw(OSError(errno.ENOSPC, "No space left")))
+        return made
+
+    with monkeypatch.context() as patch:
+        patch.setattr(shard_module, "writer", full)
+        with pytest.raises(MotionloomError, match=r"cannot write to out: No space left"):
+            make(ready, rows(5))
+    del before["manifest.json"]  # it says five rows now
+    after = everything()
+    del after["manifest.json"]
+    assert after == before
+    assert make(ready, rows(5)).made == 2
+
+
+@pytest.mark.parametrize("damage", ["cut", "gone", "no record", "no head"])
+@pytest.mark.parametrize("kind", ["npz", "webdataset"])
+def test_a_damaged_shard_is_made_anew(ready: Maker, kind: str, damage: str) -> None:
+    asked = replace(ready.options, format=kind)
+    make(ready, rows(3), asked)
+    before = everything()
+    data = Store(OUT, kind).data(0)
+    file = data if data.is_file() else next(data.iterdir())
+    if damage == "cut":
+        file.write_bytes(file.read_bytes()[:-10])
+    elif damage == "gone":
+        file.unlink()
+    else:
+        record = OUT / "records/000000.jsonl"
+        record.unlink() if damage == "no record" else record.write_text("{}\n")
+    assert make(ready, rows(3), asked).made == 3
+    assert everything() == before
+
+
+def test_goals_timelines_and_skeletons_are_made_and_measured(ready: Maker, folder: Path) -> None:
+    (folder / "a.yaml").write_text(TIMELINE)
+    goal = {"path": {"points": [[0, 0], [0, 0.5]]}}
+    (folder / "goal.json").write_text(json.dumps(goal))
+    taller = load(_someone_taller(folder))
+    found = [
+        {"prompt": "a person walks", "seconds": 1, "goal": "goal.json"},
+        {"prompt": "a person walks", "seconds": 1, "seed": 1, "goal": goal},
+        {"timeline": "a.yaml", "seed": 4},
+        {"prompt": "a person walks", "seconds": 1, "skeleton": "rig.npz"},
+    ]
+    report = make(ready, found)
+    assert report.counts == {"made": 4}
+    control, _, long, rig = results()
+    assert control.about["error"] is not None
+    assert (long.about["frames"], long.about["text"], long.about["error"]) == (
+        40,
+        "a person walks; a person sits",
+        None,
+    )
+    assert rig.motion is not None
+    assert np.allclose(rig.motion.skeleton.offsets, taller.skeleton.offsets)
+    (folder / "goal.json").write_text(json.dumps({"path": {"points": [[0, 0], [0, 0.4]]}}))
+    assert make(ready, found).made == 1  # only that of the goal that changed
+
+
+def _someone_taller(folder: Path) -> Path:
+    from motionloom.io import save
+    from motionloom.motion import Motion
+    from motionloom.skeleton import SMPL22
+
+    skeleton = replace(SMPL22, offsets=1.2 * SMPL22.offsets)
+    return save(Motion(skeleton, 20.0, np.zeros((2, 3)), np.tile([1.0, 0, 0, 0], (2, 22, 1))), folder / "rig.npz")
+
+
+def test_single_motions_are_those_of_the_single_commands(ready: Maker, folder: Path) -> None:
+    """The same as `generate`, `control` and `compose` of the same seeds make."""
+    from motionloom import Segment, compose, control, generate
+    from motionloom.goals.goal_file import read_goal
+    from motionloom.io.stream import joined
+
+    goal = {"path": {"points": [[0, 0], [0, 0.5]]}}
+    (folder / "a.yaml").write_text(TIMELINE)
+    found = [
+        {"prompt": "a person walks", "seconds": 1, "seed": 3},
+        {"prompt": "a person walks", "seconds": 1, "seed": 3, "goal": goal},
+        {"timeline": "a.yaml", "seed": 3},
+    ]
+    make(ready, found)
+    prior, read = ready.prior, read_goal(goal, frames=20, folder=folder)
+    segments = [Segment("a person walks", 1.0, transition=0.5), Segment("a person sits", 1.0, transition=0.5)]
+    single = [
+        generate(prior, "a person walks", seconds=1.0, seed=3, steps=2)[0],
+        control(prior, "a person walks", read, seed=3, steps=2)[0].motion,
+        joined(list(compose(prior, segments, seed=3, steps=2))),
+    ]
+    for one, motion in zip(results(), single, strict=True):
+        assert one.motion is not None
+        assert np.abs(one.motion.positions() - motion.positions()).max() < 2e-5
+
+
+@pytest.mark.parametrize(
+    "change", [{"steps": 3}, {"guidance": 1.0}, {"format": "bvh"}, {"filter": "skate < 1"}, {"seed": 1}]
+)
+def test_a_folder_of_other_settings_is_refused(ready: Maker, change: dict[str, Any]) -> None:
+    make(ready, rows(2))
+    with pytest.raises(MotionloomError, match="other settings"):
+        make(ready, rows(2), replace(ready.options, **change))
+
+
+def test_a_folder_of_something_else_is_refused(ready: Maker) -> None:
+    OUT.mkdir()
+    (OUT / "holiday.jpg").write_text("a picture")
+    with pytest.raises(MotionloomError, match=r"holds other files"):
+        make(ready, rows(2))
+    (OUT / "manifest.json").write_text('{"kind": "train"}')
+    with pytest.raises(MotionloomError, match="does not describe a batch"):
+        make(ready, rows(2))

@@ -1,0 +1,100 @@
+"""batch, as somebody types it, on a tiny prior with random weights."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from motionloom.cli import main
+from tests.bulk.rows import rows, written
+from tests.cli.said import complaint
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Each test runs in an empty folder of its own, with a job of four rows in it."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT"):
+        monkeypatch.delenv(name, raising=False)
+    written(tmp_path / "jobs.jsonl", rows(4))
+    (tmp_path / "prompts.txt").write_text("a person walks\na person turns\n")
+    return tmp_path
+
+
+def command(weights: str, *words: str) -> int:
+    return main(["batch", *words, "--out", "out", "--weights", weights, "--steps", "2", "--workers", "1"])
+
+
+def test_variants_of_prompts_are_made_once(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("--prompts", "prompts.txt", "--variants", "2", "--seconds", "0.5", "--json")
+    assert command(weights, *words) == 0
+    assert json.loads(capsys.readouterr().out) == {"folder": "out", "tried": 4, "made": 4}
+    made = sorted(path.name for path in Path("out").rglob("*.npz"))
+    assert len(made) == 4
+    assert command(weights, *words) == 0
+    assert json.loads(capsys.readouterr().out) == {"folder": "out", "tried": 0, "made": 4}
+    assert sorted(path.name for path in Path("out").rglob("*.npz")) == made
+
+
+def test_failed_rows_are_told_and_the_exit_code_says_so(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+    written(Path("jobs.jsonl"), [*rows(2), {"prompt": "a", "seconds": 99}])
+    assert command(weights, "jobs.jsonl", "--filter", "travel < 0") == 1
+    said = capsys.readouterr()
+    assert said.err == "motionloom: row 2: a motion of 99 seconds cannot be made; ask for more than 0 and at most 60\n"
+    assert "2 were dropped by the filter, 1 failed" in said.out
+
+
+def test_a_dry_run_says_how_much_and_writes_nothing(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command(weights, "jobs.jsonl", "--dry-run", "--json", "--filter", "travel >= 0") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["rows"], found["sampled"], found["usable"], found["workers"]) == (4, 4, 1.0, 1)
+    assert found["hours"] == pytest.approx(4 * found["seconds_each"] / 3600)
+    assert 3e-6 < found["gigabytes"] < 1e-3  # some ten kB each
+    assert not Path("out").exists()
+    assert command(weights, "jobs.jsonl", "--dry-run", "--shard", "0/4") == 0
+    assert capsys.readouterr().out.startswith("4 motions: ")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        [], ["jobs.jsonl", "--prompts", "prompts.txt"], ["absent.jsonl"], ["prompts.txt"], ["--prompts", "absent.txt"],
+        ["jobs.jsonl", "--variants", "2"], ["--prompts", "prompts.txt", "--variants", "0"],
+        ["jobs.jsonl", "--filter", "speedy < 2"], ["jobs.jsonl", "--filter", "open('x')"],
+        ["jobs.jsonl", "--shard", "2/2"],
+        ["jobs.jsonl", "--shard", "x"], ["jobs.jsonl", "--shard", "0/2", "--ray"], ["jobs.jsonl", "--workers", "0"],
+        ["jobs.jsonl", "--seed", "-1"], ["jobs.jsonl", "--bf16"], ["jobs.jsonl", "--fps", "0"],
+        ["jobs.jsonl", "--skeleton", "absent.bvh"], ["jobs.jsonl", "--weights", "absent"],
+    ],
+    ids=lambda words: " ".join(words) or "nothing",
+)  # fmt: skip
+def test_mistakes_are_one_sentence_and_nothing_is_written(
+    weights: str, words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = ["batch", "--out", "out", *([] if "--weights" in words else ["--weights", weights]), *words]
+    assert main(line) == 2
+    complaint(capsys)
+    assert not Path("out").exists()
+
+
+def test_a_column_that_is_none_is_told_before_the_work(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+    written(Path("jobs.jsonl"), [{"prompt": "a", "sead": 3}])
+    assert command(weights, "jobs.jsonl") == 2
+    assert "unknown column 'sead'" in complaint(capsys)
+    assert not Path("out").exists()
+
+
+def test_parquet_without_pyarrow_says_what_to_install(
+    weights: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
+    assert command(weights, "jobs.jsonl", "--format", "parquet") == 2
+    assert "pip install 'motionloom[parquet]'" in complaint(capsys)
+
+
+def test_ray_that_is_not_installed_says_what_to_install(
+    weights: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "ray", None)
+    assert command(weights, "jobs.jsonl", "--ray") == 2
+    assert "pip install 'motionloom[ray]'" in complaint(capsys)
