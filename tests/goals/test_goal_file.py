@@ -141,7 +141,8 @@ def test_following_takes_the_places_of_the_other_world(read) -> None:
     goal = read(follow={"from": "walk.bvh", "joints": ["left_wrist"], "from_time": 0.5})
     assert goal.joints == ("left_wrist",)
     assert goal.asked[:, WRIST].all(-1).sum() == 30  # the clip has 40 frames at 20 a second
-    assert goal.positions[10, WRIST] == pytest.approx(clip[40, WRIST], abs=1e-3)
+    # the file does not say where the floor is: it is found anew, a millimetre off
+    assert goal.positions[10, WRIST] == pytest.approx(clip[40, WRIST], abs=2e-3)
     assert (goal.start.x, goal.start.z, goal.start.facing) == pytest.approx((2.5, 1, np.pi / 2), abs=2e-3)
     sparse = read(follow=[{"from": "walk.bvh", "joints": ["hands"], "times": [0, 1.5]}], start={"position": [2, 1]})
     assert sparse.asked[:, WRIST].any(-1).nonzero()[0].tolist() == [0, 30]

@@ -189,7 +189,7 @@ REFUSED = [
 def test_what_is_wrong_is_told_with_its_line(read, tmp_path, monkeypatch, text, line, message, loader):
     """By the quick parser and by the one that is there without a compiler."""
     if loader == "Python":
-        monkeypatch.setattr(lined_yaml, "_LOADER", yaml.SafeLoader)
+        monkeypatch.setattr(lined_yaml, "_loader", lambda: yaml.SafeLoader)
     os.symlink(tmp_path.parent, tmp_path / "away")
     (tmp_path.parent / "clip.bvh").write_text("")
     if line is None:
@@ -258,13 +258,13 @@ ODD = st.sampled_from([*WORDS.split(), "\n", "\n\n", "\n  ", "\t", "\u2028", "\u
 )
 def test_any_bytes_are_a_timeline_or_one_sentence(read, data, quick):
     said = ""
-    lined_yaml._LOADER, before = yaml.CSafeLoader if quick else yaml.SafeLoader, lined_yaml._LOADER
+    before, lined_yaml._loader = lined_yaml._loader, lambda: yaml.CSafeLoader if quick else yaml.SafeLoader
     try:
         assert read(data).segments
     except MotionloomError as error:
         said = str(error)
     finally:
-        lined_yaml._LOADER = before
+        lined_yaml._loader = before
     assert "\n" not in said
     assert len(said) < 700
 

@@ -25,15 +25,15 @@ def main() -> int:
     lines: queue.Queue[str] = queue.Queue()
     threading.Thread(target=_listen, args=(lines,), daemon=True).start()
 
-    def say(**message: Any) -> None:
+    def say(message: dict[str, Any]) -> None:
         said.write(json.dumps(message) + "\n")
         said.flush()
 
-    warnings.showwarning = lambda message, *_: say(warning=" ".join(str(message).split()))  # type: ignore[assignment]
+    warnings.showwarning = lambda message, *_: say({"warning": " ".join(str(message).split())})  # type: ignore[assignment]
     try:
         _work(lines, say)
     except MotionloomError as error:
-        say(fatal=str(error))
+        say({"fatal": str(error)})
     return 0
 
 
@@ -52,12 +52,12 @@ def _work(lines: "queue.Queue[str]", say: Any) -> None:
     torch.set_num_threads(1)  # there is a process for each core
     batch = Batch.from_json(lines.get())
     maker = Maker(batch.options, folder=Path(batch.folder), weights=batch.weights)
-    say(ready=True)
+    say({"ready": True})
     while True:
         asked = json.loads(lines.get())
         task = Task(asked["shard"], asked["first"], [row.encode("latin-1") for row in asked["rows"]])
-        report = make_shard(task, batch, maker, lambda rows: say(moved=rows))
-        say(report=asdict(report))
+        report = make_shard(task, batch, maker, lambda rows: say({"moved": rows}))
+        say({"report": asdict(report)})
 
 
 if __name__ == "__main__":

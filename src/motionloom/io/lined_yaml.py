@@ -80,7 +80,7 @@ def read_lined(path: Path | str, *, max_bytes: int = 32_000_000) -> Lined:
     except UnicodeDecodeError as error:
         fail(path, data.count(b"\n", 0, error.start) + 1, "this is not UTF-8 text; save the file as UTF-8")
     try:
-        return _build(yaml.parse(data, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)), path)
+        return _build(yaml.parse(data, Loader=_loader()), path)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         fail(path, mark.line + 1 if mark else 1, f"this is not YAML: {' '.join(str(error.problem).split())[:200]}")
@@ -88,6 +88,12 @@ def read_lined(path: Path | str, *, max_bytes: int = 32_000_000) -> Lined:
         at = getattr(error, "position", 0)
         reason = " ".join(str(getattr(error, "reason", "it cannot be read")).split())
         fail(path, data.count(b"\n", 0, at if isinstance(at, int) else 0) + 1, f"this is not YAML: {reason[:200]}")
+
+
+def _loader() -> Any:
+    import yaml
+
+    return getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class _Open:
