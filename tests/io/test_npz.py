@@ -112,7 +112,7 @@ def test_a_shape_that_promises_more_than_is_there_is_refused_at_once(tmp_path):
     np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (10**12, 22, 4)})
     with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
         archive.writestr("rotations.npy", header.getvalue())
-    with pytest.raises(MotionloomError, match="the archive is damaged"):
+    with pytest.raises(MotionloomError, match="damaged"):
         io.load(tmp_path / "a.npz")
 
 

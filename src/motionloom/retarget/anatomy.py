@@ -127,7 +127,8 @@ def read_body(skeleton: Skeleton, override: Override | None = None) -> Body:
     axes = _rest_axes(rest)
     drivers = found.drivers(skeleton)
     if axes is not None:
-        stands = skeleton.on_floor and axes[1][1] > 0.9
+        # of the uniform person, whose legs differ by millimetres, it is measured, as when the weights were trained
+        stands = skeleton.on_floor and axes[1][1] > 0.9 and skeleton != SMPL22
         height = float(rest[list(TOES), 1].mean()) if stands else _toe_height(skeleton, found, rest, axes[1])
         return Body(skeleton, points, drivers, rest, _rest_frames(rest, axes), True, axes[1], height, tips)
     known = _is_bandai(skeleton)

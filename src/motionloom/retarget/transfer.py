@@ -81,7 +81,8 @@ def retarget(
         return replace(made, skeleton=target)
     pose = _read_pose(_y_up(motion, source), source)
     stance = read_stance(pose.places, motion.fps)
-    if source.on_floor:
+    characters = [b for b in (source, body) if b.on_floor and b.skeleton != SMPL22]
+    if source.on_floor and characters:  # a recording's skeleton knows no floor
         stance = stance.on_floor(source.toe_height, slack=0.08 * source.leg)
     goals = _scale(pose, stance, ratio=body.leg / source.leg, toe_height=body.toe_height)
     if source.broad or body.broad:
