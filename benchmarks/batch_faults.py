@@ -12,6 +12,7 @@ import argparse
 import json
 import os
 import random
+import secrets
 import signal
 import subprocess
 import sys
@@ -94,6 +95,7 @@ def main() -> None:
     parser.add_argument("--weights", default="default")
     parser.add_argument("--steps", type=int, default=24)
     arguments = parser.parse_args()
+    os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(16)  # this cluster's own
     dice, blows, drivers = random.Random(arguments.seed), Counter[str](), 1
     with tempfile.TemporaryDirectory(prefix="motionloom-") as name:
         folder = Path(name)
@@ -128,7 +130,7 @@ def main() -> None:
                 blows[kind] += 1
                 print(f"{time.strftime('%X')} {kind}", flush=True)
             code = driver.wait() if driver.poll() is None else driver.poll()
-            while code not in (0, 1):
+            while code not in (0, 1) and drivers < 2 * arguments.blows + 10:
                 code, drivers = subprocess.run(command, check=False).returncode, drivers + 1
             again = subprocess.run(command, capture_output=True, text=True, check=False)
         finally:

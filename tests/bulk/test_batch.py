@@ -147,7 +147,8 @@ def test_the_same_command_goes_on_where_a_driver_ended(
 ) -> None:
     out = folder / "out"
     first = start(weights, jobs, out, "--workers", "1", start_new_session=True)
-    wait_for(lambda: (out / "records/000000.jsonl").exists(), first)
+    begun = "manifest.json" if blow is signal.SIGINT else "records/000000.jsonl"
+    wait_for(lambda: (out / begun).exists(), first)
     first.send_signal(blow)
     _, said = first.communicate(timeout=60)
     assert first.returncode == (130 if blow is signal.SIGINT else -9)
