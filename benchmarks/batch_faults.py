@@ -95,7 +95,7 @@ def main() -> None:
     parser.add_argument("--weights", default="default")
     parser.add_argument("--steps", type=int, default=24)
     arguments = parser.parse_args()
-    os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(16)  # this cluster's own
+    os.environ |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(16)}  # this cluster's own
     dice, blows, drivers = random.Random(arguments.seed), Counter[str](), 1
     with tempfile.TemporaryDirectory(prefix="motionloom-") as name:
         folder = Path(name)
