@@ -1,7 +1,7 @@
 """Motions inside of a Ray Data pipeline: `map_batches` with a prior in each actor.
 
 Ray Data streams blocks through actors and keeps nothing of a job that died; `motionloom batch --ray` does that part.
-This is for pipelines that go on behind the motions: filter, tokenise, train. Needs the extras ray and parquet.
+This is for pipelines that go on behind the motions: filter, tokenise, train. Needs: pip install 'ray[data]'
 """
 
 import json
@@ -37,8 +37,8 @@ if __name__ == "__main__":
     try:
         import ray
     except ImportError:
-        sys.exit(print("this example needs Ray: pip install 'motionloom[ray,parquet]'"))
-    ray.init(log_to_driver=False, include_dashboard=False, runtime_env={"env_vars": {"OMP_NUM_THREADS": "1"}})
+        sys.exit(print("this example needs Ray Data: pip install 'ray[data]'"))
+    ray.init("local", log_to_driver=False, include_dashboard=False, runtime_env={"env_vars": {"OMP_NUM_THREADS": "1"}})
     prompts = ray.data.from_items([{"prompt": "a person walks", "seconds": 2.0, "seed": i} for i in range(8)])
     motions = prompts.map_batches(Motions, batch_size=8, concurrency=1)
     for row in motions.iter_rows():
