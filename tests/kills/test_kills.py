@@ -151,5 +151,11 @@ def test_training_goes_on_bit_for_bit(tmp_path: Path) -> None:
             assert seen.items() <= right.items()
         ended = run(words, folder)
         assert ended.code == 0, ended.said
-        assert (folder / "run" / "state.safetensors").read_bytes() == state
+        assert _content((folder / "run" / "state.safetensors").read_bytes()) == _content(state)
         assert parts(folder) == []
+
+
+def _content(state: bytes) -> tuple[dict, bytes]:
+    """The head of a safetensors file as values, since the order of its metadata is nobody's, and the numbers."""
+    size = int.from_bytes(state[:8], "little")
+    return json.loads(state[8 : 8 + size]), state[8 + size :]
