@@ -146,7 +146,7 @@ def test_the_same_command_goes_on_where_a_driver_ended(
     weights: str, jobs: Path, folder: Path, exact: dict[Any, Any], blow: signal.Signals
 ) -> None:
     out = folder / "out"
-    first = start(weights, jobs, out, "--workers", "1", start_new_session=True)
+    first = start(weights, jobs, out, "--workers", "1", start_new_session=True, preexec_fn=_not_deaf)
     begun = "manifest.json" if blow is signal.SIGINT else "records/000000.jsonl"
     wait_for(lambda: (out / begun).exists(), first)
     first.send_signal(blow)
