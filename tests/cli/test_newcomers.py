@@ -157,3 +157,9 @@ def test_the_roots_offset_is_zero_so_that_all_programs_agree() -> None:
     save_bvh(person(1.0, 30.0), "walk.bvh")
     first = Path("walk.bvh").read_text().split("OFFSET")[1].split("\n")[0]
     assert [float(number) for number in first.split()] == [0.0, 0.0, 0.0]
+
+
+def test_a_misspelt_other_name_of_an_option_suggests_the_option(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["generate", "a person walks", "--lenght", "3"])
+    assert "did you mean --seconds?" in capsys.readouterr().err

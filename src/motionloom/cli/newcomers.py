@@ -62,12 +62,13 @@ def option_names(parser: argparse.ArgumentParser) -> set[str]:
 def suggestion(parser: argparse.ArgumentParser, words: Sequence[str]) -> str:
     """``, did you mean ...`` for the first option that a command does not have, or nothing."""
     known = option_names(parser)
+    meant = {name: name for name in known} | {alias: name for alias, name in OPTIONS.items() if name in known}
     for word in words:
         name = word.partition("=")[0]
         if name in _SEVERAL and set(_SEVERAL[name]) & known:
             return f", did you mean {' or '.join(n for n in _SEVERAL[name] if n in known)}?"
-        if name.startswith("-") and (close := difflib.get_close_matches(name, sorted(known), n=1, cutoff=0.6)):
-            return f", did you mean {close[0]}?"
+        if name.startswith("-") and (close := difflib.get_close_matches(name, sorted(meant), n=1, cutoff=0.6)):
+            return f", did you mean {meant[close[0]]}?"
     return ""
 
 
