@@ -27,7 +27,6 @@ from motionloom.data.clips import SHORTEST, STATES, Clip, Note, read_clip, write
 from motionloom.data.derived import (
     LOOPED,
     SEATED,
-    at_origin,
     joined_clips,
     laid_down,
     lengthened,
@@ -35,6 +34,7 @@ from motionloom.data.derived import (
     mixed_clips,
 )
 from motionloom.data.made import hands_up
+from motionloom.data.person import uniform_person
 from motionloom.data.sources import Span, Take, find_takes
 from motionloom.data.windows import label_clip
 from motionloom.data.words import mirror_text
@@ -61,7 +61,7 @@ def clips_of(take: Take) -> Iterator[Clip]:
         yield from _with_mirror(_clip(take, np.asarray(read, dtype=np.float32), "plain"))
         return
     positions, fps = read
-    positions = at_origin(hml.uniform(hml.resample_positions(positions, fps)))
+    positions = uniform_person(positions, fps)
     if len(positions) <= SHORTEST:
         raise MotionloomError(f"only {len(positions) / FPS:.2f} s long; at least {SHORTEST / FPS:.0f} s are needed")
     clip = _clip(take, hml.encode(positions, heading="corrected"), "plain")

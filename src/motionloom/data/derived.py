@@ -9,6 +9,7 @@ from motionloom.data import augment
 from motionloom.data.actions import ACTIONS, PREFIX, Action, sentences, side_of
 from motionloom.data.clips import MADE, SHORTEST, THEN, Clip, Note
 from motionloom.data.made import GESTURES, hands_up, lower_arms, perform, words_for
+from motionloom.data.person import at_origin
 from motionloom.data.sources import Take
 from motionloom.data.words import sentence
 from motionloom.features import humanml as hml
@@ -20,11 +21,6 @@ LOOPED = 200
 POSTURES = ("sit down", "stand up", "sit down and stand up", "lie down", "get up", "kneel", "crouch", "bow", "fall")
 """Actions that end (and begin) in a posture which people keep, though many a recording is cut a moment before."""
 SEATED = ("sit down", "stand up", "sit down and stand up")
-
-
-def at_origin(positions: Array) -> Array:
-    """The published canonical start (origin, facing +Z), with the floor left where planted feet say it is."""
-    return hml.canonical(positions) + np.array([0.0, positions[..., 1].min(), 0.0])
 
 
 def lengthened(take: Take, clip: Clip, positions: Array) -> Iterator[Clip]:

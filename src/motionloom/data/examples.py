@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from motionloom.data import augment
-from motionloom.data.derived import at_origin
+from motionloom.data.person import uniform_person
 from motionloom.data.words import mirror_text
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
@@ -158,7 +158,7 @@ def uniform_positions(motion: Motion) -> Array:
     """Joints (frames, 22, 3) of the uniform person who does what ``motion`` does: at 20 per second, from the origin,
     facing +Z, the lowest point at y = 0."""
     person = to_smpl22(motion)
-    return at_origin(hml.uniform(hml.resample_positions(person.positions(), person.fps)))
+    return uniform_person(person.positions(), person.fps)
 
 
 def _example(motion: Motion, captioned: CaptionedClip) -> Example:
