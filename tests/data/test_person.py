@@ -72,6 +72,6 @@ def test_a_body_in_the_floor_is_raised_and_feet_do_not_count(walk: np.ndarray) -
 
 
 def test_the_uniform_person_starts_at_the_origin_at_20_per_second(walk: np.ndarray) -> None:
-    person = uniform_person(np.repeat(walk, 3, axis=0) + [3.0, 0.0, -2.0], 60.0)
+    person = uniform_person(np.repeat(walk, 3, axis=0) + np.array([3.0, 0.0, -2.0]), 60.0)
     assert len(person) == pytest.approx(len(walk), abs=1)
     assert person[0, 0, [0, 2]] == pytest.approx([0, 0], abs=1e-6)
