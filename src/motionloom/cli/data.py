@@ -22,6 +22,10 @@ def add(subparsers) -> None:
         help="clips of each kind made from others: arms of one on another's walk, two actions in a row, gestures "
         "(default 700)",
     )
+    build.add_argument(
+        "--exclude", action="append", default=[], metavar="NAME",
+        help="leave out the takes whose names begin so, and all that would be made of them; may be given again",
+    )  # fmt: skip
     build.set_defaults(run=_build)
 
 
@@ -31,5 +35,5 @@ def _build(arguments: argparse.Namespace) -> None:
 
     build(
         arguments.folders, arguments.out, captions=arguments.captions, workers=arguments.workers, mixed=arguments.mixed,
-        find=find_takes,
+        exclude=arguments.exclude, find=find_takes,
     )  # fmt: skip

@@ -186,17 +186,20 @@ def build(
     captions: Path | str | None = None,
     workers: int = 2,
     mixed: int = 700,
+    exclude: Sequence[str] = (),
     find: Finder = find_takes,
     progress: Callable[[str], None] = print,
 ) -> Path:
     """Build a training set from folders of recordings; returns ``set.json``. Takes already done are kept.
 
+    exclude: takes whose names begin with one of these are left out, and so is all that would be made of them.
     find: what finds the takes of a folder.
     """
     out = Path(out)
     if workers < 1 or mixed < 0:
         raise MotionloomError(f"at least 1 worker and 0 mixed clips are needed; got {workers} and {mixed}")
     jobs = list(_jobs(folders, captions, out, find=find, progress=progress))
+    jobs = _without(jobs, exclude)
     for part in ("clips", "done"):
         (out / part).mkdir(parents=True, exist_ok=True)
         sweep(out / part)
@@ -208,6 +211,18 @@ def build(
         if number % 100 == 0:
             progress(f"{number} of {len(left)} takes done")
     return _finish(out, mixed, progress)
+
+
+def _without(jobs: list[Job], exclude: Sequence[str]) -> list[Job]:
+    """The jobs whose takes' names begin with none of ``exclude``."""
+    for prefix in exclude:
+        left_out = [job for job in jobs if prefix and job[2].startswith(prefix)]
+        if not left_out:
+            raise MotionloomError(f"no take's name begins with {prefix!r}, which was to be left out; see the manifests")
+        for _, _, name, out, _ in left_out:
+            if (Path(out) / "done" / name).exists():
+                raise MotionloomError(f"{out} already holds {name}, which is to be left out; build into another folder")
+    return [job for job in jobs if not job[2].startswith(tuple(exclude))]
 
 
 def _jobs(
