@@ -12,7 +12,9 @@ from motionloom.errors import MotionloomError
 from motionloom.nets.prior import Bound, Condition, NetConfig, PriorNet, condition
 from tests.nets import tiny
 
-BOTH = pytest.mark.parametrize("config", [tiny.MODULATED, tiny.PUBLISHED], ids=["modulated", "published"])
+BOTH = pytest.mark.parametrize(
+    "config", [tiny.MODULATED, tiny.CLOCKED, tiny.PUBLISHED], ids=["modulated", "clocked", "published"]
+)
 CLOSE = {"rtol": 0, "atol": 2e-5}
 
 
@@ -66,6 +68,23 @@ def test_rows_are_independent(config: NetConfig) -> None:
         one = Condition(*(part[row : row + 1] for part in cond))
         alone = run(net, x[row : row + 1], one, levels[row : row + 1])
         torch.testing.assert_close(together[row, :length], alone[0, :length], **CLOSE)
+
+
+def test_a_clock_tells_time_and_text_without_the_noise() -> None:
+    """New, it changes nothing; with weights, what it adds differs by token and by text, and not by the state."""
+    plain = tiny.net(tiny.MODULATED)
+    fresh = PriorNet(tiny.CLOCKED).eval()
+    missing = fresh.load_state_dict(plain.state_dict(), strict=False).missing_keys
+    assert {key.split(".")[0] for key in missing} == {"place", "clock"}
+    x, cond = noise(2, 12), said(2)
+    assert torch.equal(run(fresh, x, cond), run(plain, x, cond))
+    net = tiny.net(tiny.CLOCKED)
+    with torch.inference_mode():
+        added, other = (net.enter(state, 7, net.bind(cond)).clock for state in (x, noise(2, 12, seed=3)))
+    assert torch.equal(added, other)
+    assert added.shape == (2, 3, 64)
+    assert (added[0] - added[1]).abs().max() > 1e-3
+    assert (added[:, 0] - added[:, 2]).abs().max() > 1e-3
 
 
 @BOTH

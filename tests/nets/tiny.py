@@ -1,5 +1,7 @@
 """Priors small enough for tests: random weights, an embedded text encoder one can read."""
 
+from dataclasses import replace
+
 import torch
 
 from motionloom.diffusion import cosine
@@ -10,6 +12,7 @@ from motionloom.weights.prior import Card, Prior
 from tests.nets.text import tiny
 
 MODULATED = NetConfig(manner="modulated", width=32, layers=2, heads=2, hidden=48, text=tiny.WIDTH, patch=4, dropout=0.0)
+CLOCKED = replace(MODULATED, clock=True)
 PUBLISHED = NetConfig(width=32, layers=2, heads=4, hidden=48, text=tiny.WIDTH, dropout=0.0)
 
 

@@ -5,7 +5,7 @@ import torch
 
 from motionloom.features import humanml as hml
 from motionloom.features.layout import FEET, LAYOUT, ric
-from motionloom.train.objectives import PLANTED, displacement_error
+from motionloom.train.objectives import PLANTED, WEIGHTS, displacement_error, feature_scale
 from tests.kinematics.people import walking
 
 MEAN, STD = torch.full((263,), 0.1), torch.full((263,), 0.5)
@@ -57,3 +57,15 @@ def test_padding_is_not_looked_at() -> None:
     rubbish = moved(x, slice(0, 263), 3.0, slice(30, None))
     assert displacement_error(rubbish, x, torch.tensor([30]), MEAN, STD) < 1e-8
     assert displacement_error(rubbish, x, torch.tensor([31]), MEAN, STD) > 0.1
+
+
+def test_heights_count_more_and_nothing_else_does() -> None:
+    """The root's height and every joint's second number, relative to the rest; the mean stays 1."""
+    plain, raised = feature_scale(), feature_scale(WEIGHTS, 3.0)
+    ratio = (raised / plain) / (raised / plain)[LAYOUT["rot6d"]][0]
+    wanted = torch.ones(263)
+    wanted[LAYOUT["root_height"]] = 3.0
+    for joint in range(1, 22):
+        wanted[ric(joint).start + 1] = 3.0
+    torch.testing.assert_close(ratio, wanted)
+    torch.testing.assert_close(raised.mean(), torch.tensor(1.0))

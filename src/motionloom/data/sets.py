@@ -19,7 +19,7 @@ from motionloom.io.text import parse_json, read_utf8
 
 WORDINGS = 48
 """Sentences made per measured label."""
-SHARE = {"action": 0.62, "human": 0.1, "index": 0.03, "label": 0.25}
+SHARE = {"action": 0.68, "human": 0.08, "index": 0.02, "label": 0.22}
 """How often a training sample shows a named action, a written caption, an index description, a measured label."""
 WEIGHT = {"capture": 1.0, "made": 0.7, "keyed": 0.4}
 """How often a stretch is drawn among those of its action: animated by hand it teaches what, not how."""
@@ -31,8 +31,9 @@ FAVOUR: dict[str, float] = {
     **{
         f"action:{name}": weight
         for weight, names in {
-            4.0: ("sit down", "stand up", "lie down", "get up", "kneel", "bow", "pick up", "stop running"),
-            3.0: ("crouch", "sit down and stand up", "stop walking", "walk turn around", "throw", "crawl", "then"),
+            8.0: ("sit down", "stand up", "lie down", "get up"),
+            6.0: ("kneel", "bow", "pick up", "stop running", "crouch"),
+            4.0: ("sit down and stand up", "stop walking", "walk turn around", "throw", "crawl", "then"),
             2.0: (
                 "squat",
                 "lunge",

@@ -42,6 +42,8 @@ class NetConfig:
     """Frames per token."""
     flags: bool = False
     """Published only: a 2 x 4 table for per-frame transition flags, appended to the features (BABEL, DoubleTake)."""
+    clock: bool = False
+    """Modulated only: every token's time and the text shift every block, beside the noise (`PriorNet.enter`)."""
     dropout: float = 0.1
 
     def __post_init__(self) -> None:
@@ -53,6 +55,7 @@ class NetConfig:
             or self.layers > 256
             or self.width % self.heads
             or not isinstance(self.flags, bool)
+            or not isinstance(self.clock, bool)
         ):
             raise MotionloomError(f"the network's sizes are not usable: {asdict(self)}")
         if (self.width // self.heads) % 2 or not 0 <= self.dropout < 1:
@@ -142,6 +145,8 @@ class Inner(NamedTuple):
     """Modulated: (rows, 6, width) for every block; else (rows, 0)."""
     last: Tensor
     """Modulated: (rows, 1, 2 * width) behind them; else (rows, 0)."""
+    clock: Tensor
+    """With a clock: (rows, tokens, 2 * width), added to the two shifts of every block; else (rows, 0)."""
 
 
 def sinusoids(positions: Tensor, width: int) -> Tensor:
@@ -201,13 +206,13 @@ class ModulatedBlock(nn.Module):
         self.table = nn.Parameter(torch.zeros(6, width))
         self.drop = nn.Dropout(config.dropout)
 
-    def forward(
-        self, x: Tensor, mask: Tensor | None, change: Tensor, *, keys: Tensor, values: Tensor, words: Tensor
-    ) -> Tensor:
+    def forward(self, x: Tensor, inner: Inner, *, keys: Tensor, values: Tensor, words: Tensor) -> Tensor:
         rows, tokens, width = x.shape
-        shift1, scale1, gate1, shift2, scale2, gate2 = (change + self.table).unsqueeze(2).unbind(1)
+        shift1, scale1, gate1, shift2, scale2, gate2 = (inner.change + self.table).unsqueeze(2).unbind(1)
+        if inner.clock.shape[1]:
+            shift1, shift2 = shift1 + inner.clock[..., :width], shift2 + inner.clock[..., width:]
         y = F.layer_norm(x, (width,)) * (1 + scale1) + shift1
-        x = x + (1 + gate1) * self.drop(self.attention(y, mask))
+        x = x + (1 + gate1) * self.drop(self.attention(y, inner.mask))
         q = self.query(self.norm(x)).view(rows, tokens, self.heads, -1).transpose(1, 2)
         y = F.scaled_dot_product_attention(q, keys, values, attn_mask=words)
         x = x + self.heard(y.transpose(1, 2).reshape(rows, tokens, width))
@@ -234,7 +239,11 @@ class PriorNet(nn.Module):
             self.words = nn.Linear(config.text, 2 * width * config.layers)
             self.change = nn.Linear(width, 6 * width)
             self.last = nn.Linear(width, 2 * width)
-            for layer in (self.change, self.last):
+            zeroed = [self.change, self.last]
+            if config.clock:
+                self.place, self.clock = nn.Linear(width, width), nn.Linear(width, 2 * width)
+                zeroed.append(self.clock)
+            for layer in zeroed:
                 nn.init.zeros_(layer.weight)
                 nn.init.zeros_(layer.bias)
         else:
@@ -280,8 +289,11 @@ class PriorNet(nn.Module):
         else:
             tokens = torch.cat([both[:, None], tokens], dim=1)
         places = torch.arange(tokens.shape[1], device=x.device) * self.config.patch
-        tokens = self.drop(tokens + sinusoids(places, self.config.width).to(tokens.dtype))
-        return Inner(tokens, both, self._mask(valid), change, last)
+        times = sinusoids(places, self.config.width).to(tokens.dtype)
+        clock = x.new_zeros(rows, 0)
+        if self.modulated and self.config.clock:  # what a text asks for at a time, on a way that carries no noise
+            clock = self.clock(F.silu(both[:, None] + self.place(times)))
+        return Inner(self.drop(tokens + times), both, self._mask(valid), change, last, clock)
 
     def through(self, inner: Inner, bound: Bound, layers: slice = slice(None)) -> Inner:
         """Through some of the blocks."""
@@ -289,7 +301,7 @@ class PriorNet(nn.Module):
         for i in range(*layers.indices(len(self.blocks))):
             if self.modulated:
                 words = {"keys": bound.keys[:, i], "values": bound.values[:, i], "words": bound.words}
-                x = self.blocks[i](x, inner.mask, inner.change, **words)
+                x = self.blocks[i](x, inner, **words)
             else:
                 x = self.blocks[i](x, inner.mask)
         return inner._replace(x=x)

@@ -93,15 +93,13 @@ class CleanGuess:
 
     def __init__(
         self, net: nn.Module, schedule: Schedule, batches: Batches, words: WordBank, *, drop_text: float = 0.1,
-        weights: dict[str, float] = WEIGHTS, displacement: float = 0.0, early: float = 0.0, device: str = "cpu",
+        weights: dict[str, float] = WEIGHTS, displacement: float = 0.0, early: float = 0.0, heights: float = 1.0,
+        device: str = "cpu",
     ) -> None:  # fmt: skip
         self.net, self.schedule, self.batches, self.words = net, schedule, batches, words
         self.drop_text, self.displacement, self.early_share, self.device = drop_text, displacement, early, device
         self.mean, self.std = batches.data.mean.to(device), batches.data.std.to(device)
-        scale = torch.ones(len(self.mean))
-        for name, block in LAYOUT.items():
-            scale[block] = weights[name]
-        self.scale = (scale / scale.mean()).to(device)
+        self.scale = feature_scale(weights, heights).to(device)
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `Objective.loss`."""
@@ -135,6 +133,16 @@ class CleanGuess:
             moved = displacement_error(guess, drawn.clean, drawn.cond.lengths, self.mean, self.std)
             error = error + self.displacement * moved
         return error
+
+
+def feature_scale(weights: dict[str, float] = WEIGHTS, heights: float = 1.0) -> Tensor:
+    """(263,) how much each feature's error counts, 1 on average; ``heights``: how much more that of a height does."""
+    scale = torch.ones(max(block.stop for block in LAYOUT.values()))
+    for name, block in LAYOUT.items():
+        scale[block] = weights[name]
+    scale[LAYOUT["root_height"]] *= heights
+    scale[LAYOUT["ric"]][1::3] *= heights
+    return scale / scale.mean()
 
 
 class Conditioned(nn.Module):

@@ -57,7 +57,8 @@ def train_prior(
     words = WordBank(text, motions.texts, progress=say if world.rank == 0 else lambda line: None)
     objective = CleanGuess(
         net, schedule, batches, words,
-        drop_text=recipe.drop_text, displacement=recipe.displacement, early=recipe.early, device=world.device,
+        drop_text=recipe.drop_text, displacement=recipe.displacement, early=recipe.early,
+        heights=recipe.heights, device=world.device,
     )  # fmt: skip
     say(f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(motions.items):,} described stretches, "
         f"{len(motions.texts):,} sentences, {motions.minutes:.0f} minutes recorded")  # fmt: skip

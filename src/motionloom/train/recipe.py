@@ -56,6 +56,8 @@ class Recipe:
     """Weight of `objectives.displacement_error` in the loss; 0: the published loss alone."""
     early: float = 0.0
     """Share of the samples whose noise level is drawn as the sampler's spacing ``early`` goes; the rest evenly."""
+    heights: float = 1.0
+    """How much more the heights of the joints and of the root count in the loss: sitting down, lying, getting up."""
     drop_text: float = 0.1
     """Share of samples trained without their text."""
     schedule: str = "cosine"
@@ -160,6 +162,7 @@ def _in_range(recipe: Recipe) -> Iterator[bool]:
     yield 0 <= recipe.ema < 1
     yield 0 <= recipe.drop_text < 1
     yield 0 <= recipe.early <= 1
+    yield 0 < recipe.heights <= 100
     yield 0 <= recipe.cooldown <= 1
     yield 0 <= recipe.warmup <= 10**9
     yield recipe.clip <= 1e6
