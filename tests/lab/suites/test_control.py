@@ -17,6 +17,7 @@ from motionloom.lab.report import report
 from motionloom.lab.suites import control, control_kinds
 from motionloom.lab.suites.control_kinds import Kind, Wish, kind
 from motionloom.lab.suites.control_methods import BASE, EXPORTED, METHODS, OURS, UNCONTROLLED, Made, groups, of_motion
+from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.items import Item
 from motionloom.lab.suites.parts import Parts
 from motionloom.lab.suites.protocol import Selection
@@ -308,12 +309,12 @@ def test_a_kind_twice_is_refused() -> None:
 
 def test_without_a_set_it_says_what_is_missing() -> None:
     with pytest.raises(MotionloomError, match="name a set with --data"):
-        control.run(data=None)
+        control.run(Run())
 
 
 def test_an_unknown_way_is_refused() -> None:
     with pytest.raises(MotionloomError, match="the ways of control are"):
-        control.run(data=None, methods=["magic"])
+        control.run(Run(), methods=["magic"])
 
 
 def test_the_report_is_kept_as_data_and_told_as_tables() -> None:

@@ -20,6 +20,7 @@ from motionloom.lab.suites import duet_ways as ways
 from motionloom.lab.suites.duet import COLUMNS, ERRORS, LOOKS, How
 from motionloom.lab.suites.duet_blocks import Beside
 from motionloom.lab.suites.duet_ways import FRAMES, Crops
+from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.needs import NoData, pairs_of
 from motionloom.nets.pair import Talk, fitting
 from motionloom.nets.prior import condition
@@ -235,13 +236,13 @@ def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
         return perfect(crops, sample)
 
     how = How(crops=20, samples=1)
-    first = duet.measure(crops, {"ours": counted}, how, kinds=("ours",), folder=tmp_path)
+    first = duet.measure(crops, {"ours": counted}, how, kinds=("ours",), run=Run(folder=tmp_path))
     assert calls == [tuple(range(16)), (16, 17, 18, 19)]
-    assert duet.measure(crops, {"ours": counted}, how, kinds=("ours",), folder=tmp_path) == first
+    assert duet.measure(crops, {"ours": counted}, how, kinds=("ours",), run=Run(folder=tmp_path)) == first
     assert len(calls) == 2
     assert first.rows[0].values["root_1"].count == 20
     with pytest.raises(MotionloomError, match="other settings"):
-        duet.measure(crops, {"ours": counted}, replace(how, seed=1), kinds=("ours",), folder=tmp_path)
+        duet.measure(crops, {"ours": counted}, replace(how, seed=1), kinds=("ours",), run=Run(folder=tmp_path))
 
 
 def test_wishes_that_cannot_be_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -263,7 +264,7 @@ def test_wishes_that_cannot_be_are_told(tmp_path: Path, monkeypatch: pytest.Monk
         pairs_of(tmp_path)
     assert not isinstance(told.value, NoData)
     with pytest.raises(MotionloomError, match="the rows are"):
-        duet.run(data=tmp_path, kinds=("best",))
+        duet.run(Run(data=tmp_path), kinds=("best",))
 
 
 def test_a_transformer_from_its_file_is_a_row(tmp_path: Path) -> None:
@@ -327,7 +328,7 @@ def test_a_block_beside_has_one_sample_and_a_new_one_leaves_what_is_done(tmp_pat
         for name, digest, off in [("b", "1", 0.1), ("b", "1", 0.1), ("b", "2", 0.3)]
     )
     ours = {"ours": counted("ours", 0.0)}
-    made = duet.measure(crops, ours, how, kinds=kinds, beside=[first], folder=tmp_path)
+    made = duet.measure(crops, ours, how, kinds=kinds, beside=[first], run=Run(folder=tmp_path))
     here = [row for row in made.rows if not row.measured_on]
     assert [row.name for row in here] == ["ours, one sample", "ours, mean of 2 samples", "b: 1 layer"]
     assert here[2].values["root_2"].mean == pytest.approx(0.1)
@@ -336,9 +337,9 @@ def test_a_block_beside_has_one_sample_and_a_new_one_leaves_what_is_done(tmp_pat
     )
     assert made.protocol["blocks beside"] == {"b: 1 layer": "1"}
     assert calls == ["ours", "ours", "1"]
-    assert duet.measure(crops, ours, how, kinds=kinds, beside=[again], folder=tmp_path) == made
+    assert duet.measure(crops, ours, how, kinds=kinds, beside=[again], run=Run(folder=tmp_path)) == made
     assert len(calls) == 3
-    other = duet.measure(crops, ours, how, kinds=kinds, beside=[second], folder=tmp_path)
+    other = duet.measure(crops, ours, how, kinds=kinds, beside=[second], run=Run(folder=tmp_path))
     assert calls[3:] == ["2"]
     assert other.rows[2].values["root_2"].mean == pytest.approx(0.3)
 

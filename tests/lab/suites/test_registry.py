@@ -82,7 +82,7 @@ def test_a_kill_between_report_and_mark_is_measured_again(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr("motionloom.lab.suites.everything.obey.write_json", killed)
+        patched.setattr("motionloom.lab.suites.everything.files.write_json", killed)
         with pytest.raises(KeyboardInterrupt):
             run_all(replace(job, quick=True), tmp_path / "out", [one.suite()], again=True)
     (outcome,) = run_all(job, tmp_path / "out", [one.suite()])
