@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.blending import smoothstep
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
@@ -247,7 +248,7 @@ def two_bones(
     by_bend = np.sqrt((first**2 + second**2 + 2 * first * second * bend).clip(0))
     wanted = seen[:, 2] - start
     distance = np.linalg.norm(wanted, axis=-1)
-    near = _smoothstep(distance / (first + second), *_NEARLY_STRAIGHT)
+    near = _between(distance / (first + second), _NEARLY_STRAIGHT)
     return reach(start, start + _unit(wanted) * (distance + near * (by_bend - distance))[:, None], seen, axis, lengths)
 
 
@@ -303,7 +304,7 @@ def hinge_axes(seen: np.ndarray, world: np.ndarray, fps: float) -> Array:
 
     bend = plane(np.cross(upper, lower))
     usual = plane(_usual_axes(seen, upper, lower, local))
-    strength = _smoothstep(np.abs(bend), *_BENT)
+    strength = _between(np.abs(bend), _BENT)
     angle = _smooth_angles(bend, strength, usual, _STIFFNESS * (fps / 20) ** 2)
     axes = np.cos(angle)[..., None] * first + np.sin(angle)[..., None] * second
     return rot.rotate(world[:, bases], axes).swapaxes(0, 1)
@@ -389,6 +390,7 @@ def _perpendicular(v: np.ndarray, to: np.ndarray) -> Array:
     return _unit(np.where(np.linalg.norm(part, axis=-1, keepdims=True) > 1e-9, part, other))
 
 
-def _smoothstep(x: np.ndarray, low: float, high: float) -> Array:
-    u = np.clip((x - low) / (high - low), 0, 1)
-    return u * u * (3 - 2 * u)
+def _between(x: np.ndarray, ends: tuple[float, float]) -> Array:
+    """0 below, 1 above, smooth between."""
+    low, high = ends
+    return smoothstep((x - low) / (high - low))

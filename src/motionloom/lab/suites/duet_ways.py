@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from motionloom.diffusion import row_seed
 from motionloom.features import pair as two
-from motionloom.goals.goal import Placement
+from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics.pair import PREFIX
 from motionloom.lab.metrics.prediction import constant_velocity, zero_velocity
@@ -117,7 +117,7 @@ def drawn(
             for one in known
         ]
         people = [torch.from_numpy(person) for one in known for person in one.features]
-        leaving = [Past(person.float(), Placement()).holder(prior, FRAMES) for person in people]
+        leaving = [Past(person.float(), GroundPose()).holder(prior, FRAMES) for person in people]
         features, _ = make(
             prior, net, [prompt] * len(people), FRAMES,
             seeds=[s for number in crops.numbers for s in person_seeds(row_seed(seed, sample), number)],
