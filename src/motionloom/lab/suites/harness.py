@@ -12,8 +12,8 @@ import numpy as np
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.kinematics.physics import Array
-from motionloom.lab.evaluator import own
-from motionloom.lab.evaluator.evaluators import Evaluator, load_evaluator
+from motionloom.lab.evaluator import evaluators, own
+from motionloom.lab.evaluator.evaluators import Evaluator
 from motionloom.lab.metrics import retrieval
 from motionloom.lab.report.report import Column, Row, Value
 from motionloom.lab.suites.parts import Parts, fingerprint
@@ -58,7 +58,7 @@ class Run:
 
     def judge(self) -> Evaluator:
         """The evaluator; MotionloomError for a file that is none."""
-        return load_evaluator(self.evaluator)
+        return evaluators.load_evaluator(self.evaluator)
 
     def settings(self, judge: Evaluator) -> dict[str, Any]:
         """What the weights, the evaluator and the device change, for `parts`."""
