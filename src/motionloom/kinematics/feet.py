@@ -53,7 +53,7 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
         return motion
     places = motion.positions()
     planted = planted_feet(places, motion.fps, contacts=contacts)
-    targets, directions = places[:, [7, 8]].copy(), np.empty((len(motion), 2, 3))
+    targets, directions = places[:, [limb.end for limb in LIMBS[:2]]].copy(), np.empty((len(motion), 2, 3))
     for i in (0, 1):
         ankle, toe = FEET[2 * i : 2 * i + 2]
         foot = places[:, toe] - places[:, ankle]
