@@ -124,7 +124,7 @@ class Oracle:
 def test_a_sampler_that_knows_what_came_has_no_error(given: str, slots: int) -> None:
     positions = couple(6.0) + np.array([0.0, 0.3, 0.0])  # features call their lowest point 0, the world does not
     crops, prior = crops_of(positions), tiny.prior()
-    oracle, net = Oracle(crops), ways.silent_net(tiny.prior())
+    oracle, net = Oracle(crops), ways.no_communication_net(tiny.prior())
     way = ways.drawn(prior, net, given=given, steps=4, make=oracle)
     found = duet.score(crops, way, 1)
     assert max(float(np.abs(found[name]).max()) for name in ERRORS) < 1e-4
@@ -142,7 +142,7 @@ def test_a_sampler_that_knows_what_came_has_no_error(given: str, slots: int) -> 
 def test_noise_goes_by_crop_and_sample_whatever_crops_are_beside() -> None:
     crops, prior = crops_of(couple(6.0), 4), tiny.prior()
     oracle = Oracle(crops)
-    way = ways.drawn(prior, ways.silent_net(prior), steps=4, make=oracle)
+    way = ways.drawn(prior, ways.no_communication_net(prior), steps=4, make=oracle)
     way(crops, 0), way(crops.part(slice(2, 4)), 0), way(crops, 1)
     whole, part, again = (asked["seeds"] for asked in oracle.asked)
     assert whole[4:] == part
@@ -151,7 +151,7 @@ def test_noise_goes_by_crop_and_sample_whatever_crops_are_beside() -> None:
 
 def test_a_real_sampler_of_random_weights_keeps_the_given_second() -> None:
     crops, prior = crops_of(couple(6.0), 2), tiny.prior()
-    made = ways.drawn(prior, ways.silent_net(prior), steps=2)(crops, 0)
+    made = ways.drawn(prior, ways.no_communication_net(prior), steps=2)(crops, 0)
     assert made.shape == (2, 2, FRAMES, 22, 3)
     np.testing.assert_allclose(made[:, :, :20], crops.positions[:, :, :20], atol=2e-3)
     assert np.isfinite(made).all()
@@ -293,7 +293,7 @@ def test_other_blocks_are_rows_by_their_names_and_sizes(tmp_path: Path) -> None:
         "layers2: 2 layers after layer 1, not aware", f"known: 1 layer after layer {last}"
     ]  # fmt: skip
     assert found[0].digest == hashlib.sha256(files[0].read_bytes()).hexdigest()[:12]
-    silent = ways.drawn(prior, ways.silent_net(prior), steps=2)
+    silent = ways.drawn(prior, ways.no_communication_net(prior), steps=2)
     made, alone = (way(crops_of(couple(6.0), 2), 0) for way in (found[0].way, silent))
     np.testing.assert_allclose(made, alone, atol=1e-4)  # a fresh block says nothing
 

@@ -29,7 +29,7 @@ from motionloom.lab.metrics.skate import skate
 from motionloom.lab.report import published_rows
 from motionloom.lab.report.report import REAL, Column, Report
 from motionloom.lab.suites import control_kinds, text_reference
-from motionloom.lab.suites.control_kinds import Kind, Wish
+from motionloom.lab.suites.control_kinds import Kind, Target
 from motionloom.lab.suites.control_methods import BASE, METHODS, OURS, Made, Maker, Sampling, checked, fits, maker
 from motionloom.lab.suites.harness import Run, check_names, digest, diversity, row_of
 from motionloom.lab.suites.items import Item, fitting, pick, read_items, spread
@@ -100,10 +100,10 @@ class Trial:
         said = [item.captions[k] for item, k in zip(self.items, picked, strict=True)]
         return said, np.stack([several[k] for several, k in zip(self.texts, picked, strict=True)])
 
-    def wishes(self, one: Kind, replication: int) -> list[Wish]:
+    def targets(self, one: Kind, replication: int) -> list[Target]:
         """What a kind asks of each motion of a replication."""
         said, _ = self.captions(replication)
-        return [control_kinds.wish(one, i.features, c.text) for i, c in zip(self.items, said, strict=True)]
+        return [control_kinds.target_of(one, i.features, c.text) for i, c in zip(self.items, said, strict=True)]
 
 
 def prepare(
@@ -129,12 +129,12 @@ def prepare(
 # ---- the numbers of one replication ----------------------------------------------------------------------------------
 
 
-def measured(trial: Trial, replication: int, made: Sequence[Made], wishes: Sequence[Wish]) -> dict[str, float]:
-    """What one motion per wish is worth; a number that has no meaning for this kind is left out."""
+def measured(trial: Trial, replication: int, made: Sequence[Made], targets: Sequence[Target]) -> dict[str, float]:
+    """What one motion per target is worth; a number that has no meaning for this kind is left out."""
     embedded = trial.evaluator.motions([one.features for one in made])
     return {
         **_judged(trial, replication, embedded),
-        **met(made, wishes, trial.scale),
+        **met(made, targets, trial.scale),
         **physical([one.positions for one in made]),
     }
 
@@ -149,20 +149,22 @@ def _judged(trial: Trial, replication: int, embedded: Array) -> dict[str, float]
     }
 
 
-def met(made: Sequence[Made], wishes: Sequence[Wish], scale: np.ndarray) -> dict[str, float]:
+def met(made: Sequence[Made], targets: Sequence[Target], scale: np.ndarray) -> dict[str, float]:
     """How far the motions are from what was asked: cm, shares, degrees, standard deviations."""
-    pairs = list(zip(made, wishes, strict=True))
-    apart = [metrics.distances(one.positions, wish.goal.positions, wish.goal.asked) for one, wish in pairs]
+    pairs = list(zip(made, targets, strict=True))
+    apart = [metrics.distances(one.positions, target.goal.positions, target.goal.asked) for one, target in pairs]
     root, joints, both = metrics.of_root(apart), metrics.of_joints(apart), metrics.control_error(apart)
     found = {**_error("root", root), **_error("joint", joints)}
     if both is not None:
         found |= {"worst": both.worst, "beyond_20": both.beyond_20, "beyond_50": both.beyond_50}
     turns = [
-        metrics.facing_error(one.positions, wish.goal.positions, wish.goal.facing_asked) for one, wish in pairs
+        metrics.facing_error(one.positions, target.goal.positions, target.goal.facing_asked) for one, target in pairs
     ]  # fmt: skip
     found["facing"] = float(np.mean(every)) if (every := np.concatenate(turns)).size else math.nan
     found["feature_error"] = metrics.feature_error(
-        [one.features / scale for one in made], [wish.known / scale for wish in wishes], [wish.mask for wish in wishes]
+        [one.features / scale for one in made],
+        [target.known / scale for target in targets],
+        [target.mask for target in targets],
     )
     return {name: number for name, number in found.items() if math.isfinite(number)}
 
@@ -191,19 +193,19 @@ def of_real(trial: Trial, replication: int) -> dict[str, float]:
 
 def of_method(trial: Trial, one: Kind, name: str, replication: int) -> dict[str, float]:
     """One way of control on one kind of goal; the time is that of making the motions."""
-    wishes = trial.wishes(one, replication)
-    made, seconds = trial.plain.get((name, replication)) or _made(trial, one, name, replication, wishes)
+    targets = trial.targets(one, replication)
+    made, seconds = trial.plain.get((name, replication)) or _made(trial, one, name, replication, targets)
     if name in BASE.values():
         trial.plain[name, replication] = made, seconds
-    return {**measured(trial, replication, made, wishes), "seconds": seconds / len(wishes)}
+    return {**measured(trial, replication, made, targets), "seconds": seconds / len(targets)}
 
 
-def _made(trial: Trial, one: Kind, name: str, replication: int, wishes: Sequence[Wish]) -> tuple[list[Made], float]:
-    """One motion per wish, and the seconds that all took."""
+def _made(trial: Trial, one: Kind, name: str, replication: int, targets: Sequence[Target]) -> tuple[list[Made], float]:
+    """One motion per target, and the seconds that all took."""
     make = trial.make(one, name)
     start = time.perf_counter()
-    made = make(wishes, seeds=trial.protocol.seeds(replication, len(wishes)))
-    return checked(made, wishes), time.perf_counter() - start
+    made = make(targets, seeds=trial.protocol.seeds(replication, len(targets)))
+    return checked(made, targets), time.perf_counter() - start
 
 
 # ---- the run ---------------------------------------------------------------------------------------------------------

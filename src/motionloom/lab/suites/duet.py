@@ -163,7 +163,7 @@ def ways_of(
     """Every way that there are weights for, by its kind."""
     asked = _asked(how)
     found: dict[str, Way] = {"zero": ways.standing(), "constant": ways.gliding()}
-    found["silent"] = ways.drawn(prior, ways.silent_net(prior), **asked)
+    found["silent"] = ways.drawn(prior, ways.no_communication_net(prior), **asked)
     if communication is not None and "communication" in kinds:
         found["communication"] = ways.drawn(*ways.only_communication(prior, communication), **asked)
     if block is not None:

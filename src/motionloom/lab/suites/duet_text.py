@@ -22,7 +22,7 @@ from motionloom.lab.metrics import pair as mp
 from motionloom.lab.metrics import pair_groups as groups
 from motionloom.lab.report.report import REAL, Column, Report, Row, Value
 from motionloom.lab.suites.duet import HELD_OUT, chosen_block
-from motionloom.lab.suites.duet_ways import silent_net
+from motionloom.lab.suites.duet_ways import no_communication_net
 from motionloom.lab.suites.harness import Run, Say, check_names
 from motionloom.lab.suites.needs import pairs_of
 from motionloom.tasks.control import moved
@@ -158,7 +158,7 @@ def text_table(pairs: Sequence[Pair]) -> Table:
 
 def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
     """The prior without communication, its people beginning where partners of random train windows stand."""
-    frames, net, begun = frames_in(how.seconds, prior.fps), silent_net(prior), beginnings(pairs, how)
+    frames, net, begun = frames_in(how.seconds, prior.fps), no_communication_net(prior), beginnings(pairs, how)
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
         nothing = torch.zeros(2, 0, len(prior.mean))

@@ -130,7 +130,7 @@ def drawn(
     return way
 
 
-def silent_net(prior: Prior) -> PairNet:
+def no_communication_net(prior: Prior) -> PairNet:
     """The prior without communication: a block that says nothing, and two motions that know nothing of each other."""
     return PairNet(
         prior.net, Talk(fitting(prior.net.config), prior.net.config).to(prior.mean.device), prior.schedule,

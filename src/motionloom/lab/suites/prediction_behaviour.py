@@ -13,7 +13,7 @@ from motionloom.data.prediction import Protocol
 from motionloom.diffusion import row_seed
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import SMPL_LAYOUT, Layout
-from motionloom.goals.hold import HeldPart, Hold
+from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.kinematics import physics
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.lab.metrics import prediction as metrics
@@ -179,7 +179,7 @@ def held_rotations(predictor: Predictor, trial: Trial, number: int, group: str, 
         np.concatenate([trial.pasts(number, number + 1)[0], trial.future(number)]), predictor.fps
     )
     source = whole.frames(seen, len(whole))
-    held = Hold(source, (HeldPart((group,)),), align=False)
+    held = FixedJoints(source, (FixedPart((group,)),), align=False)
     seconds = len(source) / predictor.fps
     (made,) = predict(predictor, whole.frames(0, seen), count=1, seconds=seconds, seed=seed, hold=held)
     got, wanted = made.rotations[seen:, joints], source.rotations[:, joints]
