@@ -322,18 +322,10 @@ def double_take(
     draws: tuple[Draw, Draw],
     **options: Unpack[TakeOptions],
 ) -> Takes:
-    """Both takes. One interval is sampled as ever and has no second take.
+    """Both takes; one interval is sampled as ever and has no second take.
 
-    Args:
-        first: has the texts of the rows; bound to the lengths it should know.
-        second: the same without texts.
-        x: noise (repetitions * intervals, longest interval, features) at ``way[0]``.
-        plan: intervals and handshakes.
-        mode: published code or paper.
-        way: the levels, noisiest first.
-        schedule: of the noise.
-        draws: noise for the first and for the second take.
-        options: see `TakeOptions`.
+    ``first`` has the texts of the rows, ``second`` none; each is bound to the lengths it should know. ``x``: noise
+    (repetitions * intervals, longest interval, features) at ``way[0]``. ``draws``: noise for either take.
     """
     solver, second_take_only = options.get("solver", DDPM), options.get("second_take_only", False)
     made = first_take(
@@ -383,8 +375,6 @@ def double_take_features(
         mode: published code or paper.
         handshake: frames, one number or one per transition.
         ramp: the same; None takes the mode's own (20 published, 10 paper).
-        seed: of the noise.
-        settings: see `Settings`.
 
     Returns:
         Features (frames, 263), not standardised, and where each interval ends (`Plan.ends`).
