@@ -158,7 +158,7 @@ def test_files_of_segments_are_read_beforehand(prior: Prior, tmp_path: Path) -> 
     assert isinstance(read, Adapter)
     assert (read.name, factor) == ("a1", 0.5)
     (tmp_path / "b.safetensors").write_bytes(b"x" * 100)
-    with pytest.raises(MotionloomError, match="is not an adapter"):
+    with pytest.raises(MotionloomError, match="not a whole safetensors file"):
         with_loaded(prior, [replace(WALK, adapters=((tmp_path / "b.safetensors", 0.5),))])
 
 
