@@ -170,7 +170,9 @@ def test_what_is_known_stays_known(prior: Prior, block: PairBlock) -> None:
 
 def test_a_fresh_block_leads_nobody(prior: Prior) -> None:
     fresh = block_of(prior, fresh=True)
-    made = [generate_pair(prior, fresh, SAID[0], seconds=4, steps=2, clean=False, together=w)[0] for w in (0.0, 1.0)]
+    made = [
+        generate_pair(prior, fresh, SAID[0], seconds=4, steps=2, foot_lock=False, together=w)[0] for w in (0.0, 1.0)
+    ]
     for free, held in zip(*made, strict=True):
         assert np.array_equal(free.positions(), held.positions())
 

@@ -65,7 +65,7 @@ def test_whoever_is_given_stays_and_the_other_stands_where_he_was_drawn(
         return torch.from_numpy(encoded.features)[None], torch.from_numpy(elsewhere)[None]
 
     monkeypatch.setattr(tasks, "pair_features", true)
-    [(first, second)] = react(prior, block, given, "two people walk", clean=False)
+    [(first, second)] = react(prior, block, given, "two people walk", foot_lock=False)
     assert first is given
     assert (len(second), second.fps, second.skeleton) == (len(given), given.fps, SMPL22)
     apart = np.linalg.norm(second.positions() - truth.positions(), axis=-1)
@@ -78,8 +78,8 @@ def test_whoever_is_given_stays_and_the_other_stands_where_he_was_drawn(
 def test_the_given_motion_may_stand_on_a_floor_of_its_own(prior: Prior, block: PairBlock) -> None:
     given, _ = walkers(1.2)
     raised = replace(given, root=given.root + np.array([0.0, 0.2, 0.0]))
-    [(_, low)] = react(prior, block, given, steps=2, clean=False)
-    [(_, high)] = react(prior, block, raised, steps=2, clean=False)
+    [(_, low)] = react(prior, block, given, steps=2, foot_lock=False)
+    [(_, high)] = react(prior, block, raised, steps=2, foot_lock=False)
     np.testing.assert_allclose(high.root - low.root, np.broadcast_to([0.0, 0.2, 0.0], low.root.shape), atol=0.01)
 
 
@@ -94,7 +94,7 @@ def test_motions_that_nobody_can_react_to_are_refused(prior: Prior, block: PairB
 
 
 def test_a_long_duet_has_all_frames_of_its_segments_and_no_seam(prior: Prior, block: PairBlock) -> None:
-    made = whole(list(compose_pair(prior, block, SEGMENTS, seed=1, steps=4, clean=False)))
+    made = whole(list(compose_pair(prior, block, SEGMENTS, seed=1, steps=4, foot_lock=False)))
     for motion in made:
         assert len(motion) == 20 + 16 + 18
         steps = np.linalg.norm(np.diff(motion.root, axis=0), axis=-1)
@@ -258,7 +258,7 @@ def test_a_path_for_one_of_them_holds_through_all_segments(
     path = Goal.nothing(54)
     path.positions[:, 0, 0] = np.linspace(2.0, 5.0, 54)
     path.asked[:, 0] = [True, False, True]
-    made = whole(list(compose_pair(prior, block, SEGMENTS, path=path, person=1, steps=3, clean=False)))
+    made = whole(list(compose_pair(prior, block, SEGMENTS, path=path, person=1, steps=3, foot_lock=False)))
     off = np.linalg.norm((made[1].root - path.positions[:, 0])[:, [0, 2]], axis=-1)
     assert off.mean() < 0.03
     assert abs(heading(made[1].positions()[:1])[0] - np.pi / 2) < 0.5

@@ -176,7 +176,7 @@ def test_a_goal_is_met_in_the_frame_of_its_segment(prior: Prior, facing: float) 
     _, place = decoded(pieces[0].numpy().astype(np.float64), place)
     seen = humanml.decode_positions(pieces[1].numpy().astype(np.float64))
     np.testing.assert_allclose(seen[20, 0, ::2], (0.3, 0.5), atol=0.1)
-    made = whole(prior, segments, start=clip, clean=False)
+    made = whole(prior, segments, start=clip, foot_lock=False)
     np.testing.assert_allclose(made.root[60, ::2], place.to_world(np.array([0.3, 0, 0.5]))[::2], atol=0.01)
 
 
@@ -199,7 +199,7 @@ def test_a_motion_goes_on_where_a_clip_ends(prior: Prior, turn: float) -> None:
     quaternion = np.array([np.cos(turn / 2), 0, np.sin(turn / 2), 0])
     clip = carried(person(61 / 30, 30.0), quaternion, np.zeros(3), np.array([4.0, 0, -7.0]))
     assert len(clip) == 61  # two seconds: frames 0, 3, 6, ... are frames at 20 fps
-    made = whole(prior, [Segment(WALK, 2.0)], start=clip, clean=False)
+    made = whole(prior, [Segment(WALK, 2.0)], start=clip, foot_lock=False)
     old, new = to_smpl22(clip).resample(20).positions(), made.positions()  # which stands on the floor
     step = old[-1] - old[-2]
     assert np.linalg.norm(new[0] - (old[-1] + step), axis=-1).max() < 0.05

@@ -147,9 +147,9 @@ def test_seeds_of_people_go_with_them() -> None:
 
 
 def test_files_keep_the_distance_that_was_drawn(prior: Prior, block: PairBlock) -> None:
-    [duet] = generate_pair(prior, block, SAID[0], seconds=0.7, steps=4, seed=1, clean=False)
+    [duet] = generate_pair(prior, block, SAID[0], seconds=0.7, steps=4, seed=1, foot_lock=False)
     made, stands = pair_features(prior, block.net(prior), [SAID[0]] * 2, 14, seeds=person_seeds(1, 0), steps=4)
-    alone = np.stack([finish(prior, one, clean=False).positions() for one in made[0]])
+    alone = np.stack([finish(prior, one, foot_lock=False).positions() for one in made[0]])
     expected = two.put(alone, stands[0].double().numpy()[:, None, None])
     np.testing.assert_allclose(np.stack([motion.positions() for motion in duet]), expected, atol=1e-4)
 
@@ -166,7 +166,7 @@ def walk(frames: int) -> Goal:
 @pytest.mark.parametrize("person", [0, 1])
 def test_a_path_leads_one_of_the_two(prior: Prior, block: PairBlock, person: int) -> None:
     goal = walk(40)
-    [duet] = generate_pair(prior, block, SAID[0], goal=goal, person=person, steps=4, seed=2, clean=False)
+    [duet] = generate_pair(prior, block, SAID[0], goal=goal, person=person, steps=4, seed=2, foot_lock=False)
     off = [np.linalg.norm((m.root - goal.positions[:, 0])[:, [0, 2]], axis=-1).mean() for m in duet]
     assert off[person] < 0.02 < off[1 - person]
     assert len(duet[0]) == len(duet[1]) == 40
@@ -179,7 +179,7 @@ def test_the_other_one_stands_as_drawn_beside_who_follows_a_path(
     drawn = []
     real = pair.pair_features
     monkeypatch.setattr(pair, "pair_features", lambda *a, **k: drawn.append(real(*a, **k)) or drawn[-1])
-    [duet] = generate_pair(prior, block, SAID[0], goal=walk(40), person=1, steps=3, clean=False)
+    [duet] = generate_pair(prior, block, SAID[0], goal=walk(40), person=1, steps=3, foot_lock=False)
     stands = drawn[0][1][0].double().numpy()
     there = np.array([np.cos(np.pi / 2), np.sin(np.pi / 2), 1.0, 2.0])
     other = placement(two.compose(there, two.seen(stands[1], stands[0])))

@@ -125,13 +125,13 @@ def test_a_person_wears_what_was_seen_and_then_what_was_drawn_each_at_its_frame(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """At the predictor's own rate a frame of the grid is a frame of the result."""
-    given, wear = [], task.worn
+    given, wear = [], task.apply_positions
 
-    def worn(places, old, **asked):
+    def apply_positions(places, old, **asked):
         given.append((places, asked["known"]))
         return wear(places, old, **asked)
 
-    monkeypatch.setattr(task, "worn", worn)
+    monkeypatch.setattr(task, "apply_positions", apply_positions)
     predict(PREDICTOR, PAST, count=1, seconds=1.0, steps=1, temperature=1.0)
     ((places, known),) = given
     seen = person_of(PREDICTOR, PAST)
@@ -186,7 +186,7 @@ def test_minutes_look_back_a_few_seconds_only(monkeypatch: pytest.MonkeyPatch) -
     """Nothing that is kept grows with what was made: neither places nor poses."""
     kept: list[int] = []
 
-    def worn(places, old, **_):
+    def apply_positions(places, old, **_):
         kept.append(len(old))
         return old
 
@@ -196,9 +196,9 @@ def test_minutes_look_back_a_few_seconds_only(monkeypatch: pytest.MonkeyPatch) -
         assert at[-1] <= len(grid) - 1 + 1e-6
         return grid[at.round().astype(int)]
 
-    monkeypatch.setattr(task, "worn", worn)
+    monkeypatch.setattr(task, "apply_positions", apply_positions)
     monkeypatch.setattr(task, "positions_at", positions_at)
-    total = sum(len(piece) for piece in predict_pieces(PREDICTOR, PAST, seconds=60, steps=1, clean=False))
+    total = sum(len(piece) for piece in predict_pieces(PREDICTOR, PAST, seconds=60, steps=1, foot_lock=False))
     assert total == 30 + 1800
     assert max(kept) <= 15 + 30 * (task.CHUNK + 1) + 2 * 15
 

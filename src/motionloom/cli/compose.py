@@ -169,7 +169,7 @@ def _pieces(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline")
         yield from long.compose(
             prior, timeline.segments, seed=_first(arguments.seed, timeline.seed, 0),
             guidance=_first(arguments.guidance, timeline.guidance, GUIDANCE),
-            steps=steps, start=start, path=timeline.path, clean=not arguments.raw, progress=progress,
+            steps=steps, start=start, path=timeline.path, foot_lock=not arguments.raw, progress=progress,
         )  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from motionloom.cli.sampling import (
     places,
     remark_unknown,
     report,
+    sampling_of,
     write,
 )
 from motionloom.cli.skeletons import put_all
@@ -138,14 +139,12 @@ def _make(arguments: argparse.Namespace, prior: "Prior", goal: "Goal") -> "tuple
     import time
 
     from motionloom.tasks.control import control
-    from motionloom.tasks.text import STEPS
 
     began = time.perf_counter()
     with bar("controlling") as progress:
         made = control(
-            prior, arguments.prompt, goal, count=arguments.count, seed=arguments.seed, guidance=arguments.guidance,
-            steps=STEPS if arguments.steps is None else arguments.steps, adapters=_adapters(arguments.adapters, prior),
-            exact=not arguments.loose, clean=not arguments.raw, progress=progress,
+            prior, arguments.prompt, goal, adapters=_adapters(arguments.adapters, prior), fit=not arguments.loose,
+            foot_lock=not arguments.raw, progress=progress, **sampling_of(arguments),
         )  # fmt: skip
     return made, time.perf_counter() - began
 

@@ -121,7 +121,7 @@ def _make(
     from motionloom.tasks import duet, pair
 
     text, seed = arguments.text or "", arguments.seed or 0
-    shared: dict[str, Any] = {"clean": not arguments.raw}
+    shared: dict[str, Any] = {"foot_lock": not arguments.raw}
     shared |= {n: v for n in ("steps", "guidance", "together") if (v := getattr(arguments, n)) is not None}
     if timeline is not None:
         return [_composed(arguments, prior, block, timeline, progress, shared)]

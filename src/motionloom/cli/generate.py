@@ -217,7 +217,7 @@ def _drawn(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timel
 
     given = {"steps": arguments.steps, "guidance": arguments.guidance}
     options: dict[str, Any] = {name: value for name, value in given.items() if value is not None} | {
-        "clean": not arguments.raw
+        "foot_lock": not arguments.raw
     }
     solver = {} if arguments.solver is None else {"solver": arguments.solver}
     count = 0

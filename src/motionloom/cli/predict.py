@@ -134,7 +134,7 @@ def run_predict(arguments: argparse.Namespace) -> int:
     with bar("predicting") as progress:
         motions = predict(
             predictor, past, count=arguments.count, seconds=arguments.seconds, seed=arguments.seed, hold=hold,
-            guidance=arguments.guidance, root=not arguments.no_root, clean=not arguments.raw, progress=progress,
+            guidance=arguments.guidance, root=not arguments.no_root, foot_lock=not arguments.raw, progress=progress,
             **_steps(arguments),
         )  # fmt: skip
     written = write_futures(wanted, motions, len(past), manner, caption=_caption(arguments))
@@ -165,7 +165,7 @@ def run_switch(arguments: argparse.Namespace) -> int:
 
     motions = switch(
         predictor, past, target, count=arguments.count, seconds=arguments.seconds, seed=arguments.seed,
-        facing=arguments.facing, guidance=arguments.guidance, clean=not arguments.raw, **_steps(arguments),
+        facing=arguments.facing, guidance=arguments.guidance, foot_lock=not arguments.raw, **_steps(arguments),
     )  # fmt: skip
     written = write_futures(wanted, motions, len(past), manner, caption=_caption(arguments))
     _report(arguments, [str(file) for file in written])
@@ -217,7 +217,8 @@ def _pieces(
         for number in range(arguments.count):
             pieces = predict_pieces(
                 predictor, past, seconds=arguments.seconds, number=number, seed=arguments.seed, hold=hold,
-                guidance=arguments.guidance, root=not arguments.no_root, clean=not arguments.raw, **_steps(arguments),
+                guidance=arguments.guidance, root=not arguments.no_root, foot_lock=not arguments.raw,
+                **_steps(arguments),
             )  # fmt: skip
             yield moved(pieces, number * frames)
 

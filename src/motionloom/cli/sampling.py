@@ -41,6 +41,13 @@ def add_sampling(
     add_skeleton(parser, own=own_skeleton)
 
 
+def sampling_of(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The settings of `Sampling` that the line says, as keywords of a task; the others are the task's own."""
+    names = ("steps", "solver", "guidance", "seed", "count", "temperature", "pair_guidance")
+    found = {name: getattr(arguments, name, None) for name in names}
+    return {name: value for name, value in found.items() if value is not None}
+
+
 def add_adapters(parser: argparse.ArgumentParser) -> None:
     """``--adapter``: what was taught from clips."""
     parser.add_argument(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
+from motionloom._moved import renamed
 from motionloom.diffusion import SOLVERS, Link, levels, staggered
 from motionloom.edits.relative_pose import Lead, leader
 from motionloom.errors import MotionloomError
@@ -45,7 +46,7 @@ from motionloom.tasks.pair import (
     prompts_of,
     standing_at,
 )
-from motionloom.tasks.splice import person_at_20, worn
+from motionloom.tasks.splice import apply_positions, person_at_20
 from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS, Progress, check, finish, smooth
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -61,6 +62,7 @@ AT_ONCE = 8
 # Somebody is given
 
 
+@renamed({"clean": "foot_lock"})
 def react(
     prior: Prior,
     block: PairBlock,
@@ -72,7 +74,7 @@ def react(
     guidance: float = GUIDANCE,
     steps: int = STEPS,
     together: float = 1.0,
-    clean: bool = True,
+    foot_lock: bool = True,
     progress: Progress | None = None,
 ) -> list[Duet]:
     """``count`` duets whose first person is ``given``, bit for bit, and whose second is drawn to go with it.
@@ -106,7 +108,7 @@ def react(
     at = np.arange(len(given)) / given.fps * FPS
     for numbers, standing in zip(features, drawn.double().numpy(), strict=True):
         stand = standing_at(standing, placement(stands[0]), 0)[1]
-        other = moved(finish(prior, numbers[1], clean=clean), placement(stand)).at(at, given.fps)
+        other = moved(finish(prior, numbers[1], foot_lock=foot_lock), placement(stand)).at(at, given.fps)
         height = np.array([0.0, floor, 0.0])
         made.append((given, replace(other, root=other.root * [ratio, 1.0, ratio] + height)))
     return made
@@ -116,7 +118,7 @@ def _floor(motion: Motion) -> float:
     """Metres: the height on which somebody's own motion stands; raises where it does not stand upright along +Y."""
     few = motion.frames(0, min(len(motion), round(3 * motion.fps) + 2))
     uniform, own = to_smpl22(few), joints22(few)
-    worn(uniform.positions(), few, clean=False)
+    apply_positions(uniform.positions(), few, foot_lock=False)
     ratio = read_body(motion.skeleton).leg / read_body(SMPL22).leg
     return float(np.median(own[:, 0, 1] - ratio * uniform.root[:, 1]))
 
@@ -124,6 +126,7 @@ def _floor(motion: Motion) -> float:
 # Several prompts
 
 
+@renamed({"clean": "foot_lock"})
 def compose_pair(
     prior: Prior,
     block: PairBlock,
@@ -135,7 +138,7 @@ def compose_pair(
     guidance: float = GUIDANCE,
     steps: int = STEPS,
     together: float = 1.0,
-    clean: bool = True,
+    foot_lock: bool = True,
     at_once: int = AT_ONCE,
     progress: Moves | None = None,
 ) -> Iterator[Duet]:
@@ -168,7 +171,7 @@ def compose_pair(
                 prior, _of(pieces[i], i), deque(segment.goal for segment in asked[i]), placement(stands[i]),
                 track if i == person else None,
             ),
-            prior.fps, clean=clean,
+            prior.fps, foot_lock=foot_lock,
         )
         for i in (0, 1)
     ]  # fmt: skip

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
+from motionloom._moved import renamed
 from motionloom.diffusion import SOLVERS, Link, levels, staggered
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction, toward
@@ -69,6 +70,7 @@ class Row:
         return self.before + self.frames + self.after
 
 
+@renamed({"clean": "foot_lock"})
 def compose(
     prior: Prior,
     segments: Iterable[Segment],
@@ -78,7 +80,7 @@ def compose(
     steps: int = STEPS,
     start: Motion | None = None,
     path: Goal | None = None,
-    clean: bool = True,
+    foot_lock: bool = True,
     together: int = TOGETHER,
     progress: Progress | None = None,
 ) -> Iterator[Motion]:
@@ -87,7 +89,7 @@ def compose(
     In all it has the sum of ``round(seconds * 20)`` frames at 20 per second. start: a motion of anybody that this one
     goes on from, in its place; it is not repeated. path: where the pelvis is on the ground in each frame of the whole
     (`Goal` of that length, in the world); goals of segments are seen from where the person stands when they begin.
-    clean: keep planted feet still. Segments may be endless if there is no path; memory does not grow with them.
+    foot_lock: keep planted feet still. Segments may be endless if there is no path; memory does not grow with them.
     Raises `MotionloomError` for what cannot be asked. (Shafir et al. 2024, section 4, as in docs/decisions/0013.)
     """
     if len(prior.mean) != WIDTH or prior.fps != FPS:
@@ -113,7 +115,7 @@ def compose(
         prior, asked(), seed=seed, guidance=guidance, steps=steps, past=past, together=together, progress=progress
     )
     place = past.end if past else track.stands(0) if track else Placement()
-    return bodies(in_world(prior, pieces, wishes, place, track), prior.fps, clean=clean)
+    return bodies(in_world(prior, pieces, wishes, place, track), prior.fps, foot_lock=foot_lock)
 
 
 @torch.inference_mode()

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
+from motionloom._moved import renamed
 from motionloom.diffusion import SOLVERS, Draw, guide, inpaint, levels, observe, row_draw, row_seed, sample
 from motionloom.edits.fitting import fit
 from motionloom.edits.relative_pose import leader
@@ -30,7 +31,7 @@ from motionloom.retarget import to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.tasks.control import moved
 from motionloom.tasks.long import Past
-from motionloom.tasks.splice import concatenated, kept_parts, splice, worn
+from motionloom.tasks.splice import apply_positions, concatenated, kept_parts, splice
 from motionloom.tasks.text import (
     GUIDANCE,
     LARGEST_SEED,
@@ -224,6 +225,7 @@ def known_state(prior: Prior, net: PairNet, features: Tensor, stands: Tensor, fr
 # From words
 
 
+@renamed({"clean": "foot_lock"})
 def generate_pair(
     prior: Prior,
     block: PairBlock,
@@ -237,7 +239,7 @@ def generate_pair(
     guidance: float = GUIDANCE,
     steps: int = STEPS,
     together: float = 1.0,
-    clean: bool = True,
+    foot_lock: bool = True,
     progress: Progress | None = None,
 ) -> list[Duet]:
     """Make ``count`` duets: two people of the 22-joint skeleton at 20 frames per second in one world.
@@ -246,8 +248,7 @@ def generate_pair(
     duet i depends on it and i alone; two numbers are one for each person, and go with him where people are exchanged.
     The first person starts at the origin facing +Z. goal: what ``person`` (0 or 1) is asked in the world (`Goal`), who
     then starts at its `placement_of`; the duet is as long as the goal, and ``seconds`` is not looked at. guidance,
-    steps, clean: as of `text.generate`; together: as of `pair_features`. Raises `MotionloomError` for what cannot be
-    asked.
+    steps, foot_lock: as of `text.generate`; together: as of `pair_features`. Raises `MotionloomError`.
     """
     said = prompts_of(prompt)
     if not all(words.strip() for words in said):
@@ -268,7 +269,8 @@ def generate_pair(
     for numbers, standing in zip(features, stands.double().numpy(), strict=True):
         if goal:
             standing = standing_at(standing, place, person)
-        duet = [moved(finish(prior, f, clean=clean), placement(s)) for f, s in zip(numbers, standing, strict=True)]
+        people = [finish(prior, one, foot_lock=foot_lock) for one in numbers]
+        duet = [moved(one, placement(stand)) for one, stand in zip(people, standing, strict=True)]
         if goal:
             duet[person] = fit(duet[person], goal)
         made.append((duet[0], duet[1]))
@@ -314,6 +316,7 @@ def check_asked(prior: Prior, *, count: int, seed: Seed, person: int = 0, second
 # Going on
 
 
+@renamed({"clean": "foot_lock"})
 def complete_pair(
     prior: Prior,
     block: PairBlock,
@@ -326,7 +329,7 @@ def complete_pair(
     guidance: float = GUIDANCE,
     steps: int = STEPS,
     together: float = 1.0,
-    clean: bool = True,
+    foot_lock: bool = True,
     progress: Progress | None = None,
 ) -> list[Duet]:
     """``count`` duets that begin with both people's past, bit for bit, and go on for ``seconds``.
@@ -356,7 +359,7 @@ def complete_pair(
     for numbers in features.double().numpy():
         places = two.decode(numbers, stands) + floors[:, None, None, None] * np.array([0.0, 1.0, 0.0])
         contacts = numbers[..., LAYOUT["contacts"]]
-        duet = [ground.behind(i, places[i], contacts[i], seen, added, clean=clean) for i in (0, 1)]
+        duet = [ground.behind(i, places[i], contacts[i], seen, added, foot_lock=foot_lock) for i in (0, 1)]
         made.append((duet[0], duet[1]))
     return made
 
@@ -397,7 +400,7 @@ class Ground:
         ratio = float(np.mean(self.legs)) / self.legs[person]
         return places + (ratio - 1.0) * places[:, :1] * np.array([1.0, 0.0, 1.0])
 
-    def behind(self, person: int, places: Array, contacts: Array, seen: int, added: int, *, clean: bool) -> Motion:
+    def behind(self, person: int, places: Array, contacts: Array, seen: int, added: int, *, foot_lock: bool) -> Motion:
         """The person's motion with ``added`` frames more: places (frames, 22, 3) at 20 per second on the common
         ground, contacts (frames, 4); frame ``seen - 1`` is the motion's last."""
         motion = self.motions[person]
@@ -407,7 +410,7 @@ class Ground:
         at = (np.arange(len(old)) - (shown - 1)) / motion.fps * FPS + seen - 1
         nearest = np.clip(at.round().astype(int), 0, len(contacts) - 1)
         drawn = positions_at(self.own(person, places), at)
-        made = worn(drawn, old, contacts=contacts[nearest], clean=clean, known=shown)
+        made = apply_positions(drawn, old, contacts=contacts[nearest], foot_lock=foot_lock, known=shown)
         nothing = kept_parts(motion.skeleton, frozenset(), np.zeros(3, dtype=bool))
         new = splice(old, made, shown, last=len(old), kept=nothing).frames(shown, shown + added)
         return concatenated(motion, new)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom._moved import renamed
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import positions_at
 from motionloom.features.positions import SMPL_LAYOUT
@@ -20,7 +21,7 @@ from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.tasks.completion import STEPS, TEMPERATURE, Known
 from motionloom.tasks.held import Given, check_like, given
-from motionloom.tasks.splice import carried_level, concatenated, kept_parts, splice, standing, worn
+from motionloom.tasks.splice import apply_positions, carried_level, concatenated, kept_parts, splice, standing
 from motionloom.tasks.text import LARGEST_SEED, Progress
 from motionloom.tasks.windows import CONTEXT, Pen, person_of, seen_frames, windows_for
 from motionloom.weights.predictor import Predictor
@@ -43,6 +44,7 @@ TARGET = 1.0
 """Seconds of the target that are shown to the network, at most."""
 
 
+@renamed({"clean": "foot_lock"})
 def predict(
     predictor: Predictor,
     past: Motion,
@@ -55,7 +57,7 @@ def predict(
     guidance: float = 1.0,
     temperature: float = TEMPERATURE,
     root: bool = True,
-    clean: bool = True,
+    foot_lock: bool = True,
     progress: Progress | None = None,
 ) -> list[Motion]:
     """``count`` motions that begin with the past, bit for bit, and go on for ``seconds``; future i from (seed, i).
@@ -64,8 +66,8 @@ def predict(
     ``predictor.observed`` / ``predictor.fps`` seconds are seen. hold: parts whose future is given. steps: network calls
     per window. guidance: how strictly the past and what is held are heeded, 1 as learned. temperature: above 1 the
     futures are livelier and more various. root: predict the way through the world too; False: the person stays in
-    place, as published (Chen et al. 2023). clean: keep planted feet still. Longer than a window the future goes on from
-    itself. Raises `MotionloomError` for what cannot be asked.
+    place, as published (Chen et al. 2023). foot_lock: keep planted feet still. Longer than a window the future
+    goes on from itself. Raises `MotionloomError` for what cannot be asked.
     """
     _check(
         predictor, past, seconds, count,
@@ -85,11 +87,12 @@ def predict(
         if progress:
             progress(number + 1, windows)
     return [
-        concatenated(past, *_dressed(predictor, past, row, _frames(past, seconds), hold=parts, clean=clean))
+        concatenated(past, *_dressed(predictor, past, row, _frames(past, seconds), hold=parts, foot_lock=foot_lock))
         for row in drawn
     ]
 
 
+@renamed({"clean": "foot_lock"})
 def predict_pieces(
     predictor: Predictor,
     past: Motion,
@@ -102,7 +105,7 @@ def predict_pieces(
     guidance: float = 1.0,
     temperature: float = TEMPERATURE,
     root: bool = True,
-    clean: bool = True,
+    foot_lock: bool = True,
 ) -> Iterator[Motion]:
     """Future ``number`` of `predict`, any length in constant memory: the past, then consecutive pieces behind it."""
     _check(
@@ -117,9 +120,10 @@ def predict_pieces(
         windows_for(predictor, total / past.fps),
     )  # fmt: skip
     yield past
-    yield from _dressed(predictor, past, (window[0] for window in windows), total, hold=parts, clean=clean)
+    yield from _dressed(predictor, past, (window[0] for window in windows), total, hold=parts, foot_lock=foot_lock)
 
 
+@renamed({"clean": "foot_lock"})
 def switch(
     predictor: Predictor,
     past: Motion,
@@ -132,7 +136,7 @@ def switch(
     steps: int = STEPS,
     guidance: float = 1.0,
     temperature: float = TEMPERATURE,
-    clean: bool = True,
+    foot_lock: bool = True,
 ) -> list[Motion]:
     """``count`` motions: the past, ``seconds`` in between, and the target from its first frame on.
 
@@ -156,17 +160,17 @@ def switch(
     if free:
         begun = predict(
             predictor, past, count=count, seconds=free / past.fps, seed=seed,
-            steps=steps, guidance=guidance, temperature=temperature, clean=clean,
+            steps=steps, guidance=guidance, temperature=temperature, foot_lock=foot_lock,
         )  # fmt: skip
     pen = Pen(predictor, steps, guidance, temperature, True)
     return [
-        _arriving(pen, one, target, gap - free, seed=(seed, i), facing=facing, clean=clean)
+        _arriving(pen, one, target, gap - free, seed=(seed, i), facing=facing, foot_lock=foot_lock)
         for i, one in enumerate(begun)
     ]
 
 
 def _arriving(
-    pen: Pen, past: Motion, target: Motion, gap: int, *, seed: tuple[int, int], facing: str, clean: bool
+    pen: Pen, past: Motion, target: Motion, gap: int, *, seed: tuple[int, int], facing: str, foot_lock: bool
 ) -> Motion:
     predictor, fps = pen.predictor, past.fps
     rate = predictor.fps / fps
@@ -188,7 +192,7 @@ def _arriving(
     pads = concatenated(tail, *[tail.frames(len(tail) - 1, len(tail))] * (gap + shown))
     grid = np.concatenate([person, places])
     times = (np.arange(len(pads)) - (len(tail) - 1)) * rate + len(person) - 1
-    made = worn(positions_at(grid, times), pads, clean=clean, known=len(tail))
+    made = apply_positions(positions_at(grid, times), pads, foot_lock=foot_lock, known=len(tail))
     first = len(tail) + gap
     begin, to = standing(target, 0)[0], standing(made, first)[0]
     moved = carried_level(target, rot.rotvec_to_quat(np.array([0.0, turn, 0.0])), begin, to)
@@ -208,7 +212,7 @@ def _frames(past: Motion, seconds: float) -> int:
 
 def _dressed(
     predictor: Predictor, past: Motion, windows: Iterable[Array], total: int,
-    *, hold: Given | None, clean: bool,
+    *, hold: Given | None, foot_lock: bool,
 ) -> Iterator[Motion]:  # fmt: skip
     """``total`` frames behind the past, in pieces of about `CHUNK` seconds; ``windows`` (frames, 22, 3) are read as
     needed."""
@@ -225,7 +229,7 @@ def _dressed(
         last = tail.frames(len(tail) - 1, len(tail))
         old = concatenated(tail, *[last] * (ready - done))
         at = (done + np.arange(len(old)) - (len(tail) - 1)) * rate + zero
-        made = worn(positions_at(grid, at), old, clean=clean, known=len(tail))
+        made = apply_positions(positions_at(grid, at), old, foot_lock=foot_lock, known=len(tail))
         new = splice(old, made, len(tail), last=len(old), kept=nothing).frames(len(tail), len(old))
         new = hold.laid_over(new, done) if hold else new
         yield new

@@ -14,7 +14,8 @@ from motionloom.kinematics.physics import Array
 from motionloom.lab.suites.control_kinds import Kind, Target
 from motionloom.motion import Motion
 from motionloom.tasks.blending import Net, control_features
-from motionloom.tasks.text import ROWS, SOLVER, SPACING, sample_features, smooth, to_motion
+from motionloom.tasks.sampling import BATCH as ROWS
+from motionloom.tasks.text import SOLVER, SPACING, sample_features, smooth, to_motion
 from motionloom.weights.adapter import Adapter, adapted
 from motionloom.weights.prior import Prior
 
@@ -140,14 +141,7 @@ def ours(prior: Prior, how: Sampling, *, exact: bool) -> Method:
         made = []
         for target, seed in zip(targets, seeds, strict=True):
             (one,) = control(
-                prior,
-                target.prompt,
-                target.goal,
-                count=1,
-                seed=seed,
-                guidance=how.guidance,
-                steps=how.steps,
-                exact=exact,
+                prior, target.prompt, target.goal, seed=seed, guidance=how.guidance, steps=how.steps, fit=exact
             )
             made.append(of_motion(one.motion))
         return made

@@ -109,7 +109,7 @@ def answers(prior: Prior, block: PairBlock, given: Windows, how: How) -> Make:
         for number, window in enumerate(given.draw(caption, count, seed)):
             made += react(
                 prior, block, motion_from_positions(window[0], mp.FPS), caption, seed=own_seed(seed, number),
-                guidance=how.guidance, steps=how.steps, clean=how.clean,
+                guidance=how.guidance, steps=how.steps, foot_lock=how.clean,
             )  # fmt: skip
         return made
 
@@ -124,7 +124,7 @@ def alone(prior: Prior, given: Windows, how: How) -> Make:
         for number, window in enumerate(given.draw(caption, count, seed)):
             (partner,) = generate(
                 prior, caption, seconds=how.seconds, seed=own_seed(seed, number), guidance=how.guidance,
-                steps=how.steps, clean=how.clean,
+                steps=how.steps, foot_lock=how.clean,
             )  # fmt: skip
             begins = placement(two.encode(window).stands[1])
             made.append((motion_from_positions(window[0], mp.FPS), moved(partner, begins)))

@@ -76,7 +76,7 @@ def ours(prior: Prior, block: PairBlock, captions: Sequence[str], how: How) -> M
             pieces = list(
                 compose_pair(
                     prior, block, timeline(captions, caption, how), seed=own_seed(seed, number),
-                    guidance=how.guidance, steps=how.steps, clean=how.clean,
+                    guidance=how.guidance, steps=how.steps, foot_lock=how.clean,
                 )
             )  # fmt: skip
             made.append((_whole(first for first, _ in pieces), _whole(second for _, second in pieces)))
@@ -93,7 +93,7 @@ def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: How
         return _whole(
             compose(
                 prior, timeline(captions, caption, how), seed=seed, guidance=how.guidance, steps=how.steps,
-                clean=how.clean,
+                foot_lock=how.clean,
             )
         )  # fmt: skip
 

@@ -132,7 +132,7 @@ def run(run: Run, *, block: str | Path | None = None, how: How | None = None, ki
     prior, found, pairs, about = opened(run, block, kinds)
     ours: Make = lambda caption, count, seed: generate_pair(  # noqa: E731
         prior, found, caption, seconds=how.seconds, count=count, seed=seed, guidance=how.guidance, steps=how.steps,
-        clean=how.clean,
+        foot_lock=how.clean,
     )  # fmt: skip
     return measure(
         pairs, ours, beside(prior, pairs, how), how, table=text_table(pairs), run=run, kinds=kinds, about=about
@@ -172,7 +172,8 @@ def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
         made = []
         for numbers, standing in zip(features, stands.double().numpy(), strict=True):
             first, second = (
-                moved(finish(prior, f, clean=how.clean), placement(s)) for f, s in zip(numbers, standing, strict=True)
+                moved(finish(prior, f, foot_lock=how.clean), placement(s))
+                for f, s in zip(numbers, standing, strict=True)
             )
             made.append((first, second))
         return made
