@@ -22,7 +22,7 @@ io viz: draw figure film overlay scene video
 tasks goals: goals=goal goal_file mask_file timeline paths drawing following reach fields lined_file
 tasks edits: steering stances fitting duet_places=relative_pose
 tasks tasks: redraw=inpaint
-tasks lab.papers: double_take humanmac baselines
+tasks lab.papers: double_take humanmac baselines blending=diffusion_blending
 nets lab.papers: published=mdm pair_published=commdm mrt guo=guo_nets
 train lab.papers: mrt=mrt_training
 evaluation lab.papers: guo guo_words

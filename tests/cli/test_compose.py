@@ -87,7 +87,7 @@ def test_a_timeline_says_everything_and_the_line_has_the_last_word(weights, aske
         ],
         "remarks": [],
     }
-    assert compose(weights, "three.yaml", "--seed", "0", "--guidance", "0", "--raw", "--steps", "3") == 0
+    assert compose(weights, "three.yaml", "--seed", "0", "--guidance", "0", "--no-foot-lock", "--steps", "3") == 0
     assert [asked[key] for key in ("seed", "guidance", "foot_lock", "steps")] == [0, 0, False, 3]
 
 

@@ -63,7 +63,7 @@ def test_options_reach_the_task(weights: str, asked: list, capsys: pytest.Captur
         "--guidance",
         "3",
     ]
-    assert control(weights, *words, "--steps", "7", "--loose", "--raw", "--out", "a.npz") == 0
+    assert control(weights, *words, "--steps", "7", "--no-fit", "--no-foot-lock", "--out", "a.npz") == 0
     call = asked[0]
     goal = call.pop("goal")
     assert call == {"prompt": "a person walks", "count": 2, "seed": 5, "guidance": 3.0, "steps": 7, "fit": False,

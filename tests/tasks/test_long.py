@@ -71,9 +71,9 @@ def test_company_and_patch_do_not_matter(prior: Prior) -> None:
         Segment((WALK, TURN, "jump")[i % 3], 1.0 + 0.15 * i, guidance=float(i), transition=0.1 * i) for i in range(6)
     ]
     for one in (prior, net):
-        alone = features(one, segments, together=1)
+        alone = features(one, segments, batch_size=1)
         for together in (2, 16):
-            for a, b in zip(alone, features(one, segments, together=together), strict=True):
+            for a, b in zip(alone, features(one, segments, batch_size=together), strict=True):
                 torch.testing.assert_close(a, b, atol=1e-4, rtol=0)
 
 
@@ -112,7 +112,7 @@ def test_what_is_far_behind_changes_nothing(prior: Prior) -> None:
     """Rows tell their neighbours one row per move: with 2 moves, row i depends on rows up to i + 2 and no further."""
     segments = [Segment(WALK, 1.5) for _ in range(6)]
     base = features(prior, segments, steps=2)
-    more = features(prior, [*segments[:5], Segment(TURN, 2.0), Segment("jump", 1.0)], steps=2, together=3)
+    more = features(prior, [*segments[:5], Segment(TURN, 2.0), Segment("jump", 1.0)], steps=2, batch_size=3)
     apart = [(a - b).abs().amax(dim=1) for a, b in zip(base[:5], more)]
     assert max(float(one.max()) for one in apart[:3]) < 1e-4
     assert float(apart[3][:-10].max()) < 1e-4  # of the last it could reach, it reaches what is shared
@@ -147,7 +147,7 @@ def test_endless_segments_come_as_they_are_read_and_leaving_stops_everything(pri
             read.append("closed")
 
     state = torch.get_rng_state()
-    made = compose(prior, endless(), steps=1, together=2)
+    made = compose(prior, endless(), steps=1, batch_size=2)
     assert not read
     block = next(made)
     assert len(block) > 0

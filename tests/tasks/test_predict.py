@@ -12,8 +12,9 @@ from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22, joints22
 from motionloom.tasks import predict as task
 from motionloom.tasks.predict import predict, predict_pieces, switch
+from motionloom.tasks.sampling import PredictionSampling
 from motionloom.tasks.splice import concatenated, standing
-from motionloom.tasks.windows import Pen, person_of
+from motionloom.tasks.windows import Past, WindowSampler
 from tests.nets import tiny_predictor
 from tests.shared import shared
 from tests.tasks.small_predictor import small_predictor
@@ -134,9 +135,11 @@ def test_a_person_wears_what_was_seen_and_then_what_was_drawn_each_at_its_frame(
     monkeypatch.setattr(task, "apply_positions", apply_positions)
     predict(PREDICTOR, PAST, count=1, seconds=1.0, steps=1, temperature=1.0)
     ((places, known),) = given
-    seen = person_of(PREDICTOR, PAST)
+    seen = Past.of(PREDICTOR, PAST).person
     assert known == len(seen)
-    drawn = next(Pen(PREDICTOR, 1, 1.0, 1.0, True).windows(seen[None], [(0, 0)], None, 1))[0]
+    drawn = next(
+        WindowSampler(PREDICTOR, PredictionSampling(steps=1, temperature=1.0)).windows(seen[None], [(0, 0)], None, 1)
+    )[0]
     np.testing.assert_allclose(places, np.concatenate([seen, drawn]), atol=1e-5)
 
 
@@ -263,13 +266,13 @@ def test_neither_seam_of_a_switch_jumps(seconds: float, fps: float) -> None:
 
 
 def test_the_network_is_told_the_target_from_the_moment_on_when_it_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
-    told, draw = [], Pen.window
+    told, draw = [], WindowSampler.window
 
     def window(self, person, seeds, number, known, **asked):
         told.append(known)
         return draw(self, person, seeds, number, known, **asked)
 
-    monkeypatch.setattr(Pen, "window", window)
+    monkeypatch.setattr(WindowSampler, "window", window)
     target = person(3.0, 30.0).frames(60, 90)
     switch(PREDICTOR, PAST, target, seconds=0.5, steps=1, facing="kept")
     (known,) = told

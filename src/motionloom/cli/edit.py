@@ -110,7 +110,7 @@ def _make(
     )  # fmt: skip
     with bar("editing") as progress:
         motions = edit(
-            prior, clip, text, changes, skeleton=skeleton, foot_lock=not arguments.raw, progress=progress,
+            prior, clip, text, changes, skeleton=skeleton, foot_lock=arguments.foot_lock, progress=progress,
             **sampling_of(arguments),
         )  # fmt: skip
     if arguments.fps is not None:

@@ -4,13 +4,13 @@ import argparse
 import sys
 from collections.abc import Generator, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from motionloom.cli.futures import FORMATS, Long, Manner, targets, write_futures
 from motionloom.cli.futures import Target as Files
 from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, note_rate, read_clip
-from motionloom.cli.sampling import bar, check_count, fail
+from motionloom.cli.sampling import bar, check_count, fail, sampling_of
 from motionloom.cli.skeletons import Target, add_skeleton, read_target
 
 if TYPE_CHECKING:
@@ -102,7 +102,9 @@ def _add_sampling(parser: argparse.ArgumentParser, other: str) -> None:
     parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster")
     parser.add_argument("--guidance", type=float, default=1.0, help="strength of what is known (default 1)")
     parser.add_argument("--temperature", type=float, help="livelier above 1, calmer below, 0 to 2 (default 1.1)")
-    parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
+    parser.add_argument(
+        "--no-foot-lock", dest="foot_lock", action="store_false", help="leave the feet as the network drew them"
+    )
     parser.add_argument(
         "--weights", default="predictor", metavar="NAME|PATH", help="shipped name or file (default: predictor)"
     )
@@ -133,9 +135,8 @@ def run_predict(arguments: argparse.Namespace) -> int:
 
     with bar("predicting") as progress:
         motions = predict(
-            predictor, past, count=arguments.count, seconds=arguments.seconds, seed=arguments.seed, hold=hold,
-            guidance=arguments.guidance, root=not arguments.no_root, foot_lock=not arguments.raw, progress=progress,
-            **_steps(arguments),
+            predictor, past, seconds=arguments.seconds, hold=hold, root=not arguments.no_root,
+            foot_lock=arguments.foot_lock, progress=progress, **sampling_of(arguments),
         )  # fmt: skip
     written = write_futures(wanted, motions, len(past), manner, caption=_caption(arguments))
     _report(arguments, [str(file) for file in written])
@@ -164,8 +165,8 @@ def run_switch(arguments: argparse.Namespace) -> int:
     from motionloom.tasks.predict import switch
 
     motions = switch(
-        predictor, past, target, count=arguments.count, seconds=arguments.seconds, seed=arguments.seed,
-        facing=arguments.facing, guidance=arguments.guidance, foot_lock=not arguments.raw, **_steps(arguments),
+        predictor, past, target, seconds=arguments.seconds, facing=arguments.facing, foot_lock=arguments.foot_lock,
+        **sampling_of(arguments),
     )  # fmt: skip
     written = write_futures(wanted, motions, len(past), manner, caption=_caption(arguments))
     _report(arguments, [str(file) for file in written])
@@ -214,11 +215,11 @@ def _pieces(
                 done += len(piece)
                 move(done, frames * arguments.count)
 
+        settings = sampling_of(arguments) | {"count": 1}
         for number in range(arguments.count):
             pieces = predict_pieces(
-                predictor, past, seconds=arguments.seconds, number=number, seed=arguments.seed, hold=hold,
-                guidance=arguments.guidance, root=not arguments.no_root, foot_lock=not arguments.raw,
-                **_steps(arguments),
+                predictor, past, seconds=arguments.seconds, number=number, hold=hold, root=not arguments.no_root,
+                foot_lock=arguments.foot_lock, **settings,
             )  # fmt: skip
             yield moved(pieces, number * frames)
 
@@ -230,12 +231,6 @@ def _predictor(arguments: argparse.Namespace) -> "Predictor":
     from motionloom.weights.predictor import Predictor
 
     return Predictor.load(arguments.weights, device=arguments.device)
-
-
-def _steps(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The task's own numbers unless the line says others."""
-    said = {"steps": arguments.steps, "temperature": arguments.temperature}
-    return {name: value for name, value in said.items() if value is not None}
 
 
 def _inputs(arguments: argparse.Namespace) -> list[Path]:

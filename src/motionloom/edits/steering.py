@@ -83,15 +83,15 @@ def corrected(denoise: Denoiser, corrections: Sequence[Correction | None]) -> De
     """The denoiser whose guess of row i is changed by ``corrections[i]``; None leaves the row alone."""
     if not any(corrections):
         return denoise
+    return lambda state, level: corrected_rows(denoise(state, level), corrections, level)
 
-    def edited(state: Tensor, level: int) -> Tensor:
-        guess = denoise(state, level)
-        if len(guess) != len(corrections):
-            raise ValueError(f"{len(corrections)} corrections for {len(guess)} rows: give one, or None, per row")
-        rows = [row if change is None else change(row, level) for row, change in zip(guess, corrections, strict=True)]
-        return torch.stack(rows)
 
-    return edited
+def corrected_rows(guess: Tensor, corrections: Sequence[Correction | None], level: int) -> Tensor:
+    """A guess (rows, frames, features) whose row i went through ``corrections[i]``, if there is one."""
+    if len(guess) != len(corrections):
+        raise ValueError(f"{len(corrections)} corrections for {len(guess)} rows: give one, or None, per row")
+    rows = [row if change is None else change(row, level) for row, change in zip(guess, corrections, strict=True)]
+    return torch.stack(rows)
 
 
 # What does not depend on the guess

@@ -7,7 +7,7 @@ drawn motion is put into the world and fitted to what is left of the wishes (`fi
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal, Unpack
+from typing import Any, Literal, TypeAlias, Unpack
 
 import numpy as np
 import torch
@@ -15,7 +15,7 @@ from torch import Tensor
 
 from motionloom import rotations as rot
 from motionloom._moved import renamed, say
-from motionloom.diffusion import Denoiser, Weight, mix
+from motionloom.diffusion import Denoiser, Weight, blend, guide, mix
 from motionloom.edits import fitting
 from motionloom.edits.steering import Correction, corrected, toward
 from motionloom.errors import MotionloomError
@@ -24,14 +24,15 @@ from motionloom.features.layout import ric
 from motionloom.goals.goal import Goal, Placement, placement_of
 from motionloom.goals.segment import LONGEST
 from motionloom.motion import Motion
+from motionloom.nets.prior import Condition, PriorNet
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.blending import blended
 from motionloom.tasks.sampling import Batch, Progress, Rows, Sampling, Settings, sample, to_features
 from motionloom.tasks.text import check_prompts, to_motion
-from motionloom.weights.adapter import Adapter, adapted
+from motionloom.weights.adapter import AdaptedNet, Adapter, adapted, show
 from motionloom.weights.adapter import adapters as shipped
 from motionloom.weights.prior import Prior
 
+Net: TypeAlias = PriorNet | AdaptedNet
 Weighted = tuple[Adapter, Weight]
 Adapters = Literal["none", "fitting"] | Sequence[Adapter | Weighted]
 
@@ -145,6 +146,18 @@ def steered_features(
     rows = Rows(prompts, [len(goal)] * len(prompts), seeds)
     made = dict(sample(prior, rows, chosen, edits=[steer], progress=progress))
     return [to_features(prior, made[row]).cpu() for row in range(len(prompts))]
+
+
+def blended(
+    nets: Sequence[Net], cond: Condition, known: Tensor, mask: Tensor, *, weights: Sequence[Weight], guidance: float
+) -> Denoiser:
+    """DiffusionBlending: networks guided by themselves, then their weighted sum; shown what is given if they can be."""
+    null = cond.null()
+    guided = [
+        guide(net, show(net, net.bind(cond), known, mask), show(net, net.bind(null), known, mask), guidance)
+        for net in nets
+    ]
+    return guided[0] if len(nets) == 1 and weights[0] == 1.0 else blend(guided, weights)
 
 
 def controlled_numbers(goal: Goal) -> Tensor:

@@ -15,7 +15,7 @@ from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.completion import Known
 from motionloom.tasks.splice import carried_level, concatenated, kept_parts, overlaid, standing
-from motionloom.tasks.windows import CONTEXT, person_of
+from motionloom.tasks.windows import CONTEXT, Past
 from motionloom.weights.predictor import Predictor
 
 Array = NDArray[np.float64]
@@ -57,19 +57,20 @@ class Given:
         return concatenated(held, new.frames(count, len(new))) if count < len(new) else held
 
 
-def given(predictor: Predictor, past: Motion, hold: Hold | None, seconds: float) -> Given | None:
+def given(predictor: Predictor, seen: Past, hold: Hold | None, seconds: float) -> Given | None:
     """A hold made ready for a past and a horizon; raises MotionloomError for what cannot be held."""
     if hold is None:
         return None
+    past = seen.motion
     check_like(past, hold.source, "motion that parts are held to")
     _check_parts(hold, seconds)
-    rate, total = predictor.fps / past.fps, max(round(seconds * past.fps), 1)
+    rate, total = seen.rate, seen.frames(seconds)
     source = _placed(past, hold.source) if hold.align else hold.source
     source = source.frames(0, total + int(np.ceil(predictor.frames / rate)))  # the last window looks further
     end = len(source) / past.fps
     tail = past.frames(max(len(past) - round(CONTEXT * past.fps) - 2, 0), len(past))
     together = to_smpl22(concatenated(tail, source)).positions()
-    together = together + (person_of(predictor, past)[-1, 0] - together[len(tail) - 1, 0])
+    together = together + (seen.person[-1, 0] - together[len(tail) - 1, 0])
     count = int(len(source) * rate + 1e-6)
     places = positions_at(together, len(tail) - 1 + np.arange(1, count + 1) / rate)
     source = concatenated(source, *[source.frames(len(source) - 1, len(source))] * round(RAMP * past.fps))

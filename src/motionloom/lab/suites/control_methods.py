@@ -11,10 +11,12 @@ import torch
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.kinematics.physics import Array
+from motionloom.lab.papers.diffusion_blending import control_features
 from motionloom.lab.suites.control_kinds import Kind, Target
 from motionloom.motion import Motion
-from motionloom.tasks.blending import Net, control_features
+from motionloom.tasks.control import Net
 from motionloom.tasks.sampling import BATCH as ROWS
+from motionloom.tasks.sampling import Observed
 from motionloom.tasks.text import SOLVER, SPACING, sample_features, smooth, to_motion
 from motionloom.weights.adapter import Adapter, adapted
 from motionloom.weights.prior import Prior
@@ -100,7 +102,7 @@ def uncontrolled(prior: Prior, how: Sampling, *, exported: bool) -> Method:
 
 
 def published(prior: Prior, how: Sampling, nets: Sequence[Net], *, noise_free: bool) -> Method:
-    """Control in the representation: the fixed numbers are written into every guess (`tasks.blending`)."""
+    """Control in the representation: the fixed numbers are written into every guess (`diffusion_blending`)."""
 
     def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
         result: dict[int, Made] = {}
@@ -123,8 +125,8 @@ def _controlled(
     given = torch.from_numpy(np.stack([target.known for target in targets])).to(prior.mean)
     known = (given - prior.mean) / prior.std
     state = control_features(
-        prior, nets, [target.prompt for target in targets], known, mask, weights=None, seeds=seeds,
-        guidance=how.guidance, steps=how.steps, solver=how.solver, spacing=how.spacing, noise_free=noise_free,
+        prior, nets, [target.prompt for target in targets], Observed(known, mask, noise_free), seeds=seeds,
+        guidance=how.guidance, steps=how.steps, solver=how.solver, spacing=how.spacing,
     )  # fmt: skip
     drawn = state * prior.std + prior.mean
     if prior.net.config.patch > 1:

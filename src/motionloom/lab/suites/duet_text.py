@@ -26,7 +26,16 @@ from motionloom.lab.suites.duet_ways import no_communication_net
 from motionloom.lab.suites.harness import Run, Say, check_names
 from motionloom.lab.suites.needs import pairs_of
 from motionloom.tasks.control import moved
-from motionloom.tasks.pair import Duet, generate_pair, known_state, pair_features, person_seeds, placement
+from motionloom.tasks.pair import (
+    Duet,
+    PairEdits,
+    generate_pair,
+    known_state,
+    pair_features,
+    person_seeds,
+    placement,
+    stacked,
+)
 from motionloom.tasks.text import GUIDANCE, STEPS, finish, frames_in
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -166,8 +175,7 @@ def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
         features, stands = pair_features(
             prior, net, [caption] * (2 * count), frames,
             seeds=[s for number in range(count) for s in person_seeds(seed, number)],
-            known=torch.cat([state for state, _ in told]), mask=torch.cat([mask for _, mask in told]),
-            guidance=how.guidance, steps=how.steps,
+            edits=PairEdits(stacked(told)), guidance=how.guidance, steps=how.steps,
         )  # fmt: skip
         made = []
         for numbers, standing in zip(features, stands.double().numpy(), strict=True):

@@ -22,7 +22,7 @@ from motionloom.lab.papers.mrt import Mrt, completed
 from motionloom.nets.pair import PairNet, Talk, fitting
 from motionloom.nets.prior import ModulatedBlock, PriorNet, PublishedBlock
 from motionloom.tasks.long import Past
-from motionloom.tasks.pair import known_state, pair_features, person_seeds
+from motionloom.tasks.pair import PairEdits, known_state, pair_features, person_seeds, stacked
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior, save_prior
 
@@ -121,8 +121,8 @@ def drawn(
         features, _ = make(
             prior, net, [prompt] * len(people), FRAMES,
             seeds=[s for number in crops.numbers for s in person_seeds(row_seed(seed, sample), number)],
-            known=torch.cat([state for state, _ in told]), mask=torch.cat([mask for _, mask in told]),
-            change=leaving if given == "past" else None, still=[False] * len(people), guidance=guidance, steps=steps,
+            edits=PairEdits(stacked(told), leaving if given == "past" else None, frozen=[False] * len(people)),
+            guidance=guidance, steps=steps,
         )  # fmt: skip
         stands, floors = np.stack([one.stands for one in known]), np.stack([one.floors for one in known])
         return two.decode(features.double().numpy(), stands) + floors[..., None, None, None] * _UP

@@ -176,7 +176,7 @@ def drawn(
 ) -> Way:
     """Our own way of predicting."""
     return lambda past: futures(
-        predictor, past, count=samples, seed=seed, steps=steps, guidance=guidance, rows=trials.ROWS,
+        predictor, past, count=samples, seed=seed, steps=steps, guidance=guidance, batch_size=trials.ROWS,
         solver=solver, spacing=spacing,
     )  # fmt: skip
 

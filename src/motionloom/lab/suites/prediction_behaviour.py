@@ -24,9 +24,10 @@ from motionloom.lab.suites.harness import Say, plain_row, silent
 from motionloom.lab.suites.prediction_trial import Array, Trial, from_root
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.completion import STEPS, TEMPERATURE, Known, next_frames
+from motionloom.tasks.completion import Known, next_frames
 from motionloom.tasks.predict import predict, switch
-from motionloom.tasks.windows import Pen
+from motionloom.tasks.sampling import PredictionSampling
+from motionloom.tasks.windows import WindowSampler
 from motionloom.weights.predictor import Predictor
 
 Found = tuple[list[Column], list[Row], dict[str, Any]]
@@ -69,8 +70,8 @@ def long_futures(
     count, fps = len(trial.windows), predictor.fps
     person = np.repeat(trial.pasts(0, count), samples, axis=0)
     turns, made = int(np.ceil(seconds * fps / (predictor.frames - predictor.observed) - 1e-9)), []
-    pen = Pen(predictor, STEPS, 1.0, TEMPERATURE, True)
-    for turn, new in enumerate(pen.windows(person, [(seed, i) for i in range(len(person))], None, turns)):
+    sampler = WindowSampler(predictor, PredictionSampling())
+    for turn, new in enumerate(sampler.windows(person, [(seed, i) for i in range(len(person))], None, turns)):
         say(f"window {turn + 1} of {turns}")
         made.append(new)
     whole = np.concatenate(made, axis=1)[:, : round(seconds * fps)]
