@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from motionloom.bulk.metadata import read_batch
     from motionloom.errors import MotionloomError
     from motionloom.goals.goal import Goal
-    from motionloom.goals.hold import HeldPart, Hold
+    from motionloom.goals.hold import FixedJoints, FixedPart, HeldPart, Hold
     from motionloom.goals.segment import Segment
     from motionloom.io import load, save
     from motionloom.motion import Motion
@@ -65,6 +65,8 @@ _PLACES = {
     "Redraw": "tasks.edit",
     "edit": "tasks.edit",
     "Goal": "goals.goal",
+    "FixedJoints": "goals.hold",
+    "FixedPart": "goals.hold",
     "HeldPart": "goals.hold",
     "Hold": "goals.hold",
     "Segment": "goals.segment",
@@ -83,6 +85,8 @@ __all__ = [
     "SMPL22",
     "Controlled",
     "Extend",
+    "FixedJoints",
+    "FixedPart",
     "Goal",
     "HeldPart",
     "Hold",

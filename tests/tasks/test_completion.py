@@ -211,7 +211,7 @@ MISTAKES = {
 
 @pytest.mark.parametrize("name", sorted(MISTAKES))
 def test_what_cannot_be_completed_is_told(name: str) -> None:
-    with pytest.raises(MotionloomError, match="got|a count of 0"):
+    with pytest.raises(MotionloomError, match=r"got|a count of 0"):
         futures(PREDICTOR, **{"past": PAST, "count": 1} | MISTAKES[name])
 
 

@@ -4,7 +4,7 @@ import argparse
 import sys
 from collections.abc import Generator, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.futures import FORMATS, Long, Manner, targets, write_futures
 from motionloom.cli.futures import Target as Files
@@ -14,7 +14,7 @@ from motionloom.cli.sampling import bar, check_count, fail, sampling_of
 from motionloom.cli.skeletons import Target, add_skeleton, read_target
 
 if TYPE_CHECKING:
-    from motionloom.goals.hold import Hold
+    from motionloom.goals.hold import FixedJoints
     from motionloom.motion import Motion
     from motionloom.weights.predictor import Predictor
 
@@ -178,7 +178,7 @@ def run_switch(arguments: argparse.Namespace) -> int:
 
 
 def _predict_long(
-    arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", *, hold: "Hold | None", long: Long
+    arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", *, hold: "FixedJoints | None", long: Long
 ) -> int:
     """One future after the other, in memory that does not grow with their length."""
     from contextlib import closing
@@ -202,7 +202,7 @@ def _predict_long(
 
 
 def _pieces(
-    arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", hold: "Hold | None", *, frames: int
+    arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", hold: "FixedJoints | None", *, frames: int
 ) -> "Generator[Iterator[Motion], None, None]":
     """Of each future its pieces, while a bar shows how far they are."""
     from motionloom.tasks.predict import predict_pieces
@@ -215,7 +215,7 @@ def _pieces(
                 done += len(piece)
                 move(done, frames * arguments.count)
 
-        settings = sampling_of(arguments) | {"count": 1}
+        settings: dict[str, Any] = sampling_of(arguments) | {"count": 1}
         for number in range(arguments.count):
             pieces = predict_pieces(
                 predictor, past, seconds=arguments.seconds, number=number, hold=hold, root=not arguments.no_root,
@@ -292,10 +292,10 @@ def _difference(motion: "Motion", past: "Motion") -> str:
     return "bones that change length" if motion.translations is not None and past.translations is None else ""
 
 
-def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "Hold | None":
+def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "FixedJoints | None":
     """What is held, if anything is."""
     from motionloom.goals import mask_file
-    from motionloom.goals.hold import HeldPart, Hold
+    from motionloom.goals.hold import FixedJoints, FixedPart
 
     if not (arguments.hold or arguments.mask):
         if arguments.source is not None:
@@ -306,7 +306,7 @@ def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "Hold 
     parts = mask_file.read_mask(arguments.mask, fps=past.fps) if arguments.mask else ()
     if arguments.hold:
         names = [name.strip() for part in arguments.hold for name in part.split(",") if name.strip()]
-        parts = (*parts, HeldPart(mask_file.check_names(names)))
+        parts = (*parts, FixedPart(mask_file.check_names(names)))
     seconds = horizon / past.fps
     late = min(min(begin for begin, _ in part.spans) for part in parts)
     if late >= seconds:
@@ -322,7 +322,7 @@ def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "Hold 
             f"on, and parts are held for {last:.2f} s; give a longer motion, a shorter --seconds, or hold them for "
             "less with 'to' in a --mask"
         )
-    return Hold(source.frames(skipped, len(source)), parts)
+    return FixedJoints(source.frames(skipped, len(source)), parts)
 
 
 # What cannot be asked

@@ -21,8 +21,9 @@ from motionloom.edits.steering import Correction, corrected, toward
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import mask as named
 from motionloom.features.layout import ric
-from motionloom.goals.goal import Goal, Placement, placement_of
+from motionloom.goals.goal import Goal, placement_of
 from motionloom.goals.segment import LONGEST
+from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.nets.prior import Condition, PriorNet
 from motionloom.skeleton import SMPL22
@@ -206,7 +207,7 @@ def _seeing(net: Callable[[Tensor, Tensor], Denoiser], change: Correction, prior
     return seen
 
 
-def moved(motion: Motion, place: Placement) -> Motion:
+def moved(motion: Motion, place: GroundPose) -> Motion:
     """A motion that starts at the origin facing +Z, put to ``place``."""
     turn = rot.rotvec_to_quat(np.array([0.0, place.facing, 0.0]))
     rotations = motion.rotations.copy()

@@ -15,7 +15,7 @@ from motionloom.diffusion import Denoiser
 from motionloom.edits.boundary import InpaintWindow, arrival, joining
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT
-from motionloom.goals.goal import Placement
+from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import heading
 from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, Sampling, sample, smooth
 from motionloom.weights.prior import Prior
@@ -62,21 +62,21 @@ def inpaint_motion(
     return Inpainted(_placed(features, known[0].cpu().double(), window, place), features[:, LAYOUT["contacts"]].numpy())
 
 
-def _placement(positions: Array) -> Placement:
-    return Placement(float(positions[0, 0, 0]), float(positions[0, 0, 2]), float(heading(positions[:1])[0]))
+def _placement(positions: Array) -> GroundPose:
+    return GroundPose(float(positions[0, 0, 0]), float(positions[0, 0, 2]), float(heading(positions[:1])[0]))
 
 
-def _placed(features: Tensor, known: Tensor, window: InpaintWindow, place: Placement) -> Array:
+def _placed(features: Tensor, known: Tensor, window: InpaintWindow, place: GroundPose) -> Array:
     """(frames, 22, 3) in the world, where the frames before the stretch are, or else those behind it."""
     positions = humanml.decode_positions(features).numpy()
     if window.first == 0 and window.last < len(features):
         there, here = (_standing(f, window.last) for f in (known, features))
-        turn = Placement(there.x, there.z, there.facing - here.facing)
+        turn = GroundPose(there.x, there.z, there.facing - here.facing)
         positions = turn.to_world(positions - np.array([here.x, 0, here.z]))
     return place.to_world(positions)
 
 
-def _standing(features: Tensor, frame: int) -> Placement:
+def _standing(features: Tensor, frame: int) -> GroundPose:
     turn, root = humanml.recover_root(features)
     half = torch.atan2(turn[frame, 2], turn[frame, 0])
-    return Placement(float(root[frame, 0]), float(root[frame, 2]), -2 * float(half))
+    return GroundPose(float(root[frame, 0]), float(root[frame, 2]), -2 * float(half))

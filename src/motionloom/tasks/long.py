@@ -26,9 +26,10 @@ from motionloom.edits.steering import Correction, toward
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
-from motionloom.goals.goal import Goal, Placement, merged, overlaid, placement_of
+from motionloom.goals.goal import Goal, merged, overlaid, placement_of
 from motionloom.goals.paths import along
 from motionloom.goals.segment import Segment
+from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
 from motionloom.nets.prior import Bound, PriorNet
@@ -116,7 +117,7 @@ def compose(
             first += frames
 
     pieces = long_features(prior, asked(), past=past, sampling=chosen, progress=progress)
-    place = past.end if past else track.stands(0) if track else Placement()
+    place = past.end if past else track.stands(0) if track else GroundPose()
     return bodies(in_world(prior, pieces, wishes, place, track), prior.fps, foot_lock=foot_lock)
 
 
@@ -276,7 +277,7 @@ class Past:
 
     known: Tensor
     """(frames, 263) features of its last frames, not standardised."""
-    end: Placement
+    end: GroundPose
     """Where the person is one frame behind them: at frame 0 of what follows."""
 
     @staticmethod
@@ -289,7 +290,7 @@ class Past:
             )
         positions = positions[-LOOK_BACK - 1 :]
         x, _, z = positions[0, 0]
-        begin = Placement(float(x), float(z), float(heading(positions[:1])[0]))
+        begin = GroundPose(float(x), float(z), float(heading(positions[:1])[0]))
         known = humanml.encode(begin.from_world(positions)).astype(np.float64)
         return Past(torch.from_numpy(known).float(), decoded(known, begin)[1])
 
@@ -323,12 +324,12 @@ class Track:
             raise MotionloomError("the path of a long motion must say where to be in every frame; give points for all")
         return Track(path, np.where(path.facing_asked, path.facing, along(path.positions[:, 0, [0, 2]], fps)))
 
-    def stands(self, frame: int) -> Placement:
+    def stands(self, frame: int) -> GroundPose:
         """Where the person is at that frame."""
         if frame == 0:
             return placement_of(self.path)
         x, _, z = self.path.positions[frame, 0]
-        return Placement(float(x), float(z), float(self.ways[frame]))
+        return GroundPose(float(x), float(z), float(self.ways[frame]))
 
     def led(self, segment: Segment, first: int, frames: int) -> Segment:
         """The segment that begins with frame ``first``, with its part of the path among its wishes."""
@@ -341,7 +342,7 @@ class Track:
 
 
 def in_world(
-    prior: Prior, pieces: Iterable[Tensor], wishes: deque[Goal | None], place: Placement, track: Track | None
+    prior: Prior, pieces: Iterable[Tensor], wishes: deque[Goal | None], place: GroundPose, track: Track | None
 ) -> Iterator[Places]:
     """Each piece where the one before it ends; on a path bent once more, so that errors do not add up."""
     mean, first = prior.mean.cpu(), 0
@@ -359,9 +360,9 @@ def in_world(
         place, first = after, first + len(piece)
 
 
-def decoded(features: Array, place: Placement) -> tuple[Array, Placement]:
+def decoded(features: Array, place: GroundPose) -> tuple[Array, GroundPose]:
     """(frames, 22, 3) of features (frames, 263) that begin at a place, and the place of the frame behind them."""
     positions = humanml.decode_positions(np.concatenate([features, features[-1:]]))
     x, _, z = place.to_world(positions[-1, 0])
     facing = place.facing - 2 * float(features[:, LAYOUT["yaw_velocity"]].sum())
-    return place.to_world(positions[:-1]), Placement(float(x), float(z), facing)
+    return place.to_world(positions[:-1]), GroundPose(float(x), float(z), facing)

@@ -24,8 +24,9 @@ from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
 from motionloom.features.pair import one_world, together
-from motionloom.goals.goal import Goal, Placement, placement_of
+from motionloom.goals.goal import Goal, placement_of
 from motionloom.goals.segment import LONGEST
+from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.nets.pair import PairNet, join, part
 from motionloom.retarget import to_smpl22
@@ -230,7 +231,7 @@ def generate_pair(
         raise MotionloomError("a prompt is empty; say in words what the two people do")
     check_pair(prior, count=chosen.number(), seconds=len(goal) / FPS if goal else seconds)
     frames = _goal_frames(goal) if goal else frames_in(seconds, prior.fps)
-    place = placement_of(goal) if goal else Placement()
+    place = placement_of(goal) if goal else GroundPose()
     change: list[Correction | None] = [None, None]
     if goal:
         change[person] = toward(goal.seen_from(place), prior)
@@ -262,13 +263,13 @@ def _goal_of(goals: tuple[Goal | None, Goal | None], settings: Any) -> tuple[Goa
     return next((goal for goal in goals if goal), None), int(goals[0] is None and goals[1] is not None)
 
 
-def placement(stand: np.ndarray) -> Placement:
-    """A stand (4,) of `features.pair` as a `Placement`."""
+def placement(stand: np.ndarray) -> GroundPose:
+    """A stand (4,) of `features.pair` as a `GroundPose`."""
     c, s, x, z = (float(number) for number in stand)
-    return Placement(x, z, float(np.arctan2(s, c)))
+    return GroundPose(x, z, float(np.arctan2(s, c)))
 
 
-def standing_at(stands: Array, place: Placement, person: int) -> Array:
+def standing_at(stands: Array, place: GroundPose, person: int) -> Array:
     """Stands (2, 4) moved rigidly on the ground so that ``person`` stands at a place."""
     there = np.array([np.cos(place.facing), np.sin(place.facing), place.x, place.z])
     return two.compose(there, two.seen(stands[person], stands))
@@ -339,7 +340,7 @@ def complete_pair(
     frames = seen + int(np.ceil(added / past[0].fps * FPS - 1e-6)) + 1
     net, count = block.net(prior), chosen.number()
     observed = known_state(prior, net, torch.from_numpy(known), torch.from_numpy(stands), frames)
-    leaving = [Past(torch.from_numpy(one).float(), Placement()).holder(prior, frames) for one in known]
+    leaving = [Past(torch.from_numpy(one).float(), GroundPose()).holder(prior, frames) for one in known]
     edits = PairEdits(stacked([observed] * count), leaving * count, frozen=[False] * (2 * count))
     features, _ = pair_features(
         prior, net, said * count, frames, seeds=pair_seeds(chosen), edits=edits, sampling=chosen, progress=progress

@@ -18,7 +18,7 @@ from motionloom._moved import renamed
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import positions_at
 from motionloom.features.positions import SMPL_LAYOUT
-from motionloom.goals.hold import HeldPart, Hold
+from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.tasks.completion import FUTURES, Known
@@ -28,7 +28,7 @@ from motionloom.tasks.splice import apply_positions, carried_level, concatenated
 from motionloom.tasks.windows import CONTEXT, Past, WindowSampler, windows_for
 from motionloom.weights.predictor import Predictor
 
-__all__ = ["HeldPart", "Hold", "predict", "predict_pieces", "switch"]
+__all__ = ["FixedJoints", "FixedPart", "predict", "predict_pieces", "switch"]
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ def predict(
     past: Motion,
     *,
     seconds: float = 2.0,
-    hold: Hold | None = None,
+    hold: FixedJoints | None = None,
     root: bool = True,
     foot_lock: bool = True,
     sampling: PredictionSampling | None = None,
@@ -105,7 +105,7 @@ def predict_pieces(
     *,
     seconds: float,
     number: int = 0,
-    hold: Hold | None = None,
+    hold: FixedJoints | None = None,
     root: bool = True,
     foot_lock: bool = True,
     sampling: PredictionSampling | None = None,
