@@ -44,7 +44,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
         progress(1, 1)
         return [stream.joined([past, future(past, seconds, i)]) for i in range(count)]
 
-    def predict_pieces(predictor, past, *, seconds, number, seed, hold, guidance, root, foot_lock, **walk):
+    def predict_pieces(predictor, past, *, seconds, number, count, seed, hold, guidance, root, foot_lock, **walk):
         seen.update(past=past, seconds=seconds, seed=seed, hold=hold, root=root, foot_lock=foot_lock, walk=walk)
         if (number, -1) == seen["stop"]:
             raise seen["problem"]
