@@ -130,8 +130,8 @@ def test_how_firmly_the_two_stay_together_changes_what_is_drawn(files: Path, nam
 def test_how_firmly_the_two_stay_together_is_asked_behind_a_past_too(files: Path, monkeypatch) -> None:
     asked = []
 
-    def complete(*_, together: float, **__):
-        asked.append(together)
+    def complete(*_, pair_guidance: float, **__):
+        asked.append(pair_guidance)
         return [walkers(1.0)]
 
     monkeypatch.setattr(pair, "complete_pair", complete)
