@@ -72,8 +72,8 @@ class Container:
         """The description in a file's head."""
         with self.parsing(path):
             if self.key not in head:
-                kinds = [name.removeprefix("motionloom-") for name in head if name.startswith("motionloom")]
-                raise ValueError(f"its head is that of {', '.join(kinds) or 'something else'}")
+                kind = next((_a(other.noun) for other in KINDS if other.key in head), "something else")
+                raise MotionloomError(f"{path} is {kind}, not {_a(self.noun)}; name weights of that kind")
             about = plain_json(head[self.key])
             if about.get("format", FORMAT) != FORMAT:
                 raise MotionloomError(
@@ -103,10 +103,15 @@ class Container:
         return save_tensors(kept, path, metadata={self.key: json.dumps({"format": FORMAT, **about}, default=dict)})
 
 
+def _a(noun: str) -> str:
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
+
+
 PRIORS = Container("prior", "motionloom")
 PREDICTORS = Container("predictor", "motionloom-predictor", "prediction")
 PAIRS = Container("two-person block", "motionloom-pair", "pair", 64 << 20)
 ADAPTERS = Container("adapter", "motionloom-adapter", "control", 64 << 20)
+KINDS = (PRIORS, PREDICTORS, PAIRS, ADAPTERS)
 
 
 def read_tensors(path: Path, max_bytes: int = MAX_BYTES) -> tuple[dict[str, Tensor], dict[str, str]]:
