@@ -124,6 +124,12 @@ def test_hostile_recipes_are_refused_at_once(tmp_path, said):
     assert "\n" not in str(caught.value)
 
 
+def test_keys_of_very_many_parts_are_refused_before_they_are_read(tmp_path):
+    (tmp_path / "a.toml").write_text("a." * 20_000 + "a = 1")
+    with pytest.raises(MotionloomError, match="dots"):
+        load_recipe(tmp_path / "a.toml")
+
+
 def test_a_key_of_very_many_parts_on_the_line_is_no_key():
     assert changes(["a." * 200_000 + "a=1"]) == {"a." * 200_000 + "a": "1"}
 
