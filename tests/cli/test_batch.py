@@ -5,9 +5,16 @@ from pathlib import Path
 
 import pytest
 
+from motionloom import io
 from motionloom.cli import main
+from motionloom.io.atomic import finished
+from motionloom.tasks.adapting import adapt
+from motionloom.tasks.text import generate
+from motionloom.weights.prior import Prior
 from tests.bulk.rows import rows, written
 from tests.cli.said import complaint
+from tests.io.motions import largest_distance
+from tests.weights.test_adapter import adapter_of, trained
 
 
 @pytest.fixture(autouse=True)
@@ -34,6 +41,23 @@ def test_variants_of_prompts_are_made_once(weights: str, capsys: pytest.CaptureF
     assert command(weights, *words) == 0
     assert json.loads(capsys.readouterr().out) == {"folder": "out", "tried": 0, "made": 4}
     assert sorted(path.name for path in Path("out").rglob("*.npz")) == made
+
+
+def test_what_was_taught_is_in_the_motions_and_in_their_names(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Motions with an adapter are those of `generate` with it; without it the folder is another batch's."""
+    prior = Prior.load(weights)
+    for seed, name in ((1, "a"), (2, "b")):
+        adapter_of(trained(prior.net, given_rank=0, seed=seed), prior.net).save(f"{name}.safetensors")
+    words = ("--prompts", "prompts.txt", "--seconds", "0.5", "--seed", "3")
+    assert command(weights, *words, "--adapter", "a.safetensors:0.5") == 0
+    made = {path.name: io.load(path) for path in finished(Path("out"), "**/*.npz")}
+    (motion,) = generate(adapt(prior, [(Path("a.safetensors"), 0.5)]), "a person walks", seconds=0.5, seed=3, steps=2)
+    assert min(largest_distance(motion, one) for one in made.values()) < 3e-6
+    for other in ((), ("--adapter", "b.safetensors:0.5"), ("--adapter", "a.safetensors")):
+        assert command(weights, *words, *other) == 2
+        assert "other settings" in capsys.readouterr().err
+    assert command(weights, *words, "--adapter", "none.safetensors") == 2
+    assert "there is no adapter none.safetensors" in capsys.readouterr().err
 
 
 def test_failed_rows_are_told_and_the_exit_code_says_so(weights: str, capsys: pytest.CaptureFixture[str]) -> None:

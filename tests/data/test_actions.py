@@ -1,11 +1,16 @@
 """Which captions name which action, and which part of a recording shows a change."""
 
+import re
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from motionloom.data.actions import ACTIONS, action_of, core, sentences, side_of
 from motionloom.data.words import mirror_text
 from tests.kinematics import people
+from tests.work import ends
 
 
 @pytest.mark.parametrize(
@@ -33,6 +38,32 @@ def test_captions_name_the_action_that_people_read_in_them(captions: tuple[str, 
     found = action_of(captions)
     assert found is not None
     assert found.name == name
+
+
+WORDS = ["a person", "walks", "walk", "walking", "runs", "jogs", "then", "slowly", "to", "and", "stops", "stop",
+         "sits down", "stands up", "starts", "picks", "back", "forward", "turns around", "jumps", "left", "right",
+         "lying", "gets up", "floor", "puts", "down", "skips", "crouches", "knee,"]  # fmt: skip
+
+
+@given(st.lists(st.sampled_from(WORDS), max_size=12).map(" ".join))
+def test_patterns_mean_what_they_mean_as_expressions(text: str) -> None:
+    """What is searched part by part is found where the whole expression is found, and nowhere else."""
+    for action in ACTIONS.values():
+        plain = any(re.search(pattern, text) for pattern in action.words) and not re.search(action.unless, text)
+        assert action.named_by([text]) == plain, action.name
+
+
+def test_parts_are_joined_outside_of_brackets_only() -> None:
+    for action in ACTIONS.values():
+        for part in (part for pattern in action.words for part in pattern.split(".*")):
+            assert re.compile(part)
+            assert not re.search(r"[*+]", part.replace(r"\w*", "*")), part
+        assert not re.search(r"[*+]", action.unless), action.unless
+
+
+@pytest.mark.parametrize("words", ["walks_", "walk ", "run stand start jog walk ", "crawl"])
+def test_an_endless_caption_takes_no_endless_time(words: str) -> None:
+    assert ends(lambda: action_of([words * (200_000 // len(words))]))
 
 
 def test_one_caption_among_many_does_not_name_the_action() -> None:

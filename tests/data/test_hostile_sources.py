@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from motionloom.data.build import build
+from motionloom.data.clips import Clip, Note, read_clip, write_clip
 from motionloom.data.sources import Span, find_takes
 from motionloom.errors import MotionloomError
+from motionloom.lab.suites.items import read_items
+from motionloom.lab.suites.protocol import Selection
 
 ROW = {"amass_path": "x/CMU/02/02_01_poses.npy", "mirrored": False, "start_s": 0.0, "end_s": 2.0, "split": "train",
        "captions": [{"text": "a man walks", "from_s": 0, "to_s": 0}]}  # fmt: skip
@@ -62,6 +65,42 @@ def test_texts_of_humanml3d_are_utf_8_with_seconds(tmp_path: Path, line: bytes) 
         (tmp_path / f"{split}.txt").write_text("1" if split == "train" else "")
     with pytest.raises(MotionloomError, match=r"1\.txt"):
         find_takes(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("lists", "named"),
+    [(["1\n1", "", ""], "train.txt lists 1, which train.txt"), (["1", "", "1"], "test.txt lists 1, which train.txt")],
+    ids=["twice in a list", "in two lists"],
+)
+def test_a_clip_is_listed_once(tmp_path: Path, lists: list[str], named: str) -> None:
+    """A list of a clip 20,000 times would be 20,000 takes; and what is trained on is not tested with."""
+    for part in ("new_joint_vecs", "texts"):
+        (tmp_path / part).mkdir()
+    np.save(tmp_path / "new_joint_vecs" / "1.npy", np.zeros((50, 263), np.float32))
+    (tmp_path / "texts" / "1.txt").write_text("a man walks#a/DET#0.0#0.0")
+    for split, said in zip(("train", "val", "test"), lists, strict=True):
+        (tmp_path / f"{split}.txt").write_text(said)
+    with pytest.raises(MotionloomError, match=named):
+        find_takes(tmp_path)
+    with pytest.raises(MotionloomError, match=named):
+        read_items(tmp_path, Selection(splits=("train", "test"), sources=("humanml3d",)))
+
+
+def test_captions_are_not_longer_than_captions_are(tmp_path: Path) -> None:
+    """2,000 characters; the longest of HumanML3D has 897."""
+    Span(0.0, 1.0, ("x" * 2000,), "human")
+    with pytest.raises(ValueError, match="2,001 characters"):
+        Span(0.0, 1.0, ("x", "x" * 2001), "human")
+    row = ROW | {"captions": [{"text": "walk " * 500, "from_s": 0, "to_s": 0}]}
+    (folder(tmp_path) / "c.jsonl").write_text(json.dumps(row))
+    with pytest.raises(MotionloomError, match="a caption has 2,500 characters"):
+        find_takes(tmp_path, captions=tmp_path / "c.jsonl")
+    clip = Clip(
+        "a", "x", "x", "train", "plain", (Note(0, 20, "human", ("x" * 2001,)),), np.zeros((20, 263), np.float32)
+    )
+    write_clip(tmp_path, clip)
+    with pytest.raises(MotionloomError, match="2,001 characters"):
+        read_clip(tmp_path / "a.safetensors")
 
 
 def test_a_part_that_a_killed_process_left_is_no_recording(tmp_path: Path) -> None:

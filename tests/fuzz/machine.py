@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.errors import MotionloomError
-from tests.fuzz.mutations import mutated
+from tests.fuzz.mutations import mutated, prepare
 
 if TYPE_CHECKING:
     from tests.fuzz.readers import Reader
@@ -61,13 +61,19 @@ class Result:
         return "\n".join([*rows, f"{sum(self.tried.values())} files tried, {len(self.failures)} failures"])
 
 
-def fuzz(*, seconds: float, files: int = 10**9, seed: int = 0, only: str = "", keep: Path | None = None) -> Result:
-    """Try mutated files, all readers in turn, until the time or the number of files is over."""
+def fuzz(
+    *, seconds: float, files: int = 10**9, first: int = 0, seed: int = 0, only: str = "", keep: Path | None = None
+) -> Result:
+    """Try mutated files, all readers in turn, until the time or the number of files is over.
+
+    A file is made of the seed and its number alone (and of `only`, which says whose turn it is): ``files=1`` and
+    ``first`` try one again.
+    """
     from tests.fuzz.readers import READERS
 
     chosen = [reader for reader in READERS if reader.name.startswith(only)]
     turns = [reader for turn in range(20) for reader in chosen if turn < reader.weight]
-    result, number = Result(), 0
+    result, number = Result(), first
     memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
     with tempfile.TemporaryDirectory(dir=memory) as place, warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -76,10 +82,11 @@ def fuzz(*, seconds: float, files: int = 10**9, seed: int = 0, only: str = "", k
             folder.mkdir(parents=True)
             reader.make(folder)
             reader.read(folder)
+        prepare()
         end = time.monotonic() + seconds
-        job = _Job(Path(place), turns, end, seed, keep.absolute() if keep else None)
-        while number < files and time.monotonic() < end:
-            number = _one_process(job, result, number, min(files, number + EACH))
+        job = _Job(Path(place), turns, end, seed, keep)
+        while number < first + files and time.monotonic() < end:
+            number = _one_process(job, result, number, min(first + files, number + EACH))
     return result
 
 
@@ -123,7 +130,17 @@ def _one_process(job: _Job, result: Result, number: int, last: int) -> int:
     died = -(child.exitcode or 0)
     said = f"no answer within {ALARM:g} s" if died == signal.SIGPROF else f"the process died ({child.exitcode})"
     result.failures.append((name, number, said))
+    if job.keep:
+        _keep(job, child.pid, name, number, said)
     return number + 1
+
+
+def _keep(job: _Job, process: int | None, name: str, number: int, said: str) -> None:
+    """Copy the folder that a process tried into the folder of failures, with a line on what happened."""
+    assert job.keep
+    kept = job.keep / f"{name}-{number}"
+    shutil.copytree(job.place / f"spoiled {process}", kept, dirs_exist_ok=True)
+    (kept / "what.txt").write_text(f"{said}\n")
 
 
 def _work(job: _Job, tell: multiprocessing.connection.Connection, first: int, last: int) -> None:
@@ -141,9 +158,7 @@ def _work(job: _Job, tell: multiprocessing.connection.Connection, first: int, la
         with contextlib.redirect_stderr(io.StringIO()):
             what, read = _try(reader.read, spoiled)
         if what and job.keep:
-            kept = job.keep / f"{reader.name}-{number}"
-            shutil.copytree(spoiled, kept, dirs_exist_ok=True)
-            (kept / "what.txt").write_text(f"{name}\n{what}\n")
+            _keep(job, os.getpid(), reader.name, number, f"{name}\n{what}")
         shutil.rmtree(spoiled)
         tell.send(("done", what.strip().splitlines()[-1][:300] if what else "", read))
         number += 1

@@ -14,6 +14,8 @@ from typing import Any
 
 Mutation = Callable[[bytes, random.Random], bytes]
 
+LARGEST = 900_000
+"""Bytes of a damaged file."""
 NUMBERS = [b"nan", b"NaN", b"-inf", b"Infinity", b"1e308", b"-1e308", b"1e999", b"1e-320", b"0", b"-0", b"-1", b"1",
            b"0.5", b"1e9", b"2147483648", b"-9223372036854775809", b"18446744073709551616", b"9" * 400, b"9" * 5000,
            b"0x10", b"1_0", b"1,5", b"--1", b"1e", b"\xd9\xa1", b"true", b"null", b"'1'", b"1" + b"0" * 30]  # fmt: skip
@@ -37,8 +39,7 @@ def mutated(data: bytes, kind: str, rng: random.Random) -> bytes:
             data = rng.choice(KINDS[kind])(data, rng)
         except Exception:
             data = rng.choice(RAW)(data, rng)  # damaged beyond its structure by the mutation before
-        if len(data) > 900_000:
-            data = data[:900_000]
+        data = data[:LARGEST]
     return data
 
 
@@ -182,7 +183,8 @@ def change(value: Any, rng: random.Random) -> Any:
             json.loads(json.dumps(other[at])) if at in (other if isinstance(other, dict) else range(len(other))) else 0
         )
     elif choice == 5 and isinstance(inside, list):
-        inside[key:key] = [inside[key]] * rng.choice((1, 10, 2000))
+        most = LARGEST // len(json.dumps(inside[key])) + 1  # more would be cut off anyway
+        inside[key:key] = [inside[key]] * min(most, rng.choice((1, 10, 2000)))
     elif choice == 5:
         inside[rng.choice(("x", "", "\n", "a" * 2000, "__class__"))] = inside[key]
     elif choice == 6:
@@ -278,19 +280,44 @@ def bomb(data: bytes, rng: random.Random) -> bytes:
     name = rng.choice([n for n in members if n.endswith(".npy")])
     kind, shape = rng.choice(BOMBS)
     packed = rng.choice((zipfile.ZIP_DEFLATED, zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA))
-    return _with_bomb(data, name, kind, shape, packed)
+    return _with_bomb(members, name, kind, shape, packed)
+
+
+def _with_bomb(members: dict[str, bytes], name: str, kind: str, shape: tuple[int, ...], packed: int) -> bytes:
+    made, head = io.BytesIO(), npy_head(kind, shape)
+    info = zipfile.ZipInfo(name)
+    info.compress_type, info.file_size = packed, len(head) + math.prod(shape) * int(kind[-1])
+    info.CRC, body = _packed_bomb(kind, shape, packed)
+    info.compress_size = len(body)
+    with zipfile.ZipFile(made, "w") as archive:
+        for other, content in members.items():
+            if other != name:
+                archive.writestr(zipfile.ZipInfo(other), content)
+        info.header_offset = made.tell()  # what is packed already is put in as it is
+        made.write(info.FileHeader() + body)
+        archive.filelist.append(info)
+        archive.NameToInfo[name] = info
+        archive.start_dir, archive._didModify = made.tell(), True  # type: ignore[attr-defined]
+    return made.getvalue()
 
 
 @cache
-def _with_bomb(data: bytes, name: str, kind: str, shape: tuple[int, ...], packed: int) -> bytes:
+def _packed_bomb(kind: str, shape: tuple[int, ...], packed: int) -> tuple[int, bytes]:
+    """Checksum and packed bytes of an array of zeros as a file of numpy's."""
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w") as archive:
-        for other, content in _members(data).items():
-            if other != name:
-                archive.writestr(zipfile.ZipInfo(other), content)
-        body = bytes(math.prod(shape) * int(kind[-1]))
-        archive.writestr(zipfile.ZipInfo(name), npy_head(kind, shape) + body, compress_type=packed, compresslevel=1)
-    return made.getvalue()
+        body = npy_head(kind, shape) + bytes(math.prod(shape) * int(kind[-1]))
+        archive.writestr(zipfile.ZipInfo("a"), body, compress_type=packed, compresslevel=1)
+        info = archive.getinfo("a")
+    first = len(info.FileHeader())
+    return info.CRC, made.getvalue()[first : first + info.compress_size]
+
+
+def prepare() -> None:
+    """Pack what takes long to pack: once, and not in every process."""
+    for kind, shape in BOMBS:
+        for packed in (zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA):
+            _packed_bomb(kind, shape, packed)
 
 
 def directory(data: bytes, rng: random.Random) -> bytes:

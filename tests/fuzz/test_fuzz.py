@@ -25,12 +25,12 @@ def test_every_reader_answers_damaged_files_with_a_value_or_one_sentence() -> No
 def one(monkeypatch: pytest.MonkeyPatch):
     """The fuzzer with one reader, whose way of reading is given."""
 
-    def run(read, files: int = 3) -> machine.Result:
+    def run(read, files: int = 3, first: int = 0, keep: Path | None = None) -> machine.Result:
         made = Reader(
             "x", lambda folder: (folder / "a").write_bytes(b"one 2 three\n"), {"a": "text"}, _good_first(read)
         )
         monkeypatch.setattr(readers, "READERS", [made])
-        return fuzz(seconds=600.0, files=files, seed=1)
+        return fuzz(seconds=600.0, files=files, first=first, seed=1, keep=keep)
 
     return run
 
@@ -94,6 +94,21 @@ def test_more_than_a_gigabyte_is_a_failure(one) -> None:
     assert not one(lambda folder: bytearray(machine.MEMORY // 2), files=1).failures
 
 
-def test_the_same_seed_tries_the_same_files(one) -> None:
-    seen = [str(one(fail(ValueError(str(seed)))).failures) for seed in (1, 1)]
-    assert seen[0] == seen[1]
+def show(folder: Path) -> None:
+    raise ValueError(repr((folder / "a").read_bytes()[:200]))
+
+
+def test_the_same_seed_and_number_make_the_same_file(one) -> None:
+    """So a file that failed is tried again alone."""
+    seen = one(show, files=5).failures
+    assert seen == one(show, files=5).failures
+    assert one(show, files=1, first=3).failures == seen[3:4]
+    assert len({what for _, _, what in seen}) > 1
+
+
+@pytest.mark.parametrize("read", [endless, show], ids=["hangs", "raises"])
+def test_what_fails_is_kept(one, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, read) -> None:
+    monkeypatch.setattr(machine, "ALARM", 0.2)
+    (failure,) = one(read, files=1, first=4, keep=tmp_path / "kept").failures
+    assert (tmp_path / "kept" / "x-4" / "a").is_file()
+    assert failure[2] in (tmp_path / "kept" / "x-4" / "what.txt").read_text()

@@ -15,10 +15,14 @@ import pytest
 from motionloom import io
 from motionloom.data.clips import read_clip
 from motionloom.io.atomic import finished
+from motionloom.weights.predictor import save_predictor
 from motionloom.weights.prior import save_prior
+from tests.cli.predict.clips import tiny_predictor
 from tests.data import people as made
 from tests.kills.programs import SIGNALS, Ended, moments, parts, run
 from tests.nets import tiny
+from tests.tasks.test_edit import person
+from tests.tasks.two_people import block
 from tests.train import runs
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs forks and signals")
@@ -68,35 +72,74 @@ def test_compose_keeps_what_was_finished_and_shows_nothing_half_written(weights:
     assert some or number == signal.SIGKILL, "no interruption came between the first piece and the last"
 
 
+@pytest.fixture(scope="module")
+def inputs(weights: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What the commands of `COUNTED` read: weights, clips and a goal."""
+    folder = tmp_path_factory.mktemp("inputs")
+    prior = tiny.prior()
+    save_prior(prior, folder / "pair.safetensors", half=False)
+    block(prior).save(folder / "block.safetensors", half=False)
+    save_predictor(tiny_predictor(), folder / "predictor.safetensors")
+    (folder / "goal.json").write_text(json.dumps({"path": {"points": [[1, 0], [1, 1.2]]}}))
+    io.save(person(1.0, 20.0), folder / "past.npz")
+    io.save(person(1.5, 20.0), folder / "kick.npz")
+    return folder
+
+
+COUNTED = {
+    "generate": (30, "a person walks", "--seconds", "0.5"),
+    "control": (12, "a person walks", "--goal", "@goal.json", "--seconds", "0.5"),
+    "edit": (3, "@past.npz", "a person walks", "--between", "0.3", "0.7"),
+    "predict": (18, "@past.npz", "--seconds", "0.3", "--weights", "@predictor.safetensors", "--no-foot-lock"),
+    "switch": (18, "@past.npz", "@kick.npz", "--seconds", "0.3", "--weights", "@predictor.safetensors", "--no-foot-lock"),
+    "duet": (10, "two people walk", "--seconds", "0.5", "--pair-weights", "@block.safetensors",
+             "--weights", "@pair.safetensors", "--no-foot-lock"),
+}  # fmt: skip
+"""Commands with a count, how many, and the other words."""
+
+
+def counted(command: str, inputs: Path, weights: str) -> tuple[list[str], int]:
+    """The words of a command, and how many motions it makes."""
+    count, *more = COUNTED[command]
+    words = [str(inputs / word[1:]) if str(word).startswith("@") else str(word) for word in more]
+    own = [] if "--weights" in words else ["--weights", weights]
+    out = ["--out", "m.glb" if command == "duet" else "m.npz"]
+    return [command, *words, "--count", str(count), "--steps", "3", *own, *out], int(count)
+
+
 @pytest.mark.parametrize("number", SIGNALS, ids=lambda number: number.name)
-def test_generate_keeps_the_motions_that_were_finished(weights: str, tmp_path: Path, number) -> None:
-    """Thirty motions, eight drawn at a time: the first ones, those that were finished, are there, bit for bit."""
-    words = ["generate", "a person walks", "--count", "30", "--seconds", "0.5", "--steps", "3", "--weights", weights,
-             "--out", "m.npz"]  # fmt: skip
-    _, chosen = moments(words, tmp_path / "whole", kills(8), seed=SEED)
+@pytest.mark.parametrize("command", COUNTED)
+def test_every_command_with_a_count_keeps_what_was_finished(
+    command: str, inputs: Path, weights: str, tmp_path: Path, number
+) -> None:
+    """Several are drawn at a time: the first ones, those that were finished, are there, bit for bit."""
+    words, count = counted(command, inputs, weights)
+    _, chosen = moments(words, tmp_path / "whole", kills(8 if command == "generate" else 3), seed=SEED)
+    names = sorted(path.name for path in finished(tmp_path / "whole", "*"))
+    assert len(names) == count
     for at in chosen:
         folder = tmp_path / f"at {at}"
         ended = run(words, folder, at=at, number=number)
         assert ended_by(number, ended), (at, ended)
         found = finished(folder, "*")
         for path in found:
-            right = io.load(tmp_path / "whole" / path.name)
-            assert np.array_equal(io.load(path).rotations, right.rotations)
+            assert path.read_bytes() == (tmp_path / "whole" / path.name).read_bytes()
         if number != signal.SIGKILL:
-            assert [path.name for path in found] == [f"m_{k:02d}.npz" for k in range(len(found))], at
+            assert [path.name for path in found] == names[: len(found)], at
             assert parts(folder) == []
-            assert (f"{len(found)} of 30 motions" in ended.said) == (len(found) > 0) or len(found) == 30
+            assert (f"{len(found)} of {count} " in ended.said) == (len(found) > 0) or len(found) == count
         shutil.rmtree(folder)
 
 
-def test_an_interruption_at_a_sixth_keeps_the_first_motions(weights: str, tmp_path: Path) -> None:
-    words = ["generate", "a person walks", "--count", "30", "--seconds", "0.5", "--steps", "3", "--weights", weights,
-             "--out", "m.npz"]  # fmt: skip
+@pytest.mark.parametrize("command", COUNTED)
+def test_an_interruption_late_keeps_the_first_ones(command: str, inputs: Path, weights: str, tmp_path: Path) -> None:
+    """At four fifths of the marks some are finished, whatever the command."""
+    words, count = counted(command, inputs, weights)
     whole = run(words, tmp_path / "whole")
-    ended = run(words, tmp_path / "cut", at=whole.marks * 2 // 5, number=signal.SIGTERM)
+    ended = run(words, tmp_path / "cut", at=whole.marks * 4 // 5, number=signal.SIGTERM)
     assert ended.code == 130
-    assert len(finished(tmp_path / "cut", "*.npz")) >= 8
-    assert "motions were finished" in ended.said
+    assert 0 < len(finished(tmp_path / "cut", "m*")) < count
+    assert "were finished" in ended.said
 
 
 @pytest.fixture(scope="module")

@@ -16,6 +16,7 @@ from motionloom.motion import Motion
 from motionloom.nets.pair import PairNet
 from motionloom.retarget import to_smpl22
 from motionloom.tasks import pair
+from motionloom.tasks.duet import react
 from motionloom.tasks.pair import (
     Ground,
     PairEdits,
@@ -140,6 +141,14 @@ def test_duets_are_repeated_by_their_seeds(prior: Prior, block: PairBlock) -> No
     again = generate_pair(prior, block, SAID[0], count=1, seed=4, **few)
     np.testing.assert_allclose(several[0][1].positions(), again[0][1].positions(), atol=1e-4)
     assert np.abs(several[1][1].positions() - again[0][1].positions()).max() > 1e-2
+    [second] = generate_pair(prior, block, SAID[0], count=1, first=1, seed=4, **few)
+    np.testing.assert_allclose(several[1][1].positions(), second[1].positions(), atol=1e-4)
+    added = {"seed": 4, "seconds": 0.5, "steps": 2, "foot_lock": False}
+    for make in (
+        lambda **some: complete_pair(prior, block, walkers(1.2), **some, **added),
+        lambda **some: react(prior, block, walkers(1.2)[0], **some, seed=4, steps=2, foot_lock=False),
+    ):
+        np.testing.assert_allclose(make(count=2)[1][1].positions(), make(count=1, first=1)[0][1].positions(), atol=1e-4)
     assert [len(motion) for motion in again[0]] == [12, 12]
 
 

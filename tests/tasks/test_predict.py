@@ -163,6 +163,8 @@ def test_future_i_is_the_same_alone_among_others_and_in_pieces() -> None:
     close(concatenated(*pieces), many[2])
     for i in (0, 1):
         close(few[i], many[i])
+    (last,) = predict(PREDICTOR, PAST, count=1, first=2, **asked)
+    close(last, many[2])
     again = predict(PREDICTOR, PAST, count=2, **asked)
     assert all(same(a, b) for a, b in zip(few, again, strict=True))
     apart = [np.abs(many[i].positions() - many[j].positions()).max() for i in range(3) for j in range(i)]
@@ -287,6 +289,13 @@ def test_many_switches_differ_and_each_has_its_own_seed() -> None:
     many = switch(PREDICTOR, PAST, target, count=2, seconds=0.6, steps=2, seed=3)
     (first,) = switch(PREDICTOR, PAST, target, count=1, seconds=0.6, steps=2, seed=3)
     close(first, many[0])
+    (second,) = switch(PREDICTOR, PAST, target, count=1, first=1, seconds=0.6, steps=2, seed=3)
+    close(second, many[1])
+    (free, beyond) = (
+        switch(PREDICTOR, PAST, target, count=number, first=2 - number, seconds=3.0, steps=2, seed=3)[-1]
+        for number in (2, 1)
+    )
+    close(free, beyond)  # longer than what is drawn in sight of the target
     assert np.abs(many[0].positions() - many[1].positions()).max() > 0.005
     assert all(len(made) == 30 + 18 + 10 for made in many)
 

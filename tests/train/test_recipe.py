@@ -112,7 +112,8 @@ def test_any_values_give_a_recipe_or_one_kind_of_error(tmp_path_factory: pytest.
 
 @pytest.mark.parametrize(
     "said", ["a." * 200_000 + "a = 1", "steps = " + "9" * 5000, "favour.walk = nan", "favour.walk = -1",
-             "rate = " + "9" * 400, "ema = " + "9" * 400, "favour.walk = true", "favour.walk = 'x'", "x" * 70_000],
+             "rate = " + "9" * 400, "ema = " + "9" * 400, "favour.walk = true", "favour.walk = 'x'", "x" * 70_000,
+             "[pair]\nprefix = " + "9" * 400, "[predictor]\nuntold = " + "9" * 400, "[net]\na = [[9" + "9" * 30 + "]]"],
     ids=lambda said: said[:20],
 )  # fmt: skip
 def test_hostile_recipes_are_refused_at_once(tmp_path, said):
@@ -121,6 +122,12 @@ def test_hostile_recipes_are_refused_at_once(tmp_path, said):
         load_recipe(tmp_path / "a.toml")
     assert len(str(caught.value)) < 900
     assert "\n" not in str(caught.value)
+
+
+def test_keys_of_very_many_parts_are_refused_before_they_are_read(tmp_path):
+    (tmp_path / "a.toml").write_text("a." * 20_000 + "a = 1")
+    with pytest.raises(MotionloomError, match="dots"):
+        load_recipe(tmp_path / "a.toml")
 
 
 def test_a_key_of_very_many_parts_on_the_line_is_no_key():

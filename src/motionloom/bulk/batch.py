@@ -15,6 +15,7 @@ from motionloom.bulk.metadata import Result, read_batch, result, write_table
 from motionloom.bulk.row import parse
 from motionloom.bulk.shard import Batch, Report, Task
 from motionloom.errors import MotionloomError
+from motionloom.goals.adapters import parse_adapter
 
 Source = Jobs | Path | str | Iterable[Mapping[str, Any]]
 LOCAL = "local"
@@ -189,7 +190,9 @@ def _found(options: Options) -> Options:
     def whole(name: str | None) -> str | None:
         return str(Path(name).resolve()) if name is not None and Path(name).is_file() else name
 
-    return replace(options, weights=whole(options.weights) or "default", skeleton=whole(options.skeleton))
+    adapters = [f"{path.resolve()}:{factor!r}" for path, factor in map(parse_adapter, options.adapters)]
+    weights = whole(options.weights) or "default"
+    return replace(options, weights=weights, adapters=adapters, skeleton=whole(options.skeleton))
 
 
 def _workers(options: Options) -> int:

@@ -18,9 +18,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from motionloom.bulk.maker import Options, hash_file
+from motionloom.bulk.maker import Options, hash_weights
 from motionloom.bulk.measures import MEANING
-from motionloom.bulk.row import FORMAT
+from motionloom.bulk.row import FORMAT, hash_file
 from motionloom.bulk.writers import sizes, suffix, sync
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
@@ -123,14 +123,13 @@ def digest(rows: Sequence[bytes]) -> str:
 
 def about(options: Options, *, rows: int, shard_rows: int) -> dict[str, Any]:
     """The manifest of a batch."""
-    weights = find_weights(options.weights)
-    card = read_card(weights)
+    card, weights = read_card(find_weights(options.weights)), hash_weights(options)
     return {
         "kind": KIND,
         "format": FORMAT,
         "version": version("motionloom"),
-        "weights": {"name": card.name, "sha256": hash_file(weights), "licence": card.licence},
-        "motions": options.of_motions(hash_file(weights)),
+        "weights": {"name": card.name, "sha256": weights, "licence": card.licence},
+        "motions": options.of_motions(weights),
         "defaults": {"seconds": options.seconds, "seed": options.seed, "skeleton": _skeleton(options)},
         "files": options.format,
         "filter": options.filter,

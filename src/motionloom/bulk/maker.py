@@ -9,14 +9,16 @@ from typing import Any
 import numpy as np
 
 from motionloom.bulk.measures import Judge, find_judge, measure
-from motionloom.bulk.row import Asked, Sources
+from motionloom.bulk.row import Asked, Sources, hash_adapters, hash_file
 from motionloom.bulk.sampling import LEAST, draw_group, groups
 from motionloom.edits.fitting import fit
 from motionloom.errors import MotionloomError
+from motionloom.goals.adapters import parse_adapter
 from motionloom.goals.goal import placement_of
 from motionloom.io.stream import joined
 from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22
+from motionloom.tasks.adapting import adapt
 from motionloom.tasks.control import Controlled, judged, moved, steered_features
 from motionloom.tasks.long import compose
 from motionloom.tasks.text import GUIDANCE, SOLVER, STEPS, check, check_features, finish, to_motion
@@ -33,6 +35,8 @@ class Options:
 
     weights: str = "default"
     """A shipped name or a file."""
+    adapters: Sequence[str] = ()
+    """What was taught from clips: ``FILE`` or ``FILE:FACTOR``, see `motionloom.goals.adapters.parse_adapter`."""
     device: str = "cpu"
     bf16: bool = False
     """Let the network compute in bfloat16."""
@@ -57,7 +61,7 @@ class Options:
     """``module:function`` that says whether a motion obeys its prompt; see `motionloom.bulk.measures.Judge`."""
 
     def of_motions(self, weights: str) -> dict[str, Any]:
-        """What determines every motion of the batch; ``weights`` is the hash of their file."""
+        """What determines every motion of the batch; ``weights``: `hash_weights`."""
         return {
             "weights": weights, "steps": self.steps, "guidance": self.guidance, "solver": self.solver,
             "raw": self.raw, "fps": self.fps, "bf16": self.bf16,
@@ -73,26 +77,32 @@ class Made:
     """`motionloom.bulk.measures.MEANING` of the 22-joint person, before it came onto another skeleton."""
 
 
-def hash_file(path: Path) -> str:
-    """SHA-256 of a file."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+def hash_weights(options: Options) -> str:
+    """SHA-256 of the weights' file; with adapters a hash of that, of their files and of their factors.
+
+    Raises `MotionloomError` for an adapter that is no file.
+    """
+    found = hash_file(find_weights(options.weights))
+    if not options.adapters:
+        return found
+    said = [found, *hash_adapters([parse_adapter(one) for one in options.adapters])]
+    return hashlib.sha256("\n".join(said).encode()).hexdigest()
 
 
 class Maker:
     """A prior that is ready to make rows, and what it makes them with.
 
-    ``weights``: the hash that the weights' file must have, where that is known beforehand.
+    ``weights``: what `hash_weights` must give, where that is known beforehand.
     Raises `MotionloomError` for options that no motion can be made with.
     """
 
     def __init__(self, options: Options, *, folder: Path, weights: str | None = None) -> None:
-        path = find_weights(options.weights)
-        found = hash_file(path)
+        path, found = find_weights(options.weights), hash_weights(options)
         if weights is not None and found != weights:
-            raise MotionloomError(f"{path} differs from the weights that this batch is made with; use the same file")
+            which = f"{path} or an adapter" if options.adapters else str(path)
+            raise MotionloomError(f"{which} differs from what this batch is made with; use the same files")
         self.options = options
-        self.prior = Prior.load(path, device=options.device)
+        self.prior = adapt(Prior.load(path, device=options.device), [parse_adapter(one) for one in options.adapters])
         check(self.prior, [], steps=options.steps, guidance=options.guidance, solver=options.solver)
         check_features(self.prior)
         self.sources = Sources(

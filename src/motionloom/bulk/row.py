@@ -4,7 +4,7 @@ import hashlib
 import json
 import re
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
@@ -255,6 +255,20 @@ def _digest(*parts: Any) -> str:
     return digest.hexdigest()
 
 
+def hash_file(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def hash_adapters(adapters: Sequence[tuple[Path, float]]) -> list[str]:
+    """Hash and factor of each file; raises `MotionloomError` for one that is not there."""
+    for path, _ in adapters:
+        if not path.is_file():
+            raise MotionloomError(f"there is no adapter {path}; name a file that 'motionloom teach' made")
+    return [f"{hash_file(path)} {factor!r}" for path, factor in adapters]
+
+
 def digest_goal(goal: Goal) -> str:
     """Hash of what a goal asks; what is not asked does not count."""
     where = np.where(goal.asked, goal.positions, 0.0)
@@ -265,7 +279,10 @@ def digest_goal(goal: Goal) -> str:
 def digest_timeline(timeline: Timeline, start: Motion | None) -> str:
     """Hash of what a timeline asks, the motion it goes on from included."""
     segments = [
-        (s.text, s.seconds, s.guidance, s.transition, None if s.goal is None else digest_goal(s.goal))
+        (
+            *(s.text, s.seconds, s.guidance, s.transition, None if s.goal is None else digest_goal(s.goal)),
+            *hash_adapters(s.adapters),
+        )
         for s in timeline.segments
     ]
     known = () if start is None else (digest_skeleton(start.skeleton), start.fps, start.root, start.rotations)

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.cli.sampling import fail
+from motionloom.cli.sampling import add_adapters, fail
 
 if TYPE_CHECKING:
     from motionloom.bulk.batch import Where
@@ -56,6 +56,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument(
         "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
     )
+    add_adapters(parser)
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--bf16", action="store_true", help="let the network compute in bfloat16")
     parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one per core, or per GPU)")
@@ -109,7 +110,8 @@ def _options(arguments: argparse.Namespace) -> "Options":
     given = {name: getattr(arguments, name) for name in ("steps", "guidance", "solver")}
     obeys = arguments.filter is not None and "obeys" in Filter(arguments.filter).names
     return Options(
-        weights=arguments.weights, device=arguments.device, bf16=arguments.bf16, raw=arguments.raw, fps=arguments.fps,
+        weights=arguments.weights, adapters=arguments.adapter, device=arguments.device, bf16=arguments.bf16,
+        raw=arguments.raw, fps=arguments.fps,
         seconds=arguments.seconds, seed=arguments.seed, skeleton=arguments.skeleton, format=arguments.format,
         filter=arguments.filter, judge=JUDGE if obeys else None,
         **{name: value for name, value in given.items() if value is not None},

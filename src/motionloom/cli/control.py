@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionloom.cli.finished import finished_motions, groups
 from motionloom.cli.newcomers import check_overwriting, one_sentence
 from motionloom.cli.sampling import (
     add_sampling,
@@ -17,12 +18,13 @@ from motionloom.cli.sampling import (
     remark_unknown,
     report,
     sampling_of,
-    write,
 )
-from motionloom.cli.skeletons import put_all
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from motionloom.goals.goal import Goal
+    from motionloom.motion import Motion
     from motionloom.tasks.control import Adapters, Controlled
     from motionloom.weights.prior import Prior
 
@@ -67,13 +69,13 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.set_defaults(run=run_control)
 
 
-def run_control(arguments: argparse.Namespace) -> None:
+def run_control(arguments: argparse.Namespace) -> int:
     """``motionloom control PROMPT --goal FILE``."""
     if arguments.schema:
         from motionloom.goals.goal_file import SCHEMA
 
         print(SCHEMA.read_text(encoding="utf-8"), end="")
-        return
+        return 0
     outs, target = check_outs(arguments)
     check_count(arguments)
     if len(one_sentence(arguments.prompt)) > 1:
@@ -87,13 +89,12 @@ def run_control(arguments: argparse.Namespace) -> None:
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [arguments.prompt])
-    made, seconds = _make(arguments, prior, goal)
-    motions = put_all(target, [one.motion for one in made])
-    if arguments.fps is not None:
-        motions = [motion.resample(arguments.fps) for motion in motions]
-    captions = [arguments.prompt] * arguments.count
-    written = [write(motions, several, captions, target) for several in files]
-    _report(arguments, made, written, seconds=seconds, remarks=remarks)
+    made = finished_motions(files, [arguments.prompt] * arguments.count, target)
+    judged: list[Controlled] = []
+    interrupted = made.take(_made(arguments, prior, goal, judged))
+    written = [[file for file in several if file in made.written] for several in files]
+    _report(arguments, judged[: made.count], written, seconds=made.sampling, remarks=remarks)
+    return made.ended(interrupted)
 
 
 def _goal(arguments: argparse.Namespace) -> "Goal":
@@ -141,18 +142,22 @@ def _drawn(path: Path, width: float | None, frames: int) -> "Goal":
     return read_goal({"path": {"svg": drawing.name, **size}}, frames=frames, folder=drawing.parent)
 
 
-def _make(arguments: argparse.Namespace, prior: "Prior", goal: "Goal") -> "tuple[list[Controlled], float]":
-    import time
-
+def _made(
+    arguments: argparse.Namespace, prior: "Prior", goal: "Goal", judged: "list[Controlled]"
+) -> "Iterator[list[Motion]]":
+    """The motions, as many at once as the network sees; ``judged`` gets them too, with how near they came."""
     from motionloom.tasks.control import control
+    from motionloom.tasks.sampling import BATCH
 
-    began = time.perf_counter()
+    adapters, rate = _adapters(arguments.adapters, prior), arguments.fps
     with bar("controlling") as progress:
-        made = control(
-            prior, arguments.prompt, goal, adapters=_adapters(arguments.adapters, prior), fit=arguments.fit,
-            foot_lock=arguments.foot_lock, progress=progress, **sampling_of(arguments),
-        )  # fmt: skip
-    return made, time.perf_counter() - began
+        for some, moved in groups(arguments.count, BATCH, progress):
+            made = control(
+                prior, arguments.prompt, goal, adapters=adapters, fit=arguments.fit, foot_lock=arguments.foot_lock,
+                progress=moved, **sampling_of(arguments) | some,
+            )  # fmt: skip
+            judged += made
+            yield [one.motion if rate is None else one.motion.resample(rate) for one in made]
 
 
 def _adapters(names: list[str], prior: "Prior") -> "Adapters":

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from motionloom.cli.finished import Finished, groups
 from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
@@ -22,6 +23,8 @@ from motionloom.cli.sampling import (
 from motionloom.cli.skeletons import Target, add_skeleton, put_all, read_target
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from motionloom.goals.goal import Goal
     from motionloom.goals.timeline import Timeline
     from motionloom.motion import Motion
@@ -32,6 +35,8 @@ MAX_SECONDS = 3600.0
 """Of a timeline."""
 SECONDS, ADDED = 6.0, 3.0
 """Length of a duet, and what is added to a past, unless asked otherwise."""
+PAIRS = 8
+"""Duets that are drawn together: those of a group that is finished stay where the next one is interrupted."""
 SINGLE = (".bvh", ".npz", ".vrma")
 """Files of one person each."""
 
@@ -90,10 +95,8 @@ def _add_sampling(parser: argparse.ArgumentParser) -> None:
     add_skeleton(parser, own="the uniform person's, or those of the motions given")
 
 
-def run_duet(arguments: argparse.Namespace) -> None:
+def run_duet(arguments: argparse.Namespace) -> int:
     """``motionloom duet``."""
-    import time
-
     _check(arguments)
     outs, skin = _check_outs(arguments)
     files = places(outs, arguments.count, sheets=False, target=skin)
@@ -103,17 +106,34 @@ def run_duet(arguments: argparse.Namespace) -> None:
     given, manners = _read(arguments)
     _check_sizes(arguments, files, given, timeline)
     prior, block = _load(arguments)
-    began = time.perf_counter()
-    with bar("drawing two people") as progress:
-        duets = _make(arguments, prior, block, given=given, timeline=timeline, goal=goal, progress=progress)
-    seconds = time.perf_counter() - began
-    if arguments.fps is not None:
-        duets = [[motion.resample(arguments.fps) for motion in duet] for duet in duets]
-    if skin is not None:
-        duets = [put_all(skin, duet) for duet in duets]
-    written = _write(duets, files, manners, _caption(arguments, timeline), skin)
-    report(arguments, _about(arguments, duets), written, seconds)
+    caption = _caption(arguments, timeline)
+
+    def write(duets: "Sequence[list[Motion]]", places: list[list[Path]], first: int) -> None:
+        _write(duets, places, manners, caption, skin)
+
+    def put(duets: "Sequence[list[Motion]]") -> "list[list[Motion]]":
+        return [put_all(skin, duet) for duet in duets]
+
+    made = Finished(files, arguments.count, write, put, what="duets")
+    seconds = 0.0
+
+    def drawn() -> "Iterator[list[list[Motion]]]":
+        nonlocal seconds
+        with bar("drawing two people") as progress:
+            for some, moved in groups(arguments.count, PAIRS, progress):
+                duets = _make(
+                    arguments, prior, block, given=given, timeline=timeline, goal=goal, progress=moved, some=some
+                )
+                rate = arguments.fps
+                if rate is not None:
+                    duets = [[motion.resample(rate) for motion in duet] for duet in duets]
+                seconds = duets[0][0].seconds
+                yield duets
+
+    interrupted = made.take(drawn())
+    report(arguments, _about(arguments, made.count, seconds), made.written, made.sampling)
     note_rate(arguments, _inputs(arguments))
+    return made.ended(interrupted)
 
 
 def _make(
@@ -125,14 +145,16 @@ def _make(
     timeline: "Timeline | None",
     goal: "Goal | None",
     progress: Any,
+    some: dict[str, int],
 ) -> "list[list[Motion]]":
+    """Some of the duets, of which ``some`` says which."""
     from motionloom.tasks import duet, pair
 
     text: str = arguments.text or ""
     shared: dict[str, Any] = {"foot_lock": arguments.foot_lock, **sampling_of(arguments)}
     if timeline is not None:
         return [_composed(arguments, prior, block, timeline, progress, shared)]
-    shared["progress"] = progress
+    shared |= {**some, "progress": progress}
     if arguments.past:
         added = ADDED if arguments.seconds is None else arguments.seconds
         made = pair.complete_pair(prior, block, (given[0], given[1]), text, seconds=added, **shared)
@@ -330,7 +352,7 @@ def _caption(arguments: argparse.Namespace, timeline: "Timeline | None") -> str:
 
 
 def _write(
-    duets: "list[list[Motion]]",
+    duets: "Sequence[list[Motion]]",
     files: list[list[Path]],
     manners: "list[tuple[float, dict[str, str]]]",
     caption: str,
@@ -360,14 +382,14 @@ def _write(
     return written
 
 
-def _about(arguments: argparse.Namespace, duets: "list[list[Motion]]") -> dict[str, Any]:
+def _about(arguments: argparse.Namespace, count: int, seconds: float) -> dict[str, Any]:
     return {
         "prompt": arguments.text,
         "past": [str(path) for path in arguments.past or ()],
         "given": None if arguments.react_to is None else str(arguments.react_to),
         "timeline": None if arguments.timeline is None else str(arguments.timeline),
-        "duets": len(duets),
-        "seconds": duets[0][0].seconds,
+        "duets": count,
+        "seconds": seconds,
         "seed": arguments.seed,
         "weights": str(arguments.weights),
         "block": str(arguments.pair_weights),

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from motionloom.cli.finished import Finished, groups
 from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import add_reading, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
@@ -20,9 +21,11 @@ from motionloom.cli.sampling import (
     take_text_anywhere,
     write,
 )
-from motionloom.cli.skeletons import put_all
+from motionloom.cli.skeletons import Target, put_all
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
     from motionloom.motion import Motion
     from motionloom.weights.prior import Prior
 
@@ -59,7 +62,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.set_defaults(run=run_edit)
 
 
-def run_edit(arguments: argparse.Namespace) -> None:
+def run_edit(arguments: argparse.Namespace) -> int:
     """``motionloom edit CLIP TEXT``."""
     uniform = arguments.skeleton in ("smpl", "smpl22")  # made so, rather than put on it afterwards
     arguments.skeleton = None if uniform or arguments.skeleton == "own" else arguments.skeleton
@@ -74,52 +77,57 @@ def run_edit(arguments: argparse.Namespace) -> None:
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [arguments.text or ""])
-    motions, seconds = _make(arguments, prior, crop(clip, arguments), "smpl" if uniform else "own")
-    motions = put_all(target, motions)
-    if uniform:
-        unit, orders = None, {}
-    written = []
-    for several in files:
-        if several[0].suffix.lower() == ".bvh" and target is None:
-            written += [_write_bvh(motion, place, unit, orders) for motion, place in zip(motions, several, strict=True)]
-        else:
-            written += write(motions, several, captions, target)
+    manner = (None, {}) if uniform else (unit, orders)
+    made = Finished(
+        files, arguments.count, _writer(captions, target, *manner), put=lambda motions: put_all(target, motions)
+    )
+    interrupted = made.take(_made(arguments, prior, crop(clip, arguments), "smpl" if uniform else "own"))
     about = {
         "clip": str(arguments.clip),
         "prompt": arguments.text,
-        "seeds": [arguments.seed + i for i in range(arguments.count)],
+        "seeds": [arguments.seed + i for i in range(made.count)],
         "weights": str(arguments.weights),
         "remarks": remarks,
     }
-    report(arguments, about, written, seconds)
+    report(arguments, about, made.written, made.sampling)
     note_rate(arguments, [arguments.clip])
+    return made.ended(interrupted)
 
 
-def _make(
+def _made(
     arguments: argparse.Namespace, prior: "Prior", clip: "Motion", skeleton: "Literal['own', 'smpl']"
-) -> "tuple[list[Motion], float]":
-    import time
-
+) -> "Iterator[list[Motion]]":
+    """The versions, one after the other."""
     from motionloom.tasks.edit import changes_asked, edit
 
-    text, began = arguments.text or "", time.perf_counter()
+    text, rate = arguments.text or "", arguments.fps
     changes = changes_asked(
         text, keep=[name.strip() for part in arguments.keep for name in part.split(",")], loop=arguments.loop,
         between=[tuple(span) for span in arguments.between], blend=arguments.blend, extend=arguments.extend,
         strength=arguments.strength,
     )  # fmt: skip
     with bar("editing") as progress:
-        motions = edit(
-            prior, clip, text, changes, skeleton=skeleton, foot_lock=arguments.foot_lock, progress=progress,
-            **sampling_of(arguments),
-        )  # fmt: skip
-    if arguments.fps is not None:
-        motions = [motion.resample(arguments.fps) for motion in motions]
-    return motions, time.perf_counter() - began
+        for some, moved in groups(arguments.count, 1, progress):
+            motions = edit(
+                prior, clip, text, changes, skeleton=skeleton, foot_lock=arguments.foot_lock, progress=moved,
+                **sampling_of(arguments) | some,
+            )  # fmt: skip
+            yield motions if rate is None else [motion.resample(rate) for motion in motions]
 
 
-def _write_bvh(motion: "Motion", place: Path, unit: float | None, orders: dict[str, str]) -> Path:
-    """In the unit and the orders of rotations of the clip's own file."""
-    from motionloom.io.bvh_writer import save_bvh
+def _writer(
+    captions: list[str], target: Target | None, unit: float | None, orders: dict[str, str]
+) -> "Callable[[Sequence[Motion], list[list[Path]], int], None]":
+    """What writes versions; BVH files in the unit and the orders of rotations of the clip's own file."""
 
-    return save_bvh(motion, place, order=orders, unit=unit or 1.0)
+    def written(motions: "Sequence[Motion]", places: list[list[Path]], first: int) -> None:
+        from motionloom.io.bvh_writer import save_bvh
+
+        for several in places:
+            if several[0].suffix.lower() != ".bvh" or target is not None:
+                write(motions, several, captions[first : first + len(motions)], target)
+                continue
+            for motion, place in zip(motions, several, strict=True):
+                save_bvh(motion, place, order=orders, unit=unit or 1.0)
+
+    return written

@@ -84,7 +84,10 @@ def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool, ow
 def write_futures(
     wanted: Sequence[Target], motions: "Sequence[Motion]", past: int, manner: Manner, *, caption: str
 ) -> list[Path]:
-    """Motions that begin with ``past`` given frames, into all files at once: they all appear, or none does."""
+    """Motions that begin with ``past`` given frames, into all files at once: they all appear, or none does.
+
+    There may be fewer than names in ``wanted``: then the first of those are written. Gives the files that were.
+    """
     from motionloom.io import save
     from motionloom.io.bvh_writer import save_bvh
     from motionloom.io.folder import atomic_folder
@@ -94,7 +97,7 @@ def write_futures(
         for target in wanted:
             folder = stack.enter_context(atomic_folder(target.folder))
             for names in target.futures:
-                for motion, name in zip(motions, names, strict=True):
+                for motion, name in zip(motions, names[: len(motions)], strict=True):
                     if manner.skeleton is not None:
                         manner.skeleton.save(motion, folder / name, caption=Path(name).stem)
                     elif name.lower().endswith(".bvh"):
@@ -102,7 +105,12 @@ def write_futures(
                     else:
                         save(motion, folder / name, captions=[Path(name).stem])
             draw_overlays(motions, past, [folder / name for name in target.overlays], caption=caption)
-    return [file for target in wanted for file in target.files]
+    return [
+        target.folder / name
+        for target in wanted
+        for names in (*(names[: len(motions)] for names in target.futures), target.overlays)
+        for name in names
+    ]
 
 
 def draw_overlays(motions: "Sequence[Motion]", past: int, files: Sequence[Path], *, caption: str) -> None:

@@ -2,11 +2,11 @@
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from motionloom.cli.finished import finished_motions
 from motionloom.cli.newcomers import check_overwriting, one_sentence
 from motionloom.cli.sampling import (
     add_sampling,
@@ -20,10 +20,7 @@ from motionloom.cli.sampling import (
     remark_unknown,
     report,
     sampling_of,
-    write,
 )
-from motionloom.cli.skeletons import Target, put_all
-from motionloom.interruption import held_back
 
 if TYPE_CHECKING:
     from motionloom.goals.timeline import Timeline
@@ -72,8 +69,10 @@ def _generate(arguments: argparse.Namespace) -> int:
     prior = load_prior(arguments)
     timelines = {prompt: _timeline(arguments, prior, prompt) for prompt in prompts}
     remarks = remark_unknown(prior, [segment.text for found in timelines.values() for segment in found.segments])
-    made = _Made(files, captions, target)
-    interrupted = _make(arguments, prior, [timelines[caption] for caption in captions], made)
+    made = finished_motions(files, captions, target)
+    drawn = _drawn(arguments, prior, [timelines[caption] for caption in captions])
+    rate = arguments.fps
+    interrupted = made.take([motion if rate is None else motion.resample(rate)] for motion in drawn)
     motions = [
         {"prompt": caption, "seed": arguments.seed + i, "segments": _segments(timelines[caption])}
         for i, caption in enumerate(captions[: made.count])
@@ -81,52 +80,7 @@ def _generate(arguments: argparse.Namespace) -> int:
     length = SECONDS if arguments.seconds is None else arguments.seconds
     about = {"motions": motions, "seconds": length, "weights": str(arguments.weights), "remarks": remarks}
     report(arguments, about, made.written, made.sampling)
-    if interrupted:
-        print(f"motionloom: interrupted; {made.count} of {len(captions)} motions were finished", file=sys.stderr)
-        return 130
-    return 0
-
-
-@dataclass(eq=False)
-class _Made:
-    """Motions that are written as they are finished; a picture that shows several is drawn at the end."""
-
-    files: Sequence[Sequence[Path]]
-    """For each ``--out`` a file per motion, or one that shows them all."""
-    captions: Sequence[str]
-    target: Target | None = None
-    """The skeleton that they are put on."""
-    count: int = 0
-    """Motions that are finished."""
-    sampling: float = 0.0
-    """Seconds of drawing."""
-    _files: dict[Path, None] = field(default_factory=dict)
-    _shown: "list[Motion]" = field(default_factory=list)
-
-    @property
-    def written(self) -> list[Path]:
-        """Files that are in their places, by ``--out``."""
-        return [file for several in self.files for file in several if file in self._files]
-
-    def add(self, motions: "Sequence[Motion]") -> None:
-        """Write the motions that come next, all of them, before an interruption is heard."""
-        with held_back():
-            motions = put_all(self.target, list(motions))
-            first, self.count = self.count, self.count + len(motions)
-            self._shown += motions if any(len(several) == 1 for several in self.files) else ()
-            for several in self.files:
-                if len(several) == 1:
-                    continue
-                write(motions, several[first : self.count], self.captions[first : self.count], self.target)
-                self._files |= dict.fromkeys(several[first : self.count])
-
-    def finish(self) -> None:
-        """Draw what shows several motions, those that are finished."""
-        with held_back():
-            for several in self.files:
-                if len(several) == 1 and self.count:
-                    write(self._shown, several, self.captions[: self.count], self.target)
-                    self._files[several[0]] = None
+    return made.ended(interrupted)
 
 
 def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str) -> "Timeline":
@@ -187,25 +141,6 @@ def _lines(file: Path) -> list[str]:
     except UnicodeDecodeError:
         fail(f"{file} is not UTF-8 text; save it as UTF-8 with one prompt per line")
     return [line.strip() for line in text.splitlines() if line.strip()]
-
-
-def _make(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timeline]", made: _Made) -> bool:
-    """Draw and write the motions; true if that was interrupted after some were finished."""
-    import time
-
-    try:
-        began = time.perf_counter()
-        for motion in _drawn(arguments, prior, timelines):
-            made.sampling += time.perf_counter() - began
-            made.add([motion if arguments.fps is None else motion.resample(arguments.fps)])
-            began = time.perf_counter()
-    except KeyboardInterrupt:
-        if not made.count:
-            raise
-        made.finish()
-        return True
-    made.finish()
-    return False
 
 
 def _drawn(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timeline]") -> "Iterator[Motion]":

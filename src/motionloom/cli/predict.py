@@ -2,10 +2,11 @@
 
 import argparse
 import sys
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from motionloom.cli.finished import Finished, groups
 from motionloom.cli.futures import FORMATS, Long, Manner, targets, write_futures
 from motionloom.cli.futures import Target as Files
 from motionloom.cli.newcomers import check_overwriting
@@ -23,6 +24,8 @@ LONG = 30.0
 DAY = 86_400.0
 LISTED = 40
 """Files told at the end; --json lists all."""
+TOGETHER = 16
+"""Futures that are drawn together: those of a group that is finished stay where the next one is interrupted."""
 SAME_BONE = 1e-4
 """Metres by which bones of one skeleton may differ from file to file: numbers are rounded when they are written."""
 
@@ -133,16 +136,38 @@ def run_predict(arguments: argparse.Namespace) -> int:
         return _predict_long(arguments, predictor, past, hold=hold, long=long)
     from motionloom.tasks.predict import predict
 
-    with bar("predicting") as progress:
-        motions = predict(
-            predictor, past, seconds=arguments.seconds, hold=hold, root=not arguments.no_root,
-            foot_lock=arguments.foot_lock, progress=progress, **sampling_of(arguments),
-        )  # fmt: skip
-    written = write_futures(wanted, motions, len(past), manner, caption=_caption(arguments))
-    _report(arguments, [str(file) for file in written])
-    _note_seen(predictor, past)
+    def drawn() -> "Iterator[list[Motion]]":
+        with bar("predicting") as progress:
+            for some, moved in groups(arguments.count, TOGETHER, progress):
+                yield predict(
+                    predictor, past, seconds=arguments.seconds, hold=hold, root=not arguments.no_root,
+                    foot_lock=arguments.foot_lock, progress=moved, **sampling_of(arguments) | some,
+                )  # fmt: skip
+
+    return _written(arguments, drawn(), wanted, manner, len(past), note=lambda: _note_seen(predictor, past))
+
+
+def _written(
+    arguments: argparse.Namespace,
+    drawn: "Iterator[list[Motion]]",
+    wanted: list[Files],
+    manner: Manner,
+    past: int,
+    *,
+    note: "Callable[[], None]" = lambda: None,
+) -> int:
+    """Write the futures, all of them at once, and say so; after an interruption those that were finished."""
+    written: list[Path] = []
+
+    def write(motions: "Sequence[Motion]", places: list[list[Path]], first: int) -> None:
+        written.extend(write_futures(wanted, motions, past, manner, caption=_caption(arguments)))
+
+    made = Finished([[target.folder] for target in wanted[:1]], arguments.count, write, what="futures")
+    interrupted = made.take(drawn)
+    _report(arguments, [str(file) for file in written], made.count)
+    note()
     note_rate(arguments, _inputs(arguments))
-    return 0
+    return made.ended(interrupted)
 
 
 def run_switch(arguments: argparse.Namespace) -> int:
@@ -164,14 +189,14 @@ def run_switch(arguments: argparse.Namespace) -> int:
     predictor = _predictor(arguments)
     from motionloom.tasks.predict import switch
 
-    motions = switch(
-        predictor, past, target, seconds=arguments.seconds, facing=arguments.facing, foot_lock=arguments.foot_lock,
-        **sampling_of(arguments),
+    drawn = (
+        switch(
+            predictor, past, target, seconds=arguments.seconds, facing=arguments.facing,
+            foot_lock=arguments.foot_lock, **sampling_of(arguments) | some,
+        )
+        for some, _ in groups(arguments.count, TOGETHER, lambda done, total: None)
     )  # fmt: skip
-    written = write_futures(wanted, motions, len(past), manner, caption=_caption(arguments))
-    _report(arguments, [str(file) for file in written])
-    note_rate(arguments, _inputs(arguments))
-    return 0
+    return _written(arguments, drawn, wanted, manner, len(past))
 
 
 # Futures of any length
@@ -191,7 +216,8 @@ def _predict_long(
         )
     with closing(_pieces(arguments, predictor, past, hold, frames=long.frames)) as makers:
         interrupted = long.write(makers)
-    _report(arguments, [f"{file}: {s:.2f} s" if s and not arguments.json else str(file) for file, s in long.finished])
+    told = [f"{file}: {s:.2f} s" if s and not arguments.json else str(file) for file, s in long.finished]
+    _report(arguments, told, arguments.count)
     if interrupted:
         total = long.frames / past.fps
         print(f"motionloom: interrupted; what was finished is in {long.kept()} of {total:.2f} s", file=sys.stderr)
@@ -373,14 +399,14 @@ def _note_seen(predictor: "Predictor", past: "Motion") -> None:
         print(f"note: of the {there:.2f} s of the past the predictor sees the last {seen:.2f}", file=sys.stderr)
 
 
-def _report(arguments: argparse.Namespace, written: list[str]) -> None:
+def _report(arguments: argparse.Namespace, written: list[str], count: int) -> None:
     if arguments.json:
         import json
 
         about = {
             "past": str(arguments.past),
             "seconds": arguments.seconds,
-            "count": arguments.count,
+            "count": count,
             "seed": arguments.seed,
             "weights": str(arguments.weights),
             "files": written,

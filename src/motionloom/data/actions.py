@@ -28,7 +28,7 @@ class Action:
     """One entry of ``actions.toml``, which says what each part means."""
 
     name: str
-    words: str
+    words: tuple[str, ...]
     says: tuple[str, ...]
     kind: Kind
     unless: str = r"(?!)"
@@ -38,14 +38,31 @@ class Action:
     def named_by(self, texts: Sequence[str]) -> bool:
         """True where at least half of the captions name this action."""
         lowered = [text.lower() for text in texts]
-        hits = sum(bool(re.search(self.words, t)) and not re.search(self.unless, t) for t in lowered)
+        hits = sum(any(_in_order(p, t) for p in self.words) and not re.search(self.unless, t) for t in lowered)
         return 2 * hits >= len(lowered) > 0
+
+
+def _in_order(pattern: str, text: str) -> bool:
+    """As `re.search`, in time linear in the text: what `.*` joins is searched one after the other.
+
+    The first place of each part is as good as any other, since what comes behind it may lie anywhere. `re` itself tries
+    all places of all parts, which a long text without the last part makes very many.
+    """
+    at = 0
+    for part in pattern.split(".*"):
+        found = re.compile(part).search(text, at)
+        if found is None:
+            return False
+        at = found.end()
+    return True
 
 
 def _read() -> dict[str, Action]:
     table = tomllib.loads((resources.files("motionloom.data") / "actions.toml").read_text(encoding="utf-8"))
     made = {}
     for name, entry in table.items():
+        words = entry.pop("words")
+        entry["words"] = (words,) if isinstance(words, str) else tuple(words)
         phrases = {key: tuple(entry.pop(key, ())) for key in ("says", "sided")}
         made[name] = Action(name, **phrases, **entry)
     return made

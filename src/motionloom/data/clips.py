@@ -8,7 +8,7 @@ import numpy as np
 from safetensors import SafetensorError, safe_open
 
 from motionloom.data.actions import PREFIX
-from motionloom.data.words import LABELS
+from motionloom.data.words import LABELS, check_caption
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import WIDTH
 from motionloom.io.tensors import save_tensors
@@ -104,5 +104,7 @@ def _check_clip(clip: Clip) -> None:
             raise ValueError(f"what a window must hold, frames {note.core}, is not within {note.first} to {note.last}")
         if not all(isinstance(t, str) for t in note.texts) or (written and not note.texts):
             raise ValueError(f"a note of kind {note.kind} lacks its texts")
+        for text in note.texts:
+            check_caption(text)
         if not written and not all(label in LABELS for label in note.kind.split("+", 1)):
             raise ValueError(f"there is no label {note.kind!r}")

@@ -4,14 +4,14 @@ import csv
 import gzip
 import re
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from motionloom.data.paths import inside
-from motionloom.data.words import describe_index
+from motionloom.data.words import check_caption, describe_index
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import WIDTH
 from motionloom.io import load, text
@@ -46,6 +46,8 @@ class Span:
     def __post_init__(self) -> None:
         if not (0 <= self.start_s <= LATEST and self.end_s >= 0):  # also what is no number; the end may be infinity
             raise ValueError(f"a stretch goes from {self.start_s:g} to {self.end_s:g} seconds")
+        for said in self.texts:
+            check_caption(said)
 
 
 @dataclass(frozen=True)
@@ -158,24 +160,33 @@ def _amass_span(row: dict) -> Span:
 
 def _humanml3d(folder: Path) -> Iterator[Take]:
     """HumanML3D as its authors lay it out: new_joint_vecs/*.npy, texts/*.txt, train.txt, val.txt, test.txt."""
-    for split in ("train", "val", "test"):
+    for split, name in listed_names(folder, ("train", "val", "test")):
+        if name.startswith("M"):
+            continue  # mirrored copies are made here
+        said = tuple(_texts(folder / "texts" / f"{name}.txt"))
+        features = _features(inside(folder, f"new_joint_vecs/{name}.npy"))
+        yield Take(name, "humanml3d", HUMANML3D_LICENCE, split, said, features)
+
+
+def listed_names(folder: Path, splits: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """The clips that a HumanML3D folder lists, as (split, name).
+
+    folder: with a list ``SPLIT.txt`` for each of ``splits``, a name to a line.
+    Raises `MotionloomError` for a list that is missing or holds what is no name, and for a clip that is listed twice:
+    it would count twice, or be trained on and tested with.
+    """
+    seen: dict[str, Path] = {}
+    for split in splits:
         listed = folder / f"{split}.txt"
         if not listed.is_file():
             raise MotionloomError(f"{listed} is missing; a HumanML3D folder has train.txt, val.txt and test.txt")
         for name in text.read_utf8(listed, max_bytes=_MAX_LIST, empty=True).split():
             if not re.fullmatch(r"[\w.-]{1,80}", name):
                 raise MotionloomError(f"{listed} lists {name[:40]!r}, which is not a name; mend it")
-            if name.startswith("M"):
-                continue  # mirrored copies are made here
-            path = inside(folder, f"new_joint_vecs/{name}.npy")
-            yield Take(
-                name,
-                "humanml3d",
-                HUMANML3D_LICENCE,
-                split,
-                tuple(_texts(folder / "texts" / f"{name}.txt")),
-                _features(path),
-            )
+            if name in seen:
+                raise MotionloomError(f"{listed} lists {name}, which {seen[name].name} has listed already; mend them")
+            seen[name] = listed
+            yield split, name
 
 
 def _texts(path: Path) -> Iterator[Span]:
@@ -188,8 +199,8 @@ def _texts(path: Path) -> Iterator[Span]:
         try:
             start, end = (float(p) if p not in ("", "nan") else 0.0 for p in parts[2:])
             span = Span(start, end if end > start else float("inf"), (parts[0].strip(),), "human")
-        except ValueError:
-            raise MotionloomError(f"{path} has a line whose times are no seconds: {line[:60]!r}; mend it") from None
+        except ValueError as error:
+            raise MotionloomError(f"{path} has a line that cannot be used ({error}): {line[:60]!r}; mend it") from None
         yield span
 
 

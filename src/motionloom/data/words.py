@@ -19,6 +19,15 @@ _SIDE = re.compile(
     re.IGNORECASE,
 )
 
+MAX_CAPTION = 2_000
+"""Characters of a caption; the longest of HumanML3D has 897."""
+
+
+def check_caption(text: str) -> None:
+    """Raises ValueError for a text that is too long for a caption."""
+    if len(text) > MAX_CAPTION:
+        raise ValueError(f"a caption has {len(text):,} characters; at most {MAX_CAPTION:,} are read")
+
 
 def mirror_text(text: str) -> str:
     """Left and right, clockwise and counterclockwise exchanged: the caption of the mirrored motion."""

@@ -9,7 +9,7 @@ import re
 import shutil
 import stat
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from motionloom.errors import MotionloomError
@@ -113,9 +113,10 @@ def _made(folder: Path, suffix: str, *, is_folder: bool) -> tuple[Path, int]:
         os.close(file)
 
 
-def check_place(path: Path | str) -> Path:
+def check_place(path: Path | str, *, folders: bool = False) -> Path:
     """The path (where a link leads, the place it leads to), if a file could be made there.
 
+    folders: its folder and those above it may be missing, if they could be made. Nothing is made.
     Raises `MotionloomError` if it is a folder or another thing that is no file, its name is impossible, or its folder
     is missing or not writable.
     """
@@ -131,7 +132,7 @@ def check_place(path: Path | str) -> Path:
         if isinstance(error, MotionloomError):
             raise
         raise MotionloomError(f"cannot write {str(path)!r}: {getattr(error, 'strerror', None) or error}") from None
-    folder = target.parent
+    folder = _nearest(target) if folders else target.parent
     if target.is_dir():
         raise MotionloomError(f"cannot write {path}: it is a folder; add a file name")
     if not folder.is_dir():
@@ -141,17 +142,57 @@ def check_place(path: Path | str) -> Path:
     return target
 
 
+def _nearest(path: Path) -> Path:
+    """The nearest folder above the path that is there, if the names between the two are possible ones."""
+    folder, names = path.absolute().parent, [path.name]
+    while not os.path.lexists(folder):
+        names.append(folder.name)
+        folder = folder.parent
+    if not folder.is_dir():
+        raise MotionloomError(f"cannot write {path}: {folder} is not a folder; name another place")
+    for name in names:
+        try:
+            os.lstat(folder / name)
+        except FileNotFoundError:
+            continue
+        except OSError as error:  # such as a name that is too long
+            raise MotionloomError(f"cannot write {path}: {error.strerror or error}") from None
+    return folder
+
+
 @contextmanager
-def atomic_path(path: Path | str) -> Iterator[Path]:
+def with_folders(folder: Path) -> Iterator[None]:
+    """The folder and those above it are there in the block; where it fails, those made for it that are empty go again.
+
+    Raises OSError where one cannot be made.
+    """
+    made: list[Path] = []
+    try:
+        for one in (*reversed(folder.parents), folder):
+            with held_back():
+                if not one.is_dir():
+                    one.mkdir(exist_ok=True)
+                    made.append(one)
+        yield
+    except BaseException:
+        with held_back(), suppress(OSError):
+            for one in reversed(made):
+                one.rmdir()
+        raise
+
+
+@contextmanager
+def atomic_path(path: Path | str, *, folders: bool = False) -> Iterator[Path]:
     """Give a fresh path beside ``path`` to write to, and move it into place when the block ends well.
 
     The temporary name keeps the suffix. On any error the temporary file goes and what stood at ``path`` stays.
+    folders: folders that are missing are made, and go again on any error.
     Raises `MotionloomError` if ``path`` is a folder, or lies in a folder that is missing or cannot be written.
     """
-    target = check_place(path)
+    target = check_place(path, folders=folders)
     temporary: Path | None = None
     try:
-        with new_part(target.parent, target.suffix) as temporary:
+        with with_folders(target.parent), new_part(target.parent, target.suffix) as temporary:
             yield temporary
             os.replace(temporary, target)
     except OSError as error:

@@ -158,7 +158,7 @@ def person_seeds(seed: Seed, number: int) -> tuple[int, int]:
 
 def pair_seeds(sampling: PairSampling) -> list[int]:
     """One seed per row of as many duets as are to be made."""
-    return [seed for number in range(sampling.number()) for seed in person_seeds(sampling.seed, number)]
+    return [seed for number in sampling.numbers() for seed in person_seeds(sampling.seed, number)]
 
 
 def prompts_of(prompt: Prompt) -> tuple[str, str]:

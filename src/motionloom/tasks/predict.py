@@ -83,10 +83,10 @@ def predict(
     _check(predictor, past, seconds, count=count, sampling=chosen, longest=WHOLE)
     seen = Past.of(predictor, past)
     parts, total = given(predictor, seen, hold, seconds), seen.frames(seconds)
-    [first], count_of = chosen.seeds(1), windows_for(predictor, total / past.fps)
+    [seed], count_of = replace(chosen, first=0).seeds(1), windows_for(predictor, total / past.fps)
     sampler = WindowSampler(predictor, chosen, root)
     person = np.broadcast_to(seen.person, (count, *seen.person.shape))
-    made = sampler.windows(person, [(first, i) for i in range(count)], parts and parts.known, count_of)
+    made = sampler.windows(person, [(seed, i) for i in chosen.numbers(FUTURES)], parts and parts.known, count_of)
     windows = []
     for window in made:
         windows.append(window)
@@ -170,10 +170,10 @@ def switch(
         begun = predict(predictor, past, seconds=free / past.fps, sampling=chosen, foot_lock=foot_lock)
     pasts = [Past.of(predictor, one) for one in begun]
     pasts = pasts if free else pasts * chosen.number()
-    sampler = WindowSampler(predictor, chosen)
+    sampler = WindowSampler(predictor, replace(chosen, first=0))
     return [
         _arriving(sampler, one, target, gap - free, number=i, facing=facing, foot_lock=foot_lock)
-        for i, one in enumerate(pasts)
+        for i, one in enumerate(pasts, start=chosen.first)
     ]
 
 

@@ -56,6 +56,7 @@ class Settings(TypedDict, total=False):
     guidance: float
     seed: Seed
     count: int | None
+    first: int
     batch_size: int | None
 
 
@@ -90,6 +91,8 @@ class Sampling:
     """Motion i is sampled from ``seed + i``. Two people may have one each."""
     count: int | None = None
     """Motions to make, of each prompt; None: what the task makes by itself, 1, or 10 futures."""
+    first: int = 0
+    """Number of the first of them, so that very many can be made in several calls."""
     batch_size: int | None = None
     """Rows in one network call at most, pairs where two people are sampled; None: what the task takes by itself."""
 
@@ -107,6 +110,8 @@ class Sampling:
                 raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {seed}")
         if self.count is not None and (not _whole(self.count) or self.count < 1):
             raise MotionloomError(f"nothing to make: a count of {self.count}; ask for 1 or more")
+        if not _whole(self.first) or not 0 <= self.first < LARGEST_SEED:
+            raise MotionloomError(f"the first motion has a number from 0 to below 2**62; got {self.first}")
         if self.batch_size is not None and (not _whole(self.batch_size) or self.batch_size < 1):
             raise MotionloomError(f"a batch has 1 row or more; got a batch_size of {self.batch_size}")
 
@@ -141,11 +146,15 @@ class Sampling:
         """The seeds of ``count`` motions of one person."""
         if isinstance(self.seed, tuple):
             raise MotionloomError(f"one person has one seed; got {self.seed}")
-        return [self.seed + number for number in range(count)]
+        return [self.seed + self.first + number for number in range(count)]
 
     def number(self, usual: int = 1) -> int:
         """How many motions to make."""
         return self.count or usual
+
+    def numbers(self, usual: int = 1) -> range:
+        """The numbers of the motions to make."""
+        return range(self.first, self.first + self.number(usual))
 
     def alone(self) -> Self:
         """The same where one motion is made, and no more; raises MotionloomError for a greater count."""

@@ -1,6 +1,5 @@
 """Recipes: what to train, on what, how. A recipe is a small TOML file; unknown keys are errors."""
 
-import math
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -103,6 +102,7 @@ def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Reci
     except (ValueError, RecursionError) as error:  # not TOML, or a number of thousands of digits
         raise MotionloomError(f"{path} is not TOML: {error}") from None
     values = _merged(values, changes or {})
+    _check_whole_numbers(path, values)
     hints = get_type_hints(Recipe)
     for key, value in values.items():
         if key not in hints:
@@ -111,7 +111,7 @@ def load_recipe(path: Path | str, changes: dict[str, Any] | None = None) -> Reci
             )
         kind = getattr(hints[key], "__origin__", hints[key])
         if kind is float and isinstance(value, int) and not isinstance(value, bool):
-            values[key] = float(value) if abs(value) < 1e300 else math.inf
+            values[key] = float(value)
         elif not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
             raise MotionloomError(f"{path}: {key} must be of kind {kind.__name__}; got {_shown(value)}")
     recipe = Recipe(**values)
@@ -202,6 +202,17 @@ def _parsed(said: str) -> dict[str, Any]:
     if any(line.count(".") > MAX_DOTS for line in said.splitlines()):
         raise ValueError(f"a line has more than {MAX_DOTS} dots")
     return tomllib.loads(said)
+
+
+def _check_whole_numbers(path: Path, values: dict[str, Any]) -> None:
+    """Refuse whole numbers beyond TOML's own 64 bits, wherever they are: tomllib reads any, and no float holds them."""
+    inside: list[Any] = [values]
+    while inside:
+        value = inside.pop()
+        if isinstance(value, dict | list):
+            inside += value.values() if isinstance(value, dict) else value
+        elif isinstance(value, int) and not -(2**63) <= value < 2**63:
+            raise MotionloomError(f"{path}: a number of TOML has at most 64 bits; got {_shown(value)}")
 
 
 def _shown(value: object) -> str:

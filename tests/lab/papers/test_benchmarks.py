@@ -16,6 +16,7 @@ from motionloom.lab.papers.benchmarks import (
 )
 from tests.data import people
 from tests.lab.papers.benchmark_files import amass_folder, h36m, humaneva, person, starts, write
+from tests.work import ends
 
 RIGHT_HIP, LEFT_HIP, HEAD, LEFT_WRIST = 1, 6, 15, 19  # in the file's 32 joints
 
@@ -76,6 +77,14 @@ def test_classes_are_actions_without_their_number(tmp_path: Path) -> None:
     assert [h36m_class(n) for n in longer] == ["Photo", "WalkDog", "WalkTogether"]
     assert {r.action for r in read_h36m(h36m(tmp_path)).recordings} <= set(read_h36m(h36m(tmp_path)).speeds)
     assert sum(H36M_SPEEDS.values()) == pytest.approx(0.0724604)
+
+
+@pytest.mark.parametrize(
+    "name", ["Walking " + "9" * 400_000 + "x", "9" * 400_000 + "x", "Walking" + " 9" * 200_000 + "x"]
+)
+def test_endless_names_take_no_endless_time(name: str) -> None:
+    """Digits before something else: a search that began at each of them would take hours."""
+    assert ends(lambda: h36m_class(name))
 
 
 def test_a_tenth_of_each_persons_actions_is_held_out() -> None:

@@ -1,12 +1,10 @@
 """Files of the laboratory: tables as text, and JSON and pages that are written whole or not at all."""
 
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path, check_place
 
 
@@ -25,14 +23,8 @@ def plain(rows: Sequence[Sequence[str]]) -> str:
 
 
 def check_report(path: Path) -> Path:
-    """The path, its folders made, if a report can be written there: ask before long work."""
-    try:
-        os.makedirs(path.parent, exist_ok=True)
-    except OSError as error:
-        raise MotionloomError(
-            f"cannot write {path}: the folder {path.parent} cannot be made ({error.strerror or error}); name another"
-        ) from None
-    check_place(path)
+    """The path, if a report can be written there, whose folders may be missing: ask before long work."""
+    check_place(path, folders=True)
     return path
 
 
@@ -43,6 +35,6 @@ def write_json(path: Path, value: Any) -> Path:
 
 def write_text(path: Path, value: str) -> Path:
     """Whole or not at all, the folders made."""
-    with atomic_path(check_report(path)) as temp:
+    with atomic_path(path, folders=True) as temp:
         temp.write_text(value, encoding="utf-8")
     return path

@@ -83,7 +83,7 @@ def _grid(count: int, *, width: float, height: float):
 
 def _save(figure, report: Report, path: Path) -> Path:
     figure.suptitle(_plain(report.title, 110), fontsize=11, color=INK)
-    with atomic_path(path) as temp, warnings.catch_warnings():
+    with atomic_path(path, folders=True) as temp, warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a script that the font lacks is drawn as boxes
         figure.savefig(temp, format="png", metadata={"Software": None})
     return path

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from motionloom.io.atomic import with_folders
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics.everyday.sets import THEMES
@@ -53,4 +54,5 @@ class FirstDraws:
             positions, fps = self._kept[check.prompt]
             motions.append(motion_from_positions(positions, fps))
             marks.append(DONE if check.obeyed(check.measured(positions, fps)) else NOT_DONE)
-        return draw_grid(motions, path, captions=[check.prompt for check in checks], marks=marks)
+        with with_folders(path.parent):
+            return draw_grid(motions, path, captions=[check.prompt for check in checks], marks=marks)

@@ -3,7 +3,6 @@
 They come out of a built set, a folder of recordings, or HumanML3D as its authors lay it out (with its tokens).
 """
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -13,6 +12,8 @@ import numpy as np
 
 from motionloom.data.build import clips_of
 from motionloom.data.clips import Clip, read_clip
+from motionloom.data.sources import listed_names
+from motionloom.data.words import check_caption
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.io.atomic import finished
@@ -142,16 +143,12 @@ def _described(clip: Clip) -> Iterator[Item]:
 
 def _humanml3d(folder: Path, selection: Selection) -> Iterator[Item]:
     """new_joint_vecs/NAME.npy, texts/NAME.txt and a list of names per split; the mirrored ones begin with M."""
-    for split in selection.splits:
-        listed = folder / f"{split}.txt"
-        for name in _text(listed).split():
-            if not re.fullmatch(r"[\w.-]{1,80}", name):
-                raise MotionloomError(f"{listed} lists {name[:40]!r}, which is not a name; mend it")
-            if name.startswith("M") and not selection.mirrored:
-                continue
-            place = folder / "new_joint_vecs" / f"{name}.npy"
-            if place.is_file():  # as published: what the folder lacks is skipped
-                yield from _spoken(name, split, _features(place), _text(folder / "texts" / f"{name}.txt"))
+    for split, name in listed_names(folder, selection.splits):
+        if name.startswith("M") and not selection.mirrored:
+            continue
+        place = folder / "new_joint_vecs" / f"{name}.npy"
+        if place.is_file():  # as published: what the folder lacks is skipped
+            yield from _spoken(name, split, _features(place), _text(folder / "texts" / f"{name}.txt"))
 
 
 def _spoken(name: str, split: str, features: np.ndarray, text: str) -> Iterator[Item]:
@@ -165,9 +162,10 @@ def _spoken(name: str, split: str, features: np.ndarray, text: str) -> Iterator[
             start, end = (float(part) if part.strip() not in ("", "nan") else 0.0 for part in parts[2:])
             whole = start == 0 and end == 0
             first, last = (0, len(features)) if whole else (int(start * FPS), min(int(end * FPS), len(features)))
-        except (ValueError, OverflowError):
+            check_caption(parts[0])
+        except (ValueError, OverflowError) as error:
             raise MotionloomError(
-                f"the text of {name} has times that are not numbers: {line[:60]!r}; mend it"
+                f"the text of {name} has a line that cannot be used ({error}): {line[:60]!r}; mend it"
             ) from None
         if 0 <= first < last:
             spans.setdefault((first, last), []).append(Caption(parts[0].strip(), tuple(parts[1].split())))

@@ -1,0 +1,126 @@
+"""Motions that are written as they are finished, so that an interruption keeps those: for every ``--count``."""
+
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from motionloom.cli.sampling import write
+from motionloom.cli.skeletons import Target, put_all
+from motionloom.interruption import held_back
+
+if TYPE_CHECKING:
+    from motionloom.motion import Motion
+
+Made = TypeVar("Made")
+"""What is made ``--count`` times: a motion, or the motions of two people."""
+Write = Callable[[Sequence[Made], list[list[Path]], int], object]
+"""(what comes next, its files for each ``--out``, the number of its first): write it."""
+
+
+def groups(count: int, size: int, progress: Callable[[int, int], None]) -> Iterator[tuple[dict[str, int], "Moved"]]:
+    """Numbers of what is made together: ``first`` and ``count`` of each group, and what moves the bar of all of them.
+
+    count: how many in all; size: how many at once, at most.
+    """
+    for first in range(0, count, size):
+        some = min(size, count - first)
+        yield {"first": first, "count": some}, Moved(progress, first, some, count)
+
+
+@dataclass(frozen=True)
+class Moved:
+    """Moves the bar of the whole by how far a group is: (calls done, calls in all)."""
+
+    progress: Callable[[int, int], None]
+    first: int
+    some: int
+    count: int
+
+    def __call__(self, done: int, total: int) -> None:
+        self.progress(self.first * total + self.some * done, self.count * total)
+
+
+@dataclass(eq=False)
+class Finished(Generic[Made]):
+    """What is finished, and the files that are in their places; a picture that shows several is drawn at the end."""
+
+    files: Sequence[Sequence[Path]]
+    """For each ``--out`` a file each, or one that shows them all."""
+    total: int
+    """How many were asked for."""
+    write: Write[Made]
+    put: Callable[[Sequence[Made]], Sequence[Made]] = lambda made: made
+    """What is done to them before they are written, such as putting them on a skeleton."""
+    what: str = "motions"
+    """What they are called in a message."""
+    count: int = 0
+    """How many are finished."""
+    sampling: float = 0.0
+    """Seconds of drawing."""
+    _files: dict[Path, None] = field(default_factory=dict)
+    _shown: list[Made] = field(default_factory=list)
+
+    @property
+    def written(self) -> list[Path]:
+        """Files that are in their places, by ``--out``."""
+        return [file for several in self.files for file in several if file in self._files]
+
+    def take(self, makers: Iterable[Sequence[Made]]) -> bool:
+        """Write what ``makers`` give, in order, as it comes; true if that was interrupted after some was finished."""
+        try:
+            began = time.perf_counter()
+            for some in makers:
+                self.sampling += time.perf_counter() - began
+                self._add(some)
+                began = time.perf_counter()
+        except KeyboardInterrupt:
+            if not self.count:
+                raise
+            self._finish()
+            return True
+        self._finish()
+        return False
+
+    def ended(self, interrupted: bool) -> int:
+        """The exit code; says what was finished if it was interrupted."""
+        if not interrupted:
+            return 0
+        print(f"motionloom: interrupted; {self.count} of {self.total} {self.what} were finished", file=sys.stderr)
+        return 130
+
+    def _shows_all(self, several: Sequence[Path]) -> bool:
+        return len(several) < self.total
+
+    def _add(self, some: Sequence[Made]) -> None:
+        """Write what comes next, all of it, before an interruption is heard."""
+        with held_back():
+            some = self.put(some)
+            first, self.count = self.count, self.count + len(some)
+            self._shown += some if any(map(self._shows_all, self.files)) else ()
+            places = [list(several[first : self.count]) for several in self.files if not self._shows_all(several)]
+            if places:
+                self.write(some, places, first)
+            self._files |= dict.fromkeys(file for several in places for file in several)
+
+    def _finish(self) -> None:
+        """Draw what shows several, those that are finished."""
+        with held_back():
+            places = [list(several) for several in self.files if self._shows_all(several)]
+            if self.count and places:
+                self.write(self._shown, places, 0)
+                self._files |= dict.fromkeys(file for several in places for file in several)
+
+
+def finished_motions(
+    files: Sequence[Sequence[Path]], captions: Sequence[str], target: Target | None
+) -> "Finished[Motion]":
+    """Motions of these captions that are to be finished, put on the target's skeleton, and written to these files."""
+
+    def written(motions: "Sequence[Motion]", places: list[list[Path]], first: int) -> None:
+        for several in places:
+            write(motions, several, captions[first : first + len(motions)], target)
+
+    return Finished(files, len(captions), written, lambda motions: put_all(target, motions))
