@@ -76,6 +76,10 @@ class Target:
 
         if self.character is not None and self.writes(path):
             return self.character.save(motion, path, name=self.clip_name or caption, replace=self.replace)
+        if self.character is not None and path.suffix.lower() == ".usda":
+            from motionloom.io.usda import save_usda
+
+            return save_usda([motion], path, surfaces=self.character.surfaces() or None)
         if path.suffix.lower() == ".bvh":
             from motionloom.io.bvh_writer import save_bvh
 

@@ -10,7 +10,7 @@ from motionloom.motion import Motion
 
 READS = (".bvh", ".amc", ".glb", ".gltf", ".vrm", ".vrma", ".npz")
 GLTF = (".glb", ".gltf", ".vrm", ".vrma")
-WRITES = (".bvh", ".glb", ".vrma", ".npz", ".mp4", ".gif", ".png")
+WRITES = (".bvh", ".glb", ".vrma", ".usda", ".npz", ".mp4", ".gif", ".png")
 _ONE_PERSON = (".bvh", ".npz", ".vrma")
 _OWN = "that is written for a character of such a file: --skeleton hero{0} --out moving{0}; else write a .glb"
 _BLENDER = "Blender turns it into a .glb (docs/blender.md)"
@@ -18,7 +18,7 @@ _WAYS_OUT = {
     ".gltf": _OWN.format(".gltf"),
     ".vrm": _OWN.format(".vrm"),
     ".fbx": "write a .glb, which Blender turns into an .fbx (docs/blender.md)",
-    **dict.fromkeys((".usd", ".usdc", ".usdz", ".usda"), "write a .glb, which Blender turns into USD"),
+    **dict.fromkeys((".usd", ".usdc", ".usdz"), "write a .usda, which USD's own usdcat turns into the others"),
     ".dae": "write a .glb or .bvh",
     ".blend": "write a .glb and import it in Blender (docs/blender.md)",
 }
@@ -97,7 +97,8 @@ def check_output(path: Path | str, *, own: str | None = None) -> Path:
 
 
 def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequence[str] | None = None) -> Path:
-    """Write one motion or several; the suffix picks BVH (in metres), GLB, NPZ, MP4, GIF or PNG; gives the path back.
+    """Write one motion or several; the suffix picks BVH (in metres), GLB, VRMA, USDA, NPZ, MP4, GIF or PNG; gives
+    the path back.
 
     ``captions`` label pictures and films, one per motion. BVH and NPZ files hold one person. The file appears whole
     or not at all. Raises `MotionloomError` for another suffix or a place that cannot be written.
@@ -118,6 +119,10 @@ def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequ
         from motionloom.io.vrma import save_vrma
 
         return save_vrma(several[0], path)
+    if suffix == ".usda":
+        from motionloom.io.usda import save_usda
+
+        return save_usda(several, path)
     if suffix == ".glb":
         from motionloom.io.gltf import save_glb
 
@@ -142,10 +147,10 @@ def save_scene(
     names: Sequence[str] | None = None,
     captions: Sequence[str] | None = None,
 ) -> Path:
-    """Write people who share one world frame as one scene: GLB, or one MP4, GIF or PNG with everybody in it.
+    """Write people who share one world frame as one scene: GLB, USDA, or one MP4, GIF or PNG with everybody in it.
 
-    ``names``, one per person, name them in a GLB and in a picture's legend; ``captions``, one per person, stand over
-    pictures and films (one only where all are the same). `save` would draw the same people side by side instead.
+    ``names``, one per person, name them in a GLB or USDA and in a picture's legend; ``captions``, one per person, stand
+    over pictures and films (one only where all are the same). `save` would draw the same people side by side instead.
     BVH and NPZ files hold one person. The file appears whole or not at all.
     Raises `MotionloomError` for names or captions of another count, another suffix, or a place that cannot be written.
     """
@@ -161,6 +166,10 @@ def save_scene(
         from motionloom.io.gltf import save_glb
 
         return save_glb(motions, path, names=names)
+    if suffix == ".usda":
+        from motionloom.io.usda import save_usda
+
+        return save_usda(motions, path, names=names)
     from motionloom.viz.overlay import draw_scene, tint
     from motionloom.viz.scene import Actor
 

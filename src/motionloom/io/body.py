@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 SIDES = 10
 _LIFT = np.array([-90.0, -50.0, 0.0, 0.0, 50.0, 90.0]) * np.pi / 180  # rings from pole to pole
 MAX_FRAMES = 400
+MATERIALS = {1: ("left", (0.82, 0.17, 0.05)), -1: ("right", (0.03, 0.17, 0.60)), 0: ("middle", (0.16, 0.19, 0.24)),
+             2: ("skin", (0.76, 0.51, 0.35))}  # fmt: skip
+"""Name and linear colour for each `Piece.side`."""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.io.glb import Document, pack_glb, read_document_chunks
+from motionloom.io.gltf_mesh import Surface, read_surfaces
 from motionloom.io.gltf_nodes import Node, upwards
 from motionloom.io.gltf_read import OpenedGlb, open_glb, settled
 from motionloom.io.gltf_rig import Rig, Worlds, parents_first, read_rig, worlds
@@ -47,6 +48,10 @@ class Character:
     def skeleton(self) -> Skeleton:
         """The skeleton that motions must have to be written into the file."""
         return self.rig.skeleton
+
+    def surfaces(self) -> list[Surface]:
+        """The meshes of the file at rest, on `skeleton`; those that are compressed are left out."""
+        return read_surfaces(self.file.document, self.nodes, self.file.parents, self.rig)
 
     def save(self, motion: Motion, path: str | Path, *, name: str | None = None, replace: bool = False) -> Path:
         """Write the character's own file with one more animation, or with ``replace`` this one only.
