@@ -11,9 +11,11 @@ if TYPE_CHECKING:
     from motionloom.io.stream import Stream
     from motionloom.motion import Motion
     from motionloom.retarget import RootMode
+    from motionloom.retarget.hands import HandPose
     from motionloom.skeleton import Skeleton
 
 ROOTS = ("motion", "hips", "in-place")
+HANDS = ("relaxed", "fist", "flat", "as-is")
 
 
 def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform person's") -> None:
@@ -28,6 +30,9 @@ def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform per
         help="what carries the way over the ground on a skeleton with a root bone: that bone (motion, the default), "
         "the hips, or nothing",
     )  # fmt: skip
+    parser.add_argument(
+        "--hands", choices=HANDS, help="pose of the hands on a skeleton with fingers (default as-is: its rest pose)"
+    )
     parser.add_argument("--clip-name", metavar="NAME", help="name of the animation in the character's file")
     parser.add_argument("--replace", action="store_true", help="leave only this animation in the character's file")
     parser.add_argument("--force", action="store_true", help="write over files without saying so")
@@ -44,6 +49,7 @@ class Target:
     orders: dict[str, str] = field(default_factory=dict)
     character: "Character | None" = None
     root: "RootMode" = "motion"
+    hands: "HandPose" = "as-is"
     joint_map: Path | None = None
     clip_name: str | None = None
     replace: bool = False
@@ -52,14 +58,14 @@ class Target:
         """The motion on this skeleton; ``source`` names it in an error."""
         from motionloom.errors import MotionloomError
         from motionloom.retarget import retarget
+        from motionloom.retarget.hands import pose_hands
 
         try:
-            return retarget(
-                motion, self.skeleton, source_map=source_map, target_map=self.joint_map, root=self.root
-            )  # fmt: skip
+            made = retarget(motion, self.skeleton, source_map=source_map, target_map=self.joint_map, root=self.root)
         except MotionloomError as error:
             hint = "--source-map or --target-map"
             raise MotionloomError(f"{source} onto {self.name}: {error} ({hint})") from None
+        return pose_hands(made, self.hands, self.joint_map)
 
     @property
     def suffix(self) -> str | None:
@@ -92,7 +98,7 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
     from motionloom.errors import MotionloomError
 
     if arguments.skeleton is None:
-        for name in ("root", "clip_name", "replace", "target_map"):
+        for name in ("root", "hands", "clip_name", "replace", "target_map"):
             if getattr(arguments, name):
                 raise MotionloomError(f"--{name.replace('_', '-')} goes with a --skeleton; name one")
         return None
@@ -117,7 +123,7 @@ def _find(arguments: argparse.Namespace) -> Target:
     name, path = arguments.skeleton, Path(arguments.skeleton)
     suffix = path.suffix.lower()
     options = {
-        "root": arguments.root or "motion", "joint_map": arguments.target_map,
+        "root": arguments.root or "motion", "hands": arguments.hands or "as-is", "joint_map": arguments.target_map,
         "clip_name": arguments.clip_name, "replace": arguments.replace,
     }  # fmt: skip
     if name.lower() in NAMED and not path.exists():

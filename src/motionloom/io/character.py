@@ -92,6 +92,7 @@ class Character:
         rig, parents = self.rig, self.file.parents
         driven = {d for d in self.joints.drivers(self.skeleton) if d is not None}
         above_driven = {a for d in driven for a in ancestors(self.skeleton, d)}
+        turned = set(np.flatnonzero((1 - np.abs(motion.rotations[..., 0]) > _SAME_TURN).any(axis=0)).tolist())
         slots = {n: k for k, n in enumerate(rig.nodes)}
         above = upwards(rig.nodes[0], parents)[:0:-1]
         wanted = rot.multiply(motion.world_rotations(), rig.turns)
@@ -104,7 +105,7 @@ class Character:
             turn = rot.unroll(rot.normalize(turn))
             still = (1 - np.abs(turn @ node.turn) < _SAME_TURN).all()
             sampled: dict[tuple[int, str], Array] = {}
-            if k in driven or (k in above_driven and not still):
+            if k in driven or k in turned or (k in above_driven and not still):
                 sampled[n, "rotation"] = turn
                 keys.append((n, "rotation", np.roll(turn, -1, axis=-1)))
             if k in free:
