@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.cli.newcomers import check_overwriting, one_sentence
+from motionloom.cli.newcomers import one_sentence
 from motionloom.cli.sampling import (
     add_sampling,
     bar,
@@ -20,6 +20,7 @@ from motionloom.cli.sampling import (
     write,
 )
 from motionloom.cli.skeletons import put_all
+from motionloom.cli.writing import at_rate, check_overwriting
 
 if TYPE_CHECKING:
     from motionloom.goals.goal import Goal
@@ -88,11 +89,9 @@ def run_control(arguments: argparse.Namespace) -> None:
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [arguments.prompt])
     made, seconds = _make(arguments, prior, goal)
-    motions = put_all(target, [one.motion for one in made])
-    if arguments.fps is not None:
-        motions = [motion.resample(arguments.fps) for motion in motions]
+    motions = at_rate(put_all(target, [one.motion for one in made]), arguments.fps)
     captions = [arguments.prompt] * arguments.count
-    written = [write(motions, several, captions, target) for several in files]
+    written = [write(motions, several, captions, target, unit=arguments.out_unit) for several in files]
     _report(arguments, made, written, seconds=seconds, remarks=remarks)
 
 

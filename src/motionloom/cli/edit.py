@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import add_reading, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
     add_sampling,
@@ -21,6 +20,7 @@ from motionloom.cli.sampling import (
     write,
 )
 from motionloom.cli.skeletons import put_all
+from motionloom.cli.writing import at_rate, check_overwriting
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
@@ -53,7 +53,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--seed", type=int, default=0, help="the first version's seed (default 0)")
     parser.add_argument("--count", type=int, default=1, help="versions to make (default 1)")
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
-    add_sampling(parser, own_rate="the clip's", own_skeleton="own, the clip's")
+    add_sampling(parser, own_rate="the clip's", own_skeleton="own, the clip's", own_unit="the clip's")
     add_reading(parser)
     take_text_anywhere(parser)
     parser.set_defaults(run=run_edit)
@@ -78,6 +78,7 @@ def run_edit(arguments: argparse.Namespace) -> None:
     motions = put_all(target, motions)
     if uniform:
         unit, orders = None, {}
+    unit = arguments.out_unit or unit
     written = []
     for several in files:
         if several[0].suffix.lower() == ".bvh" and target is None:
@@ -113,9 +114,7 @@ def _make(
             prior, clip, text, changes, skeleton=skeleton, foot_lock=arguments.foot_lock, progress=progress,
             **sampling_of(arguments),
         )  # fmt: skip
-    if arguments.fps is not None:
-        motions = [motion.resample(arguments.fps) for motion in motions]
-    return motions, time.perf_counter() - began
+    return at_rate(motions, arguments.fps), time.perf_counter() - began
 
 
 def _write_bvh(motion: "Motion", place: Path, unit: float | None, orders: dict[str, str]) -> Path:

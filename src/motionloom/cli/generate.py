@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionloom.cli.newcomers import check_overwriting, one_sentence
+from motionloom.cli.newcomers import one_sentence
 from motionloom.cli.sampling import (
     add_sampling,
     bar,
@@ -23,6 +23,7 @@ from motionloom.cli.sampling import (
     write,
 )
 from motionloom.cli.skeletons import Target, put_all
+from motionloom.cli.writing import check_overwriting
 from motionloom.interruption import held_back
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def _generate(arguments: argparse.Namespace) -> int:
     prior = load_prior(arguments)
     timelines = {prompt: _timeline(arguments, prior, prompt) for prompt in prompts}
     remarks = remark_unknown(prior, [segment.text for found in timelines.values() for segment in found.segments])
-    made = _Made(files, captions, target)
+    made = _Made(files, captions, target, arguments.out_unit)
     interrupted = _make(arguments, prior, [timelines[caption] for caption in captions], made)
     motions = [
         {"prompt": caption, "seed": arguments.seed + i, "segments": _segments(timelines[caption])}
@@ -96,6 +97,8 @@ class _Made:
     captions: Sequence[str]
     target: Target | None = None
     """The skeleton that they are put on."""
+    unit: float | None = None
+    """Of BVH files, where no skeleton says it."""
     count: int = 0
     """Motions that are finished."""
     sampling: float = 0.0
@@ -117,7 +120,9 @@ class _Made:
             for several in self.files:
                 if len(several) == 1:
                     continue
-                write(motions, several[first : self.count], self.captions[first : self.count], self.target)
+                write(
+                    motions, several[first : self.count], self.captions[first : self.count], self.target, unit=self.unit
+                )
                 self._files |= dict.fromkeys(several[first : self.count])
 
     def finish(self) -> None:
@@ -125,7 +130,7 @@ class _Made:
         with held_back():
             for several in self.files:
                 if len(several) == 1 and self.count:
-                    write(self._shown, several, self.captions[: self.count], self.target)
+                    write(self._shown, several, self.captions[: self.count], self.target, unit=self.unit)
                     self._files[several[0]] = None
 
 

@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,7 +35,6 @@ def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform per
     )
     parser.add_argument("--clip-name", metavar="NAME", help="name of the animation in the character's file")
     parser.add_argument("--replace", action="store_true", help="leave only this animation in the character's file")
-    parser.add_argument("--force", action="store_true", help="write over files without saying so")
     parser.add_argument("--target-map", type=Path, metavar="JSON", help="which joints are which, of the --skeleton")
 
 
@@ -103,6 +102,7 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
                 raise MotionloomError(f"--{name.replace('_', '-')} goes with a --skeleton; name one")
         return None
     found = _find(arguments)
+    found = found if arguments.out_unit is None else replace(found, unit=arguments.out_unit)
     if found.character is not None:
         path = found.character.path
         if not any(found.writes(out) or not out.suffix for out in outs) and (arguments.clip_name or arguments.replace):
