@@ -7,7 +7,7 @@ bytes behind those that were there.
 import base64
 import copy
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -143,9 +143,29 @@ def load_character(path: str | Path, *, joint_map: Override | None = None) -> Ch
         except MotionloomError as error:
             problem = problem or error
         else:
-            return Character(path, file, nodes, rig, found)
+            return _with_soles(Character(path, file, nodes, rig, found))
     assert problem is not None
     raise MotionloomError(f"{path}: {problem}")
+
+
+_DOWN = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, -0.4, 0) for z in (-1, 0, 1) if x or y or z])
+"""Directions in which the corners of a foot are looked for."""
+
+
+def _with_soles(character: Character) -> Character:
+    """The character whose skeleton knows the corners of its feet, where it has a mesh and stands on the floor."""
+    skeleton = character.skeleton
+    if not skeleton.on_floor:
+        return character
+    feet = {skeleton.index(name) for j in (7, 8, 10, 11) for name, weight in character.joints.points[j] if weight}
+    feet |= {k for k in range(len(skeleton)) if feet & set(ancestors(skeleton, k))}
+    rest, found = skeleton.rest_positions(), {}
+    points = [(s.points, s.joints[np.arange(len(s.points)), s.weights.argmax(axis=1)]) for s in character.surfaces()]
+    for j in sorted(feet):
+        own = np.concatenate([places[of == j] for places, of in points] or [np.zeros((0, 3))]) - rest[j]
+        if len(own):
+            found[j] = own[np.unique((own @ _DOWN.T).argmax(axis=0))]
+    return replace(character, rig=replace(character.rig, skeleton=replace(skeleton, soles=found)))
 
 
 def _inside(now: Worlds, node: int, place: Array) -> Array:
