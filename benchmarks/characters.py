@@ -36,7 +36,9 @@ def measured(path: Path) -> list[tuple[str, dict[str, float]]]:
 
 def row(name: str, clip: str, values: dict[str, float]) -> str:
     """A line of the table; what misses its target has a star."""
-    cells = [f"{values[c]:6.2f}{'*' if values[c] > TARGETS[c] else ' '}" if c in values else "      - " for c in COLUMNS]
+    cells = [
+        f"{values[c]:6.2f}{'*' if values[c] > TARGETS[c] else ' '}" if c in values else "      - " for c in COLUMNS
+    ]
     return f"{name:22} {clip:36} " + " ".join(cells)
 
 

@@ -311,12 +311,13 @@ def _on_soles(ankles: Array, goals: _Goals, body: Body, *, world: Array, places:
     """The ankles' goals (frames, 2, 3), raised where a foot of a character's own shape would be in the ground.
 
     ``places`` (frames, 22, 3) are of the body with joint 0 at the origin. A foot that the source has below y = 0, such
-    as down a stair, may be as low there.
+    as down a stair, may be as low there. What both feet lack is left: it may as well be a pose in the air, which games
+    play in one place.
     """
     if not body.skeleton.soles:
         return ankles
     joints = _positions(body.skeleton, world)
-    raised = ankles.copy()
+    lack = np.zeros(ankles.shape[:2])
     for side, foot in enumerate(FEET):
         driver = body.drivers[foot]
         own = [j for j in body.skeleton.soles if driver is not None and driver in ancestors(body.skeleton, j)]
@@ -324,8 +325,9 @@ def _on_soles(ankles: Array, goals: _Goals, body: Body, *, world: Array, places:
             points = rot.rotate(world[:, None, j], body.skeleton.soles[j][None]) + joints[:, None, j]
             under = (points - places[:, None, foot])[..., 1].min(axis=1)
             ground = np.minimum(goals.toes[:, side, 1] - body.toe_height, 0.0)
-            raised[:, side, 1] = np.maximum(raised[:, side, 1], ground - under)
-    return raised
+            lack[:, side] = np.maximum(lack[:, side], ground - under - ankles[:, side, 1])
+    lack = lack - lack.min(axis=1, keepdims=True)
+    return ankles + lack[..., None] * np.array([0.0, 1.0, 0.0])
 
 
 def _make_up(goals: _Goals, ankles: Array) -> Array:
