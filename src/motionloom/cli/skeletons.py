@@ -52,6 +52,8 @@ class Target:
     joint_map: Path | None = None
     clip_name: str | None = None
     replace: bool = False
+    kept: object = None
+    """What must stay as long as the character does: a folder with what an FBX became."""
 
     def put(self, motion: "Motion", *, source: str = "the motion", source_map: Path | None = None) -> "Motion":
         """The motion on this skeleton; ``source`` names it in an error."""
@@ -69,18 +71,19 @@ class Target:
     @property
     def suffix(self) -> str | None:
         """How the character's own file ends."""
-        return self.character.path.suffix.lower() if self.character else None
+        return Path(self.name).suffix.lower() if self.character else None
 
     def writes(self, path: Path) -> bool:
         """Whether a file of this name is the character's own with one more animation."""
-        return path.suffix.lower() == self.suffix
+        suffix = path.suffix.lower()
+        return self.character is not None and suffix in (self.suffix, self.character.path.suffix.lower(), ".fbx")
 
     def save(self, motion: "Motion", path: Path, *, caption: str | None = None) -> Path:
         """Write a motion that is `put` on the skeleton; the suffix picks the format."""
         from motionloom import io
 
         if self.character is not None and self.writes(path):
-            return self.character.save(motion, path, name=self.clip_name or caption, replace=self.replace)
+            return self._save_own(self.character, motion, path, self.clip_name or caption)
         if self.character is not None and path.suffix.lower() == ".usda":
             from motionloom.io.usda import save_usda
 
@@ -90,6 +93,21 @@ class Target:
 
             return save_bvh(motion, path, order=self.orders, unit=self.unit)
         return io.save(motion, path, captions=None if caption is None else [caption])
+
+    def _save_own(self, character: "Character", motion: "Motion", path: Path, name: str | None) -> Path:
+        """The character's own file with one more animation; as FBX by way of a GLB."""
+        if path.suffix.lower() != ".fbx":
+            return character.save(motion, path, name=name, replace=self.replace)
+        import tempfile
+
+        from motionloom.errors import MotionloomError
+        from motionloom.io.blender import glb_to_fbx
+
+        if character.path.suffix.lower() != ".glb":
+            raise MotionloomError(f"a {character.path.suffix} character is not written as {path}; give it as a .glb")
+        with tempfile.TemporaryDirectory() as folder:
+            made = character.save(motion, Path(folder) / "moving.glb", name=name, replace=self.replace)
+            return glb_to_fbx(made, path, fps=motion.fps)
 
 
 def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target | None:
@@ -104,7 +122,7 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
     found = _find(arguments)
     found = found if arguments.out_unit is None else replace(found, unit=arguments.out_unit)
     if found.character is not None:
-        path = found.character.path
+        path = Path(found.name)
         if not any(found.writes(out) or not out.suffix for out in outs) and (arguments.clip_name or arguments.replace):
             raise MotionloomError(f"--clip-name and --replace are for the character's own file, a {path.suffix}")
         for out in outs:
@@ -142,6 +160,19 @@ def _find(arguments: argparse.Namespace) -> Target:
 
         character = load_character(path, joint_map=arguments.target_map)
         return Target(name, character.skeleton, character=character, **options)
+    if suffix == ".fbx":
+        import tempfile
+
+        from motionloom.io.blender import fbx_to_glb
+        from motionloom.io.character import load_character
+
+        folder = tempfile.TemporaryDirectory()
+        made = fbx_to_glb(path, Path(folder.name))
+        try:
+            character = load_character(made, joint_map=arguments.target_map)
+        except MotionloomError as error:
+            raise MotionloomError(str(error).replace(str(made), str(path))) from None
+        return Target(name, character.skeleton, character=character, kept=folder, **options)
     if suffix not in io.READS:
         raise MotionloomError(
             f"--skeleton needs {', '.join(NAMED)} or a file (.asf, {', '.join(io.READS)}); got {name!r}"

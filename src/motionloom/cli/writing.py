@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionloom.cli.reading import as_unit
+from motionloom.cli.reading import add_blender, as_unit
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
@@ -18,6 +18,7 @@ def add_writing(parser: argparse.ArgumentParser, *, unit: str = "m") -> None:
         "--out-unit", type=as_unit, metavar="UNIT", help=f"unit of a BVH written: m, cm, inch, or metres ({unit})"
     )
     add_force(parser)
+    add_blender(parser)
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
@@ -69,6 +70,6 @@ def _inputs(arguments: argparse.Namespace) -> list[Path]:
     for name, value in vars(arguments).items():
         if name == "skeleton" and isinstance(value, str):
             found.append(Path(value))
-        elif name not in ("out", "output"):
+        elif name not in ("out", "output", "blender"):
             found += value if isinstance(value, list | tuple) else [value]
     return [value for value in found if isinstance(value, Path)]
