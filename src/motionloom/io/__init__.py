@@ -38,7 +38,7 @@ def load(
 
     ``fps`` replaces the rate the file states (AMC files state none: 120), without resampling. ``unit`` is metres per
     unit of length for BVH, ASF and glTF (None: guessed, what the ASF says, metres). ``asf`` is the skeleton of an AMC
-    file (None: looked for beside it). ``clip`` is the number, from 1, or the name of an animation in a glTF or FBX file.
+    file (None: looked for beside it). ``clip`` is the number, from 1, or the name of a clip of a glTF or FBX file.
     Raises `MotionloomError` for a file that is missing, damaged or of another kind.
     """
     path = Path(path)
