@@ -14,8 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from motionloom.cli import main
 from motionloom.io.bvh_writer import save_bvh
@@ -29,6 +28,7 @@ from tests.cli.predict.clips import tiny_predictor
 from tests.nets import tiny
 from tests.tasks.two_people import block
 
+ROOT = Path(__file__).parents[1]
 SUFFIXES = (".bvh", ".glb", ".gltf", ".vrm", ".vrma")
 PRIOR = ("--weights", "{w}/prior.safetensors", "--steps", "2", "--raw")
 PREDICTOR = ("--weights", "{w}/predictor.safetensors", "--steps", "2", "--raw")
@@ -103,7 +103,8 @@ def table(files: list[Path], commands: dict[str, tuple[str, ...]], notes: Notes,
         cells = []
         for words in commands.values():
             filled = [word.format(file=path, w=made, own=own) for word in words]
-            code, text = said([*filled, *(["--force"] if filled[0] != "info" else [])], {str(path): "FILE", made: ""})
+            force = ["--force"] if filled[0] != "info" else []
+            code, text = said([*filled, *force], {str(path): "FILE", made: ""})
             cells.append(notes.cell(code, text.replace(path.name, "FILE")))
         lines.append(f"| {path.name} | " + " | ".join(cells) + " |")
         print(lines[-1], flush=True)

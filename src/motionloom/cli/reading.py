@@ -19,7 +19,10 @@ def add_reading(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--up", choices=("y", "z"), help="the axis that is up in the file (default: as people stand)")
     command.add_argument(
-        "--clip", metavar="NAME|NUMBER", help="animation of a .glb, .gltf, .vrm or .fbx (default: the first)"
+        "--clip",
+        dest="animation",
+        metavar="NAME|NUMBER",
+        help="animation of a .glb, .gltf, .vrm or .fbx (default: the first)",
     )
     add_blender(command)
     command.add_argument(
@@ -91,7 +94,7 @@ def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float
         file = read_bvh(path, fps=arguments.source_fps, unit=arguments.unit)
         motion, unit, orders = file.motion, file.unit, dict(file.orders)
     else:
-        clip = arguments.clip if path.suffix.lower() in io.CLIPS else None
+        clip = arguments.animation if path.suffix.lower() in io.CLIPS else None
         motion = io.load(path, fps=arguments.source_fps, asf=arguments.asf, unit=arguments.unit, clip=clip)
     return _upright(motion, path, arguments), unit, orders
 
