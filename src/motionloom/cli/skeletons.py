@@ -121,6 +121,7 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
         return None
     found = _find(arguments)
     found = found if arguments.out_unit is None else replace(found, unit=arguments.out_unit)
+    _check_humanoid(found)
     if found.character is not None:
         path = Path(found.name)
         if not any(found.writes(out) or not out.suffix for out in outs) and (arguments.clip_name or arguments.replace):
@@ -131,6 +132,20 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
     elif arguments.clip_name or arguments.replace:
         raise MotionloomError(f"--clip-name and --replace are for .glb, .gltf and .vrm characters; got {found.name}")
     return found
+
+
+def _check_humanoid(target: Target) -> None:
+    """Refuse a skeleton that is no person, or has no fingers for ``--hands``, before anything is drawn."""
+    from motionloom.errors import MotionloomError
+    from motionloom.retarget.anatomy import read_body
+    from motionloom.retarget.hands import check_fingers
+
+    try:
+        body = read_body(target.skeleton, target.joint_map)
+    except MotionloomError as error:
+        raise MotionloomError(f"--skeleton {target.name}: {error} (--target-map)") from None
+    if target.hands != "as-is":
+        check_fingers(body)
 
 
 def _find(arguments: argparse.Namespace) -> Target:

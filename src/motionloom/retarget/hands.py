@@ -60,15 +60,24 @@ def pose_hands(motion: Motion, pose: HandPose, override: Override | None = None)
         raise MotionloomError(f"hands are {', '.join(POSES)}; got {pose!r}")
     if pose == "as-is":
         return motion
-    body = read_body(motion.skeleton, override)
-    hands = [hand for side in (0, 1) if (hand := _read_hand(body, side)) is not None]
-    if not hands:
-        raise MotionloomError("the skeleton has no fingers that could be posed; leave out --hands")
+    hands = _hands(read_body(motion.skeleton, override))
     rotations = motion.rotations.copy()
     for hand in hands:
         for joint, turn in _turns(motion.skeleton, hand, pose).items():
             rotations[:, joint] = turn
     return replace(motion, rotations=rotations)
+
+
+def check_fingers(body: Body) -> None:
+    """Raise `MotionloomError` where a body has no fingers that `pose_hands` could pose."""
+    _hands(body)
+
+
+def _hands(body: Body) -> list[_Hand]:
+    hands = [hand for side in (0, 1) if (hand := _read_hand(body, side)) is not None]
+    if not hands:
+        raise MotionloomError("the skeleton has no fingers that could be posed; leave out --hands")
+    return hands
 
 
 def _read_hand(body: Body, side: int) -> _Hand | None:
