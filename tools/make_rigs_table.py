@@ -30,8 +30,8 @@ from tests.tasks.two_people import block
 
 ROOT = Path(__file__).parents[1]
 SUFFIXES = (".bvh", ".glb", ".gltf", ".vrm", ".vrma")
-PRIOR = ("--weights", "{w}/prior.safetensors", "--steps", "2", "--raw")
-PREDICTOR = ("--weights", "{w}/predictor.safetensors", "--steps", "2", "--raw")
+PRIOR = ("--weights", "{w}/prior.safetensors", "--steps", "2", "--no-foot-lock")
+PREDICTOR = ("--weights", "{w}/predictor.safetensors", "--steps", "2", "--no-foot-lock")
 ON = ("--skeleton", "{file}", "--out", "{w}/out{own}")
 READING = {
     "info": ("info", "{file}"),
@@ -51,7 +51,7 @@ WRITING = {
     "predict": ("predict", "{w}/walk.bvh", "--count", "1", "--seconds", "0.5", *ON, *PREDICTOR),
     "switch": ("switch", "{w}/walk.bvh", "{w}/walk.bvh", "--seconds", "0.5", *ON, *PREDICTOR),
     "duet": ("duet", "two people dance", "--seconds", "1", *ON, "--out", "{w}/other{own}", *PRIOR,
-             "--block", "{w}/block.safetensors"),
+             "--pair-weights", "{w}/block.safetensors"),
     "fist": ("export", "{w}/walk.bvh", *ON, "--hands", "fist"),
     "usda": ("export", "{w}/walk.bvh", "--skeleton", "{file}", "--out", "{w}/out.usda"),
 }  # fmt: skip

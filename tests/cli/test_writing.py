@@ -24,11 +24,11 @@ COMMANDS = {
     "predict long": ("predict", "walk.bvh", "--seconds", "31", "--count", "1"),
     "switch": ("switch", "walk.bvh", "walk.bvh", "--seconds", "0.5"),
     "duet": ("duet", "two people dance", "--seconds", "1", "--out", "other.bvh"),
-    "duet given": ("duet", "waves", "--given", "walk.bvh", "--out", "other.bvh"),
+    "duet given": ("duet", "waves", "--react-to", "walk.bvh", "--out", "other.bvh"),
     "export": ("export", "walk.bvh"),
 }
 WEIGHTS = {"predict": ("predictor",), "switch": ("predictor",), "duet": ("prior", "block"), "export": ()}
-OPTION = {"predictor": "--weights", "prior": "--weights", "block": "--block"}
+OPTION = {"predictor": "--weights", "prior": "--weights", "block": "--pair-weights"}
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def line(name: str, files: Path) -> list[str]:
     words = list(COMMANDS[name])
     for kind in WEIGHTS.get(words[0], ("prior",)):
         words += [OPTION[kind], str(files / f"{kind}.safetensors")]
-    return words if words[0] == "export" else [*words, "--steps", "2", "--raw"]
+    return words if words[0] == "export" else [*words, "--steps", "2", "--no-foot-lock"]
 
 
 @pytest.mark.parametrize("skeleton", [(), ("--skeleton", "mixamo")], ids=["own", "mixamo"])
