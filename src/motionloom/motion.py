@@ -137,7 +137,7 @@ class Motion:
         """The same motion of a body, and over a way, ``size`` times as large."""
         return replace(
             self,
-            skeleton=replace(self.skeleton, offsets=self.skeleton.offsets * size),
+            skeleton=self.skeleton.scaled(size),
             root=self.root * size,
             translations=None if self.translations is None else self.translations * size,
         )

@@ -6,7 +6,7 @@ The *rest pose* is what forward kinematics gives when every rotation is the iden
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -36,6 +36,8 @@ class Skeleton:
     """The joints of body parts where the file names them (VRM): SMPL joint, such as ``left_knee``, to joint name."""
     on_floor: bool = False
     """Whether the rest pose stands on the ground y = 0, as modelled characters do; a recording's skeleton need not."""
+    soles: dict[int, NDArray[np.float64]] = field(default_factory=dict)
+    """(points, 3) metres in the frames of joints of the feet: corners of the mesh that must not go into the floor."""
 
     def __post_init__(self) -> None:
         offsets = np.asarray(self.offsets, dtype=np.float64)
@@ -91,6 +93,11 @@ class Skeleton:
         for name in names:
             chosen.update(self.groups[name] if name in self.groups else (self.index(name),))
         return tuple(sorted(chosen))
+
+    def scaled(self, size: float) -> "Skeleton":
+        """The same skeleton ``size`` times as large."""
+        soles = {joint: points * size for joint, points in self.soles.items()}
+        return replace(self, offsets=self.offsets * size, soles=soles)
 
     def rest_positions(self) -> NDArray[np.float64]:
         """(joints, 3) metres: joint positions in rest pose, the root at its own offset."""

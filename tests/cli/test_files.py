@@ -105,7 +105,7 @@ def test_joints_without_telling_names_are_found_by_a_map(walk, capsys):
     save_bvh(Motion(blank, 30, walk.root[:1], walk.rotations[:1]), "blank.bvh")
     words = ["export", "walk.bvh", "a.bvh", "--skeleton", "blank.bvh"]
     assert main(words) == 2
-    assert "walk.bvh onto blank.bvh" in capsys.readouterr().err
+    assert "--skeleton blank.bvh: the skeleton is not a humanoid" in capsys.readouterr().err
     Path("map.json").write_text(json.dumps({name: f"b{j}" for j, name in enumerate(SMPL22.names)}))
     assert main([*words, "--target-map", "map.json"]) == 0
     assert set(io.load("a.bvh").skeleton.names) >= set(blank.names)
@@ -184,7 +184,7 @@ def small() -> Skeleton:
 
 MISTAKES = [
     (["export", "walk.bvh"], "one file to write is needed"),
-    (["export", "walk.bvh", "walk.fbx"], "its name must end in .bvh, .glb"),
+    (["export", "walk.bvh", "walk.dae"], "its name must end in .bvh, .glb"),
     (["export", "no.bvh", "a.glb"], "cannot read no.bvh: No such file"),
     (["export", "a.glb", "walk.bvh"], "cannot read a.glb"),
     (["export", "walk.bvh", "no/a.bvh"], "does not exist; make it first"),

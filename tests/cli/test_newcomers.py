@@ -45,9 +45,9 @@ def test_other_names_mean_the_same(weights: str, words: tuple[str, ...]) -> None
         (["a person walks"], 'did you mean: motionloom generate "a person walks"'),
         (["genrate", "walk"], "did you mean: motionloom generate walk"),
         (["xyzzy"], "the commands are generate"),
-        (["export", "a.bvh", "a.fbx"], "which Blender turns into an .fbx"),
+        (["export", "a.bvh", "a.usdz"], "usdcat"),
         (["export", "a.bvh", "a.vrm"], "--skeleton hero.vrm"),
-        (["export", "a.fbx", "a.bvh"], "Blender turns it into a .glb"),
+        (["export", "a.dae", "a.bvh"], "Blender turns it into a .glb"),
     ],
 )
 def test_what_is_meant_is_suggested(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:

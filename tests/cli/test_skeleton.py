@@ -104,6 +104,14 @@ def test_info_lists_clips_and_clip_picks_one(capsys: pytest.CaptureFixture[str])
     assert "2 clips" in complaint(capsys)
 
 
+def test_edit_and_predict_read_one_clip_of_a_character(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Hero().clip("wave", wave(20)).clip("run", wave(60)).write(Path("two.glb"))
+    more = ["--weights", weights, *TINY, "--out", "out.bvh"]
+    assert main(["edit", "two.glb", "waves", "--clip", "run", "--between", "0.5", "1.5", *more]) == 0
+    assert len(io.load("out.bvh")) == 60
+    assert "none was chosen" not in capsys.readouterr().err
+
+
 # The root bone -------------------------------------------------------------------------------------------------------
 
 

@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from motionloom import rotations as rot
 from motionloom.io.body import body
+from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
 from tests.io.gltf_files import person
 
@@ -19,5 +21,15 @@ def test_the_body_is_closed_faces_outward_and_has_human_size() -> None:
     tall, wide = np.ptp(points[:, 1]), np.ptp(points[:, 0])
     assert 1.5 < tall < 1.9
     assert 1.2 < wide < 2.0
-    assert points[:, 1].min() > -0.08
+    assert points[:, 1].min() > -0.03
     assert {p.side for p in pieces} == {-1, 0, 1, 2}
+
+
+def test_soles_stand_on_the_floor_and_not_in_it() -> None:
+    still = Motion(SMPL22, 30.0, SMPL22.offsets[:1], np.tile(rot.IDENTITY, (1, 22, 1)))
+    rest = SMPL22.rest_positions()
+    for piece in body(still):
+        if SMPL22.names[piece.joint].endswith("ankle"):
+            heights = (piece.points + rest[piece.joint])[:, 1]
+            assert abs(heights.min()) < 1e-3
+            assert (heights < 1e-3).sum() > 8  # a sole, and no ridge

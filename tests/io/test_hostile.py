@@ -202,11 +202,11 @@ def test_empty_missing_and_folder_are_told_apart(tmp_path, suffix):
 
 
 def test_unknown_suffixes_are_refused_with_the_known_ones(tmp_path):
-    for name in ("a.fbx", "a", "a.bvh.txt", "a.asf"):
+    for name in ("a.dae", "a", "a.bvh.txt", "a.asf"):
         with pytest.raises(MotionloomError, match=r"\.bvh|\.amc"):
             io.load(tmp_path / name)
     motion = Motion(SMPL22, 30, np.zeros((2, 3)), np.tile(IDENTITY, (2, 22, 1)))
-    for name in ("a.fbx", "a", "a.amc"):
+    for name in ("a.dae", "a", "a.amc"):
         with pytest.raises(MotionloomError, match=r"\.bvh"):
             io.save(motion, tmp_path / name)
     for several in ([], [motion, motion]):

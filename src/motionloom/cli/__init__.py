@@ -7,7 +7,8 @@ import os
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from pathlib import Path
 from typing import Any
 
 from motionloom.cli.newcomers import COMMANDS, suggestion, with_command, with_options
@@ -107,9 +108,18 @@ def _run(argv: Sequence[str] | None) -> int:
     if not hasattr(arguments, "run"):
         top.print_help(sys.stderr)
         return 2
-    with warnings.catch_warnings(), _seldom_collected():
+    with warnings.catch_warnings(), _seldom_collected(), _blender(getattr(arguments, "blender", None)):
         warnings.showwarning = _warn
         return arguments.run(arguments) or 0
+
+
+def _blender(chosen: Path | None) -> AbstractContextManager[None]:
+    """The Blender that the line names, for FBX files."""
+    if chosen is None:
+        return nullcontext()
+    from motionloom.io.blender import using
+
+    return using(chosen)
 
 
 @contextmanager

@@ -6,9 +6,9 @@ from collections.abc import Generator, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.sampling import add_sampling, bar, check_outs, fail, load_prior, moves, remark_unknown, sampling_of
 from motionloom.cli.skeletons import Target, open_target
+from motionloom.cli.writing import check_overwriting
 
 if TYPE_CHECKING:
     from motionloom.goals.timeline import Timeline
@@ -61,11 +61,11 @@ def _compose(arguments: argparse.Namespace) -> int:
         return 0
     from motionloom.tasks.long import with_loaded
 
-    check_overwriting(arguments, outs)
+    check_overwriting(arguments, outs, also=() if timeline.start is None else (Path(timeline.start),))
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [segment.text for segment in timeline.segments[:REMARKED]])
     timeline = replace(timeline, segments=with_loaded(prior, timeline.segments))
-    streams = _open(outs, timeline, arguments.fps, target)
+    streams = _open(arguments, outs, timeline, target)
     interrupted = _make(arguments, prior, timeline, streams)
     seconds = max(stream.seconds for stream in streams) if interrupted else timeline.seconds
     _report(arguments, timeline, seconds=seconds, streams=_saved(streams), remarks=remarks)
@@ -95,18 +95,20 @@ def _timeline(arguments: argparse.Namespace) -> "Timeline":
     return timeline.read_timeline(files[0])
 
 
-def _open(outs: Sequence[Path], timeline: "Timeline", fps: float | None, target: Target | None) -> list["Stream"]:
+def _open(
+    arguments: argparse.Namespace, outs: Sequence[Path], timeline: "Timeline", target: Target | None
+) -> list["Stream"]:
     """The files, those that grow on the disk last: they are closed first, and that is quick."""
     from motionloom.io.stream import check_length, open_stream
 
-    rate = fps or 20.0
+    rate, unit = arguments.fps or 20.0, arguments.out_unit or 1.0
     total = int((timeline.frames - 1) / 20 * rate + 1e-6) + 1
     said = "; ".join(" ".join(segment.text.split()) for segment in timeline.segments[:20])
     if target is not None:
         for out in outs:
             check_length(out, total=total, fps=rate, joints=len(target.skeleton))
         return [open_target(target, out, caption=said) for out in outs]
-    streams = [open_stream(out, total=total, fps=rate, caption=said) for out in outs]
+    streams = [open_stream(out, total=total, fps=rate, caption=said, unit=unit) for out in outs]
     return sorted(streams, key=lambda stream: stream.path.suffix.lower() == ".bvh")
 
 

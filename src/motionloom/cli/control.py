@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.cli.finished import finished_motions, groups
-from motionloom.cli.newcomers import check_overwriting, one_sentence
+from motionloom.cli.newcomers import one_sentence
 from motionloom.cli.sampling import (
     add_sampling,
     bar,
@@ -19,6 +19,7 @@ from motionloom.cli.sampling import (
     report,
     sampling_of,
 )
+from motionloom.cli.writing import check_overwriting
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -89,7 +90,9 @@ def run_control(arguments: argparse.Namespace) -> int:
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [arguments.prompt])
-    made = finished_motions(files, [arguments.prompt] * arguments.count, target)
+    made = finished_motions(
+        files, [arguments.prompt] * arguments.count, target, unit=arguments.out_unit, rate=arguments.fps
+    )
     judged: list[Controlled] = []
     interrupted = made.take(_made(arguments, prior, goal, judged))
     written = [[file for file in several if file in made.written] for several in files]
@@ -149,7 +152,7 @@ def _made(
     from motionloom.tasks.control import control
     from motionloom.tasks.sampling import BATCH
 
-    adapters, rate = _adapters(arguments.adapters, prior), arguments.fps
+    adapters = _adapters(arguments.adapters, prior)
     with bar("controlling") as progress:
         for some, moved in groups(arguments.count, BATCH, progress):
             made = control(
@@ -157,7 +160,7 @@ def _made(
                 progress=moved, **sampling_of(arguments) | some,
             )  # fmt: skip
             judged += made
-            yield [one.motion if rate is None else one.motion.resample(rate) for one in made]
+            yield [one.motion for one in made]
 
 
 def _adapters(names: list[str], prior: "Prior") -> "Adapters":

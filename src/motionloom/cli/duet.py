@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from motionloom.cli.finished import Finished, groups
-from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
     add_adapters,
@@ -21,6 +20,7 @@ from motionloom.cli.sampling import (
     take_text_anywhere,
 )
 from motionloom.cli.skeletons import Target, add_skeleton, put_all, read_target
+from motionloom.cli.writing import add_writing, at_rate, check_overwriting, check_rate, check_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -93,6 +93,7 @@ def _add_sampling(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
     add_skeleton(parser, own="the uniform person's, or those of the motions given")
+    add_writing(parser, unit="m, or those of the motions given")
 
 
 def run_duet(arguments: argparse.Namespace) -> int:
@@ -112,7 +113,7 @@ def run_duet(arguments: argparse.Namespace) -> int:
         _write(duets, places, manners, caption, skin)
 
     def put(duets: "Sequence[list[Motion]]") -> "list[list[Motion]]":
-        return [put_all(skin, duet) for duet in duets]
+        return [put_all(skin, at_rate(duet, arguments.fps)) for duet in duets]
 
     made = Finished(files, arguments.count, write, put, what="duets")
     seconds = 0.0
@@ -124,9 +125,6 @@ def run_duet(arguments: argparse.Namespace) -> int:
                 duets = _make(
                     arguments, prior, block, given=given, timeline=timeline, goal=goal, progress=moved, some=some
                 )
-                rate = arguments.fps
-                if rate is not None:
-                    duets = [[motion.resample(rate) for motion in duet] for duet in duets]
                 seconds = duets[0][0].seconds
                 yield duets
 
@@ -215,7 +213,11 @@ def _read(arguments: argparse.Namespace) -> "tuple[list[Motion], list[tuple[floa
     for path in paths:
         motion, unit, orders = read_clip(arguments, path)
         motions.append(crop(motion, arguments))
-        manners.append((unit or 1.0, orders))
+        manners.append((arguments.out_unit or unit or 1.0, orders))
+    if not paths:
+        manners = [(arguments.out_unit or 1.0, {})] * 2
+    elif len(paths) == 1:
+        manners.append((arguments.out_unit or 1.0, {}))
     return motions, manners
 
 
@@ -301,8 +303,7 @@ def _check_numbers(arguments: argparse.Namespace) -> None:
         fail(f"--guidance must be -100 to 100, usually 1 to 7; got {arguments.guidance:g}")
     if arguments.pair_guidance is not None and not 0 <= arguments.pair_guidance <= 1:
         fail(f"--pair-guidance must be 0 to 1; got {arguments.pair_guidance:g}")
-    if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
-        fail(f"--fps must be 1 to 1000; got {arguments.fps:g}")
+    check_rate(arguments)
 
 
 def _check_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target | None]:
@@ -311,6 +312,7 @@ def _check_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target | Non
     skin = read_target(arguments, outs)
     if len({out.resolve() for out in outs}) != len(outs):
         fail("the same --out is given twice; give each file its own name")
+    check_unit(arguments, outs)
     for suffix in _single(skin):
         own = [out for out in outs if out.suffix.lower() == suffix]
         if len(own) not in (0, 2):
@@ -374,7 +376,7 @@ def _write(
             seen[suffix] += 1
             if skin is not None:
                 written.append(skin.save(duet[person], out, caption=caption))
-            elif suffix == ".bvh" and person < len(manners):
+            elif suffix == ".bvh":
                 unit, orders = manners[person]
                 written.append(save_bvh(duet[person], out, order=orders, unit=unit))
             else:

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from motionloom.cli.finished import Finished, groups
-from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import add_reading, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
     add_sampling,
@@ -22,6 +21,7 @@ from motionloom.cli.sampling import (
     write,
 )
 from motionloom.cli.skeletons import Target, put_all
+from motionloom.cli.writing import at_rate, check_overwriting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -56,7 +56,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--seed", type=int, default=0, help="the first version's seed (default 0)")
     parser.add_argument("--count", type=int, default=1, help="versions to make (default 1)")
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
-    add_sampling(parser, own_rate="the clip's", own_skeleton="own, the clip's")
+    add_sampling(parser, own_rate="the clip's", own_skeleton="own, the clip's", own_unit="the clip's")
     add_reading(parser)
     take_text_anywhere(parser)
     parser.set_defaults(run=run_edit)
@@ -77,10 +77,11 @@ def run_edit(arguments: argparse.Namespace) -> int:
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [arguments.text or ""])
-    manner = (None, {}) if uniform else (unit, orders)
+    unit, orders = (None, {}) if uniform else (unit, orders)
     made = Finished(
-        files, arguments.count, _writer(captions, target, *manner), put=lambda motions: put_all(target, motions)
-    )
+        files, arguments.count, _writer(captions, target, arguments.out_unit or unit, orders),
+        put=lambda motions: put_all(target, motions),
+    )  # fmt: skip
     interrupted = made.take(_made(arguments, prior, crop(clip, arguments), "smpl" if uniform else "own"))
     about = {
         "clip": str(arguments.clip),
@@ -100,7 +101,7 @@ def _made(
     """The versions, one after the other."""
     from motionloom.tasks.edit import changes_asked, edit
 
-    text, rate = arguments.text or "", arguments.fps
+    text = arguments.text or ""
     changes = changes_asked(
         text, keep=[name.strip() for part in arguments.keep for name in part.split(",")], loop=arguments.loop,
         between=[tuple(span) for span in arguments.between], blend=arguments.blend, extend=arguments.extend,
@@ -112,7 +113,7 @@ def _made(
                 prior, clip, text, changes, skeleton=skeleton, foot_lock=arguments.foot_lock, progress=moved,
                 **sampling_of(arguments) | some,
             )  # fmt: skip
-            yield motions if rate is None else [motion.resample(rate) for motion in motions]
+            yield at_rate(motions, arguments.fps)
 
 
 def _writer(

@@ -5,12 +5,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import (
     RATE_ASSUMED,
     add_reading,
     as_rate,
-    as_unit,
     check_size,
     crop,
     note_rate,
@@ -18,6 +16,7 @@ from motionloom.cli.reading import (
     read_clip,
 )
 from motionloom.cli.skeletons import add_skeleton, read_target
+from motionloom.cli.writing import add_force, add_writing, at_rate, check_overwriting, check_rate
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
@@ -39,7 +38,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     add_skeleton(export, own="IN's")
     export.add_argument("--source-map", "--joint-map", type=Path, metavar="JSON", help="which joints are which, of IN")
     export.add_argument("--mirror", action="store_true", help="exchange left and right")
-    export.add_argument("--out-unit", type=as_unit, metavar="UNIT", help="unit of a BVH written (as read, else m)")
+    add_writing(export, unit="as read, else m")
     export.add_argument("--order", metavar="XYZ", help="order of rotations of a BVH written (as read, else ZXY)")
     export.set_defaults(run=run_export)
 
@@ -49,6 +48,8 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     view.add_argument("inputs", metavar="FILE", type=Path, nargs="+")
     add_reading(view)
     view.add_argument("--out", metavar="PICTURE", type=Path, help="(default: FILE's name with .png, in this folder)")
+    view.add_argument("--fps", type=float, metavar="N", help="frame rate of a film (default: as read)")
+    add_force(view)
     view.set_defaults(run=run_view)
 
     info = subparsers.add_parser(
@@ -108,8 +109,10 @@ def run_view(arguments: argparse.Namespace) -> None:
     if target.suffix.lower() not in (".png", ".mp4", ".gif"):
         raise MotionloomError(f"a picture ends in .png and a film in .mp4 or .gif; got {target}")
     io.check_output(target)
+    check_rate(arguments)
+    check_overwriting(arguments, [target])
     motions = [crop(read_clip(arguments, path)[0], arguments) for path in arguments.inputs]
-    io.save(motions, target, captions=[path.stem for path in arguments.inputs])
+    io.save(at_rate(motions, arguments.fps), target, captions=[path.stem for path in arguments.inputs])
     print(f"wrote {target}")
     note_rate(arguments, arguments.inputs)
 

@@ -5,10 +5,11 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from motionloom.cli.sampling import write
 from motionloom.cli.skeletons import Target, put_all
+from motionloom.cli.writing import at_rate
 from motionloom.interruption import held_back
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ Write = Callable[[Sequence[Made], list[list[Path]], int], object]
 """(what comes next, its files for each ``--out``, the number of its first): write it."""
 
 
-def groups(count: int, size: int, progress: Callable[[int, int], None]) -> Iterator[tuple[dict[str, int], "Moved"]]:
+def groups(count: int, size: int, progress: Callable[[int, int], None]) -> Iterator[tuple[dict[str, Any], "Moved"]]:
     """Numbers of what is made together: ``first`` and ``count`` of each group, and what moves the bar of all of them.
 
     count: how many in all; size: how many at once, at most.
@@ -115,12 +116,20 @@ class Finished(Generic[Made]):
 
 
 def finished_motions(
-    files: Sequence[Sequence[Path]], captions: Sequence[str], target: Target | None
+    files: Sequence[Sequence[Path]],
+    captions: Sequence[str],
+    target: Target | None,
+    *,
+    unit: float | None = None,
+    rate: float | None = None,
 ) -> "Finished[Motion]":
-    """Motions of these captions that are to be finished, put on the target's skeleton, and written to these files."""
+    """Motions of these captions that are to be finished, put on the target's skeleton, and written to these files.
+
+    unit: metres that a unit of a BVH is, without a target; rate: frames per second, None: as they are made.
+    """
 
     def written(motions: "Sequence[Motion]", places: list[list[Path]], first: int) -> None:
         for several in places:
-            write(motions, several, captions[first : first + len(motions)], target)
+            write(motions, several, captions[first : first + len(motions)], target, unit=unit)
 
-    return Finished(files, len(captions), written, lambda motions: put_all(target, motions))
+    return Finished(files, len(captions), written, lambda motions: at_rate(put_all(target, motions), rate))

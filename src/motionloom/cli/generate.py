@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.finished import finished_motions
-from motionloom.cli.newcomers import check_overwriting, one_sentence
+from motionloom.cli.newcomers import one_sentence
 from motionloom.cli.sampling import (
     add_sampling,
     bar,
@@ -21,6 +21,7 @@ from motionloom.cli.sampling import (
     report,
     sampling_of,
 )
+from motionloom.cli.writing import check_overwriting
 
 if TYPE_CHECKING:
     from motionloom.goals.timeline import Timeline
@@ -69,10 +70,9 @@ def _generate(arguments: argparse.Namespace) -> int:
     prior = load_prior(arguments)
     timelines = {prompt: _timeline(arguments, prior, prompt) for prompt in prompts}
     remarks = remark_unknown(prior, [segment.text for found in timelines.values() for segment in found.segments])
-    made = finished_motions(files, captions, target)
+    made = finished_motions(files, captions, target, unit=arguments.out_unit, rate=arguments.fps)
     drawn = _drawn(arguments, prior, [timelines[caption] for caption in captions])
-    rate = arguments.fps
-    interrupted = made.take([motion if rate is None else motion.resample(rate)] for motion in drawn)
+    interrupted = made.take([motion] for motion in drawn)
     motions = [
         {"prompt": caption, "seed": arguments.seed + i, "segments": _segments(timelines[caption])}
         for i, caption in enumerate(captions[: made.count])

@@ -4,8 +4,6 @@ import argparse
 import difflib
 import sys
 from collections.abc import Iterable, Sequence
-from pathlib import Path
-from typing import Any
 
 COMMANDS = {"gen": "generate", "convert": "export", "play": "view", "show": "view", "draw": "view", "join": "compose"}
 OPTIONS = {"--length": "--seconds", "--duration": "--seconds", "-o": "--out", "--output": "--out", "-n": "--count"}
@@ -83,29 +81,3 @@ def one_sentence(words: Sequence[str]) -> list[str]:
     if len(words) < 2 or any(" " in word.strip() for word in words):
         return list(words)
     return [" ".join(words)]
-
-
-def check_overwriting(arguments: argparse.Namespace, files: Iterable[Path]) -> None:
-    """Refuse to write over what is read; say so where another file is written over without ``--force``.
-
-    Raises `MotionloomError` naming the file that is both.
-    """
-    from motionloom.errors import MotionloomError
-
-    read = {path.resolve() for path in _inputs(arguments)}
-    for file in files:
-        if not file.exists() or file.is_dir():
-            continue
-        if file.resolve() in read:
-            raise MotionloomError(f"{file} is read and would be written over; give what is made another name")
-        if not arguments.force:
-            print(f"note: {file} was there and is written over (--force says nothing)", file=sys.stderr)
-
-
-def _inputs(arguments: argparse.Namespace) -> list[Path]:
-    """The files that the line names to be read."""
-    found: list[Any] = []
-    for name, value in vars(arguments).items():
-        if name not in ("out", "output"):
-            found += value if isinstance(value, list | tuple) else [value]
-    return [value for value in found if isinstance(value, Path)]

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 from motionloom.cli.finished import Finished, groups
 from motionloom.cli.futures import FORMATS, Long, Manner, targets, write_futures
 from motionloom.cli.futures import Target as Files
-from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import bar, check_count, fail, sampling_of
 from motionloom.cli.skeletons import Target, add_skeleton, read_target
+from motionloom.cli.writing import add_writing, at_rate, check_overwriting, check_rate, check_unit
 
 if TYPE_CHECKING:
     from motionloom.goals.hold import FixedJoints
@@ -113,7 +113,9 @@ def _add_sampling(parser: argparse.ArgumentParser, other: str) -> None:
     )
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
+    parser.add_argument("--fps", type=float, metavar="N", help="frame rate of the files (default: PAST's)")
     add_skeleton(parser, own="PAST's")
+    add_writing(parser, unit="PAST's, else m")
     add_reading(parser)
 
 
@@ -125,6 +127,7 @@ def run_predict(arguments: argparse.Namespace) -> int:
     own = skin and skin.suffix
     formats = arguments.format or [own[1:] if own else "bvh"]
     wanted = targets(outs, arguments.count, formats, pictures=not arguments.no_picture, own=own)
+    check_unit(arguments, [file for one in wanted for file in one.files])
     check_overwriting(arguments, [file for one in wanted for file in one.files])
     past, manner = _read_past(arguments, skin)
     horizon = round(arguments.seconds * past.fps)
@@ -132,7 +135,8 @@ def run_predict(arguments: argparse.Namespace) -> int:
     hold = _hold(arguments, past, horizon)
     predictor = _predictor(arguments)
     if arguments.seconds > LONG:
-        long = Long(wanted, manner, len(past), len(past) + horizon, _caption(arguments))
+        given, frames = (_frames_at(arguments, past, count) for count in (len(past), len(past) + horizon))
+        long = Long(wanted, manner, given, frames, _caption(arguments))
         return _predict_long(arguments, predictor, past, hold=hold, long=long)
     from motionloom.tasks.predict import predict
 
@@ -144,7 +148,7 @@ def run_predict(arguments: argparse.Namespace) -> int:
                     foot_lock=arguments.foot_lock, progress=moved, **sampling_of(arguments) | some,
                 )  # fmt: skip
 
-    return _written(arguments, drawn(), wanted, manner, len(past), note=lambda: _note_seen(predictor, past))
+    return _written(arguments, drawn(), wanted, manner, past, note=lambda: _note_seen(predictor, past))
 
 
 def _written(
@@ -152,17 +156,21 @@ def _written(
     drawn: "Iterator[list[Motion]]",
     wanted: list[Files],
     manner: Manner,
-    past: int,
+    past: "Motion",
     *,
     note: "Callable[[], None]" = lambda: None,
 ) -> int:
     """Write the futures, all of them at once, and say so; after an interruption those that were finished."""
     written: list[Path] = []
+    given = _frames_at(arguments, past, len(past))
 
     def write(motions: "Sequence[Motion]", places: list[list[Path]], first: int) -> None:
-        written.extend(write_futures(wanted, motions, past, manner, caption=_caption(arguments)))
+        written.extend(write_futures(wanted, motions, given, manner, caption=_caption(arguments)))
 
-    made = Finished([[target.folder] for target in wanted[:1]], arguments.count, write, what="futures")
+    made = Finished(
+        [[target.folder] for target in wanted[:1]], arguments.count, write,
+        put=lambda motions: at_rate(motions, arguments.fps), what="futures",
+    )  # fmt: skip
     interrupted = made.take(drawn)
     _report(arguments, [str(file) for file in written], made.count)
     note()
@@ -181,6 +189,7 @@ def run_switch(arguments: argparse.Namespace) -> int:
     for out in outs:
         check_output(out, own=own)  # files, and no folder
     wanted = targets(outs, arguments.count, [], pictures=False, own=own)
+    check_unit(arguments, [file for one in wanted for file in one.files])
     check_overwriting(arguments, [file for one in wanted for file in one.files])
     past, manner = _read_past(arguments, skin)
     _check_size(arguments, past, round(arguments.seconds * past.fps), wanted)
@@ -196,7 +205,7 @@ def run_switch(arguments: argparse.Namespace) -> int:
         )
         for some, _ in groups(arguments.count, TOGETHER, lambda done, total: None)
     )  # fmt: skip
-    return _written(arguments, drawn, wanted, manner, len(past))
+    return _written(arguments, drawn, wanted, manner, past)
 
 
 # Futures of any length
@@ -219,7 +228,7 @@ def _predict_long(
     told = [f"{file}: {s:.2f} s" if s and not arguments.json else str(file) for file, s in long.finished]
     _report(arguments, told, arguments.count)
     if interrupted:
-        total = long.frames / past.fps
+        total = long.frames / (arguments.fps or past.fps)
         print(f"motionloom: interrupted; what was finished is in {long.kept()} of {total:.2f} s", file=sys.stderr)
         return 130
     _note_seen(predictor, past)
@@ -231,6 +240,7 @@ def _pieces(
     arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", hold: "FixedJoints | None", *, frames: int
 ) -> "Generator[Iterator[Motion], None, None]":
     """Of each future its pieces, while a bar shows how far they are."""
+    from motionloom.io.stream import resampled
     from motionloom.tasks.predict import predict_pieces
 
     with bar("predicting") as move:
@@ -247,6 +257,7 @@ def _pieces(
                 predictor, past, seconds=arguments.seconds, number=number, hold=hold, root=not arguments.no_root,
                 foot_lock=arguments.foot_lock, **settings,
             )  # fmt: skip
+            pieces = pieces if arguments.fps is None else resampled(pieces, arguments.fps)
             yield moved(pieces, number * frames)
 
 
@@ -275,7 +286,7 @@ def _read_past(arguments: argparse.Namespace, skin: Target | None) -> "tuple[Mot
     past = crop(whole, arguments)
     if len(past) < 2:
         fail(f"{arguments.past} has one frame here, and a past has at least two; only they say where the person goes")
-    return past, Manner(unit or 1.0, orders, skin)
+    return past, Manner(arguments.out_unit or unit or 1.0, orders, skin)
 
 
 def _like_past(arguments: argparse.Namespace, path: Path, past: "Motion") -> "Motion":
@@ -359,6 +370,7 @@ def _check(arguments: argparse.Namespace, *, longest: float) -> None:
         most = "86,400, a day" if longest == DAY else f"{longest:g}"
         fail(f"--seconds must be above 0 and at most {most}; got {arguments.seconds:g}")
     check_count(arguments)
+    check_rate(arguments)
     if arguments.steps is not None and not 1 <= arguments.steps <= 100_000:
         fail(f"--steps must be 1 or more; got {arguments.steps}")
     if arguments.temperature is not None and not 0 <= arguments.temperature <= 2:
@@ -373,11 +385,16 @@ def _check_size(arguments: argparse.Namespace, past: "Motion", horizon: int, wan
 
     if horizon < 1:
         fail(f"{arguments.seconds:g} s are less than a frame of {arguments.past} ({1 / past.fps:.3g} s); give more")
-    joints, frames = len(past.skeleton), len(past) + horizon
+    joints, frames = len(past.skeleton), _frames_at(arguments, past, len(past) + horizon)
     for file in (target.folder / names[0] for target in wanted for names in target.futures):
-        check_length(file, total=frames, fps=past.fps, joints=joints)
+        check_length(file, total=frames, fps=arguments.fps or past.fps, joints=joints)
     if arguments.seconds <= LONG:
         _check_poses(arguments, frames * joints)
+
+
+def _frames_at(arguments: argparse.Namespace, past: "Motion", count: int) -> int:
+    """How many frames so many of the past's rate become at ``--fps``, as `Motion.resample` makes them."""
+    return count if arguments.fps is None else int((count - 1) / past.fps * arguments.fps + 1e-6) + 1
 
 
 def _check_poses(arguments: argparse.Namespace, each: int) -> None:

@@ -19,14 +19,27 @@ def add_reading(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--up", choices=("y", "z"), help="the axis that is up in the file (default: as people stand)")
     command.add_argument(
-        "--clip", metavar="NAME|NUMBER", help="animation of a .glb, .gltf or .vrm (default: the first)"
+        "--clip",
+        dest="animation",
+        metavar="NAME|NUMBER",
+        help="animation of a .glb, .gltf, .vrm or .fbx (default: the first)",
     )
+    add_blender(command)
     command.add_argument(
         "--asf", type=Path, metavar="FILE", help="skeleton of an AMC file (default: the one beside it)"
     )
     command.add_argument("--source-fps", type=as_rate, metavar="N", help="take this rate for the file's (AMC: 120)")
     command.add_argument("--start", type=as_seconds, metavar="S", help="begin at this second")
     command.add_argument("--end", type=as_seconds, metavar="S", help="end at this second")
+
+
+def add_blender(command: argparse.ArgumentParser) -> None:
+    """``--blender``, once."""
+    if "--blender" not in command._option_string_actions:
+        command.add_argument(
+            "--blender", type=Path, metavar="PROGRAM",
+            help="Blender, or a Python with bpy, for .fbx files (default: the one on the path)",
+        )  # fmt: skip
 
 
 def _number(text: str) -> float:
@@ -81,7 +94,7 @@ def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float
         file = read_bvh(path, fps=arguments.source_fps, unit=arguments.unit)
         motion, unit, orders = file.motion, file.unit, dict(file.orders)
     else:
-        clip = arguments.clip if path.suffix.lower() in io.GLTF else None
+        clip = arguments.animation if path.suffix.lower() in io.CLIPS else None
         motion = io.load(path, fps=arguments.source_fps, asf=arguments.asf, unit=arguments.unit, clip=clip)
     return _upright(motion, path, arguments), unit, orders
 

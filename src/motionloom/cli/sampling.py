@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from motionloom.cli.newcomers import one_sentence, suggestion, with_options
 from motionloom.cli.skeletons import Target, add_skeleton, read_target
+from motionloom.cli.writing import add_writing, check_rate, check_unit
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
@@ -19,15 +20,20 @@ MAX_COUNT = 1000
 
 
 def add_sampling(
-    parser: argparse.ArgumentParser, *, own_rate: str = "the model's 20", own_skeleton: str = "the uniform person's"
+    parser: argparse.ArgumentParser,
+    *,
+    own_rate: str = "the model's 20",
+    own_skeleton: str = "the uniform person's",
+    own_unit: str = "m",
 ) -> None:
     """``--out``, how and where motions are sampled, and ``--skeleton``.
 
-    ``own_rate`` and ``own_skeleton`` are those of the files without ``--fps`` and ``--skeleton``, in words.
+    ``own_rate``, ``own_skeleton`` and ``own_unit`` are those of the files without ``--fps``, ``--skeleton`` and
+    ``--out-unit``, in words.
     """
     parser.add_argument(
         "--out", type=Path, action="append", metavar="NAME",
-        help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default motion.bvh)",
+        help="file to write, repeatable; .bvh .glb .vrma .usda .npz .mp4 .gif .png (default motion.bvh)",
     )  # fmt: skip
     parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 24)")
     parser.add_argument(
@@ -41,6 +47,7 @@ def add_sampling(
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
     add_skeleton(parser, own=own_skeleton)
+    add_writing(parser, unit=own_unit)
 
 
 def sampling_of(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -115,8 +122,8 @@ def check_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target | None
         check_output(out, own=target and target.suffix)
     if len({out.resolve() for out in outs}) != len(outs):
         fail("the same --out is given twice; give each file its own name")
-    if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
-        fail(f"--fps must be 1 to 1000; got {arguments.fps:g}")
+    check_rate(arguments)
+    check_unit(arguments, outs)
     return outs, target
 
 
@@ -148,13 +155,21 @@ def places(outs: Sequence[Path], count: int, *, sheets: bool = True, target: Tar
 
 
 def write(
-    motions: "Sequence[Motion]", files: Sequence[Path], captions: Sequence[str], target: Target | None = None
+    motions: "Sequence[Motion]",
+    files: Sequence[Path],
+    captions: Sequence[str],
+    target: Target | None = None,
+    *,
+    unit: float | None = None,
 ) -> list[Path]:
-    """Motions, on the target's skeleton, into the files of one ``--out``."""
+    """Motions, on the target's skeleton, into the files of one ``--out``; ``unit`` is a BVH's without a target."""
     from motionloom.io import save
+    from motionloom.io.bvh_writer import save_bvh
 
     if target is not None and len(files) == len(motions):
         return [target.save(one, file, caption=said) for one, file, said in zip(motions, files, captions, strict=True)]
+    if unit is not None and files[0].suffix.lower() == ".bvh":
+        return [save_bvh(one, file, unit=unit) for one, file in zip(motions, files, strict=True)]
     if len(files) == 1:
         return [save(list(motions), files[0], captions=captions)]
     return [save(one, file, captions=[said]) for one, file, said in zip(motions, files, captions, strict=True)]

@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,9 +11,11 @@ if TYPE_CHECKING:
     from motionloom.io.stream import Stream
     from motionloom.motion import Motion
     from motionloom.retarget import RootMode
+    from motionloom.retarget.hands import HandPose
     from motionloom.skeleton import Skeleton
 
 ROOTS = ("motion", "hips", "in-place")
+HANDS = ("relaxed", "fist", "flat", "as-is")
 
 
 def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform person's") -> None:
@@ -28,9 +30,11 @@ def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform per
         help="what carries the way over the ground on a skeleton with a root bone: that bone (motion, the default), "
         "the hips, or nothing",
     )  # fmt: skip
+    parser.add_argument(
+        "--hands", choices=HANDS, help="pose of the hands on a skeleton with fingers (default as-is: its rest pose)"
+    )
     parser.add_argument("--clip-name", metavar="NAME", help="name of the animation in the character's file")
     parser.add_argument("--replace", action="store_true", help="leave only this animation in the character's file")
-    parser.add_argument("--force", action="store_true", help="write over files without saying so")
     parser.add_argument("--target-map", type=Path, metavar="JSON", help="which joints are which, of the --skeleton")
 
 
@@ -44,43 +48,66 @@ class Target:
     orders: dict[str, str] = field(default_factory=dict)
     character: "Character | None" = None
     root: "RootMode" = "motion"
+    hands: "HandPose" = "as-is"
     joint_map: Path | None = None
     clip_name: str | None = None
     replace: bool = False
+    kept: object = None
+    """What must stay as long as the character does: a folder with what an FBX became."""
 
     def put(self, motion: "Motion", *, source: str = "the motion", source_map: Path | None = None) -> "Motion":
         """The motion on this skeleton; ``source`` names it in an error."""
         from motionloom.errors import MotionloomError
         from motionloom.retarget import retarget
+        from motionloom.retarget.hands import pose_hands
 
         try:
-            return retarget(
-                motion, self.skeleton, source_map=source_map, target_map=self.joint_map, root=self.root
-            )  # fmt: skip
+            made = retarget(motion, self.skeleton, source_map=source_map, target_map=self.joint_map, root=self.root)
         except MotionloomError as error:
             hint = "--source-map or --target-map"
             raise MotionloomError(f"{source} onto {self.name}: {error} ({hint})") from None
+        return pose_hands(made, self.hands, self.joint_map)
 
     @property
     def suffix(self) -> str | None:
         """How the character's own file ends."""
-        return self.character.path.suffix.lower() if self.character else None
+        return Path(self.name).suffix.lower() if self.character else None
 
     def writes(self, path: Path) -> bool:
         """Whether a file of this name is the character's own with one more animation."""
-        return path.suffix.lower() == self.suffix
+        suffix = path.suffix.lower()
+        return self.character is not None and suffix in (self.suffix, self.character.path.suffix.lower(), ".fbx")
 
     def save(self, motion: "Motion", path: Path, *, caption: str | None = None) -> Path:
         """Write a motion that is `put` on the skeleton; the suffix picks the format."""
         from motionloom import io
 
         if self.character is not None and self.writes(path):
-            return self.character.save(motion, path, name=self.clip_name or caption, replace=self.replace)
+            return self._save_own(self.character, motion, path, self.clip_name or caption)
+        if self.character is not None and path.suffix.lower() == ".usda":
+            from motionloom.io.usda import save_usda
+
+            return save_usda([motion], path, surfaces=self.character.surfaces() or None)
         if path.suffix.lower() == ".bvh":
             from motionloom.io.bvh_writer import save_bvh
 
             return save_bvh(motion, path, order=self.orders, unit=self.unit)
         return io.save(motion, path, captions=None if caption is None else [caption])
+
+    def _save_own(self, character: "Character", motion: "Motion", path: Path, name: str | None) -> Path:
+        """The character's own file with one more animation; as FBX by way of a GLB."""
+        if path.suffix.lower() != ".fbx":
+            return character.save(motion, path, name=name, replace=self.replace)
+        import tempfile
+
+        from motionloom.errors import MotionloomError
+        from motionloom.io.blender import glb_to_fbx
+
+        if character.path.suffix.lower() != ".glb":
+            raise MotionloomError(f"a {character.path.suffix} character is not written as {path}; give it as a .glb")
+        with tempfile.TemporaryDirectory() as folder:
+            made = character.save(motion, Path(folder) / "moving.glb", name=name, replace=self.replace)
+            return glb_to_fbx(made, path, fps=motion.fps)
 
 
 def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target | None:
@@ -88,13 +115,15 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
     from motionloom.errors import MotionloomError
 
     if arguments.skeleton is None:
-        for name in ("root", "clip_name", "replace", "target_map"):
+        for name in ("root", "hands", "clip_name", "replace", "target_map"):
             if getattr(arguments, name):
                 raise MotionloomError(f"--{name.replace('_', '-')} goes with a --skeleton; name one")
         return None
     found = _find(arguments)
+    found = found if arguments.out_unit is None else replace(found, unit=arguments.out_unit)
+    _check_humanoid(found)
     if found.character is not None:
-        path = found.character.path
+        path = Path(found.name)
         if not any(found.writes(out) or not out.suffix for out in outs) and (arguments.clip_name or arguments.replace):
             raise MotionloomError(f"--clip-name and --replace are for the character's own file, a {path.suffix}")
         for out in outs:
@@ -105,6 +134,20 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
     return found
 
 
+def _check_humanoid(target: Target) -> None:
+    """Refuse a skeleton that is no person, or has no fingers for ``--hands``, before anything is drawn."""
+    from motionloom.errors import MotionloomError
+    from motionloom.retarget.anatomy import read_body
+    from motionloom.retarget.hands import check_fingers
+
+    try:
+        body = read_body(target.skeleton, target.joint_map)
+    except MotionloomError as error:
+        raise MotionloomError(f"--skeleton {target.name}: {error} (--target-map)") from None
+    if target.hands != "as-is":
+        check_fingers(body)
+
+
 def _find(arguments: argparse.Namespace) -> Target:
     from motionloom import io
     from motionloom.errors import MotionloomError
@@ -113,7 +156,7 @@ def _find(arguments: argparse.Namespace) -> Target:
     name, path = arguments.skeleton, Path(arguments.skeleton)
     suffix = path.suffix.lower()
     options = {
-        "root": arguments.root or "motion", "joint_map": arguments.target_map,
+        "root": arguments.root or "motion", "hands": arguments.hands or "as-is", "joint_map": arguments.target_map,
         "clip_name": arguments.clip_name, "replace": arguments.replace,
     }  # fmt: skip
     if name.lower() in NAMED and not path.exists():
@@ -132,6 +175,19 @@ def _find(arguments: argparse.Namespace) -> Target:
 
         character = load_character(path, joint_map=arguments.target_map)
         return Target(name, character.skeleton, character=character, **options)
+    if suffix == ".fbx":
+        import tempfile
+
+        from motionloom.io.blender import fbx_to_glb
+        from motionloom.io.character import load_character
+
+        folder = tempfile.TemporaryDirectory()
+        made = fbx_to_glb(path, Path(folder.name))
+        try:
+            character = load_character(made, joint_map=arguments.target_map)
+        except MotionloomError as error:
+            raise MotionloomError(str(error).replace(str(made), str(path))) from None
+        return Target(name, character.skeleton, character=character, kept=folder, **options)
     if suffix not in io.READS:
         raise MotionloomError(
             f"--skeleton needs {', '.join(NAMED)} or a file (.asf, {', '.join(io.READS)}); got {name!r}"

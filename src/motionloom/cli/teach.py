@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.reading import as_rate, as_unit
 from motionloom.cli.sampling import fail
+from motionloom.cli.writing import add_force, check_overwriting
 
 if TYPE_CHECKING:
     from motionloom.data.examples import CaptionedClip, Example
@@ -47,6 +48,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--up", choices=("y", "z"), default="y", help="the axis that is up in the files (default y)")
     parser.add_argument("--source-fps", type=as_rate, metavar="N", help="take this rate for the files' (AMC: 120)")
     parser.add_argument("--json", action="store_true", help="print what was made or found as JSON")
+    add_force(parser)
     parser.set_defaults(run=run_teach)
 
 
@@ -61,6 +63,7 @@ def run_teach(arguments: argparse.Namespace) -> int:
         fail(f"adapters are written as .safetensors; {out.name} has another suffix")
     if not arguments.check:
         check_place(out)
+        check_overwriting(arguments, [out])
     captioned = find_examples(places, caption)
     motions, findings = _read(arguments, captioned)
     if arguments.check:

@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from motionloom.cli.writing import add_force, check_overwriting
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -32,6 +34,7 @@ def add(subparsers) -> None:
     parser.add_argument("--name", help="name on the card (default: the checkpoint's)")
     parser.add_argument("--licence", help="what one may do with these weights, as whoever gave them says")
     parser.add_argument("--half", action="store_true", help="write float16: half the size, nearly the same numbers")
+    add_force(parser)
     parser.set_defaults(run=_import)
     parser = subparsers.add_parser("weights", help="what a weight file holds, or which ones ship with motionloom")
     parser.add_argument(
@@ -54,6 +57,7 @@ def _import(arguments: argparse.Namespace) -> None:
     if arguments.out.suffix != ".safetensors":
         raise MotionloomError(f"weights are written as .safetensors; {arguments.out.name} has another suffix")
     check_place(arguments.out)
+    check_overwriting(arguments, [arguments.out])
     if not arguments.checkpoint.is_file():
         raise MotionloomError(f"there is no checkpoint {arguments.checkpoint}")
     if arguments.checkpoint.suffix == ".tar":

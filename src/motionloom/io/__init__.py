@@ -8,21 +8,22 @@ from motionloom.errors import MotionloomError
 from motionloom.io.atomic import check_place
 from motionloom.motion import Motion
 
-READS = (".bvh", ".amc", ".glb", ".gltf", ".vrm", ".vrma", ".npz")
+READS = (".bvh", ".amc", ".glb", ".gltf", ".vrm", ".vrma", ".fbx", ".npz")
 GLTF = (".glb", ".gltf", ".vrm", ".vrma")
-WRITES = (".bvh", ".glb", ".vrma", ".npz", ".mp4", ".gif", ".png")
+CLIPS = (*GLTF, ".fbx")
+"""Files that hold several animations."""
+WRITES = (".bvh", ".glb", ".vrma", ".usda", ".fbx", ".npz", ".mp4", ".gif", ".png")
 _ONE_PERSON = (".bvh", ".npz", ".vrma")
 _OWN = "that is written for a character of such a file: --skeleton hero{0} --out moving{0}; else write a .glb"
 _BLENDER = "Blender turns it into a .glb (docs/blender.md)"
 _WAYS_OUT = {
     ".gltf": _OWN.format(".gltf"),
     ".vrm": _OWN.format(".vrm"),
-    ".fbx": "write a .glb, which Blender turns into an .fbx (docs/blender.md)",
-    **dict.fromkeys((".usd", ".usdc", ".usdz", ".usda"), "write a .glb, which Blender turns into USD"),
+    **dict.fromkeys((".usd", ".usdc", ".usdz"), "write a .usda, which USD's own usdcat turns into the others"),
     ".dae": "write a .glb or .bvh",
     ".blend": "write a .glb and import it in Blender (docs/blender.md)",
 }
-_WAYS_IN = dict.fromkeys((".fbx", ".dae", ".blend", ".usd", ".usda", ".usdc", ".usdz"), _BLENDER)
+_WAYS_IN = dict.fromkeys((".dae", ".blend", ".usd", ".usda", ".usdc", ".usdz"), _BLENDER)
 
 
 def load(
@@ -33,18 +34,18 @@ def load(
     unit: float | None = None,
     clip: int | str | None = None,
 ) -> Motion:
-    """Read a BVH, AMC (with its ASF), GLB, glTF, VRM or NPZ file as a `Motion` in metres.
+    """Read a BVH, AMC (with its ASF), GLB, glTF, VRM, FBX (through Blender) or NPZ file as a `Motion` in metres.
 
     ``fps`` replaces the rate the file states (AMC files state none: 120), without resampling. ``unit`` is metres per
     unit of length for BVH, ASF and glTF (None: guessed, what the ASF says, metres). ``asf`` is the skeleton of an AMC
-    file (None: looked for beside it). ``clip`` is the number, from 1, or the name of the animation in a glTF file.
+    file (None: looked for beside it). ``clip`` is the number, from 1, or the name of a clip of a glTF or FBX file.
     Raises `MotionloomError` for a file that is missing, damaged or of another kind.
     """
     path = Path(path)
     suffix = path.suffix.lower()
     _check(path, suffix, fps, unit=unit, asf=asf)
-    if clip is not None and suffix not in GLTF:
-        raise MotionloomError(f"{path} holds one motion; a clip is chosen in .glb, .gltf and .vrm files")
+    if clip is not None and suffix not in CLIPS:
+        raise MotionloomError(f"{path} holds one motion; a clip is chosen in .glb, .gltf, .vrm and .fbx files")
     if suffix == ".bvh":
         from motionloom.io.bvh import load_bvh
 
@@ -57,9 +58,14 @@ def load(
         from motionloom.io.npz import load_npz
 
         return load_npz(path, fps=fps)
-    from motionloom.io.gltf import load_glb
+    if suffix == ".fbx":
+        from motionloom.io.fbx import load_fbx
 
-    motion = load_glb(path, clip=clip)
+        motion = load_fbx(path, clip=clip)
+    else:
+        from motionloom.io.gltf import load_glb
+
+        motion = load_glb(path, clip=clip)
     motion = motion if fps is None else replace(motion, fps=fps)
     return motion if unit is None else motion.scaled(unit)
 
@@ -93,11 +99,16 @@ def check_output(path: Path | str, *, own: str | None = None) -> Path:
         hint = f"; {_WAYS_OUT[suffix]}" if suffix in _WAYS_OUT else f"; it ends in {suffix or 'none'}"
         raise MotionloomError(f"cannot write {path}: its name must end in {', '.join(WRITES)}{hint}")
     check_place(path)
+    if suffix == ".fbx":
+        from motionloom.io.blender import find_blender
+
+        find_blender()
     return path
 
 
 def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequence[str] | None = None) -> Path:
-    """Write one motion or several; the suffix picks BVH (in metres), GLB, NPZ, MP4, GIF or PNG; gives the path back.
+    """Write one motion or several; the suffix picks BVH (in metres), GLB, VRMA, USDA, FBX (through Blender),
+    NPZ, MP4, GIF or PNG; gives the path back.
 
     ``captions`` label pictures and films, one per motion. BVH and NPZ files hold one person. The file appears whole
     or not at all. Raises `MotionloomError` for another suffix or a place that cannot be written.
@@ -118,6 +129,14 @@ def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequ
         from motionloom.io.vrma import save_vrma
 
         return save_vrma(several[0], path)
+    if suffix == ".usda":
+        from motionloom.io.usda import save_usda
+
+        return save_usda(several, path)
+    if suffix == ".fbx":
+        from motionloom.io.fbx import save_fbx
+
+        return save_fbx(several, path)
     if suffix == ".glb":
         from motionloom.io.gltf import save_glb
 
@@ -142,10 +161,10 @@ def save_scene(
     names: Sequence[str] | None = None,
     captions: Sequence[str] | None = None,
 ) -> Path:
-    """Write people who share one world frame as one scene: GLB, or one MP4, GIF or PNG with everybody in it.
+    """Write people who share one world frame as one scene: GLB, USDA, or one MP4, GIF or PNG with everybody in it.
 
-    ``names``, one per person, name them in a GLB and in a picture's legend; ``captions``, one per person, stand over
-    pictures and films (one only where all are the same). `save` would draw the same people side by side instead.
+    ``names``, one per person, name them in a GLB or USDA and in a picture's legend; ``captions``, one per person, stand
+    over pictures and films (one only where all are the same). `save` would draw the same people side by side instead.
     BVH and NPZ files hold one person. The file appears whole or not at all.
     Raises `MotionloomError` for names or captions of another count, another suffix, or a place that cannot be written.
     """
@@ -161,6 +180,14 @@ def save_scene(
         from motionloom.io.gltf import save_glb
 
         return save_glb(motions, path, names=names)
+    if suffix == ".usda":
+        from motionloom.io.usda import save_usda
+
+        return save_usda(motions, path, names=names)
+    if suffix == ".fbx":
+        from motionloom.io.fbx import save_fbx
+
+        return save_fbx(motions, path, names=names)
     from motionloom.viz.overlay import draw_scene, tint
     from motionloom.viz.scene import Actor
 

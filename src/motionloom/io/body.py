@@ -4,19 +4,25 @@ Sizes come from `figure`. Pieces are measured in the joints' own frames over the
 that is no natural pose (all bones along one axis, say) gives the same body.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.motion import Motion
+from motionloom.skeleton import Skeleton
 from motionloom.viz.figure import Figure, figure
 
 Array = NDArray[np.float64]
 SIDES = 10
 _LIFT = np.array([-90.0, -50.0, 0.0, 0.0, 50.0, 90.0]) * np.pi / 180  # rings from pole to pole
 MAX_FRAMES = 400
+DEEPEST = 0.04
+"""Body heights by which a foot's piece is in the floor at most, where the floor is the one it stands on."""
+MATERIALS = {1: ("left", (0.82, 0.17, 0.05)), -1: ("right", (0.03, 0.17, 0.60)), 0: ("middle", (0.16, 0.19, 0.24)),
+             2: ("skin", (0.76, 0.51, 0.35))}  # fmt: skip
+"""Name and linear colour for each `Piece.side`."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +74,33 @@ def _seen(shape: Figure, world: Array, joint: int, point: Array) -> Array:
 def _bone(motion: Motion, shape: Figure, world: Array, i: int) -> Piece | None:
     parent, child = shape.bones[i]
     tip = _seen(shape, world, parent, shape.places[:, child])
-    return _loft(parent, shape.sides[child], np.stack([np.zeros(3), tip]), np.repeat(shape.radii[i], 2).reshape(2, 2))
+    piece = _loft(parent, shape.sides[child], np.stack([np.zeros(3), tip]), np.repeat(shape.radii[i], 2).reshape(2, 2))
+    below = motion.skeleton.children(child)
+    foot = set(below) <= motion.skeleton.ends and set(shape.hips[:-1]) & set(_ancestors(motion.skeleton, parent))
+    return _with_sole(piece, shape, world, child) if piece is not None and foot else piece
+
+
+def _ancestors(skeleton: Skeleton, joint: int) -> list[int]:
+    """The joint and all above it."""
+    line = [joint]
+    while skeleton.parents[line[-1]] >= 0:
+        line.append(skeleton.parents[line[-1]])
+    return line
+
+
+def _with_sole(piece: Piece, shape: Figure, world: Array, toe: int) -> Piece:
+    """A piece of a foot made flat where it would be in the floor while its ``toe`` stands there."""
+    standing = shape.contacts[:, toe]
+    if not standing.any():
+        return piece
+    up = np.median(rot.rotate(rot.inverse(world[standing, piece.joint]), np.array([0.0, 1.0, 0.0])), axis=0)
+    up = up / max(float(np.linalg.norm(up)), 1e-9)
+    sole = float(np.median(shape.floor - shape.places[standing, piece.joint, 1]))
+    under = np.maximum(sole - piece.points @ up, 0.0)
+    if under.max() > DEEPEST * shape.height:
+        return piece  # no foot that stands on this floor
+    points = piece.points + under[:, None] * up
+    return replace(piece, points=points, normals=_normals(points, piece.triangles))
 
 
 def _trunk(shape: Figure, world: Array, joints: tuple[int, ...], wide: float) -> Piece | None:

@@ -6,6 +6,7 @@ named ``"<parent> End Site"`` and are listed in ``Skeleton.ends``.
 """
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io import text
+from motionloom.io.bvh_tips import is_tip
 from motionloom.io.bvh_writer import SAME_PLACE, end_name, moving_offsets, save_bvh
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
@@ -186,11 +188,17 @@ def _check_joints(joints: list[_Joint], path: Path | str) -> None:
 
 
 def _without_empty_ends(joints: list[_Joint]) -> list[_Joint]:
-    kept = [i for i, j in enumerate(joints) if not (j.end and not any(j.offset or ()))]
+    """The joints without End Sites at no distance, and without those that say no more than `bvh_tips` does."""
+    alone = Counter(j.parent for j in joints)
+    kept = [i for i, j in enumerate(joints) if not (j.end and _says_nothing(j, joints[j.parent], alone[j.parent] == 1))]
     place = {old: new for new, old in enumerate(kept)} | {-1: -1}
     for i in kept:
         joints[i].parent = place[joints[i].parent]
     return [joints[i] for i in kept]
+
+
+def _says_nothing(end: _Joint, joint: _Joint, alone: bool) -> bool:
+    return not any(end.offset or ()) or (alone and is_tip(joint.offset or (0.0, 0.0, 0.0), end.offset or ()))
 
 
 def _describe(words: _Words, key: str, joint: _Joint) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
+from motionloom.io.bvh_tips import low_joints, tip
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
 
@@ -31,7 +32,7 @@ def save_bvh(motion: Motion, path: Path | str, *, order: str | Mapping[str, str]
     ``order`` is the order of the rotation channels, for all joints or by joint name (others ``"ZXY"``); ``unit`` is
     metres per unit of length in the file: 1 for Blender, which takes the numbers for metres, 0.01 for programs that
     take them for centimetres (MotionBuilder, Maya, Unreal). Joints whose bones change length get position channels.
-    A joint at the tip of its branch that is no End Site itself gets one at zero distance, as some readers demand.
+    A joint at the tip of its branch that is no End Site itself gets one that gives it a length (`bvh_tips`).
     """
     with atomic_path(path) as temporary, temporary.open("wb", buffering=0) as file:
         growing = GrowingBvh(file, motion, order=order, unit=unit, frames=len(motion))
@@ -167,7 +168,7 @@ def _hierarchy(
     skeleton: Skeleton, sequence: list[int], tips: set[int], *, orders: list[str], moving: set[int], offsets: Array
 ) -> list[str]:
     names, parents = _names(skeleton), skeleton.parents
-    with_children = set(parents)
+    with_children, low = set(parents), low_joints(parents, offsets)
     lines, depth, open_joints = ["HIERARCHY"], 0, []
     for joint in sequence:
         while open_joints and open_joints[-1] != parents[joint]:
@@ -183,7 +184,8 @@ def _hierarchy(
             lines.append(_tab(depth + 1) + " ".join(["CHANNELS", str(len(places + turns)), *places, *turns]))
             if joint not in with_children:
                 tab = _tab(depth + 1)
-                lines += [tab + "End Site", tab + "{", tab + "\tOFFSET 0 0 0", tab + "}"]
+                end = " ".join(f"{v:.6f}" for v in tip(offsets[joint], level=bool(low[joint])) + 0.0)
+                lines += [tab + "End Site", tab + "{", tab + f"\tOFFSET {end}", tab + "}"]
         open_joints.append(joint)
         depth += 1
     lines += [_tab(d) + "}" for d in range(depth - 1, -1, -1)]

@@ -7,7 +7,7 @@ bytes behind those that were there.
 import base64
 import copy
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.io.glb import Document, pack_glb, read_document_chunks
+from motionloom.io.gltf_mesh import Surface, read_surfaces
 from motionloom.io.gltf_nodes import Node, upwards
 from motionloom.io.gltf_read import OpenedGlb, open_glb, settled
 from motionloom.io.gltf_rig import Rig, Worlds, parents_first, read_rig, worlds
@@ -47,6 +48,10 @@ class Character:
     def skeleton(self) -> Skeleton:
         """The skeleton that motions must have to be written into the file."""
         return self.rig.skeleton
+
+    def surfaces(self) -> list[Surface]:
+        """The meshes of the file at rest, on `skeleton`; those that are compressed are left out."""
+        return read_surfaces(self.file.document, self.nodes, self.file.parents, self.rig)
 
     def save(self, motion: Motion, path: str | Path, *, name: str | None = None, replace: bool = False) -> Path:
         """Write the character's own file with one more animation, or with ``replace`` this one only.
@@ -87,6 +92,7 @@ class Character:
         rig, parents = self.rig, self.file.parents
         driven = {d for d in self.joints.drivers(self.skeleton) if d is not None}
         above_driven = {a for d in driven for a in ancestors(self.skeleton, d)}
+        turned = set(np.flatnonzero((1 - np.abs(motion.rotations[..., 0]) > _SAME_TURN).any(axis=0)).tolist())
         slots = {n: k for k, n in enumerate(rig.nodes)}
         above = upwards(rig.nodes[0], parents)[:0:-1]
         wanted = rot.multiply(motion.world_rotations(), rig.turns)
@@ -99,7 +105,7 @@ class Character:
             turn = rot.unroll(rot.normalize(turn))
             still = (1 - np.abs(turn @ node.turn) < _SAME_TURN).all()
             sampled: dict[tuple[int, str], Array] = {}
-            if k in driven or (k in above_driven and not still):
+            if k in driven or k in turned or (k in above_driven and not still):
                 sampled[n, "rotation"] = turn
                 keys.append((n, "rotation", np.roll(turn, -1, axis=-1)))
             if k in free:
@@ -137,9 +143,29 @@ def load_character(path: str | Path, *, joint_map: Override | None = None) -> Ch
         except MotionloomError as error:
             problem = problem or error
         else:
-            return Character(path, file, nodes, rig, found)
+            return _with_soles(Character(path, file, nodes, rig, found))
     assert problem is not None
     raise MotionloomError(f"{path}: {problem}")
+
+
+_DOWN = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, -0.4, 0) for z in (-1, 0, 1) if x or y or z])
+"""Directions in which the corners of a foot are looked for."""
+
+
+def _with_soles(character: Character) -> Character:
+    """The character whose skeleton knows the corners of its feet, where it has a mesh and stands on the floor."""
+    skeleton = character.skeleton
+    if not skeleton.on_floor:
+        return character
+    feet = {skeleton.index(name) for j in (7, 8, 10, 11) for name, weight in character.joints.points[j] if weight}
+    feet |= {k for k in range(len(skeleton)) if feet & set(ancestors(skeleton, k))}
+    rest, found = skeleton.rest_positions(), {}
+    points = [(s.points, s.joints[np.arange(len(s.points)), s.weights.argmax(axis=1)]) for s in character.surfaces()]
+    for j in sorted(feet):
+        own = np.concatenate([places[of == j] for places, of in points] or [np.zeros((0, 3))]) - rest[j]
+        if len(own):
+            found[j] = own[np.unique((own @ _DOWN.T).argmax(axis=0))]
+    return replace(character, rig=replace(character.rig, skeleton=replace(skeleton, soles=found)))
 
 
 def _inside(now: Worlds, node: int, place: Array) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
-from motionloom.io.body import Piece, body
+from motionloom.io.body import MATERIALS, Piece, body
 from motionloom.io.gltf_read import load_glb, load_glb_people
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
@@ -28,8 +28,6 @@ _FLOAT, _U8, _U16, _U32 = 5126, 5121, 5123, 5125
 _NUMPY = {_FLOAT: "<f4", _U8: "<u1", _U16: "<u2", _U32: "<u4"}
 _TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 _VERTICES, _INDICES = 34962, 34963  # what a buffer view is for
-_MATERIALS = {1: ("left", (0.82, 0.17, 0.05)), -1: ("right", (0.03, 0.17, 0.60)), 0: ("middle", (0.16, 0.19, 0.24)),
-              2: ("skin", (0.76, 0.51, 0.35))}  # fmt: skip
 
 
 @dataclass
@@ -180,7 +178,7 @@ def _primitive(file: _File, pieces: list[Piece], rest: Array, side: int) -> pygl
 
 
 def _material(document: pygltflib.GLTF2, side: int) -> int:
-    name, colour = _MATERIALS[side]
+    name, colour = MATERIALS[side]
     for number, material in enumerate(document.materials):
         if material.name == name:
             return number

@@ -19,6 +19,7 @@ from motionloom.retarget.joint_map import Override, joint_map
 from motionloom.retarget.limbs import bend
 from motionloom.retarget.measured import frames_of_positions, mean_rotation
 from motionloom.retarget.root import RootMode, place_root
+from motionloom.retarget.topology import ancestors
 from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
@@ -76,8 +77,9 @@ def retarget(
         source = read_body(motion.skeleton, source_map)
     if not _LEGS[0] < body.leg < _LEGS[1]:
         size = _LEG / body.leg
-        small = replace(target, offsets=target.offsets * size)
-        made = retarget(motion, small, source_map=source_map, target_map=target_map, root=root).scaled(1 / size)
+        made = retarget(motion, target.scaled(size), source_map=source_map, target_map=target_map, root=root).scaled(
+            1 / size
+        )
         return replace(made, skeleton=target)
     pose = _read_pose(_y_up(motion, source), source)
     stance = read_stance(pose.places, motion.fps)
@@ -293,6 +295,7 @@ def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
     root = goals.hips + shift - places[:, [1, 2]].mean(axis=1)
     places = places + root[:, None]
     ankles = ankles + (1.0 - goals.low) * (goals.ankles + shift[:, None] - ankles)
+    ankles = _on_soles(ankles, goals, body, world=world, places=places - root[:, None])
     drop = _drop(places, ankles, body)
     root, places = root - drop, places - drop[:, None]
     for side, (hip, knee, ankle) in enumerate(((1, 4, 7), (2, 5, 8))):
@@ -302,6 +305,29 @@ def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
         world = _aim(world, body, hip, places[:, knee] - places[:, hip], middle - places[:, hip])
         world = _aim(world, body, knee, places[:, ankle] - places[:, knee], end - middle)
     return Motion(body.skeleton, fps, root, _locals(body.skeleton, world))
+
+
+def _on_soles(ankles: Array, goals: _Goals, body: Body, *, world: Array, places: Array) -> Array:
+    """The ankles' goals (frames, 2, 3), raised where a foot of a character's own shape would be in the ground.
+
+    ``places`` (frames, 22, 3) are of the body with joint 0 at the origin. A foot that the source has below y = 0, such
+    as down a stair, may be as low there. What both feet lack is left: it may as well be a pose in the air, which games
+    play in one place.
+    """
+    if not body.skeleton.soles:
+        return ankles
+    joints = _positions(body.skeleton, world)
+    lack = np.zeros(ankles.shape[:2])
+    for side, foot in enumerate(FEET):
+        driver = body.drivers[foot]
+        own = [j for j in body.skeleton.soles if driver is not None and driver in ancestors(body.skeleton, j)]
+        for j in own:
+            points = rot.rotate(world[:, None, j], body.skeleton.soles[j][None]) + joints[:, None, j]
+            under = (points - places[:, None, foot])[..., 1].min(axis=1)
+            ground = np.minimum(goals.toes[:, side, 1] - body.toe_height, 0.0)
+            lack[:, side] = np.maximum(lack[:, side], ground - under - ankles[:, side, 1])
+    lack = lack - lack.min(axis=1, keepdims=True)
+    return ankles + lack[..., None] * np.array([0.0, 1.0, 0.0])
 
 
 def _make_up(goals: _Goals, ankles: Array) -> Array:

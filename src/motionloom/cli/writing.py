@@ -1,0 +1,75 @@
+"""What the commands that write motions share about their files: unit, frame rate, what is there already."""
+
+import argparse
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from motionloom.cli.reading import add_blender, as_unit
+
+if TYPE_CHECKING:
+    from motionloom.motion import Motion
+
+
+def add_writing(parser: argparse.ArgumentParser, *, unit: str = "m") -> None:
+    """``--out-unit`` and ``--force``; ``unit`` is what a BVH is in without it, in words."""
+    parser.add_argument(
+        "--out-unit", type=as_unit, metavar="UNIT", help=f"unit of a BVH written: m, cm, inch, or metres ({unit})"
+    )
+    add_force(parser)
+    add_blender(parser)
+
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """``--force``, for `check_overwriting`."""
+    parser.add_argument("--force", action="store_true", help="write over files without saying so")
+
+
+def check_rate(arguments: argparse.Namespace) -> None:
+    """Refuse a ``--fps`` that cannot be."""
+    from motionloom.errors import MotionloomError
+
+    if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
+        raise MotionloomError(f"--fps must be 1 to 1000; got {arguments.fps:g}")
+
+
+def check_unit(arguments: argparse.Namespace, files: Sequence[Path]) -> None:
+    """Refuse an ``--out-unit`` where no BVH is written: the other formats state their unit."""
+    from motionloom.errors import MotionloomError
+
+    if arguments.out_unit is not None and not any(file.suffix.lower() == ".bvh" for file in files):
+        raise MotionloomError(f"--out-unit is for BVH files; {', '.join(map(str, files[:3]))} is none")
+
+
+def at_rate(motions: "Iterable[Motion]", fps: float | None) -> "list[Motion]":
+    """Motions at the rate that the line asks; as they are without one."""
+    return [motion if fps is None else motion.resample(fps) for motion in motions]
+
+
+def check_overwriting(arguments: argparse.Namespace, files: Iterable[Path], *, also: Iterable[Path] = ()) -> None:
+    """Refuse to write over what is read; say so where another file is written over without ``--force``.
+
+    ``also`` are files that are read and not on the line. Raises `MotionloomError` naming the file that is both.
+    """
+    from motionloom.errors import MotionloomError
+
+    read = {path.resolve() for path in (*_inputs(arguments), *also)}
+    for file in files:
+        if not file.exists() or file.is_dir():
+            continue
+        if file.resolve() in read:
+            raise MotionloomError(f"{file} is read and would be written over; give what is made another name")
+        if not arguments.force:
+            print(f"note: {file} was there and is written over (--force says nothing)", file=sys.stderr)
+
+
+def _inputs(arguments: argparse.Namespace) -> list[Path]:
+    """The files that the line names to be read."""
+    found: list[Any] = []
+    for name, value in vars(arguments).items():
+        if name == "skeleton" and isinstance(value, str):
+            found.append(Path(value))
+        elif name not in ("out", "output", "blender"):
+            found += value if isinstance(value, list | tuple) else [value]
+    return [value for value in found if isinstance(value, Path)]

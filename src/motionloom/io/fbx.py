@@ -1,0 +1,38 @@
+"""FBX files, by way of the GLB that Blender makes of them (`blender`)."""
+
+import tempfile
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+from motionloom.errors import MotionloomError
+from motionloom.io.blender import fbx_to_glb, glb_to_fbx
+from motionloom.io.gltf import load_glb, save_glb
+from motionloom.motion import Motion
+
+
+def load_fbx(path: Path, *, clip: int | str | None = None) -> Motion:
+    """Read one animation of an FBX, chosen as in `load_glb`.
+
+    Raises `MotionloomError` as that does, and where there is no Blender or it cannot read the file.
+    """
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        made = fbx_to_glb(path, Path(folder))
+        try:
+            motion = load_glb(made, clip=clip)
+        except MotionloomError as error:
+            raise MotionloomError(str(error).replace(str(made), str(path))) from None
+    for one in said:
+        if issubclass(one.category, UserWarning):
+            warnings.warn(str(one.message).replace(str(made), str(path)), stacklevel=2)
+    return motion
+
+
+def save_fbx(motions: Sequence[Motion], path: Path, *, names: Sequence[str] | None = None) -> Path:
+    """Write people with simple bodies as FBX, keyed at the first one's rate.
+
+    Raises `MotionloomError` as `save_glb` does, and where there is no Blender or it fails.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        return glb_to_fbx(save_glb(motions, Path(folder) / "motion.glb", names=names), path, fps=motions[0].fps)

@@ -1,0 +1,191 @@
+"""A character's meshes at rest, with the joints that carry them: for files that are not the character's own."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
+from motionloom.io.glb import Document
+from motionloom.io.gltf_nodes import Node, printable, upwards
+from motionloom.io.gltf_rig import Rig, worlds
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+MAX_PIECES = 4096
+MAX_VERTICES = 2_000_000
+GREY = (0.6, 0.6, 0.6)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles that follow a skeleton: linear blend skinning from the rest pose."""
+
+    name: str
+    points: Array
+    """(vertices, 3) metres in the world, at rest."""
+    normals: Array | None
+    """(vertices, 3) of unit length."""
+    texture: Array | None
+    """(vertices, 2) texture coordinates as glTF has them, from the upper left."""
+    triangles: Whole
+    """(triangles, 3) counter-clockwise from outside."""
+    joints: Whole
+    """(vertices, influences) numbers of the skeleton's joints."""
+    weights: Array
+    """(vertices, influences), each row adding up to 1."""
+    colour: tuple[float, ...] = GREY
+    """Red, green, blue, linear, 0 to 1."""
+
+
+def read_surfaces(document: Document, nodes: list[Node], parents: list[int], rig: Rig) -> list[Surface]:
+    """The meshes that hang on a rig, skinned or not, in the rig's rest pose.
+
+    What is compressed (Draco, meshopt) or stored in another unusual way is left out, so that the list may be empty.
+    Raises `MotionloomError` for a file that declares more than memory should hold.
+    """
+    rest = _Rest(nodes, parents, rig)
+    found: list[Surface] = []
+    pieces = vertices = 0
+    for number, entry in enumerate(document.items("nodes")):
+        if entry.get("mesh") is None:
+            continue
+        meshes = document.items("meshes")
+        mesh = meshes[document.index(entry["mesh"], len(meshes), "meshes")]
+        for piece in document.items("primitives", mesh):
+            pieces += 1
+            try:
+                surface = _surface(document, entry, number, piece, rest)
+            except MotionloomError:
+                continue  # compressed, sparse or damaged: what moves does not depend on it
+            if surface is not None:
+                found.append(surface)
+                vertices += len(surface.points)
+            if pieces > MAX_PIECES or vertices > MAX_VERTICES:
+                raise document.bad(f"it has more than {MAX_PIECES} pieces of mesh or {MAX_VERTICES:,} vertices")
+    return found
+
+
+class _Rest:
+    """Where nodes are in a rig's rest pose, and which joint carries each."""
+
+    def __init__(self, nodes: list[Node], parents: list[int], rig: Rig) -> None:
+        self.nodes, self.parents = nodes, parents
+        self.slots = {n: k for k, n in enumerate(rig.nodes)}
+        self._known: dict[int, Array] = {}
+        line = [*upwards(rig.nodes[0], parents)[:0:-1], *rig.nodes]
+        linear = worlds(nodes, parents, line, {}).linear
+        for k, (n, place) in enumerate(zip(rig.nodes, rig.skeleton.rest_positions())):
+            whole = linear[n]
+            size = 1.0 if whole is None else float(np.cbrt(np.linalg.det(whole[0])))
+            self._known[n] = _matrix(place, rig.turns[k], np.full(3, size))
+
+    def matrix(self, node: int) -> Array:
+        """(4, 4) world_from_node."""
+        for n in reversed(upwards(node, self.parents)):
+            if n not in self._known:
+                own, above = self.nodes[n], self.parents[n]
+                local = _matrix(own.place, own.turn, own.scale)
+                self._known[n] = local if above < 0 else self._known[above] @ local
+        return self._known[node]
+
+    def joint(self, node: int) -> int | None:
+        """The skeleton's joint that carries a node; None for what does not hang on the skeleton."""
+        return next((self.slots[n] for n in upwards(node, self.parents) if n in self.slots), None)
+
+
+def _matrix(place: Array, turn: Array, scale: Array) -> Array:
+    found = np.eye(4)
+    found[:3, :3] = rot.quat_to_matrix(turn) * scale
+    found[:3, 3] = place
+    return found
+
+
+def _surface(
+    document: Document, entry: dict[str, Any], number: int, piece: dict[str, Any], rest: _Rest
+) -> Surface | None:
+    attributes = piece.get("attributes")
+    if not isinstance(attributes, dict) or piece.get("mode", 4) != 4:
+        return None
+    points = document.accessor(attributes.get("POSITION"), "VEC3", "the places of a mesh")
+    if len(points) > MAX_VERTICES:
+        raise document.bad(f"a mesh has {len(points):,} vertices")
+    carried = _influences(document, entry, number, attributes, len(points), rest)
+    if carried is None:
+        return None
+    joints, weights, moves = carried
+    blend = np.einsum("vk,vkab->vab", weights, moves)
+    normals = _optional(document, attributes.get("NORMAL"), "VEC3", len(points))
+    if normals is not None:
+        normals = np.einsum("vab,vb->va", blend[:, :3, :3], normals)
+        normals = normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)
+    return Surface(
+        printable(entry.get("name")) or f"mesh_{number}",
+        np.einsum("vab,vb->va", blend[:, :3, :3], points) + blend[:, :3, 3],
+        normals,
+        _optional(document, attributes.get("TEXCOORD_0"), "VEC2", len(points)),
+        _triangles(document, piece.get("indices"), len(points)),
+        joints,
+        weights,
+        _colour(document, piece.get("material")),
+    )
+
+
+def _optional(document: Document, number: Any, kind: str, count: int) -> Array | None:
+    values = None if number is None else document.accessor(number, kind, "a mesh's attributes")
+    return values if values is not None and len(values) == count else None
+
+
+def _influences(
+    document: Document, entry: dict[str, Any], number: int, attributes: dict[str, Any], count: int, rest: _Rest
+) -> tuple[Whole, Array, Array] | None:
+    """Joints and weights (vertices, k), and world_from_mesh at rest (vertices, k, 4, 4) as each of them carries it."""
+    if entry.get("skin") is None:
+        joint = rest.joint(number)
+        if joint is None:
+            return None
+        moves = np.broadcast_to(rest.matrix(number), (count, 1, 4, 4))
+        return np.full((count, 1), joint), np.ones((count, 1)), moves
+    skins = document.items("skins")
+    skin = skins[document.index(entry["skin"], len(skins), "skins")]
+    listed = [document.index(n, len(rest.nodes), "nodes") for n in skin.get("joints", [])]
+    carriers = [rest.joint(n) for n in listed]
+    if not listed or None in carriers:
+        return None
+    binds = np.tile(np.eye(4), (len(listed), 1, 1))
+    if skin.get("inverseBindMatrices") is not None:
+        flat = document.accessor(skin["inverseBindMatrices"], "MAT4", "inverse bind matrices")
+        binds = flat.reshape(-1, 4, 4).transpose(0, 2, 1)[: len(listed)]
+    moves = np.array([rest.matrix(n) @ bind for n, bind in zip(listed, binds, strict=True)])
+    sets = [k for k in range(8) if f"JOINTS_{k}" in attributes]
+    which = [document.accessor(attributes[f"JOINTS_{k}"], "VEC4", "the joints of a mesh") for k in sets]
+    shares = [document.accessor(attributes.get(f"WEIGHTS_{k}"), "VEC4", "the weights of a mesh") for k in sets]
+    if not sets or any(len(part) != count for part in (*which, *shares)):
+        return None
+    numbers, weights = np.concatenate(which, axis=1).astype(np.int64), np.concatenate(shares, axis=1)
+    total = weights.sum(axis=1, keepdims=True)
+    if numbers.max() >= len(listed) or not (total > 0).all():
+        return None
+    return np.array(carriers, dtype=np.int64)[numbers], weights / total, moves[numbers]
+
+
+def _triangles(document: Document, number: Any, count: int) -> Whole:
+    flat = np.arange(count) if number is None else document.accessor(number, "SCALAR", "the triangles of a mesh")[:, 0]
+    indices = flat[: len(flat) - len(flat) % 3].astype(np.int64).reshape(-1, 3)
+    if len(indices) and (indices.max() >= count or indices.min() < 0):
+        raise document.bad("a triangle names a vertex that is not there")
+    return indices
+
+
+def _colour(document: Document, number: Any) -> tuple[float, ...]:
+    """The base colour of a material, without its textures."""
+    materials = document.items("materials")
+    if number is None:
+        return GREY
+    surface = materials[document.index(number, len(materials), "materials")].get("pbrMetallicRoughness")
+    factor = surface.get("baseColorFactor") if isinstance(surface, dict) else None
+    if isinstance(surface, dict) and surface.get("baseColorTexture") is not None and factor is None:
+        return GREY
+    return tuple(document.numbers(factor, 4, "a colour")[:3].clip(0, 1).tolist()) if factor is not None else GREY
