@@ -1,0 +1,106 @@
+"""One window of a live motion: its first frames are known, the rest is drawn in a few steps.
+
+The walk is that of every other motion (`diffusion.sampling`), what is known is held as in `tasks.redraw`, and the noise
+belongs to the numbers of frames: a frame that is drawn again, because something was asked, is drawn from the same noise.
+"""
+
+from collections import OrderedDict
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from motionloom.diffusion import SOLVERS, Denoiser, Draw, guide, inpaint, levels, observe, row_seed, sample
+from motionloom.edits.boundary import joining
+from motionloom.edits.steering import Correction
+from motionloom.live.settings import Settings
+from motionloom.nets.prior import Bound
+from motionloom.tasks.text import smooth
+from motionloom.weights.prior import Prior
+
+TEXTS = 64
+"""Prompts whose vectors are kept."""
+
+
+class Noise:
+    """Standard normal numbers for the frames of one person: they depend on the seed and the frame's number alone."""
+
+    def __init__(self, seed: int, moves: int, features: int) -> None:
+        self._seed = seed
+        self._shape = 2 * moves + 2, features  # the walk draws, and what is known is shown at noise of its own
+        self._kept: dict[int, Tensor] = {}
+
+    def draw(self, first: int, frames: int, device: torch.device) -> Draw:
+        """The noise of the frames from ``first`` on, for one walk: call number k gets that of its k-th draw."""
+        self._kept = {number: kept for number, kept in self._kept.items() if number >= first}
+        for number in range(first, first + frames):
+            if number not in self._kept:
+                generator = torch.Generator().manual_seed(row_seed(self._seed, number + (1 << 20)))
+                self._kept[number] = torch.randn(self._shape, generator=generator)
+        whole = torch.stack([self._kept[number] for number in range(first, first + frames)], dim=1).to(device)
+        calls = iter(range(len(whole)))
+        return lambda like: whole[next(calls)][None].to(like)
+
+
+class Drawer:
+    """Draws windows with one prior; keeps the vectors of what was said last."""
+
+    def __init__(self, prior: Prior, settings: Settings) -> None:
+        self.prior, self.settings = prior, settings
+        self.calls = 0
+        """Guided calls of the network so far."""
+        self._bound: OrderedDict[str, tuple[Bound, Bound]] = OrderedDict()
+        self._levels = levels(prior.schedule, settings.steps, spacing=settings.spacing)  # type: ignore[arg-type]
+
+    @torch.inference_mode()
+    def __call__(
+        self, text: str, known: Tensor, frames: int, draw: Draw, edits: Sequence[Correction] = ()
+    ) -> np.ndarray:
+        """(known + frames, 263) float64 features, not standardised, the known ones as they were.
+
+        text: what is done; known: (n, 263) features of the last frames, n may be 0; frames: how many to draw; draw: as
+        of `Noise.draw`, over all frames of the window; edits: what every guess goes through, one after the other.
+        """
+        prior, count = self.prior, len(known)
+        spread = torch.where(prior.std > 0, prior.std, 1.0)
+        given = torch.cat([known.to(prior.mean), prior.mean.new_zeros(frames, len(prior.mean))])[None]
+        mask = torch.zeros_like(given, dtype=torch.bool)
+        mask[:, :count] = True
+        data = (given - prior.mean) / spread
+        meet = joining(given, mask, count, count + frames)
+        free = inpaint(self._guided(text), data, mask)
+
+        def denoise(state: Tensor, level: int) -> Tensor:
+            self.calls += 1
+            return changed(free(state, level), level)
+
+        def changed(guess: Tensor, level: int) -> Tensor:
+            for edit in edits:
+                guess = edit(guess[0], level)[None]
+            return torch.where(mask, data, (meet(guess * spread + prior.mean) - prior.mean) / spread)
+
+        hold = observe(data, mask, prior.schedule, draw)
+        state = hold(draw(data), self._levels[0])
+        walk = sample(
+            denoise, state, levels=self._levels, solver=SOLVERS[self.settings.solver], schedule=prior.schedule,
+            draw=draw, constrain=hold,
+        )  # fmt: skip
+        for snapshot in walk:
+            state = snapshot.state
+        made = state * spread + prior.mean
+        if prior.net.config.patch > 1:
+            made = torch.where(mask, given, smooth(made))
+        finished = changed((made - prior.mean) / spread, 0) * spread + prior.mean
+        return torch.where(mask, given, finished)[0].cpu().double().numpy()
+
+    def _guided(self, text: str) -> Denoiser:
+        """The prior's guess under a text; an empty one asks for nothing in particular."""
+        if text not in self._bound:
+            cond = self.prior.condition([text])
+            self._bound[text] = self.prior.net.bind(cond), self.prior.net.bind(cond.null())
+            while len(self._bound) > TEXTS:
+                self._bound.popitem(last=False)
+        self._bound.move_to_end(text)
+        own, null = self._bound[text]
+        return guide(self.prior.net, own, null, self.settings.guidance)
