@@ -28,11 +28,12 @@ def heading_for(direction: float, prior: Prior, *, first: int) -> Correction:
     """The correction of one row's guess so that from frame ``first`` on the way goes to ``direction``.
 
     direction: radians, seen from where the person stands and faces at row frame ``first``. The turn begins there and
-    takes `SOONEST` to `LONGEST` frames. Of two ways round the one taken first is kept.
+    takes `SOONEST` to `LONGEST` frames. How long, and which of two ways round, the first guess decides.
     """
     mean = prior.mean.cpu().double().numpy()
     spread = torch.where(prior.std > 0, prior.std, 1.0).cpu().double().numpy()
-    before: list[float] = []
+    before: list[float] = []  # the turn that was made of the guess before
+    over: list[float] = []
 
     def correct(guess: Tensor, level: int) -> Tensor:
         features = guess.detach().cpu().double().numpy() * spread + mean
@@ -42,8 +43,9 @@ def heading_for(direction: float, prior: Prior, *, first: int) -> Correction:
         near = before[0] if before else float(turn_between(middle, 0.0))
         lack += 2 * np.pi * round((near - middle) / (2 * np.pi))
         before[:] = [float(np.median(lack))]
-        over = SOONEST + (LONGEST - SOONEST) * min(abs(before[0]) / np.pi, 1.0)
-        u = (np.arange(len(lack)) / over).clip(0, 1)
+        if not over:
+            over.append(SOONEST + (LONGEST - SOONEST) * min(abs(before[0]) / np.pi, 1.0))
+        u = (np.arange(len(lack)) / over[0]).clip(0, 1)
         turn = np.concatenate([np.zeros(first), lack * u * u * (3 - 2 * u)])
         changed = guess.clone()
         step = torch.from_numpy(-np.diff(turn) / 2 / spread[0]).to(guess)

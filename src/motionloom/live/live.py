@@ -254,14 +254,15 @@ class Live:
         frames, count = self.settings.ahead, len(known)
         goal, words, again = self._wanted(course, frames)
         edits: list[Correction] = []
+        turns: list[Correction] = []
         if not goal.empty:
             edits.append(toward(goal.seen_from(course.place), self._draw.prior, first=count))
         if self._trail is None and self._steer.speed is None and self._steer.direction is not None:
             way = self._steer.direction - course.place.facing
-            edits.append(heading_for(way, self._draw.prior, first=count))
+            turns.append(heading_for(way, self._draw.prior, first=count))
         first = self._next - count
         draw = self._noise.draw(first, count + frames, self._draw.prior.mean.device)
-        features = self._draw(words, torch.from_numpy(known).float(), frames, draw, edits)
+        features = self._draw(words, torch.from_numpy(known).float(), frames, draw, edits=edits, turns=turns)
         positions, contacts, places = _decoded(features, begin)
         made = body(positions, contacts, FPS, shown)
         motion = made if shown is None else _one(shown, made)

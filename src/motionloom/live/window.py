@@ -55,12 +55,20 @@ class Drawer:
 
     @torch.inference_mode()
     def __call__(
-        self, text: str, known: Tensor, frames: int, draw: Draw, edits: Sequence[Correction] = ()
+        self,
+        text: str,
+        known: Tensor,
+        frames: int,
+        draw: Draw,
+        *,
+        edits: Sequence[Correction] = (),
+        turns: Sequence[Correction] = (),
     ) -> np.ndarray:
         """(known + frames, 263) float64 features, not standardised, the known ones as they were.
 
         text: what is done; known: (n, 263) features of the last frames, n may be 0; frames: how many to draw; draw: as
-        of `Noise.draw`, over all frames of the window; edits: what every guess goes through, one after the other.
+        of `Noise.draw`, over all frames of the window; edits: what every guess goes through, one after the other, before it
+        is made to leave the known frames without a jump; turns: the same behind that, for edits that jump nowhere.
         """
         prior, count = self.prior, len(known)
         spread = torch.where(prior.std > 0, prior.std, 1.0)
@@ -78,7 +86,10 @@ class Drawer:
         def changed(guess: Tensor, level: int) -> Tensor:
             for edit in edits:
                 guess = edit(guess[0], level)[None]
-            return torch.where(mask, data, (meet(guess * spread + prior.mean) - prior.mean) / spread)
+            guess = (meet(guess * spread + prior.mean) - prior.mean) / spread
+            for turn in turns:
+                guess = turn(guess[0], level)[None]
+            return torch.where(mask, data, guess)
 
         hold = observe(data, mask, prior.schedule, draw)
         state = hold(draw(data), self._levels[0])
