@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from motionloom.goals.hold import FixedJoints, FixedPart, HeldPart, Hold
     from motionloom.goals.segment import Segment
     from motionloom.io import load, save
+    from motionloom.live.live import Live
     from motionloom.motion import Motion
     from motionloom.retarget import from_smpl22, retarget, to_smpl22
     from motionloom.skeleton import SMPL22, Skeleton
@@ -45,6 +46,7 @@ _PLACES = {
     "Prior": "weights.prior",
     "save_prior": "weights.prior",
     "MotionloomError": "errors",
+    "Live": "live.live",
     "load": "io",
     "save": "io",
     "Motion": "motion",
@@ -90,6 +92,7 @@ __all__ = [
     "Goal",
     "HeldPart",
     "Hold",
+    "Live",
     "Loop",
     "Motion",
     "MotionloomError",

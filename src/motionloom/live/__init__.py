@@ -1,1 +1,1 @@
-"""A character that is steered while it moves: short windows drawn ahead of the clock, a body that is never changed behind it."""
+"""Somebody who is steered while he moves: short windows drawn ahead, a body that is never changed once it was shown."""

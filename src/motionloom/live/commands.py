@@ -163,7 +163,8 @@ def _degrees(value: Any, name: str) -> float | None:
 
 
 def _steer(said: Mapping[str, Any]) -> Steer:
-    return Steer(_degrees(said.get("direction"), "direction"), said.get("speed"), _degrees(said.get("facing"), "facing"))
+    direction, facing = (_degrees(said.get(name), name) for name in ("direction", "facing"))
+    return Steer(direction, said.get("speed"), facing)
 
 
 _KINDS: Mapping[str, tuple[set[str], set[str], Callable[[Mapping[str, Any]], Command]]] = {

@@ -1,7 +1,7 @@
 """Where somebody is to go in the frames of the next window: steering and paths as a few places of the pelvis.
 
-Places are asked every `EVERY` frames only, so that between them the body sways as it is drawn. Nobody changes pace or way
-within a frame: what is asked leads over from how the person moves.
+Places are asked every `EVERY` frames only, so that between them the body sways as it is drawn. Nobody changes pace or
+way within a frame: what is asked leads over from how the person moves.
 """
 
 import math
@@ -22,8 +22,8 @@ PICK_UP, TURN = 12.0, 20.0
 """Frames in which a pace is taken up, and in which half a turn is made."""
 ARRIVED = 0.3
 """Metres from the end of a path at which it is over."""
-BRAKING = 0.09
-"""Metres per frame that are lost in each of 20 frames, over 20: the pace is at most the root of this times the way left."""
+BRAKING = 1.0
+"""Metres per second squared with which somebody slows down towards the end of a path."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +43,18 @@ def steered(course: Course, steer: Steer, frames: int, fps: float) -> Goal:
         ahead = course.place.facing if steer.facing is None else steer.facing
         direction = ahead if steer.direction is None else steer.direction
         way = _walked(course, direction, steer.speed / fps, frames)
-        goal.positions[at, 0, 0], goal.positions[at, 0, 2] = way[at].T
-        goal.asked[np.ix_(at, [0], [0, 2])] = True
+        _ask(goal, at, way)
     if steer.facing is not None:
         turn = float(turn_between(steer.facing, course.place.facing))
         goal.facing[:] = course.place.facing + turn * _eased(np.arange(frames), _turning(turn))
         goal.facing_asked[at] = True
     return goal
+
+
+def _ask(goal: Goal, at: NDArray[np.int_], way: Array) -> None:
+    """Ask for the pelvis in some frames of a way (frames, 2)."""
+    goal.positions[at, 0, ::2] = way[at]
+    goal.asked[at, 0, ::2] = True
 
 
 def _walked(course: Course, direction: float, step: float, frames: int) -> Array:
@@ -96,18 +101,17 @@ class Trail:
         return max(rest, float(np.linalg.norm(self._points[-1] - here))) if rest < ARRIVED else rest
 
     def goal(self, course: Course, frames: int, fps: float) -> tuple[Goal, int]:
-        """Places for so many frames, in the world, and the frame in which the end is near (``frames``: none of them)."""
+        """Places for so many frames, in the world, and the frame that is near the end (``frames``: none is)."""
         left, pace, gone = self.left(course), math.hypot(*course.velocity), 0.0
         places = np.empty(frames)
         for k in range(frames):
             places[k] = gone
             wanted = pace + (self.speed / fps - pace) * float(_eased(np.array([k]), PICK_UP)[0])
-            gone += min(wanted, math.sqrt(BRAKING / fps * max(left - gone, 0.0)), left - gone)
+            gone += min(wanted, math.sqrt(2 * BRAKING * max(left - gone, 0.0)) / fps, left - gone)
         over = int((left - places > ARRIVED).sum())
         way = np.stack([np.interp(self._gone + places, self._along, column) for column in self._points.T], axis=-1)
         here = np.array([course.place.x, course.place.z])
         way += (here - way[0]) * (1 - _eased(np.arange(frames), fps))[:, None]
         goal, at = Goal.nothing(frames), np.arange(EVERY, frames, EVERY)
-        goal.positions[at, 0, 0], goal.positions[at, 0, 2] = way[at].T
-        goal.asked[np.ix_(at, [0], [0, 2])] = True
+        _ask(goal, at, way)
         return goal, over

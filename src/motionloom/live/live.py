@@ -1,9 +1,9 @@
 """`Live`: one pose after the other, without end, and what is asked in between changes what comes.
 
-There is one plan: the frames that were drawn and not yet shown. When something is asked, or when the plan runs short, a
-window is drawn from the next frame on (`window`), knowing the last half second; its body follows from the poses that were
-shown (`body`). Everything is counted in frames, no clock is looked at: the same seed and the same commands at the same
-frames make the same motion. `clock` runs one of these against the time.
+There is one plan: the frames that were drawn and not yet shown. When something is asked, or when the plan runs short,
+a window is drawn from the next frame on (`window`), knowing the last half second; its body follows from the poses that
+were shown (`body`). Everything is counted in frames, no clock is looked at: the same seed and the same commands at the
+same frames make the same motion. `clock` runs one of these against the time.
 """
 
 from collections import deque
@@ -19,7 +19,7 @@ from motionloom.edits.steering import Correction, toward
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
-from motionloom.goals.goal import Goal, Placement, overlaid
+from motionloom.goals.goal import Goal, Placement, body_facing, overlaid
 from motionloom.goals.paths import WALKING
 from motionloom.live.body import body
 from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer
@@ -37,6 +37,8 @@ Array = NDArray[np.float64]
 
 STAY = 4
 """Frames that a joint is asked to stay where it was asked to be."""
+LOGGED = 100_000
+"""Commands that are remembered with their frames."""
 MOST_ASKED = 64
 """Things to reach and poses that wait at once; of more the oldest are dropped."""
 
@@ -137,6 +139,8 @@ class Live:
         self._known, self._shown = self._begin(start)
         self._next, self._plan, self._again = 0, None, 0  # the next frame at 20 per second; when to draw anew
         self._two: list[tuple[Array, Array, str]] = []  # the last two frames at 20 per second
+        self._rest, self._open = self.settings.rest, True  # frames between windows; whether commands may be taken up
+        self._taken: deque[tuple[int, Command]] = deque(maxlen=LOGGED)
 
     # What is asked
 
@@ -153,9 +157,7 @@ class Live:
         """Do this from now on, such as "a person walks"; empty words leave it to the steering what is done."""
         self.ask(Say(text))
 
-    def steer(
-        self, direction: float | None = None, speed: float | None = None, facing: float | None = None
-    ) -> None:
+    def steer(self, direction: float | None = None, speed: float | None = None, facing: float | None = None) -> None:
         """Go to a direction (radians in the world; None: ahead), at a speed (metres per second; None: the words' own),
         facing another one (radians; None: as the words do). Without any of them steering ends, and so does a path.
         """
@@ -175,7 +177,7 @@ class Live:
         """
         if isinstance(places, Motion):
             seen = places.frames(0, 1).positions()
-            there = Placement(float(seen[0, 0, 0]), float(seen[0, 0, 2]), float(_facing_of(seen)))
+            there = Placement(float(seen[0, 0, 0]), float(seen[0, 0, 2]), body_facing(seen[0]))
             places = there.from_world(seen)[0]
         self.ask(Pose(tuple(map(tuple, np.asarray(places, dtype=np.float64).tolist())), within))
 
@@ -191,18 +193,32 @@ class Live:
         """Guided calls of the network so far."""
         return self._draw.calls
 
+    @property
+    def taken(self) -> list[tuple[int, Command]]:
+        """What was asked, with the frames that it first changed: asked before these frames of a `Live` of the same seed
+        and start, it makes the same motion again."""
+        return list(self._taken)
+
+    def stretch(self, seconds: float) -> int:
+        """Draw windows at least so many seconds apart, for machines that are slow; gives the frames back (at 20 per
+        second), which are not below those of the settings."""
+        self._rest = min(max(int(np.ceil(seconds * FPS)), self.settings.rest), self.settings.used)
+        return self._rest
+
     def __iter__(self) -> Iterator[Frame]:
         return self
 
     def __next__(self) -> Frame:
+        self._open = True
         at = self._frame / self.fps * FPS
         low = int(at + 1e-9)
-        while self._next < low + 2 and not (self._next == low + 1 and at - low < 1e-9):
+        part = at - low if at - low > 1e-9 else 0.0
+        while self._next < low + (2 if part else 1):
             self._two = [*self._two, self._shown_next()][-2:]
-        part = at - low
-        (root, turns, words), last = self._two[0 if part > 1e-9 else -1], self._two[-1]
-        if part > 1e-9:
-            both = Motion(SMPL22, FPS, np.stack([root, last[0]]), np.stack([turns, last[1]]))
+        root, turns, words = self._two[0 if part else -1]
+        if part:
+            after = self._two[-1]
+            both = Motion(SMPL22, FPS, np.stack([root, after[0]]), np.stack([turns, after[1]]))
             between = both.at(np.array([part]), FPS)
             root, turns = between.root[0], between.rotations[0]
         frame = Frame(self._frame, self._frame / self.fps, root, turns, words)
@@ -215,9 +231,11 @@ class Live:
 
     def _shown_next(self) -> tuple[Array, Array, str]:
         """The next frame at 20 per second."""
-        plan, rest = self._plan, self.settings.rest
-        if plan is None or self._next >= self._again or (self._asked and self._next >= plan.drawn + rest):
-            plan = self._plan = self._planned()
+        plan = self._plan
+        asked = self._open and len(self._asked) > 0
+        self._open = False
+        if plan is None or self._next >= self._again or (asked and self._next >= plan.drawn + self._rest):
+            plan = self._plan = self._planned(asked or plan is None)
         k = self._next - plan.first
         self._next += 1
         return plan.motion.root[k], plan.motion.rotations[k], plan.words
@@ -245,12 +263,14 @@ class Live:
         begin = max(0, end - count)
         return plan.features[begin:end], plan.places[begin], plan.motion.frames(begin, end)
 
-    def _planned(self) -> _Plan:
-        """A plan from the next frame on, with everything that was asked."""
+    def _planned(self, asked: bool) -> _Plan:
+        """A plan from the next frame on, with what was asked if that may be taken up."""
         known, begin, shown = self._past()
         course = _course(known, begin)
-        while self._asked:
-            self._take_up(self._asked.popleft(), course)
+        while asked and self._asked:
+            command = self._asked.popleft()
+            self._taken.append((self._frame, command))
+            self._take_up(command, course)
         frames, count = self.settings.ahead, len(known)
         goal, words, again = self._wanted(course, frames)
         edits: list[Correction] = []
@@ -290,7 +310,6 @@ class Live:
         plan = self._plan
         there = course.place if plan is None else plan.places[min(frame - plan.first, len(plan.places) - 1)]
         places = np.array(command.places)
-        there = replace(there)
         goal.positions[0] = there.to_world(places - places[:1] * [1, 0, 1])
         goal.asked[0] = True
         return goal
@@ -346,9 +365,3 @@ def _course(known: Array, begin: Placement) -> Course:
     back = places[max(0, len(places) - 5)]
     count = min(4, len(places) - 1)
     return Course(places[-1], ((places[-1].x - back.x) / count, (places[-1].z - back.z) / count))
-
-
-def _facing_of(places: Array) -> float:
-    from motionloom.goals.goal import body_facing
-
-    return body_facing(places[0])

@@ -1,7 +1,7 @@
 """One window of a live motion: its first frames are known, the rest is drawn in a few steps.
 
-The walk is that of every other motion (`diffusion.sampling`), what is known is held as in `tasks.redraw`, and the noise
-belongs to the numbers of frames: a frame that is drawn again, because something was asked, is drawn from the same noise.
+The walk is that of every other motion (`diffusion.sampling`), what is known is held as in `tasks.redraw`, and the
+noise belongs to the numbers of frames: a frame that is drawn again, because something was asked, has the same noise.
 """
 
 from collections import OrderedDict
@@ -10,13 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from motionloom.diffusion import SOLVERS, Denoiser, Draw, guide, inpaint, levels, observe, row_seed, sample
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction
 from motionloom.live.settings import Settings
 from motionloom.nets.prior import Bound
-from motionloom.tasks.text import smooth
 from motionloom.weights.prior import Prior
 
 TEXTS = 64
@@ -66,8 +66,8 @@ class Drawer:
     ) -> np.ndarray:
         """(known + frames, 263) float64 features, not standardised, the known ones as they were.
 
-        text: what is done; known: (n, 263) features of the last frames, n may be 0; frames: how many to draw; draw: as
-        of `Noise.draw`, over all frames of the window; edits: what every guess goes through, one after the other, before it
+        text: what is done; known: (n, 263) features of the last frames, n may be 0; frames: how many to draw; draw: of
+        `Noise.draw`, for all frames of the window; edits: what every guess goes through, one after the other, before it
         is made to leave the known frames without a jump; turns: the same behind that, for edits that jump nowhere.
         """
         prior, count = self.prior, len(known)
@@ -77,11 +77,11 @@ class Drawer:
         mask[:, :count] = True
         data = (given - prior.mean) / spread
         meet = joining(given, mask, count, count + frames)
-        free = inpaint(self._guided(text), data, mask)
+        free = self._guided(text, count + frames)
 
         def denoise(state: Tensor, level: int) -> Tensor:
             self.calls += 1
-            return changed(free(state, level), level)
+            return changed(inpaint(free, data, mask)(state, level), level)
 
         def changed(guess: Tensor, level: int) -> Tensor:
             for edit in edits:
@@ -99,19 +99,36 @@ class Drawer:
         )  # fmt: skip
         for snapshot in walk:
             state = snapshot.state
-        made = state * spread + prior.mean
-        if prior.net.config.patch > 1:
-            made = torch.where(mask, given, smooth(made))
-        finished = changed((made - prior.mean) / spread, 0) * spread + prior.mean
-        return torch.where(mask, given, finished)[0].cpu().double().numpy()
+        return torch.where(mask, given, state * spread + prior.mean)[0].cpu().double().numpy()
 
-    def _guided(self, text: str) -> Denoiser:
-        """The prior's guess under a text; an empty one asks for nothing in particular."""
+    def _guided(self, text: str, frames: int) -> Denoiser:
+        """The prior's guess under a text; an empty one asks for nothing in particular.
+
+        A token of the network holds several frames, and between tokens it leaves small steps: the last guess is the
+        average over all ways to divide the frames into tokens (as in `tasks.long`), which are rows of one call.
+        """
         if text not in self._bound:
             cond = self.prior.condition([text])
             self._bound[text] = self.prior.net.bind(cond), self.prior.net.bind(cond.null())
             while len(self._bound) > TEXTS:
                 self._bound.popitem(last=False)
         self._bound.move_to_end(text)
-        own, null = self._bound[text]
-        return guide(self.prior.net, own, null, self.settings.guidance)
+        net, bound, scale = self.prior.net, self._bound[text], self.settings.guidance
+        once, ways = guide(net, *bound, scale), net.config.patch
+        lengths = torch.arange(frames, frames - ways, -1, device=self.prior.mean.device)
+        own, null = (
+            Bound(*(part.repeat_interleave(ways, 0) for part in one))._replace(lengths=lengths) for one in bound
+        )
+        shifted = guide(net, own, null, scale)
+
+        def guess(state: Tensor, level: int) -> Tensor:
+            if level != self._levels[-2] or ways == 1:
+                return once(state, level)
+            rows = shifted(torch.cat([F.pad(state[:, k:], (0, 0, 0, k)) for k in range(ways)]), level)
+            total = torch.zeros_like(state)
+            for k, row in enumerate(rows):
+                total[:, k:] += row[: frames - k]
+            count = torch.arange(1, frames + 1, device=state.device).clamp(max=ways)
+            return total / count[:, None]
+
+        return guess

@@ -5,7 +5,12 @@ import math
 from motionloom.goals.goal import turn_between
 
 STANDS = "a person stands still"
-_FORWARD = ((0.15, STANDS), (1.9, "a person walks forward"), (2.4, "a person jogs slowly"), (math.inf, "a person runs forward"))
+_FORWARD = (
+    (0.15, STANDS),
+    (1.9, "a person walks forward"),
+    (2.4, "a person jogs slowly"),
+    (math.inf, "a person runs forward"),
+)
 _BACKWARDS, _SIDEWAYS = "a person walks backwards", "a person walks sideways"
 
 
