@@ -14,21 +14,40 @@ from motionloom.edits.boundary import JOIN
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
+from motionloom.retarget import retarget
+from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 
 
 def body(positions: Array, contacts: Array, fps: float, shown: Motion | None) -> Motion:
-    """The frames of ``positions`` (frames, 22, 3) metres that lie behind the shown ones, on the 22-joint skeleton.
+    """The 22-joint person of places (frames, 22, 3) metres, begun with the frames that were shown.
 
     The first ``len(shown)`` places are those that ``shown`` was made of; contacts: (frames, 4) as in the features.
     """
     drawn = motion_from_positions(positions, fps)
     if shown is None:
         return clean_feet(drawn, contacts=contacts)
+    return _begun(shown, clean_feet(_led(drawn, shown), contacts=contacts, shown=len(shown)))
+
+
+def put(motion: Motion, skeleton: Skeleton, shown: Motion | None) -> Motion:
+    """A motion of the 22-joint person on another skeleton, begun with the frames that were shown on that."""
+    if skeleton == SMPL22:
+        return motion
+    worn = retarget(motion, skeleton)
+    return worn if shown is None else _begun(shown, _led(worn, shown))
+
+
+def _begun(shown: Motion, made: Motion) -> Motion:
+    """What was made, its first frames bit for bit those that were shown."""
     count = len(shown)
-    led = _led(drawn, shown)
-    return clean_feet(led, contacts=contacts, shown=count).frames(count, len(drawn))
+    turns = rot.unroll(np.concatenate([shown.rotations[-1:], made.rotations[count:]]))[1:]
+    return replace(
+        made,
+        root=np.concatenate([shown.root, made.root[count:]]),
+        rotations=np.concatenate([shown.rotations, turns]),
+    )
 
 
 def _led(drawn: Motion, shown: Motion) -> Motion:

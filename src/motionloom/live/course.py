@@ -22,6 +22,10 @@ PICK_UP, TURN = 12.0, 20.0
 """Frames in which a pace is taken up, and in which half a turn is made."""
 ARRIVED = 0.3
 """Metres from the end of a path at which it is over."""
+AHEAD = 0.6
+"""Metres further on along a path to which somebody on it heads."""
+FASTEST_TURN, GAIN = math.radians(8.0), 0.008
+"""Radians by which a way turns in a frame, and metres a frame by which a pace grows in a frame, at most."""
 BRAKING = 1.0
 """Metres per second squared with which somebody slows down towards the end of a path."""
 
@@ -93,25 +97,39 @@ class Trail:
 
     def left(self, course: Course) -> float:
         """Metres to the end from where somebody is; remembers how far he has come."""
-        near = np.flatnonzero(np.abs(self._along - self._gone) < 2.0)
-        here = np.array([course.place.x, course.place.z])
-        nearest = near[np.linalg.norm(self._points[near] - here, axis=-1).argmin()]
-        self._gone = max(self._gone, float(self._along[nearest]))
-        rest = float(self._along[-1]) - self._gone
-        return max(rest, float(np.linalg.norm(self._points[-1] - here))) if rest < ARRIVED else rest
+        self._gone = self._come(np.array([course.place.x, course.place.z]), self._gone, 1.5)
+        return float(self._along[-1]) - self._gone
+
+    def _come(self, here: Array, gone: float, most: float) -> float:
+        """Metres along the path of the place nearest to ``here`` that is not behind, nor further on than ``most``."""
+        near = np.flatnonzero((self._along >= gone - 1e-9) & (self._along <= gone + most))
+        return (
+            float(self._along[near[np.linalg.norm(self._points[near] - here, axis=-1).argmin()]]) if len(near) else gone
+        )
 
     def goal(self, course: Course, frames: int, fps: float) -> tuple[Goal, int]:
-        """Places for so many frames, in the world, and the frame that is near the end (``frames``: none is)."""
-        left, pace, gone = self.left(course), math.hypot(*course.velocity), 0.0
-        places = np.empty(frames)
+        """Places for so many frames, in the world, and the frame that is near the end (``frames``: none is).
+
+        Somebody heads for the place on the path that is `AHEAD` of him, turns no faster than he can, and goes slower
+        while he must turn far.
+        """
+        here, gone = np.array([course.place.x, course.place.z]), self._gone
+        x, z = course.velocity
+        pace = math.hypot(x, z)
+        angle = math.atan2(x, z) if pace > 0.01 else course.place.facing
+        way, over = np.empty((frames, 2)), frames
         for k in range(frames):
-            places[k] = gone
-            wanted = pace + (self.speed / fps - pace) * float(_eased(np.array([k]), PICK_UP)[0])
-            gone += min(wanted, math.sqrt(2 * BRAKING * max(left - gone, 0.0)) / fps, left - gone)
-        over = int((left - places > ARRIVED).sum())
-        way = np.stack([np.interp(self._gone + places, self._along, column) for column in self._points.T], axis=-1)
-        here = np.array([course.place.x, course.place.z])
-        way += (here - way[0]) * (1 - _eased(np.arange(frames), fps))[:, None]
-        goal, at = Goal.nothing(frames), np.arange(EVERY, frames, EVERY)
-        _ask(goal, at, way)
+            way[k] = here
+            left = float(self._along[-1]) - gone
+            if left <= ARRIVED and over == frames:
+                over = k
+            aim = [np.interp(gone + AHEAD, self._along, column) for column in self._points.T] - here
+            off = float(turn_between(math.atan2(*aim), angle)) if np.linalg.norm(aim) > 0.05 else 0.0
+            angle += float(np.clip(off, -FASTEST_TURN, FASTEST_TURN))
+            wanted = min(self.speed * max(0.3, math.cos(off)), math.sqrt(2 * BRAKING * max(left, 0.0))) / fps
+            pace += float(np.clip(wanted - pace, -2 * GAIN, GAIN))
+            here = here + pace * np.array([math.sin(angle), math.cos(angle)])
+            gone = self._come(here, gone, 2 * pace + 0.1)
+        goal = Goal.nothing(frames)
+        _ask(goal, np.arange(EVERY, frames, EVERY), way)
         return goal, over

@@ -76,20 +76,12 @@ class Drawer:
         mask = torch.zeros_like(given, dtype=torch.bool)
         mask[:, :count] = True
         data = (given - prior.mean) / spread
-        meet = joining(given, mask, count, count + frames)
+        changed = leaving(prior, known, frames, edits=edits, turns=turns)
         free = self._guided(text, count + frames)
 
         def denoise(state: Tensor, level: int) -> Tensor:
             self.calls += 1
-            return changed(inpaint(free, data, mask)(state, level), level)
-
-        def changed(guess: Tensor, level: int) -> Tensor:
-            for edit in edits:
-                guess = edit(guess[0], level)[None]
-            guess = (meet(guess * spread + prior.mean) - prior.mean) / spread
-            for turn in turns:
-                guess = turn(guess[0], level)[None]
-            return torch.where(mask, data, guess)
+            return changed(inpaint(free, data, mask)(state, level)[0], level)[None]
 
         hold = observe(data, mask, prior.schedule, draw)
         state = hold(draw(data), self._levels[0])
@@ -132,3 +124,28 @@ class Drawer:
             return total / count[:, None]
 
         return guess
+
+
+def leaving(
+    prior: Prior, known: Tensor, frames: int, *, edits: Sequence[Correction], turns: Sequence[Correction]
+) -> Correction:
+    """What every guess of a window goes through: ``edits``, then it leaves the known frames without a jump, ``turns``.
+
+    known: (n, 263) features, not standardised, of which ``frames`` are behind; the known ones stay as they are.
+    """
+    spread = torch.where(prior.std > 0, prior.std, 1.0)
+    given = torch.cat([known.to(prior.mean), prior.mean.new_zeros(frames, len(prior.mean))])[None]
+    mask = torch.zeros_like(given, dtype=torch.bool)
+    mask[:, : len(known)] = True
+    meet = joining(given, mask, len(known), len(known) + frames)
+    data = (given - prior.mean) / spread
+
+    def changed(guess: Tensor, level: int) -> Tensor:
+        for edit in edits:
+            guess = edit(guess, level)
+        guess = ((meet(guess[None] * spread + prior.mean) - prior.mean) / spread)[0]
+        for turn in turns:
+            guess = turn(guess, level)
+        return torch.where(mask[0], data[0], guess)
+
+    return changed
