@@ -18,6 +18,8 @@ SHORTEST, LONGEST = 0.1, 2.0
 """Seconds of frames that wait in the buffer, at least and at most."""
 WAITING = 64
 """Commands that wait for the planner; of more the oldest are dropped."""
+SLOW = 0.6
+"""Seconds that a command waits from which on the machine is said to be too slow."""
 LATE = 0.02
 """Seconds after its time from which on a frame counts as late."""
 REMEMBERED = 20
@@ -44,6 +46,28 @@ class Health:
     """In words, where the machine is too slow."""
 
 
+class Pace:
+    """When frames are due: the first at once, the others at their times from there; a late one delays all behind it."""
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self._begun: float | None = None
+
+    def until(self, frame: Frame) -> float:
+        """Seconds until a frame is due, 0 where it is late."""
+        if self._begun is None:
+            self._begun = self._now() - frame.time
+        return max(0.0, self._begun + frame.time - self._now())
+
+    def late(self, frame: Frame) -> float:
+        """Seconds that a frame comes after its time; asked once, when it is shown."""
+        assert self._begun is not None
+        late = max(0.0, self._now() - self._begun - frame.time)
+        if late > LATE:
+            self._begun += late  # the clock waits, so that what follows is not rushed
+        return late
+
+
 class Player:
     """Plays one `Live` against the time. Commands come from any thread; frames are taken by one."""
 
@@ -60,9 +84,13 @@ class Player:
         self._health = Health(0, 0, 0.0, self._ahead, 0, 0.0)
         self._thread = threading.Thread(target=self._plan, name="motionloom-live", daemon=True)
 
-    def __enter__(self) -> "Player":
+    def start(self) -> "Player":
+        """Begin to draw ahead, in a thread of its own."""
         self._thread.start()
         return self
+
+    def __enter__(self) -> "Player":
+        return self.start()
 
     def __exit__(self, *_: object) -> None:
         self.stop()
@@ -74,6 +102,11 @@ class Player:
             self._changed.notify_all()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
+
+    @property
+    def ended(self) -> bool:
+        """Whether no more frames are made."""
+        return self._stopped
 
     def ask(self, command: Command) -> None:
         """Ask for something as soon as possible."""
@@ -89,30 +122,21 @@ class Player:
         with self._changed:
             return self._health
 
+    @property
+    def taken(self) -> list[tuple[int, Command]]:
+        """What was asked, with the frames that it first changed (`Live.taken`)."""
+        return self._live.taken
+
     def frames(self) -> Iterator[Frame]:
         """Frames, each at its time; without end, or until `stop`."""
-        begun: float | None = None
-        while (frame := self._taken()) is not None:
-            now = self._now()
-            due = now if begun is None else begun + frame.time
-            if begun is None:
-                begun = now - frame.time
-            if now < due:
-                self._wait(due - now)
-            late = max(0.0, self._now() - due)
-            if late > LATE:
-                begun += late  # the clock waits, so that what follows is not rushed
-            self._count(late)
+        pace = Pace(self._now)
+        while (frame := self.take()) is not None:
+            time.sleep(pace.until(frame))
+            self.shown(pace.late(frame))
             yield frame
-
-    def _wait(self, seconds: float) -> None:
-        time.sleep(seconds)
 
     def take(self, timeout: float | None = None) -> Frame | None:
         """The next frame as soon as it is there, whatever the time; None after ``timeout`` seconds or at the end."""
-        return self._taken(timeout)
-
-    def _taken(self, timeout: float | None = None) -> Frame | None:
         with self._changed:
             self._changed.wait_for(lambda: self._buffer or self._stopped or self._error, timeout)
             if not self._buffer:
@@ -123,7 +147,8 @@ class Player:
             self._changed.notify_all()
             return frame
 
-    def _count(self, late: float) -> None:
+    def shown(self, late: float) -> None:
+        """Count a frame that was shown, so many seconds after its time."""
         with self._changed:
             old = self._health
             self._health = replace(old, shown=old.shown + 1, late=old.late + (late > LATE), worst=max(old.worst, late))
@@ -164,10 +189,10 @@ class Player:
         self._took.append(took)
         longest = max(self._took)
         self._ahead = min(max(1.5 * longest, SHORTEST), LONGEST)
-        rest = self._live.stretch(1.5 * longest)
+        rest = self._live.stretch(1.25 * longest)
         times = self._made / self._live.fps / max(self._busy, 1e-9)
         problem = ""
-        if rest > self._live.settings.rest:
+        if self._ahead > SLOW:
             problem = (
                 f"this machine takes {longest:.2f} s for a window of motion: what is asked is followed every "
                 f"{rest / 20:.2f} s and {self._ahead:.2f} s late"
