@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from motionloom.errors import MotionloomError
 from motionloom.live.clock import Player
-from motionloom.live.live import Live
+from motionloom.live.live import Frame, Live
 from motionloom.live.messages import Hello
 from motionloom.live.settings import Settings
 from motionloom.weights.prior import Prior
@@ -28,6 +28,8 @@ class Session:
     player: Player
     number: int = 0
     """Of the frame that is sent next."""
+    pending: Frame | None = None
+    """A frame that was taken from the player and could not be sent."""
     left: float | None = None
     """When the client was lost; None while there is one."""
 

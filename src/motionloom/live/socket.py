@@ -9,6 +9,7 @@ import asyncio
 import json
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, Protocol
 
 from motionloom.errors import MotionloomError, one_line
@@ -58,12 +59,12 @@ async def live_session(websocket: Socket, sessions: Sessions) -> None:
         await _both(_listen(websocket, session), _play(websocket, session))
         await asyncio.to_thread(sessions.end, session)
         session = None
-        await websocket.close(GOODBYE)
+        await _close(websocket, GOODBYE)
     except (MotionloomError, TimeoutError) as error:
         said = str(error) or "nothing was said in time"
         code = TRY_LATER if "come back later" in said else NOT_ALLOWED
         await _farewell(websocket, code, said)
-    except (Gone, RuntimeError, OSError):
+    except Gone:
         pass
     finally:
         if session is not None:
@@ -122,15 +123,16 @@ async def _play(websocket: Socket, session: Session) -> None:
     pace, told = Pace(time.monotonic), time.monotonic()
     player = session.player
     while True:
-        while (frame := player.take(timeout=0.0)) is None:
+        while (frame := session.pending or player.take(timeout=0.0)) is None:
             if player.ended:
                 raise MotionloomError("the live session ended")
             await asyncio.sleep(LOOK)
+        session.pending = frame  # until it is sent: the client may go in between
         await asyncio.sleep(pace.until(frame))
         late = pace.late(frame)
         player.shown(late)
         await _send(websocket, messages.frame(frame, late))
-        session.number = frame.number + 1
+        session.number, session.pending = frame.number + 1, None
         if time.monotonic() - told > EVERY:
             told = time.monotonic()
             await _send(websocket, messages.health(player.health))
@@ -138,7 +140,10 @@ async def _play(websocket: Socket, session: Session) -> None:
 
 async def _text(websocket: Socket) -> str | bytes:
     """The next message, as text or bytes; `Gone` where there is none."""
-    found = await websocket.receive()
+    try:
+        found = await websocket.receive()
+    except Exception as error:  # every server has its own for a client that is gone
+        raise Gone from error
     if found["type"] != "websocket.receive":
         raise Gone
     text = found.get("text")
@@ -146,16 +151,21 @@ async def _text(websocket: Socket) -> str | bytes:
 
 
 async def _send(websocket: Socket, said: Mapping[str, Any]) -> None:
+    """Send one message; `Gone` where nobody takes it."""
+    text = json.dumps(said, separators=(",", ":"))
     try:
         async with asyncio.timeout(STUCK):
-            await websocket.send_text(json.dumps(said, separators=(",", ":")))
-    except TimeoutError:
-        raise Gone from None
+            await websocket.send_text(text)
+    except Exception as error:
+        raise Gone from error
 
 
 async def _farewell(websocket: Socket, code: int, said: str) -> None:
-    try:
+    with suppress(Gone):
         await _send(websocket, {"type": "error", "message": one_line(said)[:300], "last": True})
-        await websocket.close(code, one_line(said)[:100])
-    except (Gone, RuntimeError, OSError):
-        pass
+    await _close(websocket, code, one_line(said)[:100])
+
+
+async def _close(websocket: Socket, code: int, reason: str | None = None) -> None:
+    with suppress(Exception):  # it may be closed
+        await websocket.close(code, reason)
