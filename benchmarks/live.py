@@ -21,10 +21,10 @@ import numpy as np
 import torch
 
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS
+from motionloom.features.layout import FEET, FPS
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.feet import planted_feet
-from motionloom.kinematics.physics import FEET, speed
+from motionloom.kinematics.physics import speed
 from motionloom.lab.metrics.obedience import check
 from motionloom.lab.metrics.skate import slide
 from motionloom.lab.metrics.transitions import mean_jerk
