@@ -198,6 +198,7 @@ def test_what_cannot_be_asked_is_refused_in_a_sentence(prior: Prior) -> None:
     live = Live(prior, settings=QUICK)
     for wrong in (
         lambda: live.say("x" * 501),
+        lambda: live.say("a person \ud800 walks"),
         lambda: live.steer(float("nan")),
         lambda: live.steer(0.0, 50.0),
         lambda: live.path([]),

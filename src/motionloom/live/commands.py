@@ -35,6 +35,8 @@ class Say:
     def __post_init__(self) -> None:
         if not isinstance(self.text, str) or len(self.text) > LONGEST_TEXT:
             raise MotionloomError(f"what is done is said in words, at most {LONGEST_TEXT} characters of them")
+        if not self.text.isascii() and any("\ud800" <= letter <= "\udfff" for letter in self.text):
+            raise MotionloomError("what is done is not text: it holds half a letter (a lone surrogate)")
         object.__setattr__(self, "text", " ".join(self.text.split()))
 
 

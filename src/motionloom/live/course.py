@@ -93,11 +93,13 @@ class Trail:
         self._points = even(points, np.linspace(0, 1, count)) if chord[-1] > 0 else points
         self._along = lengths_along(self._points)
         self.speed = WALKING if path.speed is None else path.speed
-        self._gone = 0.0
+        self._gone, self._planned_at, self._planned = 0.0, 0, np.zeros(1)  # metres; the last plan's, frame by frame
 
-    def left(self, course: Course) -> float:
-        """Metres to the end from where somebody is; remembers how far he has come."""
-        self._gone = self._come(np.array([course.place.x, course.place.z]), self._gone, 1.5)
+    def left(self, course: Course, frame: int) -> float:
+        """Metres to the end from where somebody is in a frame; remembers how far he has come."""
+        passed = min(frame - self._planned_at, len(self._planned) - 1)
+        behind = max(self._gone, self._planned[passed] - 0.75)
+        self._gone = self._come(np.array([course.place.x, course.place.z]), behind, 1.5)
         return float(self._along[-1]) - self._gone
 
     def _come(self, here: Array, gone: float, most: float) -> float:
@@ -107,7 +109,7 @@ class Trail:
             float(self._along[near[np.linalg.norm(self._points[near] - here, axis=-1).argmin()]]) if len(near) else gone
         )
 
-    def goal(self, course: Course, frames: int, fps: float) -> tuple[Goal, int]:
+    def goal(self, course: Course, frames: int, fps: float, *, frame: int = 0) -> tuple[Goal, int]:
         """Places for so many frames, in the world, and the frame that is near the end (``frames``: none is).
 
         Somebody heads for the place on the path that is `AHEAD` of him, turns no faster than he can, and goes slower
@@ -117,9 +119,10 @@ class Trail:
         x, z = course.velocity
         pace = math.hypot(x, z)
         angle = math.atan2(x, z) if pace > 0.01 else course.place.facing
-        way, over = np.empty((frames, 2)), frames
+        way, facing, over = np.empty((frames, 2)), np.empty(frames), frames
+        self._planned_at, self._planned = frame, np.empty(frames)
         for k in range(frames):
-            way[k] = here
+            way[k], facing[k], self._planned[k] = here, angle, gone
             left = float(self._along[-1]) - gone
             if left <= ARRIVED and over == frames:
                 over = k
@@ -130,6 +133,7 @@ class Trail:
             pace += float(np.clip(wanted - pace, -2 * GAIN, GAIN))
             here = here + pace * np.array([math.sin(angle), math.cos(angle)])
             gone = self._come(here, gone, 2 * pace + 0.1)
-        goal = Goal.nothing(frames)
-        _ask(goal, np.arange(EVERY, frames, EVERY), way)
+        goal, at = Goal.nothing(frames), np.arange(EVERY, frames, EVERY)
+        _ask(goal, at, way)
+        goal.facing[:], goal.facing_asked[at] = facing, True  # a sharp turn has two ways round; this is the one
         return goal, over

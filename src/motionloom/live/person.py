@@ -222,10 +222,10 @@ class Person(Asked):
         """What is asked of the next frames, in the world; the words; and after how many frames to draw again."""
         frames, again = self._settings.ahead, self._settings.used
         words, steer = self._words, self._steer
-        if self._trail is not None and self._trail.left(course) <= ARRIVED:
+        if self._trail is not None and self._trail.left(course, frame) <= ARRIVED:
             self._trail = None
         if self._trail is not None:
-            goal, over = self._trail.goal(course, frames, FPS)
+            goal, over = self._trail.goal(course, frames, FPS, frame=frame)
             again = max(self._settings.rest, min(again, over))
             words = words or for_pace(self._trail.speed, None, None)
         else:

@@ -10,6 +10,8 @@
 Times are seconds; what the commands hold is what their JSON objects hold (`commands.from_json`).
 """
 
+import json
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,15 +56,22 @@ def read_script(path: Path | str) -> Script:
 
 def written(script: Script) -> str:
     """The text of a script file that `read_script` reads as this script."""
-    import json
-
     lines = [f"seconds: {script.seconds:g}", f"seed: {script.seed}", "commands:" if script.commands else "commands: []"]
     for at, command in script.commands:
         said = to_json(command)
         kind = said.pop("type")
         value = said["text"] if kind == "say" else said
-        lines.append(f"  - {json.dumps({'at': round(at, 6), kind: value})}")
+        lines.append(f"  - {_PAIR.sub(_whole, json.dumps({'at': round(at, 6), kind: value}))}")
     return "\n".join(lines) + "\n"
+
+
+_PAIR = re.compile(r"\\u(d[89ab]..)\\u(d[c-f]..)")
+"""A letter beyond the first 65,536 as JSON writes it; YAML has another way."""
+
+
+def _whole(pair: re.Match[str]) -> str:
+    high, low = (int(part, 16) for part in pair.groups())
+    return f"\\U{0x10000 + ((high - 0xD800) << 10) + (low - 0xDC00):08x}"
 
 
 @dataclass(frozen=True)

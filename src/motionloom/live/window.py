@@ -129,7 +129,7 @@ class Drawer:
 def leaving(
     prior: Prior, known: Tensor, frames: int, *, edits: Sequence[Correction], turns: Sequence[Correction]
 ) -> Correction:
-    """What every guess of a window goes through: ``edits``, then it leaves the known frames without a jump, ``turns``.
+    """What every guess of a window goes through: ``edits``, no jump behind what is known, ``edits`` again, ``turns``.
 
     known: (n, 263) features, not standardised, of which ``frames`` are behind; the known ones stay as they are.
     """
@@ -144,7 +144,7 @@ def leaving(
         for edit in edits:
             guess = edit(guess, level)
         guess = ((meet(guess[None] * spread + prior.mean) - prior.mean) / spread)[0]
-        for turn in turns:
+        for turn in (*edits, *turns):  # edits again: a heading bent at the border turns all that is behind it
             guess = turn(guess, level)
         return torch.where(mask[0], data[0], guess)
 
