@@ -20,7 +20,7 @@ from motionloom.live.person import Person, Request
 from motionloom.live.settings import Settings
 from motionloom.live.window import leaving
 from motionloom.motion import Motion
-from motionloom.tasks.pair import Duet, known_state, pair_features, placement, prompts_of
+from motionloom.tasks.pair import Duet, PairEdits, PairSampling, known_state, pair_features, placement, prompts_of
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
@@ -79,18 +79,19 @@ class LivePair(Stage):
         count, frames, prior = len(requests[0].known), self.settings.ahead, self._prior
         known = torch.from_numpy(np.stack([request.known for request in requests])).float()
         changes: list[Correction | None] = [None, None]
-        state = mask = None
+        observed = None
         if count:
             stands = two.seen(_stand(requests[0].begin), np.stack([_stand(request.begin) for request in requests]))
-            state, mask = known_state(prior, self._net, known, torch.from_numpy(stands).float(), count + frames)
+            observed = known_state(prior, self._net, known, torch.from_numpy(stands).float(), count + frames)
         for i, request in enumerate(requests):
             if count or request.edits or request.turns:
                 changes[i] = leaving(prior, known[i], frames, edits=request.edits, turns=request.turns)
+        frozen = [bool(request.edits or request.turns) for request in requests]
         features, drawn = pair_features(
             prior, self._net, [request.words for request in requests], count + frames,
-            seeds=[row_seed(self._seed, i, self._next) for i in (0, 1)], known=state, mask=mask, change=changes,
-            still=[bool(request.edits or request.turns) for request in requests], guidance=self.settings.guidance,
-            steps=self.settings.steps,
+            seeds=[row_seed(self._seed, i, self._next) for i in (0, 1)],
+            edits=PairEdits(observed, changes, frozen=frozen),
+            sampling=PairSampling(guidance=self.settings.guidance, steps=self.settings.steps),
         )  # fmt: skip
         self._calls += self.settings.steps
         made = features[0].double().numpy()
