@@ -6,7 +6,8 @@ save(motions[0], "walk.bvh")
 
 `compose` makes long motions out of `Segment`s, `control` motions that meet a `Goal`, `edit` changes clips; a
 `Predictor` can `predict` what somebody does next, or `switch` from one clip to another. With a `PairBlock` two people
-come into one world: `generate_pair`, `complete_pair`, `react`, `compose_pair`.
+come into one world: `generate_pair`, `complete_pair`, `react`, `compose_pair`. `Live` and `LivePair`
+move without end and do what is asked meanwhile.
 """
 
 from importlib import import_module
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from motionloom.goals.hold import FixedJoints, FixedPart, HeldPart, Hold
     from motionloom.goals.segment import Segment
     from motionloom.io import load, save
+    from motionloom.live.live import Live
+    from motionloom.live.pair import LivePair
     from motionloom.motion import Motion
     from motionloom.retarget import from_smpl22, retarget, to_smpl22
     from motionloom.skeleton import SMPL22, Skeleton
@@ -45,6 +48,8 @@ _PLACES = {
     "Prior": "weights.prior",
     "save_prior": "weights.prior",
     "MotionloomError": "errors",
+    "Live": "live.live",
+    "LivePair": "live.pair",
     "load": "io",
     "save": "io",
     "Motion": "motion",
@@ -90,6 +95,8 @@ __all__ = [
     "Goal",
     "HeldPart",
     "Hold",
+    "Live",
+    "LivePair",
     "Loop",
     "Motion",
     "MotionloomError",

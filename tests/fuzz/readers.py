@@ -148,6 +148,14 @@ d="M10,10 L20 20 C 30 20 40 40 50,30 s 5 5 9 1 Q 1 2 3 4 t 9 9
 A 5 6 30 0 1 60 60 h 5 v 5 z" style="fill:none"/></g></svg>"""
 POINTS = """<svg xmlns="http://www.w3.org/2000/svg">
 <polyline points="0,0 10,20 30,15.5 40 2" transform="matrix(1 0 0 1 2 3)"/></svg>"""
+SCRIPT = """seconds: 12
+seed: 3
+commands:
+- {at: 0, say: a person walks forward}
+- {at: 4.5, steer: {direction: 90, speed: 1.4, facing: -10}}
+- {at: 8, path: {points: [[2, 3], [4, 0]], speed: 1}}
+- {at: 9, reach: {joint: left_wrist, position: [0, 1, 2], within: 0.5}}
+"""
 MASK = """hold:
 - joints: [left_wrist, right_wrist]
   from: 0.5
@@ -183,6 +191,12 @@ def read_timeline(folder: Path) -> object:
     return read_timeline(folder / "a.yaml")
 
 
+def read_script(folder: Path) -> object:
+    from motionloom.live.script import read_script
+
+    return read_script(folder / "a.yaml")
+
+
 def read_mask(folder: Path) -> object:
     from motionloom.goals.mask_file import read_mask
 
@@ -212,6 +226,7 @@ def read_joint_map(folder: Path) -> object:
 
 
 reader("timeline", text_file("a.yaml", TIMELINE), {"a.yaml": "text"}, read_timeline)
+reader("live script", text_file("a.yaml", SCRIPT), {"a.yaml": "text"}, read_script)
 reader("goal", goal, {"a.json": "json"}, read_goal)
 reader("goal of others", goal_of_others, {"a.json": "json", "pose.npz": "npz"}, read_goal, weight=1)
 reader("goal with a drawing", drawn_goal, {"a.json": "json", "a.svg": "svg"}, read_goal)

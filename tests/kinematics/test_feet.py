@@ -67,6 +67,26 @@ def test_a_sliding_march_stands_on_its_feet() -> None:
     np.testing.assert_allclose(np.abs((clean.rotations * motion.rotations).sum(-1))[:, upper], 1, atol=1e-9)
 
 
+@pytest.mark.parametrize("shown", [8, 15, 23, 30])
+def test_what_was_shown_stays_and_a_foot_that_stands_stands_on_there(shown: int) -> None:
+    motion = slider()
+    places = motion.positions()
+    clean = clean_feet(motion, shown=shown)
+    now = clean.positions()
+    np.testing.assert_allclose(now[:shown], places[:shown], atol=1e-6)
+    planted = planted_feet(places, FPS)
+    for k, joint in enumerate(FEET):
+        stop = shown
+        while planted[stop, k] and stop - shown < 10:
+            stop += 1
+        if planted[shown - 1, k] and k % 2:  # toes: the heel may rise over them
+            away = np.linalg.norm((now[shown:stop, joint] - places[shown - 1, joint])[:, [0, 2]], axis=-1)
+            assert (away < 0.01).all()
+    steps = np.linalg.norm(np.diff(now[:, FEET], axis=0), axis=-1)
+    before = np.linalg.norm(np.diff(places[:, FEET], axis=0), axis=-1)
+    assert steps[shown - 1].max() < before[shown - 2 : shown + 1].max() + 0.02, "no jump where the shown frames end"
+
+
 def test_feet_come_out_of_the_floor() -> None:
     motion = slider(sink=0.04)
     assert depth(motion) > 0.03

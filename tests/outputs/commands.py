@@ -51,6 +51,16 @@ TIMELINES = {
             {"text": "two people dance", "seconds": 1.5, "transition": 0.6},
         ],
     },
+    "live": {
+        "seconds": 3,
+        "seed": 5,
+        "commands": [
+            {"at": 0, "say": WALK},
+            {"at": 0.8, "steer": {"direction": 60}},
+            {"at": 1.6, "steer": {"direction": 0, "speed": 1.4, "facing": 20}},
+            {"at": 2.3, "reach": {"joint": "left_wrist", "position": [0.5, 1.2, 3], "within": 0.5}},
+        ],
+    },
 }  # fmt: skip
 """Written beside the outputs as NAME.yaml (JSON is YAML)."""
 
@@ -66,6 +76,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "compose goals": ("compose", "{work}/goals.yaml", *FEW),
     "compose path": ("compose", "{work}/path.yaml", *FEW),
     "compose start": ("compose", "{work}/start.yaml", *FEW),
+    "live": ("live", "{work}/live.yaml", *FEW),
+    "live start": ("live", "{work}/live.yaml", "--start", CLIP, "--fps", "30", *FEW),
     "control path": ("control", WALK, "--goal", str(GOALS / "s_curve.json"), "--seconds", "2", *FEW),
     "control drawing": ("control", WALK, "--path", str(GOALS / "figure_eight.svg"), "--seconds", "2", *FEW),
     "control stop": ("control", WALK, "--goal", str(GOALS / "stop.json"), "--seconds", "6", *FEW),

@@ -35,7 +35,7 @@ def test_every_recorded_command_is_compared() -> None:
 
 
 def test_every_command_that_draws_is_recorded() -> None:
-    """Seven commands draw motion; each is there."""
+    """Eight commands draw motion; each is there."""
     assert {words[0] for words in COMMANDS.values()} == {
-        "generate", "compose", "control", "edit", "predict", "switch", "duet"
+        "generate", "compose", "live", "control", "edit", "predict", "switch", "duet"
     }  # fmt: skip

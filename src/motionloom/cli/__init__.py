@@ -18,6 +18,7 @@ from motionloom.interruption import interruptible, was_interrupted
 FAMILIES = (
     "generate",
     "compose",
+    "live",
     "control",
     "edit",
     "predict",

@@ -37,12 +37,13 @@ _SUNK = 0.002
 _LENGTHS = SMPL22.bone_lengths()
 
 
-def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: float = 0.0) -> Motion:
+def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: float = 0.0, shown: int = 0) -> Motion:
     """Lock planted feet and lift feet out of the floor.
 
     ``motion`` on the 22-joint skeleton; ``contacts`` (frames or frames - 1, 4), flags or probabilities for left ankle,
     left foot, right ankle, right foot as the 263 features have them, else height and speed decide; ``floor`` metres.
-    Changes the legs, and the height of the root where a leg would be too short. Everything else stays as it is.
+    Changes the legs, and the height of the root where a leg would be too short. Everything else stays as it is. The
+    first ``shown`` frames stay too: a foot that stands at the last of them stands on where it is.
     """
     if motion.skeleton != SMPL22:
         raise MotionloomError(
@@ -54,16 +55,21 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
     places = motion.positions()
     planted = planted_feet(places, motion.fps, contacts=contacts)
     targets, directions = places[:, [limb.end for limb in LIMBS[:2]]].copy(), np.empty((len(motion), 2, 3))
+    free = _coming(len(motion), shown, max(1, round(EASE * motion.fps)))
     for i in (0, 1):
         ankle, toe = FEET[2 * i : 2 * i + 2]
         foot = places[:, toe] - places[:, ankle]
         flags = planted[:, 2 * i : 2 * i + 2]
-        directions[:, i] = _steady_direction(foot, flags[:, 0] & flags[:, 1], motion.fps)
+        directions[:, i] = _steady_direction(foot, flags[:, 0] & flags[:, 1], motion.fps, shown)
         tip = directions[:, i] * np.linalg.norm(foot, axis=-1, keepdims=True)
-        targets[:, i] += _correction(places[:, ankle], places[:, ankle] + tip, flags, motion.fps)
+        since = max(shown - 1, 0)
+        moved = _correction(
+            places[since:, ankle], (places[:, ankle] + tip)[since:], flags[since:], motion.fps, held=shown > 0
+        )
+        targets[since:, i] += moved
         below = floor - targets[:, i, 1] - np.minimum(tip[:, 1], 0)
-        targets[:, i, 1] += envelope((below - _SUNK).clip(0), round(0.1 * motion.fps))
-    down = _root_drop(places, targets, motion.fps)
+        targets[:, i, 1] += free * envelope((below - _SUNK).clip(0), round(0.1 * motion.fps))
+    down = free * _root_drop(places, targets, motion.fps)
     return _with_legs(motion, places - down[:, None, None] * [0, 1, 0], targets, directions)
 
 
@@ -119,7 +125,12 @@ def _joined(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
 # Where the feet go
 
 
-def _steady_direction(foot: Array, flat: Flags, fps: float) -> Array:
+def _coming(frames: int, shown: int, ease: int) -> Array:
+    """(frames,) factors: 0 in the frames that were shown, 1 from ``ease`` frames behind them on."""
+    return smoothstep((np.arange(frames) - shown + 1) / ease) if shown else np.ones(frames)
+
+
+def _steady_direction(foot: Array, flat: Flags, fps: float, shown: int = 0) -> Array:
     """Unit directions ankle to toes (frames, 3); one direction while the whole foot is on the floor."""
     unit = foot / np.linalg.norm(foot, axis=-1, keepdims=True).clip(1e-9)
     result, runs, ease = unit.copy(), _runs(flat), max(1, round(_TURN_EASE * fps))
@@ -130,22 +141,36 @@ def _steady_direction(foot: Array, flat: Flags, fps: float) -> Array:
         after = min(ease, runs[i + 1][0] - stop + 1) if i + 1 < len(runs) else ease
         away = np.maximum((start - frames) / before, (frames - stop + 1) / after)
         weight = 1 - smoothstep(away)
-        result += weight[:, None] * (unit[start:stop].mean(0) - result)
+        if start < shown < stop:  # it stands on as it was shown
+            steady = unit[shown - 1]
+            weight[:shown] = 0
+        else:
+            steady = unit[start:stop].mean(0)
+            weight *= _coming(len(foot), shown, ease)
+        result += weight[:, None] * (steady - result)
     return result / np.linalg.norm(result, axis=-1, keepdims=True).clip(1e-9)
 
 
-def _correction(ankle: Array, toe: Array, planted: Flags, fps: float) -> Array:
-    """(frames, 3) metres to add to the foot so that whatever is planted does not move; eased in and out."""
+def _correction(ankle: Array, toe: Array, planted: Flags, fps: float, *, held: bool = False) -> Array:
+    """(frames, 3) metres to add to the foot so that whatever is planted does not move; eased in and out.
+
+    held: nothing is added to frame 0, which was shown; stances that begin soon after it keep near where they begin.
+    """
     steps = np.zeros((len(ankle) - 1, 3))
     for place, flags in ((ankle, planted[:, 0]), (toe, planted[:, 1])):
         both = flags[1:] & flags[:-1]
         steps[both] = -np.diff(place, axis=0)[both]  # toes last: they are the pivot when the whole foot stands
     steps[:, 1] = 0  # heights stay: a foot that begins to rise must not be held down
+    ease = max(2, round(EASE * fps))
     pieces = list(_pieces(steps, planted[:, 0] | planted[:, 1], max(2, round(EASE * fps / 2))))
+    if held:
+        pieces = [(start, path - max(0.0, 1 - start / ease) * path[0]) for start, path in pieces]
+        if not pieces or pieces[0][0] > 0:
+            pieces.insert(0, (0, np.zeros((1, 3))))
     result = np.zeros_like(ankle)
     for start, values in pieces:
         result[start : start + len(values)] = values
-    _bridge(result, [(start, start + len(values)) for start, values in pieces], max(2, round(EASE * fps)))
+    _bridge(result, [(start, start + len(values)) for start, values in pieces], ease)
     return result
 
 

@@ -1,0 +1,77 @@
+"""The way somebody goes, turned to a direction of the world: steps stay as they are drawn, pace and gait too.
+
+Velocities and joints are told in the heading of the body, so that a change of the heading turns path and body together.
+"""
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from motionloom.edits.steering import Correction
+from motionloom.features import humanml
+from motionloom.features.layout import LAYOUT
+from motionloom.goals.goal import turn_between
+from motionloom.weights.prior import Prior
+
+Array = NDArray[np.float64]
+
+SOONEST, LONGEST = 8, 22
+"""Frames over which the way turns: by next to nothing, and by half a circle."""
+_SWAY = 8.0
+"""Frames (standard deviation) over which the way is averaged: a walk sways."""
+_STANDING = 0.004
+"""Metres a frame that the facing counts for in the way: all there is where nobody goes anywhere."""
+
+
+def heading_for(direction: float, prior: Prior, *, first: int) -> Correction:
+    """The correction of one row's guess so that from frame ``first`` on the way goes to ``direction``.
+
+    direction: radians, seen from where the person stands and faces at row frame ``first``. The turn begins there and
+    takes `SOONEST` to `LONGEST` frames. How long, and which of two ways round, the first guess decides.
+    """
+    mean = prior.mean.cpu().double().numpy()
+    spread = torch.where(prior.std > 0, prior.std, 1.0).cpu().double().numpy()
+    before: list[float] = []  # the turn that was made of the guess before
+    over: list[float] = []
+
+    def correct(guess: Tensor, level: int) -> Tensor:
+        features = guess.detach().cpu().double().numpy() * spread + mean
+        way = _ways(features, first)
+        lack = np.unwrap(np.asarray(turn_between(direction, np.angle(way))))
+        middle = float(np.median(lack))
+        near = before[0] if before else float(turn_between(middle, 0.0))
+        lack += 2 * np.pi * round((near - middle) / (2 * np.pi))
+        before[:] = [float(np.median(lack))]
+        if not over:
+            over.append(SOONEST + (LONGEST - SOONEST) * min(abs(before[0]) / np.pi, 1.0))
+        u = (np.arange(len(lack)) / over[0]).clip(0, 1)
+        turn = np.concatenate([np.zeros(first), lack * u * u * (3 - 2 * u)])
+        changed = guess.clone()
+        step = torch.from_numpy(-np.diff(turn) / 2 / spread[0]).to(guess)
+        changed[: len(step), 0] += step
+        return _moved_along(guess, changed, prior)
+
+    return correct
+
+
+def _ways(features: Array, first: int) -> NDArray[np.complex128]:
+    """The averaged way of the frames from ``first`` on as complex numbers whose angle is its direction."""
+    facing = -2 * np.concatenate([[0.0], np.cumsum(features[:, 0])])
+    steps = (features[:, 2] + 1j * features[:, 1]) * np.exp(1j * facing[1:])
+    ahead = np.exp(1j * facing[:-1])
+    frames = np.arange(len(features))
+    lag = frames[first:, None] - frames[first:]
+    kernel = np.exp(-0.5 * (lag / _SWAY) ** 2)
+    kernel /= kernel.sum(1, keepdims=True)
+    way = kernel @ (steps[first:] + _STANDING * ahead[first:])
+    return way * np.exp(-1j * facing[first])
+
+
+def _moved_along(old: Tensor, new: Tensor, prior: Prior) -> Tensor:
+    """``new`` with the displacements of the joints changed as its root was."""
+    spread = torch.where(prior.std > 0, prior.std, 1.0)
+    before, after = (humanml.displacements((part * spread + prior.mean)[None])[0] for part in (old, new))
+    result = new.clone()
+    result[:-1, LAYOUT["joint_velocity"]] += (after - before).flatten(1) / spread[LAYOUT["joint_velocity"]]
+    return result

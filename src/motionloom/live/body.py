@@ -1,0 +1,74 @@
+"""Places of joints to a body whose first frames were shown: those stay, the rest follows from them.
+
+The pose and its change that were shown last lead over into the new ones as at the borders of a drawn stretch
+(`edits.boundary`), here on a body with constant bones; feet that stand go on standing where they were shown.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.edits.boundary import JOIN
+from motionloom.kinematics.feet import clean_feet
+from motionloom.kinematics.ik import motion_from_positions
+from motionloom.motion import Motion
+from motionloom.retarget import retarget
+from motionloom.skeleton import SMPL22, Skeleton
+
+Array = NDArray[np.float64]
+
+
+def body(positions: Array, contacts: Array, fps: float, shown: Motion | None) -> Motion:
+    """The 22-joint person of places (frames, 22, 3) metres, begun with the frames that were shown.
+
+    The first ``len(shown)`` places are those that ``shown`` was made of; contacts: (frames, 4) as in the features.
+    """
+    drawn = motion_from_positions(positions, fps)
+    if shown is None:
+        return clean_feet(drawn, contacts=contacts)
+    return _begun(shown, clean_feet(_led(drawn, shown), contacts=contacts, shown=len(shown)))
+
+
+def put(motion: Motion, skeleton: Skeleton, shown: Motion | None) -> Motion:
+    """A motion of the 22-joint person on another skeleton, begun with the frames that were shown on that."""
+    if skeleton == SMPL22:
+        return motion
+    worn = retarget(motion, skeleton)
+    return worn if shown is None else _begun(shown, _led(worn, shown))
+
+
+def _begun(shown: Motion, made: Motion) -> Motion:
+    """What was made, its first frames bit for bit those that were shown."""
+    count = len(shown)
+    turns = rot.unroll(np.concatenate([shown.rotations[-1:], made.rotations[count:]]))[1:]
+    return replace(
+        made,
+        root=np.concatenate([shown.root, made.root[count:]]),
+        rotations=np.concatenate([shown.rotations, turns]),
+    )
+
+
+def _led(drawn: Motion, shown: Motion) -> Motion:
+    """The shown frames, and the drawn ones behind them, led over from what was shown."""
+    count, behind = len(shown), len(drawn) - len(shown)
+    reach = min(JOIN, behind)
+    u = (np.arange(1, behind + 1) / (reach + 1)).clip(0, 1)
+    value, change = (1 - u) ** 2 * (1 + 2 * u), (1 - u) ** 2 * u * (reach + 1)
+    off = shown.root - drawn.root[:count]
+    root = drawn.root.copy()
+    root[:count] = shown.root
+    root[count:] += value[:, None] * off[-1] + change[:, None] * (off[-1] - off[-2])
+    last = [rot.quat_to_rotvec(_nearest(rot.multiply(shown.rotations[k], rot.inverse(drawn.rotations[k])))) for k in
+            (count - 2, count - 1)]  # fmt: skip
+    turn = value[:, None, None] * last[1] + change[:, None, None] * (last[1] - last[0])
+    turns = drawn.rotations.copy()
+    turns[:count] = shown.rotations
+    turns[count:] = rot.multiply(rot.rotvec_to_quat(turn), drawn.rotations[count:])
+    return replace(drawn, root=root, rotations=rot.unroll(rot.normalize(turns)))
+
+
+def _nearest(quaternions: Array) -> Array:
+    """Both signs are one turn: those of the shorter way."""
+    return np.where(quaternions[..., :1] < 0, -quaternions, quaternions)

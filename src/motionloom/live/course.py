@@ -1,0 +1,139 @@
+"""Where somebody is to go in the frames of the next window: steering and paths as a few places of the pelvis.
+
+Places are asked every `EVERY` frames only, so that between them the body sways as it is drawn. Nobody changes pace or
+way within a frame: what is asked leads over from how the person moves.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom.goals.goal import Goal, Placement, turn_between
+from motionloom.goals.paths import WALKING, even, lengths_along
+from motionloom.live.commands import Path, Steer
+
+Array = NDArray[np.float64]
+
+EVERY = 8
+"""Frames between two places that are asked."""
+PICK_UP, TURN = 12.0, 20.0
+"""Frames in which a pace is taken up, and in which half a turn is made."""
+ARRIVED = 0.3
+"""Metres from the end of a path at which it is over."""
+AHEAD = 0.6
+"""Metres further on along a path to which somebody on it heads."""
+FASTEST_TURN, GAIN = math.radians(8.0), 0.008
+"""Radians by which a way turns in a frame, and metres a frame by which a pace grows in a frame, at most."""
+BRAKING = 1.0
+"""Metres per second squared with which somebody slows down towards the end of a path."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """Where somebody is and how he moves in the first frame that can be changed."""
+
+    place: Placement
+    velocity: tuple[float, float]
+    """Metres a frame, x and z in the world."""
+
+
+def steered(course: Course, steer: Steer, frames: int, fps: float) -> Goal:
+    """Places and facings for so many frames, in the world, at the asked speed; facings alone where none is asked."""
+    goal = Goal.nothing(frames)
+    at = np.arange(EVERY, frames, EVERY)
+    if steer.speed is not None:
+        ahead = course.place.facing if steer.facing is None else steer.facing
+        direction = ahead if steer.direction is None else steer.direction
+        way = _walked(course, direction, steer.speed / fps, frames)
+        _ask(goal, at, way)
+    if steer.facing is not None:
+        turn = float(turn_between(steer.facing, course.place.facing))
+        goal.facing[:] = course.place.facing + turn * _eased(np.arange(frames), _turning(turn))
+        goal.facing_asked[at] = True
+    return goal
+
+
+def _ask(goal: Goal, at: NDArray[np.int_], way: Array) -> None:
+    """Ask for the pelvis in some frames of a way (frames, 2)."""
+    goal.positions[at, 0, ::2] = way[at]
+    goal.asked[at, 0, ::2] = True
+
+
+def _walked(course: Course, direction: float, step: float, frames: int) -> Array:
+    """(frames, 2) places of somebody who comes to go ``step`` metres a frame to ``direction``."""
+    x, z = course.velocity
+    pace = math.hypot(x, z)
+    start = math.atan2(x, z) if pace > 0.01 else course.place.facing
+    turn = float(turn_between(direction, start))
+    count = np.arange(frames)
+    angle = start + turn * _eased(count, _turning(turn))
+    size = pace + (step - pace) * _eased(count, PICK_UP)
+    steps = np.stack([size * np.sin(angle), size * np.cos(angle)], axis=-1)
+    return np.array([course.place.x, course.place.z]) + np.concatenate([np.zeros((1, 2)), steps[:-1].cumsum(0)])
+
+
+def _turning(turn: float) -> float:
+    return 8.0 + (TURN - 8.0) * min(abs(turn) / math.pi, 1.0)
+
+
+def _eased(count: NDArray[np.int_], over: float) -> Array:
+    u = (count / over).clip(0, 1)
+    return u * u * (3 - 2 * u)
+
+
+class Trail:
+    """A path that is being walked."""
+
+    def __init__(self, path: Path, course: Course) -> None:
+        points = np.array([(course.place.x, course.place.z), *path.points])
+        chord = lengths_along(points)
+        count = max(2, min(20_000, int(chord[-1] / 0.05) + 1))
+        self._points = even(points, np.linspace(0, 1, count)) if chord[-1] > 0 else points
+        self._along = lengths_along(self._points)
+        self.speed = WALKING if path.speed is None else path.speed
+        self._gone, self._planned_at, self._planned = 0.0, 0, np.zeros(1)  # metres; the last plan's, frame by frame
+
+    def left(self, course: Course, frame: int) -> float:
+        """Metres to the end from where somebody is in a frame; remembers how far he has come."""
+        passed = min(frame - self._planned_at, len(self._planned) - 1)
+        behind = max(self._gone, self._planned[passed] - 0.75)
+        self._gone = self._come(np.array([course.place.x, course.place.z]), behind, 1.5)
+        return float(self._along[-1]) - self._gone
+
+    def _come(self, here: Array, gone: float, most: float) -> float:
+        """Metres along the path of the place nearest to ``here`` that is not behind, nor further on than ``most``."""
+        near = np.flatnonzero((self._along >= gone - 1e-9) & (self._along <= gone + most))
+        return (
+            float(self._along[near[np.linalg.norm(self._points[near] - here, axis=-1).argmin()]]) if len(near) else gone
+        )
+
+    def goal(self, course: Course, frames: int, fps: float, *, frame: int = 0) -> tuple[Goal, int]:
+        """Places for so many frames, in the world, and the frame that is near the end (``frames``: none is).
+
+        Somebody heads for the place on the path that is `AHEAD` of him, turns no faster than he can, and goes slower
+        while he must turn far.
+        """
+        here, gone = np.array([course.place.x, course.place.z]), self._gone
+        x, z = course.velocity
+        pace = math.hypot(x, z)
+        angle = math.atan2(x, z) if pace > 0.01 else course.place.facing
+        way, facing, over = np.empty((frames, 2)), np.empty(frames), frames
+        self._planned_at, self._planned = frame, np.empty(frames)
+        for k in range(frames):
+            way[k], facing[k], self._planned[k] = here, angle, gone
+            left = float(self._along[-1]) - gone
+            if left <= ARRIVED and over == frames:
+                over = k
+            aim = [np.interp(gone + AHEAD, self._along, column) for column in self._points.T] - here
+            off = float(turn_between(math.atan2(*aim), angle)) if np.linalg.norm(aim) > 0.05 else 0.0
+            angle += float(np.clip(off, -FASTEST_TURN, FASTEST_TURN))
+            wanted = min(self.speed * max(0.3, math.cos(off)), math.sqrt(2 * BRAKING * max(left, 0.0))) / fps
+            pace += float(np.clip(wanted - pace, -2 * GAIN, GAIN))
+            here = here + pace * np.array([math.sin(angle), math.cos(angle)])
+            gone = self._come(here, gone, 2 * pace + 0.1)
+        goal, at = Goal.nothing(frames), np.arange(EVERY, frames, EVERY)
+        _ask(goal, at, way)
+        goal.facing[:], goal.facing_asked[at] = facing, True  # a sharp turn has two ways round; this is the one
+        return goal, over

@@ -1,0 +1,199 @@
+"""`Live`: one pose after the other, without end, and what is asked in between changes what comes.
+
+There is one plan: the frames that were drawn and not yet shown. When something is asked, or when the plan runs short,
+a window is drawn from the next frame on (`window`), knowing the last half second; its body follows from the poses that
+were shown (`body`). Everything is counted in frames, no clock is looked at: the same seed and the same commands at the
+same frames make the same motion. `clock` runs one of these against the time; `pair` has two people.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import FPS, WIDTH
+from motionloom.live.commands import Command
+from motionloom.live.person import Asked, Person, Request
+from motionloom.live.settings import Settings
+from motionloom.live.window import Drawer, Noise
+from motionloom.motion import Motion
+from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.tasks.text import LARGEST_SEED
+from motionloom.weights.prior import Prior
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One pose that was shown."""
+
+    number: int
+    """0, 1, 2, ... at the rate of the `Live`."""
+    time: float
+    """Seconds from frame 0."""
+    root: Array
+    """(3,) metres in the world: joint 0."""
+    rotations: Array
+    """(joints, 4) each joint's orientation in its parent's frame; joint 0 in the world."""
+    words: str
+    """What is being done."""
+    skeleton: Skeleton = field(default_factory=lambda: SMPL22)
+
+    def positions(self) -> Array:
+        """(joints, 3) metres in the world."""
+        return motion_of([self], 1.0).positions()[0]
+
+
+def motion_of(frames: Sequence[Frame], fps: float) -> Motion:
+    """Frames that follow each other as a motion."""
+    root, turns = np.stack([frame.root for frame in frames]), np.stack([frame.rotations for frame in frames])
+    return Motion(frames[0].skeleton, fps, root, turns)
+
+
+class Stage(ABC):
+    """One person or two who move without end: frames are counted, windows are drawn when they must be."""
+
+    def __init__(self, people: Sequence[Person], settings: Settings, fps: float) -> None:
+        if not (np.isfinite(fps) and 1 <= fps <= 240):
+            raise MotionloomError(f"live motion of {fps:g} frames per second cannot be shown; give 1 to 240")
+        self.people, self.settings, self.fps = tuple(people), settings, float(fps)
+        self._frame = 0  # the next one to be shown, at the rate of what is shown
+        self._next = self._again = 0  # the next frame at 20 per second, and when to draw anew
+        self._drawn = -settings.used  # where the last window began
+        self._rest, self._open = settings.rest, True  # frames between windows; whether commands may be taken up
+        self._two: list[list[tuple[Array, Array, str]]] = []  # the last two frames at 20 per second, of everybody
+
+    @property
+    def number(self) -> int:
+        """Of the frame that comes next."""
+        return self._frame
+
+    @property
+    @abstractmethod
+    def calls(self) -> int:
+        """Guided calls of the network so far."""
+
+    def stretch(self, seconds: float) -> int:
+        """Draw windows at least so many seconds apart, for machines that are slow; gives the frames back (at 20 per
+        second), which are not below those of the settings."""
+        self._rest = min(max(int(np.ceil(seconds * FPS)), self.settings.rest), self.settings.used)
+        return self._rest
+
+    @abstractmethod
+    def _windows(self, requests: Sequence[Request]) -> None:
+        """Draw a window for everybody, from frame ``_next`` on."""
+
+    def frames(self) -> tuple[Frame, ...]:
+        """The next frame of everybody."""
+        self._open = True
+        at = self._frame / self.fps * FPS
+        low = int(at + 1e-9)
+        part = at - low if at - low > 1e-9 else 0.0
+        while self._next < low + (2 if part else 1):
+            self._two = [*self._two, self._advanced()][-2:]
+        shown = tuple(self._between(person, i, part) for i, person in enumerate(self.people))
+        self._frame += 1
+        return shown
+
+    def _between(self, person: Person, i: int, part: float) -> Frame:
+        root, turns, words = self._two[0 if part else -1][i]
+        if part:
+            after = self._two[-1][i]
+            both = Motion(person.skeleton, FPS, np.stack([root, after[0]]), np.stack([turns, after[1]]))
+            between = both.at(np.array([part]), FPS)
+            root, turns = between.root[0], between.rotations[0]
+        return Frame(self._frame, self._frame / self.fps, root, turns, words, person.skeleton)
+
+    def _advanced(self) -> list[tuple[Array, Array, str]]:
+        """The next frame at 20 per second."""
+        take = self._open and any(person.waiting for person in self.people)
+        self._open = False
+        take = take and self._next >= self._drawn + self._rest
+        if take or self._next >= self._again:
+            requests = [person.request(self._next, self._frame, take=take) for person in self.people]
+            self._windows(requests)
+            self._drawn, self._again = self._next, self._next + min(request.again for request in requests)
+        made = [person.pose_at(self._next) for person in self.people]
+        self._next += 1
+        return made
+
+
+class Live(Stage, Asked):
+    """Somebody who moves without end and does what is asked.
+
+    live = Live(Prior.load(), seed=1)
+    live.say("a person walks forward")
+    for frame in live:
+        ...
+
+    Not for several threads at once; `clock.Player` plays one against the time.
+    """
+
+    def __init__(
+        self,
+        prior: Prior,
+        *,
+        seed: int = 0,
+        fps: float = FPS,
+        start: Motion | None = None,
+        skeleton: Skeleton | None = None,
+        settings: Settings | None = None,
+    ) -> None:
+        """prior: weights that make HumanML3D's 263 numbers. fps: rate of the frames that are shown, 1 to 240; motion is
+        drawn at 20 per second and interpolated. start: a motion of anybody that this goes on from, in its place;
+        without one the person begins at the origin facing +Z. skeleton: a humanoid that frames are shown on (None: the
+        22-joint person). Raises `MotionloomError` for what cannot be.
+        """
+        check(prior, seed)
+        chosen = settings or Settings()
+        super().__init__([Person(prior, chosen, start=start, skeleton=skeleton)], chosen, fps)
+        self._draw = Drawer(prior, chosen)
+        self._noise = Noise(seed, chosen.steps, len(prior.mean))
+
+    def ask(self, command: Command) -> None:
+        """Ask for something from the next frame on."""
+        self.people[0].ask(command)
+
+    @property
+    def calls(self) -> int:
+        """Guided calls of the network so far."""
+        return self._draw.calls
+
+    @property
+    def taken(self) -> list[tuple[int, Command]]:
+        """What was asked, with the frames that it first changed: asked before these frames of a `Live` of the same seed
+        and start, it makes the same motion again."""
+        return self.people[0].taken
+
+    def __iter__(self) -> Iterator[Frame]:
+        return self
+
+    def __next__(self) -> Frame:
+        return self.frames()[0]
+
+    def take(self, count: int) -> Motion:
+        """The next ``count`` frames as a motion."""
+        return motion_of([next(self) for _ in range(count)], self.fps)
+
+    def _windows(self, requests: Sequence[Request]) -> None:
+        (request,), (person,) = requests, self.people
+        count, frames = len(request.known), self.settings.ahead
+        draw = self._noise.draw(self._next - count, count + frames, self._draw.prior.mean.device)
+        known = torch.from_numpy(request.known).float()
+        features = self._draw(request.words, known, frames, draw, edits=request.edits, turns=request.turns)
+        person.accept(request, features, self._next)
+
+
+def check(prior: Prior, seed: int) -> None:
+    """`MotionloomError` for weights and seeds that no live motion is drawn with."""
+    if len(prior.mean) != WIDTH or prior.fps != FPS:
+        raise MotionloomError(
+            f"these weights make {len(prior.mean)} numbers a frame; live motion needs {WIDTH} at {FPS:g} fps"
+        )
+    if not 0 <= seed < LARGEST_SEED:
+        raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {seed}")

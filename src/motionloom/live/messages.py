@@ -1,0 +1,109 @@
+"""The JSON messages of a live connection: what a client may say, checked, and what it is answered (docs/live.md)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.io.text import parse_json
+from motionloom.live.clock import Health
+from motionloom.live.commands import Command, to_json
+from motionloom.live.live import Frame
+from motionloom.retarget.named import named_skeleton
+from motionloom.skeleton import SMPL22, Skeleton
+
+VERSION = 1
+LARGEST = 256 * 1024
+"""Bytes of one message."""
+MOST_JOINTS = 300
+_HELLO = ("type", "seed", "fps", "skeleton", "session")
+
+
+@dataclass(frozen=True)
+class Hello:
+    """How a session begins."""
+
+    seed: int = 0
+    fps: float = 20.0
+    skeleton: Skeleton = field(default_factory=lambda: SMPL22)
+    session: str = ""
+    """The key of a session to go on with."""
+
+
+def read(text: str | bytes) -> Mapping[str, Any]:
+    """A message: a JSON object with a type. `MotionloomError` for anything else."""
+    if len(text) > LARGEST:
+        raise MotionloomError(f"a message has at most {LARGEST} bytes; this one has {len(text)}")
+    said = parse_json(text, "the message")
+    if not isinstance(said, dict) or not isinstance(said.get("type"), str):
+        raise MotionloomError('a message is a JSON object with a "type"')
+    return said
+
+
+def hello(said: Mapping[str, Any]) -> Hello:
+    """The first message of a client; `MotionloomError` names what is wrong with it."""
+    if said.get("type") != "hello":
+        raise MotionloomError('the first message is {"type": "hello"}')
+    if extra := [key for key in said if key not in _HELLO]:
+        raise MotionloomError(f"hello has no {extra[0][:40]!r}; it has {', '.join(_HELLO[1:])}")
+    seed, fps, session = said.get("seed", 0), said.get("fps", 20.0), said.get("session", "")
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**62:
+        raise MotionloomError("a seed is a whole number from 0 to below 2**62")
+    if isinstance(fps, bool) or not isinstance(fps, int | float) or not 1 <= fps <= 120:
+        raise MotionloomError("fps is a number from 1 to 120")
+    if not isinstance(session, str) or len(session) > 100:
+        raise MotionloomError("a session is named by the key that its welcome gave")
+    return Hello(seed, float(fps), skeleton(said.get("skeleton", "smpl22")), session)
+
+
+def skeleton(said: Any) -> Skeleton:
+    """A skeleton by its name (`retarget.named`), or of names, parents and offsets in metres."""
+    if isinstance(said, str):
+        return named_skeleton(said)
+    if not isinstance(said, dict) or set(said) != {"names", "parents", "offsets"}:
+        raise MotionloomError("a skeleton is a name, or an object with names, parents and offsets")
+    names, parents, offsets = said["names"], said["parents"], said["offsets"]
+    if not all(isinstance(part, list) and len(part) <= MOST_JOINTS for part in (names, parents, offsets)):
+        raise MotionloomError(f"a skeleton has lists of names, parents and offsets, of at most {MOST_JOINTS} joints")
+    if not all(isinstance(name, str) for name in names) or any(type(parent) is not int for parent in parents):
+        raise MotionloomError("the names of a skeleton are words and its parents whole numbers, -1 for the root")
+    try:
+        places = np.array(offsets, dtype=np.float64)
+    except (TypeError, ValueError):
+        places = np.empty(0)
+    if places.shape != (len(names), 3) or not (np.isfinite(places).all() and np.abs(places).max(initial=0) < 1e4):
+        raise MotionloomError(f"the offsets of a skeleton of {len(names)} joints are as many lists of 3 numbers")
+    return Skeleton(tuple(names), tuple(parents), places)
+
+
+def welcome(begun: Hello, key: str, number: int) -> dict[str, Any]:
+    """The answer to hello; ``number``: of the frame that comes first."""
+    bones = begun.skeleton
+    return {
+        "type": "welcome", "version": VERSION, "session": key, "fps": begun.fps, "seed": begun.seed, "frame": number,
+        "joints": list(bones.names), "parents": list(bones.parents), "offsets": bones.offsets.round(6).tolist(),
+    }  # fmt: skip
+
+
+def frame(shown: Frame, late: float) -> dict[str, Any]:
+    """One pose: root in metres, rotations (w, x, y, z) in the parent's frame; late: seconds behind its time."""
+    return {
+        "type": "frame", "frame": shown.number, "time": round(shown.time, 6), "late": round(late, 4),
+        "root": shown.root.round(5).tolist(), "rotations": shown.rotations.round(6).tolist(), "words": shown.words,
+    }  # fmt: skip
+
+
+def health(state: Health) -> dict[str, Any]:
+    """How the server keeps up."""
+    return {
+        "type": "health", "late": state.late, "worst": round(state.worst, 4), "ahead": round(state.ahead, 4),
+        "dropped": state.dropped, "times": round(state.times, 2), "problem": state.problem,
+    }  # fmt: skip
+
+
+def recorded(begun: Hello, taken: list[tuple[int, Command]], number: int) -> dict[str, Any]:
+    """What was asked so far, before which frames: the session again, with the same seed and rate."""
+    commands = [{"frame": at, **to_json(command)} for at, command in taken[-10_000:]]
+    return {"type": "recorded", "seed": begun.seed, "fps": begun.fps, "frames": number, "commands": commands}

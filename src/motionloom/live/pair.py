@@ -1,0 +1,106 @@
+"""`LivePair`: two people who move without end in one world, and what is asked of either changes what comes.
+
+Both are drawn together by one frozen prior and the block that makes two people of it (`tasks.pair`): each window knows
+the last half second of both and where they stand to each other. Their bodies follow as one person's does.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import torch
+
+from motionloom.diffusion import row_seed
+from motionloom.edits.steering import Correction
+from motionloom.features import pair as two
+from motionloom.features.layout import FPS
+from motionloom.goals.goal import Placement
+from motionloom.live.commands import Say
+from motionloom.live.live import Frame, Stage, check
+from motionloom.live.person import Person, Request
+from motionloom.live.settings import Settings
+from motionloom.live.window import leaving
+from motionloom.motion import Motion
+from motionloom.tasks.pair import Duet, PairEdits, PairSampling, known_state, pair_features, placement, prompts_of
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
+
+
+class LivePair(Stage):
+    """Two people who move without end.
+
+    pair = LivePair(prior, PairBlock.load("duet", prior), seed=1)
+    pair.say("two people shake hands")
+    pair.people[0].steer(speed=0.0)
+    for first, second in pair:
+        ...
+
+    What is asked of one of them is asked of `people[0]` or `people[1]`, as of a `Live`.
+    """
+
+    def __init__(
+        self,
+        prior: Prior,
+        block: PairBlock,
+        *,
+        seed: int = 0,
+        fps: float = FPS,
+        start: Duet | None = None,
+        settings: Settings | None = None,
+    ) -> None:
+        """block: weights that make two people of this prior. start: what both did before, in one world; without it
+        the first person begins at the origin facing +Z and the words say where the second stands. Otherwise as `Live`.
+        The solver and how the levels are spread are those of every duet. Raises `MotionloomError` for what cannot be.
+        """
+        check(prior, seed)
+        chosen = settings or Settings()
+        pasts: tuple[Motion | None, Motion | None] = start or (None, None)
+        people = [Person(prior, chosen, start=past, skeleton=None) for past in pasts]
+        super().__init__(people, chosen, fps)
+        self._prior, self._net, self._seed, self._calls = prior, block.net(prior), seed, 0
+
+    def say(self, text: str) -> None:
+        """What both do from now on, or what each does: "A :: B"."""
+        for person, words in zip(self.people, prompts_of(text) if text.strip() else ("", ""), strict=True):
+            person.ask(Say(words))
+
+    @property
+    def calls(self) -> int:
+        """Guided calls of the network so far."""
+        return self._calls
+
+    def __iter__(self) -> Iterator[tuple[Frame, Frame]]:
+        return self
+
+    def __next__(self) -> tuple[Frame, Frame]:
+        first, second = self.frames()
+        return first, second
+
+    def _windows(self, requests: Sequence[Request]) -> None:
+        count, frames, prior = len(requests[0].known), self.settings.ahead, self._prior
+        known = torch.from_numpy(np.stack([request.known for request in requests])).float()
+        changes: list[Correction | None] = [None, None]
+        observed = None
+        if count:
+            stands = two.seen(_stand(requests[0].begin), np.stack([_stand(request.begin) for request in requests]))
+            observed = known_state(prior, self._net, known, torch.from_numpy(stands).float(), count + frames)
+        for i, request in enumerate(requests):
+            if count or request.edits or request.turns:
+                changes[i] = leaving(prior, known[i], frames, edits=request.edits, turns=request.turns)
+        frozen = [bool(request.edits or request.turns) for request in requests]
+        features, drawn = pair_features(
+            prior, self._net, [request.words for request in requests], count + frames,
+            seeds=[row_seed(self._seed, i, self._next) for i in (0, 1)],
+            edits=PairEdits(observed, changes, frozen=frozen),
+            sampling=PairSampling(guidance=self.settings.guidance, steps=self.settings.steps),
+        )  # fmt: skip
+        self._calls += self.settings.steps
+        made = features[0].double().numpy()
+        begins: list[Placement | None] = [None, None] if count else [placement(stand) for stand in drawn[0].numpy()]
+        for i, (person, request) in enumerate(zip(self.people, requests, strict=True)):
+            window = np.concatenate([request.known, made[i, count:]])
+            person.accept(request, window, self._next, begins[i])
+
+
+def _stand(place: Placement) -> np.ndarray:
+    """(4,) as of `features.pair`."""
+    return np.array([np.cos(place.facing), np.sin(place.facing), place.x, place.z])

@@ -1,0 +1,108 @@
+"""A scripted session: a YAML file that says what is asked when, for films and tests.
+
+    seconds: 12
+    seed: 3
+    commands:
+      - {at: 0, say: a person walks forward}
+      - {at: 4, steer: {direction: 90, speed: 1.4}}
+      - {at: 8, path: {points: [[2, 3], [4, 0]]}}
+
+Times are seconds; what the commands hold is what their JSON objects hold (`commands.from_json`).
+"""
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from motionloom.errors import MotionloomError
+from motionloom.goals.lined_file import LinedFile
+from motionloom.io.lined_yaml import Lined, read_lined
+from motionloom.live.commands import Command, from_json, to_json
+from motionloom.live.live import Frame, Live
+
+LONGEST = 3600.0
+"""Seconds of a session that is written to files."""
+MOST = 10_000
+"""Commands of a script."""
+MAX_BYTES = 4_000_000
+_TYPES = ("say", "steer", "path", "reach", "pose")
+
+
+@dataclass(frozen=True)
+class Script:
+    """What is asked when."""
+
+    seconds: float
+    commands: tuple[tuple[float, Command], ...]
+    """Seconds and what is asked then, times rising."""
+    seed: int = 0
+
+    def run(self, live: Live) -> Iterator[Frame]:
+        """The frames of the session, each command asked before the frame of its time."""
+        waiting = list(self.commands)[::-1]
+        for number in range(max(1, round(self.seconds * live.fps))):
+            while waiting and waiting[-1][0] * live.fps <= number + 1e-6:
+                live.ask(waiting.pop()[1])
+            yield next(live)
+
+
+def read_script(path: Path | str) -> Script:
+    """A script file; `MotionloomError` names file and line of what is wrong with it."""
+    path = Path(path)
+    return _Reader(path).script(read_lined(path, max_bytes=MAX_BYTES))
+
+
+def written(script: Script) -> str:
+    """The text of a script file that `read_script` reads as this script."""
+    lines = [f"seconds: {script.seconds:g}", f"seed: {script.seed}", "commands:" if script.commands else "commands: []"]
+    for at, command in script.commands:
+        said = to_json(command)
+        kind = said.pop("type")
+        value = said["text"] if kind == "say" else said
+        lines.append(f"  - {_PAIR.sub(_whole, json.dumps({'at': round(at, 6), kind: value}))}")
+    return "\n".join(lines) + "\n"
+
+
+_PAIR = re.compile(r"\\u(d[89ab]..)\\u(d[c-f]..)")
+"""A letter beyond the first 65,536 as JSON writes it; YAML has another way."""
+
+
+def _whole(pair: re.Match[str]) -> str:
+    high, low = (int(part, 16) for part in pair.groups())
+    return f"\\U{0x10000 + ((high - 0xD800) << 10) + (low - 0xDC00):08x}"
+
+
+@dataclass(frozen=True)
+class _Reader(LinedFile):
+    def script(self, found: Lined) -> Script:
+        parts = self.mapping(found, ("seconds", "seed", "commands"), "a live script")
+        seconds = self.number(parts.get("seconds"), "seconds", low=0.05, high=LONGEST, unit="seconds")
+        if seconds is None:
+            self.fail(found.line, "a live script says how long it is: give 'seconds'")
+        seed = self.number(parts.get("seed"), "seed", low=0, high=2**62 - 1)
+        if seed is not None and not isinstance(seed, int):
+            self.fail(parts["seed"].line, f"'seed' must be a whole number; got {seed:g}")
+        listed = parts.get("commands")
+        entries: Sequence[Lined] = []
+        if listed is not None and listed.value != []:
+            entries = self.items(listed, "commands", of="command", most=MOST)
+        commands = sorted((self._command(entry) for entry in entries), key=lambda pair: pair[0])
+        return Script(float(seconds), tuple(commands), int(seed or 0))
+
+    def _command(self, entry: Lined) -> tuple[float, Command]:
+        parts = self.mapping(entry, ("at", *_TYPES), "a command")
+        at = self.number(parts.get("at"), "at", low=0, high=LONGEST, unit="seconds")
+        kinds = [kind for kind in _TYPES if kind in parts]
+        if at is None or len(kinds) != 1:
+            self.fail(entry.line, f"a command has a time 'at' and one of {', '.join(_TYPES)}")
+        value = parts[kinds[0]]
+        said = value.plain()
+        fields = {"text": said} if kinds[0] == "say" else {} if said is None else said
+        if not isinstance(fields, dict):
+            self.fail(value.line, f"'{kinds[0]}' must be a mapping; got {self.got(value)}")
+        try:
+            return float(at), from_json({**fields, "type": kinds[0]})
+        except MotionloomError as error:
+            self.fail(value.line, str(error))

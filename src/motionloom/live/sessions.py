@@ -1,0 +1,109 @@
+"""Live sessions of a server: how many there are, and those whose client is gone and may come back."""
+
+import secrets
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from motionloom.errors import MotionloomError
+from motionloom.live.clock import Player
+from motionloom.live.live import Frame, Live
+from motionloom.live.messages import Hello
+from motionloom.live.settings import Settings
+from motionloom.weights.prior import Prior
+
+MOST = 4
+"""Sessions at once, those that wait for their client included."""
+KEPT = 120.0
+"""Seconds that a session waits for its client to come back."""
+
+
+@dataclass(eq=False)
+class Session:
+    """Somebody who moves for one client. Without a client he waits: his buffer is full, and nothing is drawn."""
+
+    key: str
+    begun: Hello
+    player: Player
+    number: int = 0
+    """Of the frame that is sent next."""
+    pending: Frame | None = None
+    """A frame that was taken from the player and could not be sent."""
+    left: float | None = None
+    """When the client was lost; None while there is one."""
+
+
+class Sessions:
+    """All live sessions of one server; asked from any thread."""
+
+    def __init__(
+        self,
+        prior: Callable[[], Prior],
+        *,
+        most: int = MOST,
+        settings: Settings | None = None,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """prior: gives the weights, called in the thread of the first session (it may take seconds)."""
+        self._prior, self._most, self._settings, self._now = prior, most, settings, now
+        self._open: dict[str, Session] = {}
+        self._lock = threading.Lock()
+
+    def begin(self, asked: Hello) -> Session:
+        """A new session, or the one that ``asked`` names; `MotionloomError` where there is no room or none such."""
+        with self._lock:
+            self._forget()
+            if asked.session:
+                return self._again(asked.session)
+            if len(self._open) >= self._most and not self._make_room():
+                raise MotionloomError(f"this server plays {self._most} live sessions and no more; come back later")
+            live = Live(self._prior(), seed=asked.seed, fps=asked.fps, skeleton=asked.skeleton, settings=self._settings)
+            session = Session(secrets.token_urlsafe(16), asked, Player(live).start())
+            self._open[session.key] = session
+            return session
+
+    def leave(self, session: Session) -> None:
+        """The client is gone; it may come back."""
+        with self._lock:
+            session.left = self._now()
+
+    def end(self, session: Session) -> None:
+        """The session is over."""
+        with self._lock:
+            self._open.pop(session.key, None)
+        session.player.stop()
+
+    def close(self) -> None:
+        """End them all."""
+        for session in list(self._open.values()):
+            self.end(session)
+
+    def __len__(self) -> int:
+        return len(self._open)
+
+    def _again(self, key: str) -> Session:
+        session = self._open.get(key)
+        if session is None:
+            raise MotionloomError("there is no such live session, or not any more; begin another one")
+        if session.left is None:
+            raise MotionloomError("this live session has its client already; begin another one")
+        session.left = None
+        return session
+
+    def _forget(self) -> None:
+        """End sessions whose clients did not come back in time."""
+        for session in [one for one in self._open.values() if one.left is not None]:
+            if self._now() - (session.left or 0.0) > KEPT:
+                self._open.pop(session.key)
+                session.player.stop()
+
+    def _make_room(self) -> bool:
+        """End the session that has waited longest for its client, if any waits."""
+        waiting = [one for one in self._open.values() if one.left is not None]
+        if not waiting:
+            return False
+        oldest = min(waiting, key=lambda one: one.left or 0.0)
+        self._open.pop(oldest.key)
+        oldest.player.stop()
+        return True

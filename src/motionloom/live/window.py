@@ -1,0 +1,151 @@
+"""One window of a live motion: its first frames are known, the rest is drawn in a few steps.
+
+The walk is that of every other motion (`diffusion.sampling`), what is known is held as in `tasks.redraw`, and the
+noise belongs to the numbers of frames: a frame that is drawn again, because something was asked, has the same noise.
+"""
+
+from collections import OrderedDict
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from motionloom.diffusion import SOLVERS, Denoiser, Draw, guide, inpaint, levels, observe, row_seed, sample
+from motionloom.edits.boundary import joining
+from motionloom.edits.steering import Correction
+from motionloom.live.settings import Settings
+from motionloom.nets.prior import Bound
+from motionloom.weights.prior import Prior
+
+TEXTS = 64
+"""Prompts whose vectors are kept."""
+
+
+class Noise:
+    """Standard normal numbers for the frames of one person: they depend on the seed and the frame's number alone."""
+
+    def __init__(self, seed: int, moves: int, features: int) -> None:
+        self._seed = seed
+        self._shape = 2 * moves + 2, features  # the walk draws, and what is known is shown at noise of its own
+        self._kept: dict[int, Tensor] = {}
+
+    def draw(self, first: int, frames: int, device: torch.device) -> Draw:
+        """The noise of the frames from ``first`` on, for one walk: call number k gets that of its k-th draw."""
+        self._kept = {number: kept for number, kept in self._kept.items() if number >= first}
+        for number in range(first, first + frames):
+            if number not in self._kept:
+                generator = torch.Generator().manual_seed(row_seed(self._seed, number + (1 << 20)))
+                self._kept[number] = torch.randn(self._shape, generator=generator)
+        whole = torch.stack([self._kept[number] for number in range(first, first + frames)], dim=1).to(device)
+        calls = iter(range(len(whole)))
+        return lambda like: whole[next(calls)][None].to(like)
+
+
+class Drawer:
+    """Draws windows with one prior; keeps the vectors of what was said last."""
+
+    def __init__(self, prior: Prior, settings: Settings) -> None:
+        self.prior, self.settings = prior, settings
+        self.calls = 0
+        """Guided calls of the network so far."""
+        self._bound: OrderedDict[str, tuple[Bound, Bound]] = OrderedDict()
+        self._levels = levels(prior.schedule, settings.steps, spacing=settings.spacing)  # type: ignore[arg-type]
+
+    @torch.inference_mode()
+    def __call__(
+        self,
+        text: str,
+        known: Tensor,
+        frames: int,
+        draw: Draw,
+        *,
+        edits: Sequence[Correction] = (),
+        turns: Sequence[Correction] = (),
+    ) -> np.ndarray:
+        """(known + frames, 263) float64 features, not standardised, the known ones as they were.
+
+        text: what is done; known: (n, 263) features of the last frames, n may be 0; frames: how many to draw; draw: of
+        `Noise.draw`, for all frames of the window; edits: what every guess goes through, one after the other, before it
+        is made to leave the known frames without a jump; turns: the same behind that, for edits that jump nowhere.
+        """
+        prior, count = self.prior, len(known)
+        spread = torch.where(prior.std > 0, prior.std, 1.0)
+        given = torch.cat([known.to(prior.mean), prior.mean.new_zeros(frames, len(prior.mean))])[None]
+        mask = torch.zeros_like(given, dtype=torch.bool)
+        mask[:, :count] = True
+        data = (given - prior.mean) / spread
+        changed = leaving(prior, known, frames, edits=edits, turns=turns)
+        free = self._guided(text, count + frames)
+
+        def denoise(state: Tensor, level: int) -> Tensor:
+            self.calls += 1
+            return changed(inpaint(free, data, mask)(state, level)[0], level)[None]
+
+        hold = observe(data, mask, prior.schedule, draw)
+        state = hold(draw(data), self._levels[0])
+        walk = sample(
+            denoise, state, levels=self._levels, solver=SOLVERS[self.settings.solver], schedule=prior.schedule,
+            draw=draw, constrain=hold,
+        )  # fmt: skip
+        for snapshot in walk:
+            state = snapshot.state
+        return torch.where(mask, given, state * spread + prior.mean)[0].cpu().double().numpy()
+
+    def _guided(self, text: str, frames: int) -> Denoiser:
+        """The prior's guess under a text; an empty one asks for nothing in particular.
+
+        A token of the network holds several frames, and between tokens it leaves small steps: the last guess is the
+        average over all ways to divide the frames into tokens (as in `tasks.long`), which are rows of one call.
+        """
+        if text not in self._bound:
+            cond = self.prior.condition([text])
+            self._bound[text] = self.prior.net.bind(cond), self.prior.net.bind(cond.null())
+            while len(self._bound) > TEXTS:
+                self._bound.popitem(last=False)
+        self._bound.move_to_end(text)
+        net, bound, scale = self.prior.net, self._bound[text], self.settings.guidance
+        once, ways = guide(net, *bound, scale), net.config.patch
+        lengths = torch.arange(frames, frames - ways, -1, device=self.prior.mean.device)
+        own, null = (
+            Bound(*(part.repeat_interleave(ways, 0) for part in one))._replace(lengths=lengths) for one in bound
+        )
+        shifted = guide(net, own, null, scale)
+
+        def guess(state: Tensor, level: int) -> Tensor:
+            if level != self._levels[-2] or ways == 1:
+                return once(state, level)
+            rows = shifted(torch.cat([F.pad(state[:, k:], (0, 0, 0, k)) for k in range(ways)]), level)
+            total = torch.zeros_like(state)
+            for k, row in enumerate(rows):
+                total[:, k:] += row[: frames - k]
+            count = torch.arange(1, frames + 1, device=state.device).clamp(max=ways)
+            return total / count[:, None]
+
+        return guess
+
+
+def leaving(
+    prior: Prior, known: Tensor, frames: int, *, edits: Sequence[Correction], turns: Sequence[Correction]
+) -> Correction:
+    """What every guess of a window goes through: ``edits``, no jump behind what is known, ``edits`` again, ``turns``.
+
+    known: (n, 263) features, not standardised, of which ``frames`` are behind; the known ones stay as they are.
+    """
+    spread = torch.where(prior.std > 0, prior.std, 1.0)
+    given = torch.cat([known.to(prior.mean), prior.mean.new_zeros(frames, len(prior.mean))])[None]
+    mask = torch.zeros_like(given, dtype=torch.bool)
+    mask[:, : len(known)] = True
+    meet = joining(given, mask, len(known), len(known) + frames)
+    data = (given - prior.mean) / spread
+
+    def changed(guess: Tensor, level: int) -> Tensor:
+        for edit in edits:
+            guess = edit(guess, level)
+        guess = ((meet(guess[None] * spread + prior.mean) - prior.mean) / spread)[0]
+        for turn in (*edits, *turns):  # edits again: a heading bent at the border turns all that is behind it
+            guess = turn(guess, level)
+        return torch.where(mask[0], data[0], guess)
+
+    return changed

@@ -1,0 +1,25 @@
+"""The words for what somebody does who is steered and was told nothing else: plain ones, which every prior knows."""
+
+import math
+
+from motionloom.goals.goal import turn_between
+
+STANDS = "a person stands still"
+_FORWARD = (
+    (0.15, STANDS),
+    (1.9, "a person walks forward"),
+    (2.4, "a person jogs slowly"),
+    (math.inf, "a person runs forward"),
+)
+_BACKWARDS, _SIDEWAYS = "a person walks backwards", "a person walks sideways"
+
+
+def for_pace(speed: float, direction: float | None, facing: float | None) -> str:
+    """speed: metres per second; direction, facing: radians in the world, None where they are one."""
+    words = next(words for most, words in _FORWARD if speed < most)
+    if words == STANDS or direction is None or facing is None:
+        return words
+    off = abs(float(turn_between(direction, facing)))
+    if off > math.radians(130):
+        return _BACKWARDS
+    return _SIDEWAYS if off > math.radians(50) else words

@@ -1,0 +1,217 @@
+"""Live motion in frames: the same script gives the same motion, what was shown stays, commands come at once."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from motionloom.errors import MotionloomError
+from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer
+from motionloom.live.live import Frame, Live, motion_of
+from motionloom.live.settings import Settings
+from motionloom.motion import Motion
+from motionloom.weights.prior import Prior
+from tests.live import people
+from tests.live.people import QUICK
+from tests.tasks.test_edit import person
+
+WALK, RUN = "a person walks forward", "a person runs forward"
+SCRIPT: dict[int, list[Command]] = {
+    0: [Say(WALK)],
+    25: [Steer(1.0, 1.3)],
+    33: [Say(RUN), Steer(-1.0)],
+    34: [Reach("left_wrist", (0.3, 1.2, 1.0))],
+    60: [Path(((0.0, 1.0), (1.0, 2.0)))],
+}
+
+
+@pytest.fixture(scope="module")
+def prior() -> Prior:
+    return people.prior()
+
+
+@pytest.fixture(scope="module")
+def real() -> Prior:
+    """The shipped weights."""
+    return Prior.load()
+
+
+def played(live: Live, script: Mapping[int, list[Command]], count: int) -> list[Frame]:
+    frames = []
+    for number in range(count):
+        for command in script.get(number, []):
+            live.ask(command)
+        frames.append(next(live))
+    return frames
+
+
+def same(first: list[Frame], second: list[Frame]) -> bool:
+    return all(
+        np.array_equal(a.root, b.root) and np.array_equal(a.rotations, b.rotations)
+        for a, b in zip(first, second, strict=True)
+    )
+
+
+def test_the_same_seed_and_script_make_the_same_motion_and_another_seed_another(prior: Prior) -> None:
+    first, again = (played(Live(prior, seed=3, settings=QUICK), SCRIPT, 70) for _ in range(2))
+    assert same(first, again)
+    assert not same(first, played(Live(prior, seed=4, settings=QUICK), SCRIPT, 70))
+
+
+def test_frames_before_a_command_do_not_know_of_it_and_those_behind_do(prior: Prior) -> None:
+    quiet = played(Live(prior, seed=3, settings=QUICK), {0: [Say(WALK)]}, 60)
+    asked = played(Live(prior, seed=3, settings=QUICK), {0: [Say(WALK)], 30: [Steer(2.0, 1.5)]}, 60)
+    assert same(quiet[:30], asked[:30])
+    assert not same(quiet[30:34], asked[30:34])
+
+
+def test_a_frame_that_was_handed_out_is_never_changed(prior: Prior) -> None:
+    live = Live(prior, seed=1, settings=QUICK)
+    frames = played(live, {}, 20)
+    copies = [(frame.root.copy(), frame.rotations.copy()) for frame in frames]
+    played(live, {k: [Say(WALK if k % 2 else RUN)] for k in range(0, 30, 3)}, 30)
+    assert all(np.array_equal(f.root, r) and np.array_equal(f.rotations, q) for f, (r, q) in zip(frames, copies))
+
+
+def test_windows_are_drawn_where_they_must_be_and_not_more_often(prior: Prior) -> None:
+    """One at the beginning, one whenever the used frames are shown; a flood of commands makes one each ``rest``."""
+    settings = Settings(steps=2, ahead=40, used=30, rest=5)
+    live = Live(prior, seed=1, settings=settings)
+    played(live, {}, 90)
+    assert live.calls == 2 * 3
+    flood = Live(prior, seed=1, settings=settings)
+    played(flood, {k: [Steer(k * 0.01, 1.0)] * 50 for k in range(60)}, 60)
+    assert flood.calls == 2 * 60 / 5
+
+
+def test_what_was_taken_up_replays_the_session_at_any_rate_and_spacing(prior: Prior) -> None:
+    for fps in (20, 24, 10):
+        live = Live(prior, seed=5, fps=fps, settings=QUICK)
+        live.stretch(0.6)
+        made = played(live, SCRIPT, 80)
+        asked: dict[int, list[Command]] = {}
+        for frame, command in live.taken:
+            asked.setdefault(frame, []).append(command)
+        assert same(made, played(Live(prior, seed=5, fps=fps, settings=QUICK), asked, 80)), fps
+
+
+def test_faster_frames_show_the_same_poses_and_what_lies_between(prior: Prior) -> None:
+    slow = played(Live(prior, seed=2, settings=QUICK), {}, 50)
+    fast = played(Live(prior, seed=2, fps=60, settings=QUICK), {}, 148)
+    assert same(slow, fast[::3])
+    middle = (slow[10].root + slow[11].root) / 2
+    between = (fast[31].root + fast[32].root) / 2
+    np.testing.assert_allclose(between, middle, atol=1e-9)
+    assert fast[30].time == pytest.approx(slow[10].time)
+
+
+def test_somebody_goes_on_from_a_motion_in_its_place(prior: Prior) -> None:
+    start = person(2.0)
+    live = Live(prior, seed=1, start=start, settings=QUICK)
+    first = next(live)
+    step = start.root[-1] - start.root[-2]
+    assert np.linalg.norm((first.root - (start.root[-1] + step))[[0, 2]]) < 0.03
+
+
+def test_joints_never_jump_when_something_is_asked(real: Prior) -> None:
+    """Between frames nothing moves faster than in runs that nobody interrupts: 11 m/s is a foot that runs."""
+    live = Live(real, seed=2)
+    script = {0: [Say(WALK)], 31: [Say(RUN)], 66: [Say("a person stands still")], 83: [Say(WALK)], 95: [Steer(2.5)],
+              104: [Steer(-1.5, 2.0)], 131: [Say("")], 140: [Path(((0.0, 0.0),))]}  # fmt: skip
+    motion = motion_of(played(live, script, 200), 20)
+    steps = np.diff(motion.positions(), axis=0)
+    assert np.linalg.norm(steps, axis=-1).max() * 20 < 11.0
+    assert np.linalg.norm(np.diff(steps, axis=0), axis=-1).max() * 400 < 200.0
+
+
+def test_a_standing_foot_stands_on_when_something_is_asked(real: Prior) -> None:
+    live = Live(real, seed=1)
+    still = played(live, {0: [Say("a person stands still")]}, 60)
+    live.say("a person raises both arms")
+    places = motion_of([*still[-2:], *(next(live) for _ in range(10))], 20).positions()
+    toes = places[:, [10, 11]][..., [0, 2]]
+    moved = np.linalg.norm(toes[1:] - toes[:1], axis=-1).max(axis=0)
+    assert moved.min() < 0.002  # the other one may make a step
+
+
+def test_a_steered_person_goes_there_within_a_second_at_the_speed_asked(real: Prior) -> None:
+    live = Live(real, seed=1)
+    live.steer(0.0, 1.2)
+    live.take(50)
+    live.steer(np.pi / 2, 1.5)
+    live.take(20)
+    way = np.diff(live.take(41).root[::20], axis=0) * [1, 0, 1]
+    angles = np.degrees(np.arctan2(way[:, 0], way[:, 2]))
+    np.testing.assert_allclose(angles, 90, atol=8)
+    np.testing.assert_allclose(np.linalg.norm(way, axis=-1), 1.5, atol=0.15)
+
+
+def test_a_direction_alone_turns_the_way_and_leaves_the_pace_to_the_words(real: Prior) -> None:
+    def pace(motion: Motion) -> float:
+        return float(np.linalg.norm((motion.root[-1] - motion.root[0])[[0, 2]]))
+
+    live = Live(real, seed=1)
+    live.say(WALK)
+    before = pace(live.take(60).frames(39, 60))
+    live.steer(np.pi / 2)
+    live.take(24)
+    after = live.take(30)
+    way = after.root[-1] - after.root[0]
+    assert abs(np.degrees(np.arctan2(way[0], way[2])) - 90) < 15
+    assert 0.5 * before < pace(after.frames(0, 21)) < 2 * before
+
+
+def test_a_path_is_walked_to_its_end_and_there_somebody_stands(real: Prior) -> None:
+    live = Live(real, seed=4)
+    live.path([(0.5, 2.0), (2.0, 3.0)])
+    motion = live.take(180)
+    assert np.linalg.norm(motion.root[:, [0, 2]] - [0.5, 2.0], axis=-1).min() < 0.3
+    assert np.linalg.norm(motion.root[-20:, [0, 2]] - [2.0, 3.0], axis=-1).max() < 0.5
+    assert np.linalg.norm(motion.root[-1] - motion.root[-20]) < 0.1
+
+
+def test_a_wrist_reaches_its_place_in_time(real: Prior) -> None:
+    live = Live(real, seed=1)
+    live.say("a person stands still")
+    at = live.take(40).positions()[-1]
+    wanted = at[16] + [0.15, 0.1, 0.35]
+    live.reach("left_wrist", wanted, within=0.8)
+    places = live.take(22).positions()[:, 20]
+    assert np.linalg.norm(places[15:19] - wanted, axis=-1).min() < 0.06
+
+
+def test_a_pose_is_taken_where_the_person_is(real: Prior) -> None:
+    live = Live(real, seed=1)
+    live.say("a person stands still")
+    live.take(40)
+    other = Live(real, seed=9)
+    other.say("a person raises both arms")
+    wanted = other.take(40)
+    live.pose(wanted.frames(30, 31), within=0.8)
+    got = live.take(20).positions()[16]
+    want = wanted.positions()[30]
+    off = (got[[20, 21]] - got[0])[:, 1] - (want[[20, 21]] - want[0])[:, 1]
+    assert np.abs(off).max() < 0.12
+
+
+def test_what_cannot_be_asked_is_refused_in_a_sentence(prior: Prior) -> None:
+    live = Live(prior, settings=QUICK)
+    for wrong in (
+        lambda: live.say("x" * 501),
+        lambda: live.say("a person \ud800 walks"),
+        lambda: live.steer(float("nan")),
+        lambda: live.steer(0.0, 50.0),
+        lambda: live.path([]),
+        lambda: live.path([(0.0, 1e9)]),
+        lambda: live.reach("tail", (0, 0, 0)),
+        lambda: live.reach("left_wrist", (0, 9, 0)),
+        lambda: live.reach("left_wrist", (0, 1, 0), within=0.0),
+        lambda: live.pose(np.zeros((5, 3))),
+        lambda: Live(prior, seed=-1),
+        lambda: Live(prior, fps=0.0),
+        lambda: Live(prior, settings=Settings(steps=0)),
+        lambda: Live(prior, settings=Settings(used=80)),
+        lambda: Pose(((0.0, 0.0, 0.0),) * 21),
+    ):
+        with pytest.raises(MotionloomError):
+            wrong()
