@@ -15,7 +15,7 @@ import {
   segment,
   toFrame,
 } from "../project/model";
-import { freeze, freezeRest, unfrozen } from "../project/timeline";
+import { freeze, unfrozen } from "../project/timeline";
 import { type Result, motion, takeOf } from "../server/api";
 import { type App, shownClip } from "./app";
 import type { Drawer } from "./drawing";
@@ -24,18 +24,6 @@ import { NOTHING } from "./session";
 const FUTURES = 5;
 const FUTURE_SECONDS = 2;
 const SWITCH_SECONDS = 1;
-
-/** Change the words of a block. Where stretches are frozen, all but this block becomes frozen. */
-export function write(project: Project, id: string, text: string, second = false): Project {
-  const index = project.segments.findIndex((one) => one.id === id);
-  const key = second ? "other" : "text";
-  if (index < 0 || project.segments[index]![key] === text) return project;
-  const changed = {
-    ...project,
-    segments: project.segments.map((one) => (one.id === id ? { ...one, [key]: text } : one)),
-  };
-  return project.base ? freezeRest({ ...changed, base: null }, id) : changed;
-}
 
 export class Deeds {
   constructor(

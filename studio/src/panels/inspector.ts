@@ -2,7 +2,7 @@
 
 import type { Actions } from "../app/actions";
 import { type App, shownClip } from "../app/app";
-import { type Deeds, write } from "../app/deeds";
+import type { Deeds } from "../app/deeds";
 import { h, morph } from "../app/dom";
 import { NOTHING } from "../app/session";
 import { jointName } from "../body/skeleton";
@@ -10,7 +10,7 @@ import { changePoint, changeTarget, removePose, removeTarget, setPath, setSpeed 
 import { UNMET, isMeasurable, pathMiss, poseMiss, targetMiss } from "../project/misses";
 import { type Person, type Project, type Segment, begins, length, round } from "../project/model";
 import { pathLength, timed } from "../project/path";
-import { freezeRest, longestTransition, resizeSegment, setPeople, setTransition } from "../project/timeline";
+import { freezeRest, longestTransition, resizeSegment, setPeople, setTransition, write } from "../project/timeline";
 import { clipsSection, fanSection, takesSection } from "./takes";
 import { miss, numberField, section, textButton } from "./parts";
 

@@ -30,6 +30,18 @@ export function changeSegment(project: Project, id: string, part: Partial<Segmen
   return { ...project, segments: project.segments.map((one) => (one.id === id ? { ...one, ...part } : one)) };
 }
 
+/** Change the words of a block. Where stretches are frozen, all but this block becomes frozen. */
+export function write(project: Project, id: string, text: string, second = false): Project {
+  const index = project.segments.findIndex((one) => one.id === id);
+  const key = second ? "other" : "text";
+  if (index < 0 || project.segments[index]![key] === text) return project;
+  const changed = {
+    ...project,
+    segments: project.segments.map((one) => (one.id === id ? { ...one, [key]: text } : one)),
+  };
+  return project.base ? freezeRest({ ...changed, base: null }, id) : changed;
+}
+
 /** Drag the end of a segment to a time; those behind it move along. */
 export function resizeSegment(project: Project, id: string, end: number): Project {
   const index = project.segments.findIndex((one) => one.id === id);

@@ -1,7 +1,10 @@
 /** Requests to the server: a token if the page was opened with one, and errors as the library's sentence. */
 
-const CLIENT = crypto.randomUUID();
-const TOKEN = new URLSearchParams(location.search).get("token");
+import { newId } from "../project/model";
+
+/** `crypto.randomUUID` is for pages from this machine or over https alone. */
+const CLIENT = newId();
+const TOKEN = new URLSearchParams(globalThis.location?.search).get("token");
 
 /** What the server refused; `message` is its sentence. */
 export class Refused extends Error {

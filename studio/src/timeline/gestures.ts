@@ -2,9 +2,9 @@
 
 import { type App, duration } from "../app/app";
 import { changePose, changeTarget, shiftTarget } from "../project/asks";
-import { type Project, begins, clamp, length, newId, round, toFrame } from "../project/model";
+import { type Project, begins, clamp, length, newId, round } from "../project/model";
 import { halfSeconds, snap } from "../project/snap";
-import { moveSeam, moveSegment, resizeSegment, setTransition } from "../project/timeline";
+import { moveSeam, moveSegment, resizeSegment, setTransition, transitionOf } from "../project/timeline";
 import type { TimelineView } from "./view";
 
 /** Pixels within which a time catches on a mark, and that a block is moved before it is being dragged. */
@@ -46,39 +46,50 @@ export function listen(app: App, view: TimelineView, root: HTMLElement): void {
 function begin(app: App, view: TimelineView, handle: HTMLElement, event: PointerEvent): Gesture {
   const id = handle.dataset.id ?? "";
   const who = app.session.value.person;
-  const caught = (time: number, at: PointerEvent) =>
-    snap(time, marks(app), REACH / view.scale, at.altKey || !app.session.value.snapping);
-  const edits = (label: string, edit: (project: Project, time: number) => Project) => editing(app, label, caught, edit);
+  const caught = (time: number, now: PointerEvent) =>
+    snap(time, marks(app), REACH / view.scale, now.altKey || !app.session.value.snapping);
+  const at = begins(app.project.value.segments);
+  const index = app.project.value.segments.findIndex((one) => one.id === id);
+  /** An edit that follows the pointer as far from it as the edge was that it took hold of. */
+  const edits = (label: string, edge: number, edit: (project: Project, time: number) => Project) => {
+    const offset = view.timeAt(event.clientX) - edge;
+    const follow = (time: number, now: PointerEvent) => caught(time - offset, now);
+    return editing(app, label, follow, edit);
+  };
   switch (handle.dataset.drag) {
     case "ruler":
       return event.shiftKey
         ? marking(app, caught, view.timeAt(event.clientX))
         : scrubbing(app, view.timeAt(event.clientX));
     case "end":
-      return edits("change a length", (project, time) => resizeSegment(project, id, time));
+      return edits("change a length", at[index + 1]!, (project, time) => resizeSegment(project, id, time));
     case "seam":
-      return edits("move a seam", (project, time) => moveSeam(project, id, time));
+      return edits("move a seam", at[index + 1]!, (project, time) => moveSeam(project, id, time));
     case "transition": {
-      const seam = Number(handle.dataset.at);
-      return edits("change a transition", (project, time) =>
+      const seam = at[index + 1]!;
+      const edge = seam + transitionOf(app.project.value, index) / 2;
+      return edits("change a transition", edge, (project, time) =>
         setTransition(project, id, round(Math.abs(time - seam) * 2)),
       );
     }
-    case "target": {
+    case "target":
+    case "until": {
       app.session.update({ selection: { kind: "target", id }, ...jointOf(app, id) });
-      const from = app.project.value.people[who]?.targets.find((one) => one.id === id)?.time ?? 0;
-      const offset = view.timeAt(event.clientX) - from;
-      return edits("move a target", (project, time) => shiftTarget(project, who, id, toFrame(time - offset)));
-    }
-    case "until":
-      return edits("pin a target", (project, time) =>
+      const target = app.project.value.people[who]?.targets.find((one) => one.id === id);
+      if (handle.dataset.drag === "target") {
+        return edits("move a target", target?.time ?? 0, (project, time) => shiftTarget(project, who, id, time));
+      }
+      return edits("pin a target", target?.until ?? 0, (project, time) =>
         changeTarget(project, who, id, { until: clamp(time, 0, length(project)) }),
       );
-    case "pose":
+    }
+    case "pose": {
       app.session.update({ selection: { kind: "pose", id } });
-      return edits("move a pose", (project, time) =>
+      const pose = app.project.value.people[who]?.poses.find((one) => one.id === id);
+      return edits("move a pose", pose?.time ?? 0, (project, time) =>
         changePose(project, who, id, { time: clamp(time, 0, length(project)) }),
       );
+    }
     default:
       return reordering(app, view, handle, id, event.clientX);
   }

@@ -227,7 +227,7 @@ export class TimelineView {
         style: this.span(seam - half, seam + half),
         title: `Transition: ${round(half * 2)} s`,
       },
-      h("i", { "data-drag": "transition", "data-id": project.segments[index]!.id, "data-at": String(seam) }),
+      h("i", { "data-drag": "transition", "data-id": project.segments[index]!.id }),
     );
   }
 
