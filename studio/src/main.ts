@@ -77,6 +77,7 @@ async function start(): Promise<void> {
   drawer.schedule();
   app.session.update({ playing: isNew || app.project.value.takes.length > 0 });
   document.body.dataset.ready = "true";
+  performance.mark("ready");
 }
 
 /** The panels, each in its place of the page. */

@@ -1,5 +1,7 @@
 import { describe, expect, it } from "vitest";
-import { changeTarget, putPose, putTarget, shiftTarget } from "../src/project/asks";
+import { changeTarget, keepWay, needsWay, putPose, putTarget, setPath, shiftTarget } from "../src/project/asks";
+import { motionClip } from "../src/body/clip";
+import { pathPoint } from "../src/project/path";
 import { type Project, type Vec3, exampleProject, keptTake, segment } from "../src/project/model";
 import { goalOf, timelineOf } from "../src/project/goals";
 import { plan, planKey } from "../src/project/plan";
@@ -31,6 +33,24 @@ describe("targets", () => {
         },
       ],
     });
+  });
+
+  it("of one block are seen from where it begins, of several they keep the way as it is", () => {
+    const several = asking((old) => putTarget(old, 0, 21, 1, [0, 1, 0]));
+    const one = { ...several, segments: several.segments.slice(0, 1) };
+    expect(timelineOf(one).path).toBeUndefined();
+    expect(timelineOf(one).segments[0]!.goal!.joints).toHaveLength(1);
+    expect(needsWay(several)).toBe(0);
+    expect(plan(several).missing).toContain("way");
+    const walking = Float32Array.from({ length: 130 * 66 }, (_, n) =>
+      n % 66 === 2 ? Math.floor(n / 66) / 20 : n % 66 === 3 ? 1 : 0,
+    );
+    const kept = keepWay(several, 0, motionClip(20, [walking]));
+    expect(needsWay(kept)).toBe(-1);
+    const { path } = timelineOf(kept).path!;
+    expect(path!.points.at(-1)![1]).toBeCloseTo(6.45, 1);
+    expect(path!.times.at(-1)).toBe(6.5);
+    expect(new Set(path!.facing)).toEqual(new Set([0]));
   });
 
   it("that are pinned ask for every frame between", () => {
@@ -97,7 +117,7 @@ describe("what is drawn", () => {
   it("is a duet for two people, with words for each where they differ", () => {
     let project = setPeople(exampleProject(), 2);
     project = write(project, project.segments[0]!.id, "a person sits", true);
-    project = putTarget(project, 1, 21, 1, [0, 1, 0]);
+    project = setPath(project, 1, { points: [pathPoint(0, 1), pathPoint(0, 3)], speed: null, times: null });
     expect(plan(project).jobs).toMatchObject([
       { task: "duet", person: 1, timeline: { segments: [{ text: "a person walks forward :: a person sits" }, {}] } },
     ]);

@@ -48,7 +48,9 @@ class Studio:
     def put(self, project: dict[str, Any]) -> None:
         """Save a project as the page would."""
         body = json.dumps(project).encode()
-        request = urllib.request.Request(f"{self.server}/project", body, {"Content-Type": "application/json"}, method="PUT")
+        request = urllib.request.Request(
+            f"{self.server}/project", body, {"Content-Type": "application/json"}, method="PUT"
+        )
         urllib.request.urlopen(request, timeout=60).close()
 
     # -- deeds

@@ -1,11 +1,12 @@
 /** Draws again on its own: whatever changes what is asked makes a new motion, a quick one first. */
 
+import { keepWay, needsWay } from "../project/asks";
 import { type Project, keptTake } from "../project/model";
 import { type Job, type Plan, plan, planKey } from "../project/plan";
 import { type JobRequest, type Result, motion, takeOf } from "../server/api";
 import { Refused } from "../server/http";
 import { type Watcher, isAway, runJob } from "../server/jobs";
-import type { App } from "./app";
+import { type App, shownClip } from "./app";
 
 /** Network calls of a preview; the full draw takes the server's own number. */
 const PREVIEW_STEPS = 6;
@@ -31,6 +32,7 @@ export class Drawer {
   /** Bring the motion up to the project, after `delay` milliseconds. */
   schedule(delay = 0): void {
     clearTimeout(this.timer);
+    this.keepWays();
     const { value } = this.app.project;
     const { jobs, missing } = plan(value);
     const key = planKey(value);
@@ -43,6 +45,13 @@ export class Drawer {
     if (!this.app.session.value.autoDraw) return;
     performance.mark(MARKS.asked);
     this.timer = window.setTimeout(() => void this.draw(), delay);
+  }
+
+  /** Joints that are asked over several blocks need a path: the way as it is. */
+  private keepWays(): void {
+    const clip = shownClip(this.app);
+    const who = needsWay(this.app.project.value);
+    if (clip && who >= 0 && who < clip.people.length) this.app.project.amend((old) => keepWay(old, who, clip));
   }
 
   /** Draw with another seed. */

@@ -11,9 +11,15 @@ import {
   length,
   newId,
   round,
+  toFrame,
 } from "./model";
+import { type MotionClip, facingAt, jointAt } from "../body/clip";
+import { PELVIS } from "../body/skeleton";
 import { type Ground, pathPoint, simplified } from "./path";
 import { changePerson } from "./timeline";
+
+/** Seconds between the points of a way that is kept. */
+const WAY_STEP = 0.5;
 
 export function setPath(project: Project, who: number, path: Path | null): Project {
   return changePerson(project, who, (person) => (person.path === path ? person : { ...person, path }));
@@ -23,32 +29,53 @@ export function setPath(project: Project, who: number, path: Path | null): Proje
 export function drawPath(project: Project, who: number, line: readonly Ground[]): Project {
   const points = simplified(line).map(({ x, z }) => pathPoint(x, z));
   if (points.length < 2) return project;
-  return setPath(project, who, { points, speed: project.people[who]?.path?.speed ?? null });
+  return setPath(project, who, { points, speed: project.people[who]?.path?.speed ?? null, times: null });
 }
 
 /** One more point at the end; the first one makes a path that begins at `start`. */
 export function addPoint(project: Project, who: number, at: Ground, start: Ground): Project {
   const path = project.people[who]?.path ?? { points: [pathPoint(start.x, start.z)], speed: null };
-  return setPath(project, who, { ...path, points: [...path.points, pathPoint(at.x, at.z)] });
+  return setPath(project, who, { ...path, times: null, points: [...path.points, pathPoint(at.x, at.z)] });
 }
 
 export function changePoint(project: Project, who: number, index: number, part: Partial<PathPoint>): Project {
   const path = project.people[who]?.path;
   if (!path?.points[index]) return project;
   const points = path.points.map((one, n) => (n === index ? { ...one, ...part } : one));
-  return setPath(project, who, { ...path, points });
+  return setPath(project, who, { ...path, points, times: part.stop === undefined ? path.times : null });
 }
 
 export function removePoint(project: Project, who: number, index: number): Project {
   const path = project.people[who]?.path;
   if (!path?.points[index]) return project;
   const points = path.points.filter((_, n) => n !== index);
-  return setPath(project, who, points.length < 2 ? null : { ...path, points });
+  return setPath(project, who, points.length < 2 ? null : { ...path, times: null, points });
 }
 
 export function setSpeed(project: Project, who: number, speed: number | null): Project {
   const path = project.people[who]?.path;
-  return path ? setPath(project, who, { ...path, speed }) : project;
+  return path ? setPath(project, who, { ...path, speed, times: null }) : project;
+}
+
+/**
+ * Whether somebody's joints are asked for and nobody says where the person goes: over several blocks the server has to
+ * know the way to say where a joint is.
+ */
+export function needsWay(project: Project): number {
+  if (project.segments.length < 2) return -1;
+  return project.people.findIndex((one) => !one.path && (one.targets.length > 0 || one.poses.length > 0));
+}
+
+/** The way of a motion as it is, as a path with its times and facings. */
+export function keepWay(project: Project, who: number, clip: MotionClip): Project {
+  const seconds = Math.min(length(project), clip.seconds - 1 / clip.fps);
+  const count = Math.max(Math.round(seconds / WAY_STEP), 1);
+  const times = Array.from({ length: count + 1 }, (_, n) => toFrame((seconds * n) / count));
+  const points = times.map((time) => {
+    const [x, , z] = jointAt(clip, who, PELVIS, time);
+    return { ...pathPoint(x, z), facing: round(facingAt(clip, who, time)) };
+  });
+  return setPath(project, who, { points, speed: null, times });
 }
 
 /** Ask for a joint at a time: its target there moves, or a new one with this name appears. */

@@ -76,6 +76,7 @@ function person(found: unknown, name: string) {
   const path = given.path ? mapping(given.path, `${name}.path`) : null;
   return {
     path: path && {
+      times: path.times ? numbers(path.times, `${name}.path.times`, list(path.points, name, MOST_POINTS).length) : null,
       speed: path.speed == null ? null : number(path.speed, `${name}.path.speed`, 0.05, 12),
       points: list(path.points, `${name}.path.points`, MOST_POINTS).map((one, index) => {
         const at = `${name}.path.points[${index}]`;

@@ -17,6 +17,7 @@ export interface SegmentJson {
   text: string;
   seconds: number;
   transition?: number;
+  goal?: Goal;
 }
 
 export interface TimelineJson {
@@ -50,8 +51,11 @@ export function timelineOf(project: Project, seed = project.seed): TimelineJson 
       return json;
     }),
   };
-  const goal = goalOf(project.people[asked(project)]!, length(project));
-  if (goal) timeline.path = goal;
+  const person = project.people[asked(project)]!;
+  const goal = goalOf(person, length(project));
+  // Who has no path begins at the origin facing +Z, and what a first block asks is seen from there: the world.
+  if (goal && !goal.path) timeline.segments[0]!.goal = goal;
+  else if (goal) timeline.path = goal;
   return timeline;
 }
 

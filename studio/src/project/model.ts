@@ -36,6 +36,8 @@ export interface Path {
   readonly points: readonly PathPoint[];
   /** Metres per second; null: as fast as fills the time. */
   readonly speed: number | null;
+  /** When each point is reached, for a way that was walked already; null: as `speed` and stops say. */
+  readonly times: readonly number[] | null;
 }
 
 /** A joint that is asked to be somewhere. */

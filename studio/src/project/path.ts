@@ -34,8 +34,9 @@ export function apart(a: Ground, b: Ground): number {
   return Math.hypot(a.x - b.x, a.z - b.z);
 }
 
-/** When each point is reached within `seconds`; null for fewer than two different points. */
+/** When each point is reached within `seconds`, which it fills: who arrives early stays. Null for fewer than two points. */
 export function timed(path: Path, seconds: number): TimedPath | null {
+  if (path.times) return walked(path, path.times, seconds);
   const points = withoutDoubles(path.points);
   const metres = pathLength(points);
   if (points.length < 2 || metres < SHORTEST_STEP) return null;
@@ -45,19 +46,38 @@ export function timed(path: Path, seconds: number): TimedPath | null {
   const hurried = path.speed !== null && metres / path.speed > walking + 1e-6;
   const speed = path.speed === null || hurried ? metres / walking : path.speed;
 
-  const result = { points: [] as Ground[], times: [] as number[], facing: [] as (number | null)[] };
-  const add = (point: PathPoint, time: number) => {
-    result.points.push({ x: point.x, z: point.z });
-    result.times.push(round(Math.min(time, seconds)));
-    result.facing.push(point.facing);
-  };
+  const stages: Stage[] = [];
   let time = 0;
   points.forEach((point, index) => {
     if (index > 0) time += apart(points[index - 1]!, point) / speed;
-    add(point, time);
-    if (point.stop > 0) add(point, (time += point.stop * squeeze));
+    stages.push({ point, time });
+    if (point.stop > 0) stages.push({ point, time: (time += point.stop * squeeze) });
   });
-  return { ...result, speed, hurried };
+  return { ...filling(stages, seconds), speed, hurried };
+}
+
+interface Stage {
+  readonly point: PathPoint;
+  readonly time: number;
+}
+
+/** A way with times of its own. */
+function walked(path: Path, times: readonly number[], seconds: number): TimedPath | null {
+  const stages = path.points
+    .map((point, index) => ({ point, time: times[index]! }))
+    .filter(({ time }) => time <= seconds);
+  if (stages.length < 2) return null;
+  return { ...filling(stages, seconds), speed: pathLength(stages.map(({ point }) => point)) / seconds, hurried: false };
+}
+
+function filling(stages: readonly Stage[], seconds: number): Pick<TimedPath, "points" | "times" | "facing"> {
+  const last = stages.at(-1)!;
+  const all = seconds - last.time > 0.02 ? [...stages, { point: last.point, time: seconds }] : stages;
+  return {
+    points: all.map(({ point: { x, z } }) => ({ x, z })),
+    times: all.map(({ time }) => round(Math.min(time, seconds))),
+    facing: all.map(({ point }) => point.facing),
+  };
 }
 
 /** Degrees from one place to another; 0 is +Z, 90 is +X. */

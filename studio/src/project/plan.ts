@@ -1,13 +1,15 @@
 /** Which jobs of the server make a project's motion. */
 
 import { type Project, type Range, begins, length } from "./model";
-import { type TimelineJson, asked, timelineOf } from "./goals";
+import { type Goal, type TimelineJson, asked, goalOf, timelineOf } from "./goals";
+import { needsWay } from "./asks";
 import { between } from "./timeline";
 
 /** One job; where `motion` is missing in an edit, it is the result of the job before. */
 export type Job =
   | { task: "compose"; timeline: TimelineJson; seed: number; count: number }
   | { task: "duet"; timeline: TimelineJson; seed: number; count: number; person: number }
+  | { task: "duet"; prompt: string; seconds: number; goals: Goal; seed: number; count: number; person: number }
   | { task: "duet"; react_to: string; prompt: string; seed: number; count: number }
   | { task: "edit"; motion?: string; prompt: string; redraw: Range[]; seed: number; count: number };
 
@@ -18,6 +20,9 @@ export function plan(project: Project): Plan {
   if (project.base) return redraw(project);
   const empty = project.segments.findIndex((one) => !one.text.trim());
   if (empty >= 0) return { jobs: [], missing: `Block ${empty + 1} has no words yet; say what the person does.` };
+  if (needsWay(project) >= 0) {
+    return { jobs: [], missing: "Joints and poses over several blocks need the person's way; draw a path (P)." };
+  }
   const { seed, count } = project;
   const timeline = timelineOf(project);
   if (project.people.length === 1) return { jobs: [{ task: "compose", timeline, seed, count }], missing: null };
@@ -56,5 +61,9 @@ function duet(project: Project): Job {
     const prompt = project.segments.map((one) => one.other.trim() || one.text.trim()).join(", then ");
     return { task: "duet", react_to: reactTo.motion, prompt, seed, count };
   }
-  return { task: "duet", timeline: timelineOf(project), seed, count, person: asked(project) };
+  const person = asked(project);
+  const goals = goalOf(project.people[person]!, length(project));
+  const timeline = timelineOf(project);
+  if (!goals || goals.path) return { task: "duet", timeline, seed, count, person };
+  return { task: "duet", prompt: timeline.segments[0]!.text, seconds: length(project), goals, seed, count, person };
 }

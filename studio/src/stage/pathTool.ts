@@ -69,6 +69,14 @@ export class PathTool {
     this.scene.invalidate();
   }
 
+  /** Where the path's end is on the screen, for those who cannot see it. */
+  tell(): void {
+    const last = this.app.project.value.people[this.app.session.value.person]?.path?.points.at(-1);
+    const { canvas } = this.scene;
+    if (last) canvas.dataset.pathEnd = this.onScreen(last).map(Math.round).slice(0, 2).join();
+    else delete canvas.dataset.pathEnd;
+  }
+
   /** Show where on the path the person should be. */
   at(time: number): void {
     const project = this.app.project.value;
@@ -176,10 +184,15 @@ export class PathTool {
   }
 
   private isNear(event: PointerEvent, place: Ground): boolean {
+    const [x, y, depth] = this.onScreen(place);
+    return depth < 1 && Math.hypot(event.clientX - x, event.clientY - y) < GRAB;
+  }
+
+  /** Pixels of the window, and the depth from -1 to 1. */
+  private onScreen(place: Ground): [number, number, number] {
     const box = this.scene.canvas.getBoundingClientRect();
     const at = new THREE.Vector3(place.x, HEIGHT, place.z).project(this.scene.camera);
-    const [x, y] = [box.left + ((at.x + 1) / 2) * box.width, box.top + ((1 - at.y) / 2) * box.height];
-    return at.z < 1 && Math.hypot(event.clientX - x, event.clientY - y) < GRAB;
+    return [box.left + ((at.x + 1) / 2) * box.width, box.top + ((1 - at.y) / 2) * box.height, at.z];
   }
 
   /** Only the chosen point and those with a facing of their own show a handle. */

@@ -8,6 +8,7 @@ import type { StageTheme } from "./theme";
 /** Frames slower than this for a while make the picture coarser. */
 const SLOW = 45;
 const PATIENCE = 12;
+const COARSEST = 0.5;
 
 export class Scene {
   readonly scene = new THREE.Scene();
@@ -19,10 +20,14 @@ export class Scene {
   private readonly sun: THREE.DirectionalLight;
   private dirty = true;
   private slow = 0;
+  private readonly fine = Math.min(devicePixelRatio, 2);
+  private coarse = this.fine;
   private last = 0;
 
   /** Called for each frame with the milliseconds since the last one; true: draw. */
   step: (elapsed: number) => boolean = () => false;
+  /** Called behind each picture. */
+  painted: () => void = () => undefined;
   /** Called instead of a plain draw, where the picture is divided. */
   paint: (() => void) | null = null;
 
@@ -31,7 +36,7 @@ export class Scene {
     theme: StageTheme,
   ) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setPixelRatio(this.fine);
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     this.renderer.toneMapping = THREE.NeutralToneMapping;
@@ -100,7 +105,7 @@ export class Scene {
 
   private frame(now: number): void {
     requestAnimationFrame((next) => this.frame(next));
-    const elapsed = Math.min(now - this.last, 100);
+    const elapsed = Math.min(now - this.last, 250);
     this.last = now;
     const moved = this.step(elapsed);
     this.orbit.update();
@@ -109,25 +114,28 @@ export class Scene {
       return;
     }
     this.dirty = false;
+    this.sharpness(moved ? this.coarse : this.fine);
     if (this.paint) this.paint();
     else this.renderer.render(this.scene, this.camera);
+    this.painted();
     this.adapt(elapsed, moved);
   }
 
-  /** Without a GPU fewer pixels and smaller shadows keep the motion in real time. */
+  /** Without a GPU fewer pixels keep the motion in real time; what does not move is drawn sharp. */
   private adapt(elapsed: number, moved: boolean): void {
     this.slow = moved && elapsed > SLOW ? this.slow + 1 : 0;
     if (this.slow < PATIENCE) return;
     this.slow = 0;
-    const ratio = this.renderer.getPixelRatio();
-    if (this.sun.shadow.mapSize.x > 512) {
-      this.sun.shadow.mapSize.set(512, 512);
-      this.sun.shadow.map?.dispose();
-      this.sun.shadow.map = null;
-    } else if (ratio > 0.6) {
-      this.renderer.setPixelRatio(Math.max(ratio * 0.75, 0.6));
-      this.resize();
-    }
+    this.coarse = Math.max(this.coarse * 0.75, COARSEST);
+    this.sun.shadow.mapSize.set(512, 512);
+    this.sun.shadow.map?.dispose();
+    this.sun.shadow.map = null;
+  }
+
+  private sharpness(ratio: number): void {
+    if (this.renderer.getPixelRatio() === ratio) return;
+    this.renderer.setPixelRatio(ratio);
+    this.resize();
   }
 
   private resize(): void {

@@ -32,6 +32,7 @@ export class Stage {
     this.path = new PathTool(app, this.scene, theme);
     this.targets = new TargetTool(app, this.scene, this.cast, theme);
     this.scene.step = (elapsed) => this.step(elapsed);
+    this.scene.painted = () => this.path.tell();
     this.listen(canvas);
     app.project.subscribe(() => this.update());
     app.session.subscribe((now, before) => this.changed(now, before));
@@ -114,7 +115,7 @@ export class Stage {
   /** One frame of real time. */
   private step(elapsed: number): boolean {
     const { session } = this.app;
-    const { playing, rate, time, repeat, follow, drawing } = session.value;
+    const { playing, rate, time, repeat, follow } = session.value;
     const clip = this.app.denoising.value ?? shownClip(this.app);
     if (playing) {
       const end = duration(this.app);
@@ -133,7 +134,7 @@ export class Stage {
       );
       if (before.distanceToSquared(this.scene.orbit.target) > 1e-7) return true;
     }
-    return playing || drawing !== null;
+    return playing;
   }
 
   /** Every take in a part of the picture of its own. */
