@@ -32,8 +32,15 @@ demo: $(VENV)/.runtime  ## install, run the main job on the shipped weights, wri
 	@echo && echo "Written to $(CURDIR)/out:" && ls -l $(foreach s,$(SUFFIXES),out/demo.$(s))
 	@echo "Open demo.bvh or demo.glb in Blender (File > Import), demo.mp4 in any player."
 
-studio: $(VENV)/.runtime $(PAGE)  ## open the studio in the browser; builds its page first if that is needed
+studio: $(VENV)/.studio $(PAGE)  ## open the studio in the browser; builds its page first if that is needed
 	$(BIN)/motionloom studio
+
+# What the server needs beside the runtime, out of the whole list.
+SERVER_PACKAGES := starlette uvicorn anyio idna click h11 typing-extensions
+$(VENV)/.studio: $(VENV)/.runtime constraints.txt
+	@for one in $(SERVER_PACKAGES); do sed -n "/^$$one==/,/[^\\]$$/p" constraints.txt; done > $(VENV)/studio.txt
+	@$(LOCKED) $(VENV)/studio.txt
+	@touch $@
 
 page: $(PAGE)  ## build the studio's page, without a Node of your own
 

@@ -20,6 +20,9 @@ const MOTIONS = [".bvh", ".amc", ".npz", ".glb", ".asf"];
 const GLB_MAGIC = 0x46546c67;
 
 export class Files {
+  /** The skeleton that came last, for AMC files. */
+  private asf: string | null = null;
+
   constructor(
     private readonly app: App,
     private readonly deeds: Deeds,
@@ -27,7 +30,8 @@ export class Files {
 
   /** Whatever was dropped: motions, characters, timelines, projects. */
   async open(files: readonly File[]): Promise<void> {
-    for (const file of files) {
+    // A skeleton goes before the motions that need it.
+    for (const file of [...files].sort((a, b) => Number(isAsf(b)) - Number(isAsf(a)))) {
       await this.said(file.name, () => this.openOne(file));
     }
   }
@@ -42,10 +46,11 @@ export class Files {
       const take = keptTake(value);
       if (!take) throw new Error("there is no motion yet; write what the person does and wait for it to be drawn.");
       const skeleton = format === "bvh" || format === "glb" ? value.character?.id : undefined;
-      const people = take.people > 1 && (format === "bvh" || format === "npz") ? [1, 2] : [undefined];
+      const onePerson = format === "bvh" || format === "npz" || (format === "glb" && skeleton !== undefined);
+      const people = take.people > 1 && onePerson ? [0, 1] : [undefined];
       for (const person of people) {
         const blob = await bytes(motionFile(take.motion, format, { skeleton, person }));
-        download(blob, `${name}${person ? `_${person}` : ""}.${format}`);
+        download(blob, `${name}${person === undefined ? "" : `_${person + 1}`}.${format}`);
       }
     });
   }
@@ -62,6 +67,10 @@ export class Files {
     if (name.endsWith(".json")) return this.replace(read(await file.text()), file.name);
     if (name.endsWith(".yaml") || name.endsWith(".yml")) return this.openTimeline(file);
     if (name.endsWith(".vrm")) return this.character(file);
+    if (isAsf(file)) {
+      this.asf = (await uploadMotion(file)).id;
+      return;
+    }
     if (!MOTIONS.some((suffix) => name.endsWith(suffix))) {
       throw new Error(`this page opens ${MOTIONS.join(" ")} .vrm .yaml and ${SUFFIX} files.`);
     }
@@ -69,7 +78,7 @@ export class Files {
       ? await glbContents(file)
       : { hasMotion: true, hasBody: false };
     if (hasBody) await this.character(file);
-    if (hasMotion) this.deeds.addClip(await uploadMotion(file), file.name);
+    if (hasMotion) this.deeds.addClip(await uploadMotion(file, name.endsWith(".amc") ? this.asf : null), file.name);
   }
 
   private async character(file: File): Promise<void> {
@@ -117,6 +126,10 @@ export class Files {
       this.app.session.update({ error: message.startsWith(what) ? message : `${what}: ${message}` });
     }
   }
+}
+
+function isAsf(file: File): boolean {
+  return file.name.toLowerCase().endsWith(".asf");
 }
 
 export function download(blob: Blob, name: string): void {

@@ -78,8 +78,10 @@ export function motionFile(id: string, format: Format, options: { skeleton?: str
   return `motions/${encodeURIComponent(id)}.${format}${query.size ? `?${query}` : ""}`;
 }
 
-export async function uploadMotion(file: File): Promise<Result> {
-  return getJson(`motions?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
+/** `asf`: the id of the skeleton that an AMC file needs. */
+export async function uploadMotion(file: File, asf: string | null = null): Promise<Result> {
+  const query = new URLSearchParams({ name: file.name, ...(asf ? { asf } : {}) });
+  return getJson(`motions?${query}`, { method: "POST", body: file });
 }
 
 export async function uploadCharacter(file: File): Promise<{ id: string }> {

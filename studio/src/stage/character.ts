@@ -43,7 +43,7 @@ export class Character {
     try {
       const numbers = Array.from({ length: people }, (_, person) => person);
       const actors = await Promise.all(
-        numbers.map((person) => this.actor(motion, character, people > 1 ? person + 1 : undefined)),
+        numbers.map((person) => this.actor(motion, character, people > 1 ? person : undefined)),
       );
       if (key !== this.key) return;
       this.actors = actors;
