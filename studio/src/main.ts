@@ -7,6 +7,7 @@ import "./style/timeline.css";
 import { type Parts, actions, keyOf, nudged } from "./app/actions";
 import type { App } from "./app/app";
 import { Deeds } from "./app/deeds";
+import { h } from "./app/dom";
 import { Drawer } from "./app/drawing";
 import { Files } from "./app/files";
 import { Saver, restored } from "./app/saving";
@@ -130,4 +131,8 @@ function numbered(event: KeyboardEvent, { app, deeds }: Parts): boolean {
   return true;
 }
 
-void start();
+start().catch((error: Error) => {
+  part("notices").replaceChildren(
+    h("p", { class: "notice", role: "alert" }, `The page cannot start: ${error.message}`),
+  );
+});

@@ -42,7 +42,6 @@ export class Drawer {
       return;
     }
     if (key === this.key && this.running) return;
-    if (!this.app.session.value.autoDraw) return;
     performance.mark(MARKS.asked);
     this.timer = window.setTimeout(() => void this.draw(), delay);
   }

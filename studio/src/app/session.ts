@@ -44,7 +44,6 @@ export interface Session {
   readonly trails: boolean;
   readonly sideBySide: boolean;
   readonly snapping: boolean;
-  readonly autoDraw: boolean;
   readonly help: boolean;
   readonly drawing: Drawing | null;
   readonly fan: Fan | null;
@@ -74,7 +73,6 @@ export function newSession(): Signal<Session> {
     trails: false,
     sideBySide: false,
     snapping: true,
-    autoDraw: true,
     help: false,
     drawing: null,
     fan: null,

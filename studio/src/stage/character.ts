@@ -33,10 +33,13 @@ export class Character {
     if (character && take) void this.load(key, take.motion, character.id, take.people);
   }
 
-  /** Put the character where it is at a time; false: there is none yet. */
-  at(time: number): boolean {
-    for (const { mixer, seconds } of this.actors) mixer.setTime(Math.min(time, seconds - 1e-3));
-    return this.actors.length > 0;
+  /** Put the character where it is at a time, or hide it; false: it is not to be seen. */
+  at(time: number, isShown: boolean): boolean {
+    for (const { root, mixer, seconds } of this.actors) {
+      root.visible = isShown;
+      if (isShown) mixer.setTime(Math.min(time, seconds - 1e-3));
+    }
+    return isShown && this.actors.length > 0;
   }
 
   private async load(key: string, motion: string, character: string, people: number): Promise<void> {

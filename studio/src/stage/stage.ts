@@ -68,6 +68,7 @@ export class Stage {
     if (now.tool !== before.tool) this.buttons();
     const kept = [
       "clips",
+      "drawing",
       "tool",
       "person",
       "joint",
@@ -91,10 +92,12 @@ export class Stage {
 
   /** Everybody where they are at the playhead. */
   private place(): void {
-    const { time, fan } = this.app.session.value;
+    const { time, fan, sideBySide, drawing } = this.app.session.value;
     const clip = this.app.denoising.value ?? shownClip(this.app);
-    const dressed = this.app.denoising.value === null && this.character.at(time);
-    this.cast.show(clip, time, dressed || (fan !== null && time > fan.past));
+    const isFuture = fan !== null && time > fan.past;
+    // A character has the kept take's motion; what is being drawn is shown by the mannequin.
+    const dressed = this.character.at(time, !sideBySide && !isFuture && drawing === null);
+    this.cast.show(clip, time, dressed || isFuture);
     this.cast.showGhosts(this.ghosts(), time);
     this.path.at(time);
     this.targets.update();
