@@ -30,7 +30,8 @@ def test_one_clip_dragged_onto_another_goes_over_into_it(studio: Studio):
     studio.drawn()
     studio.key("w")
     assert len(studio.project()["clips"]) == 2
-    studio.page.locator(".clip").nth(0).drag_to(studio.page.locator(".clip").nth(1))
+    studio.page.locator(".clip").nth(1).scroll_into_view_if_needed()
+    studio.drag(studio.middle(".clip b"), studio.middle(".clip b", 1))
     project = studio.project()
     assert project["takes"][0]["how"] == "switched"
     assert abs(project["takes"][0]["seconds"] - 5.0) < 0.2

@@ -55,7 +55,7 @@ function words(app: App, project: Project): HTMLElement {
       h(
         "p",
         { class: "quiet" },
-        `${project.segments.length} blocks, ${length(project).toFixed(2)} s. Select a block to change its words.`,
+        `${project.segments.length === 1 ? "One block" : `${project.segments.length} blocks`}, ${length(project).toFixed(2)} s. Select a block to change its words.`,
       ),
       h(
         "div",

@@ -55,7 +55,7 @@ export class Stage {
     const away = camera.position.clone().sub(orbit.target);
     const above = away.y > away.length() * 0.95;
     if (above) camera.position.copy(orbit.target).add(new THREE.Vector3(3.1, 1.1, 3.5));
-    else camera.position.copy(orbit.target).add(new THREE.Vector3(0, Math.max(away.length(), 7), -0.02));
+    else camera.position.copy(orbit.target).add(new THREE.Vector3(0, Math.max(away.length(), 7), 0.02));
     this.scene.invalidate();
   }
 
