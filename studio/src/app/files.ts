@@ -1,0 +1,163 @@
+/** Files that are dropped or chosen, and files that are written. */
+
+import { SUFFIX, checked, read, written } from "../project/file";
+import { timelineOf } from "../project/goals";
+import { type Project, exampleProject, keptTake, newId } from "../project/model";
+import {
+  type Format,
+  bytes,
+  motionFile,
+  timelineJson,
+  timelineYaml,
+  uploadCharacter,
+  uploadMotion,
+} from "../server/api";
+import { isAway } from "../server/jobs";
+import type { App } from "./app";
+import type { Deeds } from "./deeds";
+
+const MOTIONS = [".bvh", ".amc", ".npz", ".glb", ".asf"];
+const GLB_MAGIC = 0x46546c67;
+
+export class Files {
+  /** The skeleton that came last, for AMC files. */
+  private asf: string | null = null;
+
+  constructor(
+    private readonly app: App,
+    private readonly deeds: Deeds,
+  ) {}
+
+  /** Whatever was dropped: motions, characters, timelines, projects. */
+  async open(files: readonly File[]): Promise<void> {
+    // A skeleton goes before the motions that need it.
+    for (const file of [...files].sort((a, b) => Number(isAsf(b)) - Number(isAsf(a)))) {
+      await this.said(file.name, () => this.openOne(file));
+    }
+  }
+
+  async export(format: Format | "yaml" | "project"): Promise<void> {
+    const { value } = this.app.project;
+    const name = fileName(value.name);
+    await this.said("Export", async () => {
+      if (format === "project")
+        return download(new Blob([written(value)], { type: "application/json" }), name + SUFFIX);
+      if (format === "yaml") return this.exportYaml(value, name);
+      const take = keptTake(value);
+      if (!take) throw new Error("there is no motion yet; write what the person does and wait for it to be drawn.");
+      const skeleton = format === "bvh" || format === "glb" ? value.character?.id : undefined;
+      const onePerson = format === "bvh" || format === "npz" || (format === "glb" && skeleton !== undefined);
+      const people = take.people > 1 && onePerson ? [0, 1] : [undefined];
+      for (const person of people) {
+        const blob = await bytes(motionFile(take.motion, format, { skeleton, person }));
+        download(blob, `${name}${person === undefined ? "" : `_${person + 1}`}.${format}`);
+      }
+    });
+  }
+
+  private async exportYaml(project: Project, name: string): Promise<void> {
+    if (project.base)
+      throw new Error("frozen stretches are not in a timeline file; unfreeze them, or export the motion itself.");
+    const blob = await timelineYaml(timelineOf(project, keptTake(project)?.seed ?? project.seed));
+    download(blob, `${name}.yaml`);
+  }
+
+  private async openOne(file: File): Promise<void> {
+    const name = file.name.toLowerCase();
+    if (name.endsWith(".json")) return this.replace(read(await file.text()), file.name);
+    if (name.endsWith(".yaml") || name.endsWith(".yml")) return this.openTimeline(file);
+    if (name.endsWith(".vrm")) return this.character(file);
+    if (isAsf(file)) {
+      this.asf = (await uploadMotion(file)).id;
+      return;
+    }
+    if (!MOTIONS.some((suffix) => name.endsWith(suffix))) {
+      throw new Error(`this page opens ${MOTIONS.join(" ")} .vrm .yaml and ${SUFFIX} files.`);
+    }
+    const { hasMotion, hasBody } = name.endsWith(".glb")
+      ? await glbContents(file)
+      : { hasMotion: true, hasBody: false };
+    if (hasBody) await this.character(file);
+    if (hasMotion) this.deeds.addClip(await uploadMotion(file, name.endsWith(".amc") ? this.asf : null), file.name);
+  }
+
+  private async character(file: File): Promise<void> {
+    const { id } = await uploadCharacter(file);
+    this.app.project.change(`use ${file.name}`, (old) => ({ ...old, character: { id, name: file.name } }));
+  }
+
+  private async openTimeline(file: File): Promise<void> {
+    const found = (await timelineJson(file)) as {
+      seed?: number;
+      segments: (string | { text: string; seconds?: number; transition?: number })[];
+    };
+    const segments = found.segments.map((one) => {
+      const { text, seconds = 5, transition = null } = typeof one === "string" ? { text: one } : one;
+      const [first, second = ""] = text.split("::").map((part) => part.trim());
+      return { id: newId(), text: first!, other: second, seconds, transition };
+    });
+    const two = segments.some((one) => one.other);
+    const nothing = exampleProject().people[0]!;
+    const people = two ? [nothing, nothing] : [nothing];
+    this.replace(
+      checked({
+        ...exampleProject(),
+        name: file.name.replace(/\.ya?ml$/i, ""),
+        seed: found.seed ?? 0,
+        segments,
+        people,
+      }),
+      file.name,
+    );
+  }
+
+  private replace(project: Project, name: string): void {
+    this.app.session.update({ time: 0, selection: { kind: "none" }, fan: null, range: null });
+    this.app.project.change(`open ${name}`, () => project);
+  }
+
+  private async said(what: string, deed: () => Promise<void>): Promise<void> {
+    try {
+      this.app.session.update({ error: null });
+      await deed();
+    } catch (error) {
+      if (isAway(error)) this.app.session.update({ connected: false });
+      const { message } = error as Error;
+      this.app.session.update({ error: message.startsWith(what) ? message : `${what}: ${message}` });
+    }
+  }
+}
+
+function isAsf(file: File): boolean {
+  return file.name.toLowerCase().endsWith(".asf");
+}
+
+export function download(blob: Blob, name: string): void {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 30_000);
+}
+
+/** Whether a GLB moves, and whether it has a skin. */
+async function glbContents(file: File): Promise<{ hasMotion: boolean; hasBody: boolean }> {
+  const head = new DataView(await file.slice(0, 20).arrayBuffer());
+  if (head.byteLength < 20 || head.getUint32(0, true) !== GLB_MAGIC)
+    throw new Error("it is no GLB file; its first bytes are not 'glTF'.");
+  const text = await file.slice(20, 20 + head.getUint32(12, true)).text();
+  const found = JSON.parse(text) as { animations?: unknown[]; skins?: unknown[]; meshes?: unknown[] };
+  return {
+    hasMotion: Boolean(found.animations?.length),
+    hasBody: Boolean(found.skins?.length && found.meshes?.length),
+  };
+}
+
+function fileName(name: string): string {
+  return (
+    name
+      .trim()
+      .replaceAll(/[^\p{L}\p{N}_-]+/gu, "_")
+      .slice(0, 60) || "motion"
+  );
+}

@@ -1,0 +1,84 @@
+/** What the page shows at the moment: nothing of it is undone, and nothing of it is in the project file. */
+
+import type { MotionClip } from "../body/clip";
+import type { Range } from "../project/model";
+import { Signal } from "./signal";
+
+export type Tool = "select" | "path" | "target";
+
+export type Selection =
+  | { readonly kind: "none" }
+  | { readonly kind: "segment"; readonly id: string }
+  | { readonly kind: "target"; readonly id: string }
+  | { readonly kind: "pose"; readonly id: string }
+  | { readonly kind: "point"; readonly index: number };
+
+/** How far a draw is; null where none is under way. */
+export interface Drawing {
+  readonly done: number;
+  readonly of: number;
+  readonly preview: boolean;
+}
+
+/** Futures to choose from. */
+export interface Fan {
+  readonly clips: readonly MotionClip[];
+  readonly motions: readonly string[];
+  readonly past: number;
+}
+
+export interface Session {
+  readonly time: number;
+  readonly playing: boolean;
+  readonly repeat: boolean;
+  readonly rate: number;
+  readonly tool: Tool;
+  /** Whose path, targets and poses are edited: 0 or 1. */
+  readonly person: number;
+  readonly joint: number;
+  readonly selection: Selection;
+  /** A stretch that is marked on the ruler. */
+  readonly range: Range | null;
+  readonly follow: boolean;
+  readonly ghosts: boolean;
+  readonly trails: boolean;
+  readonly sideBySide: boolean;
+  readonly snapping: boolean;
+  readonly help: boolean;
+  readonly drawing: Drawing | null;
+  readonly fan: Fan | null;
+  /** The clips of the project's takes, as far as they are here. */
+  readonly clips: readonly MotionClip[];
+  /** The server's sentence about the last draw. */
+  readonly error: string | null;
+  readonly connected: boolean;
+  readonly saved: "saved" | "saving" | "here";
+}
+
+export const NOTHING: Selection = { kind: "none" };
+
+export function newSession(): Signal<Session> {
+  return new Signal<Session>({
+    time: 0,
+    playing: false,
+    repeat: true,
+    rate: 1,
+    tool: "select",
+    person: 0,
+    joint: 21,
+    selection: NOTHING,
+    range: null,
+    follow: true,
+    ghosts: true,
+    trails: false,
+    sideBySide: false,
+    snapping: true,
+    help: false,
+    drawing: null,
+    fan: null,
+    clips: [],
+    error: null,
+    connected: true,
+    saved: "saved",
+  });
+}

@@ -1,0 +1,56 @@
+/** A motion in the page: places of 22 joints for each person and frame. */
+
+import type { Vec3 } from "../project/model";
+import { COUNT, LEFT_HIP, RIGHT_HIP } from "./skeleton";
+
+/** Numbers of one pose. */
+export const POSE = COUNT * 3;
+
+export interface MotionClip {
+  readonly fps: number;
+  readonly frames: number;
+  readonly seconds: number;
+  /** For each person (frames * 22 * 3) metres. */
+  readonly people: readonly Float32Array[];
+}
+
+export function motionClip(fps: number, people: readonly Float32Array[]): MotionClip {
+  const frames = Math.floor((people[0]?.length ?? 0) / POSE);
+  return { fps, frames, seconds: frames / fps, people };
+}
+
+/** Write the pose at a time into `out`; between frames it is mixed, beyond the ends it is the first or last one. */
+export function poseAt(clip: MotionClip, person: number, time: number, out: Float32Array): Float32Array {
+  const data = clip.people[Math.min(person, clip.people.length - 1)]!;
+  const at = Math.min(Math.max(time * clip.fps, 0), clip.frames - 1);
+  const [first, part] = [Math.floor(at), at % 1];
+  const [a, b] = [first * POSE, Math.min(first + 1, clip.frames - 1) * POSE];
+  for (let n = 0; n < POSE; n += 1) out[n] = data[a + n]! + (data[b + n]! - data[a + n]!) * part;
+  return out;
+}
+
+/** Where a joint is at the frame nearest to a time. */
+export function jointAt(clip: MotionClip, person: number, joint: number, time: number): Vec3 {
+  const data = clip.people[Math.min(person, clip.people.length - 1)]!;
+  const frame = Math.min(Math.max(Math.round(time * clip.fps), 0), clip.frames - 1);
+  const at = frame * POSE + joint * 3;
+  return [data[at]!, data[at + 1]!, data[at + 2]!];
+}
+
+export function vec(pose: ArrayLike<number>, joint: number): Vec3 {
+  return [pose[joint * 3]!, pose[joint * 3 + 1]!, pose[joint * 3 + 2]!];
+}
+
+/** The 22 places of a pose as they stand in a project. */
+export function places(pose: ArrayLike<number>): Vec3[] {
+  return Array.from({ length: COUNT }, (_, joint) => {
+    const [x, y, z] = vec(pose, joint);
+    return [Math.round(x * 1000) / 1000, Math.round(y * 1000) / 1000, Math.round(z * 1000) / 1000] as const;
+  });
+}
+
+/** Degrees that somebody faces at a time, by the hips; 0 is +Z and 90 is +X. */
+export function facingAt(clip: MotionClip, person: number, time: number): number {
+  const [left, right] = [jointAt(clip, person, LEFT_HIP, time), jointAt(clip, person, RIGHT_HIP, time)];
+  return (Math.atan2(right[2] - left[2], left[0] - right[0]) * 180) / Math.PI;
+}

@@ -1,0 +1,138 @@
+/** Puts the page together. */
+
+import "./style/base.css";
+import "./style/help.css";
+import "./style/panels.css";
+import "./style/timeline.css";
+import { type Parts, actions, keyOf, nudged } from "./app/actions";
+import type { App } from "./app/app";
+import { Deeds } from "./app/deeds";
+import { h } from "./app/dom";
+import { Drawer } from "./app/drawing";
+import { Files } from "./app/files";
+import { Saver, restored } from "./app/saving";
+import { newSession } from "./app/session";
+import { Signal } from "./app/signal";
+import type { MotionClip } from "./body/clip";
+import { stageBar, topBar, transport } from "./panels/bars";
+import { inspector } from "./panels/inspector";
+import { drops, help, notices, takeNames } from "./panels/overlays";
+import { History } from "./project/history";
+import { addSegment, write } from "./project/timeline";
+import { Stage } from "./stage/stage";
+import { listen } from "./timeline/gestures";
+import { TimelineView } from "./timeline/view";
+
+const THEME = "motionloom-theme";
+
+function part<T extends HTMLElement = HTMLElement>(id: string): T {
+  return document.getElementById(id) as T;
+}
+
+function isDark(): boolean {
+  return document.documentElement.dataset.theme === "dark";
+}
+
+function setTheme(name: string): void {
+  document.documentElement.dataset.theme = name;
+}
+
+async function start(): Promise<void> {
+  setTheme(localStorage.getItem(THEME) ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
+  const { project, isNew } = await restored();
+  const app: App = {
+    project: new History(project),
+    session: newSession(),
+    denoising: new Signal<MotionClip | null>(null),
+  };
+  const stage = new Stage(app, part<HTMLCanvasElement>("canvas"), isDark());
+  const drawer = new Drawer(app);
+  const deeds = new Deeds(app, drawer);
+  const files = new Files(app, deeds);
+  new Saver(app, () => {
+    drawer.loadTakes();
+    drawer.schedule();
+  });
+  const timeline = new TimelineView(app, part("tracks"), {
+    write: (id, text, second) =>
+      app.project.change("write", (old) => write(old, id, text, second), { merge: `text:${id}${second}`, typed: true }),
+    written: () => drawer.schedule(),
+  });
+  const parts: Parts = {
+    app,
+    drawer,
+    deeds,
+    files,
+    stage,
+    choose: drops(files, document.body),
+    editWords: (id) => timeline.edit(id),
+    zoom: (factor) => timeline.zoom(factor),
+    toggleTheme: () => {
+      setTheme(isDark() ? "light" : "dark");
+      localStorage.setItem(THEME, isDark() ? "dark" : "light");
+      stage.look(isDark());
+    },
+  };
+  show(parts, timeline);
+  drawer.loadTakes();
+  drawer.schedule();
+  app.session.update({ playing: isNew || app.project.value.takes.length > 0 });
+  document.body.dataset.ready = "true";
+  performance.mark("ready");
+}
+
+/** The panels, each in its place of the page. */
+function show(parts: Parts, timeline: TimelineView): void {
+  const { app, drawer, deeds, files } = parts;
+  const all = actions(parts);
+  topBar(app, all, files, part("top"));
+  stageBar(app, all, part("tools"), part("views"));
+  transport(app, all, part("transport"));
+  inspector(app, all, deeds, part("inspector"));
+  notices(app, () => drawer.schedule(), part("notices"));
+  takeNames(app, part("names"));
+  help(app, all, part<HTMLDialogElement>("help"));
+  listen(app, timeline, part("tracks"));
+  part("tracks").addEventListener("click", (event) => {
+    if (!(event.target as Element).closest("[data-act=add]")) return;
+    app.project.change("add a block", (old) => addSegment(old));
+    timeline.edit(app.project.value.segments.at(-1)!.id);
+  });
+  const byKey = new Map(Object.values(all).flatMap((action) => action.keys.map((key) => [key, action] as const)));
+  addEventListener("keydown", (event) => {
+    if (isTyping(event)) return;
+    if (numbered(event, parts)) return;
+    const action = byKey.get(keyOf(event));
+    const isButton = event.target instanceof HTMLElement && event.target.matches("button, summary");
+    if (isButton && (event.key === "Enter" || event.key === " ")) return;
+    if (nudged(event, parts)) return event.preventDefault();
+    if (!action) return;
+    event.preventDefault();
+    action.run();
+  });
+}
+
+/** Keys belong to the field that is written in, but for undo and whatever else goes with Ctrl and is no editing. */
+function isTyping(event: KeyboardEvent): boolean {
+  const { target } = event;
+  if (!(target instanceof HTMLElement) || !target.matches("input, textarea, select")) return false;
+  return !(event.ctrlKey || event.metaKey) || "acvx".includes(event.key.toLowerCase());
+}
+
+/** A number chooses a future or keeps a take. */
+function numbered(event: KeyboardEvent, { app, deeds }: Parts): boolean {
+  const index = Number(event.key) - 1;
+  if (!/^[1-9]$/.test(event.key) || event.ctrlKey || event.altKey || event.metaKey) return false;
+  const { fan, clips } = app.session.value;
+  if (fan) deeds.chooseFuture(index);
+  else if (clips.length > 1 && index < clips.length)
+    app.project.change(`keep take ${index + 1}`, (old) => (old.kept === index ? old : { ...old, kept: index }));
+  else return false;
+  return true;
+}
+
+start().catch((error: Error) => {
+  part("notices").replaceChildren(
+    h("p", { class: "notice", role: "alert" }, `The page cannot start: ${error.message}`),
+  );
+});

@@ -1,0 +1,197 @@
+/** The bar at the top, the tools on the stage, and the transport over the timeline. */
+
+import type { Actions } from "../app/actions";
+import { type App, duration } from "../app/app";
+import { h, morph } from "../app/dom";
+import type { Files } from "../app/files";
+import { begins } from "../project/model";
+import { iconButton, textButton } from "./parts";
+
+const EXPORTS = [
+  ["bvh", "BVH", "Motion on the 22 joints, or on your character"],
+  ["glb", "GLB", "For Blender, Godot and the web; on your character if there is one"],
+  ["mp4", "MP4", "A film"],
+  ["png", "PNG", "A sheet of poses"],
+  ["npz", "NPZ", "Numbers for Python"],
+  ["yaml", "Timeline (YAML)", "What the command line runs to the same motion"],
+  ["project", "Project file", "Everything on this page"],
+] as const;
+
+export function topBar(app: App, actions: Actions, files: Files, root: HTMLElement): void {
+  const render = () => {
+    const { value, undoLabel, redoLabel } = app.project;
+    const { connected, saved, drawing } = app.session.value;
+    const state = !connected
+      ? "server away"
+      : drawing
+        ? drawing.preview
+          ? "drawing a preview"
+          : "drawing"
+        : { saved: "saved", saving: "saving", here: "kept in this browser" }[saved];
+    morph(root, [
+      h("strong", { class: "brand" }, "motionloom"),
+      h("input", {
+        class: "name",
+        value: value.name,
+        "aria-label": "Name of the project",
+        spellcheck: "false",
+        maxlength: "80",
+        oninput: (event: Event) =>
+          app.project.change("rename", (old) => ({ ...old, name: (event.target as HTMLInputElement).value }), {
+            merge: "name",
+            typed: true,
+          }),
+      }),
+      iconButton(actions.undo!, "undo", {
+        disabled: undoLabel === null,
+        title: undoLabel === null ? "Undo" : `Undo: ${undoLabel}`,
+      }),
+      iconButton(actions.redo!, "redo", {
+        disabled: redoLabel === null,
+        title: redoLabel === null ? "Redo" : `Redo: ${redoLabel}`,
+      }),
+      h("span", { class: "grow" }),
+      h("span", { class: `state${connected ? "" : " away"}`, role: "status" }, state),
+      h("progress", {
+        class: drawing ? "" : "idle",
+        max: String(drawing?.of ?? 1),
+        value: String(drawing?.done ?? 0),
+        "aria-label": "How far the draw is",
+      }),
+      iconButton(actions.draw!, "draw"),
+      iconButton(actions.four!, "grid", { pressed: value.count === 4 }),
+      exportMenu(files),
+      iconButton(actions.theme!, "theme"),
+      iconButton(actions.help!, "help"),
+    ]);
+  };
+  app.project.subscribe(render);
+  app.session.subscribe((now, before) => {
+    if (now.connected !== before.connected || now.saved !== before.saved || now.drawing !== before.drawing) render();
+  });
+  render();
+}
+
+function exportMenu(files: Files): HTMLElement {
+  const close = (event: Event) => (event.currentTarget as Element).closest("details")?.removeAttribute("open");
+  return h(
+    "details",
+    { class: "menu", "data-key": "export" },
+    h("summary", { class: "text strong", "aria-label": "Export" }, "Export"),
+    h(
+      "div",
+      { class: "sheet" },
+      ...EXPORTS.map(([format, name, title]) =>
+        h(
+          "button",
+          {
+            class: "row",
+            onclick: (event: Event) => {
+              close(event);
+              void files.export(format);
+            },
+          },
+          h("b", {}, name),
+          h("small", {}, title),
+        ),
+      ),
+    ),
+  );
+}
+
+export function stageBar(app: App, actions: Actions, left: HTMLElement, right: HTMLElement): void {
+  const render = () => {
+    const { tool, follow, ghosts, trails, person } = app.session.value;
+    const two = app.project.value.people.length > 1;
+    morph(left, [
+      iconButton(actions.select!, "select", { pressed: tool === "select" }),
+      iconButton(actions.path!, "path", { pressed: tool === "path" }),
+      iconButton(actions.target!, "target", { pressed: tool === "target" }),
+      iconButton(actions.pose!, "pose"),
+      ...(two
+        ? [
+            h(
+              "button",
+              {
+                class: `icon who who${person}`,
+                title: "Work on the other person (Q)",
+                "aria-label": `Working on person ${person + 1}`,
+                onclick: actions.person!.run,
+              },
+              String(person + 1),
+            ),
+          ]
+        : []),
+    ]);
+    morph(right, [
+      iconButton(actions.follow!, "follow", { pressed: follow }),
+      iconButton(actions.above!, "above"),
+      iconButton(actions.ghosts!, "ghosts", { pressed: ghosts }),
+      iconButton(actions.trails!, "trails", { pressed: trails }),
+    ]);
+  };
+  app.project.subscribe(render);
+  app.session.subscribe((now, before) => {
+    if ((["tool", "follow", "ghosts", "trails", "person"] as const).some((key) => now[key] !== before[key])) render();
+  });
+  render();
+}
+
+export function transport(app: App, actions: Actions, root: HTMLElement): void {
+  const clock = h("output", { class: "clock", "aria-label": "Time" });
+  const render = () => {
+    const { playing, repeat, rate, snapping, selection, range } = app.session.value;
+    const { segments, frozen } = app.project.value;
+    const chosen = selection.kind === "segment" ? segments.findIndex((one) => one.id === selection.id) : -1;
+    morph(root, [
+      iconButton(actions.play!, playing ? "pause" : "play", { title: playing ? "Pause" : "Play" }),
+      iconButton(actions.repeat!, "repeat", { pressed: repeat }),
+      clock.isConnected ? root.children[2]! : clock,
+      h(
+        "button",
+        {
+          class: "text rate",
+          title: "Playback rate ([ and ])",
+          "aria-label": `Playback rate ${rate}`,
+          onclick: () => app.session.update({ rate: rate >= 2 ? 0.25 : rate * 2 }),
+        },
+        `${rate}×`,
+      ),
+      h("span", { class: "rule" }),
+      iconButton(actions.add!, "add"),
+      iconButton(actions.split!, "split"),
+      iconButton(actions.duplicate!, "duplicate"),
+      iconButton(actions.remove!, "remove", { disabled: selection.kind === "none" }),
+      h("span", { class: "rule" }),
+      iconButton(actions.freeze!, "freeze", { disabled: !range && chosen < 0 }),
+      textButton("Unfreeze", actions.unfreeze!.run, {
+        title: "Unfreeze everything (Shift F)",
+        disabled: !frozen.length,
+      }),
+      h("span", { class: "grow" }),
+      h(
+        "span",
+        { class: "note" },
+        range
+          ? `${range[0].toFixed(2)} – ${range[1].toFixed(2)} s marked`
+          : chosen >= 0
+            ? `block ${chosen + 1} of ${segments.length}, from ${begins(segments)[chosen]!.toFixed(2)} s`
+            : "",
+      ),
+      textButton("Snap", actions.snapping!.run, { title: "Times catch on marks (M)", pressed: snapping }),
+      textButton("−", actions.zoomOut!.run, { title: "Zoom out (-)" }),
+      textButton("+", actions.zoomIn!.run, { title: "Zoom in (+)" }),
+    ]);
+    tick();
+  };
+  const tick = () => {
+    clock.textContent = `${app.session.value.time.toFixed(2)} / ${duration(app).toFixed(2)} s`;
+  };
+  app.project.subscribe(render);
+  app.session.subscribe((now, before) => {
+    const keys = ["playing", "repeat", "rate", "snapping", "selection", "range", "clips"] as const;
+    if (keys.some((key) => now[key] !== before[key])) render();
+    else if (now.time !== before.time) tick();
+  });
+  render();
+}

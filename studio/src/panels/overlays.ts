@@ -1,0 +1,154 @@
+/** What lies over the stage: sentences about what went wrong, names of takes, what a key does, dropped files. */
+
+import { type Actions } from "../app/actions";
+import { type App, shownClip } from "../app/app";
+import { h, morph } from "../app/dom";
+import type { Files } from "../app/files";
+import { icon } from "./icons";
+import { shownKey } from "./parts";
+
+export function notices(app: App, retry: () => void, root: HTMLElement): void {
+  const render = () => {
+    const { error, connected, drawing } = app.session.value;
+    const waiting = !shownClip(app) && drawing;
+    morph(root, [
+      ...(connected
+        ? []
+        : [
+            h(
+              "p",
+              { class: "notice away", role: "alert" },
+              "The server does not answer. Your work is kept in this browser and goes on as soon as the server is back.",
+            ),
+          ]),
+      ...(error
+        ? [
+            h(
+              "p",
+              { class: "notice", role: "alert" },
+              h("span", {}, error),
+              h("button", { class: "text", onclick: retry }, "Try again"),
+              h(
+                "button",
+                { class: "cross", "aria-label": "Close", onclick: () => app.session.update({ error: null }) },
+                "×",
+              ),
+            ),
+          ]
+        : []),
+      ...(waiting && !error ? [h("p", { class: "notice calm" }, "Drawing the first motion …")] : []),
+    ]);
+  };
+  app.session.subscribe((now, before) => {
+    if (
+      now.error !== before.error ||
+      now.connected !== before.connected ||
+      now.drawing !== before.drawing ||
+      now.clips !== before.clips
+    )
+      render();
+  });
+  render();
+}
+
+/** The number of each take on its part of the picture. */
+export function takeNames(app: App, root: HTMLElement): void {
+  const render = () => {
+    const { sideBySide, clips, fan } = app.session.value;
+    root.hidden = !sideBySide || fan !== null;
+    const columns = clips.length > 1 ? 2 : 1;
+    root.style.gridTemplateColumns = `repeat(${columns}, 1fr)`;
+    morph(
+      root,
+      clips.map((_, index) =>
+        h(
+          "span",
+          { class: index === app.project.value.kept ? "chosen" : "" },
+          `Take ${index + 1}${index === app.project.value.kept ? " · kept" : ""}`,
+        ),
+      ),
+    );
+  };
+  app.project.subscribe(render);
+  app.session.subscribe((now, before) => {
+    if (now.sideBySide !== before.sideBySide || now.clips !== before.clips || now.fan !== before.fan) render();
+  });
+  render();
+}
+
+export function help(app: App, actions: Actions, root: HTMLDialogElement): void {
+  const groups = [...new Set(Object.values(actions).map((action) => action.group))];
+  const close = () => app.session.update({ help: false });
+  root.append(
+    h("header", {}, h("h2", {}, "Keys"), h("button", { class: "cross", "aria-label": "Close", onclick: close }, "×")),
+    h(
+      "div",
+      { class: "groups" },
+      ...groups.map((group) =>
+        h(
+          "section",
+          {},
+          h("h3", {}, group),
+          h(
+            "dl",
+            {},
+            ...Object.values(actions)
+              .filter((one) => one.group === group)
+              .flatMap((one) => [
+                h("dt", {}, ...one.keys.slice(0, 2).map((key) => h("kbd", {}, shownKey(key)))),
+                h("dd", {}, one.label),
+              ]),
+          ),
+        ),
+      ),
+    ),
+    h(
+      "p",
+      { class: "quiet" },
+      "With the path or joint tool the arrow keys move the cursor or the joint (Shift: finer), Page Up and Page Down its height, Enter puts a point. 1 to 9 keep a take or choose a future. Alt while dragging does not snap. Ctrl and the wheel zoom the timeline.",
+    ),
+  );
+  root.addEventListener("close", close);
+  app.session.subscribe((now, before) => {
+    if (now.help === before.help) return;
+    if (now.help) root.showModal();
+    else root.close();
+  });
+}
+
+/** Files dropped anywhere, or chosen in a dialog; gives what opens that dialog. */
+export function drops(files: Files, root: HTMLElement): () => void {
+  const input = h("input", {
+    type: "file",
+    multiple: true,
+    hidden: true,
+    "aria-label": "Open files",
+    accept: ".bvh,.amc,.asf,.glb,.vrm,.npz,.json,.yaml,.yml",
+  }) as HTMLInputElement;
+  input.addEventListener("change", () => {
+    void files.open([...(input.files ?? [])]);
+    input.value = "";
+  });
+  const veil = h(
+    "div",
+    { class: "veil", hidden: true },
+    h("p", {}, icon("download"), "Drop motions, characters, timelines or a project"),
+  );
+  root.append(input, veil);
+  const isFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
+  root.addEventListener("dragover", (event) => {
+    if (!isFiles(event)) return;
+    event.preventDefault();
+    veil.hidden = false;
+  });
+  root.addEventListener("dragleave", (event) => {
+    if (!event.relatedTarget) veil.hidden = true;
+  });
+  root.addEventListener("drop", (event) => {
+    veil.hidden = true;
+    if (!isFiles(event)) return;
+    event.preventDefault();
+    void files.open([...(event.dataTransfer?.files ?? [])]);
+  });
+  return () => input.click();
+}

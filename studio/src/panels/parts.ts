@@ -1,0 +1,111 @@
+/** Parts that every panel is made of. */
+
+import type { Action } from "../app/actions";
+import { h } from "../app/dom";
+import { type Icon, icon } from "./icons";
+
+/** A button of an action with its picture; its words and its key are in the title. */
+export function iconButton(
+  action: Action,
+  name: Icon,
+  options: { pressed?: boolean; disabled?: boolean; title?: string } = {},
+): HTMLElement {
+  const { pressed, disabled, title = action.label } = options;
+  return h(
+    "button",
+    {
+      class: "icon",
+      title: `${title} (${shownKey(action.keys[0]!)})`,
+      "aria-label": title,
+      onclick: action.run,
+      "aria-pressed": pressed === undefined ? null : String(pressed),
+      disabled: disabled ?? false,
+    },
+    icon(name),
+  );
+}
+
+export function textButton(
+  text: string,
+  run: () => void,
+  options: { title?: string; disabled?: boolean; pressed?: boolean; strong?: boolean } = {},
+): HTMLElement {
+  const { title, disabled = false, pressed, strong } = options;
+  return h(
+    "button",
+    {
+      class: strong ? "text strong" : "text",
+      title,
+      disabled,
+      onclick: run,
+      "aria-pressed": pressed === undefined ? null : String(pressed),
+    },
+    text,
+  );
+}
+
+export function section(title: string, ...children: (Node | string | null | undefined | false)[]): HTMLElement {
+  return h("section", { "data-key": title }, h("h2", {}, title), ...children);
+}
+
+/** A number with its name and unit; changes are told when the user is done. */
+export function numberField(
+  name: string,
+  value: number | null,
+  unit: string,
+  change: (value: number | null) => void,
+  options: { min?: number; max?: number; step?: number; empty?: string } = {},
+): HTMLElement {
+  const { min, max, step = 0.05, empty = "" } = options;
+  return h(
+    "label",
+    { class: "field" },
+    h("span", {}, name),
+    h(
+      "span",
+      { class: "value" },
+      h("input", {
+        type: "number",
+        value: value === null ? "" : String(value),
+        min,
+        max,
+        step,
+        placeholder: empty,
+        "aria-label": `${name}, ${unit}`,
+        onchange: (event: Event) => {
+          const { value: text } = event.target as HTMLInputElement;
+          const found = Number(text);
+          change(
+            text === "" || !Number.isFinite(found)
+              ? null
+              : Math.min(Math.max(found, min ?? -Infinity), max ?? Infinity),
+          );
+        },
+      }),
+      h("em", {}, unit),
+    ),
+  );
+}
+
+/** "Ctrl+Z" as somebody reads it. */
+export function shownKey(key: string): string {
+  const names: Record<string, string> = {
+    ArrowLeft: "←",
+    ArrowRight: "→",
+    ArrowUp: "↑",
+    ArrowDown: "↓",
+    Delete: "Del",
+  };
+  return (
+    key
+      .split("+")
+      .map((part) => names[part] ?? part)
+      .join(" ") || "+"
+  );
+}
+
+/** Centimetres; red where something is farther away than `limit`. */
+export function miss(centimetres: number | null, limit: number): HTMLElement {
+  if (centimetres === null) return h("span", { class: "miss" }, "–");
+  return h("span", { class: centimetres > limit ? "miss unmet" : "miss" }, `${centimetres.toFixed(1)} cm`);
+}

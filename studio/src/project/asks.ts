@@ -1,0 +1,176 @@
+/** Edits of what is asked besides words: a path, targets of joints, poses. `who` is 0 or 1. */
+
+import {
+  type Path,
+  type PathPoint,
+  type Pose,
+  type Project,
+  type Target,
+  type Vec3,
+  FPS,
+  length,
+  newId,
+  round,
+  toFrame,
+} from "./model";
+import { type MotionClip, facingAt, jointAt } from "../body/clip";
+import { PELVIS } from "../body/skeleton";
+import { type Ground, pathPoint, simplified } from "./path";
+import { changePerson } from "./timeline";
+
+/** Seconds between the points of a way that is kept. */
+const WAY_STEP = 0.5;
+
+export function setPath(project: Project, who: number, path: Path | null): Project {
+  return changePerson(project, who, (person) => (person.path === path ? person : { ...person, path }));
+}
+
+/** A line drawn by hand, as points; what it has of speed stays. */
+export function drawPath(project: Project, who: number, line: readonly Ground[]): Project {
+  const points = simplified(line).map(({ x, z }) => pathPoint(x, z));
+  if (points.length < 2) return project;
+  return setPath(project, who, { points, speed: project.people[who]?.path?.speed ?? null, times: null });
+}
+
+/** One more point at the end; the first one makes a path that begins at `start`. */
+export function addPoint(project: Project, who: number, at: Ground, start: Ground): Project {
+  const path = project.people[who]?.path ?? { points: [pathPoint(start.x, start.z)], speed: null };
+  return setPath(project, who, { ...path, times: null, points: [...path.points, pathPoint(at.x, at.z)] });
+}
+
+export function changePoint(project: Project, who: number, index: number, part: Partial<PathPoint>): Project {
+  const path = project.people[who]?.path;
+  if (!path?.points[index]) return project;
+  const points = path.points.map((one, n) => (n === index ? { ...one, ...part } : one));
+  return setPath(project, who, { ...path, points, times: part.stop === undefined ? path.times : null });
+}
+
+export function removePoint(project: Project, who: number, index: number): Project {
+  const path = project.people[who]?.path;
+  if (!path?.points[index]) return project;
+  const points = path.points.filter((_, n) => n !== index);
+  return setPath(project, who, points.length < 2 ? null : { ...path, times: null, points });
+}
+
+export function setSpeed(project: Project, who: number, speed: number | null): Project {
+  const path = project.people[who]?.path;
+  return path ? setPath(project, who, { ...path, speed, times: null }) : project;
+}
+
+/**
+ * Whether somebody's joints are asked for and nobody says where the person goes: over several blocks the server has to
+ * know the way to say where a joint is.
+ */
+export function needsWay(project: Project): number {
+  if (project.segments.length < 2) return -1;
+  return project.people.findIndex((one) => !one.path && (one.targets.length > 0 || one.poses.length > 0));
+}
+
+/** The way of a motion as it is, as a path with its times and facings. */
+export function keepWay(project: Project, who: number, clip: MotionClip): Project {
+  const seconds = Math.min(length(project), clip.seconds - 1 / clip.fps);
+  const count = Math.max(Math.round(seconds / WAY_STEP), 1);
+  const times = Array.from({ length: count + 1 }, (_, n) => toFrame((seconds * n) / count));
+  const points = times.map((time) => {
+    const [x, , z] = jointAt(clip, who, PELVIS, time);
+    return { ...pathPoint(x, z), facing: round(facingAt(clip, who, time)) };
+  });
+  return setPath(project, who, { points, speed: null, times });
+}
+
+/** Ask for a joint at a time: its target there moves, or a new one with this name appears. */
+export function putTarget(
+  project: Project,
+  who: number,
+  joint: number,
+  time: number,
+  position: Vec3,
+  id = newId(),
+): Project {
+  const place = rounded(position);
+  return changePerson(project, who, (person) => {
+    const there = person.targets.find((one) => one.joint === joint && covers(one, time));
+    if (!there) {
+      return {
+        ...person,
+        targets: [...person.targets, { id, joint, time: round(time), until: null, position: place }],
+      };
+    }
+    return { ...person, targets: person.targets.map((one) => (one === there ? { ...one, position: place } : one)) };
+  });
+}
+
+export function targetAt(project: Project, who: number, joint: number, time: number): Target | null {
+  return project.people[who]?.targets.find((one) => one.joint === joint && covers(one, time)) ?? null;
+}
+
+export function changeTarget(project: Project, who: number, id: string, part: Partial<Target>): Project {
+  return changePerson(project, who, (person) => {
+    const old = person.targets.find((one) => one.id === id);
+    if (!old) return person;
+    const next = { ...old, ...part, ...(part.position ? { position: rounded(part.position) } : {}) };
+    if (next.until !== null && next.until <= next.time) next.until = null;
+    return { ...person, targets: person.targets.map((one) => (one === old ? next : one)) };
+  });
+}
+
+/** Move a target in time, with the stretch it is pinned for. */
+export function shiftTarget(project: Project, who: number, id: string, time: number): Project {
+  const target = project.people[who]?.targets.find((one) => one.id === id);
+  if (!target) return project;
+  const last = length(project) - ((target.until ?? target.time) - target.time);
+  const to = Math.min(Math.max(round(time), 0), last);
+  if (to === target.time) return project;
+  return changeTarget(project, who, id, {
+    time: to,
+    until: target.until === null ? null : round(target.until + to - target.time),
+  });
+}
+
+export function removeTarget(project: Project, who: number, id: string): Project {
+  return changePerson(project, who, (person) => ({
+    ...person,
+    targets: person.targets.filter((one) => one.id !== id),
+  }));
+}
+
+/** Ask for a whole pose at a time; one that is there at that frame is replaced. */
+export function putPose(
+  project: Project,
+  who: number,
+  name: string,
+  time: number,
+  positions: readonly Vec3[],
+): Project {
+  const pose: Pose = { id: newId(), name, time: round(time), positions };
+  return changePerson(project, who, (person) => ({
+    ...person,
+    poses: [...person.poses.filter((one) => Math.abs(one.time - time) >= 0.5 / FPS), pose],
+  }));
+}
+
+export function changePose(project: Project, who: number, id: string, part: Partial<Pose>): Project {
+  return changePerson(project, who, (person) => ({
+    ...person,
+    poses: person.poses.map((one) => (one.id === id ? { ...one, ...part } : one)),
+  }));
+}
+
+export function removePose(project: Project, who: number, id: string): Project {
+  return changePerson(project, who, (person) => ({ ...person, poses: person.poses.filter((one) => one.id !== id) }));
+}
+
+/** A pose put where somebody stands and faces: `pose` with its pelvis over `at`. */
+export function movedTo(positions: readonly Vec3[], at: Ground): Vec3[] {
+  const [x, , z] = positions[0]!;
+  return positions.map(([px, y, pz]) => rounded([px - x + at.x, y, pz - z + at.z]));
+}
+
+function covers(target: Target, time: number): boolean {
+  const half = 0.5 / FPS;
+  return time >= target.time - half && time <= (target.until ?? target.time) + half;
+}
+
+function rounded([x, y, z]: Vec3): Vec3 {
+  return [round(x), round(y), round(z)];
+}

@@ -1,0 +1,171 @@
+/**
+ * What a project is: everything that undo brings back and that a project file keeps.
+ *
+ * Metres, seconds and degrees; +Y up; a person who faces +Z has facing 0 and the left side at +X. All values are
+ * immutable: an edit gives a new project.
+ */
+
+export const FPS = 20;
+export const SHORTEST = 0.2;
+export const LONGEST = 60;
+
+export type Vec3 = readonly [number, number, number];
+export type Range = readonly [number, number];
+
+/** One prompted stretch. */
+export interface Segment {
+  readonly id: string;
+  readonly text: string;
+  /** What the second person does, where there is one and it does something else; empty: the same words. */
+  readonly other: string;
+  readonly seconds: number;
+  /** Seconds shared with the next segment; null: one second, or half of the shorter one. */
+  readonly transition: number | null;
+}
+
+export interface PathPoint {
+  readonly x: number;
+  readonly z: number;
+  /** Seconds to stay here. */
+  readonly stop: number;
+  /** Degrees; null: along the path. */
+  readonly facing: number | null;
+}
+
+export interface Path {
+  readonly points: readonly PathPoint[];
+  /** Metres per second; null: as fast as fills the time. */
+  readonly speed: number | null;
+  /** When each point is reached, for a way that was walked already; null: as `speed` and stops say. */
+  readonly times: readonly number[] | null;
+}
+
+/** A joint that is asked to be somewhere. */
+export interface Target {
+  readonly id: string;
+  /** Index into the 22 joints. */
+  readonly joint: number;
+  readonly time: number;
+  /** The joint stays there to this time; null: only at `time`. */
+  readonly until: number | null;
+  readonly position: Vec3;
+}
+
+/** A whole pose that is asked at one time, in the world. */
+export interface Pose {
+  readonly id: string;
+  readonly name: string;
+  readonly time: number;
+  readonly positions: readonly Vec3[];
+}
+
+/** What is asked of one person besides words. */
+export interface Person {
+  readonly path: Path | null;
+  readonly targets: readonly Target[];
+  readonly poses: readonly Pose[];
+}
+
+/** A motion that the server holds. */
+export interface Take {
+  readonly motion: string;
+  readonly seed: number;
+  readonly seconds: number;
+  readonly people: number;
+  /** In words, how it was made: "drawn", "redrawn", "continued", ... */
+  readonly how: string;
+}
+
+/** A motion from a file, or one that was put aside. */
+export interface Clip {
+  readonly motion: string;
+  readonly name: string;
+  readonly seconds: number;
+}
+
+export interface Project {
+  readonly version: 1;
+  readonly name: string;
+  readonly seed: number;
+  /** How many takes a draw gives: 1 or 4. */
+  readonly count: number;
+  readonly segments: readonly Segment[];
+  /** One or two. */
+  readonly people: readonly Person[];
+  /** Stretches of `base` that stay as they are, sorted and apart; the rest is drawn between them. */
+  readonly frozen: readonly Range[];
+  readonly base: Take | null;
+  /** Whom the second person reacts to, if it does: a motion of the first. */
+  readonly reactTo: Clip | null;
+  readonly takes: readonly Take[];
+  readonly kept: number;
+  /** What `takes` were drawn from: `planKey` of that project. */
+  readonly drawn: string;
+  readonly clips: readonly Clip[];
+  /** The user's own character, as the server knows it. */
+  readonly character: { readonly id: string; readonly name: string } | null;
+}
+
+let counter = 0;
+
+/** A name that no other part of any project has. */
+export function newId(): string {
+  counter += 1;
+  return `${Date.now().toString(36)}${counter.toString(36)}${Math.floor(Math.random() * 1296).toString(36)}`;
+}
+
+export const NOTHING_ASKED: Person = { path: null, targets: [], poses: [] };
+
+export function segment(text: string, seconds: number): Segment {
+  return { id: newId(), text, other: "", seconds, transition: null };
+}
+
+/** What somebody sees who opens the page for the first time. */
+export function exampleProject(): Project {
+  return {
+    version: 1,
+    name: "Untitled",
+    seed: 1,
+    count: 1,
+    segments: [segment("a person walks forward", 3.5), segment("a person waves with the right hand", 3)],
+    people: [NOTHING_ASKED],
+    frozen: [],
+    base: null,
+    reactTo: null,
+    takes: [],
+    kept: 0,
+    drawn: "",
+    clips: [],
+    character: null,
+  };
+}
+
+/** Seconds of all segments. */
+export function length(project: Project): number {
+  return round(project.segments.reduce((sum, one) => sum + one.seconds, 0));
+}
+
+/** Where each segment begins, and at last the end of all. */
+export function begins(segments: readonly Segment[]): number[] {
+  const at = [0];
+  for (const one of segments) at.push(round(at[at.length - 1]! + one.seconds));
+  return at;
+}
+
+/** To the frame; times that add up stay on the frames. */
+export function toFrame(seconds: number): number {
+  return Math.round(seconds * FPS) / FPS;
+}
+
+/** Without the dust of binary fractions. */
+export function round(value: number): number {
+  return Math.round(value * 1000) / 1000;
+}
+
+export function clamp(value: number, low: number, high: number): number {
+  return Math.min(Math.max(value, low), high);
+}
+
+export function keptTake(project: Project): Take | null {
+  return project.takes[project.kept] ?? null;
+}

@@ -1,0 +1,123 @@
+/** What the server can be asked, with its answers as values of the page. */
+
+import { type MotionClip, motionClip } from "../body/clip";
+import type { TimelineJson } from "../project/goals";
+import type { Project, Take } from "../project/model";
+import { getJson, json, request } from "./http";
+
+export interface Result {
+  readonly id: string;
+  readonly seed: number;
+  readonly seconds: number;
+  readonly frames: number;
+  readonly people: number;
+}
+
+export interface JobState {
+  readonly id: string;
+  readonly state: string;
+  readonly error: string | null;
+  readonly results: readonly Result[];
+}
+
+/** What a job is asked; the tasks and their keys are those of the command line. */
+export type JobRequest = { readonly task: string; readonly [key: string]: unknown };
+
+interface MotionJson {
+  fps: number;
+  people: { positions: string; rotations?: string; root?: string }[];
+}
+
+export type Format = "bvh" | "glb" | "npz" | "mp4" | "png";
+
+export async function isUp(): Promise<boolean> {
+  try {
+    await request("health", { signal: AbortSignal.timeout(3000) });
+    return true;
+  } catch {
+    return false;
+  }
+}
+
+export async function startJob(job: JobRequest, signal?: AbortSignal): Promise<string> {
+  return (await getJson<{ id: string }>("jobs", { ...json("POST", job), signal })).id;
+}
+
+export async function cancelJob(id: string): Promise<void> {
+  await request(`jobs/${id}`, { method: "DELETE" }).catch(() => undefined);
+}
+
+export function jobState(id: string, signal?: AbortSignal): Promise<JobState> {
+  return getJson(`jobs/${id}`, { signal });
+}
+
+const cache = new Map<string, Promise<MotionClip>>();
+const CACHED = 40;
+
+/** A motion; the last ones are kept, so that undo shows them at once. */
+export function motion(id: string): Promise<MotionClip> {
+  const known = cache.get(id);
+  if (known) return known;
+  const asked = getJson<MotionJson>(`motions/${encodeURIComponent(id)}`).then((found) =>
+    motionClip(
+      found.fps,
+      found.people.map((one) => floats(one.positions)),
+    ),
+  );
+  cache.set(id, asked);
+  asked.catch(() => cache.delete(id));
+  if (cache.size > CACHED) cache.delete(cache.keys().next().value!);
+  return asked;
+}
+
+/** The address of a motion as a file. */
+export function motionFile(id: string, format: Format, options: { skeleton?: string; person?: number } = {}): string {
+  const query = new URLSearchParams();
+  if (options.skeleton) query.set("skeleton", options.skeleton);
+  if (options.person !== undefined) query.set("person", String(options.person));
+  return `motions/${encodeURIComponent(id)}.${format}${query.size ? `?${query}` : ""}`;
+}
+
+/** `asf`: the id of the skeleton that an AMC file needs. */
+export async function uploadMotion(file: File, asf: string | null = null): Promise<Result> {
+  const query = new URLSearchParams({ name: file.name, ...(asf ? { asf } : {}) });
+  return getJson(`motions?${query}`, { method: "POST", body: file });
+}
+
+export async function uploadCharacter(file: File): Promise<{ id: string }> {
+  return getJson(`characters?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
+}
+
+export async function bytes(path: string): Promise<Blob> {
+  return (await request(path)).blob();
+}
+
+export async function savedProject(): Promise<unknown> {
+  return getJson("project");
+}
+
+export async function saveProject(project: Project): Promise<void> {
+  await request("project", json("PUT", project));
+}
+
+/** The timeline as the YAML file that the command line reads. */
+export async function timelineYaml(timeline: TimelineJson): Promise<Blob> {
+  return (await request("timeline.yaml", json("POST", timeline))).blob();
+}
+
+/** The timeline in a YAML file. */
+export async function timelineJson(yaml: Blob): Promise<unknown> {
+  return getJson("timeline.json", { method: "POST", body: yaml });
+}
+
+export function takeOf(result: Result, how: string): Take {
+  return { motion: result.id, seed: result.seed, seconds: result.seconds, people: result.people, how };
+}
+
+/** Little-endian float32 in base64. */
+export function floats(base64: string): Float32Array {
+  const text = atob(base64);
+  const data = new Uint8Array(text.length);
+  for (let n = 0; n < text.length; n += 1) data[n] = text.charCodeAt(n);
+  return new Float32Array(data.buffer, 0, data.length >> 2);
+}

@@ -1,0 +1,59 @@
+/** Requests to the server: a token if the page was opened with one, and errors as the library's sentence. */
+
+import { newId } from "../project/model";
+
+/** `crypto.randomUUID` is for pages from this machine or over https alone. */
+const CLIENT = newId();
+const TOKEN = new URLSearchParams(globalThis.location?.search).get("token");
+
+/** What the server refused; `message` is its sentence. */
+export class Refused extends Error {
+  constructor(
+    message: string,
+    readonly status: number,
+  ) {
+    super(message);
+  }
+}
+
+/** Nobody answered. */
+export class Unreachable extends Error {
+  constructor() {
+    super("The server does not answer; your work is kept in this page and goes on when it is back.");
+  }
+}
+
+export function headers(extra: Record<string, string> = {}): Record<string, string> {
+  return { "X-Client": CLIENT, ...(TOKEN ? { Authorization: `Bearer ${TOKEN}` } : {}), ...extra };
+}
+
+/** The answer, if it is a good one. */
+export async function request(path: string, init: RequestInit = {}): Promise<Response> {
+  let response: Response;
+  try {
+    response = await fetch(path, { ...init, headers: headers(init.headers as Record<string, string>) });
+  } catch (error) {
+    if (error instanceof DOMException && error.name === "AbortError") throw error;
+    throw new Unreachable();
+  }
+  if (response.ok) return response;
+  throw new Refused(await sentence(response), response.status);
+}
+
+export async function getJson<T>(path: string, init: RequestInit = {}): Promise<T> {
+  return (await request(path, init)).json() as Promise<T>;
+}
+
+export function json(method: string, body: unknown): RequestInit {
+  return { method, body: JSON.stringify(body), headers: { "Content-Type": "application/json" } };
+}
+
+async function sentence(response: Response): Promise<string> {
+  try {
+    const body = (await response.json()) as { error?: unknown };
+    if (typeof body.error === "string") return body.error;
+  } catch {
+    /* not the server's own answer */
+  }
+  return `The server answered ${response.status} ${response.statusText}.`;
+}

@@ -1,0 +1,161 @@
+/** The scene with its light, renderer and cameras; draws a frame when somebody says that something changed. */
+
+import * as THREE from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { Floor } from "./floor";
+import type { StageTheme } from "./theme";
+
+/** Frames slower than this for a while make the picture coarser. */
+const SLOW = 45;
+const PATIENCE = 12;
+const COARSEST = 0.5;
+
+export class Scene {
+  readonly scene = new THREE.Scene();
+  readonly camera = new THREE.PerspectiveCamera(38, 1, 0.05, 120);
+  readonly renderer: THREE.WebGLRenderer;
+  readonly orbit: OrbitControls;
+  private readonly floor: Floor;
+  private readonly sky: THREE.HemisphereLight;
+  private readonly sun: THREE.DirectionalLight;
+  private dirty = true;
+  private slow = 0;
+  private readonly fine = Math.min(devicePixelRatio, 2);
+  private coarse = this.fine;
+  private last = 0;
+
+  /** Called for each frame with the milliseconds since the last one; true: draw. */
+  step: (elapsed: number) => boolean = () => false;
+  /** Called behind each picture. */
+  painted: () => void = () => undefined;
+  /** Called instead of a plain draw, where the picture is divided. */
+  paint: (() => void) | null = null;
+
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    theme: StageTheme,
+  ) {
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
+    this.renderer.setPixelRatio(this.fine);
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = THREE.PCFShadowMap;
+    this.renderer.toneMapping = THREE.NeutralToneMapping;
+    this.floor = new Floor(theme);
+    this.sky = new THREE.HemisphereLight(theme.sky, theme.ground, theme.fill);
+    this.sun = sunlight();
+    this.scene.add(this.floor.group, this.sky, this.sun, this.sun.target);
+    this.camera.position.set(2.5, 1.65, 3.5);
+    this.orbit = new OrbitControls(this.camera, canvas);
+    this.orbit.target.set(0, 0.86, 0);
+    this.orbit.enableDamping = true;
+    this.orbit.dampingFactor = 0.12;
+    this.orbit.maxPolarAngle = Math.PI / 2 - 0.03;
+    this.orbit.minDistance = 0.8;
+    this.orbit.maxDistance = 25;
+    this.orbit.addEventListener("change", () => this.invalidate());
+    this.look(theme);
+    new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
+    this.resize();
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  invalidate(): void {
+    this.dirty = true;
+  }
+
+  look(theme: StageTheme): void {
+    this.scene.background = new THREE.Color(theme.background);
+    this.scene.fog = new THREE.Fog(theme.background, 14, 34);
+    this.sky.color.set(theme.sky);
+    this.sky.groundColor.set(theme.ground);
+    this.sky.intensity = theme.fill;
+    this.sun.intensity = theme.sun;
+    this.floor.look(theme);
+    this.invalidate();
+  }
+
+  /** Light and orbit go where the people are. */
+  centre(x: number, z: number, follow: boolean, ease: number): void {
+    this.sun.position.set(x + 2.4, 5.2, z + 2.2);
+    this.sun.target.position.set(x, 0, z);
+    if (!follow) return;
+    const step = new THREE.Vector3(x - this.orbit.target.x, 0, z - this.orbit.target.z).multiplyScalar(ease);
+    if (step.lengthSq() < 1e-10) return;
+    this.orbit.target.add(step);
+    this.camera.position.add(step);
+  }
+
+  /** Where a place of the picture meets the floor; null: nowhere near. */
+  floorAt(clientX: number, clientY: number, height = 0): THREE.Vector3 | null {
+    const plane = new THREE.Plane(new THREE.Vector3(0, 1, 0), -height);
+    const hit = this.ray(clientX, clientY).ray.intersectPlane(plane, new THREE.Vector3());
+    return hit && hit.length() < 100 ? hit : null;
+  }
+
+  ray(clientX: number, clientY: number): THREE.Raycaster {
+    const box = this.canvas.getBoundingClientRect();
+    const at = new THREE.Vector2(
+      ((clientX - box.left) / box.width) * 2 - 1,
+      1 - ((clientY - box.top) / box.height) * 2,
+    );
+    const ray = new THREE.Raycaster();
+    ray.setFromCamera(at, this.camera);
+    return ray;
+  }
+
+  private frame(now: number): void {
+    requestAnimationFrame((next) => this.frame(next));
+    const elapsed = Math.min(now - this.last, 250);
+    this.last = now;
+    const moved = this.step(elapsed);
+    this.orbit.update();
+    if (!moved && !this.dirty) {
+      this.slow = 0;
+      return;
+    }
+    this.dirty = false;
+    this.sharpness(moved ? this.coarse : this.fine);
+    if (this.paint) this.paint();
+    else this.renderer.render(this.scene, this.camera);
+    this.painted();
+    this.adapt(elapsed, moved);
+  }
+
+  /** Without a GPU fewer pixels keep the motion in real time; what does not move is drawn sharp. */
+  private adapt(elapsed: number, moved: boolean): void {
+    this.slow = moved && elapsed > SLOW ? this.slow + 1 : 0;
+    if (this.slow < PATIENCE) return;
+    this.slow = 0;
+    this.coarse = Math.max(this.coarse * 0.75, COARSEST);
+    this.sun.shadow.mapSize.set(512, 512);
+    this.sun.shadow.map?.dispose();
+    this.sun.shadow.map = null;
+  }
+
+  private sharpness(ratio: number): void {
+    if (this.renderer.getPixelRatio() === ratio) return;
+    this.renderer.setPixelRatio(ratio);
+    this.resize();
+  }
+
+  private resize(): void {
+    const { clientWidth, clientHeight } = this.canvas.parentElement!;
+    if (!clientWidth || !clientHeight) return;
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
+    this.invalidate();
+  }
+}
+
+function sunlight(): THREE.DirectionalLight {
+  const sun = new THREE.DirectionalLight("#fff6e8", 2);
+  sun.castShadow = true;
+  sun.shadow.mapSize.set(2048, 2048);
+  sun.shadow.radius = 5;
+  sun.shadow.bias = -0.0005;
+  sun.shadow.normalBias = 0.02;
+  const view = sun.shadow.camera;
+  [view.left, view.right, view.top, view.bottom, view.near, view.far] = [-3.5, 3.5, 3.5, -3.5, 0.5, 14];
+  return sun;
+}

@@ -1,0 +1,215 @@
+/** The stage: who is on it at the playhead, the tools on it, and one picture or four side by side. */
+
+import * as THREE from "three";
+import { type App, duration, shownClip } from "../app/app";
+import { jointAt } from "../body/clip";
+import { Cast, type Ghost } from "./cast";
+import { Character } from "./character";
+import { PathTool } from "./pathTool";
+import { Scene } from "./scene";
+import { TargetTool } from "./targetTool";
+import { DARK, GHOSTS, LIGHT, type StageTheme } from "./theme";
+import { Trails } from "./trails";
+
+export class Stage {
+  readonly scene: Scene;
+  readonly path: PathTool;
+  readonly targets: TargetTool;
+  private readonly cast: Cast;
+  private readonly trails: Trails;
+  private readonly character: Character;
+
+  constructor(
+    private readonly app: App,
+    canvas: HTMLCanvasElement,
+    dark: boolean,
+  ) {
+    const theme = dark ? DARK : LIGHT;
+    this.scene = new Scene(canvas, theme);
+    this.cast = new Cast(this.scene.scene, theme);
+    this.trails = new Trails(this.scene.scene, theme);
+    this.character = new Character(app, this.scene);
+    this.path = new PathTool(app, this.scene, theme);
+    this.targets = new TargetTool(app, this.scene, this.cast, theme);
+    this.scene.step = (elapsed) => this.step(elapsed);
+    this.scene.painted = () => this.path.tell();
+    this.listen(canvas);
+    app.project.subscribe(() => this.update());
+    app.session.subscribe((now, before) => this.changed(now, before));
+    app.denoising.subscribe(() => this.place());
+  }
+
+  look(dark: boolean): void {
+    const theme: StageTheme = dark ? DARK : LIGHT;
+    this.scene.look(theme);
+    this.cast.look(theme);
+    this.trails.look(theme);
+    this.path.look(theme);
+    this.targets.look(theme);
+    this.place();
+  }
+
+  /** Look from above, or from the side again. */
+  fromAbove(): void {
+    const { orbit, camera } = this.scene;
+    const away = camera.position.clone().sub(orbit.target);
+    const above = away.y > away.length() * 0.95;
+    if (above) camera.position.copy(orbit.target).add(new THREE.Vector3(3.1, 1.1, 3.5));
+    else camera.position.copy(orbit.target).add(new THREE.Vector3(0, Math.max(away.length(), 7), 0.02));
+    this.scene.invalidate();
+  }
+
+  /** The picture as it is. */
+  picture(): Promise<Blob | null> {
+    return new Promise((done) => this.scene.canvas.toBlob(done));
+  }
+
+  private changed(now: App["session"]["value"], before: App["session"]["value"]): void {
+    if (now.tool !== before.tool) this.buttons();
+    const kept = [
+      "clips",
+      "drawing",
+      "tool",
+      "person",
+      "joint",
+      "selection",
+      "ghosts",
+      "trails",
+      "sideBySide",
+      "fan",
+      "playing",
+    ] as const;
+    if (kept.some((key) => now[key] !== before[key])) this.update();
+    else if (now.time !== before.time) this.place();
+  }
+
+  private update(): void {
+    this.trails.show(this.app.session.value.trails ? shownClip(this.app) : null);
+    this.path.update();
+    this.character.update();
+    this.place();
+  }
+
+  /** Everybody where they are at the playhead. */
+  private place(): void {
+    const { time, fan, sideBySide, drawing } = this.app.session.value;
+    const clip = this.app.denoising.value ?? shownClip(this.app);
+    const isFuture = fan !== null && time > fan.past;
+    // A character has the kept take's motion; what is being drawn is shown by the mannequin.
+    const dressed = this.character.at(time, !sideBySide && !isFuture && drawing === null);
+    this.cast.show(clip, time, dressed || isFuture);
+    this.cast.showGhosts(this.ghosts(), time);
+    this.path.at(time);
+    this.targets.update();
+    this.scene.paint = this.app.session.value.sideBySide ? () => this.paintTakes() : null;
+    this.scene.invalidate();
+  }
+
+  private ghosts(): Ghost[] {
+    const { clips, fan, ghosts, time } = this.app.session.value;
+    if (fan)
+      return time <= fan.past ? [] : fan.clips.map((clip, index) => ({ clip, color: GHOSTS[index % GHOSTS.length]! }));
+    if (!ghosts || clips.length < 2 || this.app.denoising.value) return [];
+    return clips.flatMap((clip, index) =>
+      index === this.app.project.value.kept ? [] : [{ clip, color: GHOSTS[index % GHOSTS.length]! }],
+    );
+  }
+
+  /** One frame of real time. */
+  private step(elapsed: number): boolean {
+    const { session } = this.app;
+    const { playing, rate, time, repeat, follow } = session.value;
+    const clip = this.app.denoising.value ?? shownClip(this.app);
+    if (playing) {
+      const end = duration(this.app);
+      const next = time + (elapsed / 1000) * rate;
+      if (next <= end) session.update({ time: next });
+      else session.update(repeat ? { time: end > 0 ? next % end : 0 } : { time: end, playing: false });
+    }
+    if (clip) {
+      const [x, , z] = jointAt(clip, 0, 0, session.value.time);
+      const before = this.scene.orbit.target.clone();
+      this.scene.centre(
+        x,
+        z,
+        follow && session.value.tool !== "path" && !this.targets.busy,
+        1 - Math.exp(-elapsed / 220),
+      );
+      if (before.distanceToSquared(this.scene.orbit.target) > 1e-7) return true;
+    }
+    return playing;
+  }
+
+  /** Every take in a part of the picture of its own. */
+  private paintTakes(): void {
+    const { clips, time } = this.app.session.value;
+    const { renderer, scene, camera } = this.scene;
+    const size = renderer.getSize(new THREE.Vector2());
+    const columns = clips.length > 1 ? 2 : 1;
+    const rows = Math.ceil(clips.length / columns);
+    const [width, height] = [size.x / columns, size.y / rows];
+    renderer.clear();
+    renderer.setScissorTest(true);
+    this.cast.showGhosts([], time);
+    clips.forEach((clip, index) => {
+      const [x, y] = [(index % columns) * width, size.y - height * (Math.floor(index / columns) + 1)];
+      this.cast.show(clip, time);
+      renderer.setViewport(x, y, width, height);
+      renderer.setScissor(x, y, width - 1, height - 1);
+      camera.aspect = width / height;
+      camera.updateProjectionMatrix();
+      renderer.render(scene, camera);
+    });
+    camera.aspect = size.x / size.y;
+    camera.updateProjectionMatrix();
+    renderer.setScissorTest(false);
+    renderer.setViewport(0, 0, size.x, size.y);
+  }
+
+  /** While a path is drawn the left button draws and the right one turns the picture. */
+  private buttons(): void {
+    const drawing = this.app.session.value.tool === "path";
+    this.scene.orbit.mouseButtons = drawing
+      ? { LEFT: null, MIDDLE: THREE.MOUSE.DOLLY, RIGHT: THREE.MOUSE.ROTATE }
+      : { LEFT: THREE.MOUSE.ROTATE, MIDDLE: THREE.MOUSE.DOLLY, RIGHT: THREE.MOUSE.PAN };
+    this.scene.canvas.style.cursor = drawing ? "crosshair" : "";
+  }
+
+  private listen(canvas: HTMLCanvasElement): void {
+    let held = false;
+    // In the capture phase, before the orbit hears of it.
+    canvas.addEventListener(
+      "pointerdown",
+      (event) => {
+        if (this.app.session.value.sideBySide) return this.keepUnder(event);
+        held = this.path.press(event);
+        if (held) {
+          this.scene.orbit.enabled = false;
+          canvas.setPointerCapture(event.pointerId);
+        } else this.targets.press(event);
+      },
+      true,
+    );
+    canvas.addEventListener("pointermove", (event) => held && this.path.move(event));
+    const end = (event: PointerEvent) => {
+      if (!held) return;
+      held = false;
+      this.scene.orbit.enabled = true;
+      this.path.release(event);
+    };
+    canvas.addEventListener("pointerup", end);
+    canvas.addEventListener("pointercancel", end);
+    canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+  }
+
+  /** A click on one of several pictures keeps that take. */
+  private keepUnder(event: PointerEvent): void {
+    const { clips } = this.app.session.value;
+    const box = (event.target as Element).getBoundingClientRect();
+    const columns = clips.length > 1 ? 2 : 1;
+    const rows = Math.ceil(clips.length / columns);
+    const column = Math.floor(((event.clientX - box.left) / box.width) * columns);
+    const index = Math.floor(((event.clientY - box.top) / box.height) * rows) * columns + column;
+    if (index < clips.length) this.app.project.change(`keep take ${index + 1}`, (old) => ({ ...old, kept: index }));
+  }
+}

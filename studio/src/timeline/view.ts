@@ -1,0 +1,330 @@
+/** The timeline as elements: ruler, blocks of words, and tracks of what is asked besides. */
+
+import { type App, duration, shownClip } from "../app/app";
+import { h, morph } from "../app/dom";
+import { jointName } from "../body/skeleton";
+import { UNMET, isMeasurable, pathMiss, poseMiss, targetMiss } from "../project/misses";
+import { type Person, type Project, begins, length, round } from "../project/model";
+import { timed } from "../project/path";
+import { transitionOf } from "../project/timeline";
+
+export interface TimelineCalls {
+  readonly write: (id: string, text: string, second: boolean) => void;
+  /** The user is done with a block's words. */
+  readonly written: () => void;
+}
+
+/** Behind the end of the motion there is room to drag. */
+const ROOM = 2;
+const LABELS = { words: "Words", other: "Words 2", path: "Path", joints: "Joints", poses: "Poses" } as const;
+
+export class TimelineView {
+  /** Pixels of one second. */
+  scale = 84;
+  /** The block whose words are edited in place; with `second`, those of the second person. */
+  editing: { id: string; second: boolean } | null = null;
+  private readonly labels = h("div", { class: "labels", "aria-hidden": "true" });
+  private readonly content = h("div", { class: "content" });
+  readonly scroll = h("div", { class: "scroll", tabindex: "-1" }, this.content);
+  private readonly playhead = h("div", { class: "playhead", "aria-hidden": "true" }, h("i"));
+
+  constructor(
+    private readonly app: App,
+    root: HTMLElement,
+    private readonly calls: TimelineCalls,
+  ) {
+    root.append(this.labels, this.scroll);
+    app.project.subscribe(() => this.render());
+    app.session.subscribe((now, before) => {
+      if (now.time !== before.time) this.movePlayhead();
+      const keys = ["clips", "selection", "range", "person", "fan", "drawing"] as const;
+      if (keys.some((key) => now[key] !== before[key])) this.render();
+    });
+    this.render();
+  }
+
+  /** Seconds at a place of the screen. */
+  timeAt(clientX: number): number {
+    return (clientX - this.content.getBoundingClientRect().left) / this.scale;
+  }
+
+  zoom(factor: number): void {
+    this.scale = Math.min(Math.max(this.scale * factor, 8), 400);
+    this.render();
+  }
+
+  edit(id: string, second = false): void {
+    this.editing = { id, second };
+    this.app.session.update({ selection: { kind: "segment", id } });
+    this.render();
+    const input = this.content.querySelector<HTMLInputElement>("input.words");
+    input?.focus();
+    input?.select();
+  }
+
+  render(): void {
+    const { value } = this.app.project;
+    const two = value.people.length > 1;
+    const tracks = ["words", ...(two ? (["other"] as const) : []), "path", "joints", "poses"] as const;
+    morph(this.labels, [
+      h("span", { class: "ruler" }),
+      ...tracks.map((name) => h("span", { class: `track ${name}` }, this.label(name, two))),
+    ]);
+    const end = duration(this.app);
+    this.content.style.width = `${(end + ROOM) * this.scale}px`;
+    const rows = [
+      this.ruler(end),
+      this.words(value, false),
+      ...(two ? [this.words(value, true)] : []),
+      ...this.asks(value),
+    ];
+    morph(this.content, [...rows, this.playhead.isConnected ? this.content.lastChild! : this.playhead]);
+    this.movePlayhead();
+  }
+
+  private label(name: keyof typeof LABELS, two: boolean): string {
+    if (!two || name === "other") return LABELS[name];
+    return name === "words" ? "Words 1" : `${LABELS[name]} ${this.app.session.value.person + 1}`;
+  }
+
+  private movePlayhead(): void {
+    const x = this.app.session.value.time * this.scale;
+    this.playhead.style.transform = `translateX(${x}px)`;
+    if (!this.app.session.value.playing) return;
+    const { scrollLeft, clientWidth } = this.scroll;
+    if (x < scrollLeft || x > scrollLeft + clientWidth - 40) this.scroll.scrollLeft = Math.max(x - 60, 0);
+  }
+
+  private ruler(end: number): HTMLElement {
+    const step = [1, 2, 5, 10, 30, 60].find((one) => one * this.scale >= 52) ?? 60;
+    const marks = Array.from({ length: Math.floor((end + ROOM) / step) + 1 }, (_, index) =>
+      h("span", { class: "mark", style: this.left(index * step) }, `${index * step} s`),
+    );
+    const { range } = this.app.session.value;
+    const frozen = this.app.project.value.frozen.map(([from, to]) =>
+      h("span", { class: "frozen", style: this.span(from, to), title: "Frozen: stays as it is" }),
+    );
+    const marked = range && h("span", { class: "range", style: this.span(range[0], range[1]) });
+    return h(
+      "div",
+      {
+        class: "ruler",
+        "data-drag": "ruler",
+        "data-key": "ruler",
+        "aria-label": "Time: drag to scrub, Shift and drag to mark a stretch",
+      },
+      ...marks,
+      ...frozen,
+      marked,
+    );
+  }
+
+  private words(project: Project, second: boolean): HTMLElement {
+    const at = begins(project.segments);
+    const blocks = project.segments.flatMap((_, index) => [
+      this.block(project, index, at[index]!, second),
+      ...(second || index === project.segments.length - 1 ? [] : [this.transition(project, index, at[index + 1]!)]),
+    ]);
+    const frozen = project.frozen.map(([from, to], index) =>
+      h("div", {
+        class: "ice",
+        "data-key": `ice${index}`,
+        style: this.span(from, Math.min(to, at.at(-1)!)),
+        "aria-hidden": "true",
+      }),
+    );
+    const add = h(
+      "button",
+      {
+        class: "add",
+        "data-act": "add",
+        "data-key": "add",
+        style: this.left(at.at(-1)!),
+        title: "Add a block (A)",
+        "aria-label": "Add a block",
+      },
+      "+",
+    );
+    return h(
+      "div",
+      {
+        class: `track words${second ? " other" : ""}`,
+        "data-key": `words${second}`,
+        role: "list",
+        "aria-label": second ? "What the second person does" : "What the person does",
+      },
+      ...blocks,
+      ...frozen,
+      ...(second ? [] : [add]),
+    );
+  }
+
+  private block(project: Project, index: number, at: number, second: boolean): HTMLElement {
+    const one = project.segments[index]!;
+    const { selection } = this.app.session.value;
+    const chosen = selection.kind === "segment" && selection.id === one.id;
+    const isEdited = this.editing?.id === one.id && this.editing.second === second;
+    const text = second ? one.other : one.text;
+    const shown = text || (second ? "does the same" : "say what happens");
+    const words = isEdited
+      ? h("input", {
+          class: "words",
+          value: text,
+          "aria-label": "What the person does",
+          maxlength: "2000",
+          oninput: (event: Event) => this.calls.write(one.id, (event.target as HTMLInputElement).value, second),
+          onkeydown: (event: KeyboardEvent) => {
+            if (["Enter", "Escape"].includes(event.key)) this.stopEditing(event);
+          },
+          onblur: () => this.stopEditing(),
+        })
+      : h("span", { class: text ? "words" : "words empty" }, shown);
+    return h(
+      "div",
+      {
+        class: `block${chosen ? " chosen" : ""}`,
+        style: this.span(at, at + one.seconds),
+        tabindex: "0",
+        role: "listitem",
+        "data-drag": second ? "second" : "block",
+        "data-id": one.id,
+        "data-key": one.id,
+        "aria-label": `Block ${index + 1}: ${shown}, ${one.seconds} seconds`,
+        onfocus: () => this.app.session.update({ selection: { kind: "segment", id: one.id } }),
+        ondblclick: () => this.edit(one.id, second),
+      },
+      words,
+      h("small", {}, `${round(one.seconds)} s`),
+      !second &&
+        index > 0 &&
+        h("i", {
+          class: "edge from",
+          "data-drag": "seam",
+          "data-id": project.segments[index - 1]!.id,
+          title: "Drag the seam",
+        }),
+      !second && h("i", { class: "edge to", "data-drag": "end", "data-id": one.id, title: "Drag the length" }),
+    );
+  }
+
+  private stopEditing(event?: KeyboardEvent): void {
+    event?.stopPropagation();
+    if (!this.editing) return;
+    const { id } = this.editing;
+    this.editing = null;
+    this.calls.written();
+    this.render();
+    if (event) this.content.querySelector<HTMLElement>(`[data-id="${id}"]`)?.focus();
+  }
+
+  private transition(project: Project, index: number, seam: number): HTMLElement {
+    const half = transitionOf(project, index) / 2;
+    return h(
+      "div",
+      {
+        class: "transition",
+        "data-key": `t${project.segments[index]!.id}`,
+        style: this.span(seam - half, seam + half),
+        title: `Transition: ${round(half * 2)} s`,
+      },
+      h("i", { "data-drag": "transition", "data-id": project.segments[index]!.id }),
+    );
+  }
+
+  private asks(project: Project): HTMLElement[] {
+    const who = Math.min(this.app.session.value.person, project.people.length - 1);
+    const person = project.people[who]!;
+    return [
+      this.pathTrack(project, person, who),
+      this.jointTrack(project, person, who),
+      this.poseTrack(project, person, who),
+    ];
+  }
+
+  private pathTrack(project: Project, person: Person, who: number): HTMLElement {
+    const seconds = length(project);
+    const path = person.path && timed(person.path, seconds);
+    const clip = shownClip(this.app);
+    const miss = isMeasurable(project, clip) ? pathMiss(clip, who, person, seconds) : null;
+    const children = path
+      ? [
+          h(
+            "div",
+            { class: `way${miss && miss[0] > 15 ? " unmet" : ""}`, style: this.span(0, path.times.at(-1)!) },
+            `${path.speed.toFixed(1)} m/s${miss ? ` · ${miss[0].toFixed(0)} cm off` : ""}`,
+          ),
+          ...path.times.map((time, index) =>
+            h("i", {
+              class: "dot",
+              "data-key": `p${index}`,
+              style: this.left(time),
+              title: `Point at ${time.toFixed(2)} s`,
+            }),
+          ),
+        ]
+      : [h("span", { class: "hint" }, "P, then draw on the floor")];
+    return h("div", { class: "track path", "data-key": "path", "aria-label": "Path" }, ...children);
+  }
+
+  private jointTrack(project: Project, person: Person, who: number): HTMLElement {
+    const clip = shownClip(this.app);
+    const { selection } = this.app.session.value;
+    const keys = person.targets.map((target) => {
+      const miss = isMeasurable(project, clip) ? targetMiss(clip, who, target) : null;
+      const chosen = selection.kind === "target" && selection.id === target.id;
+      const name = `${jointName(target.joint)} at ${target.time.toFixed(2)} s${miss === null ? "" : `, ${miss.toFixed(1)} cm off`}`;
+      const state = `${chosen ? " chosen" : ""}${miss !== null && miss > UNMET ? " unmet" : ""}`;
+      return h(
+        "button",
+        {
+          class: `key${target.until === null ? "" : " pinned"}${state}`,
+          style: target.until === null ? this.left(target.time) : this.span(target.time, target.until),
+          "data-drag": "target",
+          "data-id": target.id,
+          "data-key": target.id,
+          title: name,
+          "aria-label": name,
+        },
+        target.until === null ? "" : jointName(target.joint),
+        target.until !== null && h("i", { class: "edge to", "data-drag": "until", "data-id": target.id }),
+      );
+    });
+    return h(
+      "div",
+      { class: "track joints", "data-key": "joints", "aria-label": "Targets of joints" },
+      ...(keys.length ? keys : [h("span", { class: "hint" }, "T, then drag a joint")]),
+    );
+  }
+
+  private poseTrack(project: Project, person: Person, who: number): HTMLElement {
+    const clip = shownClip(this.app);
+    const { selection } = this.app.session.value;
+    const keys = person.poses.map((pose) => {
+      const miss = isMeasurable(project, clip) ? poseMiss(clip, who, pose) : null;
+      const chosen = selection.kind === "pose" && selection.id === pose.id;
+      const name = `${pose.name} at ${pose.time.toFixed(2)} s${miss === null ? "" : `, ${miss.toFixed(1)} cm off`}`;
+      return h("button", {
+        class: `key pose${chosen ? " chosen" : ""}${miss !== null && miss > UNMET ? " unmet" : ""}`,
+        style: this.left(pose.time),
+        "data-drag": "pose",
+        "data-id": pose.id,
+        "data-key": pose.id,
+        title: name,
+        "aria-label": name,
+      });
+    });
+    return h(
+      "div",
+      { class: "track poses", "data-key": "poses", "data-drop": "pose", "aria-label": "Poses" },
+      ...(keys.length ? keys : [h("span", { class: "hint" }, "O keeps the pose at hand")]),
+    );
+  }
+
+  private left(time: number): string {
+    return `left:${round(time * this.scale)}px`;
+  }
+
+  private span(from: number, to: number): string {
+    return `left:${round(from * this.scale)}px;width:${round((to - from) * this.scale)}px`;
+  }
+}

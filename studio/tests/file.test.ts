@@ -1,0 +1,56 @@
+import { describe, expect, it } from "vitest";
+import { putTarget } from "../src/project/asks";
+import { ProjectError, read, written } from "../src/project/file";
+import { exampleProject } from "../src/project/model";
+import { halfSeconds, snap } from "../src/project/snap";
+import { events } from "../src/server/events";
+
+describe("a project file", () => {
+  it("gives back what was written", () => {
+    const project = {
+      ...putTarget(exampleProject(), 0, 5, 1, [1, 2, 3]),
+      frozen: [[0, 1]] as const,
+      name: "Ångström 走",
+    };
+    expect(read(written(project))).toEqual(project);
+  });
+
+  it.each([
+    ["{", "it is not JSON"],
+    ["[]", "must be a mapping"],
+    ['{"version": 2}', "has version 2"],
+    ['{"version": 1, "segments": []}', "has no segments"],
+    ['{"version": 1, "segments": [{"id": "a", "text": "b", "seconds": 1e9}]}', "segments[0].seconds must be 0.2 to 60"],
+    [
+      '{"version": 1, "segments": [{"id": "a", "text": "b", "seconds": 1}], "takes": [{"motion": "../x", "seconds": 1}]}',
+      "names no motion",
+    ],
+  ])("is refused with a sentence: %s", (text, sentence) => {
+    expect(() => read(text)).toThrow(ProjectError);
+    expect(() => read(text)).toThrow(sentence);
+  });
+});
+
+describe("snapping", () => {
+  it("catches on what is near, else on a frame", () => {
+    expect(snap(1.46, halfSeconds(3), 0.1)).toBe(1.5);
+    expect(snap(1.33, halfSeconds(3), 0.1)).toBe(1.35);
+    expect(snap(1.46, halfSeconds(3), 0.1, true)).toBe(1.45);
+    expect(snap(1.46, [1.48, 1.5], 0.1)).toBe(1.48);
+  });
+});
+
+describe("server-sent events", () => {
+  it("are read whole, however the stream is cut", () => {
+    const text = 'event: progress\ndata: {"done":1}\n\n: still there\n\nevent: done\ndata: {"id":"x"}\n\n';
+    for (let cut = 0; cut <= text.length; cut += 1) {
+      const first = events(text.slice(0, cut));
+      const second = events(first.rest + text.slice(cut));
+      expect([...first.events, ...second.events]).toEqual([
+        { name: "progress", data: '{"done":1}' },
+        { name: "done", data: '{"id":"x"}' },
+      ]);
+      expect(second.rest).toBe("");
+    }
+  });
+});

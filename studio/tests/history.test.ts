@@ -1,0 +1,57 @@
+import { describe, expect, it, vi } from "vitest";
+import { History } from "../src/project/history";
+
+const add = (n: number) => (value: number) => value + n;
+
+describe("history", () => {
+  it("undoes and redoes without end", () => {
+    const history = new History(0);
+    for (let n = 0; n < 5000; n += 1) history.change("add", add(1));
+    for (let n = 0; n < 5000; n += 1) history.undo();
+    expect(history.value).toBe(0);
+    expect(history.undo()).toBe(false);
+    for (let n = 0; n < 5000; n += 1) history.redo();
+    expect(history.value).toBe(5000);
+  });
+
+  it("takes a gesture back as one step, and the next gesture as another", () => {
+    const history = new History(0);
+    for (let n = 0; n < 9; n += 1) history.change("drag", add(1), { merge: "drag:1", draft: true });
+    history.change("drag", add(0), { merge: "drag:1" });
+    history.change("drag", add(1), { merge: "drag:2" });
+    history.undo();
+    expect(history.value).toBe(9);
+    history.undo();
+    expect(history.value).toBe(0);
+  });
+
+  it("forgets what was undone when something new is done", () => {
+    const history = new History(0);
+    history.change("one", add(1));
+    history.undo();
+    history.change("ten", add(10));
+    expect(history.redo()).toBe(false);
+    expect(history.value).toBe(10);
+    expect(history.undoLabel).toBe("ten");
+  });
+
+  it("keeps results of a draw with the state that they belong to", () => {
+    const history = new History({ words: "a", takes: 0 });
+    history.amend((old) => ({ ...old, takes: 1 }));
+    history.change("write", () => ({ words: "b", takes: 1 }));
+    history.amend((old) => ({ ...old, takes: 2 }));
+    history.undo();
+    expect(history.value).toEqual({ words: "a", takes: 1 });
+    history.redo();
+    expect(history.value).toEqual({ words: "b", takes: 2 });
+  });
+
+  it("tells of every change, drafts as drafts, and of a release that changed nothing more", () => {
+    const history = new History(0);
+    const listener = vi.fn();
+    history.subscribe(listener);
+    history.change("drag", add(1), { merge: "d", draft: true });
+    history.change("drag", add(0), { merge: "d" });
+    expect(listener.mock.calls.map(([, change]) => (change as { draft: boolean }).draft)).toEqual([true, false]);
+  });
+});

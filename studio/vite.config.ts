@@ -1,0 +1,22 @@
+import { defineConfig, loadEnv } from "vite";
+
+const server = loadEnv("", ".", "MOTIONLOOM_").MOTIONLOOM_SERVER ?? "http://127.0.0.1:8765";
+
+/** The page lies in the Python package, so that the wheel carries it; `base` is relative, so that any path serves it. */
+export default defineConfig({
+  base: "./",
+  build: {
+    outDir: "../src/motionloom/server/page",
+    emptyOutDir: true,
+    target: "es2022",
+    chunkSizeWarningLimit: 1500,
+  },
+  server: {
+    proxy: Object.fromEntries(
+      ["/health", "/capabilities", "/jobs", "/motions", "/characters", "/project", "/timeline"].map((path) => [
+        path,
+        server,
+      ]),
+    ),
+  },
+});

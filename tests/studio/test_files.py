@@ -1,0 +1,92 @@
+"""Files out and in, and what survives a crash."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from motionloom import load
+from tests.studio.studio import Studio
+
+
+def test_a_bvh_comes_out_and_goes_in_again(studio: Studio, tmp_path: Path):
+    data = studio.download("e")
+    file = tmp_path / "walk.bvh"
+    file.write_bytes(data)
+    assert abs(load(file).seconds - 2.0) < 0.11
+    studio.page.locator("input[type=file]").set_input_files(str(file))
+    studio.page.wait_for_selector(".clip")
+    [clip] = studio.project()["clips"]
+    assert clip["name"] == "walk.bvh"
+    studio.page.locator(".clip select").select_option(index=1)
+    project = studio.project()
+    assert project["takes"][0]["how"] == "from a file"
+
+
+def test_one_clip_dragged_onto_another_goes_over_into_it(studio: Studio):
+    studio.key("w", "r")
+    studio.drawn()
+    studio.key("w")
+    assert len(studio.project()["clips"]) == 2
+    studio.page.locator(".clip").nth(1).scroll_into_view_if_needed()
+    studio.drag(studio.middle(".clip b"), studio.middle(".clip b", 1))
+    project = studio.project()
+    assert project["takes"][0]["how"] == "switched"
+    assert abs(project["takes"][0]["seconds"] - 5.0) < 0.2
+
+
+def test_the_timeline_runs_on_the_command_line_to_the_same_motion(studio: Studio, tmp_path: Path):
+    studio.open(("a person walks", 2), ("a person waves", 2))
+    studio.key("p", "ArrowUp", "ArrowUp", "ArrowUp", "Enter")
+    timeline = tmp_path / "timeline.yaml"
+    studio.drawn()
+    timeline.write_bytes(studio.download("Alt+e"))
+    out = tmp_path / "same.npz"
+    subprocess.run([sys.executable, "-m", "motionloom", "compose", str(timeline), "--out", str(out)], check=True)
+    here, there = studio.motion()[0], load(out).positions()
+    assert here.shape == there.shape
+    assert np.abs(here - there).max() < 1e-3
+
+
+def test_a_project_file_is_saved_and_opened(studio: Studio, tmp_path: Path):
+    studio.key("d")
+    studio.drawn()
+    file = tmp_path / "mine.loom.json"
+    file.write_bytes(studio.download("Control+s"))
+    assert len(json.loads(file.read_text())["segments"]) == 2
+    studio.key("Control+z")
+    assert len(studio.blocks()) == 1
+    studio.page.locator("input[type=file]").set_input_files(str(file))
+    assert len(studio.blocks()) == 2
+
+
+def test_a_file_that_is_no_project_is_told(studio: Studio, tmp_path: Path):
+    file = tmp_path / "broken.json"
+    file.write_text('{"version": 1, "segments": [{"id": "a", "text": 5}]}')
+    before = studio.blocks()
+    studio.page.locator("input[type=file]").set_input_files(str(file))
+    studio.page.wait_for_selector(".notice")
+    assert "segments[0].text must be text" in studio.page.locator(".notice").inner_text()
+    assert studio.blocks() == before
+
+
+def test_a_tab_that_is_closed_finds_its_project_again(studio: Studio):
+    studio.key("d")
+    before = studio.project()
+    studio.load()
+    after = studio.project()
+    assert after["segments"] == before["segments"]
+    assert after["takes"] == before["takes"]
+
+
+def test_a_server_that_is_away_is_told_and_nothing_is_lost(studio: Studio):
+    studio.page.route("**/*", lambda route: route.abort())
+    studio.key("d")
+    studio.page.wait_for_selector(".notice.away")
+    studio.page.unroute("**/*")
+    studio.page.wait_for_selector(".notice.away", state="detached")
+    project = studio.project()
+    assert len(project["segments"]) == 2
+    assert abs(project["takes"][0]["seconds"] - 4.0) < 0.01

@@ -1,0 +1,66 @@
+"""Takes, stretches that stay, what comes next, two people."""
+
+import numpy as np
+
+from tests.studio.studio import Studio
+
+
+def test_four_takes_side_by_side_and_one_is_kept(studio: Studio):
+    studio.key("g")
+    project = studio.project()
+    assert len(project["takes"]) == 4
+    assert len({take["seed"] for take in project["takes"]}) == 4
+    assert studio.page.locator("#names span").count() == 4
+    box = studio.page.locator("#canvas").bounding_box()
+    studio.page.mouse.click(box["x"] + box["width"] * 0.75, box["y"] + box["height"] * 0.75)
+    assert studio.project()["kept"] == 3
+    studio.key("2")
+    assert studio.project()["kept"] == 1
+
+
+def test_a_frozen_stretch_stays_and_the_rest_is_drawn(studio: Studio):
+    studio.open(("a person walks", 3), ("a person waves", 3))
+    before = studio.motion()
+    box = studio.page.locator(".content .ruler").bounding_box()
+    left, y = box["x"], box["y"] + 12
+    studio.drag((left + 2, y), (left + 3 * 84, y), hold="Shift")
+    studio.key("f", "r")
+    project = studio.project()
+    assert project["frozen"] == [[0, 3]]
+    assert project["takes"][0]["how"] == "redrawn"
+    after = studio.motion(project)
+    assert np.abs(after[0, :55] - before[0, :55]).max() < 0.02
+    assert np.abs(after[0, 75:] - before[0, 75:]).max() > 0.05
+    studio.key("Shift+F")
+    assert studio.project()["frozen"] == []
+
+
+def test_a_future_is_chosen(studio: Studio):
+    studio.key("n")
+    studio.page.wait_for_selector("#inspector >> text=What could come next")
+    assert studio.page.locator("#inspector .take").count() == 5
+    before = studio.motion()
+    studio.key("2")
+    project = studio.project()
+    assert [one["seconds"] for one in project["segments"]] == [2, 2]
+    after = studio.motion(project)
+    assert after.shape[1] == 80
+    assert np.abs(after[0, :40] - before[0]).max() < 1e-3
+
+
+def test_a_loop_closes(studio: Studio):
+    studio.key("l")
+    [person] = studio.motion()
+    first, last = person[0] - person[0, :1], person[-1] - person[-1, :1]
+    assert studio.project()["takes"][0]["how"] == "looped"
+    assert np.linalg.norm(first - last, axis=-1).mean() < 0.15
+
+
+def test_two_people_from_words(studio: Studio):
+    studio.open(("two people shake hands", 3))
+    studio.page.get_by_role("button", name="Two").click()
+    motion = studio.motion()
+    assert motion.shape[0] == 2
+    assert np.linalg.norm(motion[0, 0, 0] - motion[1, 0, 0]) > 0.3
+    studio.key("q")
+    assert studio.page.locator(".track.words").count() >= 2
