@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from motionloom.cli.sampling import write
 from motionloom.cli.skeletons import Target, put_all
@@ -20,7 +20,7 @@ Write = Callable[[Sequence[Made], list[list[Path]], int], object]
 """(what comes next, its files for each ``--out``, the number of its first): write it."""
 
 
-def groups(count: int, size: int, progress: Callable[[int, int], None]) -> Iterator[tuple[dict[str, int], "Moved"]]:
+def groups(count: int, size: int, progress: Callable[[int, int], None]) -> Iterator[tuple[dict[str, Any], "Moved"]]:
     """Numbers of what is made together: ``first`` and ``count`` of each group, and what moves the bar of all of them.
 
     count: how many in all; size: how many at once, at most.
