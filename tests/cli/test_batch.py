@@ -14,7 +14,7 @@ from motionloom.weights.prior import Prior
 from tests.bulk.rows import rows, written
 from tests.cli.said import complaint
 from tests.io.motions import largest_distance
-from tests.weights.test_adapter import adapter_of, trained
+from tests.tasks.test_adapting import adapter
 
 
 @pytest.fixture(autouse=True)
@@ -47,7 +47,7 @@ def test_what_was_taught_is_in_the_motions_and_in_their_names(weights: str, caps
     """Motions with an adapter are those of `generate` with it; without it the folder is another batch's."""
     prior = Prior.load(weights)
     for seed, name in ((1, "a"), (2, "b")):
-        adapter_of(trained(prior.net, given_rank=0, seed=seed), prior.net).save(f"{name}.safetensors")
+        adapter(prior, seed).save(f"{name}.safetensors")
     words = ("--prompts", "prompts.txt", "--seconds", "0.5", "--seed", "3")
     assert command(weights, *words, "--adapter", "a.safetensors:0.5") == 0
     made = {path.name: io.load(path) for path in finished(Path("out"), "**/*.npz")}

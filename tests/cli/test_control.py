@@ -66,8 +66,8 @@ def test_options_reach_the_task(weights: str, asked: list, capsys: pytest.Captur
     assert control(weights, *words, "--steps", "7", "--no-fit", "--no-foot-lock", "--out", "a.npz") == 0
     call = asked[0]
     goal = call.pop("goal")
-    assert call == {"prompt": "a person walks", "count": 2, "seed": 5, "guidance": 3.0, "steps": 7, "fit": False,
-                    "foot_lock": False, "adapters": "none"}  # fmt: skip
+    assert call == {"prompt": "a person walks", "count": 2, "first": 0, "seed": 5, "guidance": 3.0, "steps": 7,
+                    "fit": False, "foot_lock": False, "adapters": "none"}  # fmt: skip
     assert len(goal) == 40
     assert goal.positions[39, 0, ::2].tolist() == [1, 1.2]
     said = capsys.readouterr()
