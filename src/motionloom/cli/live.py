@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.sampling import add_adapters, check_outs, fail, load_prior
 from motionloom.cli.sampling import write as write_files
 from motionloom.cli.skeletons import Target, add_skeleton
+from motionloom.cli.writing import add_writing, check_overwriting, check_unit
 
 if TYPE_CHECKING:
     from motionloom.live.clock import Health
@@ -42,6 +42,7 @@ def add(subparsers) -> None:
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
     add_adapters(parser)
     add_skeleton(parser)
+    add_writing(parser)
     parser.set_defaults(run=_live)
 
 
@@ -55,10 +56,11 @@ def _live(arguments: argparse.Namespace) -> int:
     outs, target = check_outs(arguments)
     if arguments.fps is not None and not 1 <= arguments.fps <= 240:
         fail(f"--fps must be 1 to 240; got {arguments.fps:g}")
+    check_unit(arguments, outs)
     check_overwriting(arguments, outs)
     live = _made(arguments, script)
     frames, health = _against_time(script, live) if arguments.clock else (list(script.run(live)), None)
-    written = _written(frames, live.fps, outs, target)
+    written = _written(frames, live.fps, outs, target, arguments.out_unit)
     _report(arguments, script, written, health, {"calls": live.calls, "frames": len(frames)})
     return 0
 
@@ -90,7 +92,9 @@ def _against_time(script: "Script", live: "Live") -> tuple[list["Frame"], "Healt
         return frames, player.health
 
 
-def _written(frames: Sequence["Frame"], fps: float, outs: Sequence[Path], target: Target | None) -> list[Path]:
+def _written(
+    frames: Sequence["Frame"], fps: float, outs: Sequence[Path], target: Target | None, unit: float | None
+) -> list[Path]:
     """The files; a picture shows each stretch of the same words in a row of its own."""
     from itertools import groupby
 
@@ -103,7 +107,7 @@ def _written(frames: Sequence["Frame"], fps: float, outs: Sequence[Path], target
     for out in outs:
         pieces = stretches[:50] if out.suffix.lower() == ".png" and target is None else [(said, whole)]
         motions = [motion if target is None else target.put(motion) for _, motion in pieces]
-        files += write_files(motions, [out], [words for words, _ in pieces], target)
+        files += write_files(motions, [out], [words for words, _ in pieces], target, unit=unit)
     return files
 
 
