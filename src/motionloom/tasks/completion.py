@@ -5,7 +5,7 @@ clean. Here the network is told what is known, the walk ends clean, and what is 
 is led to it so that neither place nor velocity jumps, and bones keep the lengths of the past.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +13,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motionloom.diffusion import SOLVERS, guide, levels, row_draw, row_seed, run
+from motionloom.diffusion import SOLVERS, guide, levels, row_draw, row_seed, sample
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import bone_lengths, with_bones
+from motionloom.tasks.watching import reported
 from motionloom.weights.predictor import Predictor
 
 Array = NDArray[np.float64]
@@ -53,6 +54,7 @@ def complete(
     temperature: float = TEMPERATURE,
     solver: str = SOLVER,
     spacing: str = SPACING,
+    shown: Callable[[Tensor], Array] | None = None,
 ) -> Tensor:
     """Windows (rows, frames, channels) with what is not known drawn; row i from ``seeds[i]``, alone or in a batch.
 
@@ -60,6 +62,7 @@ def complete(
     observed one. Known numbers are those that are given, and the others leave them without a jump. ``guidance``
     above 1 exaggerates what is told (classifier-free guidance), below 1 heeds it less; it needs a second pass.
     ``temperature``: the standard deviation of the noise at the start; more makes livelier motion and more variety.
+    ``shown``: such windows as (rows, people, frames, 22, 3) metres, for who watches (`watching`); None: nobody can.
     """
     told = predictor.tell(features, mask, pose)
     yes, no = (torch.full((len(told),), flag, device=told.device) for flag in (True, False))
@@ -68,12 +71,16 @@ def complete(
         return predictor.denoiser(*cond)(x, level)
 
     draw = row_draw(seeds)
-    made = run(
-        guide(net, (told, yes), (told, no), guidance),
-        temperature * draw(torch.empty(len(told), *predictor.mean.shape, device=told.device)),
+    made = temperature * draw(torch.empty(len(told), *predictor.mean.shape, device=told.device))
+    walk = sample(
+        guide(net, (told, yes), (told, no), guidance), made,
         levels=levels(predictor.schedule, steps, spacing=spacing),
         solver=SOLVERS[solver], schedule=predictor.schedule, draw=draw,
     )  # fmt: skip
+    if shown is not None:
+        walk = reported(walk, steps, range(len(told)), lambda step: shown(predictor.to_features(step.clean, pose)))
+    for snapshot in walk:
+        made = snapshot.state
     return joined(predictor.to_features(made, pose), features, mask, ease=max(round(EASE * predictor.fps), 1))
 
 
@@ -160,11 +167,16 @@ def next_frames(
         count = min(given.shape[1], predictor.frames - h)
         seen[:, h : h + count], mask[h : h + count] = layout.encode(given[:, :count], place), known.mask[:count]
     features, like = torch.from_numpy(seen).to(predictor.mean), torch.from_numpy(mask).to(predictor.mean)
+
+    def placed(windows: Tensor) -> Array:
+        return layout.decode(windows[:, h : h + frames].cpu().double().numpy(), place)
+
     made = complete(
         predictor, features, like.expand(rows, -1, -1), features[:, h - 1],
         seeds=seeds, steps=steps, guidance=guidance, temperature=temperature, solver=solver, spacing=spacing,
+        shown=lambda windows: placed(windows)[:, None],
     )  # fmt: skip
-    places = layout.decode(made[:, h : h + frames].cpu().double().numpy(), place)
+    places = placed(made)
     return with_bones(places, layout.parents, bone_lengths(past, layout.parents)) if exact else places
 
 

@@ -34,9 +34,11 @@ from motionloom.tasks.text import (
     STEPS,
     Progress,
     check,
+    places_of,
     smooth,
     to_motion,
 )
+from motionloom.tasks.watching import reported
 from motionloom.weights.adapter import Adapter, adapted
 from motionloom.weights.adapter import adapters as shipped
 from motionloom.weights.prior import Prior
@@ -144,6 +146,8 @@ def steered_features(
             denoise = corrected(guided, [change] * len(said))
         state = draw(torch.empty(len(said), len(goal), len(prior.mean), device=prior.mean.device))
         walk = sample(denoise, state, levels=way, solver=SOLVERS[SOLVER], schedule=prior.schedule, draw=draw)
+        rows = range(start, start + len(said))
+        walk = reported(walk, steps, rows, lambda snapshot: places_of(prior, snapshot.clean)[:, None])
         for done, snapshot in enumerate(walk, start=1):
             state = snapshot.state
             if progress:

@@ -47,6 +47,7 @@ from motionloom.tasks.pair import (
 )
 from motionloom.tasks.splice import person_at_20, worn
 from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS, Progress, check, finish, smooth
+from motionloom.tasks.watching import Latest
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
@@ -259,6 +260,10 @@ class _Guess:
     """(2, 4) that each row's D began as."""
     nets: dict[int, PairNet] = field(default_factory=dict)
     """The network of each row, with its segment's adapters."""
+    seen: Latest = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.seen = Latest(len(self.way) - 1)
 
     def __call__(self, numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
         parts = [_parted(state.to(self.prior.mean)) for state in states]
@@ -281,6 +286,8 @@ class _Guess:
             motion = self._led(number, level, motion, begin, state=state)
             made.append(_strung(motion, places))
             self._carry(number, level, motion, begin)
+            self.seen.add([number], [(motion, begin, self.rows[number][0])])
+        self.seen.report(self._placed)
         return made
 
     def add(self, number: int, row: tuple[Row, ...], *, asked: Sequence[bool], seed: int) -> None:
@@ -316,6 +323,15 @@ class _Guess:
         """The guess of a row, its people led to each other from where they begin."""
         places = self.net.talk.config.places.encode(begin)
         return part(self.leads[number](join(places, state), join(places, motion), level))[1]
+
+    def _placed(self, parts: Sequence[tuple[Tensor, Tensor, Row]]) -> np.ndarray:
+        """(2, frames, 22, 3) of rows between their seams: guesses (2, frames, 263), where they begin, and the row."""
+        placed = []
+        for motion, begin, row in parts:
+            features = motion * self.prior.std + self.prior.mean
+            own = features[:, row.before : row.before + row.frames]
+            placed.append(two.decode(own, two.later(features, begin, row.before)))
+        return torch.cat(placed, dim=1).cpu().numpy()
 
     def _carry(self, number: int, level: int, motion: Tensor, begin: Tensor) -> None:
         row, features = self.rows[number][0], motion * self.prior.std + self.prior.mean

@@ -35,6 +35,7 @@ from motionloom.tasks.body import Places, bodies
 from motionloom.tasks.splice import person_at_20
 from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, STEPS
 from motionloom.tasks.text import check as check_sampling
+from motionloom.tasks.watching import Latest
 from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
@@ -138,6 +139,7 @@ def long_features(
     """
     rows: dict[int, Row] = {}
     way = levels(prior.schedule, steps, spacing=spacing)  # type: ignore[arg-type]
+    place, seen = past.end if past else Placement(), Latest(steps)
 
     def links() -> Iterator[Link]:
         for number, row in enumerate(chain_rows(prior, segments, guidance, past)):
@@ -148,7 +150,10 @@ def long_features(
         chosen = [rows[number] for number in numbers]
         here = [state.to(prior.mean) for state in states]  # the noise that rows begin with is the CPU's
         cleans = _settled(prior, chosen, here, at, last=way[-2])
-        return [row.correct(clean, level) for row, clean, level in zip(chosen, cleans, at, strict=True)]
+        cleans = [row.correct(clean, level) for row, clean, level in zip(chosen, cleans, at, strict=True)]
+        seen.add(numbers, [clean[row.before :][: row.frames] for row, clean in zip(chosen, cleans, strict=True)])
+        seen.report(lambda parts: decoded(_numbers(prior, torch.cat(parts)), place)[0][None])
+        return cleans
 
     walk = staggered(
         links(), guess, levels=way, solver=SOLVERS[solver], schedule=prior.schedule, features=len(prior.mean),
@@ -157,6 +162,11 @@ def long_features(
     for number, state in enumerate(walk):
         row = rows.pop(number)
         yield (state[row.before : row.before + row.frames] * prior.std + prior.mean).cpu()
+
+
+def _numbers(prior: Prior, clean: Tensor) -> Array:
+    """Features that are not standardised, on the CPU."""
+    return (clean * prior.std + prior.mean).cpu().numpy().astype(np.float64)
 
 
 def chain_rows(prior: Prior, segments: Iterable[Segment], guidance: float, past: "Past | None") -> Iterator[Row]:

@@ -14,6 +14,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from motionloom.diffusion import SOLVERS, Draw, guide, inpaint, levels, observe, row_draw, row_seed, sample
+from motionloom.diffusion.sampling import Snapshot
 from motionloom.edits.fitting import fit
 from motionloom.edits.relative_pose import leader
 from motionloom.edits.steering import Correction, toward
@@ -43,6 +44,7 @@ from motionloom.tasks.text import (
     frames_in,
     smooth,
 )
+from motionloom.tasks.watching import reported
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
@@ -174,7 +176,13 @@ def _walked(
     walk = sample(
         denoise, state, levels=way, solver=SOLVERS[SOLVER], schedule=prior.schedule, draw=draw, constrain=hold
     )
-    for done, snapshot in enumerate(walk, start=1):
+
+    def placed(snapshot: Snapshot) -> np.ndarray:
+        places, motion = part(snapshot.clean)
+        stands = net.talk.config.places.decode(places.unflatten(0, (-1, 2)))
+        return two.decode((motion * prior.std + prior.mean).unflatten(0, (-1, 2)), stands).cpu().numpy()
+
+    for done, snapshot in enumerate(reported(walk, steps, range(len(prompts) // 2), placed), start=1):
         state = snapshot.state
         told(done)
     if prior.net.config.patch > 1:

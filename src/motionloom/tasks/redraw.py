@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from motionloom.diffusion import SOLVERS, guide, inpaint, levels, observe, restart, row_draw, sample
+from motionloom.diffusion.sampling import Snapshot
 from motionloom.edits.boundary import Stretch, arrival, joining
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT
 from motionloom.goals.goal import Placement
 from motionloom.kinematics.physics import heading
 from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS, smooth
+from motionloom.tasks.watching import reported
 from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
@@ -68,9 +70,15 @@ def redraw(
     hold = observe(data, mask, prior.schedule, draw)
     state = draw(data) if stretch.strength == 1.0 else restart(data, prior.schedule, way[0], draw)
     state = hold(state, way[0])
-    for snapshot in sample(
+
+    def placed(snapshot: Snapshot) -> Array:
+        features = (snapshot.clean[0] * spread + prior.mean).cpu().double()
+        return _placed(features, known[0].cpu().double(), stretch, place)[None, None]
+
+    walk = sample(
         denoise, state, levels=way, solver=SOLVERS[SOLVER], schedule=prior.schedule, draw=draw, constrain=hold
-    ):
+    )
+    for snapshot in reported(walk, len(way) - 1, [0], placed):
         state = snapshot.state
         progress()
     made = state * spread + prior.mean

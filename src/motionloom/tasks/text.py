@@ -18,6 +18,7 @@ from motionloom.goals.segment import LONGEST
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
+from motionloom.tasks.watching import reported
 from motionloom.weights.prior import Prior
 
 STEPS, SOLVER, SPACING, GUIDANCE = 24, "ddpm", "early", 2.5
@@ -81,6 +82,7 @@ def _sampled(
         draw = row_draw([seeds[row] for row in rows])
         state = draw(torch.empty(len(rows), frames[rows[0]], len(prior.mean), device=prior.mean.device))
         walk = sample(denoise, state, levels=way, solver=SOLVERS[solver], schedule=prior.schedule, draw=draw)
+        walk = reported(walk, steps, rows, lambda snapshot: places_of(prior, snapshot.clean)[:, None])
         for done, snapshot in enumerate(walk, start=1):
             state = snapshot.state
             if progress:
@@ -168,6 +170,15 @@ def smooth(features: Tensor) -> Tensor:
     before = torch.cat([features[..., :1, :], features[..., :-1, :]], dim=-2)
     after = torch.cat([features[..., 1:, :], features[..., -1:, :]], dim=-2)
     return (before + 4 * features + after) / 6
+
+
+def places_of(prior: Prior, clean: Tensor) -> np.ndarray:
+    """(rows, frames, 22, 3) metres of standardised features (rows, frames, numbers): as the network drew them."""
+    features = clean * prior.std + prior.mean
+    features = (smooth(features) if prior.net.config.patch > 1 else features).cpu()
+    if features.shape[-1] == WIDTH:
+        return humanml.decode_positions(features).numpy()
+    return np.stack([finish(prior, row, clean=False).positions() for row in features])
 
 
 def to_motion(features: np.ndarray, fps: float, *, clean: bool = True) -> Motion:
