@@ -22,6 +22,7 @@ FAMILIES = (
     "predict",
     "duet",
     "batch",
+    "serve",
     "files",
     "data",
     "teach",
