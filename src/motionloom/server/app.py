@@ -21,12 +21,13 @@ from starlette.routing import BaseRoute, Route
 from motionloom.errors import MotionloomError
 from motionloom.io.text import parse_json
 from motionloom.retarget.named import NAMED
-from motionloom.server import asking, page
+from motionloom.server import asking
+from motionloom.server import page as built
 from motionloom.server.bodies import body_of, file_of
 from motionloom.server.guard import Door, Guard
 from motionloom.server.limits import Limits
-from motionloom.server.openapi import DOCUMENT, as_page
-from motionloom.server.project import Project
+from motionloom.server.openapi import as_page, document
+from motionloom.server.project import Project, Stored
 from motionloom.server.refusal import Refusal
 from motionloom.server.streaming import events
 from motionloom.server.worker import Worker
@@ -61,7 +62,7 @@ def build(project: Project, worker: Worker, door: Door) -> Starlette:
         worker.stop()
 
     app = Starlette(
-        routes=_routes(), lifespan=lifespan, middleware=[Middleware(Guard, door=door)],
+        routes=routes(), lifespan=lifespan, middleware=[Middleware(Guard, door=door)],
         exception_handlers={
             Refusal: _refused, MotionloomError: _mistaken, HTTPException: _no_route, Exception: _failed,
         },
@@ -70,7 +71,8 @@ def build(project: Project, worker: Worker, door: Door) -> Starlette:
     return app
 
 
-def _routes() -> list[BaseRoute]:
+def routes(*, page: bool = True) -> list[BaseRoute]:
+    """What is answered; ``page``: with the files of the studio's page."""
     return [
         Route("/health", health),
         Route("/capabilities", capabilities),
@@ -86,7 +88,7 @@ def _routes() -> list[BaseRoute]:
         Route("/timeline.json", timeline_to_json, methods=["POST"]),
         Route("/openapi.json", openapi),
         Route("/docs", docs),
-        *page.routes(),
+        *(built.routes() if page else ()),
     ]
 
 
@@ -117,11 +119,11 @@ async def capabilities(request: Request) -> Response:
 
 
 async def openapi(request: Request) -> Response:
-    return JSONResponse(DOCUMENT)
+    return JSONResponse(document(studio_of(request).limits))
 
 
 async def docs(request: Request) -> Response:
-    return HTMLResponse(as_page(DOCUMENT))
+    return HTMLResponse(as_page(document(studio_of(request).limits)))
 
 
 # Jobs
@@ -181,10 +183,15 @@ async def upload_motion(request: Request) -> Response:
     asf = request.query_params.get("asf")
     async with file_of(request, studio.project, (*files.UPLOADS, ".asf"), studio.limits) as (part, name):
         if part.suffix == ".asf":
-            about = await run_in_threadpool(_library(studio, files.read_skeleton), studio.project, part, name)
+            about = await run_in_threadpool(
+                _library(studio, files.read_skeleton, part, name), studio.project, part, name
+            )
             return JSONResponse(about, status_code=201)
-        read = _library(studio, lambda: files.read_upload(studio.project, part, name, asf=asf, limits=studio.limits))
-        stored = await run_in_threadpool(read)
+
+        def read() -> Stored:
+            return files.read_upload(studio.project, part, name, asf=asf, limits=studio.limits)
+
+        stored = await run_in_threadpool(_library(studio, read, part, name))
     first = stored.people[0]
     about = {"id": stored.id, "fps": first.fps, "frames": len(first), "people": len(stored.people)}
     return JSONResponse(about | {"seconds": round(first.seconds, 4), "name": name}, status_code=201)
@@ -228,7 +235,7 @@ async def upload_character(request: Request) -> Response:
 
     studio = studio_of(request)
     async with file_of(request, studio.project, files.SUFFIXES, studio.limits) as (part, name):
-        read = _library(studio, files.read_character)
+        read = _library(studio, files.read_character, part, name)
         about = await run_in_threadpool(read, studio.project, part, name)
     return JSONResponse(about, status_code=201)
 
@@ -239,14 +246,15 @@ async def character(request: Request) -> Response:
     return FileResponse(path, media_type=kinds.get(path.suffix, "model/gltf-binary"), filename=name)
 
 
-def _library(studio: Studio, call: Callable[..., Any]) -> Callable[..., Any]:
-    """The call, with the server's folders taken out of what it says went wrong."""
+def _library(studio: Studio, call: Callable[..., Any], part: Path | None = None, name: str = "") -> Callable[..., Any]:
+    """The call, with the server's folders taken out of what it says went wrong; ``part`` is called ``name`` there."""
 
     def called(*given: Any) -> Any:
         try:
             return call(*given)
         except MotionloomError as error:
-            raise MotionloomError(studio.project.without_paths(str(error))) from None
+            sentence = str(error) if part is None else str(error).replace(str(part), name)
+            raise MotionloomError(studio.project.without_paths(sentence)) from None
 
     return called
 

@@ -69,6 +69,7 @@ def _bound(host: str, port: int) -> socket.socket:
         made = socket.socket(family, kind, protocol)
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         made.bind(place)
+        made.listen(128)  # who connects from now on waits until the application is up
     except (OSError, OverflowError) as error:
         problem = getattr(error, "strerror", None) or error
         raise MotionloomError(
