@@ -26,6 +26,8 @@ from motionloom.server import page as built
 from motionloom.server.bodies import body_of, file_of
 from motionloom.server.guard import Door, Guard
 from motionloom.server.limits import Limits
+from motionloom.server.mmcp.routes import capabilities_of
+from motionloom.server.mmcp.routes import routes as mmcp_routes
 from motionloom.server.openapi import as_page, document
 from motionloom.server.project import Project, Stored
 from motionloom.server.refusal import Refusal
@@ -86,6 +88,7 @@ def routes(*, page: bool = True) -> list[BaseRoute]:
         Route("/project", saved_project, methods=["GET", "PUT"]),
         Route("/timeline.yaml", timeline_to_yaml, methods=["POST"]),
         Route("/timeline.json", timeline_to_json, methods=["POST"]),
+        *mmcp_routes(),
         Route("/openapi.json", openapi),
         Route("/docs", docs),
         *(built.routes() if page else ()),
@@ -115,6 +118,7 @@ async def capabilities(request: Request) -> Response:
             "tasks": list(asking.TASKS), "limits": studio.limits.public(), "formats": list(FORMATS),
             "skeletons": list(NAMED),
         }
+        | await capabilities_of(request.app)
     )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ Numbers are bounded by `Limits`; timelines and goals go through the readers of t
 are refused with the same sentences.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,6 +61,8 @@ class Request:
     motion: Stored | None = None
     other: Stored | None = None
     """What is switched to."""
+    call: "Callable[[Any, Callable[[int, int], None]], Iterator[Any]] | None" = None
+    """Draws instead of the task: (models, progress) -> results to keep."""
 
     @property
     def prompt(self) -> str:

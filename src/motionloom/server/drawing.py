@@ -60,6 +60,8 @@ class Result:
 
 def draw(models: Models, request: Request, progress: Progress) -> Iterator[Result]:
     """The motions of a request, one after the other as they are finished."""
+    if request.call is not None:
+        return request.call(models, progress)
     if request.task in ("generate", "compose", "control") and request.timeline is not None:
         return _composed(models, request, progress)
     return _TASKS[request.task](models, request, progress)
@@ -73,7 +75,7 @@ def shared(request: Request) -> dict[str, Any]:
 
 def batch_key(request: Request) -> tuple[Any, ...] | None:
     """Requests of one key may be drawn in one network call; None: this one is drawn alone."""
-    if request.task != "generate" or request.timeline is not None:
+    if request.task != "generate" or request.timeline is not None or request.call is not None:
         return None
     return text.frames_in(request.options["seconds"], RATE), request.steps, request.guidance
 

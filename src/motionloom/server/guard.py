@@ -85,10 +85,17 @@ class Guard:
         if scope["type"] == "websocket":
             await receive()
             return await send({"type": "websocket.close", "code": 1008, "reason": problem[1][:120]})
-        body = json.dumps({"error": problem[1]}).encode()
+        body = json.dumps({"error": _in_envelope(scope["path"], *problem)}).encode()
         headers = [(b"content-type", b"application/json"), (b"connection", b"close")]
         await send({"type": "http.response.start", "status": problem[0], "headers": headers})
         await send({"type": "http.response.body", "body": body})
+
+
+def _in_envelope(path: str, status: int, sentence: str) -> Any:
+    """The sentence, or MMCP's envelope of it where MMCP was asked."""
+    if path != "/generate" and not path.startswith("/mmcp"):
+        return sentence
+    return {"code": "unauthorized" if status == 401 else "forbidden", "message": sentence, "details": {}}
 
 
 def is_loopback(host: str) -> bool:
