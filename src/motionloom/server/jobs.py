@@ -130,6 +130,15 @@ class Job:
             self._listeners.add(listener)
         return lambda: self._listeners.discard(listener)
 
+    def wait(self) -> None:
+        """Block until the job has ended."""
+        ended = threading.Event()
+        stop = self.listen(ended.set)
+        while not self.finished:
+            ended.wait()
+            ended.clear()
+        stop()
+
     def forget_levels(self) -> None:
         """Drop the poses of the log."""
         with self._lock:

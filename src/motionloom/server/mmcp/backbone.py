@@ -39,6 +39,7 @@ class MotionloomBackbone(Backbone):
             limits=ModelLimits(
                 max_duration_seconds=SECONDS, max_num_samples=limits.count, max_prompt_length=limits.prompt,
                 max_request_bytes=limits.body_bytes, max_batch_size=8, max_reference_frames=3600,
+                max_video_bytes=None, max_video_seconds=None,
             ),
         )  # fmt: skip
 
@@ -84,7 +85,11 @@ class MotionloomBackbone(Backbone):
 async def ended(job: Job) -> None:
     """Wait until a job has ended."""
     loop, woken = asyncio.get_running_loop(), asyncio.Event()
-    stop = job.listen(lambda: loop.call_soon_threadsafe(woken.set))
+
+    def wake() -> None:
+        loop.call_soon_threadsafe(woken.set)
+
+    stop = job.listen(wake)
     try:
         while not job.finished:
             await woken.wait()

@@ -6,6 +6,7 @@ from typing import Any
 
 from starlette.applications import Starlette
 from starlette.routing import BaseRoute, Mount, Route
+from starlette.types import Receive, Scope, Send
 
 MISSING = "this server does not speak MMCP: install it with pip install 'motionloom[mmcp]'"
 
@@ -13,7 +14,7 @@ MISSING = "this server does not speak MMCP: install it with pip install 'motionl
 class _Forwarded:
     """Hands a request to the SDK's application, which is made when it is first asked."""
 
-    async def __call__(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         inner = application_of(scope["app"])
         if inner is None:
             body = json.dumps({"error": {"code": "model_unavailable", "message": MISSING, "details": {}}}).encode()
@@ -26,7 +27,8 @@ class _Forwarded:
 
 def routes() -> list[BaseRoute]:
     """Routes for the server's application."""
-    return [Route("/generate", _Forwarded(), methods=["POST"]), Mount("/mmcp", _Forwarded())]
+    found: list[BaseRoute] = [Route("/generate", _Forwarded(), methods=["POST"]), Mount("/mmcp", _Forwarded())]
+    return found
 
 
 def application_of(app: Starlette) -> Any:
