@@ -2,7 +2,7 @@
 
 import base64
 import threading
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -53,8 +53,8 @@ class Studio:
         self.exporting = threading.BoundedSemaphore(self.limits.exports)
 
 
-def build(project: Project, worker: Worker, door: Door) -> Starlette:
-    """The application; the worker runs as long as it does."""
+def build(project: Project, worker: Worker, door: Door, *, more: Sequence[BaseRoute] = ()) -> Starlette:
+    """The application; the worker runs as long as it does. ``more``: further routes, WebSockets too, behind the door."""
     studio = Studio(project, worker, worker.limits)
 
     @asynccontextmanager
@@ -64,7 +64,7 @@ def build(project: Project, worker: Worker, door: Door) -> Starlette:
         worker.stop()
 
     app = Starlette(
-        routes=routes(), lifespan=lifespan, middleware=[Middleware(Guard, door=door)],
+        routes=[*more, *routes()], lifespan=lifespan, middleware=[Middleware(Guard, door=door)],
         exception_handlers={
             Refusal: _refused, MotionloomError: _mistaken, HTTPException: _no_route, Exception: _failed,
         },

@@ -58,7 +58,7 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
         print(f"motionloom: {page.MISSING}", file=sys.stderr, flush=True)
     config = uvicorn.Config(
         app, log_level="warning", access_log=False, server_header=False, limit_concurrency=CONNECTIONS,
-        timeout_graceful_shutdown=2, ws="none",
+        timeout_graceful_shutdown=2, ws_max_size=1 << 16,
     )  # fmt: skip
     uvicorn.Server(config).run(sockets=[bound])
 

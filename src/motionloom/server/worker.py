@@ -16,6 +16,7 @@ from motionloom.server.refusal import Refusal
 if TYPE_CHECKING:
     from motionloom.server.drawing import Models, Result
     from motionloom.tasks.watching import Denoised
+    from motionloom.weights.prior import Prior
 
 log = logging.getLogger("motionloom.server")
 ROWS = 8
@@ -37,12 +38,20 @@ class Worker:
         """Why nothing can be drawn."""
         self._jobs: dict[str, Job] = {}
         self._lock = threading.Lock()
+        self._loaded = threading.Event()
         self._thread = threading.Thread(target=self._run, name="motionloom-worker", daemon=True)
 
     @property
     def warm(self) -> bool:
         """Whether the prior is loaded and has drawn once."""
         return self.models is not None
+
+    def prior(self) -> "Prior":
+        """The weights, once they are loaded; raises `Refusal` 503 where they cannot be."""
+        self._loaded.wait()
+        if self.models is None:
+            raise Refusal(503, self.problem or "the server was stopped")
+        return self.models.prior
 
     def start(self) -> None:
         """Begin to load the prior, and to draw."""
@@ -96,11 +105,13 @@ class Worker:
     def _run(self) -> None:
         try:
             self.models = models = self._load()
+            self._loaded.set()
         except Exception as error:
             if not isinstance(error, MotionloomError):
                 log.exception("the prior could not be loaded")
             self.problem = f"nothing can be drawn: {error or type(error).__name__}"
             print(f"motionloom: {self.problem}", file=sys.stderr)
+            self._loaded.set()
             self.stop()
             return
         from motionloom.server.drawing import batch_key
