@@ -148,6 +148,14 @@ def test_a_server_that_is_killed_comes_back_with_project_and_motions(tmp_path: P
         assert not [name for name in left if name.startswith(".")]
 
 
+def test_a_folder_has_one_server(server: Server) -> None:
+    command = [sys.executable, "-m", "motionloom", "serve", "--port", "0", "--project", str(server.project)]
+    second = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert second.returncode == 2
+    assert "another server has the project folder" in second.stderr
+    assert server.json("GET", "/health")[0] == 200
+
+
 def test_a_server_for_others_wants_its_token(tmp_path: Path) -> None:
     pytest.importorskip("starlette")
     with running(tmp_path, "--host", "0.0.0.0") as open_one:

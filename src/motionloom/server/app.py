@@ -1,7 +1,7 @@
 """The HTTP application: routes, bodies and answers. What they mean stands in `docs/server.md`."""
 
+import asyncio
 import base64
-import threading
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -47,14 +47,15 @@ class Studio:
     limits: Limits
     streams: int = 0
     """Event streams that are open."""
-    exporting: threading.BoundedSemaphore = field(init=False)
+    files: asyncio.Semaphore = field(init=False)
+    """Held while a file is read or made: few at a time, and nobody else's answers wait for a thread."""
 
     def __post_init__(self) -> None:
-        self.exporting = threading.BoundedSemaphore(self.limits.exports)
+        self.files = asyncio.Semaphore(self.limits.exports)
 
 
 def build(project: Project, worker: Worker, door: Door, *, more: Sequence[BaseRoute] = ()) -> Starlette:
-    """The application; the worker runs as long as it does. ``more``: further routes, WebSockets too, behind the door."""
+    """The application; the worker runs as long as it does. ``more``: further routes, also WebSockets."""
     studio = Studio(project, worker, worker.limits)
 
     @asynccontextmanager
@@ -187,15 +188,13 @@ async def upload_motion(request: Request) -> Response:
     asf = request.query_params.get("asf")
     async with file_of(request, studio.project, (*files.UPLOADS, ".asf"), studio.limits) as (part, name):
         if part.suffix == ".asf":
-            about = await run_in_threadpool(
-                _library(studio, files.read_skeleton, part, name), studio.project, part, name
-            )
+            about = await _with_file(studio, lambda: files.read_skeleton(studio.project, part, name), part, name)
             return JSONResponse(about, status_code=201)
 
         def read() -> Stored:
             return files.read_upload(studio.project, part, name, asf=asf, limits=studio.limits)
 
-        stored = await run_in_threadpool(_library(studio, read, part, name))
+        stored = await _with_file(studio, read, part, name)
     first = stored.people[0]
     about = {"id": stored.id, "fps": first.fps, "frames": len(first), "people": len(stored.people)}
     return JSONResponse(about | {"seconds": round(first.seconds, 4), "name": name}, status_code=201)
@@ -215,10 +214,9 @@ async def motion(request: Request) -> Response:
     person, skeleton = _person(request), request.query_params.get("skeleton")
 
     def made() -> Path:
-        with studio.exporting:
-            return files.export(studio.project, stored, kind, skeleton=skeleton, person=person)
+        return files.export(studio.project, stored, kind, skeleton=skeleton, person=person)
 
-    part = await run_in_threadpool(_library(studio, made))
+    part = await _with_file(studio, made)
     return FileResponse(
         part, media_type=files.FORMATS[kind], filename=f"motion-{name[:8]}{part.suffix}",
         background=BackgroundTask(part.unlink, missing_ok=True),
@@ -239,8 +237,7 @@ async def upload_character(request: Request) -> Response:
 
     studio = studio_of(request)
     async with file_of(request, studio.project, files.SUFFIXES, studio.limits) as (part, name):
-        read = _library(studio, files.read_character, part, name)
-        about = await run_in_threadpool(read, studio.project, part, name)
+        about = await _with_file(studio, lambda: files.read_character(studio.project, part, name), part, name)
     return JSONResponse(about, status_code=201)
 
 
@@ -250,17 +247,13 @@ async def character(request: Request) -> Response:
     return FileResponse(path, media_type=kinds.get(path.suffix, "model/gltf-binary"), filename=name)
 
 
-def _library(studio: Studio, call: Callable[..., Any], part: Path | None = None, name: str = "") -> Callable[..., Any]:
-    """The call, with the server's folders taken out of what it says went wrong; ``part`` is called ``name`` there."""
-
-    def called(*given: Any) -> Any:
+async def _with_file(studio: Studio, call: Callable[[], Any], part: Path | None = None, name: str = "") -> Any:
+    """Read or make a file in a thread, few at a time; ``part`` is called ``name`` in what goes wrong."""
+    async with studio.files:
         try:
-            return call(*given)
+            return await run_in_threadpool(call)
         except MotionloomError as error:
-            sentence = str(error) if part is None else str(error).replace(str(part), name)
-            raise MotionloomError(studio.project.without_paths(sentence)) from None
-
-    return called
+            raise MotionloomError(str(error).replace(str(part), name) if part else str(error)) from None
 
 
 # The project and its timeline
@@ -281,7 +274,7 @@ async def timeline_to_yaml(request: Request) -> Response:
     studio = studio_of(request)
     value = parse_json(await body_of(request, studio.limits.body_bytes), "the body")
     text = asking.timeline_yaml(value)
-    await run_in_threadpool(_library(studio, asking.read_timeline_text), text, studio.project, studio.limits)
+    await run_in_threadpool(asking.read_timeline_text, text, studio.project, studio.limits)
     return PlainTextResponse(text, media_type="application/yaml")
 
 
@@ -292,8 +285,7 @@ async def timeline_to_json(request: Request) -> Response:
         text = body.decode("utf-8")
     except UnicodeDecodeError:
         raise MotionloomError("the timeline is not UTF-8 text; save it as UTF-8") from None
-    read = _library(studio, asking.timeline_json)
-    return JSONResponse(await run_in_threadpool(read, text, studio.project, studio.limits))
+    return JSONResponse(await run_in_threadpool(asking.timeline_json, text, studio.project, studio.limits))
 
 
 # What goes wrong

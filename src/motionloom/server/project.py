@@ -6,6 +6,8 @@
     characters/ID.glb       a character (.glb, .gltf, .vrm, .bvh) or the skeleton of AMC files (.asf)
     characters/ID.json      its name
     temporary/              files on their way in or out; emptied at the start
+    exports/                files that an assistant asked for
+    lock                    held by the one server that has the folder open
 
 Names are made here and are 16 hexadecimal digits: nothing that a client sends becomes part of a path.
 """
@@ -16,8 +18,10 @@ import re
 import secrets
 import shutil
 import threading
+import time
 from collections import OrderedDict
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,10 +34,17 @@ from motionloom.server.refusal import Refusal
 if TYPE_CHECKING:
     from motionloom.motion import Motion
 
+try:
+    import fcntl
+except ImportError:  # no such locks on this system
+    fcntl = None
+
 ID = re.compile(r"[0-9a-f]{16}")
 CHARACTERS = (".glb", ".gltf", ".vrm", ".bvh", ".asf")
 CACHED = 24
 """Motions that stay in memory."""
+STALE = 3600.0
+"""Seconds after which a file on its way is not on its way any more: whoever waited for it is gone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +55,23 @@ class Stored:
     people: "tuple[Motion, ...]"
     about: dict[str, Any] = field(default_factory=dict)
     """Task, prompt, seed and what else is known of it; plain JSON."""
+
+
+def _own(path: Path) -> int | None:
+    """Hold a lock on a file as long as the process lives; MotionloomError where another one does."""
+    if fcntl is None:
+        return None
+    file = os.open(path, os.O_CREAT | os.O_RDWR, 0o666)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(file)
+        raise MotionloomError(
+            f"another server has the project folder {path.parent} open; end it, or name another folder with --project"
+        ) from None
+    except OSError:  # a file system without locks
+        pass
+    return file
 
 
 class Project:
@@ -58,6 +86,7 @@ class Project:
         try:
             for place in (self.motions, self.characters, self.temporary):
                 place.mkdir(parents=True, exist_ok=True)
+            self._owned = _own(self.folder / "lock")
             for left in self.temporary.iterdir():
                 shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
         except OSError as error:
@@ -68,7 +97,11 @@ class Project:
         self._order = [name[:-5] for name in self._sizes if name.endswith(".json")]
 
     def part(self, suffix: str = "") -> Path:
-        """A fresh name in the folder for what is on its way."""
+        """A fresh name in the folder for what is on its way; what others left there long ago is removed."""
+        for left in self.temporary.iterdir():
+            with suppress(OSError):
+                if time.time() - left.stat().st_mtime > STALE:
+                    left.unlink()
         return self.temporary / f"{secrets.token_hex(8)}{suffix}"
 
     def without_paths(self, sentence: str) -> str:
