@@ -37,8 +37,8 @@ def of_the_wrist(level: int) -> float:
 
 shipped = adapters()
 chosen = [Adapter.load(name, prior) for name in ("trajectory", "right_wrist") if name in shipped]
-weights = [of_the_path, of_the_wrist] if len(chosen) == 2 else None
-[made] = control(prior, "a person walks", goal, seed=1, steps=8, adapters=chosen, weights=weights)
+weighted = list(zip(chosen, [of_the_path, of_the_wrist])) if len(chosen) == 2 else chosen
+[made] = control(prior, "a person walks", goal, adapters=weighted, seed=1, steps=8)
 save(made.motion, "blended.bvh")
 print(
     f"blended.bvh: {len(chosen)} adapters, {100 * made.error:.2f} cm from the goals, {100 * made.worst:.2f} cm at most"

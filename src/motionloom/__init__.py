@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from motionloom.bulk.metadata import read_batch
     from motionloom.errors import MotionloomError
     from motionloom.goals.goal import Goal
-    from motionloom.goals.hold import HeldPart, Hold
+    from motionloom.goals.hold import FixedJoints, FixedPart, HeldPart, Hold
     from motionloom.goals.segment import Segment
     from motionloom.io import load, save
     from motionloom.motion import Motion
@@ -27,10 +27,11 @@ if TYPE_CHECKING:
     from motionloom.skeleton import SMPL22, Skeleton
     from motionloom.tasks.control import Controlled, control
     from motionloom.tasks.duet import compose_pair, react
-    from motionloom.tasks.edit import edit
+    from motionloom.tasks.edit import Extend, Loop, Redraw, edit
     from motionloom.tasks.long import compose
     from motionloom.tasks.pair import complete_pair, generate_pair
     from motionloom.tasks.predict import predict, switch
+    from motionloom.tasks.sampling import PairSampling, PredictionSampling, Sampling
     from motionloom.tasks.text import generate
     from motionloom.weights.pair import PairBlock
     from motionloom.weights.predictor import Predictor, save_predictor
@@ -59,8 +60,13 @@ _PLACES = {
     "control": "tasks.control",
     "compose_pair": "tasks.duet",
     "react": "tasks.duet",
+    "Extend": "tasks.edit",
+    "Loop": "tasks.edit",
+    "Redraw": "tasks.edit",
     "edit": "tasks.edit",
     "Goal": "goals.goal",
+    "FixedJoints": "goals.hold",
+    "FixedPart": "goals.hold",
     "HeldPart": "goals.hold",
     "Hold": "goals.hold",
     "Segment": "goals.segment",
@@ -69,20 +75,31 @@ _PLACES = {
     "generate_pair": "tasks.pair",
     "predict": "tasks.predict",
     "switch": "tasks.predict",
+    "PairSampling": "tasks.sampling",
+    "PredictionSampling": "tasks.sampling",
+    "Sampling": "tasks.sampling",
     "generate": "tasks.text",
 }
 
 __all__ = [
     "SMPL22",
     "Controlled",
+    "Extend",
+    "FixedJoints",
+    "FixedPart",
     "Goal",
     "HeldPart",
     "Hold",
+    "Loop",
     "Motion",
     "MotionloomError",
     "PairBlock",
+    "PairSampling",
+    "PredictionSampling",
     "Predictor",
     "Prior",
+    "Redraw",
+    "Sampling",
     "Segment",
     "Skeleton",
     "batch",

@@ -1,11 +1,16 @@
-"""Modules under their old names, for one release: importing one gives the module it became, with a warning."""
+"""Old names, for one release: modules give the module they became, keywords the one they became, with a warning."""
 
 import sys
 import warnings
+from collections.abc import Callable
+from functools import wraps
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
+from typing import Any, TypeVar
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 _TABLE = """
 . weights: checkpoint=prior predictor
@@ -16,7 +21,8 @@ metrics kinematics: physics gestures
 io viz: draw figure film overlay scene video
 tasks goals: goals=goal goal_file mask_file timeline paths drawing following reach fields lined_file
 tasks edits: steering stances fitting duet_places=relative_pose
-tasks lab.papers: double_take humanmac baselines
+tasks tasks: redraw=inpaint
+tasks lab.papers: double_take humanmac baselines blending=diffusion_blending
 nets lab.papers: published=mdm pair_published=commdm mrt guo=guo_nets
 train lab.papers: mrt=mrt_training
 evaluation lab.papers: guo guo_words
@@ -67,7 +73,7 @@ class Moved(MetaPathFinder, Loader):
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         """The module that an old name became."""
         new = self.places[spec.name]
-        warnings.warn(f"{spec.name} is {new} now; the old name goes with the next release", FutureWarning, stacklevel=2)
+        say(spec.name, new)
         module = import_module(new)
         self._spec[spec.name] = module.__spec__
         return module
@@ -83,3 +89,27 @@ def install() -> None:
     """Let old names be found, once, before any other finder: folders that moved would make second copies."""
     if not any(isinstance(finder, Moved) for finder in sys.meta_path):
         sys.meta_path.insert(0, Moved())
+
+
+def renamed(keywords: dict[str, str]) -> Callable[[F], F]:
+    """Let a function take old keywords (old name to new name) with a warning that says the new one."""
+
+    def wrap(function: F) -> F:
+        @wraps(function)
+        def _call(*args: Any, **given: Any) -> Any:
+            for old in keywords.keys() & given.keys():
+                new = keywords[old]
+                if new in given:
+                    raise TypeError(f"{function.__name__} got {old!r} and {new!r}, which are one; give {new!r} alone")
+                say(f"{old}=", f"{new}=")
+                given[new] = given.pop(old)
+            return function(*args, **given)
+
+        return _call  # type: ignore[return-value]
+
+    return wrap
+
+
+def say(old: str, new: str, *, above: int = 3) -> None:
+    """Warn that an old name is another one now, at the line that many calls up."""
+    warnings.warn(f"{old} is {new} now; the old name goes with the next release", FutureWarning, stacklevel=above)

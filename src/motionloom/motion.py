@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
-from motionloom.skeleton import Skeleton
+from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 MAX_POSES = 100_000_000
 """Frames times joints of the longest motion that is made or read; some 10 GB."""
+_LEFT_HIP, _RIGHT_HIP, _LEFT_SHOULDER, _RIGHT_SHOULDER = map(
+    SMPL22.index, ("left_hip", "right_hip", "left_shoulder", "right_shoulder")
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,3 +156,17 @@ class Motion:
             rotations=self.rotations[:, pairs] * np.array([1.0, 1.0, -1.0, -1.0]),
             translations=moved,
         )
+
+
+def heading(positions: np.ndarray) -> Array:
+    """Where a person faces, square to the hips and shoulders.
+
+    Args:
+        positions: (frames, 22, 3) metres, joints of `SMPL22`, +Y up.
+
+    Returns:
+        (frames,) radians, unwrapped: 0 faces +Z, growing to the left (towards +X).
+    """
+    p = np.asarray(positions, dtype=np.float64)
+    across = p[:, _LEFT_HIP] - p[:, _RIGHT_HIP] + p[:, _LEFT_SHOULDER] - p[:, _RIGHT_SHOULDER]
+    return np.unwrap(np.arctan2(-across[:, 2], across[:, 0]))

@@ -30,8 +30,10 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
     """What the command asked of the maker of motion, which walks 1 m a second along +Z and stops where it is told."""
     seen: dict = {"stop": None, "problem": KeyboardInterrupt}
 
-    def compose(prior, segments, *, seed, guidance, steps, start, path, clean, progress):
-        seen.update(segments=segments, seed=seed, guidance=guidance, steps=steps, start=start, path=path, clean=clean)
+    def compose(prior, segments, *, seed=0, guidance=2.5, steps=24, start, path, foot_lock, progress):
+        seen.update(
+            segments=segments, seed=seed, guidance=guidance, steps=steps, start=start, path=path, foot_lock=foot_lock
+        )
         at = 0
         for number, segment in enumerate(segments):
             if number == seen["stop"]:
@@ -60,7 +62,7 @@ def test_prompts_become_segments_of_equal_length(weights, asked, capsys):
     assert [(s.text, s.seconds, s.transition, s.goal) for s in asked["segments"]] == [
         (text, 2.0, 1.0, None) for text in ("walk", "jump over something", "sit down")
     ]
-    assert (asked["seed"], asked["guidance"], asked["steps"], asked["clean"]) == (0, 2.5, 24, True)
+    assert (asked["seed"], asked["guidance"], asked["steps"], asked["foot_lock"]) == (0, 2.5, 24, True)
     assert (len(io.load("long.bvh")), written()) == (120, {"long.bvh"})
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "wrote long.bvh: 6.00 s, 120 frames"
@@ -85,8 +87,8 @@ def test_a_timeline_says_everything_and_the_line_has_the_last_word(weights, aske
         ],
         "remarks": [],
     }
-    assert compose(weights, "three.yaml", "--seed", "0", "--guidance", "0", "--raw", "--steps", "3") == 0
-    assert [asked[key] for key in ("seed", "guidance", "clean", "steps")] == [0, 0, False, 3]
+    assert compose(weights, "three.yaml", "--seed", "0", "--guidance", "0", "--no-foot-lock", "--steps", "3") == 0
+    assert [asked[key] for key in ("seed", "guidance", "foot_lock", "steps")] == [0, 0, False, 3]
 
 
 def test_several_files_at_another_rate_hold_the_whole_motion(weights, asked):

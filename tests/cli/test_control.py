@@ -34,9 +34,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list:
     """What the command asks of the task, which here only stands there, 1 cm beside its goals."""
     calls = []
 
-    def fake(prior, prompt, goal, *, count, seed, guidance, steps, exact, clean, progress, adapters="none"):
-        calls.append({"prompt": prompt, "goal": goal, "count": count, "seed": seed, "exact": exact, "clean": clean,
-                      "guidance": guidance, "steps": steps, "adapters": adapters})  # fmt: skip
+    def fake(prior, prompt, goal, *, count, fit, foot_lock, progress, adapters="none", **settings):
+        calls.append({"prompt": prompt, "goal": goal, "count": count, "fit": fit, "foot_lock": foot_lock,
+                      "adapters": adapters} | settings)  # fmt: skip
         progress(1, 1)
         motion = Motion(SMPL22, 20.0, np.tile([0.0, 0.9, 0], (len(goal), 1)), np.tile(IDENTITY, (len(goal), 22, 1)))
         return [task.Controlled(motion, motion, 0.01, 0.43, ("head at 1.20 s is 0.43 m away from its goal",))] * count
@@ -63,11 +63,11 @@ def test_options_reach_the_task(weights: str, asked: list, capsys: pytest.Captur
         "--guidance",
         "3",
     ]
-    assert control(weights, *words, "--steps", "7", "--loose", "--raw", "--out", "a.npz") == 0
+    assert control(weights, *words, "--steps", "7", "--no-fit", "--no-foot-lock", "--out", "a.npz") == 0
     call = asked[0]
     goal = call.pop("goal")
-    assert call == {"prompt": "a person walks", "count": 2, "seed": 5, "guidance": 3.0, "steps": 7, "exact": False,
-                    "clean": False, "adapters": "none"}  # fmt: skip
+    assert call == {"prompt": "a person walks", "count": 2, "seed": 5, "guidance": 3.0, "steps": 7, "fit": False,
+                    "foot_lock": False, "adapters": "none"}  # fmt: skip
     assert len(goal) == 40
     assert goal.positions[39, 0, ::2].tolist() == [1, 1.2]
     said = capsys.readouterr()

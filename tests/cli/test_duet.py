@@ -41,7 +41,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def duet(files: Path, *words: str, weights: str = "tiny", block: str = "block") -> int:
     own = [str(files / word[1:]) if word.startswith("@") else word for word in words]
-    given = [] if "--block" in words else ["--block", str(files / f"{block}.safetensors")]
+    given = [] if "--pair-weights" in words else ["--pair-weights", str(files / f"{block}.safetensors")]
     return main(["duet", *own, *given, "--weights", str(files / f"{weights}.safetensors"), "--steps", "2"])
 
 
@@ -51,7 +51,7 @@ def written() -> set[str]:
 
 def test_both_people_are_in_one_scene_and_in_a_file_each_of_the_same_world(files: Path) -> None:
     outs = [word for name in ("d.glb", "a.npz", "b.npz") for word in ("--out", name)]
-    assert duet(files, "two people walk", "--seconds", "0.6", "--raw", "--seed", "2", *outs) == 0
+    assert duet(files, "two people walk", "--seconds", "0.6", "--no-foot-lock", "--seed", "2", *outs) == 0
     assert written() == {"d.glb", "a.npz", "b.npz"}
     scene = io.load_scene("d.glb")
     assert [len(motion) for motion in scene] == [12, 12]
@@ -60,7 +60,10 @@ def test_both_people_are_in_one_scene_and_in_a_file_each_of_the_same_world(files
 
 
 def test_several_duets_are_numbered(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert duet(files, "a person walks :: a person turns", "--seconds", "0.5", "--count", "2", "--raw", "--json") == 0
+    assert (
+        duet(files, "a person walks :: a person turns", "--seconds", "0.5", "--count", "2", "--no-foot-lock", "--json")
+        == 0
+    )
     assert written() == {"duet_0.glb", "duet_1.glb"}
     about = json.loads(capsys.readouterr().out)
     assert about["files"] == ["duet_0.glb", "duet_1.glb"]
@@ -77,14 +80,17 @@ def test_a_past_is_the_beginning_of_what_is_written(files: Path) -> None:
 
 
 def test_whoever_is_given_is_the_first(files: Path) -> None:
-    assert duet(files, "--given", "@a.bvh", "two people walk", "--out", "c.npz", "--out", "d.npz", "--raw") == 0
+    assert (
+        duet(files, "--react-to", "@a.bvh", "two people walk", "--out", "c.npz", "--out", "d.npz", "--no-foot-lock")
+        == 0
+    )
     assert largest_distance(io.load("c.npz"), io.load(files / "a.bvh")) < 1e-6
     assert len(io.load("d.npz")) == len(io.load("c.npz"))
 
 
 def test_a_path_in_a_file_is_walked_by_the_person_it_is_for(files: Path) -> None:
     Path("path.yaml").write_text("points: [[1, 2], [1, 4]]\n", encoding="utf-8")
-    words = ("two people walk", "--path", "path.yaml", "--person", "2", "--seconds", "2", "--raw")
+    words = ("two people walk", "--path", "path.yaml", "--person", "2", "--seconds", "2", "--no-foot-lock")
     assert duet(files, *words, "--out", "a.npz", "--out", "b.npz") == 0
     root = io.load("b.npz").root
     assert np.linalg.norm(root[0, [0, 2]] - [1, 2]) < 0.05
@@ -96,13 +102,13 @@ def test_a_timeline_is_one_duet_of_all_its_segments(files: Path) -> None:
         "seed: 3\nsegments:\n  - {text: two people walk, seconds: 1}\n  - {text: 'a :: b', seconds: 1.5}\n",
         encoding="utf-8",
     )
-    assert duet(files, "--timeline", "t.yaml", "--raw", "--out", "a.npz", "--out", "b.npz") == 0
+    assert duet(files, "--timeline", "t.yaml", "--no-foot-lock", "--out", "a.npz", "--out", "b.npz") == 0
     assert [len(io.load(f"{name}.npz")) for name in "ab"] == [50, 50]
 
 
 LED = {
     "a text": ("two people walk", "--seconds", "3.5"),
-    "somebody given": ("--given", "@slow.bvh"),
+    "somebody given": ("--react-to", "@slow.bvh"),
     "a timeline": ("--timeline", "t.yaml"),
 }
 """Long enough that the two are led."""
@@ -113,8 +119,8 @@ def test_how_firmly_the_two_stay_together_changes_what_is_drawn(files: Path, nam
     """From one seed the second person goes elsewhere with 0 than with 1, which is what is done unless told."""
     Path("t.yaml").write_text("segments:\n  - {text: two people walk, seconds: 3.5}\n", encoding="utf-8")
     made = []
-    for words in (("--together", "0"), ("--together", "1"), ()):
-        assert duet(files, *LED[name], *words, "--raw", "--out", "a.npz", "--out", "b.npz") == 0
+    for words in (("--pair-guidance", "0"), ("--pair-guidance", "1"), ()):
+        assert duet(files, *LED[name], *words, "--no-foot-lock", "--out", "a.npz", "--out", "b.npz") == 0
         made.append(io.load("b.npz").root)
     free, firm, untold = made
     assert np.abs(free - firm).max() > 1e-2
@@ -124,12 +130,12 @@ def test_how_firmly_the_two_stay_together_changes_what_is_drawn(files: Path, nam
 def test_how_firmly_the_two_stay_together_is_asked_behind_a_past_too(files: Path, monkeypatch) -> None:
     asked = []
 
-    def complete(*_, together: float, **__):
-        asked.append(together)
+    def complete(*_, pair_guidance: float, **__):
+        asked.append(pair_guidance)
         return [walkers(1.0)]
 
     monkeypatch.setattr(pair, "complete_pair", complete)
-    assert duet(files, "--past", "@a.bvh", "@b.bvh", "--together", "0.25") == 0
+    assert duet(files, "--past", "@a.bvh", "@b.bvh", "--pair-guidance", "0.25") == 0
     assert asked == [0.25]
 
 
@@ -144,16 +150,16 @@ WRONG = {
     "no number of seconds": (("walk", "--seconds", "nan"), "--seconds"),
     "too much time": (("walk", "--seconds", "61"), "at most 60"),
     "no duets": (("walk", "--count", "0"), "--count"),
-    "more than together": (("walk", "--together", "1.5"), "--together must be 0 to 1; got 1.5"),
-    "no share": (("walk", "--together", "nan"), "--together must be 0 to 1; got nan"),
-    "less than apart in a timeline": (("--timeline", "t.yaml", "--together", "-0.1"), "must be 0 to 1; got -0.1"),
-    "a block that is not there": (("walk", "--block", "nobody"), "no two-person block"),
+    "more than together": (("walk", "--pair-guidance", "1.5"), "--pair-guidance must be 0 to 1; got 1.5"),
+    "no share": (("walk", "--pair-guidance", "nan"), "--pair-guidance must be 0 to 1; got nan"),
+    "less than apart in a timeline": (("--timeline", "t.yaml", "--pair-guidance", "-0.1"), "must be 0 to 1; got -0.1"),
+    "a block that is not there": (("walk", "--pair-weights", "nobody"), "no two-person block"),
     "a past that is not there": (("--past", "@a.bvh", "no.bvh"), "no.bvh"),
     "one person as both": (("--past", "@a.bvh", "@a.bvh"), "named twice"),
     "pasts of other lengths": (("--past", "@a.bvh", "@short.bvh"), "lengths differ"),
     "pasts of other rates": (("--past", "@a.bvh", "@fast.bvh"), "rates differ"),
-    "two tasks": (("--past", "@a.bvh", "@b.bvh", "--given", "@a.bvh"), "give one of them"),
-    "the length of somebody given": (("--given", "@a.bvh", "--seconds", "2"), "--seconds"),
+    "two tasks": (("--past", "@a.bvh", "@b.bvh", "--react-to", "@a.bvh"), "give one of them"),
+    "the length of somebody given": (("--react-to", "@a.bvh", "--seconds", "2"), "--seconds"),
     "a path for a past": (("--past", "@a.bvh", "@b.bvh", "--path", "p.yaml"), "--path"),
     "no such path": (("walk", "--path", "p.yaml"), "p.yaml"),
 }

@@ -44,7 +44,16 @@ def test_prompts_come_from_the_line_and_a_file(weights: str, capsys: pytest.Capt
     Path("prompts.txt").write_text("a person turns\n\n  a person jumps  \n", encoding="utf-8")
     assert (
         generate(
-            weights, "a person walks", "--from", "prompts.txt", "--count", "2", "--out", "m.npz", "--json", "--raw"
+            weights,
+            "a person walks",
+            "--from",
+            "prompts.txt",
+            "--count",
+            "2",
+            "--out",
+            "m.npz",
+            "--json",
+            "--no-foot-lock",
         )
         == 0
     )

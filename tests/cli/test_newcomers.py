@@ -13,7 +13,7 @@ from motionloom.io.bvh_writer import save_bvh
 from tests.cli.said import complaint
 from tests.tasks.test_edit import person
 
-TINY = ("--steps", "2", "--raw")
+TINY = ("--steps", "2", "--no-foot-lock")
 
 
 @pytest.fixture(autouse=True)

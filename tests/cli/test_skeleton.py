@@ -19,7 +19,7 @@ from tests.io.rigged import Hero, wave
 from tests.io.test_character import check_only_one_animation_is_new
 from tests.tasks.test_edit import person
 
-TINY = ("--steps", "2", "--raw")
+TINY = ("--steps", "2", "--no-foot-lock")
 
 
 @pytest.fixture(autouse=True)

@@ -132,7 +132,7 @@ def test_wrong_adapters_are_one_sentence(knowing: str, weights: str, zombie: str
     for line, reason in (
         (["--adapter", "none.safetensors"], "no adapter"),
         (["--adapter", f"{zombie}:9"], "FILE:FACTOR"),
-        (["--adapter", knowing], "is not an adapter"),
+        (["--adapter", knowing], "is a prior, not an adapter"),
     ):
         assert main(["generate", "a person walks", "--weights", knowing, *line]) == 2
         assert reason in complaint(capsys)

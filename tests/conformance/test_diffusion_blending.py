@@ -5,9 +5,11 @@ import torch
 
 from motionloom.diffusion import DDPM, Denoiser, cosine
 from motionloom.features.layout import mask
+from motionloom.lab.papers.diffusion_blending import controlled
 from motionloom.lab.papers.mdm import from_published
 from motionloom.nets.prior import condition
-from motionloom.tasks.blending import blended, controlled
+from motionloom.tasks.control import blended
+from motionloom.tasks.sampling import Observed
 from tests.conformance.runner import KNOWN, MOTION, NOISE, TEXT, Case, case, cases, compare, normal, stream, weights
 from tests.conformance.test_sampling import to_motion, to_state
 
@@ -36,7 +38,7 @@ def test_blended_guesses_and_whole_runs_are_the_published_ones(recorded):
     compare(recorded, "forward", to_motion(denoise(x, config["timesteps"][0] + 1)))
     known, rng = to_state(normal(stream(config["seed"], KNOWN), shape)), stream(config["seed"], NOISE)
     sample = controlled(
-        denoise, known, torch.from_numpy(mask(config["mask"])).expand_as(known),
+        denoise, Observed(known, torch.from_numpy(mask(config["mask"])).expand_as(known), noise_free=True),
         levels=range(config["steps"], -1, -1), solver=DDPM, schedule=cosine(config["steps"]),
         draw=lambda like: to_state(normal(rng, shape)), start=known,
     )  # fmt: skip

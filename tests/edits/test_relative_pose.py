@@ -9,11 +9,11 @@ import torch
 from torch import Tensor
 
 from motionloom.edits import relative_pose as duet_places
-from motionloom.edits.relative_pose import Places, leader
+from motionloom.edits.relative_pose import Places, relative_pose_guidance
 from motionloom.features import pair as two
 from motionloom.features.pair import PUBLISHED_CODE
 from motionloom.nets.pair import PairNet, join
-from motionloom.tasks.pair import generate_pair, known_state, pair_draw, pair_features
+from motionloom.tasks.pair import PairEdits, generate_pair, known_state, pair_draw, pair_features
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from tests.nets import tiny
@@ -154,7 +154,7 @@ def test_exchanged_people_stay_together_exchanged(prior: Prior, block: PairBlock
     net, shared = block.net(prior), {"steps": 3}
     one, _ = pair_features(prior, net, SAID, 70, seeds=[1, 2], **shared)
     other, _ = pair_features(prior, net, SAID[::-1], 70, seeds=[2, 1], **shared)
-    free, _ = pair_features(prior, net, SAID, 70, seeds=[1, 2], together=0.0, **shared)
+    free, _ = pair_features(prior, net, SAID, 70, seeds=[1, 2], pair_guidance=0.0, **shared)
     torch.testing.assert_close(one[0], other[0].flip(0), rtol=0, atol=1e-3)
     assert (one - free).abs().max() > 1e-3
     many, _ = pair_features(prior, net, SAID * 2, 70, seeds=[1, 2, 3, 4], **shared)
@@ -163,14 +163,17 @@ def test_exchanged_people_stay_together_exchanged(prior: Prior, block: PairBlock
 
 def test_what_is_known_stays_known(prior: Prior, block: PairBlock) -> None:
     net, first = block.net(prior), drifting(prior)[:, :20]
-    state, mask = known_state(prior, net, first, BESIDE, 90)
-    made, _ = pair_features(prior, net, SAID, 90, seeds=[1, 2], known=state, mask=mask, steps=2)
+    observed = known_state(prior, net, first, BESIDE, 90)
+    made, _ = pair_features(prior, net, SAID, 90, seeds=[1, 2], edits=PairEdits(observed), steps=2)
     torch.testing.assert_close(made[0, :, :20], first, rtol=0, atol=1e-5)
 
 
 def test_a_fresh_block_leads_nobody(prior: Prior) -> None:
     fresh = block_of(prior, fresh=True)
-    made = [generate_pair(prior, fresh, SAID[0], seconds=4, steps=2, clean=False, together=w)[0] for w in (0.0, 1.0)]
+    made = [
+        generate_pair(prior, fresh, SAID[0], seconds=4, steps=2, foot_lock=False, pair_guidance=w)[0]
+        for w in (0.0, 1.0)
+    ]
     for free, held in zip(*made, strict=True):
         assert np.array_equal(free.positions(), held.positions())
 
@@ -244,13 +247,13 @@ def test_knots_stand_evenly_up_to_twenty_frames_before_the_end(begin: int, frame
     assert Places.of([1, 2], frames, [begin], [False] * 2).knots == (knots,)
 
 
-def leads(prior: Prior, block: PairBlock, mask: Tensor, still=(False, False)) -> tuple[Tensor, Tensor, Told]:
-    """A guess before and after `leader`'s lead, where ``mask`` (2, 1 + frames) tells what is known."""
+def leads(prior: Prior, block: PairBlock, mask: Tensor, frozen=(False, False)) -> tuple[Tensor, Tensor, Told]:
+    """A guess before and after the guidance, where ``mask`` (2, 1 + frames) tells what is known."""
     net, spread = block.net(prior), torch.where(prior.std > 0, prior.std, 1.0)
     told = Told(net)
     guess = join(net.talk.config.places.encode(BESIDE), (drifting(prior) - prior.mean) / spread)
     known = mask[..., None].expand(guess.shape)
-    lead = leader(prior, told, net.bind(prior.condition(SAID)), seeds=[1, 2], mask=known, still=still)  # type: ignore
+    lead = relative_pose_guidance(prior, told, net.bind(prior.condition(SAID)), seeds=[1, 2], mask=known, frozen=frozen)  # type: ignore
     return guess, lead(guess, guess, 25), told
 
 
@@ -287,7 +290,7 @@ def test_knots_begin_two_seconds_behind_the_common_beginning_and_known_numbers_s
 @pytest.mark.parametrize("away", [0, 1])
 def test_whom_others_move_is_not_led(prior: Prior, block: PairBlock, away: int) -> None:
     nothing = torch.zeros(2, FRAMES + 1, dtype=torch.bool)
-    before, after, _ = leads(prior, block, nothing, still=(away == 0, away == 1))
+    before, after, _ = leads(prior, block, nothing, frozen=(away == 0, away == 1))
     off = (after - before).abs().amax((1, 2))
     assert off[away] < 1e-5
     assert off[1 - away] > 0.1

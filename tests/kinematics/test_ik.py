@@ -187,7 +187,7 @@ def test_what_is_drawn_wrongly_counts_less_than_how_it_changes() -> None:
     expected /= np.linalg.norm(expected, axis=1, keepdims=True)
     flipped = turns * rng.choice([-1.0, 1.0], (12, 1))
     for one in (turns, flipped):
-        found = ik._settled(one, error)
+        found = ik._smooth_by_confidence(one, error)
         np.testing.assert_allclose(found * np.sign((found * expected).sum(-1, keepdims=True)), expected, atol=1e-6)
     rest = np.array([0.0, 0.2, 0.0])
     np.testing.assert_allclose(ik._misdrawn(np.outer([0.5, 1.0, 1.5, 0.0], [0.0, 0.0, 0.2]), rest), [0.5, 0, 0.5, 1])

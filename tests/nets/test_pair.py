@@ -322,7 +322,7 @@ def test_hostile_files_are_refused(tmp_path, monkeypatch):
     for name in ("cut.safetensors", "no-such-file"):
         with pytest.raises(MotionloomError):
             PairBlock.load(tmp_path / name, prior)  # type: ignore[arg-type]
-    monkeypatch.setattr(pair_block, "MAX_BYTES", 1000)
+    monkeypatch.setattr(pair_block, "PAIRS", replace(pair_block.PAIRS, max_bytes=1000))
     with pytest.raises(MotionloomError, match="larger"):
         PairBlock.load(path, prior)  # type: ignore[arg-type]
     with pytest.raises(MotionloomError, match="suffix"):

@@ -146,7 +146,7 @@ def test_an_adapter_of_one_segment_leaves_far_ones_alone(prior: Prior) -> None:
 
 def test_how_many_rows_go_together_changes_nothing(prior: Prior) -> None:
     segments = [replace(WALK, adapters=((adapter(prior, i % 3), 1.0),) if i % 3 else ()) for i in range(5)]
-    together, apart = (torch.cat(features(prior, segments, together=count)) for count in (8, 1))
+    together, apart = (torch.cat(features(prior, segments, batch_size=count)) for count in (8, 1))
     torch.testing.assert_close(together, apart, rtol=0, atol=2e-4)
 
 
@@ -158,7 +158,7 @@ def test_files_of_segments_are_read_beforehand(prior: Prior, tmp_path: Path) -> 
     assert isinstance(read, Adapter)
     assert (read.name, factor) == ("a1", 0.5)
     (tmp_path / "b.safetensors").write_bytes(b"x" * 100)
-    with pytest.raises(MotionloomError, match="is not an adapter"):
+    with pytest.raises(MotionloomError, match="not a whole safetensors file"):
         with_loaded(prior, [replace(WALK, adapters=((tmp_path / "b.safetensors", 0.5),))])
 
 

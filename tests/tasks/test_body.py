@@ -73,7 +73,7 @@ def test_clean_and_contacts_are_those_of_the_frames() -> None:
     whole = places(80, planted=True)
     raw = motion_from_positions(whole.positions, 20.0)
     for clean, expected in ((False, raw), (True, clean_feet(raw, contacts=whole.contacts))):
-        made = strung(list(bodies(cut(whole, [30, 50]), 20.0, clean=clean)))
+        made = strung(list(bodies(cut(whole, [30, 50]), 20.0, foot_lock=clean)))
         np.testing.assert_allclose(made.positions(), expected.positions(), atol=1e-9)
     assert not np.allclose(raw.positions(), clean_feet(raw, contacts=whole.contacts).positions(), atol=1e-4)
 
@@ -104,11 +104,11 @@ def test_signs_stay_when_a_block_is_told_with_the_other_ones(monkeypatch: pytest
         return replace(made, rotations=made.rotations * (-1) ** (count // 2))
 
     monkeypatch.setattr(body, "motion_from_positions", moody)
-    made = strung(list(bodies([places(400)], 20.0, clean=False)))
+    made = strung(list(bodies([places(400)], 20.0, foot_lock=False)))
     assert count >= 5
     assert (made.rotations[1:] * made.rotations[:-1]).sum(-1).min() > 0.9
     monkeypatch.undo()
-    np.testing.assert_allclose(made.positions(), posed(places(400), 20.0, clean=False).positions(), atol=1e-6)
+    np.testing.assert_allclose(made.positions(), posed(places(400), 20.0, foot_lock=False).positions(), atol=1e-6)
 
 
 @pytest.mark.parametrize("frame", [59, 60, 66, 118, 125])

@@ -145,7 +145,7 @@ def test_futures_have_the_bones_of_the_past_and_leave_it_smoothly() -> None:
 
 def test_future_number_i_of_a_past_is_the_same_whatever_else_is_asked() -> None:
     many = futures(PREDICTOR, PAST, count=4, seed=9)
-    few, parted = futures(PREDICTOR, PAST, count=2, seed=9), futures(PREDICTOR, PAST, count=4, seed=9, rows=3)
+    few, parted = futures(PREDICTOR, PAST, count=2, seed=9), futures(PREDICTOR, PAST, count=4, seed=9, batch_size=3)
     alone, short = futures(PREDICTOR, PAST[1:], count=1, seed=9), futures(PREDICTOR, PAST, count=1, seed=9, frames=7)
     for made, same in ((few, many[:, :2]), (parted, many), (alone[0], many[1, :1]), (short, many[:, :1, :7])):
         np.testing.assert_allclose(made, same, atol=1e-5)
@@ -205,13 +205,13 @@ MISTAKES = {
     "no frames": {"frames": 0},
     "too many frames": {"frames": 31},
     "no futures": {"count": 0},
-    "no rows at once": {"rows": 0},
+    "no rows at once": {"batch_size": 0},
 }
 
 
 @pytest.mark.parametrize("name", sorted(MISTAKES))
 def test_what_cannot_be_completed_is_told(name: str) -> None:
-    with pytest.raises(MotionloomError, match="got"):
+    with pytest.raises(MotionloomError, match=r"got|a count of 0"):
         futures(PREDICTOR, **{"past": PAST, "count": 1} | MISTAKES[name])
 
 

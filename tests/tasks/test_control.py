@@ -58,8 +58,8 @@ def test_a_path_is_met_and_the_quarter_turned_path_gives_the_quarter_turned_moti
 
 
 def test_motion_i_is_drawn_from_seed_plus_i_whatever_stands_beside_it(prior: Prior) -> None:
-    both = control(prior, "a person walks", path(), count=2, seed=1, steps=3, exact=False)
-    alone = control(prior, "a person walks", path(), seed=2, steps=3, exact=False)[0]
+    both = control(prior, "a person walks", path(), count=2, seed=1, steps=3, fit=False)
+    alone = control(prior, "a person walks", path(), seed=2, steps=3, fit=False)[0]
     np.testing.assert_allclose(both[1].motion.positions(), alone.motion.positions(), atol=1e-4)
     assert np.abs(both[0].motion.positions() - both[1].motion.positions()).max() > 1e-3
 
@@ -77,7 +77,7 @@ def test_what_is_missed_is_said_worst_first(prior: Prior) -> None:
 
 def test_error_is_the_mean_distance_over_what_is_asked(prior: Prior) -> None:
     """One joint 3 cm off on x and 4 cm on z where only these are asked, another met: 2.5 cm."""
-    motion = generate(prior, "a person walks", seconds=1.0, steps=2, clean=False)[0]
+    motion = generate(prior, "a person walks", seconds=1.0, steps=2, foot_lock=False)[0]
     goal = replace(Goal.nothing(len(motion)), positions=motion.positions() + np.array([0.03, 7.0, 0.04]))
     goal.asked[5, WRIST, [0, 2]] = True
     goal.positions[9, 0], goal.asked[9, 0] = motion.root[9], True
@@ -97,7 +97,7 @@ def test_the_numbers_that_a_goal_is_about() -> None:
 def test_adapters_are_told_the_last_steered_guess_and_none_that_change_nothing_change_little(prior: Prior) -> None:
     """An adapter of zeros is the prior; what it is shown is the steered guess in the numbers asked, noise-free."""
     blank = adapter(prior)
-    made = control(prior, "a person walks", path(), seed=1, steps=3, adapters=[blank, blank], weights=[0.25, 0.75])[0]
+    made = control(prior, "a person walks", path(), seed=1, steps=3, adapters=[(blank, 0.25), (blank, 0.75)])[0]
     assert made.error < 0.005
     free = replace(Goal.nothing(24), start=Placement())
     same = control(prior, "a person walks", free, seed=1, steps=3, adapters=[blank])[0]
@@ -130,7 +130,7 @@ def test_shipped_adapters_of_other_weights_and_damaged_ones_are_said(
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"count": 0}, "0 motions"),
+        ({"count": 0}, "a count of 0"),
         ({"seed": -1}, "seed"),
         ({"steps": 0}, "0 steps"),
         ({"guidance": np.nan}, "guidance"),

@@ -65,21 +65,22 @@ def test_whoever_is_given_stays_and_the_other_stands_where_he_was_drawn(
         return torch.from_numpy(encoded.features)[None], torch.from_numpy(elsewhere)[None]
 
     monkeypatch.setattr(tasks, "pair_features", true)
-    [(first, second)] = react(prior, block, given, "two people walk", clean=False)
+    [(first, second)] = react(prior, block, given, "two people walk", foot_lock=False)
     assert first is given
     assert (len(second), second.fps, second.skeleton) == (len(given), given.fps, SMPL22)
     apart = np.linalg.norm(second.positions() - truth.positions(), axis=-1)
     assert apart.mean() < 0.03
-    assert asked["mask"][0, 1:].all()
-    assert not asked["mask"][0, 0].any()
-    assert not asked["mask"][1].any()
+    mask = asked["edits"].observed.mask
+    assert mask[0, 1:].all()
+    assert not mask[0, 0].any()
+    assert not mask[1].any()
 
 
 def test_the_given_motion_may_stand_on_a_floor_of_its_own(prior: Prior, block: PairBlock) -> None:
     given, _ = walkers(1.2)
     raised = replace(given, root=given.root + np.array([0.0, 0.2, 0.0]))
-    [(_, low)] = react(prior, block, given, steps=2, clean=False)
-    [(_, high)] = react(prior, block, raised, steps=2, clean=False)
+    [(_, low)] = react(prior, block, given, steps=2, foot_lock=False)
+    [(_, high)] = react(prior, block, raised, steps=2, foot_lock=False)
     np.testing.assert_allclose(high.root - low.root, np.broadcast_to([0.0, 0.2, 0.0], low.root.shape), atol=0.01)
 
 
@@ -94,7 +95,7 @@ def test_motions_that_nobody_can_react_to_are_refused(prior: Prior, block: PairB
 
 
 def test_a_long_duet_has_all_frames_of_its_segments_and_no_seam(prior: Prior, block: PairBlock) -> None:
-    made = whole(list(compose_pair(prior, block, SEGMENTS, seed=1, steps=4, clean=False)))
+    made = whole(list(compose_pair(prior, block, SEGMENTS, seed=1, steps=4, foot_lock=False)))
     for motion in made:
         assert len(motion) == 20 + 16 + 18
         steps = np.linalg.norm(np.diff(motion.root, axis=0), axis=-1)
@@ -105,7 +106,7 @@ def test_rows_denoised_together_or_alone_make_the_same(prior: Prior, block: Pair
     net = block.net(prior)
     longer = [replace(segment, seconds=segment.seconds + 2.5) for segment in SEGMENTS]  # long enough for being led
     both = [tasks._asked(longer, i, None, 0) for i in (0, 1)]
-    one, several = (list(duet_features(prior, net, both, steps=3, at_once=n)) for n in (1, 8))
+    one, several = (list(duet_features(prior, net, both, steps=3, batch_size=n)) for n in (1, 8))
     for (a, stands), (b, others) in zip(one, several, strict=True):
         torch.testing.assert_close(a, b, rtol=0, atol=1e-4)
         np.testing.assert_allclose(stands, others, atol=1e-3)
@@ -145,17 +146,17 @@ def test_each_row_is_told_and_led_from_where_the_two_stand_when_it_begins(
         motion = clean.repeat(len(x) // 2, 1)[:, None].expand(-1, x.shape[1] - 1, -1)
         return join(places.repeat(len(x) // 2, 1), motion)
 
-    def led(guess: tasks._Guess, number: int, level: int, motion: torch.Tensor, begin: torch.Tensor, *, state):
-        begins[number] = begin
+    def led(_: object, row: tasks._PairRow, level: int, motion: torch.Tensor, begin: torch.Tensor, *, state):
+        begins[row.length] = begin
         return motion
 
-    def leader(prior: Prior, net: PairNet, bound: Bound, **how) -> object:
+    def guidance(prior: Prior, net: PairNet, bound: Bound, **how) -> object:
         leads.append(how | {"text": bound.text})
         return None
 
     monkeypatch.setattr(PairNet, "forward", constant)
-    monkeypatch.setattr(tasks._Guess, "_led", led)
-    monkeypatch.setattr(tasks, "leader", leader)
+    monkeypatch.setattr(tasks._PairDenoiser, "_led", led)
+    monkeypatch.setattr(tasks, "relative_pose_guidance", guidance)
     segments = [
         Segment("a person walks", 1.0, transition=0.4),
         Segment("a person turns :: a person jumps", 0.8, transition=0.6),
@@ -163,10 +164,10 @@ def test_each_row_is_told_and_led_from_where_the_two_stand_when_it_begins(
     ]
     both = [tasks._asked(segments, i, None, 0) for i in (0, 1)]
     both[1][0] = replace(both[1][0], goal=Goal.nothing(20))  # which asks for nothing
-    pieces = list(duet_features(prior, block.net(prior), both, steps=4, together=0.7))
+    pieces = list(duet_features(prior, block.net(prior), both, steps=4, pair_guidance=0.7))
     motion = torch.cat([piece for piece, _ in pieces], dim=1).double().numpy()
     there = two.decode(motion, stands.double().numpy())[:, :, 0]
-    for number, length, frame in ((1, 4 + 16 + 6, 20 - 4), (2, 6 + 22, 36 - 6)):  # by half of the transition earlier
+    for length, frame in ((4 + 16 + 6, 20 - 4), (6 + 22, 36 - 6)):  # by half of the transition earlier
         calls = shown[length]
         noise = calls[0][0]
         signal, spread = prior.schedule.at(calls[-1][1])
@@ -182,10 +183,10 @@ def test_each_row_is_told_and_led_from_where_the_two_stand_when_it_begins(
             c * way[2] + s * way[0],
         ]
         np.testing.assert_allclose(told[0], expected, atol=1e-3)
-        np.testing.assert_allclose(two.seen(begins[number][0], begins[number][1]), expected, atol=1e-3)
+        np.testing.assert_allclose(two.seen(begins[length][0], begins[length][1]), expected, atol=1e-3)
     assert len({seed for how in leads for seed in how["seeds"]}) == 6
     assert {how["weight"] for how in leads} == {0.7}
-    assert not any(any(how["still"]) for how in leads)
+    assert not any(any(how["frozen"]) for how in leads)
     for how, said in zip(leads, ("a person walks", "a person turns", "a person walks"), strict=True):
         net = block.net(prior)
         words = [said, "a person jumps" if said == "a person turns" else said]
@@ -215,7 +216,7 @@ def test_a_block_that_wants_them_beside_each_other_keeps_them_there_for_long(
         goal.asked[0, 0, 1], goal.positions[0, 0, 1] = True, 0.9  # what he does anyway
         both[asked] = [replace(segment, goal=goal) for segment in both[asked]]
     for together, far in ((0.0, (3.0, 4.0)), (1.0, (0.0, 0.8))):
-        drawn = list(duet_features(prior, block.net(prior), both, steps=4, together=together))
+        drawn = list(duet_features(prior, block.net(prior), both, steps=4, pair_guidance=together))
         made = torch.cat([piece for piece, _ in drawn], dim=1).double().numpy()
         roots = two.decode(made, drawn[0][1])[:, :, 0]
         off = np.linalg.norm((roots[1] - roots[0])[:, [0, 2]] - [1.0, 2.0], axis=-1)
@@ -227,16 +228,17 @@ def test_a_block_that_wants_them_beside_each_other_keeps_them_there_for_long(
 
 
 def test_a_row_is_led_from_where_it_begins_and_shows_the_noised_state(prior: Prior, block: PairBlock) -> None:
-    guess, asked = tasks._Guess(prior, block.net(prior), [50, 1], 1.0), {}
+    net, asked = block.net(prior), {}
 
     def lead(state: torch.Tensor, clean: torch.Tensor, level: int) -> torch.Tensor:
         asked.update(state=state, clean=clean, level=level)
         return clean + 1
 
-    guess.leads[3] = lead
+    row = tasks._PairRow((), net, lead, None)
+    denoiser = tasks._PairDenoiser(prior, net, [50, 1], 1.0)
     state, motion = torch.randn(2, 2, 30, 263, generator=torch.Generator().manual_seed(0))
     begin = torch.tensor([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
-    assert torch.equal(guess._led(3, 50, motion, begin, state=state), motion + 1)
+    assert torch.equal(denoiser._led(row, 50, motion, begin, state=state), motion + 1)
     assert asked["level"] == 50
     assert torch.equal(asked["state"], join(block.config.places.encode(begin), state))
     assert torch.equal(asked["clean"], join(block.config.places.encode(begin), motion))
@@ -258,7 +260,7 @@ def test_a_path_for_one_of_them_holds_through_all_segments(
     path = Goal.nothing(54)
     path.positions[:, 0, 0] = np.linspace(2.0, 5.0, 54)
     path.asked[:, 0] = [True, False, True]
-    made = whole(list(compose_pair(prior, block, SEGMENTS, path=path, person=1, steps=3, clean=False)))
+    made = whole(list(compose_pair(prior, block, SEGMENTS, path=path, person=1, steps=3, foot_lock=False)))
     off = np.linalg.norm((made[1].root - path.positions[:, 0])[:, [0, 2]], axis=-1)
     assert off.mean() < 0.03
     assert abs(heading(made[1].positions()[:1])[0] - np.pi / 2) < 0.5
@@ -281,7 +283,7 @@ def test_guesses_go_where_their_person_is_asked_to_be(
     goal = Goal.nothing(40)
     goal.asked[39, 0, 0], goal.positions[39, 0, 0] = True, 0.3
     both[1] = [replace(both[1][0], goal=goal)]
-    [(piece, _)] = duet_features(prior, block.net(prior), both, steps=4, together=0.0)
+    [(piece, _)] = duet_features(prior, block.net(prior), both, steps=4, pair_guidance=0.0)
     first, second = two.along(piece.double())[:, 39, 2]
     assert abs(first) < 1e-4
     assert second == pytest.approx(0.3, abs=0.05)
@@ -296,4 +298,4 @@ def test_nothing_is_composed_of_nothing(prior: Prior, block: PairBlock) -> None:
 @pytest.mark.parametrize("share", [-0.1, 8, float("nan")])
 def test_nobody_is_kept_together_by_more_than_wholly(prior: Prior, block: PairBlock, share: float) -> None:
     with pytest.raises(MotionloomError, match="kept together by 0"):
-        list(compose_pair(prior, block, SEGMENTS, together=share))
+        list(compose_pair(prior, block, SEGMENTS, pair_guidance=share))

@@ -7,16 +7,17 @@ import pytest
 import torch
 
 from motionloom import rotations as rot
-from motionloom.edits.boundary import Stretch, arrival, joining
+from motionloom.edits.boundary import InpaintWindow, arrival, joining
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import WIDTH
 from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22
 from motionloom.skeleton import SMPL22, Skeleton
-from motionloom.tasks.edit import edit, kept_numbers
-from motionloom.tasks.redraw import redraw
-from motionloom.tasks.splice import carried, in_manner_of, kept_parts, person_at_20, splice, standing
+from motionloom.tasks.edit import Extend, Loop, Redraw, edit, kept_numbers
+from motionloom.tasks.inpaint import inpaint_motion
+from motionloom.tasks.sampling import Sampling
+from motionloom.tasks.splice import carried, kept_parts, match_root, person_at_20, splice, standing
 from motionloom.weights.prior import Prior
 from tests.nets import tiny
 
@@ -77,7 +78,7 @@ def clip_of(kind: str) -> Motion:
 def test_outside_of_the_stretch_everything_stays_to_the_bit(prior: Prior, kind: str) -> None:
     """And inside it does not; the length, rate and skeleton are the clip's."""
     clip = clip_of(kind)
-    made = edit(prior, clip, "a person turns", between=[(0.5, 1.2), (2.0, 2.5)], **FEW)[0]
+    made = edit(prior, clip, "a person turns", Redraw([(0.5, 1.2), (2.0, 2.5)]), **FEW)[0]
     borders = [round(s * clip.fps) for s in (0.5, 1.2, 2.0, 2.5)]
     assert (len(made), made.fps, made.skeleton) == (len(clip), clip.fps, clip.skeleton)
     assert all(same(made, clip, slice(*s)) for s in ((0, borders[0]), borders[1:3], (borders[3], None)))
@@ -88,7 +89,7 @@ def test_outside_of_the_stretch_everything_stays_to_the_bit(prior: Prior, kind: 
 @pytest.mark.parametrize("kind", ["person at 20", "rig", "floating"])
 def test_kept_joints_keep_their_rotations_and_the_root_its_place(prior: Prior, kind: str) -> None:
     clip = clip_of(kind)
-    made = edit(prior, clip, "a person jumps", keep=["lower_body"], **FEW)[0]
+    made = edit(prior, clip, "a person jumps", Redraw(keep=["lower_body"]), **FEW)[0]
     shift = len(clip.skeleton) > 22
     lower = [j + shift for j in SMPL22.groups["lower_body"]]
     upper = [j + shift for j in (3, 9, 16, 17, 18)]
@@ -101,7 +102,7 @@ def test_kept_joints_keep_their_rotations_and_the_root_its_place(prior: Prior, k
 
 def test_the_root_alone_can_be_kept(prior: Prior) -> None:
     clip = person(3.0)
-    made = edit(prior, clip, "a person jumps", keep=["root"], between=[(1.0, 2.0)], **FEW)[0]
+    made = edit(prior, clip, "a person jumps", Redraw([(1.0, 2.0)], keep=["root"]), **FEW)[0]
     assert np.array_equal(made.root, clip.root)
     assert not np.array_equal(made.rotations[:, 1], clip.rotations[:, 1])
 
@@ -119,7 +120,7 @@ def test_a_stretch_arrives_where_the_clip_goes_on() -> None:
     mask = torch.ones_like(known, dtype=torch.bool)
     mask[:, 30:70] = False
     wild = torch.where(mask, known, known + 0.05 * torch.randn(known.shape, generator=torch.Generator().manual_seed(1)))
-    stretch = Stretch(np.zeros((100, 22, 3)), 30, 70, np.zeros(WIDTH, bool))
+    stretch = InpaintWindow(np.zeros((100, 22, 3)), 30, 70, np.zeros(WIDTH, bool))
     bent = arrival(known, mask, stretch)(wild)
 
     def walked(features: np.ndarray) -> tuple[float, complex]:
@@ -159,7 +160,7 @@ def test_an_open_stretch_is_left_alone() -> None:
     """At the clip's end, and where the root is known anyway, there is nothing to arrive at."""
     known = torch.from_numpy(humanml.motion_to_features(person(3.0)))[None]
     mask = torch.zeros_like(known, dtype=torch.bool)
-    at_end = Stretch(np.zeros((60, 22, 3)), 30, known.shape[1], np.zeros(WIDTH, bool))
+    at_end = InpaintWindow(np.zeros((60, 22, 3)), 30, known.shape[1], np.zeros(WIDTH, bool))
     assert torch.equal(arrival(known, mask, at_end)(2 * known), 2 * known)
     mask[..., :3] = True
     assert torch.equal(arrival(known, mask, replace(at_end, last=50))(2 * known), 2 * known)
@@ -169,7 +170,8 @@ def test_an_open_stretch_is_left_alone() -> None:
 def test_known_frames_come_back_in_the_world(prior: Prior, first: int, last: int) -> None:
     """Of a clip far from the origin; also where the stretch is at either end."""
     positions = person(3.0).positions()
-    drawn = redraw(prior, Stretch(positions, first, last, np.zeros(WIDTH, bool)), "a person jumps", **FEW)
+    window = InpaintWindow(positions, first, last, np.zeros(WIDTH, bool))
+    drawn = inpaint_motion(prior, window, "a person jumps", Sampling(**FEW), seed=0)
     outside = [*range(first), *range(last, 59)]
     np.testing.assert_allclose(drawn.positions[outside], positions[:59][outside], atol=2e-4)
     assert np.abs(drawn.positions[first + 3 : last - 3] - positions[first + 3 : last - 3]).max() > 1e-3
@@ -178,8 +180,9 @@ def test_known_frames_come_back_in_the_world(prior: Prior, first: int, last: int
 def test_little_strength_stays_nearer_to_the_clip(prior: Prior) -> None:
     clip = person(3.0)
     near, far = (
-        np.abs(edit(prior, clip, "a person jumps", strength=s, seed=1, **FEW)[0].positions() - clip.positions()).mean()
+        np.abs(made.positions() - clip.positions()).mean()
         for s in (0.02, 1.0)
+        for made in edit(prior, clip, "a person jumps", Redraw(strength=s), seed=1, **FEW)
     )
     assert near < 0.8 * far
 
@@ -205,7 +208,7 @@ def test_a_splice_leaves_neither_a_jump_nor_a_kink() -> None:
 def test_a_looped_clip_can_follow_itself(prior: Prior) -> None:
     """Frame 0, moved behind the last frame, continues it: no joint turns much faster there than the arms swing."""
     clip = person(3.75, 30.0)
-    made = edit(prior, clip, loop=True, **FEW)[0]
+    made = edit(prior, clip, changes=Loop(), **FEW)[0]
     assert (len(made), same(made, clip, slice(0, 82))) == (112, True)
 
     def wrap(motion: Motion) -> float:
@@ -221,13 +224,13 @@ def test_a_clip_that_ends_where_it_began_loops_in_the_world(prior: Prior) -> Non
     still = replace(still, root=np.tile([1.0, 0.9, 2.0], (60, 1)))
     still = replace(still, rotations=still.rotations.copy() * 1.0)
     still.rotations[:, 0] = rot.IDENTITY
-    made = edit(prior, still, loop=True, **FEW)[0]
+    made = edit(prior, still, changes=Loop(), **FEW)[0]
     assert np.linalg.norm(made.root[-1] - made.root[0]) < 0.1
 
 
 def test_an_extended_clip_is_the_clip_and_more(prior: Prior) -> None:
     clip = clip_of("rig")
-    made = edit(prior, clip, "a person sits", extend=1.5, **FEW)[0]
+    made = edit(prior, clip, "a person sits", Extend(1.5), **FEW)[0]
     assert len(made) == len(clip) + 45
     assert same(made, clip, slice(0, len(clip)))
     assert speeds(made)[len(clip) - 1] < 1.5 * speeds(clip).max()
@@ -237,16 +240,16 @@ def test_versions_have_their_own_seeds(prior: Prior) -> None:
     clip = person(3.0)
     said: list[tuple[int, int]] = []
     two = edit(
-        prior, clip, "a person jumps", between=[(1, 2)], count=2, seed=4, progress=lambda *p: said.append(p), **FEW
+        prior, clip, "a person jumps", Redraw([(1, 2)]), count=2, seed=4, progress=lambda *p: said.append(p), **FEW
     )
     assert said == [(1, 4), (2, 4), (3, 4), (4, 4)]
-    alone = edit(prior, clip, "a person jumps", between=[(1, 2)], seed=5, **FEW)[0]
+    alone = edit(prior, clip, "a person jumps", Redraw([(1, 2)]), seed=5, **FEW)[0]
     assert np.array_equal(two[1].rotations, alone.rotations)
     assert not np.array_equal(two[0].rotations, two[1].rotations)
 
 
 def test_the_skeleton_can_be_the_persons(prior: Prior) -> None:
-    made = edit(prior, clip_of("rig"), "a person jumps", between=[(1, 2)], skeleton="smpl", **FEW)[0]
+    made = edit(prior, clip_of("rig"), "a person jumps", Redraw([(1, 2)]), skeleton="smpl", **FEW)[0]
     assert made.skeleton == SMPL22
     assert made.fps == 30
 
@@ -261,14 +264,14 @@ def test_a_long_clip_costs_what_its_window_costs(prior: Prior, monkeypatch: pyte
         return forward(net, x, *rest)
 
     monkeypatch.setattr(type(prior.net), "forward", counted)
-    edit(prior, person(30.0), "a person jumps", between=[(14, 16)], **FEW)
+    edit(prior, person(30.0), "a person jumps", Redraw([(14, 16)]), **FEW)
     assert 0 < max(seen) <= 160
 
 
 def test_manner_keeps_places() -> None:
     """Hips that move under a still root are where the moving root had them."""
     clip = from_smpl22(person(1.0), rig())
-    told = in_manner_of(floating(clip), clip)
+    told = match_root(floating(clip), clip)
     np.testing.assert_allclose(told.positions()[:, 1:], clip.positions()[:, 1:], atol=1e-9)
     assert np.array_equal(told.root, np.zeros((20, 3)))
 
@@ -322,8 +325,18 @@ def test_standing_tells_the_facing() -> None:
 )
 def test_what_cannot_be_asked_is_refused(prior: Prior, asked: dict, said: str) -> None:
     with pytest.raises(MotionloomError, match=said) as caught:
-        edit(prior, person(3.0), **asked)
+        edit(prior, person(3.0), **asked)  # by their old names
     assert "\n" not in str(caught.value)
+
+
+def test_old_keywords_are_the_new_values_and_say_so(prior: Prior) -> None:
+    """To the bit."""
+    clip, changes = person(3.0), [Redraw([(0.5, 1.2)], ["head"], 0.5), Extend(0.5), Loop(0.6)]
+    old = {"between": [(0.5, 1.2)], "keep": ["head"], "strength": 0.5, "extend": 0.5, "loop": True, "blend": 0.6}
+    with pytest.warns(FutureWarning, match="changes="):
+        [before] = edit(prior, clip, "a person jumps", **old, **FEW)  # type: ignore[arg-type]
+    [now] = edit(prior, clip, "a person jumps", changes, **FEW)
+    assert np.array_equal(before.rotations, now.rotations)
 
 
 def test_clips_that_cannot_be_edited_are_refused(prior: Prior) -> None:

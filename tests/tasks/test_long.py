@@ -71,9 +71,9 @@ def test_company_and_patch_do_not_matter(prior: Prior) -> None:
         Segment((WALK, TURN, "jump")[i % 3], 1.0 + 0.15 * i, guidance=float(i), transition=0.1 * i) for i in range(6)
     ]
     for one in (prior, net):
-        alone = features(one, segments, together=1)
+        alone = features(one, segments, batch_size=1)
         for together in (2, 16):
-            for a, b in zip(alone, features(one, segments, together=together), strict=True):
+            for a, b in zip(alone, features(one, segments, batch_size=together), strict=True):
                 torch.testing.assert_close(a, b, atol=1e-4, rtol=0)
 
 
@@ -112,7 +112,7 @@ def test_what_is_far_behind_changes_nothing(prior: Prior) -> None:
     """Rows tell their neighbours one row per move: with 2 moves, row i depends on rows up to i + 2 and no further."""
     segments = [Segment(WALK, 1.5) for _ in range(6)]
     base = features(prior, segments, steps=2)
-    more = features(prior, [*segments[:5], Segment(TURN, 2.0), Segment("jump", 1.0)], steps=2, together=3)
+    more = features(prior, [*segments[:5], Segment(TURN, 2.0), Segment("jump", 1.0)], steps=2, batch_size=3)
     apart = [(a - b).abs().amax(dim=1) for a, b in zip(base[:5], more)]
     assert max(float(one.max()) for one in apart[:3]) < 1e-4
     assert float(apart[3][:-10].max()) < 1e-4  # of the last it could reach, it reaches what is shared
@@ -147,7 +147,7 @@ def test_endless_segments_come_as_they_are_read_and_leaving_stops_everything(pri
             read.append("closed")
 
     state = torch.get_rng_state()
-    made = compose(prior, endless(), steps=1, together=2)
+    made = compose(prior, endless(), steps=1, batch_size=2)
     assert not read
     block = next(made)
     assert len(block) > 0
@@ -176,7 +176,7 @@ def test_a_goal_is_met_in_the_frame_of_its_segment(prior: Prior, facing: float) 
     _, place = decoded(pieces[0].numpy().astype(np.float64), place)
     seen = humanml.decode_positions(pieces[1].numpy().astype(np.float64))
     np.testing.assert_allclose(seen[20, 0, ::2], (0.3, 0.5), atol=0.1)
-    made = whole(prior, segments, start=clip, clean=False)
+    made = whole(prior, segments, start=clip, foot_lock=False)
     np.testing.assert_allclose(made.root[60, ::2], place.to_world(np.array([0.3, 0, 0.5]))[::2], atol=0.01)
 
 
@@ -199,7 +199,7 @@ def test_a_motion_goes_on_where_a_clip_ends(prior: Prior, turn: float) -> None:
     quaternion = np.array([np.cos(turn / 2), 0, np.sin(turn / 2), 0])
     clip = carried(person(61 / 30, 30.0), quaternion, np.zeros(3), np.array([4.0, 0, -7.0]))
     assert len(clip) == 61  # two seconds: frames 0, 3, 6, ... are frames at 20 fps
-    made = whole(prior, [Segment(WALK, 2.0)], start=clip, clean=False)
+    made = whole(prior, [Segment(WALK, 2.0)], start=clip, foot_lock=False)
     old, new = to_smpl22(clip).resample(20).positions(), made.positions()  # which stands on the floor
     step = old[-1] - old[-2]
     assert np.linalg.norm(new[0] - (old[-1] + step), axis=-1).max() < 0.05

@@ -18,6 +18,7 @@ from motionloom.retarget import to_smpl22
 from motionloom.tasks import pair
 from motionloom.tasks.pair import (
     Ground,
+    PairEdits,
     complete_pair,
     generate_pair,
     known_state,
@@ -26,6 +27,7 @@ from motionloom.tasks.pair import (
     placement,
     prompts_of,
 )
+from motionloom.tasks.sampling import Observed
 from motionloom.tasks.text import finish, sample_features
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -51,8 +53,8 @@ def features(prior: Prior, block: PairBlock, prompts: list[str], seeds: list[int
     return pair_features(prior, block.net(prior), prompts, FRAMES, seeds=seeds, steps=4, **given)
 
 
-def both_known(prior: Prior, block: PairBlock, count: int = 5) -> tuple[torch.Tensor, torch.Tensor]:
-    """A state whose first frames and D are known, and its mask."""
+def both_known(prior: Prior, block: PairBlock, count: int = 5) -> Observed:
+    """A state whose first frames and D are known."""
     first = torch.randn(2, count, 263, generator=torch.Generator().manual_seed(3)) * prior.std + prior.mean
     stands = torch.tensor([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
     return known_state(prior, block.net(prior), first, stands, FRAMES)
@@ -60,9 +62,10 @@ def both_known(prior: Prior, block: PairBlock, count: int = 5) -> tuple[torch.Te
 
 @pytest.mark.parametrize("known", [False, True], ids=["free", "prefix"])
 def test_exchanged_people_get_exchanged_motions(prior: Prior, block: PairBlock, known: bool) -> None:
-    state, mask = both_known(prior, block) if known else (None, None)
-    given = {} if state is None else {"known": state, "mask": mask}
-    turned = {} if state is None or mask is None else {"known": state.flip(0), "mask": mask.flip(0)}
+    observed = both_known(prior, block)
+    given = {"edits": PairEdits(observed)} if known else {}
+    exchanged = replace(observed, values=observed.values.flip(0), mask=observed.mask.flip(0))
+    turned = {"edits": PairEdits(exchanged)} if known else {}
     one, stands = features(prior, block, SAID, [1, 2], **given)
     other, exchanged = features(prior, block, SAID[::-1], [2, 1], **turned)
     torch.testing.assert_close(one[0], other[0].flip(0), rtol=0, atol=1e-4)
@@ -104,8 +107,9 @@ def test_what_is_known_is_shown_without_noise_and_comes_back(
         return forward(net, x, level, bound)
 
     monkeypatch.setattr(PairNet, "forward", recorded)
-    state, mask = both_known(prior, block)
-    made, _ = features(prior, block, SAID, [1, 2], known=state, mask=mask)
+    observed = both_known(prior, block)
+    state, mask = observed.values, observed.mask
+    made, _ = features(prior, block, SAID, [1, 2], edits=PairEdits(observed))
     assert [level for _, level in seen] == list(levels(prior.schedule, 4, spacing="early"))[:-1]
     for x, level in seen:
         torch.testing.assert_close(x[mask], prior.schedule.at(level)[0] * state[mask])
@@ -115,14 +119,14 @@ def test_what_is_known_is_shown_without_noise_and_comes_back(
 
 
 def test_a_change_of_guesses_sees_one_persons_frames_and_no_more(prior: Prior, block: PairBlock) -> None:
-    state, mask = both_known(prior, block)
-    seen = []
+    observed, seen = both_known(prior, block), []
+    state, mask = observed.values, observed.mask
 
     def change(guess: torch.Tensor, level: int) -> torch.Tensor:
         seen.append(guess)
         return torch.where(mask[1, 1:], guess, 0.5)
 
-    made, _ = features(prior, block, SAID, [1, 2], known=state, mask=mask, change=[None, change])
+    made, _ = features(prior, block, SAID, [1, 2], edits=PairEdits(observed, [None, change]))
     assert len(seen) == 5
     assert all(torch.equal(guess[:5], state[1, 1:6]) for guess in seen)
     assert seen[0].shape == (FRAMES, 263)
@@ -131,7 +135,7 @@ def test_a_change_of_guesses_sees_one_persons_frames_and_no_more(prior: Prior, b
 
 
 def test_duets_are_repeated_by_their_seeds(prior: Prior, block: PairBlock) -> None:
-    few = {"seconds": 0.6, "steps": 2, "clean": False}
+    few = {"seconds": 0.6, "steps": 2, "foot_lock": False}
     several = generate_pair(prior, block, SAID[0], count=2, seed=4, **few)
     again = generate_pair(prior, block, SAID[0], count=1, seed=4, **few)
     np.testing.assert_allclose(several[0][1].positions(), again[0][1].positions(), atol=1e-4)
@@ -147,9 +151,9 @@ def test_seeds_of_people_go_with_them() -> None:
 
 
 def test_files_keep_the_distance_that_was_drawn(prior: Prior, block: PairBlock) -> None:
-    [duet] = generate_pair(prior, block, SAID[0], seconds=0.7, steps=4, seed=1, clean=False)
+    [duet] = generate_pair(prior, block, SAID[0], seconds=0.7, steps=4, seed=1, foot_lock=False)
     made, stands = pair_features(prior, block.net(prior), [SAID[0]] * 2, 14, seeds=person_seeds(1, 0), steps=4)
-    alone = np.stack([finish(prior, one, clean=False).positions() for one in made[0]])
+    alone = np.stack([finish(prior, one, foot_lock=False).positions() for one in made[0]])
     expected = two.put(alone, stands[0].double().numpy()[:, None, None])
     np.testing.assert_allclose(np.stack([motion.positions() for motion in duet]), expected, atol=1e-4)
 
@@ -166,10 +170,21 @@ def walk(frames: int) -> Goal:
 @pytest.mark.parametrize("person", [0, 1])
 def test_a_path_leads_one_of_the_two(prior: Prior, block: PairBlock, person: int) -> None:
     goal = walk(40)
-    [duet] = generate_pair(prior, block, SAID[0], goal=goal, person=person, steps=4, seed=2, clean=False)
+    [duet] = generate_pair(
+        prior, block, SAID[0], goals=(goal, None) if person == 0 else (None, goal), steps=4, seed=2, foot_lock=False
+    )
     off = [np.linalg.norm((m.root - goal.positions[:, 0])[:, [0, 2]], axis=-1).mean() for m in duet]
     assert off[person] < 0.02 < off[1 - person]
     assert len(duet[0]) == len(duet[1]) == 40
+
+
+def test_a_goal_by_its_old_keywords_says_the_new_one(prior: Prior, block: PairBlock) -> None:
+    with pytest.warns(FutureWarning, match="goals="):
+        [old] = generate_pair(prior, block, SAID[0], goal=walk(40), person=1, steps=2)  # type: ignore[call-arg]
+    [new] = generate_pair(prior, block, SAID[0], goals=(None, walk(40)), steps=2)
+    assert np.array_equal(old[0].root, new[0].root)
+    with pytest.raises(MotionloomError, match="both people have a goal"):
+        generate_pair(prior, block, SAID[0], goals=(walk(40), walk(40)))
 
 
 def test_the_other_one_stands_as_drawn_beside_who_follows_a_path(
@@ -179,7 +194,7 @@ def test_the_other_one_stands_as_drawn_beside_who_follows_a_path(
     drawn = []
     real = pair.pair_features
     monkeypatch.setattr(pair, "pair_features", lambda *a, **k: drawn.append(real(*a, **k)) or drawn[-1])
-    [duet] = generate_pair(prior, block, SAID[0], goal=walk(40), person=1, steps=3, clean=False)
+    [duet] = generate_pair(prior, block, SAID[0], goals=(None, walk(40)), steps=3, foot_lock=False)
     stands = drawn[0][1][0].double().numpy()
     there = np.array([np.cos(np.pi / 2), np.sin(np.pi / 2), 1.0, 2.0])
     other = placement(two.compose(there, two.seen(stands[1], stands[0])))
@@ -241,7 +256,7 @@ def test_whose_guesses_are_changed_is_still_unless_said_otherwise(
     asked: list[dict] = []
     shown: list[torch.Tensor] = []
 
-    def leader(prior: Prior, net: PairNet, bound: object, **how):
+    def guidance(prior: Prior, net: PairNet, bound: object, **how):
         asked.append(how)
 
         def lead(state: torch.Tensor, guess: torch.Tensor, level: int) -> torch.Tensor:
@@ -250,31 +265,34 @@ def test_whose_guesses_are_changed_is_still_unless_said_otherwise(
 
         return lead
 
-    monkeypatch.setattr(pair, "leader", leader)
+    monkeypatch.setattr(pair, "relative_pose_guidance", guidance)
     change = [None] * 16 + [lambda guess, level: torch.full_like(guess, 7.0), None]
     known = torch.zeros(18, 1 + FRAMES, 263, dtype=torch.bool)
     known[17, 1:5] = True
-    how = {"seeds": list(range(18)), "steps": 1, "change": change, "mask": known, "together": 0.5}
-    for still, expected in ((None, [True, False]), ([False] * 17 + [True], [False, True])):
+    observed = Observed(torch.zeros(known.shape), known, noise_free=True)
+    how = {"seeds": list(range(18)), "steps": 1, "pair_guidance": 0.5}
+    for frozen, expected in ((None, [True, False]), ([False] * 17 + [True], [False, True])):
         shown.clear()
         asked.clear()
-        pair_features(prior, block.net(prior), SAID * 9, FRAMES, still=still, **how)
+        pair_features(prior, block.net(prior), SAID * 9, FRAMES, edits=PairEdits(observed, change, frozen), **how)
         first, second = asked
-        assert (first["still"], second["still"]) == ([False] * 16, expected)
+        assert (first["frozen"], second["frozen"]) == ([False] * 16, expected)
         assert (first["seeds"], second["seeds"]) == (list(range(16)), [16, 17])
         assert (first["weight"], second["weight"]) == (0.5, 0.5)
         assert (int(first["mask"].sum()), int(second["mask"].sum())) == (0, 4 * 263)
         assert [(one[:, 1:] == 7.0).all((1, 2)).tolist() for one in shown] == [[False] * 16, [True, False]]
     with pytest.raises(MotionloomError):
-        pair_features(prior, block.net(prior), SAID * 9, FRAMES, **how | {"still": [False]})
+        pair_features(prior, block.net(prior), SAID * 9, FRAMES, edits=PairEdits(frozen=[False]), **how)
     monkeypatch.undo()
     with pytest.raises(MotionloomError, match="kept together"):
-        pair_features(prior, block.net(prior), SAID * 9, FRAMES, **how | {"together": 1.5})
+        pair_features(prior, block.net(prior), SAID * 9, FRAMES, **how | {"pair_guidance": 1.5})
 
 
 def test_who_goes_on_is_led_to_the_other(prior: Prior, block: PairBlock) -> None:
     past = walkers(1.2)
-    apart, led = (complete_pair(prior, block, past, seconds=6.0, steps=2, together=share)[0] for share in (0.0, 1.0))
+    apart, led = (
+        complete_pair(prior, block, past, seconds=6.0, steps=2, pair_guidance=share)[0] for share in (0.0, 1.0)
+    )
     for one, other in zip(apart, led, strict=True):
         off = np.abs(one.root - other.root)[:, [0, 2]].max(axis=1)
         assert off[: len(past[0])].max() == 0

@@ -12,8 +12,9 @@ from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22, joints22
 from motionloom.tasks import predict as task
 from motionloom.tasks.predict import predict, predict_pieces, switch
+from motionloom.tasks.sampling import PredictionSampling
 from motionloom.tasks.splice import concatenated, standing
-from motionloom.tasks.windows import Pen, person_of
+from motionloom.tasks.windows import Past, WindowSampler
 from tests.nets import tiny_predictor
 from tests.shared import shared
 from tests.tasks.small_predictor import small_predictor
@@ -125,18 +126,20 @@ def test_a_person_wears_what_was_seen_and_then_what_was_drawn_each_at_its_frame(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """At the predictor's own rate a frame of the grid is a frame of the result."""
-    given, wear = [], task.worn
+    given, wear = [], task.apply_positions
 
-    def worn(places, old, **asked):
+    def apply_positions(places, old, **asked):
         given.append((places, asked["known"]))
         return wear(places, old, **asked)
 
-    monkeypatch.setattr(task, "worn", worn)
+    monkeypatch.setattr(task, "apply_positions", apply_positions)
     predict(PREDICTOR, PAST, count=1, seconds=1.0, steps=1, temperature=1.0)
     ((places, known),) = given
-    seen = person_of(PREDICTOR, PAST)
+    seen = Past.of(PREDICTOR, PAST).person
     assert known == len(seen)
-    drawn = next(Pen(PREDICTOR, 1, 1.0, 1.0, True).windows(seen[None], [(0, 0)], None, 1))[0]
+    drawn = next(
+        WindowSampler(PREDICTOR, PredictionSampling(steps=1, temperature=1.0)).windows(seen[None], [(0, 0)], None, 1)
+    )[0]
     np.testing.assert_allclose(places, np.concatenate([seen, drawn]), atol=1e-5)
 
 
@@ -186,7 +189,7 @@ def test_minutes_look_back_a_few_seconds_only(monkeypatch: pytest.MonkeyPatch) -
     """Nothing that is kept grows with what was made: neither places nor poses."""
     kept: list[int] = []
 
-    def worn(places, old, **_):
+    def apply_positions(places, old, **_):
         kept.append(len(old))
         return old
 
@@ -196,9 +199,9 @@ def test_minutes_look_back_a_few_seconds_only(monkeypatch: pytest.MonkeyPatch) -
         assert at[-1] <= len(grid) - 1 + 1e-6
         return grid[at.round().astype(int)]
 
-    monkeypatch.setattr(task, "worn", worn)
+    monkeypatch.setattr(task, "apply_positions", apply_positions)
     monkeypatch.setattr(task, "positions_at", positions_at)
-    total = sum(len(piece) for piece in predict_pieces(PREDICTOR, PAST, seconds=60, steps=1, clean=False))
+    total = sum(len(piece) for piece in predict_pieces(PREDICTOR, PAST, seconds=60, steps=1, foot_lock=False))
     assert total == 30 + 1800
     assert max(kept) <= 15 + 30 * (task.CHUNK + 1) + 2 * 15
 
@@ -263,13 +266,13 @@ def test_neither_seam_of_a_switch_jumps(seconds: float, fps: float) -> None:
 
 
 def test_the_network_is_told_the_target_from_the_moment_on_when_it_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
-    told, draw = [], Pen.window
+    told, draw = [], WindowSampler.window
 
     def window(self, person, seeds, number, known, **asked):
         told.append(known)
         return draw(self, person, seeds, number, known, **asked)
 
-    monkeypatch.setattr(Pen, "window", window)
+    monkeypatch.setattr(WindowSampler, "window", window)
     target = person(3.0, 30.0).frames(60, 90)
     switch(PREDICTOR, PAST, target, seconds=0.5, steps=1, facing="kept")
     (known,) = told

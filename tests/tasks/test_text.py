@@ -44,8 +44,8 @@ def test_a_row_is_the_same_in_any_company(prior: Prior) -> None:
 
 def test_motion_i_is_drawn_from_seed_plus_i(prior: Prior) -> None:
     """Two of each prompt from seed 5: the fourth is what seed 8 alone makes of the second prompt."""
-    made = generate(prior, ["a person walks", "a person turns"], count=2, seed=5, clean=False, **FEW)
-    alone = generate(prior, "a person turns", seed=8, clean=False, **FEW)[0]
+    made = generate(prior, ["a person walks", "a person turns"], count=2, seed=5, foot_lock=False, **FEW)
+    alone = generate(prior, "a person turns", seed=8, foot_lock=False, **FEW)[0]
     assert len(made) == 4
     np.testing.assert_allclose(made[3].positions(), alone.positions(), atol=1e-4)
     assert np.abs(made[2].positions() - made[3].positions()).max() > 1e-3
@@ -137,7 +137,7 @@ def test_babel_weights_make_motions(tmp_path: Path, flags: bool) -> None:
     assert prior.net.config.flags is flags
     made = generate(prior, ["walk", "turn left"], seconds=[0.5, 1.0], steps=3)
     assert [(len(m), m.fps, len(m.skeleton)) for m in made] == [(15, 30, 22), (30, 30, 22)]
-    raw = generate(prior, "turn left", seconds=1.0, steps=3, seed=1, clean=False)[0]
+    raw = generate(prior, "turn left", seconds=1.0, steps=3, seed=1, foot_lock=False)[0]
     np.testing.assert_allclose(raw.root[0, [0, 2]], 0, atol=1e-9)
     np.testing.assert_allclose(facing(raw), [0, 0, 1], atol=1e-6)
     arms = [16, 17, 18, 19]
@@ -149,7 +149,7 @@ def test_babel_features_are_finished_as_its_codec_decodes_them(tmp_path: Path) -
     prior = babel_prior(tmp_path, flags=False)
     drawn = sample_features(prior, ["walk"], [20], seeds=[3], steps=2)[0]
     assert drawn.shape == (20, 135)
-    whole = finish(prior, drawn, clean=False)
+    whole = finish(prior, drawn, foot_lock=False)
     limbs = decode(drawn.double().numpy()).positions()
     bent = np.linalg.norm(limbs - limbs[:, :1], axis=-1)
     places = whole.positions()
@@ -164,7 +164,7 @@ def test_cleaning_holds_a_babel_foot_that_slides() -> None:
     numbers[:, 0], numbers[:, 1] = SMPL22.offsets[0, 1] - 0.02, 0.002  # a leg at full reach could not give way
     config = replace(tiny.PUBLISHED, features=135)
     prior = replace(tiny.prior(config), fps=30.0)
-    raw, clean = (finish(prior, numbers, clean=c).positions()[10:35, [7, 8, 10, 11]] for c in (False, True))
+    raw, clean = (finish(prior, numbers, foot_lock=c).positions()[10:35, [7, 8, 10, 11]] for c in (False, True))
     assert np.linalg.norm(raw[-1] - raw[0], axis=-1).min() > 0.045
     assert np.linalg.norm(clean[-1] - clean[0], axis=-1).max() < 0.005
 

@@ -11,21 +11,22 @@ from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import windows
 from motionloom.tasks.completion import next_frames
-from motionloom.tasks.windows import ONWARD, Pen, person_of, seen_frames, windows_for
+from motionloom.tasks.sampling import PredictionSampling
+from motionloom.tasks.windows import TEMPERATURE_AFTER_FIRST, Past, WindowSampler, windows_for
 from tests.tasks.small_predictor import FPS, FRAMES, OBSERVED, small_predictor
 from tests.tasks.test_edit import person
 
 PREDICTOR = small_predictor()
-PEN = Pen(PREDICTOR, 2, 1.0, 1.0, True)
+SAMPLER = WindowSampler(PREDICTOR, PredictionSampling(steps=2, temperature=1.0))
 AHEAD = FRAMES - OBSERVED
-SEEN = person_of(PREDICTOR, person(2.0, 30.0))[None]
+SEEN = Past.of(PREDICTOR, person(2.0, 30.0)).person[None]
 
 
 @pytest.mark.parametrize("fps", [10.0, 24.0, 25.0, 29.97, 30.0, 60.0, 120.0])
 def test_a_person_is_seen_at_the_rate_of_the_predictor_and_up_to_the_last_frame(fps: float) -> None:
     """Every seen moment is the smooth clip's own moment, counted back from its end."""
     past, fine = person(1.5, fps), person(1.5, 600.0)
-    seen = person_of(PREDICTOR, past)
+    seen = Past.of(PREDICTOR, past).person
     assert seen.shape == (OBSERVED, 22, 3)
     back = (len(past) - 1) / fps - np.arange(OBSERVED)[::-1] / FPS
     real = to_smpl22(fine).positions()[(back * 600).round().astype(int)]
@@ -42,14 +43,14 @@ def test_short_clips_are_seen_whole_and_by_two_moments_at_least(
     fps: float, frames: int, places: int, seen: int
 ) -> None:
     past = person(2.0, fps).frames(0, frames)
-    assert person_of(PREDICTOR, past).shape == (places, 22, 3)
-    assert min(seen_frames(PREDICTOR, past), frames) == seen
+    assert Past.of(PREDICTOR, past).person.shape == (places, 22, 3)
+    assert len(Past.of(PREDICTOR, past).tail) == seen
 
 
 def test_a_predictor_that_sees_longer_than_floors_need_sees_all_of_it() -> None:
     long = replace(PREDICTOR, observed=140, basis=replace(PREDICTOR.basis, frames=170))
     past = person(6.0, 30.0)
-    seen = person_of(long, past)
+    seen = Past.of(long, past).person
     real = to_smpl22(past).positions()[-140:]
     assert np.abs((seen - real)[..., [0, 2]]).max() < 0.02
 
@@ -61,11 +62,11 @@ def test_as_many_windows_as_the_seconds_need(seconds: float, count: int) -> None
 
 def test_each_window_sees_the_one_before() -> None:
     """By hand: the next window is what comes behind the last frames, on the bones of the person."""
-    made = list(PEN.windows(SEEN, [(7, 3)], None, 3))
+    made = list(SAMPLER.windows(SEEN, [(7, 3)], None, 3))
     whole = SEEN
     for number, window in enumerate(made):
         seeds = [row_seed(7, 3, number)]
-        heat = ONWARD if number else 1.0
+        heat = TEMPERATURE_AFTER_FIRST if number else 1.0
         by_hand = next_frames(PREDICTOR, whole[:, -OBSERVED:], seeds=seeds, steps=2, temperature=heat)
         np.testing.assert_allclose(window[..., [0, 2]], by_hand[..., [0, 2]], atol=1e-6)
         whole = np.concatenate([whole, window], axis=1)
@@ -75,16 +76,16 @@ def test_each_window_sees_the_one_before() -> None:
 
 def test_what_is_given_is_asked_for_each_window_once_and_as_far_as_it_sees() -> None:
     asked: list[tuple[int, int]] = []
-    list(PEN.windows(SEEN, [(0, 0)], lambda first, last: asked.append((first, last)), 3))
+    list(SAMPLER.windows(SEEN, [(0, 0)], lambda first, last: asked.append((first, last)), 3))
     assert asked == [(1, 1 + AHEAD), (1 + AHEAD, 1 + 2 * AHEAD), (1 + 2 * AHEAD, 1 + 3 * AHEAD)]
     asked.clear()
-    list(PEN.windows(SEEN[:, -4:], [(0, 0)], lambda first, last: asked.append((first, last)), 2))
+    list(SAMPLER.windows(SEEN[:, -4:], [(0, 0)], lambda first, last: asked.append((first, last)), 2))
     assert asked[0] == (1, 1 + FRAMES - 4)
 
 
 def test_a_person_in_place_keeps_to_it_but_rises_and_sinks() -> None:
-    free = next(PEN.windows(SEEN, [(0, 0)], None, 1))
-    bound = next(replace(PEN, root=False).windows(SEEN, [(0, 0)], None, 1))
+    free = next(SAMPLER.windows(SEEN, [(0, 0)], None, 1))
+    bound = next(replace(SAMPLER, root=False).windows(SEEN, [(0, 0)], None, 1))
     assert (bound[:, :, 0, [0, 2]] == SEEN[:, -1:, 0, [0, 2]]).all()
     np.testing.assert_allclose(bound - bound[:, :, :1], free - free[:, :, :1], atol=1e-12)
     np.testing.assert_allclose(bound[..., 1], free[..., 1], atol=1e-12)
@@ -100,7 +101,7 @@ def sinking(depth: float):
 
 def test_nobody_sinks_under_the_floor_and_the_lift_is_smooth(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(windows, "next_frames", sinking(0.5))
-    made = next(PEN.windows(SEEN, [(0, 0)], None, 1))[0]
+    made = next(SAMPLER.windows(SEEN, [(0, 0)], None, 1))[0]
     assert made[..., 1].min() > SEEN[0, -1, :, 1].min().clip(max=0) - 0.05
     whole = np.concatenate([SEEN[0, -3:, :, 1], made[..., 1]])
     assert np.abs(np.diff(whole[2:], 2, axis=0)).max() < 0.012
@@ -110,8 +111,8 @@ def test_nobody_sinks_under_the_floor_and_the_lift_is_smooth(monkeypatch: pytest
 
 def test_people_above_the_floor_or_already_under_it_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(windows, "next_frames", sinking(-0.5))
-    up = next(PEN.windows(SEEN, [(0, 0)], None, 1))
+    up = next(SAMPLER.windows(SEEN, [(0, 0)], None, 1))
     assert np.array_equal(up, sinking(-0.5)(PREDICTOR, SEEN))
     monkeypatch.setattr(windows, "next_frames", sinking(0.0))
     cellar = SEEN - np.array([0, 1.0, 0])
-    assert np.array_equal(next(PEN.windows(cellar, [(0, 0)], None, 1)), sinking(0.0)(PREDICTOR, cellar))
+    assert np.array_equal(next(SAMPLER.windows(cellar, [(0, 0)], None, 1)), sinking(0.0)(PREDICTOR, cellar))

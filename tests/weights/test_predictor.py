@@ -165,7 +165,7 @@ def test_predictors_are_written_as_safetensors_only(tmp_path: Path) -> None:
 def test_files_that_are_missing_or_of_another_kind_are_refused(tmp_path: Path) -> None:
     with pytest.raises(MotionloomError, match="no predictor"):
         Predictor.load(tmp_path / "absent.safetensors")
-    with pytest.raises(MotionloomError, match="not a predictor"):
+    with pytest.raises(MotionloomError, match="is a prior, not a predictor"):
         load_predictor(save_prior(tiny.prior(), tmp_path / "prior.safetensors"))
     (tmp_path / "text.safetensors").write_text("no weights")
     with pytest.raises(MotionloomError, match="whole safetensors"):

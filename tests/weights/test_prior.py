@@ -164,7 +164,7 @@ def test_metadata_that_is_no_description_is_refused(file: Path, tmp_path: Path, 
 def test_weights_of_something_else_are_no_prior(file: Path, tmp_path: Path) -> None:
     """An evaluator's or an adapter's; nothing of Python is in the sentence."""
     save_file(parts(file)[0], tmp_path / "a.safetensors", {"motionloom-adapter": "{}"})
-    with pytest.raises(MotionloomError, match=r"a.safetensors does not describe a motionloom prior; name"):
+    with pytest.raises(MotionloomError, match=r"a.safetensors is an adapter, not a prior; name"):
         load_prior(tmp_path / "a.safetensors")
 
 

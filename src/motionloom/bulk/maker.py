@@ -156,7 +156,7 @@ class Maker:
             bf16=options.bf16,
         )  # fmt: skip
         return [
-            self._finished(one, finish(self.prior, features, clean=not options.raw))
+            self._finished(one, finish(self.prior, features, foot_lock=not options.raw))
             for one, features in zip(rows, drawn, strict=True)
         ]
 
@@ -170,9 +170,9 @@ class Maker:
             self.prior, [one.row.prompt for one in filled], goal.seen_from(place), seeds=[one.seed for one in filled],
             guidance=self.options.guidance, steps=self.options.steps,
         )  # fmt: skip
-        clean = not self.options.raw
+        foot_lock = not self.options.raw
         placed = [
-            moved(to_motion(features.numpy().astype(np.float64), self.prior.fps, clean=clean), place)
+            moved(to_motion(features.numpy().astype(np.float64), self.prior.fps, foot_lock=foot_lock), place)
             for features in drawn[: len(rows)]
         ]
         return [judged(fit(motion, goal), motion, goal) for motion in placed]
@@ -184,7 +184,7 @@ class Maker:
         guidance = self.options.guidance if timeline.guidance is None else timeline.guidance
         pieces = compose(
             self.prior, timeline.segments, seed=asked.seed, guidance=guidance, steps=self.options.steps,
-            start=asked.start, path=timeline.path, clean=not self.options.raw,
+            start=asked.start, path=timeline.path, foot_lock=not self.options.raw,
         )  # fmt: skip
         return self._finished(asked, joined(list(pieces)))
 

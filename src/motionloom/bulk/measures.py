@@ -3,7 +3,7 @@
 import ast
 import importlib
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -132,11 +132,7 @@ def _value(node: ast.expr, values: Values) -> Any:
     """The value of a checked expression; None is unknown (as in Kleene's logic of three values)."""
     match node:
         case ast.BoolOp(op=op, values=parts):
-            found = [_value(part, values) for part in parts]
-            decisive = isinstance(op, ast.Or)
-            if any(one is not None and bool(one) == decisive for one in found):
-                return decisive
-            return None if None in found else not decisive
+            return _all_or_any(isinstance(op, ast.Or), [_value(part, values) for part in parts])
         case ast.UnaryOp(op=op, operand=part):
             found = _value(part, values)
             if found is None:
@@ -148,12 +144,23 @@ def _value(node: ast.expr, values: Values) -> Any:
                 return None
             return _COUNT[type(op)](a, b)
         case ast.Compare(left=left, ops=ops, comparators=others):
-            found = [_value(part, values) for part in (left, *others)]
-            pairs = list(zip(found, ops, found[1:], strict=False))
-            known = [_COMPARE[type(op)](a, b) for a, op, b in pairs if a is not None and b is not None]
-            return False if not all(known) else None if len(known) < len(pairs) else True
+            return _compared(ops, [_value(part, values) for part in (left, *others)])
         case ast.Name(id=name):
             return values.get(name)
         case ast.Constant(value=value):
             return value
     raise AssertionError("unchecked expression")
+
+
+def _all_or_any(decisive: bool, found: Sequence[Any]) -> bool | None:
+    """``or`` of values if ``decisive`` is True, else ``and``; None where unknown ones decide."""
+    if any(one is not None and bool(one) == decisive for one in found):
+        return decisive
+    return None if None in found else not decisive
+
+
+def _compared(ops: Sequence[ast.cmpop], found: Sequence[Any]) -> bool | None:
+    """A chain of comparisons; None where it holds for what is known and something is unknown."""
+    pairs = list(zip(found, ops, found[1:], strict=False))
+    known = [_COMPARE[type(op)](a, b) for a, op, b in pairs if a is not None and b is not None]
+    return False if not all(known) else None if len(known) < len(pairs) else True

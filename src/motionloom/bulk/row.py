@@ -83,6 +83,21 @@ class Asked:
 
 def parse(raw: bytes) -> Row:
     """The row that the bytes of a JSON object ask for; raises `MotionloomError` for what cannot be."""
+    row = _columns(raw)
+    prompt, timeline, skeleton, name = (_text(row, key) for key in ("prompt", "timeline", "skeleton", "id"))
+    goal = _goal(row.get("goal"))
+    task = _task(_text(row, "task"), goal is not None, timeline is not None)
+    if task != "compose" and not (prompt or "").strip():
+        raise MotionloomError("the row has no prompt; say in words what the person does")
+    if task == "compose" and (prompt is not None or "seconds" in row):
+        raise MotionloomError("a row with a timeline has no prompt and no seconds; write them into the timeline")
+    if name is not None and not _NAME.fullmatch(name):
+        raise MotionloomError(f"the id {name[:40]!r} cannot name a file; use at most 100 letters, digits, '_' and '-'")
+    return Row(task, prompt or "", _seconds(row), _seed(row), timeline, goal, skeleton, name)
+
+
+def _columns(raw: bytes) -> dict[str, Any]:
+    """The columns of a row that hold something."""
     try:
         row = json.loads(raw)
     except (ValueError, RecursionError) as error:
@@ -94,20 +109,14 @@ def parse(raw: bytes) -> Row:
         raise MotionloomError(
             f"the row has the unknown column {unknown[0][:40]!r}; the columns are {', '.join(COLUMNS)}"
         )
-    prompt, timeline, skeleton, name = (_text(row, key) for key in ("prompt", "timeline", "skeleton", "id"))
-    goal = row.get("goal")
+    return row
+
+
+def _goal(goal: Any) -> str | dict[str, Any] | None:
+    """The name of a goal file, or a mapping of its keys, which in a CSV file is text."""
     if goal is not None and not isinstance(goal, str | dict):
         raise MotionloomError("'goal' must be the name of a goal file or a mapping of its keys")
-    if isinstance(goal, str) and goal.lstrip().startswith("{"):  # a mapping in a CSV file
-        goal = _mapping(goal)
-    task = _task(_text(row, "task"), goal is not None, timeline is not None)
-    if task != "compose" and not (prompt or "").strip():
-        raise MotionloomError("the row has no prompt; say in words what the person does")
-    if task == "compose" and (prompt is not None or "seconds" in row):
-        raise MotionloomError("a row with a timeline has no prompt and no seconds; write them into the timeline")
-    if name is not None and not _NAME.fullmatch(name):
-        raise MotionloomError(f"the id {name[:40]!r} cannot name a file; use at most 100 letters, digits, '_' and '-'")
-    return Row(task, prompt or "", _seconds(row), _seed(row), timeline, goal, skeleton, name)
+    return _mapping(goal) if isinstance(goal, str) and goal.lstrip().startswith("{") else goal
 
 
 def _task(given: str | None, goal: bool, timeline: bool) -> str:

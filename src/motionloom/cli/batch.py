@@ -50,7 +50,9 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 24)")
     parser.add_argument("--solver", help="ddim, ddpm (the default), dpm2m or dpm2m-sde")
     parser.add_argument("--fps", type=float, help="frame rate of the files (default: the model's 20)")
-    parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
+    parser.add_argument(
+        "--no-foot-lock", dest="raw", action="store_true", help="leave the feet as the network drew them"
+    )
     parser.add_argument(
         "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
     )

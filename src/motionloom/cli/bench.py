@@ -26,7 +26,7 @@ def add(subparsers) -> None:
 
 def _bench(arguments: argparse.Namespace) -> None:
     from motionloom.lab.bench import table
-    from motionloom.lab.suites.obey import check_report, plain, write_json
+    from motionloom.lab.report.files import check_report, plain, write_json
 
     if arguments.json:
         check_report(arguments.json)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.newcomers import check_overwriting
-from motionloom.cli.sampling import add_sampling, bar, check_outs, fail, load_prior, remark_unknown
+from motionloom.cli.sampling import add_sampling, bar, check_outs, fail, load_prior, moves, remark_unknown, sampling_of
 from motionloom.cli.skeletons import Target, open_target
 
 if TYPE_CHECKING:
@@ -154,28 +154,15 @@ def _write(pieces: Iterable["Motion"], streams: Sequence["Stream"], fps: float |
 def _pieces(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline") -> Generator["Motion", None, None]:
     from motionloom.io import load
     from motionloom.tasks import long
-    from motionloom.tasks.text import GUIDANCE, STEPS
 
     start = None if timeline.start is None else load(timeline.start)
-    steps = STEPS if arguments.steps is None else arguments.steps
-    done = 0
+    told = {"guidance": timeline.guidance, "seed": timeline.seed}
+    settings: dict[str, Any] = {name: value for name, value in told.items() if value is not None}
     with bar("composing") as move:
-
-        def progress(more: int) -> None:
-            nonlocal done
-            done += more
-            move(done, steps * len(timeline.segments))
-
         yield from long.compose(
-            prior, timeline.segments, seed=_first(arguments.seed, timeline.seed, 0),
-            guidance=_first(arguments.guidance, timeline.guidance, GUIDANCE),
-            steps=steps, start=start, path=timeline.path, clean=not arguments.raw, progress=progress,
+            prior, timeline.segments, start=start, path=timeline.path, foot_lock=arguments.foot_lock,
+            progress=moves(move, arguments.steps, len(timeline.segments)), **(settings | sampling_of(arguments)),
         )  # fmt: skip
-
-
-def _first(*choices: Any) -> Any:
-    """The line's, else the file's, else the default."""
-    return next(choice for choice in choices if choice is not None)
 
 
 def _saved(streams: Sequence["Stream"]) -> list["Stream"]:

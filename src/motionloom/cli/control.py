@@ -16,6 +16,7 @@ from motionloom.cli.sampling import (
     places,
     remark_unknown,
     report,
+    sampling_of,
     write,
 )
 from motionloom.cli.skeletons import put_all
@@ -54,7 +55,9 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--seed", type=int, default=0, help="the first motion's seed (default 0)")
     parser.add_argument("--count", type=int, default=1, help="motions to make (default 1)")
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
-    parser.add_argument("--loose", action="store_true", help="leave the motion as drawn, near the goals")
+    parser.add_argument(
+        "--no-fit", dest="fit", action="store_false", help="leave the motion as sampled, near the goals"
+    )
     parser.add_argument(
         "--adapters", action="append", default=[], metavar="NAME|FILE",
         help="none (the default), fitting (the shipped ones for these goals), or names of adapters, repeatable",
@@ -110,16 +113,11 @@ def _goal(arguments: argparse.Namespace) -> "Goal":
     if not (arguments.goal or arguments.follow or arguments.path):
         fail("nothing to keep to; give --goal FILE, --path SVG, or --follow JOINT --from CLIP")
     clip = None if arguments.clip is None else load(arguments.clip)
-    seconds = arguments.seconds
-    if seconds is None:
-        seconds = 5.0 if clip is None else (len(clip) - 1) / clip.fps + 1 / FPS
-    frames = frames_in(seconds, FPS)
+    usual = 5.0 if clip is None else (len(clip) - 1) / clip.fps + 1 / FPS
+    frames = frames_in(usual if arguments.seconds is None else arguments.seconds, FPS)
     goals = [read_goal(file, frames=frames, folder=file.parent) for file in arguments.goal]
     if arguments.path is not None:
-        size = {} if arguments.width is None else {"width": arguments.width}
-        drawing = arguments.path.resolve() if arguments.path.exists() else arguments.path  # a link may lead anywhere
-        drawn = {"path": {"svg": drawing.name, **size}}
-        goals.append(read_goal(drawn, frames=frames, folder=drawing.parent))
+        goals.append(_drawn(arguments.path, arguments.width, frames))
     if clip is not None:
         goals.append(follow(clip, arguments.follow, frames=frames))
     whole = goals[0]
@@ -134,18 +132,25 @@ def _goal(arguments: argparse.Namespace) -> "Goal":
     return whole
 
 
+def _drawn(path: Path, width: float | None, frames: int) -> "Goal":
+    """The line of an SVG file."""
+    from motionloom.goals.goal_file import read_goal
+
+    size = {} if width is None else {"width": width}
+    drawing = path.resolve() if path.exists() else path  # a link may lead anywhere
+    return read_goal({"path": {"svg": drawing.name, **size}}, frames=frames, folder=drawing.parent)
+
+
 def _make(arguments: argparse.Namespace, prior: "Prior", goal: "Goal") -> "tuple[list[Controlled], float]":
     import time
 
     from motionloom.tasks.control import control
-    from motionloom.tasks.text import STEPS
 
     began = time.perf_counter()
     with bar("controlling") as progress:
         made = control(
-            prior, arguments.prompt, goal, count=arguments.count, seed=arguments.seed, guidance=arguments.guidance,
-            steps=STEPS if arguments.steps is None else arguments.steps, adapters=_adapters(arguments.adapters, prior),
-            exact=not arguments.loose, clean=not arguments.raw, progress=progress,
+            prior, arguments.prompt, goal, adapters=_adapters(arguments.adapters, prior), fit=arguments.fit,
+            foot_lock=arguments.foot_lock, progress=progress, **sampling_of(arguments),
         )  # fmt: skip
     return made, time.perf_counter() - began
 

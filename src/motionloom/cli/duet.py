@@ -13,8 +13,10 @@ from motionloom.cli.sampling import (
     check_prompt,
     fail,
     load_prior,
+    moves,
     places,
     report,
+    sampling_of,
     take_text_anywhere,
 )
 from motionloom.cli.skeletons import Target, add_skeleton, put_all, read_target
@@ -45,7 +47,9 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "text", nargs="?", metavar="TEXT", help="what the two do; 'what the first does :: what the second does'"
     )
     parser.add_argument("--past", nargs=2, type=Path, metavar=("A", "B"), help="motion files of both to go on from")
-    parser.add_argument("--given", type=Path, metavar="FILE", help="motion file of the first; only the second is drawn")
+    parser.add_argument(
+        "--react-to", type=Path, metavar="FILE", help="motion file of the first; only the second is drawn"
+    )
     parser.add_argument("--timeline", type=Path, metavar="YAML", help="several texts, one after the other")
     parser.add_argument("--path", type=Path, metavar="FILE", help="goal file (.json, .yaml) or drawing (.svg) for one")
     parser.add_argument(
@@ -56,10 +60,12 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--count", type=int, default=1, help="duets to make (default 1)")
     parser.add_argument("--guidance", type=float, help="strength of the text (default 2.5, or the timeline's)")
     parser.add_argument(
-        "--together", type=float, metavar="SHARE",
+        "--pair-guidance", type=float, metavar="SHARE",
         help="how firmly the two keep to where the block wants them, 0 (they may drift apart) to 1 (default)",
     )  # fmt: skip
-    parser.add_argument("--block", default="duet", metavar="NAME|PATH", help="what makes two of one (default duet)")
+    parser.add_argument(
+        "--pair-weights", default="duet", metavar="NAME|PATH", help="what makes two of one (default duet)"
+    )
     _add_sampling(parser)
     add_reading(parser)
     take_text_anywhere(parser)
@@ -76,7 +82,9 @@ def _add_sampling(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="the prior (default: default)")
     add_adapters(parser)
     parser.add_argument("--fps", type=float, help="frame rate of the files (default 20, or that of the motions given)")
-    parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
+    parser.add_argument(
+        "--no-foot-lock", dest="foot_lock", action="store_false", help="leave the feet as the network drew them"
+    )
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
     add_skeleton(parser, own="the uniform person's, or those of the motions given")
@@ -120,21 +128,20 @@ def _make(
 ) -> "list[list[Motion]]":
     from motionloom.tasks import duet, pair
 
-    text, seed = arguments.text or "", arguments.seed or 0
-    shared: dict[str, Any] = {"clean": not arguments.raw}
-    shared |= {n: v for n in ("steps", "guidance", "together") if (v := getattr(arguments, n)) is not None}
+    text: str = arguments.text or ""
+    shared: dict[str, Any] = {"foot_lock": arguments.foot_lock, **sampling_of(arguments)}
     if timeline is not None:
         return [_composed(arguments, prior, block, timeline, progress, shared)]
-    shared |= {"count": arguments.count, "seed": seed, "progress": progress}
+    shared["progress"] = progress
     if arguments.past:
         added = ADDED if arguments.seconds is None else arguments.seconds
         made = pair.complete_pair(prior, block, (given[0], given[1]), text, seconds=added, **shared)
-    elif arguments.given:
+    elif arguments.react_to:
         made = duet.react(prior, block, given[0], text, **shared)
     else:
         length = SECONDS if arguments.seconds is None else arguments.seconds
         made = pair.generate_pair(
-            prior, block, text, seconds=length, goal=goal, person=arguments.person - 1, **shared
+            prior, block, text, seconds=length, goals=(goal, None) if arguments.person == 1 else (None, goal), **shared
         )  # fmt: skip
     return [list(one) for one in made]
 
@@ -150,23 +157,14 @@ def _composed(
     from motionloom.tasks.duet import compose_pair
     from motionloom.tasks.long import with_loaded
     from motionloom.tasks.splice import concatenated
-    from motionloom.tasks.text import STEPS
 
-    if timeline.guidance is not None:
-        shared = {"guidance": timeline.guidance} | shared
-    seed = next((s for s in (arguments.seed, timeline.seed) if s is not None), 0)
-    done, total = 0, shared.get("steps", STEPS) * len(timeline.segments)
-
-    def told(more: int) -> None:
-        nonlocal done
-        done += more
-        progress(done, total)
-
+    told = {"guidance": timeline.guidance, "seed": timeline.seed}
+    shared = {name: value for name, value in told.items() if value is not None} | shared
     segments = with_loaded(prior, timeline.segments)
     blocks = list(
         compose_pair(
-            prior, block, segments, seed=seed, path=timeline.path, person=arguments.person - 1,
-            progress=told, **shared,
+            prior, block, segments, path=timeline.path, person=arguments.person - 1,
+            progress=moves(progress, arguments.steps, len(segments)), **shared,
         )
     )  # fmt: skip
     return [concatenated(*[one[i] for one in blocks]) for i in (0, 1)]
@@ -179,11 +177,11 @@ def _load(arguments: argparse.Namespace) -> "tuple[Prior, PairBlock]":
     from motionloom.weights.pair import PairBlock
 
     prior = load_prior(arguments)
-    return prior, PairBlock.load(arguments.block, prior)
+    return prior, PairBlock.load(arguments.pair_weights, prior)
 
 
 def _inputs(arguments: argparse.Namespace) -> list[Path]:
-    return list(arguments.past or ([arguments.given] if arguments.given else []))
+    return list(arguments.past or ([arguments.react_to] if arguments.react_to else []))
 
 
 def _read(arguments: argparse.Namespace) -> "tuple[list[Motion], list[tuple[float, dict[str, str]]]]":
@@ -255,7 +253,7 @@ def _goal(arguments: argparse.Namespace) -> "Goal":
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    kinds = [name for name in ("past", "given", "timeline") if getattr(arguments, name)]
+    kinds = [name for name in ("past", "react-to", "timeline") if getattr(arguments, name.replace("-", "_"))]
     if len(kinds) > 1:
         fail(f"--{kinds[0]} and --{kinds[1]} are different tasks; give one of them")
     if arguments.text is not None:
@@ -264,7 +262,7 @@ def _check(arguments: argparse.Namespace) -> None:
         fail("no prompt; say what the two do, such as: motionloom duet 'two people dance salsa together'")
     if kinds == ["timeline"] and (arguments.text is not None or arguments.count != 1):
         fail("a timeline has its own texts and makes one duet; leave out the text and --count")
-    if arguments.seconds is not None and kinds in (["timeline"], ["given"]):
+    if arguments.seconds is not None and kinds in (["timeline"], ["react-to"]):
         fail(f"--seconds does not go with --{kinds[0]}, which says how long it is")
     if arguments.path and kinds:
         fail(f"--path does not go with --{kinds[0]}; give it with a text, or write it into a timeline")
@@ -279,8 +277,8 @@ def _check_numbers(arguments: argparse.Namespace) -> None:
         fail(f"--steps must be 1 or more; got {arguments.steps}")
     if arguments.guidance is not None and not abs(arguments.guidance) <= 100:
         fail(f"--guidance must be -100 to 100, usually 1 to 7; got {arguments.guidance:g}")
-    if arguments.together is not None and not 0 <= arguments.together <= 1:
-        fail(f"--together must be 0 to 1; got {arguments.together:g}")
+    if arguments.pair_guidance is not None and not 0 <= arguments.pair_guidance <= 1:
+        fail(f"--pair-guidance must be 0 to 1; got {arguments.pair_guidance:g}")
     if arguments.fps is not None and not 1 <= arguments.fps <= 1000:
         fail(f"--fps must be 1 to 1000; got {arguments.fps:g}")
 
@@ -366,11 +364,11 @@ def _about(arguments: argparse.Namespace, duets: "list[list[Motion]]") -> dict[s
     return {
         "prompt": arguments.text,
         "past": [str(path) for path in arguments.past or ()],
-        "given": None if arguments.given is None else str(arguments.given),
+        "given": None if arguments.react_to is None else str(arguments.react_to),
         "timeline": None if arguments.timeline is None else str(arguments.timeline),
         "duets": len(duets),
         "seconds": duets[0][0].seconds,
         "seed": arguments.seed,
         "weights": str(arguments.weights),
-        "block": str(arguments.block),
+        "block": str(arguments.pair_weights),
     }

@@ -16,6 +16,7 @@ from motionloom.cli.sampling import (
     places,
     remark_unknown,
     report,
+    sampling_of,
     take_text_anywhere,
     write,
 )
@@ -99,18 +100,18 @@ def _make(
 ) -> "tuple[list[Motion], float]":
     import time
 
-    from motionloom.tasks.edit import edit
-    from motionloom.tasks.text import STEPS
+    from motionloom.tasks.edit import changes_asked, edit
 
-    began = time.perf_counter()
+    text, began = arguments.text or "", time.perf_counter()
+    changes = changes_asked(
+        text, keep=[name.strip() for part in arguments.keep for name in part.split(",")], loop=arguments.loop,
+        between=[tuple(span) for span in arguments.between], blend=arguments.blend, extend=arguments.extend,
+        strength=arguments.strength,
+    )  # fmt: skip
     with bar("editing") as progress:
         motions = edit(
-            prior, clip, arguments.text or "", between=[tuple(span) for span in arguments.between],
-            keep=[name.strip() for part in arguments.keep for name in part.split(",")],
-            loop=arguments.loop, blend=arguments.blend, extend=arguments.extend, strength=arguments.strength,
-            count=arguments.count, seed=arguments.seed, guidance=arguments.guidance,
-            steps=STEPS if arguments.steps is None else arguments.steps, skeleton=skeleton,
-            clean=not arguments.raw, progress=progress,
+            prior, clip, text, changes, skeleton=skeleton, foot_lock=arguments.foot_lock, progress=progress,
+            **sampling_of(arguments),
         )  # fmt: skip
     if arguments.fps is not None:
         motions = [motion.resample(arguments.fps) for motion in motions]

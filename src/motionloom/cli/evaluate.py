@@ -86,13 +86,14 @@ def _obedience(arguments: argparse.Namespace) -> None:
     import json
 
     from motionloom.lab.metrics.everyday.sets import chosen
+    from motionloom.lab.report import files
     from motionloom.lab.suites import everyday, obey
     from motionloom.lab.suites.reference import known
     from motionloom.viz.film import suffixed
 
     checks = chosen(arguments.prompts, arguments.only)
     if arguments.sheet:
-        obey.check_report(suffixed(arguments.sheet, (".png",)))
+        files.check_report(suffixed(arguments.sheet, (".png",)))
     seed = _first_seed(arguments)
     settings = _settings(arguments)
     generate = everyday.FirstDraws(_generator(arguments))
@@ -111,15 +112,15 @@ def _obedience(arguments: argparse.Namespace) -> None:
     if "paraphrases_obeyed_share" in found:
         said += f"; {found['paraphrases_obeyed_share']:.1%} in other words"
     if arguments.out:
-        parts = [obey.markdown(themes)] if len(themes) > 1 else []
-        text = "\n\n".join([f"# Obedience of {arguments.weights}", f"{said}.", *parts, obey.markdown(rows)])
-        obey.write_text(arguments.out / "report.md", text + "\n")
+        parts = [files.markdown(themes)] if len(themes) > 1 else []
+        text = "\n\n".join([f"# Obedience of {arguments.weights}", f"{said}.", *parts, files.markdown(rows)])
+        files.write_text(arguments.out / "report.md", text + "\n")
     if arguments.sheet:
         generate.draw(checks, arguments.sheet, seed=seed)
     if arguments.json:
         print(json.dumps(obey.summary(results, checks, settings=settings), indent=1))
     else:
-        tables = [obey.plain(rows), *([obey.plain(themes)] if len(themes) > 1 else [])]
+        tables = [files.plain(rows), *([files.plain(themes)] if len(themes) > 1 else [])]
         print("\n\n".join([*tables, said]))
 
 
@@ -134,14 +135,15 @@ def _realism(arguments: argparse.Namespace) -> None:
     import json
 
     from motionloom.errors import MotionloomError
-    from motionloom.lab.suites import obey, realism
+    from motionloom.lab.report import files
+    from motionloom.lab.suites import realism
     from motionloom.lab.suites.clips import real_clips
     from motionloom.lab.suites.reference import known
 
     if not 1 <= arguments.count <= 100_000:
         raise MotionloomError(f"the count must be from 1 to 100000; got {arguments.count}")
     if arguments.out:
-        obey.check_report(arguments.out / "realism.json")
+        files.check_report(arguments.out / "realism.json")
     if arguments.data:
         chosen = realism.choose(list(real_clips(arguments.data)), arguments.count)
         if not chosen:
@@ -156,22 +158,23 @@ def _realism(arguments: argparse.Namespace) -> None:
     if not arguments.data:
         said += "; the real numbers are of other actions: name recordings with --data to compare like with like"
     if arguments.out:
-        obey.write_json(arguments.out / "realism.json", found)
-        obey.write_text(
-            arguments.out / "realism.md", f"# Realism of {arguments.weights}\n\n{said}.\n\n{obey.markdown(rows)}\n"
+        files.write_json(arguments.out / "realism.json", found)
+        files.write_text(
+            arguments.out / "realism.md", f"# Realism of {arguments.weights}\n\n{said}.\n\n{files.markdown(rows)}\n"
         )
-    print(json.dumps(found, indent=1) if arguments.json else f"{obey.plain(rows)}\n\n{said}")
+    print(json.dumps(found, indent=1) if arguments.json else f"{files.plain(rows)}\n\n{said}")
 
 
 def _reference(arguments: argparse.Namespace) -> None:
-    from motionloom.lab.suites import obey, reference
+    from motionloom.lab.report import files
+    from motionloom.lab.suites import reference
     from motionloom.lab.suites.clips import real_clips
 
     if arguments.out:
-        obey.check_report(arguments.out)
+        files.check_report(arguments.out)
     found = reference.reference(real_clips(arguments.data), progress=say)
     if arguments.out:
-        obey.write_json(arguments.out, found)
-    print(obey.plain(reference.rates(found)))
+        files.write_json(arguments.out, found)
+    print(files.plain(reference.rates(found)))
     print("\nper cent of real clips of an action (rows) that pass each check (columns)\n")
-    print(obey.plain(reference.confusion_table(found)))
+    print(files.plain(reference.confusion_table(found)))

@@ -87,7 +87,7 @@ def _compare(arguments: argparse.Namespace) -> int:
     import json
 
     from motionloom.lab.report import compare
-    from motionloom.lab.suites.obey import plain
+    from motionloom.lab.report.files import plain
 
     found, alone = compare.compare_all(arguments.before, arguments.after, anyway=arguments.anyway)
     shown = found if arguments.every else [one for one in found if one.verdict in ("worse", "better", "other")]

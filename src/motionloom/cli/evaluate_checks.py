@@ -25,7 +25,8 @@ def _checks(arguments: argparse.Namespace) -> None:
     from motionloom.errors import MotionloomError
     from motionloom.lab.metrics.everyday.check import Everyday
     from motionloom.lab.metrics.everyday.sets import chosen
-    from motionloom.lab.suites import obey, trial
+    from motionloom.lab.report import files
+    from motionloom.lab.suites import trial
     from motionloom.lab.suites.clips import real_clips
     from motionloom.lab.suites.trial_clips import trials
 
@@ -33,7 +34,7 @@ def _checks(arguments: argparse.Namespace) -> None:
     if not checks:
         raise MotionloomError("only everyday checks are tried here; 'motionloom evaluate reference' tries the others")
     if arguments.out:
-        obey.check_report(arguments.out / "checks.json")
+        files.check_report(arguments.out / "checks.json")
     clips = [clip for folder in arguments.data for clip in real_clips(folder)]
     say(f"{len(clips)} real clips")
     found = trial.tried(checks, trials(), clips, progress=say)
@@ -45,10 +46,10 @@ def _checks(arguments: argparse.Namespace) -> None:
         "walking"
     )
     if arguments.out:
-        obey.write_json(arguments.out / "checks.json", {"clips": len(clips), "checks": trial.summary(found)})
-        page = f"# Everyday checks on real clips\n\n{said}.\n\n{obey.markdown(rows)}\n"
-        obey.write_text(arguments.out / "checks.md", page)
-    print(f"{obey.plain(rows)}\n\n{said}")
+        files.write_json(arguments.out / "checks.json", {"clips": len(clips), "checks": trial.summary(found)})
+        page = f"# Everyday checks on real clips\n\n{said}.\n\n{files.markdown(rows)}\n"
+        files.write_text(arguments.out / "checks.md", page)
+    print(f"{files.plain(rows)}\n\n{said}")
     if arguments.misses:
         for name, tally in found.items():
             print(f"\n{name}", *(f"  missed  {line}" for line in tally.missed), sep="\n")

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from motionloom.cli.measuring import add_judged, add_selection, given, say, selected, show, typed, words
+from motionloom.cli.measuring import add_judged, add_selection, given, prepared, selected, show, typed, words
 
 SETTINGS = ("count", "replications", "steps", "guidance", "seed")
 
@@ -34,16 +34,13 @@ def add(commands) -> None:
 
 
 def _control(arguments: argparse.Namespace) -> None:
-    from motionloom.lab.suites import control, control_kinds, obey
+    from motionloom.lab.suites import control, control_kinds
 
-    if arguments.out:
-        obey.check_report(arguments.out / "report.json")
     usual = control_kinds.QUICK if arguments.quick else control_kinds.DEFAULT
+    kinds = usual if arguments.kinds is None else arguments.kinds
     found = control.run(
-        arguments.weights, data=arguments.data, evaluator=arguments.evaluator,
-        kinds=usual if arguments.kinds is None else arguments.kinds,
+        prepared(arguments, _command(arguments), arguments.out), kinds=kinds,
         methods=arguments.method or control.METHODS, selection=selected(arguments), protocol=_protocol(arguments),
-        folder=arguments.out, device=arguments.device, command=_command(arguments), progress=say,
     )  # fmt: skip
     show(found, arguments)
 

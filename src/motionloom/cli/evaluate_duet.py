@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from motionloom.cli.measuring import say, set_threads
+from motionloom.cli.measuring import prepared, say, set_threads
 
 PARTS = ("completion", "text", "answers", "long")
 
@@ -62,8 +62,7 @@ def add(commands) -> None:
 def _duet(arguments: argparse.Namespace) -> None:
     import json
 
-    from motionloom.lab.report import report
-    from motionloom.lab.suites import obey
+    from motionloom.lab.report import files, report
 
     set_threads(arguments)
     if arguments.write_bare:
@@ -71,7 +70,7 @@ def _duet(arguments: argparse.Namespace) -> None:
     asked = [part for part in PARTS if arguments.only in (None, part)]
     for part in asked:
         if arguments.out:
-            obey.check_report(arguments.out / part / "report.json")
+            files.check_report(arguments.out / part / "report.json")
     found = {}
     for part in asked:
         found[part] = _completion(arguments) if part == "completion" else _judged(arguments, part)
@@ -104,11 +103,13 @@ def _completion(arguments: argparse.Namespace):
     said = {name: value for name in ("crops", "samples", "steps") if (value := getattr(arguments, name)) is not None}
     how = replace(duet.QUICK if arguments.quick else duet.How(), given=arguments.given, seed=arguments.seed, **said)
     return duet.run(
-        arguments.weights, data=arguments.data, block=arguments.block, communication=arguments.communication_only,
+        _run(arguments, "completion"), block=arguments.block, communication=arguments.communication_only,
         mrt=_mrt(arguments), beside=arguments.beside, how=how, with_published=not arguments.rows_without_published,
-        folder=arguments.out / "completion" if arguments.out else None, device=arguments.device,
-        command=_command(arguments, "completion"), progress=say,
     )  # fmt: skip
+
+
+def _run(arguments: argparse.Namespace, part: str):
+    return prepared(arguments, _command(arguments, part), arguments.out / part if arguments.out else None)
 
 
 def _mrt(arguments: argparse.Namespace) -> Path | None:
@@ -138,10 +139,7 @@ def _judged(arguments: argparse.Namespace, part: str):
     module = {"text": duet_text, "answers": duet_answers, "long": duet_long}[part]
     said = {name: value for name in ("duets", "steps") if (value := getattr(arguments, name)) is not None}
     how = replace(module.QUICK if arguments.quick else module.How(), seed=arguments.seed, **said)
-    return module.run(
-        arguments.weights, data=arguments.data, block=arguments.block, how=how, device=arguments.device,
-        command=_command(arguments, part), progress=say,
-    )  # fmt: skip
+    return module.run(_run(arguments, part), block=arguments.block, how=how)
 
 
 def _command(arguments: argparse.Namespace, part: str) -> str:

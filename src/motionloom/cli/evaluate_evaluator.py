@@ -30,7 +30,7 @@ def _evaluator(arguments: argparse.Namespace) -> None:
     from motionloom.lab.evaluator.evaluators import load_evaluator
     from motionloom.lab.evaluator.own import validate
     from motionloom.lab.report import report as reports
-    from motionloom.lab.suites.obey import check_report
+    from motionloom.lab.report.files import check_report
     from motionloom.weights.prior import Prior
 
     if not 1 <= arguments.repeats <= 10_000 or not 0 <= arguments.seeds <= 1000:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from motionloom.cli.measuring import say, set_threads
+from motionloom.cli.measuring import prepared, set_threads
 
 SINGLES = ("all", "skip", "skip-multimodal")
 ROWS = ("real", "zero", "constant", "ours", "ours-many", "published")
@@ -72,17 +72,13 @@ def _prediction(arguments: argparse.Namespace) -> None:
     import json
 
     from motionloom.lab.report import report
-    from motionloom.lab.suites import obey, prediction
+    from motionloom.lab.suites import prediction
 
     how = _how(arguments)
     set_threads(arguments)
-    if arguments.out:
-        obey.check_report(arguments.out / "report.json")
     found = prediction.run(
-        arguments.weights, data=arguments.data, name=arguments.protocol, how=how,
-        kinds=arguments.row or prediction.KINDS,
-        with_published=not arguments.rows_without_published, folder=arguments.out, device=arguments.device,
-        command=_command(arguments, "prediction"), progress=say,
+        prepared(arguments, _command(arguments, "prediction"), arguments.out), name=arguments.protocol, how=how,
+        kinds=arguments.row or prediction.KINDS, with_published=not arguments.rows_without_published,
     )  # fmt: skip
     if arguments.out:
         report.write(found, arguments.out)
@@ -110,9 +106,8 @@ def _study(arguments: argparse.Namespace) -> None:
         train_steps=arguments.train_steps, seed=arguments.seed,
     )  # fmt: skip
     found = studies.run(
-        arguments.name, arguments.weights, data=arguments.data, protocol=arguments.protocol, folder=arguments.out,
-        keep=arguments.keep or arguments.out / "networks", budget=budget, device=arguments.device,
-        command=_command(arguments, "study"), progress=say,
+        arguments.name, prepared(arguments, _command(arguments, "study"), arguments.out), protocol=arguments.protocol,
+        keep=arguments.keep or arguments.out / "networks", budget=budget,
     )  # fmt: skip
     print(report.plain(found))
     print(f"\nwritten: {arguments.out / arguments.name}.md, .json, .png")

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from motionloom.cli.measuring import add_judged, add_selection, given, say, selected, show, typed
+from motionloom.cli.measuring import add_judged, add_selection, given, prepared, say, selected, show, typed
 
 PROMPT = "a person walks forward and waves"
 
@@ -58,19 +58,13 @@ def _times(said: str) -> tuple[int, int]:
 
 
 def _text(arguments: argparse.Namespace) -> None:
-    from motionloom.lab.suites import obey, text
+    from motionloom.lab.suites import text
 
     if arguments.make_reference:
         return _make_reference(arguments)
     protocol, selection = _protocol(arguments), selected(arguments)
-    if arguments.out:
-        obey.check_report(arguments.out / "report.json")
-    found = text.run(
-        arguments.weights, evaluator=arguments.evaluator, data=arguments.data, selection=selection, protocol=protocol,
-        folder=arguments.out, device=arguments.device, memory=lambda steps: _memory(arguments, steps),
-        command=_command(arguments), progress=say,
-    )  # fmt: skip
-    show(found, arguments)
+    run = prepared(arguments, _command(arguments), arguments.out)
+    show(text.run(run, selection=selection, protocol=protocol, memory=lambda n: _memory(arguments, n)), arguments)
 
 
 def _make_reference(arguments: argparse.Namespace) -> None:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from motionloom.cli.measuring import add_judged, add_selection, given, say, selected, show, typed, words
+from motionloom.cli.measuring import add_judged, add_selection, given, prepared, selected, show, typed, words
 
 SETTINGS = ("intervals", "unfoldings", "replications", "steps", "guidance", "seed")
 
@@ -34,34 +34,29 @@ def add(commands) -> None:
 
 
 def _transitions(arguments: argparse.Namespace) -> None:
-    from motionloom.lab.suites import obey, transitions
+    from motionloom.lab.suites import transitions
 
     if arguments.make_reference:
         return _make_reference(arguments)
     how, selection = _protocol(arguments), selected(arguments)
-    if arguments.out:
-        obey.check_report(arguments.out / "report.json")
-    found = transitions.run(
-        arguments.weights, evaluator=arguments.evaluator, data=arguments.data, selection=selection, how=how,
-        names=arguments.methods, folder=arguments.out, device=arguments.device, command=_command(arguments),
-        progress=say,
-    )  # fmt: skip
-    show(found, arguments)
+    run = prepared(arguments, _command(arguments), arguments.out)
+    show(transitions.run(run, selection=selection, how=how, names=arguments.methods), arguments)
 
 
 def _make_reference(arguments: argparse.Namespace) -> None:
     from motionloom.errors import MotionloomError
-    from motionloom.lab.suites import obey, real_seams
+    from motionloom.lab.report import files
+    from motionloom.lab.suites import real_seams
     from motionloom.lab.suites.items import fitting, read_items
 
     if arguments.data is None:
         raise MotionloomError("a reference is made of real motions; name them with --data")
-    obey.check_report(arguments.make_reference)
+    files.check_report(arguments.make_reference)
     how, chosen = _protocol(arguments), fitting(arguments.data, selected(arguments))
     items = read_items(arguments.data, chosen)
     crops = real_seams.Crops.of([item.features for item in items], how.window, None, seed=how.seed)
     said = f"{' + '.join(chosen.splits)} of {', '.join(chosen.sources) or 'all sources'}"
-    obey.write_json(arguments.make_reference, real_seams.measure_shipped(crops, source=said, seed=how.seed))
+    files.write_json(arguments.make_reference, real_seams.measure_shipped(crops, source=said, seed=how.seed))
     print(f"{arguments.make_reference}: {len(crops.motions)} windows, mean jerk {crops.mean_jerk:.6f} m/frame³")
 
 

@@ -19,6 +19,7 @@ from motionloom.cli.sampling import (
     places,
     remark_unknown,
     report,
+    sampling_of,
     write,
 )
 from motionloom.cli.skeletons import Target, put_all
@@ -215,11 +216,8 @@ def _drawn(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timel
     from motionloom.tasks.splice import concatenated
     from motionloom.tasks.text import generate_each
 
-    given = {"steps": arguments.steps, "guidance": arguments.guidance}
-    options: dict[str, Any] = {name: value for name, value in given.items() if value is not None} | {
-        "clean": not arguments.raw
-    }
-    solver = {} if arguments.solver is None else {"solver": arguments.solver}
+    settings = {name: value for name, value in sampling_of(arguments).items() if name not in ("seed", "count")}
+    options: dict[str, Any] = {"foot_lock": arguments.foot_lock, **settings}
     count = 0
     with bar("generating") as progress:
         for single, run in groupby(timelines, lambda timeline: len(timeline.segments) == 1):
@@ -235,7 +233,6 @@ def _drawn(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timel
                         seed=seed,
                         progress=progress,
                         **options,
-                        **solver,
                     )
                 )
                 continue

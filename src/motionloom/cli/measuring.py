@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from motionloom.lab.report.report import Report
+    from motionloom.lab.suites.harness import Run
     from motionloom.lab.suites.protocol import Selection
 
 
@@ -74,6 +75,17 @@ def typed(suite: str, arguments: argparse.Namespace, said: Mapping[str, Any], *m
     for name, value in said.items():
         line += [f"--{name.replace('_', '-')}", ",".join(map(str, value)) if isinstance(value, tuple) else str(value)]
     return shlex.join([*line, *more, *(["--quick"] if arguments.quick else [])])
+
+
+def prepared(arguments: argparse.Namespace, command: str, folder: Path | None) -> "Run":
+    """Where and how a suite measures, as options say; a ``folder`` that cannot be written to is refused now."""
+    from motionloom.lab.report.files import check_report
+    from motionloom.lab.suites.harness import Run
+
+    if folder:
+        check_report(folder / "report.json")
+    evaluator = getattr(arguments, "evaluator", "own")
+    return Run(arguments.weights, arguments.data, evaluator, folder, arguments.device, command, say)
 
 
 def show(found: "Report", arguments: argparse.Namespace) -> None:

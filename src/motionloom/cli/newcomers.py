@@ -9,6 +9,9 @@ from typing import Any
 
 COMMANDS = {"gen": "generate", "convert": "export", "play": "view", "show": "view", "draw": "view", "join": "compose"}
 OPTIONS = {"--length": "--seconds", "--duration": "--seconds", "-o": "--out", "--output": "--out", "-n": "--count"}
+RENAMED = {"--raw": "--no-foot-lock", "--loose": "--no-fit", "--given": "--react-to", "--block": "--pair-weights",
+           "--together": "--pair-guidance"}  # fmt: skip
+"""Options under the names they had, for one release."""
 _SEVERAL = {"-s": ("--seconds", "--seed"), "-f": ("--fps", "--from")}
 _PROMPTS = ("prompts", "prompt", "text", "segments")
 
@@ -45,6 +48,9 @@ def with_options(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[
         plain = plain or word == "--"
         if plain or name in known:
             found.append(word)
+        elif RENAMED.get(name) in known:
+            print(f"note: {name} is {RENAMED[name]} now; the old name goes with the next release", file=sys.stderr)
+            found.append(RENAMED[name] + equals + value)
         elif OPTIONS.get(name) in known:
             found.append(OPTIONS[name] + equals + value)
         elif name == "--prompt" and takes_prompt:

@@ -10,11 +10,11 @@ from motionloom.cli.futures import FORMATS, Long, Manner, targets, write_futures
 from motionloom.cli.futures import Target as Files
 from motionloom.cli.newcomers import check_overwriting
 from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, note_rate, read_clip
-from motionloom.cli.sampling import bar, check_count, fail
+from motionloom.cli.sampling import bar, check_count, fail, sampling_of
 from motionloom.cli.skeletons import Target, add_skeleton, read_target
 
 if TYPE_CHECKING:
-    from motionloom.goals.hold import Hold
+    from motionloom.goals.hold import FixedJoints
     from motionloom.motion import Motion
     from motionloom.weights.predictor import Predictor
 
@@ -102,7 +102,9 @@ def _add_sampling(parser: argparse.ArgumentParser, other: str) -> None:
     parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster")
     parser.add_argument("--guidance", type=float, default=1.0, help="strength of what is known (default 1)")
     parser.add_argument("--temperature", type=float, help="livelier above 1, calmer below, 0 to 2 (default 1.1)")
-    parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
+    parser.add_argument(
+        "--no-foot-lock", dest="foot_lock", action="store_false", help="leave the feet as the network drew them"
+    )
     parser.add_argument(
         "--weights", default="predictor", metavar="NAME|PATH", help="shipped name or file (default: predictor)"
     )
@@ -133,9 +135,8 @@ def run_predict(arguments: argparse.Namespace) -> int:
 
     with bar("predicting") as progress:
         motions = predict(
-            predictor, past, count=arguments.count, seconds=arguments.seconds, seed=arguments.seed, hold=hold,
-            guidance=arguments.guidance, root=not arguments.no_root, clean=not arguments.raw, progress=progress,
-            **_steps(arguments),
+            predictor, past, seconds=arguments.seconds, hold=hold, root=not arguments.no_root,
+            foot_lock=arguments.foot_lock, progress=progress, **sampling_of(arguments),
         )  # fmt: skip
     written = write_futures(wanted, motions, len(past), manner, caption=_caption(arguments))
     _report(arguments, [str(file) for file in written])
@@ -164,8 +165,8 @@ def run_switch(arguments: argparse.Namespace) -> int:
     from motionloom.tasks.predict import switch
 
     motions = switch(
-        predictor, past, target, count=arguments.count, seconds=arguments.seconds, seed=arguments.seed,
-        facing=arguments.facing, guidance=arguments.guidance, clean=not arguments.raw, **_steps(arguments),
+        predictor, past, target, seconds=arguments.seconds, facing=arguments.facing, foot_lock=arguments.foot_lock,
+        **sampling_of(arguments),
     )  # fmt: skip
     written = write_futures(wanted, motions, len(past), manner, caption=_caption(arguments))
     _report(arguments, [str(file) for file in written])
@@ -177,7 +178,7 @@ def run_switch(arguments: argparse.Namespace) -> int:
 
 
 def _predict_long(
-    arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", *, hold: "Hold | None", long: Long
+    arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", *, hold: "FixedJoints | None", long: Long
 ) -> int:
     """One future after the other, in memory that does not grow with their length."""
     from contextlib import closing
@@ -201,7 +202,7 @@ def _predict_long(
 
 
 def _pieces(
-    arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", hold: "Hold | None", *, frames: int
+    arguments: argparse.Namespace, predictor: "Predictor", past: "Motion", hold: "FixedJoints | None", *, frames: int
 ) -> "Generator[Iterator[Motion], None, None]":
     """Of each future its pieces, while a bar shows how far they are."""
     from motionloom.tasks.predict import predict_pieces
@@ -214,10 +215,11 @@ def _pieces(
                 done += len(piece)
                 move(done, frames * arguments.count)
 
+        settings: dict[str, Any] = sampling_of(arguments) | {"count": 1}
         for number in range(arguments.count):
             pieces = predict_pieces(
-                predictor, past, seconds=arguments.seconds, number=number, seed=arguments.seed, hold=hold,
-                guidance=arguments.guidance, root=not arguments.no_root, clean=not arguments.raw, **_steps(arguments),
+                predictor, past, seconds=arguments.seconds, number=number, hold=hold, root=not arguments.no_root,
+                foot_lock=arguments.foot_lock, **settings,
             )  # fmt: skip
             yield moved(pieces, number * frames)
 
@@ -229,12 +231,6 @@ def _predictor(arguments: argparse.Namespace) -> "Predictor":
     from motionloom.weights.predictor import Predictor
 
     return Predictor.load(arguments.weights, device=arguments.device)
-
-
-def _steps(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The task's own numbers unless the line says others."""
-    said = {"steps": arguments.steps, "temperature": arguments.temperature}
-    return {name: value for name, value in said.items() if value is not None}
 
 
 def _inputs(arguments: argparse.Namespace) -> list[Path]:
@@ -296,10 +292,10 @@ def _difference(motion: "Motion", past: "Motion") -> str:
     return "bones that change length" if motion.translations is not None and past.translations is None else ""
 
 
-def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "Hold | None":
+def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "FixedJoints | None":
     """What is held, if anything is."""
     from motionloom.goals import mask_file
-    from motionloom.goals.hold import HeldPart, Hold
+    from motionloom.goals.hold import FixedJoints, FixedPart
 
     if not (arguments.hold or arguments.mask):
         if arguments.source is not None:
@@ -310,7 +306,7 @@ def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "Hold 
     parts = mask_file.read_mask(arguments.mask, fps=past.fps) if arguments.mask else ()
     if arguments.hold:
         names = [name.strip() for part in arguments.hold for name in part.split(",") if name.strip()]
-        parts = (*parts, HeldPart(mask_file.check_names(names)))
+        parts = (*parts, FixedPart(mask_file.check_names(names)))
     seconds = horizon / past.fps
     late = min(min(begin for begin, _ in part.spans) for part in parts)
     if late >= seconds:
@@ -326,7 +322,7 @@ def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "Hold 
             f"on, and parts are held for {last:.2f} s; give a longer motion, a shorter --seconds, or hold them for "
             "less with 'to' in a --mask"
         )
-    return Hold(source.frames(skipped, len(source)), parts)
+    return FixedJoints(source.frames(skipped, len(source)), parts)
 
 
 # What cannot be asked

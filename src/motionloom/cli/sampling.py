@@ -35,10 +35,33 @@ def add_sampling(
     )
     add_adapters(parser)
     parser.add_argument("--fps", type=float, help=f"frame rate of the files (default: {own_rate})")
-    parser.add_argument("--raw", action="store_true", help="leave the feet as the network drew them")
+    parser.add_argument(
+        "--no-foot-lock", dest="foot_lock", action="store_false", help="leave the feet as the network drew them"
+    )
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
     add_skeleton(parser, own=own_skeleton)
+
+
+def sampling_of(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The settings of `Sampling` that the line says, as keywords of a task; the others are the task's own."""
+    names = ("steps", "solver", "guidance", "seed", "count", "temperature", "pair_guidance")
+    found: dict[str, Any] = {name: getattr(arguments, name, None) for name in names}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def moves(progress: Callable[[int, int], None], steps: int | None, rows: int) -> Callable[[int], None]:
+    """What a chain of ``rows`` says of its moves, as a progress bar takes it."""
+    from motionloom.tasks.sampling import STEPS
+
+    done, total = 0, (steps or STEPS) * rows
+
+    def more(count: int) -> None:
+        nonlocal done
+        done += count
+        progress(done, total)
+
+    return more
 
 
 def add_adapters(parser: argparse.ArgumentParser) -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from motionloom import rotations as rot
+from motionloom.blending import crossfade, shares, smootherstep
 from motionloom.features import humanml as hml
 from motionloom.features.layout import LAYOUT
 from motionloom.kinematics import physics as ph
@@ -33,9 +34,9 @@ def loop(features: np.ndarray, frames: int, *, blend: int = 5, limit: float = 0.
         return None
     pieces = [features[:last]]
     count = last
-    amount = np.linspace(0, 1, blend + 2)[1:-1, None]
+    amount = shares(blend)[:, None]
     while count < frames:
-        join = features[last : last + blend] * (1 - amount) + features[first : first + blend] * amount
+        join = crossfade(features[last : last + blend], features[first : first + blend], amount)
         pieces += [join, features[first + blend : last]]
         count += last - first
     pieces.append(features[last:])
@@ -123,6 +124,5 @@ def joined(first: Array, second: Array, *, blend: int = 10, limit: float = 0.16)
         return None
     fade = np.zeros(len(moved))
     count = min(blend, len(moved) - 1)
-    amount = np.linspace(1, 0, count + 2)[1:-1]
-    fade[: len(amount)] = amount**3 * (10 - 15 * amount + 6 * amount**2)
+    fade[:count] = smootherstep(shares(count)[::-1])
     return np.concatenate([first, moved + fade[:, None, None] * gap])

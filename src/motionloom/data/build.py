@@ -18,6 +18,7 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -279,25 +280,39 @@ def _run(jobs: Sequence[Job], workers: int) -> Iterator[tuple[str, str]]:
 
 def _finish(out: Path, mixed: int, progress: Callable[[str], None]) -> Path:
     clips = [read_clip(path) for path in finished(out / "clips", "*.safetensors") if not _DERIVED.match(path.stem)]
-    frames = sum(len(clip.features) for clip in clips)
-    for seed, licence in enumerate(sorted({clip.licence for clip in clips})):
-        same = [c for c in clips if c.licence == licence]
-        share = sum(len(clip.features) for clip in same) / frames
-        for derive in (mixed_clips, laid_down, joined_clips, made_clips):
-            for clip in derive(same, round(mixed * share), seed):
-                for both in _with_mirror(clip) if derive is not mixed_clips else (clip,):
-                    write_clip(out / "clips", both)
-                    clips.append(both)
+    for clip in _derived(list(clips), mixed):
+        write_clip(out / "clips", clip)
+        clips.append(clip)
     derived = {path.stem for path in finished(out / "clips", "*.safetensors") if _DERIVED.match(path.stem)}
     for old in derived - {clip.name for clip in clips}:
         (out / "clips" / f"{old}.safetensors").unlink()  # of a build that was asked for more of them
     if not clips:
         raise MotionloomError(f"no take could be used; the reasons stand in {out / 'done'}")
     dropped = {p.name: text for p in finished(out / "done", "*") if (text := p.read_text(encoding="utf-8"))}
+    about = _summary(clips, dropped)
+    with atomic_path(out / "set.json") as temp:
+        Path(temp).write_text(json.dumps(about, indent=1), encoding="utf-8")
+    progress(f"{len(clips)} clips, {about['minutes']} minutes, {len(dropped)} takes dropped: {out / 'set.json'}")
+    return out / "set.json"
+
+
+def _derived(clips: Sequence[Clip], mixed: int) -> Iterator[Clip]:
+    """Clips made of others of the same licence, as many as its share of all frames; most with their mirror image."""
+    frames = sum(len(clip.features) for clip in clips)
+    for seed, licence in enumerate(sorted({clip.licence for clip in clips})):
+        same = [clip for clip in clips if clip.licence == licence]
+        share = sum(len(clip.features) for clip in same) / frames
+        for derive in (mixed_clips, laid_down, joined_clips, made_clips):
+            for clip in derive(same, round(mixed * share), seed):
+                yield from (clip,) if derive is mixed_clips else _with_mirror(clip)
+
+
+def _summary(clips: Sequence[Clip], dropped: dict[str, str]) -> dict[str, Any]:
+    """What a set holds: counts, minutes, licences, and the statistics of its training clips."""
     frames = np.concatenate([c.features for c in clips if c.split == "train"] or [np.zeros((1, 263), np.float32)])
     counts = Counter(f"{c.source}/{c.split}/{c.way}" for c in clips)
     labels = Counter(n.kind for c in clips for n in c.notes if c.split == "train")
-    about = {
+    return {
         "clips": dict(sorted(counts.items())),
         "minutes": round(sum(len(c.features) for c in clips) / FPS / 60, 1),
         "notes": dict(labels.most_common()),
@@ -306,7 +321,3 @@ def _finish(out: Path, mixed: int, progress: Callable[[str], None]) -> Path:
         "mean": [round(float(v), 6) for v in frames.mean(0, dtype=np.float64)],
         "std": [round(float(v), 6) for v in frames.std(0, dtype=np.float64)],
     }
-    with atomic_path(out / "set.json") as temp:
-        Path(temp).write_text(json.dumps(about, indent=1), encoding="utf-8")
-    progress(f"{len(clips)} clips, {about['minutes']} minutes, {len(dropped)} takes dropped: {out / 'set.json'}")
-    return out / "set.json"

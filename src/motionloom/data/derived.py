@@ -101,11 +101,7 @@ def laid_down(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip
 def joined_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
     """One action and then another, where the poses in between agree; training clips of one licence."""
     rng = np.random.default_rng(seed)
-    pool: dict[str, list[tuple[Clip, Note]]] = {}
-    for clip in clips:
-        for note in clip.notes:
-            if note.kind.startswith(PREFIX) and clip.split == "train" and clip.way in ("plain", "held"):
-                pool.setdefault(note.kind.removeprefix(PREFIX), []).append((clip, note))
+    pool = _by_action(clips)
     names, made = sorted(pool), 0
     for number in range(60 * count if names else 0):
         if made == count:
@@ -118,11 +114,8 @@ def joined_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[C
         both = augment.joined(*parts)
         if both is None or not 40 <= len(both) <= 180:
             continue
-        said = [_phrases(action, note) for action, (_, note) in zip(pair, picked)]
-        texts = tuple(
-            sentence(f"{a} {link} {b}", rng)
-            for link in ("and then", "and", "then") for a, b in [(rng.choice(said[0]), rng.choice(said[1]))]
-        )  # fmt: skip
+        first, second = (_phrases(action, note) for action, (_, note) in zip(pair, picked))
+        texts = _linked(first, second, rng)
         name = f"joined_{seed}_{made:04d}"
         keyed = "keyed" if any(clip.kind == "keyed" for clip, _ in picked) else "capture"
         base = Clip(
@@ -131,6 +124,25 @@ def joined_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[C
         for clip in _held(base, both, PREFIX + THEN, texts, seed=seed * 100_003 + number):
             made += 1
             yield replace(clip, name=name, way="joined")
+
+
+def _by_action(clips: Sequence[Clip]) -> dict[str, list[tuple[Clip, Note]]]:
+    """Training clips and their notes, by the name of the action that the note says they show."""
+    pool: dict[str, list[tuple[Clip, Note]]] = {}
+    for clip in clips:
+        for note in clip.notes:
+            if note.kind.startswith(PREFIX) and clip.split == "train" and clip.way in ("plain", "held"):
+                pool.setdefault(note.kind.removeprefix(PREFIX), []).append((clip, note))
+    return pool
+
+
+def _linked(first: Sequence[str], second: Sequence[str], rng: np.random.Generator) -> tuple[str, ...]:
+    """Sentences of one action and then another, each with phrases drawn anew."""
+    texts = []
+    for link in ("and then", "and", "then"):
+        a, b = rng.choice(first), rng.choice(second)
+        texts.append(sentence(f"{a} {link} {b}", rng))
+    return tuple(texts)
 
 
 def _phrases(action: Action, note: Note) -> list[str]:

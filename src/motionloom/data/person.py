@@ -5,11 +5,10 @@ import numpy as np
 from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS
 from motionloom.kinematics import physics as ph
+from motionloom.kinematics.costs import LEGS, numbers
 from motionloom.kinematics.physics import Array
 
-LEGS = ((4, 7, 10), (5, 8, 11))
-"""Knee, ankle and toe joint."""
-_BODY = [k for k in range(22) if k not in (7, 8, 10, 11)]
+_BODY = [k for k in range(22) if k not in (*numbers("ankle"), *numbers("foot"))]
 FLAT = np.radians(-25.0)
 """Elevation of a flat foot's toe joint seen from its ankle."""
 UPTURNED = np.radians(5.0)

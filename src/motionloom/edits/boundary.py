@@ -18,8 +18,8 @@ JOIN = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
-    """What is to be drawn: the frames ``first`` to before ``last`` of a person's motion, in the world."""
+class InpaintWindow:
+    """Some frames of a motion in the world; those from ``first`` to before ``last`` are sampled anew."""
 
     positions: Array
     """(frames + 1, 22, 3) metres at 20 fps, floor at y = 0; the last frame only tells how the one before it moves."""
@@ -38,14 +38,14 @@ class Stretch:
         return len(self.positions) - 1
 
 
-def arrival(known: Tensor, mask: Tensor, stretch: Stretch) -> Callable[[Tensor], Tensor]:
+def arrival(known: Tensor, mask: Tensor, window: InpaintWindow) -> Callable[[Tensor], Tensor]:
     """A function that bends the root's free velocities so that facing and place at frame ``last`` are the known ones.
 
     On features (rows, frames, 263), not standardised. What is missing is spread over the stretch as sin², so that
     velocities at its borders stay; full turns are nobody's fault and stay too.
     """
-    first, last = stretch.first, stretch.last
-    tied = (stretch.facing or stretch.place) and first > 0 and last < known.shape[1]
+    first, last = window.first, window.last
+    tied = (window.facing or window.place) and first > 0 and last < known.shape[1]
     if not tied or bool(mask[:, first:last, :3].any()):
         return lambda features: features
     share = torch.sin(torch.pi * (torch.arange(last - first, device=known.device) + 0.5) / (last - first)) ** 2
@@ -54,11 +54,11 @@ def arrival(known: Tensor, mask: Tensor, stretch: Stretch) -> Callable[[Tensor],
 
     def arrive(features: Tensor) -> Tensor:
         bent = features.clone()
-        if stretch.facing:
+        if window.facing:
             lacking = (known - features)[:, first:last, 0].sum(1)
             lacking = lacking - torch.pi * (lacking / torch.pi).round()
             bent[:, first:last, 0] += share * lacking[:, None]
-        if stretch.place:
+        if window.place:
             turn, root = humanml.recover_root(bent)
             lacking = goal - root[:, last]
             # velocities are told in the heading of the frame they lead to

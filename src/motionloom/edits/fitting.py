@@ -17,6 +17,7 @@ from motionloom.edits.stances import carried, runs
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FEET
 from motionloom.goals.goal import Goal
+from motionloom.kinematics import costs
 from motionloom.kinematics.feet import planted_feet
 from motionloom.kinematics.ik import LIMBS
 from motionloom.motion import Motion
@@ -35,16 +36,13 @@ STEPS = 12
 _DONE = 1e-4
 """Metres: no wish gets nearer by more in the last step."""
 
-_BALLS = {0: 0.15, 1: 0.5, 2: 0.5, 3: 0.15, 6: 0.15, 9: 0.15, 12: 0.2, 13: 0.1, 14: 0.1, 16: 0.6, 17: 0.6, 7: 0.3,
-          8: 0.3}  # fmt: skip
-"""Joints that turn freely, and radians by which they usually may."""
-_HINGES = {LIMBS[0].middle: 0.6, LIMBS[1].middle: 0.6, LIMBS[2].middle: 0.8, LIMBS[3].middle: 0.8}
+_BALLS, _HINGES = costs.by_number(costs.BALL_TURN), costs.by_number(costs.HINGE_TURN)
+"""Joints that turn freely, and that bend, with the radians by which they usually may."""
 _ROOT = 0.05
 """Metres that the root usually may go."""
 _BEND = (0.03, 2.6)
 """Radians between which knees and elbows stay, where they were."""
-_BASES = {3: 0, 6: 0, 9: 0, 12: 0, 15: 0, 13: 0, 14: 0, 16: 0, 17: 0, 4: 1, 7: 1, 10: 1, 5: 2, 8: 2, 11: 2,
-          18: 16, 20: 16, 19: 17, 21: 17}  # fmt: skip
+_BASES = {joint: costs.beside(joint, base) for joint, base in costs.by_number(costs.BASE).items()}
 """Joint from which another's reach is measured."""
 _EASY, _STRETCH, _LEAN, _WALK = 0.97, 0.99, 0.08, 0.5
 """Shares of a chain's length that are reached with ease, and at all; metres that the body leans, and goes, for more."""
@@ -52,7 +50,7 @@ _EASY, _STRETCH, _LEAN, _WALK = 0.97, 0.99, 0.08, 0.5
 _AXES = {limb.middle: np.array(limb.hinge, dtype=np.float64) for limb in LIMBS}
 _COLUMNS = 3 + 3 * len(_BALLS) + len(_HINGES)
 _SIZES = np.concatenate([np.full(3, _ROOT), np.repeat(list(_BALLS.values()), 3), list(_HINGES.values())])
-_FEET_OF = {4: (0, 1), 7: (0, 1), 10: (0, 1), 5: (2, 3), 8: (2, 3), 11: (2, 3)}
+_FEET_OF = {joint: (2 * side, 2 * side + 1) for side, leg in enumerate(costs.LEGS) for joint in leg}
 """Columns of `FEET` that a wish for a joint of the leg sets free."""
 
 

@@ -16,7 +16,6 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from motionloom.diffusion import row_draw, row_seed
-from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
 from motionloom.nets.pair import PLACE, PairNet, join, part
@@ -37,30 +36,33 @@ Lead: TypeAlias = Callable[[Tensor, Tensor, int], Tensor]
 """(state, its guess, level) -> the guess of states (rows, 1 + frames, 263), changed."""
 
 
-def leader(
+def relative_pose_guidance(
     prior: Prior,
     net: PairNet,
     bound: Bound,
     *,
     seeds: Sequence[int],
     mask: Tensor,
-    still: Sequence[bool],
+    frozen: Sequence[bool],
     weight: float = 1.0,
 ) -> Lead:
-    """What leads the guesses of some pairs of one length; nothing does where a block never says where people stand.
+    """What moves the guesses of pairs of one length to where the block has the two stand to each other later on.
 
-    bound, seeds: of each row; mask (rows, 1 + frames, 263): True where a state is known; it stays. Whose frames are all
-    known, or who is to be ``still``, is not led; then the other goes all of the way. weight: share of the way, 0 to
-    1, else MotionloomError. Codes of the kind world are left alone: they tell where crops stand in a file (published).
+    Nothing does where a block never says where people stand, and for codes of the kind world, which tell where crops
+    stand in a file (published).
+
+    Args:
+        bound, seeds: of each row.
+        mask: (rows, 1 + frames, 263) True where a state is known; it stays.
+        frozen: who is not moved, as those are not whose frames are all known; then the other goes all of the way.
+        weight: share of the way, 0 to 1.
     """
-    if not 0 <= weight <= 1:
-        raise MotionloomError(f"two people are kept together by 0 (not at all) to 1; got {weight:g}")
     silent = not any(bool(value.any()) for value in net.talk.place.parameters())
     if not weight or silent or net.talk.config.places.kind != "mutual":
         return lambda state, guess, level: guess
     known = mask[:, 1:, :3].all(dim=-1)
     both = known.unflatten(0, (-1, 2)).all(dim=1)
-    given = [kept or bool(row.all()) for kept, row in zip(still, known, strict=True)]
+    given = [kept or bool(row.all()) for kept, row in zip(frozen, known, strict=True)]
     past = both.cumprod(dim=1).sum(dim=1).tolist()
     places = Places.of(seeds, known.shape[1], [count + SURE if count else 0 for count in past], given)
 

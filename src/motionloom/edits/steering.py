@@ -21,7 +21,8 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT, WIDTH
 from motionloom.goals.goal import Goal, turn_between
-from motionloom.kinematics.physics import heading
+from motionloom.kinematics import costs
+from motionloom.motion import heading
 from motionloom.skeleton import SMPL22
 from motionloom.weights.prior import Prior
 
@@ -42,18 +43,10 @@ _LIFT, _HOPELESS = 0.3, 1.0
 """Metres that the body goes up or down to bring a wish into reach; the need beyond which it does not try."""
 _WIDTHS = ((0.9, 12.0), (0.5, 8.0), (0.0, 5.0))
 """Frames over which a change is spread, from noises (of the schedule) above the first number of each pair."""
-_SWING = {3: 0.05, 6: 0.05, 9: 0.05, 12: 0.2, 13: 0.15, 14: 0.15, 16: 0.5, 17: 0.5, 18: 0.5, 19: 0.5,
-          1: 0.35, 2: 0.35, 4: 0.5, 5: 0.5, 7: 0.3, 8: 0.3, 0: 0.02}  # fmt: skip
-"""Radians by which the bones beyond a joint may be off."""
-_SLACK = {18: 0.15, 19: 0.15, 20: 0.25, 21: 0.25, 4: 0.15, 5: 0.15, 7: 0.3, 8: 0.3, 10: 0.3, 11: 0.3}
-"""Metres that a joint can go before the root must come along; 0.1 for those of the trunk."""
-_REACH = {20: (16, 0.48), 21: (17, 0.48), 18: (16, 0.25), 19: (17, 0.25), 7: (1, 0.79), 8: (2, 0.79), 10: (1, 0.85),
-          11: (2, 0.85)}  # fmt: skip
-"""Where limbs begin, and metres that they reach without being quite straight."""
+_SWING, _SLACK = costs.by_number(costs.BONE_SWING), costs.by_number(costs.SLACK)
+_REACH = {j: (costs.beside(j, base), metres) for j, (base, metres) in costs.by_number(costs.REACH).items()}
 _LONGEST = 0.8
 """Metres that a limb is moved at most: what is out of reach is pointed at."""
-_LEGS = (4, 7, 10), (5, 8, 11)
-"""Knee, ankle and foot, in the order of the contacts."""
 _TURN_OVER, _SLOW = 6.0, 0.01
 """Frames over which the body turns with its path; metres a frame below which a path has no direction."""
 
@@ -90,15 +83,15 @@ def corrected(denoise: Denoiser, corrections: Sequence[Correction | None]) -> De
     """The denoiser whose guess of row i is changed by ``corrections[i]``; None leaves the row alone."""
     if not any(corrections):
         return denoise
+    return lambda state, level: corrected_rows(denoise(state, level), corrections, level)
 
-    def edited(state: Tensor, level: int) -> Tensor:
-        guess = denoise(state, level)
-        if len(guess) != len(corrections):
-            raise ValueError(f"{len(corrections)} corrections for {len(guess)} rows: give one, or None, per row")
-        rows = [row if change is None else change(row, level) for row, change in zip(guess, corrections, strict=True)]
-        return torch.stack(rows)
 
-    return edited
+def corrected_rows(guess: Tensor, corrections: Sequence[Correction | None], level: int) -> Tensor:
+    """A guess (rows, frames, features) whose row i went through ``corrections[i]``, if there is one."""
+    if len(guess) != len(corrections):
+        raise ValueError(f"{len(corrections)} corrections for {len(guess)} rows: give one, or None, per row")
+    rows = [row if change is None else change(row, level) for row, change in zip(guess, corrections, strict=True)]
+    return torch.stack(rows)
 
 
 # What does not depend on the guess
@@ -219,7 +212,8 @@ def _together() -> tuple[Array, Array, Array]:
 
 _CARRIED = np.ones(len(SMPL22))
 """What goes up and down with the root: the feet stay, the knees bend."""
-_CARRIED[[4, 5]], _CARRIED[[7, 8, 10, 11]] = 0.5, 0.0
+_CARRIED[list(costs.numbers("knee"))] = 0.5
+_CARRIED[[*costs.numbers("ankle"), *costs.numbers("foot")]] = 0.0
 _TOGETHER = _together()
 
 
@@ -282,7 +276,7 @@ def _standing(places: Array, contacts: Array, goal: Goal) -> Array:
     A leg of which something is asked stays as it is around then.
     """
     change = np.zeros_like(places)
-    for side, (knee, ankle, toe) in enumerate(_LEGS):
+    for side, (knee, ankle, toe) in enumerate(costs.LEGS):
         asked = goal.asked[:, [knee, ankle, toe]].any(axis=(1, 2))
         free = np.convolve(asked, np.ones(4 * EASE + 1))[2 * EASE : -2 * EASE] < 0.5
         told = (contacts[:, 2 * side : 2 * side + 2] > 0.5) & free[:, None]
@@ -376,4 +370,4 @@ def _turned(points: Array, facing: Array) -> Array:
     return np.stack([c * x + s * z, points[..., 1], c * z - s * x], axis=-1)
 
 
-_SLACKS = np.array([0.0, *(_SLACK.get(joint, 0.1) for joint in range(1, len(SMPL22)))])
+_SLACKS = np.array([0.0, *(_SLACK.get(joint, costs.TRUNK_SLACK) for joint in range(1, len(SMPL22)))])

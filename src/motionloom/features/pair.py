@@ -1,15 +1,15 @@
 """Two people in one world: two canonical motions, and where each of them stands.
 
 HumanML3D features tell each motion from its own first frame. What relates two people is thus lost, but for four numbers
-per person: a *stand* (cos f, sin f, x, z) says where somebody stands on the ground in metres and which way he faces, f
-in radians: 0 faces +Z, growing to the left. All functions but `encode` take arrays and tensors, with any leading axes.
+per person, a ground pose (cos f, sin f, x, z) of `motionloom.ground`: where somebody is at frame 0, in metres, and
+which way they face. All functions but `encode` take arrays and tensors, with any leading axes.
 
 `PlaceCode` says how stands become the numbers D that a network of two people guesses (Shafir et al. 2024, section 3.2).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import torch
@@ -21,12 +21,15 @@ from motionloom.features import humanml
 from motionloom.features.humanml import Heading, recover_root
 from motionloom.features.layout import FPS
 from motionloom.features.positions import SMPL_LAYOUT
+from motionloom.ground import Numbers, compose, from_world, mirrored, normalized, parts, relative, stack, to_world
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.retarget.anatomy import read_body
 
 Array = NDArray[np.float64]
-Numbers = TypeVar("Numbers", Tensor, np.ndarray)
+seen, put, told_from, upright = relative, to_world, from_world, normalized
+"""Old names, for one release."""
+__all__ = ["compose", "mirrored"]
 
 
 class Encoded(NamedTuple):
@@ -38,54 +41,6 @@ class Encoded(NamedTuple):
     """(2, 4) in the world, at frame 0."""
     floors: Array
     """(2,) metres: the height that each person's features call 0."""
-
-
-# Stands
-
-
-def compose(base: Numbers, stand: Numbers) -> Numbers:
-    """A stand (..., 4) that is told from ``base`` (..., 4), in the world of ``base``."""
-    (c, s, x, z), (c1, s1, x1, z1) = _parts(base), _parts(stand)
-    return _stack(c * c1 - s * s1, s * c1 + c * s1, x + c * x1 + s * z1, z + c * z1 - s * x1)
-
-
-def seen(base: Numbers, stand: Numbers) -> Numbers:
-    """A stand (..., 4) of the world of ``base`` (..., 4), as seen from there: the inverse of `compose`."""
-    (c, s, x, z), (c1, s1, x1, z1) = _parts(base), _parts(stand)
-    dx, dz = x1 - x, z1 - z
-    return _stack(c * c1 + s * s1, c * s1 - s * c1, c * dx - s * dz, c * dz + s * dx)
-
-
-def put(points: Numbers, stand: Numbers) -> Numbers:
-    """Points (..., 3) that are told from a stand (..., 4) into the world; the axes before the last broadcast."""
-    c, s, x, z = _parts(stand)
-    px, y, pz = points[..., 0], points[..., 1], points[..., 2]
-    return _stack(c * px + s * pz + x, y + 0 * c, c * pz - s * px + z)
-
-
-def told_from(points: Numbers, stand: Numbers) -> Numbers:
-    """The inverse of `put`."""
-    c, s, x, z = _parts(stand)
-    dx, y, dz = points[..., 0] - x, points[..., 1], points[..., 2] - z
-    return _stack(c * dx - s * dz, y + 0 * c, c * dz + s * dx)
-
-
-def upright(stands: Numbers) -> Numbers:
-    """Stands (..., 4) whose first two numbers are only about a cosine and a sine, made exact; no direction is +Z."""
-    c, s, x, z = _parts(stands)
-    length = (c * c + s * s) ** 0.5
-    if isinstance(stands, Tensor):
-        here = length > 1e-6
-        size = torch.where(here, length, torch.ones_like(length))
-        return _stack(torch.where(here, c / size, torch.ones_like(c)), torch.where(here, s / size, 0 * s), x, z)
-    here, size = length > 1e-6, np.where(length > 1e-6, length, 1.0)
-    return _stack(np.where(here, c / size, 1.0), np.where(here, s / size, 0.0), x, z)
-
-
-def mirrored(stands: Numbers) -> Numbers:
-    """Stands (..., 4) in the world with left and right exchanged (x becomes -x), as `humanml.mirror` for features."""
-    c, s, x, z = _parts(stands)
-    return _stack(c, -s, -x, z)
 
 
 def swapped(pair: Numbers, axis: int = 0) -> Numbers:
@@ -108,7 +63,7 @@ def encode(positions: np.ndarray, *, heading: Heading = "corrected") -> Encoded:
     place = SMPL_LAYOUT.place(p[:, 0])
     stands = np.stack([np.cos(place.facing), np.sin(place.facing), place.origin[:, 0], place.origin[:, 2]], axis=-1)
     floors = p[..., 1].min(axis=(1, 2))
-    local = told_from(p - floors[:, None, None, None] * np.array([0.0, 1.0, 0.0]), stands[:, None, None])
+    local = from_world(p - floors[:, None, None, None] * np.array([0.0, 1.0, 0.0]), stands[:, None, None])
     if heading == "corrected":
         turn = np.stack([humanml.heading_quaternions(person, heading=heading)[0] for person in local])
         w, y, zero = turn[:, 0], turn[:, 2], np.zeros(2)
@@ -122,14 +77,14 @@ def decode(features: Numbers, stands: Numbers) -> Numbers:
     The first axis of the two, or any other, may be the one of the people. Differentiable for tensors.
     """
     places: Any = humanml.decode_positions(features)
-    return put(places, stands[..., None, None, :])
+    return to_world(places, stands[..., None, None, :])
 
 
 def along(features: Numbers) -> Numbers:
     """Stands (..., frames, 4) along a motion (..., frames, 263), told from its frame 0 as the features tell it."""
     quaternion, place = recover_root(features)
     w, y = quaternion[..., 0], quaternion[..., 2]
-    return _stack(1 - 2 * y * y, -2 * w * y, place[..., 0], place[..., 2])  # it turns the world into the heading
+    return stack(1 - 2 * y * y, -2 * w * y, place[..., 0], place[..., 2])  # it turns the world into the heading
 
 
 def later(features: Numbers, stands: Numbers, frame: int) -> Numbers:
@@ -168,15 +123,15 @@ class PlaceCode:
         ``world``: (cos f, -sin f, x, z), which are the entries 0, 2, 6 and 8 of the published nine: the first row of
         the rotation from the world to the person, and the ground translation.
         """
-        c, s, x, z = _parts(seen(stands, swapped(stands, -2)) if self.kind == "mutual" else stands)
-        return _stack(self.turn * c, self.turn * (s if self.kind == "mutual" else -s), self.ground * x, self.ground * z)
+        c, s, x, z = parts(relative(stands, swapped(stands, -2)) if self.kind == "mutual" else stands)
+        return stack(self.turn * c, self.turn * (s if self.kind == "mutual" else -s), self.ground * x, self.ground * z)
 
     def raw(self, numbers: Numbers) -> Numbers:
         """Numbers (..., 4) without their scales: of ``mutual`` the other's stand as a person sees it, of ``world`` the
         person's own."""
-        c, s, x, z = _parts(numbers)
+        c, s, x, z = parts(numbers)
         s = s if self.kind == "mutual" else -s
-        return _stack(c / self.turn, s / self.turn, x / self.ground, z / self.ground)
+        return stack(c / self.turn, s / self.turn, x / self.ground, z / self.ground)
 
     def decode(self, numbers: Numbers) -> Numbers:
         """Numbers (..., 2, 4), exact or guessed, to stands (..., 2, 4).
@@ -186,16 +141,16 @@ class PlaceCode:
         """
         stands = self.raw(numbers)
         if self.kind == "world":
-            return upright(stands)
+            return normalized(stands)
         first, second = stands[..., 0, :], stands[..., 1, :]
-        both = _stack(
+        both = stack(
             first[..., 0] + second[..., 0], first[..., 1] - second[..., 1], 0 * first[..., 0], 0 * first[..., 0]
         )
-        c, s, x, z = _parts(upright(both))
+        c, s, x, z = parts(normalized(both))
         # the first person as the second sees him, turned round: the second as the first sees him
         x2, z2 = -(c * second[..., 2] + s * second[..., 3]), -(c * second[..., 3] - s * second[..., 2])
-        other = _stack(c, s, (first[..., 2] + x2) / 2, (first[..., 3] + z2) / 2)
-        return _pile(_stack(1 + 0 * c, 0 * s, 0 * x, 0 * z), other)
+        other = stack(c, s, (first[..., 2] + x2) / 2, (first[..., 3] + z2) / 2)
+        return _pile(stack(1 + 0 * c, 0 * s, 0 * x, 0 * z), other)
 
 
 PUBLISHED_CODE = PlaceCode("world", 0.1, 0.1)
@@ -206,21 +161,11 @@ def as_published(stands: Numbers) -> Numbers:
     """Stands (..., 2, 4) in a world to where the published tools draw them: the first person at the origin facing +Z.
 
     p_1 becomes R_0 R_1' p_1 + (t_1 - t_0): the difference on the ground is not turned, which is right only where the
-    first person faces +Z in the world. For comparison with published numbers; `seen` is the right one.
+    first person faces +Z in the world. For comparison with published numbers; `relative` is the right one.
     """
     first, second = stands[..., 0, :], stands[..., 1, :]
-    turned = seen(first, second)
-    return _pile(seen(first, first), _stack(turned[..., 0], turned[..., 1], *_parts(second - first)[2:]))
-
-
-def _parts(stand: Any) -> tuple[Any, Any, Any, Any]:
-    return stand[..., 0], stand[..., 1], stand[..., 2], stand[..., 3]
-
-
-def _stack(*parts: Any) -> Any:
-    if isinstance(parts[0], Tensor):
-        return torch.stack(torch.broadcast_tensors(*parts), dim=-1)
-    return np.stack(np.broadcast_arrays(*parts), axis=-1)
+    turned = relative(first, second)
+    return _pile(relative(first, first), stack(turned[..., 0], turned[..., 1], *parts(second - first)[2:]))
 
 
 def _pile(first: Any, second: Any) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
+from motionloom.ground import turned
 from motionloom.skeleton import SMPL22
 
 Array = NDArray[np.float64]
@@ -123,18 +124,11 @@ class Place:
 
     def into(self, positions: Array) -> Array:
         """(..., frames, joints, 3) of the world as seen from here."""
-        return _turned(positions - self.origin[..., None, None, :], -self.facing)
+        return turned(positions - self.origin[..., None, None, :], -self.facing[..., None, None])
 
     def out(self, positions: Array) -> Array:
         """The inverse of `into`."""
-        return _turned(positions, self.facing) + self.origin[..., None, None, :]
-
-
-def _turned(positions: Array, angle: Array) -> Array:
-    """Turned to the left about +Y by angles (...)."""
-    sin, cos = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
-    x, y, z = positions[..., 0], positions[..., 1], positions[..., 2]
-    return np.stack([cos * x + sin * z, y, cos * z - sin * x], axis=-1)
+        return turned(positions, self.facing[..., None, None]) + self.origin[..., None, None, :]
 
 
 def with_bones(positions: np.ndarray, parents: tuple[int, ...], lengths: np.ndarray) -> Array:

@@ -7,7 +7,8 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import resample_positions
-from motionloom.goals.goal import FPS, Goal, Placement, body_facing
+from motionloom.goals.goal import FPS, Goal, body_facing
+from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
@@ -45,6 +46,6 @@ def tracks(positions: np.ndarray, joints: Sequence[int], *, frames: int, at: Seq
     return replace(goal, start=stands(positions[0]))
 
 
-def stands(places: np.ndarray) -> Placement:
+def stands(places: np.ndarray) -> GroundPose:
     """Where a person of places (22, 3) stands."""
-    return Placement(float(places[0, 0]), float(places[0, 2]), body_facing(places))
+    return GroundPose.of(places[0], body_facing(places))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
+from motionloom.ground import GroundPose
 from motionloom.skeleton import SMPL22
 
 Array = NDArray[np.float64]
@@ -25,26 +26,8 @@ SET_OUT = 0.05
 _ACROSS = list(SMPL22.resolve(["left_hip", "right_hip", "left_shoulder", "right_shoulder"]))
 
 
-@dataclass(frozen=True)
-class Placement:
-    """A place and direction on the ground: the world seen from where somebody stands."""
-
-    x: float = 0.0
-    z: float = 0.0
-    facing: float = 0.0
-
-    def to_world(self, points: np.ndarray) -> Array:
-        """(..., 3) from here (origin, facing +Z) into the world."""
-        return _turned(np.asarray(points, dtype=np.float64), self.facing) + np.array([self.x, 0, self.z])
-
-    def from_world(self, points: np.ndarray) -> Array:
-        """(..., 3) from the world to here."""
-        return _turned(np.asarray(points, dtype=np.float64) - [self.x, 0, self.z], -self.facing)
-
-    def seen_from(self, place: "Placement") -> "Placement":
-        """This place in coordinates in which ``place`` is the origin and faces +Z."""
-        x, _, z = place.from_world(np.array([self.x, 0.0, self.z]))
-        return Placement(float(x), float(z), self.facing - place.facing)
+Placement = GroundPose
+"""The old name of `GroundPose`, for one release."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +42,7 @@ class Goal:
     """(frames,) radians."""
     facing_asked: Flags
     """(frames,)"""
-    start: Placement | None = None
+    start: GroundPose | None = None
     """Where the person stands at frame 0, where that is known; no wish, and `placement_of` falls back on the wishes."""
 
     def __post_init__(self) -> None:
@@ -104,7 +87,7 @@ class Goal:
             whole[part] = own
         return ends if before else replace(ends, start=self.start)
 
-    def seen_from(self, place: Placement) -> "Goal":
+    def seen_from(self, place: GroundPose) -> "Goal":
         """The same wishes in coordinates in which ``place`` is the origin and faces +Z.
 
         Single horizontal coordinates cannot be turned: both or none of x and z must be asked unless nothing turns.
@@ -118,14 +101,12 @@ class Goal:
             start=None if self.start is None else self.start.seen_from(place),
         )
 
-    def placed(self, place: Placement) -> "Goal":
+    def placed(self, place: GroundPose) -> "Goal":
         """The same wishes, told in coordinates in which ``place`` is the origin facing +Z, in those of the world."""
-        away = Placement(facing=-place.facing)
-        x, _, z = away.to_world(np.array([-place.x, 0.0, -place.z]))
-        return self.seen_from(Placement(float(x), float(z), -place.facing))
+        return self.seen_from(place.inverse())
 
 
-def placement_of(goal: Goal) -> Placement:
+def placement_of(goal: Goal) -> GroundPose:
     """Where the person stands at frame 0: `Goal.start` or, without it, what the wishes say.
 
     The place is the pelvis's, the direction that of the facing asked at frame 0, else of the hips and shoulders asked
@@ -134,7 +115,7 @@ def placement_of(goal: Goal) -> Placement:
     if goal.start is not None:
         return goal.start
     x, z = np.where(goal.asked[0, 0, [0, 2]], goal.positions[0, 0, [0, 2]], 0.0)
-    return Placement(float(x), float(z), _first_facing(goal))
+    return GroundPose(float(x), float(z), _first_facing(goal))
 
 
 def _first_facing(goal: Goal) -> float:
@@ -203,7 +184,7 @@ def _check_turns(first: Goal, second: Goal) -> None:
         )
 
 
-def _check_starts(first: Placement | None, second: Placement | None) -> None:
+def _check_starts(first: GroundPose | None, second: GroundPose | None) -> None:
     if first is None or second is None:
         return
     apart = float(np.hypot(first.x - second.x, first.z - second.z))
@@ -222,9 +203,3 @@ def turn_between(a: np.ndarray | float, b: np.ndarray | float) -> Array:
 
 def _parts(goal: Goal) -> tuple[np.ndarray, ...]:
     return goal.positions, goal.asked, goal.facing, goal.facing_asked
-
-
-def _turned(points: Array, angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    x, z = points[..., 0], points[..., 2]
-    return np.stack([c * x + s * z, points[..., 1], c * z - s * x], axis=-1)

@@ -18,9 +18,10 @@ from motionloom.features.humanml import resample_positions
 from motionloom.goals.drawing import read_drawing
 from motionloom.goals.fields import Field, listed
 from motionloom.goals.following import follow, stands, tracks
-from motionloom.goals.goal import FPS, Goal, Placement, merged, placement_of, turn_between
+from motionloom.goals.goal import FPS, Goal, merged, placement_of, turn_between
 from motionloom.goals.paths import CURVES, WALKING, curve, lengths_along, root_path, through, turned_to
 from motionloom.goals.reach import check_reach
+from motionloom.ground import GroundPose
 from motionloom.io import load
 from motionloom.io.text import read_text
 from motionloom.retarget import to_smpl22
@@ -122,7 +123,7 @@ class _Reader:
         goal, start = self.path(given["path"], start) if "path" in given else (Goal.nothing(self.frames), start)
         told = start.position is not None or start.facing is not None
         x, z = start.position or (0.0, 0.0)
-        origin = Placement(x, z, start.facing or 0.0)
+        origin = GroundPose(x, z, start.facing or 0.0)
         goal = replace(goal, start=origin if told else None)
         for item in given["poses"].items() if "poses" in given else ():
             goal = self.joined(goal, self.pose(item, goal, origin), item)
@@ -339,7 +340,7 @@ class _Reader:
                     "and faces; give a 'path' with a facing over that time, or use the frame 'world'"
                 )
             x, _, z = goal.positions[frame, 0]
-            world[row] = Placement(float(x), float(z), float(goal.facing[frame])).to_world(places[row])
+            world[row] = GroundPose(float(x), float(z), float(goal.facing[frame])).to_world(places[row])
         return world
 
     # -- other motions
@@ -355,7 +356,7 @@ class _Reader:
                 found.fail(f"cannot be used: {error}")
         return self.people[path]
 
-    def pose(self, item: Field, goal: Goal, origin: Placement) -> Goal:
+    def pose(self, item: Field, goal: Goal, origin: GroundPose) -> Goal:
         given = item.mapping(POSE_KEYS, ("time", "from"))
         frame = self.frame(given["time"].number(0.0, self.seconds))
         positions, fps = self.person(given["from"])
@@ -366,7 +367,7 @@ class _Reader:
         if goal.asked[frame, 0, [0, 2]].all():
             x, _, z = goal.positions[frame, 0]
             facing = goal.facing[frame] if goal.facing_asked[frame] else origin.facing
-            place = Placement(float(x), float(z), float(facing))
+            place = GroundPose(float(x), float(z), float(facing))
         position, facing = self.ground(given.get("position")), self.direction(given.get("facing"))
         if position is not None:
             place = replace(place, x=position[0], z=position[1])

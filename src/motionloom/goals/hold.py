@@ -1,4 +1,4 @@
-"""`Hold`: parts of a prediction that are given, and the motion that gives them."""
+"""`FixedJoints`: parts of a prediction that are given, and the motion that gives them."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from motionloom.motion import Motion
 
 
 @dataclass(frozen=True)
-class HeldPart:
+class FixedPart:
     """Some joints, and when they are held."""
 
     joints: tuple[str, ...]
@@ -18,11 +18,15 @@ class HeldPart:
 
 
 @dataclass(frozen=True, eq=False)
-class Hold:
+class FixedJoints:
     """Parts whose future is given: they take the local rotations of another motion exactly."""
 
     source: Motion
     """On the past's skeleton and at its rate; its first frame is the first one to predict."""
-    parts: tuple[HeldPart, ...]
+    parts: tuple[FixedPart, ...]
     align: bool = True
     """Whether a source that starts elsewhere is moved and turned on the ground to where the past ends."""
+
+
+Hold, HeldPart = FixedJoints, FixedPart
+"""Old names, for one release."""

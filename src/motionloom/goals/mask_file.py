@@ -19,7 +19,7 @@ from motionloom.io.text import shown
 from motionloom.skeleton import SMPL22
 
 if TYPE_CHECKING:
-    from motionloom.goals.hold import HeldPart
+    from motionloom.goals.hold import FixedPart
 
 SCHEMA = Path(__file__).parents[1] / "schemas" / "mask.schema.json"
 KEYS = ("hold",)
@@ -35,7 +35,7 @@ BESIDE = 0.25
 """Of a frame: so far behind a frame a stretch of frames ends, and the next one may begin."""
 
 
-def read_mask(path: Path | str, *, fps: float) -> tuple[HeldPart, ...]:
+def read_mask(path: Path | str, *, fps: float) -> tuple[FixedPart, ...]:
     """Read a mask file; its frames are of rate ``fps``, the past's, and become seconds from the end of the past.
 
     Raises `MotionloomError` with file and line for whatever is wrong.
@@ -55,7 +55,7 @@ def check_names(names: Iterable[str]) -> tuple[str, ...]:
     return found
 
 
-def all_held(parts: Sequence[HeldPart], seconds: float) -> bool:
+def all_held(parts: Sequence[FixedPart], seconds: float) -> bool:
     """Whether all 22 joints are held at every moment from 0 to ``seconds``, so that nothing is left to predict."""
     spans: dict[int, list[tuple[float, float]]] = {joint: [] for joint in range(len(SMPL22))}
     for part in parts:
@@ -84,14 +84,14 @@ def _name_problem(name: str) -> str:
 class _Reader(LinedFile):
     fps: float
 
-    def parts(self, document: Lined) -> tuple[HeldPart, ...]:
+    def parts(self, document: Lined) -> tuple[FixedPart, ...]:
         top = self.mapping(document, KEYS, "a mask")
         if "hold" not in top:
             self.fail(document.line, "there is no 'hold'; list the parts that are held")
         return tuple(self.part(item) for item in self.items(top["hold"], "hold", most=MAX_PARTS))
 
-    def part(self, item: Lined) -> HeldPart:
-        from motionloom.goals.hold import HeldPart
+    def part(self, item: Lined) -> FixedPart:
+        from motionloom.goals.hold import FixedPart
 
         given = self.mapping(item, PART_KEYS, "a held part")
         if "joints" not in given:
@@ -101,12 +101,12 @@ class _Reader(LinedFile):
             if "from" in given or "to" in given:
                 self.fail(given["frames"].key_line, "a held part has either 'frames' or 'from' and 'to', not both")
             rows = self.items(given["frames"], "frames", most=MAX_SPANS)
-            return HeldPart(names, tuple(self.stretch(row) for row in rows))
+            return FixedPart(names, tuple(self.stretch(row) for row in rows))
         begin = self.seconds(given.get("from"), "from", 0.0)
         end = self.seconds(given.get("to"), "to", math.inf)
         if end <= begin:
             self.fail(given["to"].line, f"'to' must be after 'from', {begin:g} s; got {end:g}")
-        return HeldPart(names, ((begin, end),))
+        return FixedPart(names, ((begin, end),))
 
     def joint(self, found: Lined) -> str:
         if not isinstance(found.value, str):

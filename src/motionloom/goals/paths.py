@@ -9,8 +9,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from motionloom.blending import hermite
 from motionloom.errors import MotionloomError
 from motionloom.goals.goal import FPS, Goal, turn_between
+from motionloom.ground import turned
 
 Array = NDArray[np.float64]
 
@@ -45,12 +47,9 @@ def through(points: np.ndarray, times: np.ndarray, at: np.ndarray, *, smooth: bo
     velocity = np.diff(points, axis=0) / span[:, None]
     tangent = _tangents(velocity, span, closed=len(points) > 3 and np.array_equal(points[0], points[-1]))
     h = span[piece][:, None]
-    return (
-        (2 * u**3 - 3 * u**2 + 1) * points[piece]
-        + (u**3 - 2 * u**2 + u) * h * tangent[piece]
-        + (3 * u**2 - 2 * u**3) * points[piece + 1]
-        + (u**3 - u**2) * h * tangent[piece + 1]
-    )
+    start, leaving, end, coming = hermite(u)
+    way = start * points[piece] + leaving * h * tangent[piece]
+    return way + end * points[piece + 1] + coming * h * tangent[piece + 1]
 
 
 def _tangents(velocity: Array, span: Array, *, closed: bool) -> Array:
@@ -209,6 +208,5 @@ def turned_to(points: np.ndarray, facing: float) -> Array:
     """(n, 2) points about the origin turned so that +Z becomes the direction ``facing``."""
     if not abs(turn_between(facing, 0.0)):
         return np.asarray(points, dtype=np.float64)
-    c, s = np.cos(facing), np.sin(facing)
     x, z = np.asarray(points, dtype=np.float64).T
-    return np.stack([c * x + s * z, c * z - s * x], axis=-1)
+    return turned(np.stack([x, 0 * x, z], axis=-1), facing)[:, [0, 2]]

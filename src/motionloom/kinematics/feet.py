@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.blending import hermite, shares, smoothstep
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FEET
 from motionloom.kinematics.ik import LIMBS, Limb, aim, hinge_frame, reach
@@ -52,7 +53,7 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
         return motion
     places = motion.positions()
     planted = planted_feet(places, motion.fps, contacts=contacts)
-    targets, directions = places[:, [7, 8]].copy(), np.empty((len(motion), 2, 3))
+    targets, directions = places[:, [limb.end for limb in LIMBS[:2]]].copy(), np.empty((len(motion), 2, 3))
     for i in (0, 1):
         ankle, toe = FEET[2 * i : 2 * i + 2]
         foot = places[:, toe] - places[:, ankle]
@@ -127,8 +128,8 @@ def _steady_direction(foot: Array, flat: Flags, fps: float) -> Array:
         # the easing never reaches into the neighbouring stance
         before = min(ease, start - runs[i - 1][1] + 1) if i else ease
         after = min(ease, runs[i + 1][0] - stop + 1) if i + 1 < len(runs) else ease
-        away = np.maximum((start - frames) / before, (frames - stop + 1) / after).clip(0, 1)
-        weight = 1 - away * away * (3 - 2 * away)
+        away = np.maximum((start - frames) / before, (frames - stop + 1) / after)
+        weight = 1 - smoothstep(away)
         result += weight[:, None] * (unit[start:stop].mean(0) - result)
     return result / np.linalg.norm(result, axis=-1, keepdims=True).clip(1e-9)
 
@@ -191,9 +192,8 @@ def _slope(values: Array, at: int, towards: int) -> Array:
 
 def _hermite(steps: int, left: Array, right: Array, into: Array, out: Array) -> Array:
     """(steps - 1, 3) values strictly between two ends ``steps`` frames apart, with given changes per frame there."""
-    u = (np.arange(1, steps) / steps)[:, None]
-    h10, h11 = u**3 - 2 * u**2 + u, u**3 - u**2
-    return left + (3 * u**2 - 2 * u**3) * (right - left) + steps * (h10 * into + h11 * out)
+    _, leaving, end, coming = hermite(shares(steps - 1)[:, None])
+    return left + end * (right - left) + steps * (leaving * into + coming * out)
 
 
 def envelope(need: Array, radius: int) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.blending import smoothstep
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
@@ -32,11 +33,16 @@ class Limb:
     """The joint beyond the end (the toes), whose direction tells the turn of a straight leg."""
 
 
+def _limb(base: str, names: tuple[str, str, str], hinge: tuple[float, float, float], tip: str | None = None) -> Limb:
+    base_joint, start, middle, end = map(SMPL22.index, (base, *names))
+    return Limb(base_joint, start, middle, end, hinge, None if tip is None else SMPL22.index(tip))
+
+
 LIMBS: tuple[Limb, ...] = (
-    Limb(0, 1, 4, 7, (1, 0, 0), 10),
-    Limb(0, 2, 5, 8, (1, 0, 0), 11),
-    Limb(9, 16, 18, 20, (0, -1, 0)),
-    Limb(9, 17, 19, 21, (0, 1, 0)),
+    _limb("pelvis", ("left_hip", "left_knee", "left_ankle"), (1, 0, 0), "left_foot"),
+    _limb("pelvis", ("right_hip", "right_knee", "right_ankle"), (1, 0, 0), "right_foot"),
+    _limb("spine3", ("left_shoulder", "left_elbow", "left_wrist"), (0, -1, 0)),
+    _limb("spine3", ("right_shoulder", "right_elbow", "right_wrist"), (0, 1, 0)),
 )
 """Left leg, right leg, left arm, right arm."""
 
@@ -49,7 +55,7 @@ _STIFFNESS = 1.0
 _NEARLY_STRAIGHT = (0.95, 0.995)
 """Shares of full reach between which the observed bend takes over from the observed distance."""
 
-_DOUBTFUL = 0.12
+_TOLERANCE = 0.12
 """Relative error of drawn lengths at which a rotation counts as much as its change from frame to frame."""
 
 
@@ -72,7 +78,7 @@ def motion_from_positions(positions: np.ndarray, fps: float) -> Motion:
     solve_limbs(positions, places, world, fps)
     for ankle, toe in ((7, 10), (8, 11)):
         places[:, toe] = places[:, ankle] + rot.rotate(world[:, ankle], _REST[toe])
-    return Motion(SMPL22, fps, places[:, 0], _steadied_limbs(positions, local_rotations(world)))
+    return Motion(SMPL22, fps, places[:, 0], _smooth_limbs(positions, local_rotations(world)))
 
 
 def local_rotations(world: np.ndarray) -> Array:
@@ -88,15 +94,15 @@ def local_rotations(world: np.ndarray) -> Array:
 
 def _solve_trunk(seen: Array, places: Array, world: Array) -> None:
     """Fill in places and world orientations of pelvis, spine, neck, head and collars."""
-    world[:, 0] = _settled(_pelvis(seen), _misdrawn(seen[:, 1] - seen[:, 2], _REST[1] - _REST[2]))
+    world[:, 0] = _smooth_by_confidence(_pelvis(seen), _misdrawn(seen[:, 1] - seen[:, 2], _REST[1] - _REST[2]))
     chest = [12, 13, 14]
     spare = (_REST[13] - _REST[14], seen[:, 13] - seen[:, 14])
     turned = fit_rotation(_REST[chest], seen[:, chest] - seen[:, 9:10], spare=spare)
-    world[:, 9] = _settled(turned, _misdrawn(spare[1], spare[0]))
+    world[:, 9] = _smooth_by_confidence(turned, _misdrawn(spare[1], spare[0]))
     for joint, share in ((3, 1 / 3), (6, 2 / 3)):
         child = SMPL22.children(joint)[0]
         guess = rot.slerp(world[:, 0], world[:, 9], np.full(len(seen), share))
-        world[:, joint] = aim(guess, _REST[child], _steadied(seen[:, child] - seen[:, joint], guess, child))
+        world[:, joint] = aim(guess, _REST[child], _smooth_bones(seen[:, child] - seen[:, joint], guess, child))
     trunk = (3, 6, 9, 12, 13, 14, 1, 2)
     for joint in trunk:
         places[:, joint] = _end_of(joint, places, world)
@@ -110,7 +116,7 @@ def _solve_trunk(seen: Array, places: Array, world: Array) -> None:
         error = _misdrawn(drawn, _REST[child])
         usual = rot.rotate(world[:, 9], np.broadcast_to(_REST[child], drawn.shape))
         turned = aim(world[:, 9], _REST[child], drawn + 2 * error[:, None] * usual)
-        local = _settled(rot.multiply(rot.inverse(world[:, 9]), turned), error)
+        local = _smooth_by_confidence(rot.multiply(rot.inverse(world[:, 9]), turned), error)
         world[:, joint] = rot.multiply(world[:, 9], local)
         places[:, child] = _end_of(child, places, world)
     world[:, 15] = rot.multiply(world[:, 12], _level_head(world[:, 9], world[:, 12]))
@@ -127,7 +133,7 @@ def _level_head(chest: Array, neck: Array) -> Array:
     return rot.rotvec_to_quat(np.array([-lean, 0, 0]))
 
 
-def _steadied(bone: Array, guess: Array, child: int) -> Array:
+def _smooth_bones(bone: Array, guess: Array, child: int) -> Array:
     """The seen bone (frames, 3), mixed with the guessed one as far as its breathing length shows noise."""
     length = np.linalg.norm(bone, axis=-1)
     noise = float(np.std(length) / _LENGTHS[child])
@@ -139,7 +145,7 @@ def _misdrawn(bone: Array, rest: Array) -> Array:
     return np.abs(1 - np.linalg.norm(bone, axis=-1) / np.linalg.norm(rest))
 
 
-def _settled(turns: Array, error: Array) -> Array:
+def _smooth_by_confidence(turns: Array, error: Array) -> Array:
     """Rotations (frames, ..., 4), steadied in time as far as what they were read off was drawn wrongly (frames, ...).
 
     Where a network is not sure it draws in between: somebody who spins has both hips, or a limb its two ends, in one
@@ -147,7 +153,7 @@ def _settled(turns: Array, error: Array) -> Array:
     rotation, weighted by the inverse square of the relative error, plus the squared change per frame: what is drawn
     with the right lengths stays exactly as it is.
     """
-    weight = (_DOUBTFUL / error.clip(1e-6))[..., None] ** 2
+    weight = (_TOLERANCE / error.clip(1e-6))[..., None] ** 2
     return rot.normalize(_tridiagonal(weight, 1.0, weight * rot.unroll(turns)))
 
 
@@ -207,8 +213,8 @@ def solve_limbs(seen: np.ndarray, places: np.ndarray, world: np.ndarray, fps: fl
             world[:, limb.tip] = world[:, c]  # places do not tell how toes are bent: they go with the foot
 
 
-def _steadied_limbs(seen: Array, local: Array) -> Array:
-    """Local rotations (frames, 22, 4), `_settled` at hips, knees, shoulders and elbows: a limb drawn short would have
+def _smooth_limbs(seen: Array, local: Array) -> Array:
+    """Local rotations (frames, 22, 4), smooth at hips, knees, shoulders and elbows: a limb drawn short would have
     to fold up, or open, within a frame to reach its end."""
     ends = [[limb.start, limb.middle, limb.end] for limb in LIMBS]
     joints = [[limb.start, limb.middle] for limb in LIMBS]
@@ -216,7 +222,9 @@ def _steadied_limbs(seen: Array, local: Array) -> Array:
     drawn = np.linalg.norm(np.diff(seen[:, ends], axis=2), axis=-1)
     error = np.abs(1 - drawn / lengths).mean(-1)
     result = local.copy()
-    result[:, joints] = _settled(local[:, joints], error[..., None])  # all at once: its loop is over frames
+    result[:, joints] = _smooth_by_confidence(
+        local[:, joints], error[..., None]
+    )  # all at once: its loop is over frames
     return result
 
 
@@ -247,7 +255,7 @@ def two_bones(
     by_bend = np.sqrt((first**2 + second**2 + 2 * first * second * bend).clip(0))
     wanted = seen[:, 2] - start
     distance = np.linalg.norm(wanted, axis=-1)
-    near = _smoothstep(distance / (first + second), *_NEARLY_STRAIGHT)
+    near = _between(distance / (first + second), _NEARLY_STRAIGHT)
     return reach(start, start + _unit(wanted) * (distance + near * (by_bend - distance))[:, None], seen, axis, lengths)
 
 
@@ -303,7 +311,7 @@ def hinge_axes(seen: np.ndarray, world: np.ndarray, fps: float) -> Array:
 
     bend = plane(np.cross(upper, lower))
     usual = plane(_usual_axes(seen, upper, lower, local))
-    strength = _smoothstep(np.abs(bend), *_BENT)
+    strength = _between(np.abs(bend), _BENT)
     angle = _smooth_angles(bend, strength, usual, _STIFFNESS * (fps / 20) ** 2)
     axes = np.cos(angle)[..., None] * first + np.sin(angle)[..., None] * second
     return rot.rotate(world[:, bases], axes).swapaxes(0, 1)
@@ -389,6 +397,7 @@ def _perpendicular(v: np.ndarray, to: np.ndarray) -> Array:
     return _unit(np.where(np.linalg.norm(part, axis=-1, keepdims=True) > 1e-9, part, other))
 
 
-def _smoothstep(x: np.ndarray, low: float, high: float) -> Array:
-    u = np.clip((x - low) / (high - low), 0, 1)
-    return u * u * (3 - 2 * u)
+def _between(x: np.ndarray, ends: tuple[float, float]) -> Array:
+    """0 below, 1 above, smooth between."""
+    low, high = ends
+    return smoothstep((x - low) / (high - low))

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from motionloom import ground
+from motionloom.motion import heading
 from motionloom.skeleton import SMPL22
 
 Array = NDArray[np.float64]
@@ -34,18 +36,9 @@ def smooth(values: np.ndarray, frames: int) -> Array:
     return (total[high] - total[low]) / (high - low).reshape(-1, *[1] * (values.ndim - 1))
 
 
-def heading(positions: np.ndarray) -> Array:
-    """(frames,) radians, unwrapped: 0 faces +Z, growing to the left (towards +X); from hips and shoulders."""
-    p = np.asarray(positions, dtype=np.float64)
-    across = p[:, J["left_hip"]] - p[:, J["right_hip"]] + p[:, J["left_shoulder"]] - p[:, J["right_shoulder"]]
-    return np.unwrap(np.arctan2(-across[:, 2], across[:, 0]))
-
-
 def turned(vectors: np.ndarray, angle: np.ndarray | float) -> Array:
     """World vectors (..., 3) as (left, up, forward) of someone whose heading is ``angle`` (broadcast)."""
-    v = np.asarray(vectors, dtype=np.float64)
-    sin, cos = np.sin(angle), np.cos(angle)
-    return np.stack([v[..., 0] * cos - v[..., 2] * sin, v[..., 1], v[..., 0] * sin + v[..., 2] * cos], axis=-1)
+    return ground.turned(vectors, -angle)
 
 
 def in_body(positions: np.ndarray) -> Array:

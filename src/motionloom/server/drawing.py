@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.goal import Goal, Placement, body_facing, placement_of
+from motionloom.goals.goal import Goal, body_facing, placement_of
+from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.server.asking import Request
 from motionloom.tasks import duet, long, pair, text
 from motionloom.tasks.control import control
-from motionloom.tasks.edit import edit
+from motionloom.tasks.edit import changes_asked, edit
 from motionloom.tasks.predict import predict, switch
 from motionloom.tasks.splice import concatenated
 from motionloom.weights.pair import PairBlock
@@ -126,10 +127,14 @@ def _edited(models: Models, request: Request, progress: Progress) -> Iterator[Re
     assert request.motion is not None
     options, people = request.options, request.motion.people
     given = {name: options[name] for name in ("blend", "strength") if options[name] is not None}
+    prompt = options["prompt"] or ""
+    changes = changes_asked(
+        prompt, keep=options["keep"], between=options["redraw"], loop=options["loop"],
+        extend=options["extend"] or 0.0, **given,
+    )  # fmt: skip
     made = edit(
-        models.prior, people[options["person"]], options["prompt"] or "", keep=options["keep"],
-        between=options["redraw"], loop=options["loop"], extend=options["extend"] or 0.0,
-        count=request.count, seed=request.seed, progress=progress, **given, **shared(request),
+        models.prior, people[options["person"]], prompt, changes, count=request.count, seed=request.seed,
+        progress=progress, **shared(request),
     )  # fmt: skip
     for number, motion in enumerate(made):
         all_people = list(people)
@@ -171,13 +176,11 @@ def _duet(models: Models, request: Request, progress: Progress) -> Iterator[Resu
     options, prior, block = request.options, models.prior, models.block
     given: dict[str, Any] = {"count": request.count, "seed": request.seed, "progress": progress} | shared(request)
     if options["together"] is not None:
-        given["together"] = options["together"]
+        given["pair_guidance"] = options["together"]
     said = options["prompt"] or ""
     if request.motion is None:
-        person = options["person"] or 0
-        made = pair.generate_pair(
-            prior, block, said, seconds=options["seconds"], goal=request.goal, person=person, **given
-        )  # fmt: skip
+        goals = (None, request.goal) if options["person"] else (request.goal, None)
+        made = pair.generate_pair(prior, block, said, seconds=options["seconds"], goals=goals, **given)
     elif options["past"]:
         first, second = request.motion.people
         made = pair.complete_pair(prior, block, (first, second), said, seconds=options["seconds"], **given)
@@ -192,7 +195,7 @@ def _composed_pair(models: Models, request: Request, progress: Progress) -> Iter
     assert timeline is not None
     if timeline.start is not None:
         raise MotionloomError("two people do not go on from one 'start'; leave it out, or give 'past'")
-    given = {} if request.options["together"] is None else {"together": request.options["together"]}
+    given = {} if request.options["together"] is None else {"pair_guidance": request.options["together"]}
     for number in range(request.count):
         told = _moves(progress, request, len(timeline.segments), number)
         blocks = list(
@@ -262,5 +265,5 @@ def placed(request: Request, poses: Array) -> Array:
     if request.task != "duet":
         return place.to_world(poses)
     first = poses[person, 0]
-    here = Placement(float(first[0, 0]), float(first[0, 2]), body_facing(first))
+    here = GroundPose.of(first[0], body_facing(first))
     return place.to_world(here.from_world(poses))

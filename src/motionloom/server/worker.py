@@ -203,7 +203,7 @@ class Worker:
             if not any(job.request.levels and not job.finished for job in jobs):
                 return
             for row, poses in zip(denoised.rows, denoised.positions(), strict=True):
-                job, number = owners[row] if len(denoised.rows) > 1 else _alone(jobs[0], walks)
+                job, number = owners[row] if denoised.rows != (0,) else _alone(jobs[0], walks)
                 if job.request.levels and not job.finished:
                     job.level(denoised.done, denoised.of, number, placed(job.request, poses))
 

@@ -7,28 +7,31 @@ is led to it so that neither place nor velocity jumps, and bones keep the length
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Unpack
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motionloom.diffusion import SOLVERS, guide, levels, row_draw, row_seed, sample
+from motionloom._moved import renamed
+from motionloom.diffusion import SOLVERS, guide, row_draw, row_seed, sample
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import bone_lengths, with_bones
-from motionloom.tasks.watching import reported
+from motionloom.tasks.sampling import PredictionSampling, PredictionSettings
+from motionloom.tasks.watching import View
 from motionloom.weights.predictor import Predictor
 
 Array = NDArray[np.float64]
 
-STEPS, SOLVER, SPACING = 5, "dpm2m", "index"
-"""The default walk, see docs/decisions."""
-TEMPERATURE = 1.1
-"""How much noise the walk starts from, in standard deviations: few steps draw too little of what there is, and a person
-who goes on from its own calm comes to rest; see docs/decisions."""
+STEPS, SOLVER, SPACING = PredictionSampling.steps, PredictionSampling.solver, PredictionSampling.spacing
+TEMPERATURE = PredictionSampling.temperature
+FUTURES = 10
+"""Futures that are made unless asked otherwise."""
 EASE = 0.4
 """Seconds over which unknown frames are led from what is known to the network's own course."""
-ROWS = 512
+BATCH = 512
+"""Rows in one network call."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,21 +52,19 @@ def complete(
     pose: Tensor,
     *,
     seeds: Sequence[int],
-    steps: int = STEPS,
-    guidance: float = 1.0,
-    temperature: float = TEMPERATURE,
-    solver: str = SOLVER,
-    spacing: str = SPACING,
-    shown: Callable[[Tensor], Array] | None = None,
+    sampling: PredictionSampling | None = None,
+    poses: Callable[[Tensor], Array] | None = None,
+    **settings: Unpack[PredictionSettings],
 ) -> Tensor:
     """Windows (rows, frames, channels) with what is not known drawn; row i from ``seeds[i]``, alone or in a batch.
 
     ``features`` are read where ``mask`` (rows, frames, parts) is above 0; ``pose`` (rows, channels) is the last
-    observed one. Known numbers are those that are given, and the others leave them without a jump. ``guidance``
-    above 1 exaggerates what is told (classifier-free guidance), below 1 heeds it less; it needs a second pass.
-    ``temperature``: the standard deviation of the noise at the start; more makes livelier motion and more variety.
-    ``shown``: such windows as (rows, people, frames, 22, 3) metres, for who watches (`watching`); None: nobody can.
+    observed one. Known numbers are those that are given, and the others leave them without a jump. ``sampling``, or
+    single settings of it as keywords: a guidance above 1 exaggerates the condition, below 1 heeds it less; it needs a
+    second pass. ``poses``: such windows as (rows, people, frames, 22, 3) metres, for who is `watching`; None: nobody
+    can.
     """
+    chosen = PredictionSampling.of(sampling, settings)
     told = predictor.tell(features, mask, pose)
     yes, no = (torch.full((len(told),), flag, device=told.device) for flag in (True, False))
 
@@ -71,14 +72,15 @@ def complete(
         return predictor.denoiser(*cond)(x, level)
 
     draw = row_draw(seeds)
-    made = temperature * draw(torch.empty(len(told), *predictor.mean.shape, device=told.device))
+    made = chosen.temperature * draw(torch.empty(len(told), *predictor.mean.shape, device=told.device))
+    way = chosen.levels(predictor.schedule)
     walk = sample(
-        guide(net, (told, yes), (told, no), guidance), made,
-        levels=levels(predictor.schedule, steps, spacing=spacing),
-        solver=SOLVERS[solver], schedule=predictor.schedule, draw=draw,
+        guide(net, (told, yes), (told, no), chosen.guidance), made,
+        levels=way, solver=SOLVERS[chosen.solver], schedule=predictor.schedule, draw=draw,
     )  # fmt: skip
-    if shown is not None:
-        walk = reported(walk, steps, range(len(told)), lambda step: shown(predictor.to_features(step.clean, pose)))
+    if poses is not None:
+        view = View(lambda states: poses(predictor.to_features(states, pose)))
+        walk = view.reported(walk, len(way) - 1, range(len(told)))
     for snapshot in walk:
         made = snapshot.state
     return joined(predictor.to_features(made, pose), features, mask, ease=max(round(EASE * predictor.fps), 1))
@@ -143,11 +145,8 @@ def next_frames(
     known: Known | None = None,
     frames: int | None = None,
     exact: bool = True,
-    steps: int = STEPS,
-    guidance: float = 1.0,
-    temperature: float = TEMPERATURE,
-    solver: str = SOLVER,
-    spacing: str = SPACING,
+    sampling: PredictionSampling | None = None,
+    **settings: Unpack[PredictionSettings],
 ) -> Array:
     """(rows, frames, joints, 3) metres: what comes behind pasts (rows, h, joints, 3) in the world, +Y up.
 
@@ -173,8 +172,8 @@ def next_frames(
 
     made = complete(
         predictor, features, like.expand(rows, -1, -1), features[:, h - 1],
-        seeds=seeds, steps=steps, guidance=guidance, temperature=temperature, solver=solver, spacing=spacing,
-        shown=lambda windows: placed(windows)[:, None],
+        seeds=seeds, sampling=PredictionSampling.of(sampling, settings),
+        poses=lambda windows: placed(windows)[:, None],
     )  # fmt: skip
     places = placed(made)
     return with_bones(places, layout.parents, bone_lengths(past, layout.parents)) if exact else places
@@ -206,35 +205,32 @@ def _check(predictor: Predictor, past: Array, frames: int, known: Known | None) 
         )
 
 
+@renamed({"rows": "batch_size"})
 def futures(
     predictor: Predictor,
     past: np.ndarray,
     *,
-    count: int,
-    seed: int = 0,
     frames: int | None = None,
-    rows: int = ROWS,
     exact: bool = True,
-    steps: int = STEPS,
-    guidance: float = 1.0,
-    temperature: float = TEMPERATURE,
-    solver: str = SOLVER,
-    spacing: str = SPACING,
+    sampling: PredictionSampling | None = None,
+    **settings: Unpack[PredictionSettings],
 ) -> Array:
-    """(windows, count, frames, joints, 3): ``count`` futures of each past (windows, h, joints, 3); see `next_frames`.
+    """(windows, count, frames, joints, 3): futures of each past (windows, h, joints, 3); see `next_frames`.
 
-    Future i of a past is drawn from ``row_seed(seed, i)`` whatever else is asked; ``rows``: rows per network call.
+    sampling, or single settings of it as keywords: ``count`` futures of each past; future i is sampled from
+    ``row_seed(seed, i)`` whatever else is asked.
     """
-    if count < 1 or rows < 1 or not len(past):
-        raise MotionloomError(
-            f"at least one future of one past is drawn, one row at once; got {count} of {len(past)}, {rows} at once"
-        )
-    many = np.repeat(np.asarray(past), count, axis=0)
+    chosen, many = PredictionSampling.of(sampling, settings), np.asarray(past)
+    count, rows = chosen.number(FUTURES), chosen.batch(BATCH)
+    if not len(many):
+        raise MotionloomError("at least one past is needed to predict from; got none")
+    many = np.repeat(many, count, axis=0)
+    [seed] = chosen.seeds(1)
     seeds = [row_seed(seed, i) for _ in range(len(past)) for i in range(count)]
     parts = [
         next_frames(
             predictor, many[first : first + rows], seeds=seeds[first : first + rows], frames=frames, exact=exact,
-            steps=steps, guidance=guidance, temperature=temperature, solver=solver, spacing=spacing,
+            sampling=chosen,
         )
         for first in range(0, len(many), rows)
     ]  # fmt: skip

@@ -7,43 +7,35 @@ drawn motion is put into the world and fitted to what is left of the wishes (`fi
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal, TypeAlias, Unpack
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from motionloom import rotations as rot
-from motionloom.diffusion import SOLVERS, Denoiser, Weight, guide, levels, mix, row_draw, sample
-from motionloom.edits.fitting import fit
+from motionloom._moved import renamed, say
+from motionloom.diffusion import Denoiser, Weight, blend, guide, mix
+from motionloom.edits import fitting
 from motionloom.edits.steering import Correction, corrected, toward
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import mask as named
 from motionloom.features.layout import ric
-from motionloom.goals.goal import Goal, Placement, placement_of
+from motionloom.goals.goal import Goal, placement_of
 from motionloom.goals.segment import LONGEST
+from motionloom.ground import GroundPose
 from motionloom.motion import Motion
+from motionloom.nets.prior import Condition, PriorNet
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.blending import blended
-from motionloom.tasks.text import (
-    GUIDANCE,
-    LARGEST_SEED,
-    ROWS,
-    SOLVER,
-    SPACING,
-    STEPS,
-    Progress,
-    check,
-    places_of,
-    smooth,
-    to_motion,
-)
-from motionloom.tasks.watching import reported
-from motionloom.weights.adapter import Adapter, adapted
+from motionloom.tasks.sampling import Batch, Progress, Rows, Sampling, Settings, sample, to_features
+from motionloom.tasks.text import alone, check_prompts, to_motion
+from motionloom.weights.adapter import AdaptedNet, Adapter, adapted, show
 from motionloom.weights.adapter import adapters as shipped
 from motionloom.weights.prior import Prior
 
-Adapters = Literal["none", "fitting"] | Sequence[Adapter]
+Net: TypeAlias = PriorNet | AdaptedNet
+Weighted = tuple[Adapter, Weight]
+Adapters = Literal["none", "fitting"] | Sequence[Adapter | Weighted]
 
 MISSED = 0.05
 """Metres off beyond which a wish counts as missed."""
@@ -67,45 +59,59 @@ class Controlled:
     """A sentence for each of the wishes that are more than `MISSED` off, at most `TOLD`, the worst first."""
 
 
+@renamed({"clean": "foot_lock", "exact": "fit"})
 def control(
     prior: Prior,
     prompt: str,
     goal: Goal,
     *,
-    count: int = 1,
-    seed: int = 0,
-    guidance: float = GUIDANCE,
-    steps: int = STEPS,
     adapters: Adapters = "none",
-    weights: Sequence[Weight] | None = None,
-    exact: bool = True,
-    clean: bool = True,
+    fit: bool = True,
+    foot_lock: bool = True,
+    sampling: Sampling | None = None,
     progress: Progress | None = None,
+    **settings: Unpack[Settings],
 ) -> list[Controlled]:
-    """Make ``count`` motions of the goal's length that do what ``prompt`` says and what ``goal`` asks.
+    """Make motions of the goal's length that do what ``prompt`` says and what ``goal`` asks.
 
-    Motion i is drawn from ``seed + i`` alone. ``goal`` in the world at 20 frames per second; where the person stands
-    at frame 0 is `placement_of` it. adapters: networks trained to see what is asked, blended with ``weights`` (one
-    each, else the mean); "fitting" takes the shipped ones that fit (`fitting_adapters`), "none" the prior's own
-    network: the shipped ones were measured to make no smaller errors but more jerk (docs/decisions/0012).
-    exact: fit the drawn motion to the goal; clean: lock planted feet.
-    Raises MotionloomError for what cannot be asked; a goal out of reach is no error (see `Controlled.missed`).
+    Args:
+        prior: weights that make HumanML3D's 263 numbers.
+        prompt: what the person does.
+        goal: in the world, metres, at 20 frames per second; the person stands at its `placement_of` in frame 0.
+        adapters: networks trained to see what is asked, each alone or with its weight (the mean of all by default);
+            "fitting" takes the shipped ones that fit (`fitting_adapters`), "none" the prior's own network: the shipped
+            ones were measured to make no smaller errors but more jerk (docs/decisions/0012).
+        fit: fit the sampled motion to the goal.
+        foot_lock: keep planted feet still.
+        sampling: or single settings of it as keywords; motion i is sampled from ``seed + i`` alone.
+        progress: called after each network call with the calls done and the calls in all.
+
+    Raises:
+        MotionloomError: for what cannot be asked; a goal out of reach is no error (see `Controlled.missed`).
     """
-    if count < 1:
-        raise MotionloomError(f"nothing to make: {count} motions; ask for 1 or more")
-    if not 0 <= seed < LARGEST_SEED:
-        raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {seed}")
+    weights: Any = settings.pop("weights", None)  # type: ignore[typeddict-item]
+    if weights is not None and not isinstance(adapters, str):
+        adapters = _weighted(adapters, weights)
+    chosen = Sampling.of(sampling, settings)
     longest = round(LONGEST * prior.fps)
     if not 4 <= len(goal) <= longest:
         raise MotionloomError(f"a goal of {len(goal)} frames cannot be followed; one of 4 to {longest} can")
     place = placement_of(goal)
-    chosen = fitting_adapters(prior, goal) if adapters == "fitting" else () if adapters == "none" else adapters
+    nets = fitting_adapters(prior, goal) if adapters == "fitting" else () if adapters == "none" else adapters
     made = steered_features(
-        prior, [prompt] * count, goal.seen_from(place), seeds=[seed + i for i in range(count)], guidance=guidance,
-        steps=steps, adapters=chosen, weights=weights, progress=progress,
+        prior, [prompt] * chosen.number(), goal.seen_from(place), seeds=chosen.seeds(chosen.number()), adapters=nets,
+        sampling=chosen, progress=progress,
     )  # fmt: skip
-    drawn = [moved(to_motion(row.numpy().astype(np.float64), prior.fps, clean=clean), place) for row in made]
-    return [judged(fit(motion, goal) if exact else motion, motion, goal) for motion in drawn]
+    sampled = [moved(to_motion(row.double().numpy(), prior.fps, foot_lock=foot_lock), place) for row in made]
+    return [judged(fitting.fit(motion, goal) if fit else motion, motion, goal) for motion in sampled]
+
+
+def _weighted(adapters: Sequence[Adapter | Weighted], weights: Sequence[Weight]) -> list[Weighted]:
+    """The old way to say it: weights beside the adapters."""
+    say("weights=", "adapters=[(adapter, weight), ...]", above=5)
+    if len(weights) != len(adapters):
+        raise MotionloomError(f"there are {len(weights)} weights for {len(adapters)} adapters; give one for each")
+    return [(one, weight) for one, weight in zip(adapters, weights, strict=True) if isinstance(one, Adapter)]
 
 
 @torch.inference_mode()
@@ -115,46 +121,44 @@ def steered_features(
     goal: Goal,
     *,
     seeds: Sequence[int],
-    guidance: float = GUIDANCE,
-    steps: int = STEPS,
-    adapters: Sequence[Adapter] = (),
-    weights: Sequence[Weight] | None = None,
+    adapters: Sequence[Adapter | Weighted] = (),
+    sampling: Sampling | None = None,
     progress: Progress | None = None,
+    **settings: Unpack[Settings],
 ) -> list[Tensor]:
     """`motionloom.tasks.text.sample_features` for rows of the goal's length, each guess steered towards ``goal``.
 
     ``goal`` as of `steering.toward`. With ``adapters`` their blended guesses are steered, and the numbers that are
-    asked stand in the state without noise, as the last steered guess has them (as `blending.control_features`, whose
-    numbers are known beforehand; here they depend on where the rest of the body goes).
+    asked stand in the state without noise, as the last steered guess has them (as in Shafir et al. 2024, algorithm 2,
+    whose numbers are known beforehand; here they depend on where the rest of the body goes).
     """
-    check(prior, prompts, steps=steps, guidance=guidance, solver=SOLVER)
-    if weights is not None and len(weights) != len(adapters):
-        raise MotionloomError(f"there are {len(weights)} weights for {len(adapters)} adapters; give one for each")
-    way = levels(prior.schedule, steps, spacing=SPACING)
-    nets = [adapted(prior.net, adapter) for adapter in adapters]
-    change, mask = toward(goal, prior), controlled_numbers(goal).to(prior.mean.device)
-    result: list[Tensor] = []
-    for start in range(0, len(prompts), ROWS):
-        said = list(prompts[start : start + ROWS])
-        cond, draw = prior.condition(said), row_draw(seeds[start : start + ROWS])
-        if nets:
-            shares = list(weights or [1 / len(nets)] * len(nets))
-            told = partial(blended, nets, cond, weights=shares, guidance=guidance)
-            denoise = _seeing(told, change, prior, mask)
-        else:
-            guided = guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), guidance)
-            denoise = corrected(guided, [change] * len(said))
-        state = draw(torch.empty(len(said), len(goal), len(prior.mean), device=prior.mean.device))
-        walk = sample(denoise, state, levels=way, solver=SOLVERS[SOLVER], schedule=prior.schedule, draw=draw)
-        rows = range(start, start + len(said))
-        walk = reported(walk, steps, rows, lambda snapshot: places_of(prior, snapshot.clean)[:, None])
-        for done, snapshot in enumerate(walk, start=1):
-            state = snapshot.state
-            if progress:
-                progress(start // ROWS * steps + done, -(-len(prompts) // ROWS) * steps)
-        finished = state * prior.std + prior.mean
-        result += list((smooth(finished) if prior.net.config.patch > 1 else finished).cpu())
-    return result
+    check_prompts(prompts)
+    pairs = [one if isinstance(one, tuple) else (one, 1 / len(adapters)) for one in adapters]
+    nets, weights = [adapted(prior.net, adapter) for adapter, _ in pairs], [weight for _, weight in pairs]
+    chosen, change = Sampling.of(sampling, settings), toward(goal, prior)
+    mask = controlled_numbers(goal).to(prior.mean.device)
+
+    def steer(denoise: Denoiser, batch: Batch) -> Denoiser:
+        if not nets:
+            return corrected(denoise, [change] * len(batch.rows))
+        shown = partial(blended, nets, batch.cond, weights=weights, guidance=chosen.guidance)
+        return _seeing(shown, change, prior, mask)
+
+    rows = Rows(prompts, [len(goal)] * len(prompts), seeds)
+    made = dict(sample(prior, rows, chosen, edits=[steer], progress=progress, view=alone(prior)))
+    return [to_features(prior, made[row]).cpu() for row in range(len(prompts))]
+
+
+def blended(
+    nets: Sequence[Net], cond: Condition, known: Tensor, mask: Tensor, *, weights: Sequence[Weight], guidance: float
+) -> Denoiser:
+    """DiffusionBlending: networks guided by themselves, then their weighted sum; shown what is given if they can be."""
+    null = cond.null()
+    guided = [
+        guide(net, show(net, net.bind(cond), known, mask), show(net, net.bind(null), known, mask), guidance)
+        for net in nets
+    ]
+    return guided[0] if len(nets) == 1 and weights[0] == 1.0 else blend(guided, weights)
 
 
 def controlled_numbers(goal: Goal) -> Tensor:
@@ -183,27 +187,27 @@ def fitting_adapters(prior: Prior, goal: Goal) -> list[Adapter]:
     return [Adapter.load(name, prior) for name in sorted(chosen)]
 
 
-def _seeing(told: Callable[[Tensor, Tensor], Denoiser], change: Correction, prior: Prior, mask: Tensor) -> Denoiser:
+def _seeing(net: Callable[[Tensor, Tensor], Denoiser], change: Correction, prior: Prior, mask: Tensor) -> Denoiser:
     """The steered denoiser that shows its networks the last steered guess, free of noise, where ``mask`` is True.
 
-    ``told`` (given, mask) are the networks that know what is given. At the first level nothing is.
+    ``net`` (given, mask) is the denoiser of the networks that are shown what is given. At the first level nothing is.
     """
     last: Tensor | None = None
 
     def seen(state: Tensor, level: int) -> Tensor:
         nonlocal last
         if last is None:
-            guess = told(torch.zeros_like(state), torch.zeros_like(state, dtype=torch.bool))(state, level)
+            guess = net(torch.zeros_like(state), torch.zeros_like(state, dtype=torch.bool))(state, level)
         else:
             shown = mix(state, prior.schedule.at(level)[0] * last, mask)
-            guess = told(last, mask.expand(len(state), -1, -1))(shown, level)
+            guess = net(last, mask.expand(len(state), -1, -1))(shown, level)
         last = torch.stack([change(row, level) for row in guess])
         return last
 
     return seen
 
 
-def moved(motion: Motion, place: Placement) -> Motion:
+def moved(motion: Motion, place: GroundPose) -> Motion:
     """A motion that starts at the origin facing +Z, put to ``place``."""
     turn = rot.rotvec_to_quat(np.array([0.0, place.facing, 0.0]))
     rotations = motion.rotations.copy()

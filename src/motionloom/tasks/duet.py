@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, tee
+from typing import Unpack
 
 import numpy as np
 import torch
@@ -16,8 +17,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom.diffusion import SOLVERS, Link, levels, staggered
-from motionloom.edits.relative_pose import Lead, leader
+from motionloom._moved import renamed
+from motionloom.edits.relative_pose import Lead, relative_pose_guidance
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.layout import FPS, WIDTH
@@ -32,22 +33,25 @@ from motionloom.retarget.anatomy import read_body
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.body import bodies
 from motionloom.tasks.control import moved
-from motionloom.tasks.long import Progress as Moves
 from motionloom.tasks.long import Row, Track, bound_together, chain_rows, in_world, same_net
 from motionloom.tasks.pair import (
     Duet,
-    Seed,
-    check_asked,
+    PairEdits,
+    check_pair,
+    check_person,
     known_state,
     pair_features,
+    pair_seeds,
     person_seeds,
     placement,
     prompts_of,
+    stacked,
     standing_at,
 )
-from motionloom.tasks.splice import person_at_20, worn
-from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS, Progress, check, finish, smooth
-from motionloom.tasks.watching import Latest
+from motionloom.tasks.sampling import Moves, PairSampling, PairSettings, Progress, sample_chain, smooth
+from motionloom.tasks.splice import apply_positions, person_at_20
+from motionloom.tasks.text import finish
+from motionloom.tasks.watching import ChainView
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
@@ -55,36 +59,39 @@ Array = NDArray[np.float64]
 
 SHORTEST = 1.0
 """Seconds of the shortest motion that somebody can react to."""
-AT_ONCE = 8
-"""Rows of a long duet that are denoised at once."""
+BATCH = 8
+"""Rows of a long duet in one network call."""
 
 
 # Somebody is given
 
 
+@renamed({"clean": "foot_lock", "together": "pair_guidance"})
 def react(
     prior: Prior,
     block: PairBlock,
     given: Motion,
     prompt: str = "",
     *,
-    count: int = 1,
-    seed: Seed = 0,
-    guidance: float = GUIDANCE,
-    steps: int = STEPS,
-    together: float = 1.0,
-    clean: bool = True,
+    foot_lock: bool = True,
+    sampling: PairSampling | None = None,
     progress: Progress | None = None,
+    **settings: Unpack[PairSettings],
 ) -> list[Duet]:
-    """``count`` duets whose first person is ``given``, bit for bit, and whose second is drawn to go with it.
+    """Duets whose first person is ``given``, bit for bit, and whose second is sampled to go with it.
 
-    given: one person on any humanoid skeleton that stands upright along +Y, 1 to 60 seconds, at any rate. The second
-    is the 22-joint person, of as many frames at that rate, in the same world and on the same floor. An empty prompt
-    asks for nothing in particular. together: as of `pair.pair_features`. Raises `MotionloomError` for what cannot be
-    asked.
+    Args:
+        given: one person on any humanoid skeleton that stands upright along +Y, 1 to 60 seconds, at any rate. The
+            second is the 22-joint person, of as many frames at that rate, in the same world and on the same floor.
+        prompt: as of `pair.generate_pair`; an empty one asks for nothing in particular.
+        foot_lock: keep the second person's planted feet still.
+        sampling, progress: as of `pair.generate_pair`.
+
+    Raises:
+        MotionloomError: for what cannot be asked.
     """
-    said = prompts_of(prompt)
-    check_asked(prior, count=count, seed=seed, seconds=given.seconds)
+    said, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
+    check_pair(prior, count=chosen.number(), seconds=given.seconds)
     if not SHORTEST - 1e-6 <= given.seconds <= LONGEST:
         raise MotionloomError(
             f"the given motion is {given.seconds:.2f} s long; {SHORTEST:g} to {LONGEST:g} s can be reacted to"
@@ -95,19 +102,17 @@ def react(
     places = one_world([alone, alone], legs)[0]
     known, stands, _ = two.encode(np.stack([places, places]))
     net = block.net(prior)
-    data, mask = known_state(prior, net, torch.from_numpy(known), torch.from_numpy(stands), known.shape[1])
-    mask[:, 0] = mask[1] = False
+    observed = known_state(prior, net, torch.from_numpy(known), torch.from_numpy(stands), known.shape[1])
+    observed.mask[:, 0] = observed.mask[1] = False
     features, drawn = pair_features(
-        prior, net, said * count, known.shape[1],
-        seeds=[s for number in range(count) for s in person_seeds(seed, number)],
-        known=data.repeat(count, 1, 1), mask=mask.repeat(count, 1, 1),
-        guidance=guidance, steps=steps, together=together, progress=progress,
+        prior, net, said * chosen.number(), known.shape[1], seeds=pair_seeds(chosen),
+        edits=PairEdits(stacked([observed] * chosen.number())), sampling=chosen, progress=progress,
     )  # fmt: skip
     floor, made = _floor(given), []
     at = np.arange(len(given)) / given.fps * FPS
     for numbers, standing in zip(features, drawn.double().numpy(), strict=True):
         stand = standing_at(standing, placement(stands[0]), 0)[1]
-        other = moved(finish(prior, numbers[1], clean=clean), placement(stand)).at(at, given.fps)
+        other = moved(finish(prior, numbers[1], foot_lock=foot_lock), placement(stand)).at(at, given.fps)
         height = np.array([0.0, floor, 0.0])
         made.append((given, replace(other, root=other.root * [ratio, 1.0, ratio] + height)))
     return made
@@ -117,7 +122,7 @@ def _floor(motion: Motion) -> float:
     """Metres: the height on which somebody's own motion stands; raises where it does not stand upright along +Y."""
     few = motion.frames(0, min(len(motion), round(3 * motion.fps) + 2))
     uniform, own = to_smpl22(few), joints22(few)
-    worn(uniform.positions(), few, clean=False)
+    apply_positions(uniform.positions(), few, foot_lock=False)
     ratio = read_body(motion.skeleton).leg / read_body(SMPL22).leg
     return float(np.median(own[:, 0, 1] - ratio * uniform.root[:, 1]))
 
@@ -125,40 +130,44 @@ def _floor(motion: Motion) -> float:
 # Several prompts
 
 
+@renamed({"clean": "foot_lock", "together": "pair_guidance", "at_once": "batch_size"})
 def compose_pair(
     prior: Prior,
     block: PairBlock,
     segments: Sequence[Segment],
     *,
-    seed: int = 0,
     path: Goal | None = None,
     person: int = 0,
-    guidance: float = GUIDANCE,
-    steps: int = STEPS,
-    together: float = 1.0,
-    clean: bool = True,
-    at_once: int = AT_ONCE,
+    foot_lock: bool = True,
+    sampling: PairSampling | None = None,
     progress: Moves | None = None,
+    **settings: Unpack[PairSettings],
 ) -> Iterator[Duet]:
     """One long duet, block after block in one world, as it is made; in memory that does not grow with its length.
 
-    segments: as of `long.compose`; a text with "::" in it says what the first and what the second person does. In all
-    there are ``round(seconds * 20)`` frames of each segment. path: where ``person`` is on the ground in every frame of
-    the whole, in the world; goals of segments are his too. The first person starts at the origin facing +Z, or
-    ``person`` where the path begins. together: as of `pair.pair_features`; whoever has a goal is not moved by it.
-    Raises `MotionloomError` for what cannot be asked.
+    Args:
+        segments: as of `long.compose`; a text with "::" in it says what the first and what the second person does. In
+            all there are ``round(seconds * 20)`` frames of each.
+        path: where ``person`` is on the ground in every frame of the whole, in the world; goals of segments are that
+            person's too. The first person starts at the origin facing +Z, or ``person`` where the path begins.
+        person: 0 or 1; whoever has a goal is not moved by pair guidance.
+        foot_lock: keep planted feet still.
+        sampling, progress: as of `long.compose`, with `PairSampling`.
+
+    Raises:
+        MotionloomError: for what cannot be asked.
+
     (Shafir et al. 2024, sections 3 and 4, in one loop; nothing published does both.)
     """
-    check_asked(prior, count=1, seed=seed, person=person)
-    check(prior, [], steps=steps, guidance=guidance, solver=SOLVER)
+    check_pair(prior)
+    check_person(person)
+    chosen = PairSampling.of(sampling, settings).alone()
+    chosen.levels(prior.schedule)
     if not segments:
         raise MotionloomError("there is no segment; say what the two people do, one after the other")
     track = None if path is None else Track.along(path, prior.fps)
     asked = [_asked(segments, i, track if i == person else None, person) for i in (0, 1)]
-    drawn = duet_features(
-        prior, block.net(prior), asked, seed=seed, guidance=guidance, steps=steps, together=together, at_once=at_once,
-        progress=progress,
-    )  # fmt: skip
+    drawn = duet_features(prior, block.net(prior), asked, sampling=chosen, progress=progress)
     features, stands = next(drawn)
     if track:
         stands = standing_at(stands, track.stands(0), person)
@@ -169,7 +178,7 @@ def compose_pair(
                 prior, _of(pieces[i], i), deque(segment.goal for segment in asked[i]), placement(stands[i]),
                 track if i == person else None,
             ),
-            prior.fps, clean=clean,
+            prior.fps, foot_lock=foot_lock,
         )
         for i in (0, 1)
     ]  # fmt: skip
@@ -197,38 +206,30 @@ def duet_features(
     net: PairNet,
     segments: Sequence[Sequence[Segment]],
     *,
-    seed: int = 0,
-    guidance: float = GUIDANCE,
-    steps: int = STEPS,
-    together: float = 1.0,
-    at_once: int = AT_ONCE,
+    sampling: PairSampling | None = None,
     progress: Moves | None = None,
+    **settings: Unpack[PairSettings],
 ) -> Iterator[tuple[Tensor, Array]]:
     """Pieces (2, frames, 263), not standardised, one per segment, and stands (2, 4) at the first frame of the first.
 
     segments: those of each person, of equal lengths and transitions. Strung together the pieces are the two motions.
-    Row i draws from ``seed + i``. ``at_once``: rows per network call; it changes speed and memory, not the result.
+    Row i is sampled from ``seed + i``. ``batch_size``: rows per network call; it changes speed and memory, not the
+    result.
     """
-    way = levels(prior.schedule, steps, spacing=SPACING)
-    guess = _Guess(prior, net, way, together)
-
-    def links() -> Iterator[Link]:
-        both = (chain_rows(prior, one, guidance, None) for one in segments)
-        for number, row in enumerate(zip(*both, strict=True)):
-            goals = [one[number].goal for one in segments]
-            guess.add(number, row, asked=[goal is not None and not goal.empty for goal in goals], seed=seed + number)
-            yield Link(row[0].length, row[0].overlap, seed + number)
-
-    walk = staggered(
-        links(), guess, levels=way, solver=SOLVERS[SOLVER], schedule=prior.schedule, features=2 * (WIDTH + PLACE),
-        together=at_once, moved=progress or (lambda count: None),
+    chosen = PairSampling.of(sampling, settings)
+    denoise = _PairDenoiser(prior, net, chosen.levels(prior.schedule), chosen.pair_guidance)
+    both = (chain_rows(prior, one, chosen.guidance, None) for one in segments)
+    rows = denoise.rows(zip(*both, strict=True), segments, chosen.seeds(1)[0])
+    made = sample_chain(
+        prior, rows, denoise, chosen, features=2 * (WIDTH + PLACE), batch_size=BATCH, progress=progress,
+        view=ChainView(denoise.kept, denoise.poses),
     )  # fmt: skip
-    for number, state in enumerate(walk):
-        row = guess.rows[number][0]
-        guess.drop(number)
+    for row, state in made:
+        row.before = None  # what a finished row began with is needed no more
         motion, places = _parted(state)
         motion = smooth(motion) if prior.net.config.patch > 1 else motion
-        features = motion[:, row.before : row.before + row.frames] * prior.std + prior.mean
+        one = row.people[0]
+        features = motion[:, one.before : one.before + one.frames] * prior.std + prior.mean
         yield features.cpu(), net.talk.config.places.decode(places).cpu().double().numpy()
 
 
@@ -245,29 +246,59 @@ def _strung(motion: Tensor, places: Tensor) -> Tensor:
 
 
 @dataclass(eq=False)
-class _Guess:
-    """The guided guess of rows of a chain; it remembers everybody's last one, which says where the next row begins."""
+class _PairRow:
+    """A row of the chain: both people of a segment."""
+
+    people: tuple[Row, ...]
+    net: PairNet
+    """With the segment's adapters."""
+    lead: Lead
+    before: "_PairRow | None"
+    """The row before, as long as this one is under way."""
+    noise: Tensor | None = None
+    """(2, 4) that this row's D began as."""
+    ends: dict[int, Tensor] = field(default_factory=dict)
+    """Relative poses (2, 4) at the frame with which the next row begins, by level of the guess."""
+
+    @property
+    def length(self) -> int:
+        """Frames."""
+        return self.people[0].length
+
+    @property
+    def overlap(self) -> int:
+        """Frames shared with the next row."""
+        return self.people[0].overlap
+
+
+@dataclass(frozen=True, eq=False)
+class _PairDenoiser:
+    """The guided guess of rows of a chain; each row remembers its last one, which says where the next row begins."""
 
     prior: Prior
     net: PairNet
-    way: Sequence[int]
-    together: float
-    rows: dict[int, tuple[Row, ...]] = field(default_factory=dict)
-    leads: dict[int, Lead] = field(default_factory=dict)
-    ends: dict[tuple[int, int], Tensor] = field(default_factory=dict)
-    """Stands (2, 4) at the frame of a row with which the next one begins, by row and level of the guess."""
-    noise: dict[int, Tensor] = field(default_factory=dict)
-    """(2, 4) that each row's D began as."""
-    nets: dict[int, PairNet] = field(default_factory=dict)
-    """The network of each row, with its segment's adapters."""
-    seen: Latest = field(init=False)
+    levels: Sequence[int]
+    pair_guidance: float
 
-    def __post_init__(self) -> None:
-        self.seen = Latest(len(self.way) - 1)
+    def rows(
+        self, both: Iterable[tuple[Row, ...]], segments: Sequence[Sequence[Segment]], seed: int
+    ) -> Iterator[_PairRow]:
+        """The rows of the chain; whoever has a goal is not moved by pair guidance."""
+        before: _PairRow | None = None
+        for number, people in enumerate(both):
+            goals = [one[number].goal for one in segments]
+            net = self._net(people[0].net, before)
+            mask = torch.zeros(2, 1 + people[0].length, WIDTH, dtype=torch.bool, device=self.prior.mean.device)
+            lead = relative_pose_guidance(
+                self.prior, net, bound_together([one.cond for one in people]), seeds=person_seeds(seed + number, 0),
+                mask=mask, frozen=[goal is not None and not goal.empty for goal in goals], weight=self.pair_guidance,
+            )  # fmt: skip
+            before = _PairRow(people, net, lead, before)
+            yield before
 
-    def __call__(self, numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
-        parts = [_parted(state.to(self.prior.mean)) for state in states]
-        shown = [self._shown(n, places, level) for n, (_, places), level in zip(numbers, parts, at, strict=True)]
+    def __call__(self, rows: Sequence[_PairRow], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
+        parts = [_parted(state) for state in states]
+        shown = [self._shown(row, places, level) for row, (_, places), level in zip(rows, parts, at, strict=True)]
         frames = [motion.shape[1] for motion, _ in parts]
         x = torch.cat(
             [
@@ -275,86 +306,70 @@ class _Guess:
                 for places, (motion, _) in zip(shown, parts, strict=True)
             ]
         )
-        cleans = self._guesses(numbers, x.unflatten(0, (-1, 2)), frames, at)
+        denoised = self._guesses(rows, x.unflatten(0, (-1, 2)), frames, at)
         made = []
-        for number, count, level, clean, (state, _) in zip(numbers, frames, at, cleans, parts, strict=True):
-            places, motion = part(clean)
-            rows = zip(motion[:, :count], self.rows[number], strict=True)
-            motion = torch.stack([row.correct(one, level) for one, row in rows])
-            begin = self._begin(number, level)
-            begin = self.net.talk.config.places.decode(places) if begin is None else begin
-            motion = self._led(number, level, motion, begin, state=state)
+        for row, count, level, one, (state, _) in zip(rows, frames, at, denoised, parts, strict=True):
+            places, motion = part(one)
+            people = zip(motion[:, :count], row.people, strict=True)
+            motion = torch.stack([person.correct(guess, level) for guess, person in people])
+            begin = self._begin_or(places, row, level)
+            motion = self._led(row, level, motion, begin, state=state)
             made.append(_strung(motion, places))
-            self._carry(number, level, motion, begin)
-            self.seen.add([number], [(motion, begin, self.rows[number][0])])
-        self.seen.report(self._placed)
+            features = motion * self.prior.std + self.prior.mean
+            row.ends[level] = two.later(features, begin, row.length - max(row.overlap, 1))
         return made
 
-    def add(self, number: int, row: tuple[Row, ...], *, asked: Sequence[bool], seed: int) -> None:
-        """Take in a row of the chain, of both people; ``asked``: who is asked to be somewhere."""
-        self.rows[number] = row
-        self.nets[number] = self._net(row[0].net)
-        self.leads[number] = leader(
-            self.prior, self.nets[number], bound_together([one.cond for one in row]), seeds=person_seeds(seed, 0),
-            mask=torch.zeros(2, 1 + row[0].length, WIDTH, dtype=torch.bool, device=self.prior.mean.device),
-            still=asked, weight=self.together,
-        )  # fmt: skip
-
-    def drop(self, number: int) -> None:
-        """Forget a row that is finished, as its neighbours are."""
-        del self.rows[number], self.leads[number], self.nets[number]
-        self.ends = {key: stands for key, stands in self.ends.items() if key[0] != number - 1}
-        self.noise.pop(number, None)
-
-    def _shown(self, number: int, places: Tensor, level: int) -> Tensor:
-        """D as the network sees it: drawn for the first row, else the end of the row before, noised as learned."""
-        noise, end = self.noise.setdefault(number, places), self._begin(number, level)
+    def _shown(self, row: _PairRow, places: Tensor, level: int) -> Tensor:
+        """D as the network sees it: sampled for the first row, else the end of the row before, noised as learned."""
+        row.noise, end = places if row.noise is None else row.noise, self._begin(row, level)
         if end is None:
             return places
-        return self.prior.schedule.noised(self.net.talk.config.places.encode(end), level, noise)
+        return self.prior.schedule.noised(self.net.talk.config.places.encode(end), level, row.noise)
 
-    def _begin(self, number: int, level: int) -> Tensor | None:
+    def _begin(self, row: _PairRow, level: int) -> Tensor | None:
         """Where the two stand when a row begins, by what the row before guessed one level earlier: which of the two
         moves first must not matter."""
-        step = self.way.index(level)
-        return self.ends.get((number - 1, self.way[step - 1])) if step else None
+        step = self.levels.index(level)
+        return row.before.ends.get(self.levels[step - 1]) if step and row.before else None
 
-    def _led(self, number: int, level: int, motion: Tensor, begin: Tensor, *, state: Tensor) -> Tensor:
-        """The guess of a row, its people led to each other from where they begin."""
+    def _begin_or(self, places: Tensor, row: _PairRow, level: int) -> Tensor:
+        """The same; for the first row and at the first level what D (2, 4) says."""
+        begin = self._begin(row, level)
+        return self.net.talk.config.places.decode(places) if begin is None else begin
+
+    def kept(self, row: _PairRow, state: Tensor, level: int) -> tuple[Tensor, Tensor]:
+        """Features (2, frames, 263) of a denoised row between its seams, and where the two stand in the first one."""
+        motion, places = _parted(state)
+        features, one = motion * self.prior.std + self.prior.mean, row.people[0]
+        own = features[:, one.before : one.before + one.frames]
+        return own, two.later(features, self._begin_or(places, row, level), one.before)
+
+    def poses(self, kept: list[tuple[Tensor, Tensor]]) -> Array:
+        """(2, frames, 22, 3) of what was `kept` of rows."""
+        return torch.cat([two.decode(own, stands) for own, stands in kept], dim=1).cpu().numpy()
+
+    def _led(self, row: _PairRow, level: int, motion: Tensor, begin: Tensor, *, state: Tensor) -> Tensor:
+        """The guess of a row, its people moved to each other from where they begin."""
         places = self.net.talk.config.places.encode(begin)
-        return part(self.leads[number](join(places, state), join(places, motion), level))[1]
+        return part(row.lead(join(places, state), join(places, motion), level))[1]
 
-    def _placed(self, parts: Sequence[tuple[Tensor, Tensor, Row]]) -> np.ndarray:
-        """(2, frames, 22, 3) of rows between their seams: guesses (2, frames, 263), where they begin, and the row."""
-        placed = []
-        for motion, begin, row in parts:
-            features = motion * self.prior.std + self.prior.mean
-            own = features[:, row.before : row.before + row.frames]
-            placed.append(two.decode(own, two.later(features, begin, row.before)))
-        return torch.cat(placed, dim=1).cpu().numpy()
-
-    def _carry(self, number: int, level: int, motion: Tensor, begin: Tensor) -> None:
-        row, features = self.rows[number][0], motion * self.prior.std + self.prior.mean
-        self.ends[number, level] = two.later(features, begin, row.length - max(row.overlap, 1))
-
-    def _net(self, base: PriorNet) -> PairNet:
+    def _net(self, base: PriorNet, before: _PairRow | None) -> PairNet:
         """The block over the prior's network, or over that network with a segment's adapters in it."""
         if base is self.prior.net:
             return self.net
-        known = (self.nets[n] for n, row in self.rows.items() if n in self.nets and row[0].net is base)
-        return next(known, None) or self.net.over(base)
+        return before.net if before and before.people[0].net is base else self.net.over(base)
 
-    def _guesses(self, numbers: Sequence[int], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> list[Tensor]:
+    def _guesses(self, rows: Sequence[_PairRow], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> list[Tensor]:
         """Guided guesses (2, 1 + frames, numbers) of rows x, one network call for each set of adapters."""
-        cleans: dict[int, Tensor] = {}
-        for places in same_net([self.rows[number][0] for number in numbers]):
-            some = [numbers[i] for i in places]
-            rows = [row for number in some for row in self.rows[number]]
+        denoised: dict[int, Tensor] = {}
+        for places in same_net([row.people[0] for row in rows]):
+            people = [person for i in places for person in rows[i].people]
             made = self._guided(
-                self.nets[some[0]], rows, x[places].flatten(0, 1), [frames[i] for i in places], [at[i] for i in places]
-            )
-            cleans.update(zip(places, made.unflatten(0, (-1, 2)), strict=True))
-        return [cleans[i] for i in range(len(numbers))]
+                rows[places[0]].net, people, x[places].flatten(0, 1), [frames[i] for i in places],
+                [at[i] for i in places],
+            )  # fmt: skip
+            denoised.update(zip(places, made.unflatten(0, (-1, 2)), strict=True))
+        return [denoised[i] for i in range(len(rows))]
 
     def _guided(self, net: PairNet, rows: Sequence[Row], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> Tensor:
         """``rows``, and rows of x: a0, b0, a1, b1, ...; frames and levels: one per pair."""

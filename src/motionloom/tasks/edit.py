@@ -7,13 +7,14 @@ drawn goes through the network, so that the time does not grow with the length o
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal, TypeAlias, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom.edits.boundary import Stretch
+from motionloom._moved import renamed, say
+from motionloom.edits.boundary import InpaintWindow
 from motionloom.errors import MotionloomError
 from motionloom.features import layout
 from motionloom.features.layout import FPS, WIDTH
@@ -21,18 +22,18 @@ from motionloom.goals.segment import LONGEST
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.redraw import redraw
+from motionloom.tasks.inpaint import inpaint_motion
+from motionloom.tasks.sampling import Progress, Sampling, Settings
 from motionloom.tasks.splice import (
     Kept,
+    apply_sample,
     carried_level,
     concatenated,
-    dressed,
     kept_parts,
     person_at_20,
     splice,
     standing,
 )
-from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, STEPS, Progress
 from motionloom.weights.prior import Prior
 
 WINDOW = 8.0
@@ -42,18 +43,170 @@ CONTEXT = (1.0, 3.0)
 SHORTEST = 8
 """Frames at 20 fps of the shortest clip that can be edited."""
 BLEND = 1.0
-"""Seconds that are drawn anew for a loop."""
+"""Seconds that are sampled anew for a loop."""
 NEAR = (0.5, np.radians(45))
 """Metres and radians between the ends of a clip within which a loop closes in the world too."""
+PARTS = ("root", "root_horizontal", *SMPL22.groups, *SMPL22.names)
 
 Span = tuple[float, float]
-Stage = Callable[[Motion, int], Motion]
 
 
+@dataclass(frozen=True)
+class Redraw:
+    """Some time of a clip, or some parts of it, sampled anew."""
+
+    spans: Sequence[Span] = ()
+    """Stretches (start, end) in seconds; none: the whole clip."""
+    keep: Sequence[str] = ()
+    """Parts whose own rotations stay: joints and groups of the 22-joint skeleton, ``root`` (its place),
+    ``root_horizontal``."""
+    strength: float = 1.0
+    """How much noise the old motion gets before it is denoised again, above 0 to 1 (nothing of it is left)."""
+
+    def __post_init__(self) -> None:
+        if not 0 < self.strength <= 1:
+            raise MotionloomError(f"the strength must be above 0 and at most 1; got {self.strength:g}")
+        unknown = [name for name in self.keep if name not in PARTS]
+        if unknown:
+            raise MotionloomError(f"no part called {unknown[0]!r} to keep; the parts are {', '.join(PARTS)}")
+        if len(_joints(self.keep)) == len(SMPL22):
+            raise MotionloomError("nothing to change: all joints are kept; keep fewer")
+        for (start, stop), (following, end) in pairwise(sorted(self.spans)):
+            if following < stop:
+                raise MotionloomError(f"the stretches {start:g} to {stop:g} s and {following:g} to {end:g} s overlap")
+
+    def check(self, length: float, frame: float) -> float:
+        """The seconds of a clip of ``length`` afterwards; raises MotionloomError where it cannot be changed so."""
+        for start, stop in self.spans:
+            if not (0 <= start < stop <= length + frame and stop - start >= 3 / FPS):
+                raise MotionloomError(
+                    f"no stretch from {start:g} to {stop:g} s: a clip of {length:.2f} s has stretches from 0 to "
+                    f"{length:.2f}, at least {3 / FPS:g} s long"
+                )
+        longest = max((stop - start for start, stop in self.spans), default=length)
+        if longest > LONGEST:
+            raise MotionloomError(f"{longest:.0f} s cannot be drawn at once; name stretches of at most {LONGEST:g} s")
+        return length
+
+    def frames(self, clip: Motion) -> list[tuple[int, int]]:
+        """First frames of the stretches and those behind their last."""
+        ends = [(round(start * clip.fps), round(stop * clip.fps)) for start, stop in sorted(self.spans)]
+        return [(start, min(stop, len(clip))) for start, stop in ends] or [(0, len(clip))]
+
+    def apply(self, sampler: "_Sampler", clip: Motion, seed: int) -> Motion:
+        """The clip with its stretches sampled, one after the other."""
+        for span in self.frames(clip):
+            clip = _redrawn(sampler, clip, span, self, seed)
+        return clip
+
+
+@dataclass(frozen=True)
+class Extend:
+    """More behind the end of a clip."""
+
+    seconds: float
+
+    def __post_init__(self) -> None:
+        if not 2 / FPS <= self.seconds <= LONGEST:
+            raise MotionloomError(f"a clip can be extended by {2 / FPS:g} to {LONGEST:g} seconds; got {self.seconds:g}")
+
+    def check(self, length: float, frame: float) -> float:
+        """The seconds of a clip of ``length`` afterwards."""
+        return length + self.seconds
+
+    def apply(self, sampler: "_Sampler", clip: Motion, seed: int) -> Motion:
+        """The clip and what comes behind it."""
+        tail = clip.frames(max(len(clip) - round(CONTEXT[1] * clip.fps), 0), len(clip))
+        added = max(round(self.seconds * clip.fps), 1)
+        window = concatenated(tail, *[tail.frames(len(tail) - 1, len(tail))] * added)
+        made = sampler.sample(window, _window(window, len(tail), len(window)), seed)
+        spliced = splice(window, made, len(tail), last=len(window), kept=kept_joints(clip, ()))
+        return concatenated(clip, spliced.frames(len(tail), len(window)))
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The end of a clip sampled anew so that frame 0 can follow the last one: where the clip ends near where it began
+    in the world too, else in pose and velocity."""
+
+    blend: float = BLEND
+    """Seconds that are sampled."""
+
+    def check(self, length: float, frame: float) -> float:
+        """The seconds of a clip of ``length`` afterwards; raises MotionloomError where it is too short."""
+        if not 2 / FPS <= self.blend <= length - SHORTEST / FPS:
+            raise MotionloomError(
+                f"a loop of a clip of {length:.2f} s blends over {2 / FPS:g} to "
+                f"{max(length - SHORTEST / FPS, 0):.2f} seconds; got {self.blend:g}"
+            )
+        return length
+
+    def apply(self, sampler: "_Sampler", clip: Motion, seed: int) -> Motion:
+        """The clip as a loop."""
+        return _looped(sampler, clip, self.blend, seed)
+
+
+Change: TypeAlias = Redraw | Extend | Loop
+
+
+@renamed({"clean": "foot_lock"})
 def edit(
     prior: Prior,
     motion: Motion,
     text: str = "",
+    changes: Change | Sequence[Change] = (),
+    *,
+    skeleton: Literal["own", "smpl"] = "own",
+    foot_lock: bool = True,
+    sampling: Sampling | None = None,
+    progress: Progress | None = None,
+    **settings: Unpack[Settings],
+) -> list[Motion]:
+    """Versions of a clip of one person, changed by the text.
+
+    Args:
+        prior: weights that make HumanML3D's 263 numbers.
+        motion: the clip, on any humanoid skeleton and at any rate; what is not changed comes back bit for bit.
+        text: what the person does; an empty one asks for nothing in particular.
+        changes: `Redraw`, `Extend` and `Loop`, one after the other; a text alone redraws the whole clip.
+        skeleton: the clip's own, or the 22-joint person. The result stands where the clip stood.
+        foot_lock: keep planted feet still where legs are sampled.
+        sampling: or single settings of it as keywords; version i of ``count`` is sampled from ``seed + i``.
+        progress: called after each network call with the calls done and the calls in all.
+
+    Raises:
+        MotionloomError: for what cannot be asked, and for a clip of no person (see `retarget`).
+
+    (Inpainting: Lugmayr et al. 2022; of motion: Tevet et al. 2023. Strength: Meng et al., SDEdit, 2022.)
+    """
+    old: dict[str, Any] = {name: settings.pop(name) for name in _OLD if name in settings}  # type: ignore[misc]
+    if old:
+        say(f"edit({', '.join(old)})", "edit(changes=[Redraw(...), Extend(...), Loop(...)])", above=4)
+    asked = [changes] if isinstance(changes, Redraw | Extend | Loop) else list(changes)
+    asked = asked or changes_asked(text, **old)
+    chosen = Sampling.of(sampling, settings)
+    chosen.levels(prior.schedule)
+    if skeleton not in ("own", "smpl"):
+        raise MotionloomError(f"the skeleton is 'own' or 'smpl'; got {skeleton!r}")
+    _check(prior, motion, asked)
+    clip = motion if skeleton == "own" else to_smpl22(motion)
+    stages = sum(len(one.frames(clip)) if isinstance(one, Redraw) else 1 for one in asked)
+    seeds = chosen.seeds(chosen.number())
+    sampler = _Sampler(prior, text, chosen, foot_lock, _counted(progress, len(seeds) * stages * chosen.steps))
+    made = []
+    for seed in seeds:
+        version = clip
+        for change in asked:
+            version = change.apply(sampler, version, seed)
+        made.append(version)
+    return made
+
+
+_OLD = ("keep", "between", "loop", "extend", "strength", "blend")
+
+
+def changes_asked(
+    text: str,
     *,
     keep: Sequence[str] = (),
     between: Sequence[Span] = (),
@@ -61,100 +214,50 @@ def edit(
     extend: float = 0.0,
     strength: float = 1.0,
     blend: float = BLEND,
-    count: int = 1,
-    seed: int = 0,
-    guidance: float = GUIDANCE,
-    steps: int = STEPS,
-    skeleton: Literal["own", "smpl"] = "own",
-    clean: bool = True,
-    progress: Progress | None = None,
-) -> list[Motion]:
-    """``count`` versions of a clip of one person, changed by the text; version i is drawn from ``seed + i``.
+) -> list[Change]:
+    """What single options ask for: with neither ``between`` nor ``extend`` a text is about the whole clip.
 
-    keep: parts that stay: joints and groups of the 22-joint skeleton, ``root`` (its place), ``root_horizontal``; their
-    own rotations stay as they are. between: stretches (start, end) in seconds; the rest stays. With neither ``between``
-    nor ``extend`` a text changes the whole clip. extend: seconds to go on behind the clip. loop: draw the last
-    ``blend`` seconds so that frame 0 can follow the last one: where the clip ends near where it began in the world too,
-    else in pose and velocity. strength: how much noise the old motion gets before it is drawn again, above 0 to 1
-    (nothing of it is left); the looped and added seconds are always drawn from noise. skeleton: the clip's own, or the
-    22-joint person. clean: keep planted feet still where legs are drawn. The result stands where the clip stood.
-
-    Raises `MotionloomError` for what cannot be asked, and for a clip of no person (see `retarget`).
-    (Inpainting: Lugmayr et al. 2022; of motion: Tevet et al. 2023. Strength: Meng et al., SDEdit, 2022.)
+    Raises MotionloomError where nothing is asked.
     """
-    asked = _Asked(text, tuple(keep), tuple(between), loop, extend, strength, blend)
-    _check(prior, motion, asked, count=count, seed=seed, guidance=guidance, steps=steps)
-    if skeleton not in ("own", "smpl"):
-        raise MotionloomError(f"the skeleton is 'own' or 'smpl'; got {skeleton!r}")
-    clip = motion if skeleton == "own" else to_smpl22(motion)
-    done = calls = 0
+    asked: list[Change] = []
+    if between or (text.strip() and not extend):
+        asked.append(Redraw(tuple(between), tuple(keep), strength))
+    elif keep:
+        raise MotionloomError("kept parts belong to a text or a stretch, and there is neither; add one")
+    asked += [Extend(extend)] if extend else []
+    asked += [Loop(blend)] if loop else []
+    if not asked:
+        raise MotionloomError("nothing to change: say in words what to draw, name a stretch, loop or extend")
+    return asked
 
-    def tick() -> None:
-        nonlocal done
-        done += 1
+
+def _counted(progress: Progress | None, calls: int) -> Progress:
+    """What counts the calls of all stages of all versions."""
+    counted = 0
+
+    def tick(*_: Any) -> None:
+        nonlocal counted
+        counted += 1
         if progress:
-            progress(done, calls)
+            progress(counted, calls)
 
-    stages = _stages(_Pen(prior, text, guidance, steps, clean, tick), clip, asked)
-    calls = count * len(stages) * steps
-    made = []
-    for number in range(count):
-        version = clip
-        for stage in stages:
-            version = stage(version, seed + number)
-        made.append(version)
-    return made
-
-
-@dataclass(frozen=True)
-class _Asked:
-    text: str
-    keep: tuple[str, ...]
-    between: tuple[Span, ...]
-    loop: bool
-    extend: float
-    strength: float
-    blend: float
-
-    @property
-    def whole(self) -> bool:
-        """Whether the text is about all of the clip."""
-        return bool(self.text.strip()) and not self.between and not self.extend
+    return tick
 
 
 @dataclass(frozen=True, eq=False)
-class _Pen:
-    """What draws, and how."""
+class _Sampler:
+    """What samples, and how."""
 
     prior: Prior
     text: str
-    guidance: float
-    steps: int
-    clean: bool
-    tick: Callable[[], None]
-    """Called after each network call."""
+    sampling: Sampling
+    foot_lock: bool
+    progress: Progress
 
-    def draw(self, window: Motion, stretch: Stretch, seed: int) -> Motion:
-        """The window with a new stretch, on its own skeleton, not yet spliced."""
-        drawn = redraw(
-            self.prior, stretch, self.text, seed=seed, guidance=self.guidance, steps=self.steps, progress=self.tick
-        )
-        return dressed(drawn, window, clean=self.clean)
-
-
-def _stages(pen: _Pen, clip: Motion, asked: _Asked) -> list[Stage]:
-    """One change after the other; each sees what those before it made."""
-    numbers, kept = kept_numbers(asked.keep), kept_joints(clip, asked.keep)
-    spans = [(0, len(clip))] if asked.whole else [_frames(clip, span) for span in sorted(asked.between)]
-    stages: list[Stage] = [
-        lambda motion, seed, span=span: _redrawn(pen, motion, span, seed, kept, numbers, asked.strength)
-        for span in spans
-    ]
-    if asked.extend:
-        stages.append(lambda motion, seed: _extended(pen, motion, asked.extend, seed))
-    if asked.loop:
-        stages.append(lambda motion, seed: _looped(pen, motion, asked.blend, seed))
-    return stages
+    def sample(self, motion: Motion, window: InpaintWindow, seed: int) -> Motion:
+        """A clip with a window of it sampled, on its own skeleton, not yet spliced."""
+        made = inpaint_motion(self.prior, window, self.text, self.sampling, seed=seed, progress=self.progress)
+        return apply_sample(made, motion, foot_lock=self.foot_lock)
 
 
 def kept_numbers(keep: Sequence[str]) -> NDArray[np.bool_]:
@@ -182,34 +285,23 @@ def _joints(keep: Sequence[str]) -> frozenset[int]:
     return frozenset(SMPL22.resolve(name for name in keep if name not in ("root", "root_horizontal")))
 
 
-# The three changes
+# What the changes do
 
 
-def _redrawn(
-    pen: _Pen, motion: Motion, span: tuple[int, int], seed: int, kept: Kept, numbers: NDArray[np.bool_], strength: float
-) -> Motion:
+def _redrawn(sampler: _Sampler, motion: Motion, span: tuple[int, int], change: Redraw, seed: int) -> Motion:
     start, stop = span
     around = round(float(np.clip((WINDOW - (stop - start) / motion.fps) / 2, *CONTEXT)) * motion.fps)
     begin, end = max(start - around, 0), min(stop + around, len(motion))
     window = motion.frames(begin, end)
     first, last = start - begin, stop - begin
-    stretch = _stretch(window, first, last, keep=numbers, strength=strength)
-    made = pen.draw(window, stretch, seed)
-    spliced = splice(window, made, first, last=last, kept=kept)
+    stretch = _window(window, first, last, keep=kept_numbers(change.keep), strength=change.strength)
+    made = sampler.sample(window, stretch, seed)
+    spliced = splice(window, made, first, last=last, kept=kept_joints(motion, change.keep))
     before, behind = (_some(motion.frames, span) for span in ((0, start), (stop, len(motion))))
     return concatenated(*before, spliced.frames(first, last), *behind)
 
 
-def _extended(pen: _Pen, motion: Motion, seconds: float, seed: int) -> Motion:
-    tail = motion.frames(max(len(motion) - round(CONTEXT[1] * motion.fps), 0), len(motion))
-    added = max(round(seconds * motion.fps), 1)
-    window = concatenated(tail, *[tail.frames(len(tail) - 1, len(tail))] * added)
-    made = pen.draw(window, _stretch(window, len(tail), len(window)), seed)
-    spliced = splice(window, made, len(tail), last=len(window), kept=kept_joints(motion, ()))
-    return concatenated(motion, spliced.frames(len(tail), len(window)))
-
-
-def _looped(pen: _Pen, motion: Motion, blend: float, seed: int) -> Motion:
+def _looped(sampler: _Sampler, motion: Motion, blend: float, seed: int) -> Motion:
     """The end flows into the beginning: a stretch between the last frames and, moved behind them, the first ones."""
     rest, around = len(motion) - round(blend * motion.fps), round(CONTEXT[1] * motion.fps)
     tail, head = motion.frames(max(rest - around, 0), rest), motion.frames(0, min(around, rest))
@@ -222,8 +314,8 @@ def _looped(pen: _Pen, motion: Motion, blend: float, seed: int) -> Motion:
     gap = _between(tail, head, len(motion) - rest)
     first, last = len(tail), len(tail) + len(gap)
     window = concatenated(tail, gap, head)
-    stretch = _stretch(window, first, last)
-    made = pen.draw(window, replace(stretch, facing=straight, place=here), seed)
+    stretch = _window(window, first, last)
+    made = sampler.sample(window, replace(stretch, facing=straight, place=here), seed)
     if not here:
         (to, drawn), (begin, faced) = standing(made, last), standing(window, last)
         turn = rot.IDENTITY if straight else rot.multiply(drawn, rot.inverse(faced))
@@ -238,13 +330,13 @@ def _between(before: Motion, behind: Motion, frames: int) -> Motion:
     return replace(replace(ends, fps=1.0).resample(frames + 1.0), fps=before.fps).frames(1, frames + 1)
 
 
-def _stretch(
+def _window(
     window: Motion, first: int, last: int, *, keep: NDArray[np.bool_] | None = None, strength: float = 1.0
-) -> Stretch:
+) -> InpaintWindow:
     positions = person_at_20(window)
     at = [int(np.ceil(frame / window.fps * FPS - 1e-6)) for frame in (first, last)]
     stop = at[1] if last < len(window) else len(positions) - 1
-    return Stretch(positions, at[0], stop, np.zeros(WIDTH, dtype=bool) if keep is None else keep, strength)
+    return InpaintWindow(positions, at[0], stop, np.zeros(WIDTH, dtype=bool) if keep is None else keep, strength)
 
 
 def _some(frames: Callable[[int, int], Motion], span: Span) -> list[Motion]:
@@ -254,61 +346,13 @@ def _some(frames: Callable[[int, int], Motion], span: Span) -> list[Motion]:
 # What cannot be asked
 
 
-def _frames(clip: Motion, span: Span) -> tuple[int, int]:
-    return round(span[0] * clip.fps), min(round(span[1] * clip.fps), len(clip))
-
-
-def _check(prior: Prior, motion: Motion, asked: _Asked, *, count: int, seed: int, guidance: float, steps: int) -> None:
+def _check(prior: Prior, motion: Motion, changes: Sequence[Change]) -> None:
     if len(prior.mean) != WIDTH or prior.fps != FPS:
         raise MotionloomError(
             f"these weights make {len(prior.mean)} numbers a frame; edits need {WIDTH} at {FPS:g} fps"
         )
-    if count < 1 or not 0 <= seed < LARGEST_SEED:
-        raise MotionloomError(f"the count must be 1 or more and the seed 0 to below 2**62; got {count} and {seed}")
-    if not isinstance(steps, int) or not 1 <= steps <= prior.schedule.steps:
-        raise MotionloomError(f"{steps} steps cannot be taken; these weights take 1 to {prior.schedule.steps}")
-    if not np.isfinite(guidance) or abs(guidance) > 100:
-        raise MotionloomError(f"a guidance of {guidance:g} makes no motion; usual values are 1 to 7")
-    if not 0 < asked.strength <= 1:
-        raise MotionloomError(f"the strength must be above 0 and at most 1; got {asked.strength:g}")
-    _check_parts(asked)
-    _check_times(motion, asked)
-
-
-def _check_parts(asked: _Asked) -> None:
-    known = ("root", "root_horizontal", *SMPL22.groups, *SMPL22.names)
-    unknown = [name for name in asked.keep if name not in known]
-    if unknown:
-        raise MotionloomError(f"no part called {unknown[0]!r} to keep; the parts are {', '.join(known)}")
-    if not (asked.whole or asked.between or asked.loop or asked.extend):
-        raise MotionloomError("nothing to change: say in words what to draw, name a stretch, loop or extend")
-    if asked.keep and not (asked.whole or asked.between):
-        raise MotionloomError("kept parts belong to a text or a stretch, and there is neither; add one")
-    if len(_joints(asked.keep)) == len(SMPL22):
-        raise MotionloomError("nothing to change: all joints are kept; keep fewer")
-
-
-def _check_times(motion: Motion, asked: _Asked) -> None:
-    length, frame = motion.seconds, 1 / motion.fps
+    length = motion.seconds
     if length * FPS < SHORTEST - 1e-6 or len(motion) < 3:
         raise MotionloomError(f"the clip is {length:.2f} s long; at least {SHORTEST / FPS:g} s are needed to edit it")
-    if not 0 <= asked.extend <= LONGEST or (asked.extend and asked.extend < 2 / FPS):
-        raise MotionloomError(f"a clip can be extended by {2 / FPS:g} to {LONGEST:g} seconds; got {asked.extend:g}")
-    for start, stop in asked.between:
-        if not (0 <= start < stop <= length + frame and stop - start >= 3 / FPS):
-            raise MotionloomError(
-                f"no stretch from {start:g} to {stop:g} s: a clip of {length:.2f} s has stretches from 0 to "
-                f"{length:.2f}, at least {3 / FPS:g} s long"
-            )
-    ordered = sorted(asked.between)
-    for (start, stop), (following, end) in pairwise(ordered):
-        if following < stop:
-            raise MotionloomError(f"the stretches {start:g} to {stop:g} s and {following:g} to {end:g} s overlap")
-    longest = max([length] if asked.whole else [stop - start for start, stop in asked.between], default=0.0)
-    if longest > LONGEST:
-        raise MotionloomError(f"{longest:.0f} s cannot be drawn at once; name stretches of at most {LONGEST:g} s")
-    if asked.loop and not 2 / FPS <= asked.blend <= length + asked.extend - SHORTEST / FPS:
-        raise MotionloomError(
-            f"a loop of a clip of {length + asked.extend:.2f} s blends over {2 / FPS:g} to "
-            f"{max(length + asked.extend - SHORTEST / FPS, 0):.2f} seconds; got {asked.blend:g}"
-        )
+    for change in changes:
+        length = change.check(length, 1 / motion.fps)

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import positions_at
-from motionloom.goals.hold import HeldPart, Hold
+from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.completion import Known
 from motionloom.tasks.splice import carried_level, concatenated, kept_parts, overlaid, standing
-from motionloom.tasks.windows import CONTEXT, person_of
+from motionloom.tasks.windows import CONTEXT, Past
 from motionloom.weights.predictor import Predictor
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ NEAR = (0.3, np.radians(20))
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """A `Hold`, ready: on the grid of the predictor for the network, on the past's skeleton for the result."""
+    """A `FixedJoints`, ready: on the grid of the predictor for the network, on the past's skeleton for the result."""
 
     places: Array
     """(frames, 22, 3) the source as the uniform person at the predictor's rate, from the first frame to predict."""
@@ -57,19 +57,20 @@ class Given:
         return concatenated(held, new.frames(count, len(new))) if count < len(new) else held
 
 
-def given(predictor: Predictor, past: Motion, hold: Hold | None, seconds: float) -> Given | None:
+def given(predictor: Predictor, seen: Past, hold: FixedJoints | None, seconds: float) -> Given | None:
     """A hold made ready for a past and a horizon; raises MotionloomError for what cannot be held."""
     if hold is None:
         return None
+    past = seen.motion
     check_like(past, hold.source, "motion that parts are held to")
     _check_parts(hold, seconds)
-    rate, total = predictor.fps / past.fps, max(round(seconds * past.fps), 1)
+    rate, total = seen.rate, seen.frames(seconds)
     source = _placed(past, hold.source) if hold.align else hold.source
     source = source.frames(0, total + int(np.ceil(predictor.frames / rate)))  # the last window looks further
     end = len(source) / past.fps
     tail = past.frames(max(len(past) - round(CONTEXT * past.fps) - 2, 0), len(past))
     together = to_smpl22(concatenated(tail, source)).positions()
-    together = together + (person_of(predictor, past)[-1, 0] - together[len(tail) - 1, 0])
+    together = together + (seen.person[-1, 0] - together[len(tail) - 1, 0])
     count = int(len(source) * rate + 1e-6)
     places = positions_at(together, len(tail) - 1 + np.arange(1, count + 1) / rate)
     source = concatenated(source, *[source.frames(len(source) - 1, len(source))] * round(RAMP * past.fps))
@@ -108,7 +109,7 @@ def _weights(spans: Sequence[tuple[float, float]], times: Array, ramp: float) ->
     return weight
 
 
-def _resolved(part: HeldPart) -> tuple[set[int], bool]:
+def _resolved(part: FixedPart) -> tuple[set[int], bool]:
     joints = set(SMPL22.resolve(name for name in part.joints if name != "root"))
     return joints, "root" in part.joints or 0 in joints
 
@@ -139,7 +140,7 @@ def check_like(past: Motion, other: Motion, what: str) -> None:
         raise MotionloomError(f"the {what} has {other.fps:g} fps and the past {past.fps:g}; resample it first")
 
 
-def _check_parts(hold: Hold, seconds: float) -> None:
+def _check_parts(hold: FixedJoints, seconds: float) -> None:
     known = ("root", *SMPL22.groups, *SMPL22.names)
     names = [name for part in hold.parts for name in part.joints]
     unknown = [name for name in names if name not in known]

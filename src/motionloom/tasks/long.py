@@ -9,8 +9,10 @@ The published procedure and that of the paper are in `lab.papers.double_take`; d
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Unpack
 
 import numpy as np
 import torch
@@ -18,35 +20,32 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom.diffusion import SOLVERS, Link, levels, staggered
+from motionloom._moved import renamed
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction, toward
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
-from motionloom.goals.goal import Goal, Placement, merged, overlaid, placement_of
+from motionloom.goals.goal import Goal, merged, overlaid, placement_of
 from motionloom.goals.paths import along
 from motionloom.goals.segment import Segment
+from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
 from motionloom.nets.prior import Bound, PriorNet
 from motionloom.tasks.adapting import AdaptedPriors, loaded
 from motionloom.tasks.body import Places, bodies
+from motionloom.tasks.sampling import Moves, Sampling, Settings, sample_chain
 from motionloom.tasks.splice import person_at_20
-from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, STEPS
-from motionloom.tasks.text import check as check_sampling
-from motionloom.tasks.watching import Latest
+from motionloom.tasks.watching import ChainView
 from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 
-TOGETHER = 16
-"""Rows denoised at once."""
+BATCH = 16
+"""Rows in one network call."""
 LOOK_BACK = 20
 """Frames of an older motion that a new one is made to follow."""
-
-Progress = Callable[[int], None]
-"""Told how many more row moves were made; a segment takes as many as there are steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,34 +69,42 @@ class Row:
         return self.before + self.frames + self.after
 
 
+@renamed({"clean": "foot_lock", "together": "batch_size"})
 def compose(
     prior: Prior,
     segments: Iterable[Segment],
     *,
-    seed: int = 0,
-    guidance: float = GUIDANCE,
-    steps: int = STEPS,
     start: Motion | None = None,
     path: Goal | None = None,
-    clean: bool = True,
-    together: int = TOGETHER,
-    progress: Progress | None = None,
+    foot_lock: bool = True,
+    sampling: Sampling | None = None,
+    progress: Moves | None = None,
+    **settings: Unpack[Settings],
 ) -> Iterator[Motion]:
     """One long motion of the 22-joint person, block after block in one world, as it is made.
 
-    In all it has the sum of ``round(seconds * 20)`` frames at 20 per second. start: a motion of anybody that this one
-    goes on from, in its place; it is not repeated. path: where the pelvis is on the ground in each frame of the whole
-    (`Goal` of that length, in the world); goals of segments are seen from where the person stands when they begin.
-    clean: keep planted feet still. Segments may be endless if there is no path; memory does not grow with them.
-    Raises `MotionloomError` for what cannot be asked. (Shafir et al. 2024, section 4, as in docs/decisions/0013.)
+    Args:
+        prior: weights that make HumanML3D's 263 numbers at 20 frames per second.
+        segments: what happens, one after the other, in all the sum of ``round(seconds * 20)`` frames; their goals are
+            seen from where the person stands when they begin. They may be endless if there is no path; memory does not
+            grow with them.
+        start: a motion of anybody that this one goes on from, in its place; it is not repeated.
+        path: where the pelvis is on the ground in each frame of the whole (`Goal` of that length, in the world).
+        foot_lock: keep planted feet still.
+        sampling: or single settings of it as keywords; segment i is sampled from ``seed + i``.
+        progress: called with how many more row moves were made; a segment takes as many as there are steps.
+
+    Raises:
+        MotionloomError: for what cannot be asked.
+
+    (Shafir et al. 2024, section 4, as in docs/decisions/0013.)
     """
     if len(prior.mean) != WIDTH or prior.fps != FPS:
         raise MotionloomError(
             f"these weights make {len(prior.mean)} numbers a frame; long motion needs {WIDTH} at {FPS:g} fps"
         )
-    check_sampling(prior, [], steps=steps, guidance=guidance, solver=SOLVER)
-    if not 0 <= seed < LARGEST_SEED:
-        raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {seed}")
+    chosen = Sampling.of(sampling, settings).alone()
+    chosen.levels(prior.schedule)
     past = None if start is None else Past.of(start)
     track = None if path is None else Track.along(path, prior.fps)
     wishes: deque[Goal | None] = deque()
@@ -110,63 +117,52 @@ def compose(
             yield track.led(segment, first, frames) if track else segment
             first += frames
 
-    pieces = long_features(
-        prior, asked(), seed=seed, guidance=guidance, steps=steps, past=past, together=together, progress=progress
-    )
-    place = past.end if past else track.stands(0) if track else Placement()
-    return bodies(in_world(prior, pieces, wishes, place, track), prior.fps, clean=clean)
+    pieces = long_features(prior, asked(), past=past, sampling=chosen, progress=progress)
+    place = past.end if past else track.stands(0) if track else GroundPose()
+    return bodies(in_world(prior, pieces, wishes, place, track), prior.fps, foot_lock=foot_lock)
 
 
+@renamed({"together": "batch_size"})
 @torch.inference_mode()
 def long_features(
     prior: Prior,
     segments: Iterable[Segment],
     *,
-    seed: int = 0,
-    guidance: float = GUIDANCE,
-    steps: int = STEPS,
-    solver: str = SOLVER,
-    spacing: str = SPACING,
     past: "Past | None" = None,
-    together: int = TOGETHER,
-    progress: Progress | None = None,
+    sampling: Sampling | None = None,
+    progress: Moves | None = None,
+    **settings: Unpack[Settings],
 ) -> Iterator[Tensor]:
     """Features (frames, 263), not standardised, one piece per segment; strung together they are the long motion.
 
-    Piece i has ``round(seconds * fps)`` frames. Row i draws from ``seed + i``. ``segments`` may be endless: it is read
-    as the walk gets there. ``together``: rows per network call; it changes speed and memory, not the result.
-    Raises `MotionloomError` for transitions that do not fit.
+    Piece i has ``round(seconds * fps)`` frames. ``batch_size``: rows per network call; it changes speed and memory, not
+    the result. The others as of `compose`. Raises `MotionloomError` for transitions that do not fit.
     """
-    rows: dict[int, Row] = {}
-    way = levels(prior.schedule, steps, spacing=spacing)  # type: ignore[arg-type]
-    place, seen = past.end if past else Placement(), Latest(steps)
+    chosen = Sampling.of(sampling, settings)
+    denoise = partial(_corrected, prior, chosen.levels(prior.schedule)[-2])
+    rows = chain_rows(prior, segments, chosen.guidance, past)
+    place = past.end if past else GroundPose()
 
-    def links() -> Iterator[Link]:
-        for number, row in enumerate(chain_rows(prior, segments, guidance, past)):
-            rows[number] = row
-            yield Link(row.length, row.overlap, seed + number)
+    def features(row: Row, state: Tensor, _: int = 0) -> Tensor:
+        return (state[row.before : row.before + row.frames] * prior.std + prior.mean).cpu()
 
-    def guess(numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
-        chosen = [rows[number] for number in numbers]
-        here = [state.to(prior.mean) for state in states]  # the noise that rows begin with is the CPU's
-        cleans = _settled(prior, chosen, here, at, last=way[-2])
-        cleans = [row.correct(clean, level) for row, clean, level in zip(chosen, cleans, at, strict=True)]
-        seen.add(numbers, [clean[row.before :][: row.frames] for row, clean in zip(chosen, cleans, strict=True)])
-        seen.report(lambda parts: decoded(_numbers(prior, torch.cat(parts)), place)[0][None])
-        return cleans
+    def poses(pieces: list[Tensor]) -> Array:
+        return decoded(torch.cat(pieces).numpy().astype(np.float64), place)[0][None]
 
-    walk = staggered(
-        links(), guess, levels=way, solver=SOLVERS[solver], schedule=prior.schedule, features=len(prior.mean),
-        together=together, moved=progress or (lambda count: None),
+    made = sample_chain(
+        prior, rows, denoise, chosen, features=len(prior.mean), batch_size=BATCH, progress=progress,
+        view=ChainView(features, poses),
     )  # fmt: skip
-    for number, state in enumerate(walk):
-        row = rows.pop(number)
-        yield (state[row.before : row.before + row.frames] * prior.std + prior.mean).cpu()
+    for row, state in made:
+        yield features(row, state)
 
 
-def _numbers(prior: Prior, clean: Tensor) -> Array:
-    """Features that are not standardised, on the CPU."""
-    return (clean * prior.std + prior.mean).cpu().numpy().astype(np.float64)
+def _corrected(
+    prior: Prior, last: int, rows: Sequence[Row], states: Sequence[Tensor], at: Sequence[int]
+) -> list[Tensor]:
+    """Denoised states of rows, each through what corrects it."""
+    denoised = _averaged(prior, list(rows), states, at, last=last)
+    return [row.correct(one, level) for row, one, level in zip(rows, denoised, at, strict=True)]
 
 
 def chain_rows(prior: Prior, segments: Iterable[Segment], guidance: float, past: "Past | None") -> Iterator[Row]:
@@ -212,7 +208,7 @@ def _one_after_the_other(edits: Sequence[Correction]) -> Correction:
     return correct
 
 
-def _settled(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int], *, last: int) -> list[Tensor]:
+def _averaged(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int], *, last: int) -> list[Tensor]:
     """Guesses; those of the last move are averages over all ways to divide the frames into the network's tokens.
 
     A token holds several frames, and between tokens the network leaves small steps. (Averaging over shifts is the
@@ -291,7 +287,7 @@ class Past:
 
     known: Tensor
     """(frames, 263) features of its last frames, not standardised."""
-    end: Placement
+    end: GroundPose
     """Where the person is one frame behind them: at frame 0 of what follows."""
 
     @staticmethod
@@ -304,7 +300,7 @@ class Past:
             )
         positions = positions[-LOOK_BACK - 1 :]
         x, _, z = positions[0, 0]
-        begin = Placement(float(x), float(z), float(heading(positions[:1])[0]))
+        begin = GroundPose(float(x), float(z), float(heading(positions[:1])[0]))
         known = humanml.encode(begin.from_world(positions)).astype(np.float64)
         return Past(torch.from_numpy(known).float(), decoded(known, begin)[1])
 
@@ -338,12 +334,12 @@ class Track:
             raise MotionloomError("the path of a long motion must say where to be in every frame; give points for all")
         return Track(path, np.where(path.facing_asked, path.facing, along(path.positions[:, 0, [0, 2]], fps)))
 
-    def stands(self, frame: int) -> Placement:
+    def stands(self, frame: int) -> GroundPose:
         """Where the person is at that frame."""
         if frame == 0:
             return placement_of(self.path)
         x, _, z = self.path.positions[frame, 0]
-        return Placement(float(x), float(z), float(self.ways[frame]))
+        return GroundPose(float(x), float(z), float(self.ways[frame]))
 
     def led(self, segment: Segment, first: int, frames: int) -> Segment:
         """The segment that begins with frame ``first``, with its part of the path among its wishes."""
@@ -356,7 +352,7 @@ class Track:
 
 
 def in_world(
-    prior: Prior, pieces: Iterable[Tensor], wishes: deque[Goal | None], place: Placement, track: Track | None
+    prior: Prior, pieces: Iterable[Tensor], wishes: deque[Goal | None], place: GroundPose, track: Track | None
 ) -> Iterator[Places]:
     """Each piece where the one before it ends; on a path bent once more, so that errors do not add up."""
     mean, first = prior.mean.cpu(), 0
@@ -374,9 +370,9 @@ def in_world(
         place, first = after, first + len(piece)
 
 
-def decoded(features: Array, place: Placement) -> tuple[Array, Placement]:
+def decoded(features: Array, place: GroundPose) -> tuple[Array, GroundPose]:
     """(frames, 22, 3) of features (frames, 263) that begin at a place, and the place of the frame behind them."""
     positions = humanml.decode_positions(np.concatenate([features, features[-1:]]))
     x, _, z = place.to_world(positions[-1, 0])
     facing = place.facing - 2 * float(features[:, LAYOUT["yaw_velocity"]].sum())
-    return place.to_world(positions[:-1]), Placement(float(x), float(z), facing)
+    return place.to_world(positions[:-1]), GroundPose(float(x), float(z), facing)

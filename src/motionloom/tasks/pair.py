@@ -4,8 +4,9 @@ Both are drawn by one frozen prior that a communication block makes listen to it
 each from his own first frame; where the two stand to each other is drawn with them and puts both into one world.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Unpack
 
 import numpy as np
 import torch
@@ -13,45 +14,45 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom.diffusion import SOLVERS, Draw, guide, inpaint, levels, observe, row_draw, row_seed, sample
-from motionloom.diffusion.sampling import Snapshot
+from motionloom._moved import renamed, say
+from motionloom.diffusion import Denoiser, Draw, row_draw, row_seed
 from motionloom.edits.fitting import fit
-from motionloom.edits.relative_pose import leader
-from motionloom.edits.steering import Correction, toward
+from motionloom.edits.relative_pose import relative_pose_guidance
+from motionloom.edits.steering import Correction, corrected_rows, toward
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
 from motionloom.features.pair import one_world, together
-from motionloom.goals.goal import Goal, Placement, placement_of
+from motionloom.goals.goal import Goal, placement_of
 from motionloom.goals.segment import LONGEST
+from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.nets.pair import PairNet, join, part
 from motionloom.retarget import to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.tasks.control import moved
 from motionloom.tasks.long import Past
-from motionloom.tasks.splice import concatenated, kept_parts, splice, worn
-from motionloom.tasks.text import (
-    GUIDANCE,
-    LARGEST_SEED,
-    SOLVER,
-    SPACING,
-    STEPS,
+from motionloom.tasks.sampling import (
+    Batch,
+    Observed,
+    PairSampling,
+    PairSettings,
     Progress,
-    check,
-    finish,
-    frames_in,
+    Rows,
+    Seed,
+    sample,
     smooth,
 )
-from motionloom.tasks.watching import reported
+from motionloom.tasks.splice import apply_positions, concatenated, kept_parts, splice
+from motionloom.tasks.text import finish, frames_in
+from motionloom.tasks.watching import View
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 Duet = tuple[Motion, Motion]
 Prompt = str | tuple[str, str]
-Seed = int | tuple[int, int]
 
 PAIRS = 8
 """Pairs denoised at once."""
@@ -67,6 +68,18 @@ MOST = 10_000.0
 """Seconds of all duets together that are made in one call."""
 
 
+@dataclass(frozen=True, eq=False)
+class PairEdits:
+    """What is known of rows, and how their guesses are changed; a row is a person: a0, b0, a1, b1, ..."""
+
+    observed: Observed | None = None
+    """(rows, 1 + frames, 263) of `nets.pair`: the slot of D, then the motion."""
+    corrections: Sequence[Correction | None] | None = None
+    """What each row's denoised motion (frames, 263), standardised, goes through, as of `steering`."""
+    frozen: Sequence[bool] | None = None
+    """Whose motion is not moved by pair guidance; those that are corrected, unless said otherwise."""
+
+
 @torch.inference_mode()
 def pair_features(
     prior: Prior,
@@ -75,119 +88,70 @@ def pair_features(
     frames: int,
     *,
     seeds: Sequence[int],
-    known: Tensor | None = None,
-    mask: Tensor | None = None,
-    change: Sequence[Correction | None] | None = None,
-    still: Sequence[bool] | None = None,
-    guidance: float = GUIDANCE,
-    steps: int = STEPS,
-    together: float = 1.0,
-    quiet: bool = True,
+    edits: PairEdits | None = None,
+    sampling: PairSampling | None = None,
     progress: Progress | None = None,
+    **settings: Unpack[PairSettings],
 ) -> tuple[Tensor, Tensor]:
-    """Features (pairs, 2, frames, 263), not standardised, and stands (pairs, 2, 4) of `features.pair`.
+    """Features (pairs, 2, frames, 263), not standardised, and relative poses (pairs, 2, 4) of `features.pair`.
 
-    prompts, seeds: one per row; rows are people, a0, b0, a1, b1, ...; an empty prompt asks for nothing. known
-    (rows, 1 + frames, 263), mask (the same, or what broadcasts; True where known): a state of `nets.pair` that is given
-    in part (`known_state`); with ``quiet`` the network sees it without noise (Shafir et al. 2024, section 3.3), else at
-    the noise of its level (RePaint). change: for each row, or None, what its every guess goes through, standardised
-    (frames, 263), as of `steering`. together, 0 to 1: how far every guess is led to where the block says that the two
-    stand to each other later on (`duet_places`; 0: as published); rows that are ``still`` are not moved for that: whose
-    guesses are changed, unless said otherwise. With a block that says nothing a row is what
-    `text.sample_features` makes of its prompt and seed. No more than `PAIRS` pairs are denoised at once. Raises
-    MotionloomError for what cannot be asked.
+    Args:
+        net: the block over the prior's network.
+        prompts: one per row; rows are people, a0, b0, a1, b1, ...; an empty prompt asks for nothing.
+        frames: of each motion.
+        seeds: one per row. With a block that says nothing a row is what `text.sample_features` makes of its seed.
+        edits: what is known, and what changes the guesses.
+        sampling: or single settings of it as keywords; ``batch_size`` counts pairs.
+
+    Raises:
+        MotionloomError: for what cannot be asked.
     """
-    rows = len(prompts)
-    changes = list(change or [None] * rows)
-    kept = [one is not None for one in changes] if still is None else list(still)
-    if rows % 2 or rows == 0 or {len(seeds), len(changes), len(kept)} != {rows}:
+    chosen, rows, given = PairSampling.of(sampling, settings), len(prompts), edits or PairEdits()
+    changes = list(given.corrections or [None] * rows)
+    frozen = [one is not None for one in changes] if given.frozen is None else list(given.frozen)
+    if rows % 2 or rows == 0 or {len(seeds), len(changes), len(frozen)} != {rows}:
         raise MotionloomError(
             f"two people need two prompts and seeds a pair; got {rows} prompts and {len(seeds)} seeds"
         )
-    check(prior, [], steps=steps, guidance=guidance, solver=SOLVER)
-    shape = (rows, 1 + frames, len(prior.mean))
-    data = torch.zeros(shape) if known is None else known.expand(shape)
-    here = torch.zeros(shape, dtype=torch.bool) if mask is None else mask.expand(shape)
-    made = []
-    for start in range(0, rows, 2 * PAIRS):
-        some = slice(start, start + 2 * PAIRS)
-        held = _Held(
-            data[some].to(prior.mean), here[some].to(prior.mean.device), changes[some], kept[some], quiet, together
-        )
+    mask = torch.zeros(rows, 1 + frames, len(prior.mean), dtype=torch.bool) if given.observed is None else (
+        given.observed.mask.expand(rows, 1 + frames, len(prior.mean))
+    )  # fmt: skip
+    mask = mask.to(prior.mean.device)
 
-        def told(done: int, before: int = start // (2 * PAIRS) * steps) -> None:
-            if progress:
-                progress(before + done, -(-rows // (2 * PAIRS)) * steps)
+    def corrected(state: Tensor, batch: Sequence[int], level: int) -> Tensor:
+        some = [changes[i] for i in batch]
+        return torch.cat([state[:, :1], corrected_rows(state[:, 1:], some, level)], dim=1) if any(some) else state
 
-        made.append(
-            _walked(prior, net, prompts[some], seeds[some], held=held, guidance=guidance, steps=steps, told=told)
-        )
-    places, motion = part(torch.cat(made))
-    features = motion * prior.std + prior.mean
-    stands = net.talk.config.places.decode(places.unflatten(0, (-1, 2)))
-    return features.unflatten(0, (-1, 2)).cpu(), stands.cpu()
+    def edit(denoise: Denoiser, batch: Batch) -> Denoiser:
+        lead = relative_pose_guidance(
+            prior, net, net.bind(batch.cond), seeds=batch.seeds, mask=mask[batch.rows],
+            frozen=[frozen[i] for i in batch.rows], weight=chosen.pair_guidance,
+        )  # fmt: skip
+        return lambda state, level: lead(state, corrected(denoise(state, level), batch.rows, level), level)
 
-
-@dataclass(frozen=True, eq=False)
-class _Held:
-    """What is known of some rows, and how their guesses are changed."""
-
-    data: Tensor
-    mask: Tensor
-    changes: list[Correction | None]
-    still: list[bool]
-    quiet: bool
-    together: float
-
-    def changed(self, guess: Tensor, level: int) -> Tensor:
-        """States whose motions went through the changes."""
-        if not any(self.changes):
-            return guess
-        rows = [
-            row if change is None else torch.cat([row[:1], change(row[1:], level)])
-            for row, change in zip(guess, self.changes, strict=True)
-        ]
-        return torch.stack(rows)
-
-
-def _walked(
-    prior: Prior,
-    net: PairNet,
-    prompts: Sequence[str],
-    seeds: Sequence[int],
-    *,
-    held: _Held,
-    guidance: float,
-    steps: int,
-    told: Callable[[int], None],
-) -> Tensor:
-    """Clean states of some rows."""
-    cond = prior.condition(list(prompts))
-    scale = guidance if any(prompt.strip() for prompt in prompts) else 1.0
-    guided = inpaint(guide(net, net.bind(cond), net.bind(cond.null()), scale), held.data, held.mask)
-    lead = leader(prior, net, net.bind(cond), seeds=seeds, mask=held.mask, still=held.still, weight=held.together)
-
-    def denoise(state: Tensor, level: int) -> Tensor:
-        return lead(state, held.changed(guided(state, level), level), level)
-
-    way, draw = levels(prior.schedule, steps, spacing=SPACING), pair_draw(seeds)
-    hold = observe(held.data, held.mask, prior.schedule, torch.zeros_like if held.quiet else draw)
-    state = hold(draw(held.data), way[0])
-    walk = sample(
-        denoise, state, levels=way, solver=SOLVERS[SOLVER], schedule=prior.schedule, draw=draw, constrain=hold
-    )
-
-    def placed(snapshot: Snapshot) -> np.ndarray:
-        places, motion = part(snapshot.clean)
+    def poses(states: Tensor) -> np.ndarray:
+        places, motion = part(states)
         stands = net.talk.config.places.decode(places.unflatten(0, (-1, 2)))
         return two.decode((motion * prior.std + prior.mean).unflatten(0, (-1, 2)), stands).cpu().numpy()
 
-    for done, snapshot in enumerate(reported(walk, steps, range(len(prompts) // 2), placed), start=1):
-        state = snapshot.state
-        told(done)
+    silent = not any(prompt.strip() for prompt in prompts)
+    how = replace(chosen, batch_size=2 * chosen.batch(PAIRS), guidance=1.0 if silent else chosen.guidance)
+    asked = Rows(prompts, [1 + frames] * rows, seeds, pair_draw)
+    made = dict(
+        sample(
+            prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress,
+            view=View(poses, people=2),
+        )
+    )  # fmt: skip
+    state = torch.stack([made[row] for row in range(rows)])
     if prior.net.config.patch > 1:
         state = torch.cat([state[:, :1], smooth(state[:, 1:])], dim=1)
-    return held.changed(torch.where(held.mask, held.data, state), 0)
+    if given.observed is not None:
+        state = torch.where(mask, given.observed.values.to(prior.mean).expand(mask.shape), state)
+    places, motion = part(corrected(state, range(rows), 0))
+    features = motion * prior.std + prior.mean
+    poses = net.talk.config.places.decode(places.unflatten(0, (-1, 2)))
+    return features.unflatten(0, (-1, 2)).cpu(), poses.cpu()
 
 
 def pair_draw(seeds: Sequence[int]) -> Draw:
@@ -203,6 +167,11 @@ def person_seeds(seed: Seed, number: int) -> tuple[int, int]:
     return row_seed(seed, number), row_seed(seed, number, 1)
 
 
+def pair_seeds(sampling: PairSampling) -> list[int]:
+    """One seed per row of as many duets as are to be made."""
+    return [seed for number in range(sampling.number()) for seed in person_seeds(sampling.seed, number)]
+
+
 def prompts_of(prompt: Prompt) -> tuple[str, str]:
     """What the first and what the second person is told: a text with `MARK` parts them, one without is for both."""
     if isinstance(prompt, tuple):
@@ -215,10 +184,10 @@ def prompts_of(prompt: Prompt) -> tuple[str, str]:
     return said[0], said[1]
 
 
-def known_state(prior: Prior, net: PairNet, features: Tensor, stands: Tensor, frames: int) -> tuple[Tensor, Tensor]:
-    """A state (2, 1 + frames, 263) and its mask: the first frames of two people and where they stand.
+def known_state(prior: Prior, net: PairNet, features: Tensor, stands: Tensor, frames: int) -> Observed:
+    """A state (2, 1 + frames, 263) in which the first frames of two people are known, and where they stand.
 
-    features: (2, known frames, 263), not standardised; stands: (2, 4). For several pairs: concatenate.
+    features: (2, known frames, 263), not standardised; stands: (2, 4). The network sees them without noise.
     """
     spread = torch.where(prior.std > 0, prior.std, 1.0)
     motion = (features.to(prior.mean) - prior.mean) / spread
@@ -226,70 +195,92 @@ def known_state(prior: Prior, net: PairNet, features: Tensor, stands: Tensor, fr
     state = join(places, F.pad(motion, (0, 0, 0, frames - motion.shape[1])))
     mask = torch.zeros_like(state, dtype=torch.bool)
     mask[:, : 1 + motion.shape[1]] = True
-    return state, mask
+    return Observed(state, mask, noise_free=True)
+
+
+def stacked(pairs: Sequence[Observed]) -> Observed:
+    """What is known of several pairs."""
+    values, masks = (torch.cat(parts) for parts in zip(*((one.values, one.mask) for one in pairs), strict=True))
+    return replace(pairs[0], values=values, mask=masks)
 
 
 # From words
 
 
+@renamed({"clean": "foot_lock", "together": "pair_guidance"})
 def generate_pair(
     prior: Prior,
     block: PairBlock,
     prompt: Prompt,
     *,
     seconds: float = 6.0,
-    count: int = 1,
-    seed: Seed = 0,
-    goal: Goal | None = None,
-    person: int = 0,
-    guidance: float = GUIDANCE,
-    steps: int = STEPS,
-    together: float = 1.0,
-    clean: bool = True,
+    goals: tuple[Goal | None, Goal | None] = (None, None),
+    foot_lock: bool = True,
+    sampling: PairSampling | None = None,
     progress: Progress | None = None,
+    **settings: Unpack[PairSettings],
 ) -> list[Duet]:
-    """Make ``count`` duets: two people of the 22-joint skeleton at 20 frames per second in one world.
+    """Make duets: two people of the 22-joint skeleton at 20 frames per second in one world.
 
-    prompt: what both do together, or (what the first does, what the second does); ``"A :: B"`` says the same. seed:
-    duet i depends on it and i alone; two numbers are one for each person, and go with him where people are exchanged.
-    The first person starts at the origin facing +Z. goal: what ``person`` (0 or 1) is asked in the world (`Goal`), who
-    then starts at its `placement_of`; the duet is as long as the goal, and ``seconds`` is not looked at. guidance,
-    steps, clean: as of `text.generate`; together: as of `pair_features`. Raises `MotionloomError` for what cannot be
-    asked.
+    Args:
+        block: what makes two people of one prior.
+        prompt: what both do together, or (what the first does, what the second does); ``"A :: B"`` says the same.
+        seconds: length; not looked at where there is a goal, which has its own.
+        goals: what the first or the second person is asked to do in the world, who then starts at its `placement_of`;
+            one of the two may have a goal. Without any the first person starts at the origin facing +Z.
+        foot_lock: keep planted feet still.
+        sampling: or single settings of it as keywords. Duet i depends on ``seed`` and i alone; two seeds are one for
+            each person, and go with the person where people are exchanged.
+        progress: called after each network call with the calls done and the calls in all.
+
+    Raises:
+        MotionloomError: for what cannot be asked.
     """
-    said = prompts_of(prompt)
+    goal, person = _goal_of(goals, settings)
+    said, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
     if not all(words.strip() for words in said):
         raise MotionloomError("a prompt is empty; say in words what the two people do")
-    length = len(goal) / FPS if goal else seconds
-    check_asked(prior, count=count, seed=seed, person=person, seconds=length)
+    check_pair(prior, count=chosen.number(), seconds=len(goal) / FPS if goal else seconds)
     frames = _goal_frames(goal) if goal else frames_in(seconds, prior.fps)
-    place = placement_of(goal) if goal else Placement()
+    place = placement_of(goal) if goal else GroundPose()
     change: list[Correction | None] = [None, None]
     if goal:
         change[person] = toward(goal.seen_from(place), prior)
-    features, stands = pair_features(
-        prior, block.net(prior), said * count, frames,
-        seeds=[s for number in range(count) for s in person_seeds(seed, number)],
-        change=change * count, guidance=guidance, steps=steps, together=together, progress=progress,
+    count = chosen.number()
+    features, poses = pair_features(
+        prior, block.net(prior), said * count, frames, seeds=pair_seeds(chosen),
+        edits=PairEdits(corrections=change * count), sampling=chosen, progress=progress,
     )  # fmt: skip
     made = []
-    for numbers, standing in zip(features, stands.double().numpy(), strict=True):
+    for numbers, beside in zip(features, poses.double().numpy(), strict=True):
         if goal:
-            standing = standing_at(standing, place, person)
-        duet = [moved(finish(prior, f, clean=clean), placement(s)) for f, s in zip(numbers, standing, strict=True)]
+            beside = standing_at(beside, place, person)
+        people = [finish(prior, one, foot_lock=foot_lock) for one in numbers]
+        duet = [moved(one, placement(pose)) for one, pose in zip(people, beside, strict=True)]
         if goal:
             duet[person] = fit(duet[person], goal)
         made.append((duet[0], duet[1]))
     return made
 
 
-def placement(stand: np.ndarray) -> Placement:
-    """A stand (4,) of `features.pair` as a `Placement`."""
+def _goal_of(goals: tuple[Goal | None, Goal | None], settings: Any) -> tuple[Goal | None, int]:
+    """The one goal and whose it is; also by the old keywords, which are taken out of the settings."""
+    if "goal" in settings or "person" in settings:
+        say("goal=, person=", "goals=(of the first, of the second)", above=5)
+        goal, person = settings.pop("goal", None), check_person(settings.pop("person", 0))
+        goals = (None, goal) if person else (goal, None)
+    if None not in goals:
+        raise MotionloomError("both people have a goal; give one to one of them, and the other goes along")
+    return next((goal for goal in goals if goal), None), int(goals[0] is None and goals[1] is not None)
+
+
+def placement(stand: np.ndarray) -> GroundPose:
+    """A stand (4,) of `features.pair` as a `GroundPose`."""
     c, s, x, z = (float(number) for number in stand)
-    return Placement(x, z, float(np.arctan2(s, c)))
+    return GroundPose(x, z, float(np.arctan2(s, c)))
 
 
-def standing_at(stands: Array, place: Placement, person: int) -> Array:
+def standing_at(stands: Array, place: GroundPose, person: int) -> Array:
     """Stands (2, 4) moved rigidly on the ground so that ``person`` stands at a place."""
     there = np.array([np.cos(place.facing), np.sin(place.facing), place.x, place.z])
     return two.compose(there, two.seen(stands[person], stands))
@@ -302,26 +293,29 @@ def _goal_frames(goal: Goal) -> int:
     return len(goal)
 
 
-def check_asked(prior: Prior, *, count: int, seed: Seed, person: int = 0, seconds: float = 0.0) -> None:
-    """Raise MotionloomError for weights, counts, seeds and people that there are not."""
+def check_pair(prior: Prior, *, count: int = 1, seconds: float = 0.0) -> None:
+    """Raise MotionloomError for weights that make no two people, and for more than one call makes."""
     if len(prior.mean) != WIDTH or prior.fps != FPS:
         raise MotionloomError(
             f"these weights make {len(prior.mean)} numbers a frame; two people need {WIDTH} at {FPS:g} fps"
         )
-    if count < 1 or (count > 1 and count * seconds > MOST):
+    if count > 1 and count * seconds > MOST:
         raise MotionloomError(
             f"{count} duets of {seconds:g} s cannot be made in one call; ask for 1 or more, of {MOST:g} s together"
         )
-    for number in seed if isinstance(seed, tuple) else (seed,):
-        if not 0 <= number < LARGEST_SEED:
-            raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {number}")
+
+
+def check_person(person: int) -> int:
+    """0 or 1; raises MotionloomError for anybody else."""
     if person not in (0, 1):
         raise MotionloomError(f"the two people are 0 and 1; there is no person {person}")
+    return person
 
 
 # Going on
 
 
+@renamed({"clean": "foot_lock", "together": "pair_guidance"})
 def complete_pair(
     prior: Prior,
     block: PairBlock,
@@ -329,42 +323,44 @@ def complete_pair(
     prompt: Prompt = "",
     *,
     seconds: float = 3.0,
-    count: int = 1,
-    seed: Seed = 0,
-    guidance: float = GUIDANCE,
-    steps: int = STEPS,
-    together: float = 1.0,
-    clean: bool = True,
+    foot_lock: bool = True,
+    sampling: PairSampling | None = None,
     progress: Progress | None = None,
+    **settings: Unpack[PairSettings],
 ) -> list[Duet]:
-    """``count`` duets that begin with both people's past, bit for bit, and go on for ``seconds``.
+    """Duets that begin with both people's past, bit for bit, and go on (Shafir et al. 2024, section 5.2).
 
-    past: motions of two people in one world, of equal rate and length, a second or more; each on any humanoid skeleton
-    that stands upright along +Y, which it keeps. The last `SEEN` frames (at 20 per second) are seen. An empty prompt
-    asks for nothing in particular. Otherwise as `generate_pair`. Raises `MotionloomError`, also as
-    `data.pairs.together` does. (Prefix completion, Shafir et al. 2024, section 5.2.)
+    Args:
+        past: motions of two people in one world, of equal rate and length, a second or more; each on any humanoid
+            skeleton that stands upright along +Y, which it keeps. The last `SEEN` frames (at 20 per second) are seen.
+        prompt: as of `generate_pair`; an empty one asks for nothing in particular.
+        seconds: how far to go on.
+        foot_lock: keep planted feet still.
+        sampling, progress: as of `generate_pair`.
+
+    Raises:
+        MotionloomError: for what cannot be asked, also as `data.pairs.together` does.
     """
-    said = prompts_of(prompt)
-    check_asked(prior, count=count, seed=seed, seconds=seconds)
+    said, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
+    check_pair(prior, count=chosen.number(), seconds=seconds)
     if not 0 < seconds <= LONGEST:
         raise MotionloomError(f"two people cannot go on for {seconds:g} s; ask for more than 0 and at most {LONGEST:g}")
     ground, added = Ground.of(past), max(round(seconds * past[0].fps), 1)
     known, stands, floors = ground.encoded()
     seen = known.shape[1]
     frames = seen + int(np.ceil(added / past[0].fps * FPS - 1e-6)) + 1
-    net = block.net(prior)
-    data, mask = known_state(prior, net, torch.from_numpy(known), torch.from_numpy(stands), frames)
-    leaving = [Past(torch.from_numpy(one).float(), Placement()).holder(prior, frames) for one in known]
+    net, count = block.net(prior), chosen.number()
+    observed = known_state(prior, net, torch.from_numpy(known), torch.from_numpy(stands), frames)
+    leaving = [Past(torch.from_numpy(one).float(), GroundPose()).holder(prior, frames) for one in known]
+    edits = PairEdits(stacked([observed] * count), leaving * count, frozen=[False] * (2 * count))
     features, _ = pair_features(
-        prior, net, said * count, frames, seeds=[s for number in range(count) for s in person_seeds(seed, number)],
-        known=data.repeat(count, 1, 1), mask=mask.repeat(count, 1, 1), change=leaving * count,
-        still=[False] * (2 * count), guidance=guidance, steps=steps, together=together, progress=progress,
-    )  # fmt: skip
+        prior, net, said * count, frames, seeds=pair_seeds(chosen), edits=edits, sampling=chosen, progress=progress
+    )
     made = []
     for numbers in features.double().numpy():
         places = two.decode(numbers, stands) + floors[:, None, None, None] * np.array([0.0, 1.0, 0.0])
         contacts = numbers[..., LAYOUT["contacts"]]
-        duet = [ground.behind(i, places[i], contacts[i], seen, added, clean=clean) for i in (0, 1)]
+        duet = [ground.behind(i, places[i], contacts[i], seen, added, foot_lock=foot_lock) for i in (0, 1)]
         made.append((duet[0], duet[1]))
     return made
 
@@ -405,7 +401,7 @@ class Ground:
         ratio = float(np.mean(self.legs)) / self.legs[person]
         return places + (ratio - 1.0) * places[:, :1] * np.array([1.0, 0.0, 1.0])
 
-    def behind(self, person: int, places: Array, contacts: Array, seen: int, added: int, *, clean: bool) -> Motion:
+    def behind(self, person: int, places: Array, contacts: Array, seen: int, added: int, *, foot_lock: bool) -> Motion:
         """The person's motion with ``added`` frames more: places (frames, 22, 3) at 20 per second on the common
         ground, contacts (frames, 4); frame ``seen - 1`` is the motion's last."""
         motion = self.motions[person]
@@ -415,7 +411,7 @@ class Ground:
         at = (np.arange(len(old)) - (shown - 1)) / motion.fps * FPS + seen - 1
         nearest = np.clip(at.round().astype(int), 0, len(contacts) - 1)
         drawn = positions_at(self.own(person, places), at)
-        made = worn(drawn, old, contacts=contacts[nearest], clean=clean, known=shown)
+        made = apply_positions(drawn, old, contacts=contacts[nearest], foot_lock=foot_lock, known=shown)
         nothing = kept_parts(motion.skeleton, frozenset(), np.zeros(3, dtype=bool))
         new = splice(old, made, shown, last=len(old), kept=nothing).frames(shown, shown + added)
         return concatenated(motion, new)

@@ -20,7 +20,7 @@ from motionloom.retarget import joints22, retarget, to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.measured import mean_rotation
 from motionloom.skeleton import Skeleton
-from motionloom.tasks.redraw import Drawn
+from motionloom.tasks.inpaint import Inpainted
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -68,24 +68,26 @@ def person_at_20(motion: Motion) -> Array:
     return resample_positions(np.concatenate([places, ahead]), motion.fps)[: frames + 1]
 
 
-def dressed(drawn: Drawn, old: Motion, *, clean: bool) -> Motion:
+def apply_sample(sample: Inpainted, old: Motion, *, foot_lock: bool) -> Motion:
     """What was drawn, on the old motion's skeleton, at its rate and length, over its floor; feet cleaned."""
-    places = resample_positions(drawn.positions, FPS, target=old.fps)[: len(old)]
-    nearest = np.minimum((np.arange(len(old)) * FPS / old.fps).round().astype(int), len(drawn.contacts) - 1)
-    return worn(places, old, contacts=drawn.contacts[nearest], clean=clean)
+    places = resample_positions(sample.positions, FPS, target=old.fps)[: len(old)]
+    nearest = np.minimum((np.arange(len(old)) * FPS / old.fps).round().astype(int), len(sample.contacts) - 1)
+    return apply_positions(places, old, contacts=sample.contacts[nearest], foot_lock=foot_lock)
 
 
-def worn(places: Array, old: Motion, *, clean: bool, contacts: Array | None = None, known: int | None = None) -> Motion:
+def apply_positions(
+    places: Array, old: Motion, *, foot_lock: bool, contacts: Array | None = None, known: int | None = None
+) -> Motion:
     """Places (frames of ``old``, 22, 3) metres of the uniform person that the old motion is, on its skeleton, over its
     floor; feet cleaned, by contacts (frames, 4) or by what the feet do.
 
     known: how many of the first places are the old motion's own, if what follows them is not: they tell where it is.
     """
     person = motion_from_positions(places, old.fps)
-    if clean:
+    if foot_lock:
         person = clean_feet(person, contacts=contacts)
-    made = in_manner_of(old, retarget(person, old.skeleton))
-    back = made.frames(0, known) if known else in_manner_of(old, retarget(to_smpl22(old), old.skeleton))
+    made = match_root(old, retarget(person, old.skeleton))
+    back = made.frames(0, known) if known else match_root(old, retarget(to_smpl22(old), old.skeleton))
     seen, carrier = old.frames(0, len(back)), _carrier(old.skeleton)
     apart = rot.multiply(seen.world_rotations()[:, carrier], rot.inverse(back.world_rotations()[:, carrier]))
     if np.median(np.abs(apart[:, 0])) < np.cos(np.radians(30)):
@@ -116,7 +118,7 @@ def _held_alike(made: Motion, old: Motion, known: int) -> Motion:
     return replace(made, rotations=rotations)
 
 
-def in_manner_of(old: Motion, made: Motion) -> Motion:
+def match_root(old: Motion, made: Motion) -> Motion:
     """The same poses told as in the old motion, of as many frames: which joint carries the way through the world.
 
     Files may hold the root still and move the hips in it; then the bones' changing lengths stay the old ones.
@@ -177,7 +179,7 @@ def carried(motion: Motion, turn: Array, about: Array, to: Array) -> Motion:
 
 def carried_level(motion: Motion, turn: Array, about: Array, to: Array) -> Motion:
     """The same along the floor, told in the motion's own manner."""
-    return in_manner_of(motion, carried(motion, turn, about, to * [1, 0, 1] + about * [0, 1, 0]))
+    return match_root(motion, carried(motion, turn, about, to * [1, 0, 1] + about * [0, 1, 0]))
 
 
 def standing(motion: Motion, frame: int) -> tuple[Array, Array]:

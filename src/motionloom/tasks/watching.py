@@ -16,10 +16,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from torch import Tensor
 
 from motionloom.diffusion.sampling import Snapshot
 
@@ -35,7 +36,7 @@ class Denoised:
     of: int
     """Moves of the walk; an edit of several stretches, or a batch of several lengths, takes several walks."""
     rows: tuple[int, ...]
-    """Numbers of the motions that are drawn together in this walk (duets: within their batch of 8); else 0."""
+    """Numbers of the motions that are drawn together in this walk; else 0."""
     decode: Callable[[], np.ndarray]
     """Gives what `positions` gives; any float type."""
 
@@ -67,16 +68,21 @@ def watching(on_denoised: OnDenoised) -> Iterator[None]:
         _callback.reset(token)
 
 
-def reported(
-    walk: Iterator[Snapshot], of: int, rows: Sequence[int], decode: Callable[[Snapshot], np.ndarray]
-) -> Iterator[Snapshot]:
-    """The snapshots of a walk of ``of`` moves, each reported before it is handed on.
+@dataclass(frozen=True)
+class View:
+    """How the states of a task are looked at."""
 
-    decode: a snapshot's clean data to (rows, people, frames, 22, 3).
-    """
-    for done, snapshot in enumerate(walk, start=1):
-        report(done, of, rows, lambda snapshot=snapshot: decode(snapshot))
-        yield snapshot
+    poses: Callable[[Tensor], np.ndarray]
+    """Denoised states (rows, tokens, features) to (motions, people, frames, 22, 3)."""
+    people: int = 1
+    """Rows of one motion, which lie next to each other."""
+
+    def reported(self, walk: Iterator[Snapshot], of: int, rows: Sequence[int]) -> Iterator[Snapshot]:
+        """The snapshots of a walk of ``of`` moves, each reported before it is handed on; rows: their numbers."""
+        motions = [row // self.people for row in rows[:: self.people]]
+        for done, snapshot in enumerate(walk, start=1):
+            report(done, of, motions, lambda snapshot=snapshot: self.poses(snapshot.clean))
+            yield snapshot
 
 
 def report(done: int, of: int, rows: Sequence[int], decode: Callable[[], np.ndarray]) -> None:
@@ -86,28 +92,39 @@ def report(done: int, of: int, rows: Sequence[int], decode: Callable[[], np.ndar
         callback(Denoised(done, of, tuple(rows), decode))
 
 
-class Latest:
-    """The newest prediction for each segment of a long motion, whose rows are at different levels at the same time.
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class ChainView(Generic[R]):
+    """How the rows of a long motion are looked at, which are at different levels at the same time."""
+
+    part: Callable[[R, Tensor, int], Any]
+    """A row, its denoised state and the level of that to what is kept of it."""
+    poses: Callable[[list[Any]], np.ndarray]
+    """What was kept of rows, from the first one on and in order, to (people, frames, 22, 3)."""
+
+
+class Latest(Generic[R]):
+    """The newest prediction for each segment of a long motion.
 
     It is kept only where somebody watches, for at most `SHOWN` segments, the newest ones; so memory stays bounded.
     """
 
-    def __init__(self, steps: int) -> None:
-        self.steps = steps
+    def __init__(self, view: ChainView[R], steps: int) -> None:
+        self.view, self.steps = view, steps
         self.parts: dict[int, Any] = {}
         self.calls: Counter[int] = Counter()
 
-    def add(self, numbers: Sequence[int], parts: Sequence[Any]) -> None:
-        """Take in what was predicted for some segments."""
+    def report(self, numbers: Sequence[int], rows: Sequence[R], states: Sequence[Tensor], at: Sequence[int]) -> None:
+        """Take in what was predicted for some rows, and tell of what is there if that begins with the first one."""
         if _callback.get() is None:
             return
-        self.parts.update(zip(numbers, parts, strict=True))
+        for number, row, state, level in zip(numbers, rows, states, at, strict=True):
+            self.parts[number] = self.view.part(row, state, level)
         self.calls.update(numbers)
         for old in sorted(self.parts)[:-SHOWN]:
             del self.parts[old], self.calls[old]
-
-    def report(self, decode: Callable[[list[Any]], np.ndarray]) -> None:
-        """Tell of what is there, in order; decode gives (people, frames, 22, 3) of it, from segment 0 on only."""
         if self.parts and min(self.parts) == 0:
             parts = [self.parts[number] for number in sorted(self.parts)]
-            report(min(self.calls.values()), self.steps, [0], lambda: decode(parts)[None])
+            report(min(self.calls.values()), self.steps, [0], lambda: self.view.poses(parts)[None])

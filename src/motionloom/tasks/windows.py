@@ -1,7 +1,7 @@
 """The windows that predictions are made of: the uniform person at a predictor's rate, and what draws behind it."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +12,14 @@ from motionloom.kinematics.feet import envelope
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.tasks.completion import Known, next_frames
+from motionloom.tasks.sampling import PredictionSampling
 from motionloom.weights.predictor import Predictor
 
 Array = NDArray[np.float64]
 
 CONTEXT = 3.0
 """Seconds of a clip that are looked at for where its floor is."""
-ONWARD = 1.08
+TEMPERATURE_AFTER_FIRST = 1.08
 """How much livelier the windows behind the first begin: the network goes on from its own calm; docs/decisions/0015."""
 SUNK, EASE = 0.02, 0.2
 """Metres under the floor that are left, and seconds in which people who would sink further are lifted."""
@@ -26,15 +27,44 @@ Given = Callable[[int, int], Known | None]
 """(first, last): what is known of the frames ``first`` to before ``last`` behind the past, 1 being the first."""
 
 
+@dataclass(frozen=True, eq=False)
+class Past:
+    """The clip that futures go on from: put onto the uniform person once, and carried along."""
+
+    motion: Motion
+    tail: Motion
+    """Its last frames that lie within what the predictor sees, at least 2."""
+    person: Array
+    """(h, 22, 3) metres: the uniform person at the predictor's rate; the last frame is the clip's last frame."""
+    rate: float
+    """Frames of the predictor in one of the clip."""
+    observed: int
+    """Frames that the predictor sees at most."""
+
+    @staticmethod
+    def of(predictor: Predictor, motion: Motion) -> "Past":
+        """Of a clip of two frames or more."""
+        seconds = max(CONTEXT, predictor.observed / predictor.fps)
+        context = motion.frames(max(len(motion) - round(seconds * motion.fps) - 2, 0), len(motion))
+        whole = int((len(motion) - 1) / motion.fps * predictor.fps + 1e-6) + 1
+        back = np.arange(min(max(whole, 2), predictor.observed))[::-1] / predictor.fps * motion.fps
+        person = positions_at(to_smpl22(context).positions(), len(context) - 1 - back)
+        seen = max(int(back[0] + 1e-6) + 1, 2)
+        tail = motion.frames(max(len(motion) - seen, 0), len(motion))
+        return Past(motion, tail, person, predictor.fps / motion.fps, predictor.observed)
+
+    def frames(self, seconds: float) -> int:
+        """Frames of so many seconds at the clip's rate, at least 1."""
+        return max(round(seconds * self.motion.fps), 1)
+
+
 @dataclass(frozen=True)
-class Pen:
-    """What draws, and how."""
+class WindowSampler:
+    """What samples windows, and how."""
 
     predictor: Predictor
-    steps: int
-    guidance: float
-    temperature: float
-    root: bool
+    sampling: PredictionSampling
+    root: bool = True
     """False: the person stays in place, but rises and sinks."""
 
     def windows(
@@ -45,7 +75,7 @@ class Pen:
         for number in range(count):
             first = number * frames + 1
             known = given(first, first + self.predictor.frames - person.shape[1]) if given else None
-            made = self.window(person, seeds, number, known, livelier=ONWARD if number else 1.0)
+            made = self.window(person, seeds, number, known, livelier=TEMPERATURE_AFTER_FIRST if number else 1.0)
             yield made
             person = np.concatenate([person, made], axis=1)[:, -self.predictor.observed :]
 
@@ -62,7 +92,7 @@ class Pen:
         """(rows, frames, 22, 3): window ``number`` behind ``person`` (rows, h, 22, 3)."""
         made = next_frames(
             self.predictor, person, seeds=[row_seed(*seed, number) for seed in seeds], known=known, frames=frames,
-            steps=self.steps, guidance=self.guidance, temperature=self.temperature * livelier,
+            sampling=replace(self.sampling, temperature=min(self.sampling.temperature * livelier, 2.0)),
         )  # fmt: skip
         made = made + _lift(person, made, self.predictor.fps)[..., None, None] * [0, 1, 0]
         return made if self.root else made + (person[:, -1:, :1] - made[:, :, :1]) * [1, 0, 1]
@@ -75,25 +105,6 @@ def _lift(person: Array, made: Array, fps: float) -> Array:
     ease = max(round(EASE * fps), 1)
     u = (np.arange(1, made.shape[1] + 1) / (2 * ease)).clip(0, 1)
     return envelope(under, ease // 2) * u * u * (3 - 2 * u)
-
-
-def person_of(predictor: Predictor, past: Motion) -> Array:
-    """(h, 22, 3) metres: the uniform person at the predictor's rate; the last frame is the past's last frame."""
-    seconds = max(CONTEXT, predictor.observed / predictor.fps)
-    context = past.frames(max(len(past) - round(seconds * past.fps) - 2, 0), len(past))
-    places = to_smpl22(context).positions()
-    return positions_at(places, len(context) - 1 - _back(predictor, past))
-
-
-def _back(predictor: Predictor, past: Motion) -> Array:
-    """Frames of the past's rate from its end back to each of those that are seen."""
-    whole = int((len(past) - 1) / past.fps * predictor.fps + 1e-6) + 1
-    return np.arange(min(max(whole, 2), predictor.observed))[::-1] / predictor.fps * past.fps
-
-
-def seen_frames(predictor: Predictor, past: Motion) -> int:
-    """Frames of the past that lie within what is seen, at least 2."""
-    return max(int(_back(predictor, past)[0] + 1e-6) + 1, 2)
 
 
 def windows_for(predictor: Predictor, seconds: float) -> int:

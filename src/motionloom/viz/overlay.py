@@ -7,6 +7,7 @@ futures of one past can be laid over each other. Metres, +Y up; all motions lie 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypedDict, Unpack
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -52,6 +53,16 @@ def tint(number: int) -> Colour:
     return draw.mix(colour, towards, amount)
 
 
+class Look(TypedDict, total=False):
+    """How a picture or film looks."""
+
+    caption: str
+    size: tuple[int, int]
+    """Pixels of a film."""
+    fps: float | None
+    """Frames per second of a film; None: those of the fastest motion."""
+
+
 def draw_futures(
     past: Motion,
     futures: Sequence[Motion],
@@ -59,18 +70,26 @@ def draw_futures(
     *,
     truth: Motion | None = None,
     held: Sequence[str] = (),
-    caption: str = "",
     lead: float = 2.0,
-    size: tuple[int, int] = (960, 540),
-    fps: float | None = None,
+    **look: Unpack[Look],
 ) -> Path:
     """Draw many futures of one past, each in a colour of its own and translucent, the past grey, the truth black.
 
-    ``futures`` and ``truth`` begin one frame after the past's last, in its world frame; they share its skeleton and
-    rate. A .png shows the past as ghosts up to its last pose, the futures at a few moments, and all ways from above;
-    an .mp4 or .gif plays the last ``lead`` seconds of the past and then all futures at once. ``held`` names joints to
-    mark on every future. The same input gives the same bytes (pictures and GIFs).
-    Errors: no futures, another skeleton or rate, unknown joints, more than 200 people, or as for `draw_scene`.
+    A .png shows the past as ghosts up to its last pose, the futures at a few moments, and all ways from above; an .mp4
+    or .gif plays the end of the past and then all futures at once. The same input gives the same bytes (pictures and
+    GIFs).
+
+    Args:
+        past: what was seen.
+        futures: begin one frame after the past's last, in its world; of its skeleton and rate.
+        path: the file.
+        truth: what came, as a future.
+        held: names of joints to mark on every future.
+        lead: seconds of the past that are shown.
+        look: caption, size in pixels and frames per second, see `Look`.
+
+    Raises:
+        MotionloomError: no futures, another skeleton or rate, unknown joints, more than 200 people, or as `draw_scene`.
     """
     if not futures:
         raise MotionloomError("there is no future to draw; give at least one")
@@ -89,7 +108,7 @@ def draw_futures(
     actors += [Actor(m, tint(i), past.seconds, opacity, f"{i + 1}", marks=marks) for i, m in enumerate(futures)]
     if truth is not None:
         actors.append(Actor(truth, TRUTH, past.seconds, 0.8, "truth"))
-    return draw_scene(actors, path, caption=caption, zero=past.seconds - 1 / past.fps, size=size, fps=fps)
+    return draw_scene(actors, path, zero=past.seconds - 1 / past.fps, **look)
 
 
 def draw_scene(

@@ -12,29 +12,21 @@ An `AdaptedNet` is called like the network it comes from; with `Controlled` as i
 
 import copy
 import hashlib
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import torch
-from safetensors import SafetensorError, safe_open
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from motionloom.errors import MotionloomError
-from motionloom.io.atomic import finished
-from motionloom.io.tensors import save_tensors
-from motionloom.io.text import plain_json
 from motionloom.nets.prior import Bound, Condition, NetConfig, PriorNet
-from motionloom.weights.container import check, is_signed
+from motionloom.weights.container import ADAPTERS, check, halved
 
-KEY = "motionloom-adapter"
-FORMAT = 1
-MAX_BYTES = 64 << 20
+KEY = ADAPTERS.key
 MAX_RANK = 512
 CHANGED = ("embed", "out", "project", "query", "heard", "linear1", "linear2", "change")
 """Last names of the layers that an adapter changes."""
@@ -109,12 +101,7 @@ class Adapter:
 
         Raises `MotionloomError` for a file that is missing, damaged or too large, and for another prior's adapter.
         """
-        path = adapters().get(str(adapter)) or Path(adapter)
-        if not path.is_file():
-            names = ", ".join(adapters()) or "none"
-            raise MotionloomError(
-                f"no adapter {str(adapter)!r}: there is no such file, and the shipped ones are {names}"
-            )
+        path = ADAPTERS.find(adapter)
         found = read_adapter(path)
         found.check_prior(prior, path.name)
         layers = linears(prior.net, taught=found.taught)
@@ -137,13 +124,8 @@ class Adapter:
 
     def save(self, path: Path | str) -> Path:
         """Write it as a .safetensors file (float16) and give the path back; the file appears whole or not at all."""
-        path = Path(path)
-        if path.suffix != ".safetensors":
-            raise MotionloomError(f"adapters are written as .safetensors; {path.name} has another suffix")
-        about = {key: getattr(self, key) for key in _TEXTS} | {"format": FORMAT, "rank": self.rank, "notes": self.notes}
-        tensors = {k: v.detach().cpu().to(torch.float16).contiguous() for k, v in self.tensors.items()}
-        save_tensors(tensors, path, metadata={KEY: json.dumps(about)})
-        return path
+        about = {key: getattr(self, key) for key in _TEXTS} | {"rank": self.rank, "notes": self.notes}
+        return ADAPTERS.write(path, halved(self.tensors), about)
 
 
 _TEXTS = ("name", "control", "base", "fingerprint", "licence", "data")
@@ -151,18 +133,23 @@ _TEXTS = ("name", "control", "base", "fingerprint", "licence", "data")
 
 def adapters() -> dict[str, Path]:
     """Names and places of the adapters inside the package, for the prior ``default``."""
-    folder = Path(str(resources.files("motionloom"))) / "weights" / "control"
-    return {path.stem: path for path in finished(folder, "*.safetensors")}
+    return ADAPTERS.shipped()
 
 
 def is_adapter(path: Path) -> bool:
     """True for a file of `Adapter.save`, damaged or not, by what its head says."""
-    return is_signed(path, KEY)
+    return ADAPTERS.signed(path)
 
 
 def read_adapter(path: Path) -> Adapter:
     """What a file holds and says, without a prior to fit it to; raises MotionloomError as `Adapter.load`."""
-    return _parse(path, *_read(path))
+    about, tensors = ADAPTERS.read(path)
+    with ADAPTERS.parsing(path):
+        rank, notes, said = about["rank"], about.get("notes", {}), {key: about[key] for key in _TEXTS}
+        good = isinstance(rank, int) and not isinstance(rank, bool) and 1 <= rank <= MAX_RANK
+        if not good or not isinstance(notes, dict) or not all(isinstance(value, str) for value in said.values()):
+            raise ValueError("values of the wrong kind")
+    return Adapter(rank=rank, tensors={k: v.float() for k, v in tensors.items()}, notes=notes, **said)
 
 
 def fingerprint(net: PriorNet) -> str:
@@ -345,29 +332,6 @@ def _pace(key: str) -> float:
 
 def _plain(name: str) -> str:
     return name.replace(".", "/")  # names of parameters may not have dots
-
-
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise MotionloomError(f"{path} is larger than an adapter can be ({MAX_BYTES >> 20} MiB)")
-        with safe_open(path, framework="pt") as file:
-            about = plain_json((file.metadata() or {})[KEY])
-            if not isinstance(about, dict):
-                raise ValueError("no description")
-            return about, {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
-    except (SafetensorError, KeyError, ValueError, RecursionError) as error:
-        raise MotionloomError(f"{path} is not an adapter of motionloom ({error!r}); fetch or train it again") from None
-
-
-def _parse(path: Path, about: dict[str, Any], tensors: dict[str, Tensor]) -> Adapter:
-    rank, notes, said = about.get("rank"), about.get("notes", {}), {key: about.get(key) for key in _TEXTS}
-    if about.get("format") != FORMAT:
-        raise MotionloomError(f"{path} has the adapter format {about.get('format')!r}; this motionloom reads {FORMAT}")
-    good = isinstance(rank, int) and not isinstance(rank, bool) and 1 <= rank <= MAX_RANK and isinstance(notes, dict)
-    if not good or not all(isinstance(value, str) for value in said.values()):
-        raise MotionloomError(f"{path} does not describe an adapter; fetch or train it again")
-    return Adapter(rank=rank, tensors={k: v.float() for k, v in tensors.items()}, notes=notes, **said)  # type: ignore[arg-type]
 
 
 def _shapes(

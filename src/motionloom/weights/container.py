@@ -1,22 +1,138 @@
-"""Weights out of files against the network that is to have them."""
+"""Weight files: one container for all kinds, and weights out of them against the network that is to have them.
 
-from collections.abc import Mapping, Sequence
+A file is a safetensors file with a JSON description under one key of its head, which says of what kind it is. Nothing
+in it is ever executed; what it claims is checked before anything of that size is made.
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
 from torch import Tensor, nn
 
 from motionloom.errors import MotionloomError
+from motionloom.io.atomic import finished
+from motionloom.io.tensors import save_tensors
+from motionloom.io.text import plain_json
+
+FORMAT = 1
+MAX_BYTES = 2 << 30
+_WRONG = (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError)
+"""What comes of descriptions that say something else than was expected."""
 
 
-def is_signed(path: Path, key: str) -> bool:
-    """Whether the head of a safetensors file, damaged or not, has this key: each kind of weight file has its own."""
+@dataclass(frozen=True)
+class Container:
+    """One kind of weight file."""
+
+    noun: str
+    """What it holds, such as "prior"."""
+    key: str
+    """Of the head, where the description lies; every kind has its own."""
+    folder: str = ""
+    """Of the shipped files, inside the package's ``weights``."""
+    max_bytes: int = MAX_BYTES
+
+    def shipped(self) -> dict[str, Path]:
+        """Names and places of the files of this kind inside the package."""
+        place = Path(str(resources.files("motionloom"))) / "weights" / self.folder
+        return {path.stem: path for path in finished(place, "*.safetensors") if self.folder or self.signed(path)}
+
+    def find(self, weights: str | Path) -> Path:
+        """The file for a shipped name or a path; raises MotionloomError where there is none."""
+        names = self.shipped()
+        path = names.get(str(weights)) or Path(weights)
+        if not path.is_file():
+            raise MotionloomError(
+                f"no {self.noun} {str(weights)!r}: there is no such file, and the shipped names are "
+                f"{', '.join(names) or 'none'}"
+            )
+        return path
+
+    def signed(self, path: Path) -> bool:
+        """Whether a file, damaged or not, is of this kind, by what its head says."""
+        try:
+            with safe_open(path, framework="pt") as file:
+                return self.key in (file.metadata() or {})
+        except (SafetensorError, OSError):
+            return False
+
+    def read(self, path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
+        """The description and the tensors; raises MotionloomError for a file that is damaged or of another kind."""
+        tensors, head = read_tensors(path, self.max_bytes)
+        return self.describe(path, head), tensors
+
+    def describe(self, path: Path, head: Mapping[str, str]) -> dict[str, Any]:
+        """The description in a file's head."""
+        with self.parsing(path):
+            if self.key not in head:
+                kind = next((_a(other.noun) for other in KINDS if other.key in head), "something else")
+                raise MotionloomError(f"{path} is {kind}, not {_a(self.noun)}; name weights of that kind")
+            about = plain_json(head[self.key])
+            if about.get("format", FORMAT) != FORMAT:
+                raise MotionloomError(
+                    f"{path} has the {self.noun} format {about['format']!r}; this motionloom reads {FORMAT}: update it"
+                )
+            return about
+
+    @contextmanager
+    def parsing(self, path: Path) -> Iterator[None]:
+        """Inside, whatever is wrong with a description becomes a MotionloomError."""
+        try:
+            yield
+        except MotionloomError:
+            raise
+        except _WRONG as error:
+            reason = " ".join(str(error).split())[:160] or "it says something else"
+            raise MotionloomError(
+                f"{path} does not describe a motionloom {self.noun}; name a file that does, or make it again ({reason})"
+            ) from None
+
+    def write(self, path: Path | str, tensors: Mapping[str, Tensor], about: Mapping[str, Any]) -> Path:
+        """A .safetensors file, whole or not at all; raises MotionloomError for another suffix."""
+        path = Path(path)
+        if path.suffix != ".safetensors":
+            raise MotionloomError(f"weights are written as .safetensors; {path.name} has another suffix")
+        kept = {key: value.detach().cpu().contiguous() for key, value in tensors.items()}
+        return save_tensors(kept, path, metadata={self.key: json.dumps({"format": FORMAT, **about}, default=dict)})
+
+
+def _a(noun: str) -> str:
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
+
+
+PRIORS = Container("prior", "motionloom")
+PREDICTORS = Container("predictor", "motionloom-predictor", "prediction")
+PAIRS = Container("two-person block", "motionloom-pair", "pair", 64 << 20)
+ADAPTERS = Container("adapter", "motionloom-adapter", "control", 64 << 20)
+KINDS = (PRIORS, PREDICTORS, PAIRS, ADAPTERS)
+
+
+def read_tensors(path: Path, max_bytes: int = MAX_BYTES) -> tuple[dict[str, Tensor], dict[str, str]]:
+    """Tensors and metadata of a safetensors file, sizes checked; pickles are refused by what they are."""
     try:
+        if path.stat().st_size > max_bytes:
+            raise MotionloomError(f"{path} is larger than the {max_bytes >> 20} MiB of such a file; name another")
         with safe_open(path, framework="pt") as file:
-            return key in (file.metadata() or {})
-    except (SafetensorError, OSError):
-        return False
+            return {key: file.get_tensor(key) for key in file.keys()}, dict(file.metadata() or {})  # noqa: SIM118
+    except (SafetensorError, OSError, *_WRONG, RuntimeError) as error:
+        if isinstance(error, MotionloomError):
+            raise
+        raise MotionloomError(
+            f"{path} is not a whole safetensors file ({error}); fetch or train it again, and bring published .pt files "
+            "in through 'motionloom import'"
+        ) from None
+
+
+def halved(weights: Mapping[str, Tensor], half: bool = True) -> dict[str, Tensor]:
+    """Weights as files hold them: float16, or float32 unless ``half``."""
+    return {key: value.detach().to(torch.float16 if half else torch.float32) for key, value in weights.items()}
 
 
 def shapes(net: nn.Module) -> dict[str, tuple[int, ...]]:

@@ -10,10 +10,8 @@ the observation padded with its last pose. Published checkpoints are of this man
 guesses the clean spectrum, and is told what is known, which joints in which frames that is, and the pose itself.
 """
 
-import json
 import math
 from dataclasses import asdict, dataclass, replace
-from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,15 +21,11 @@ from torch import Tensor
 from motionloom.diffusion import SCHEDULES, Basis, Dct, Denoiser, Frames, Schedule, State, from_noise
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import Layout
-from motionloom.io.atomic import finished
-from motionloom.io.tensors import save_tensors
-from motionloom.io.text import plain_json
 from motionloom.nets.predictor import NetConfig, TransLinear
 from motionloom.nets.unfilled import unfilled
-from motionloom.weights.container import fill, is_signed
-from motionloom.weights.prior import Card, find_device, read_tensors
+from motionloom.weights.container import PREDICTORS, fill, halved
+from motionloom.weights.prior import Card, find_device
 
-FORMAT = 1
 LONGEST_WINDOW = 2000
 
 
@@ -120,34 +114,19 @@ def told_shape(layout: Layout, kept: int) -> tuple[int, int]:
 
 def shipped_predictors() -> dict[str, Path]:
     """Names and places of the predictors inside the package."""
-    folder = Path(str(resources.files("motionloom"))) / "weights" / "prediction"
-    return {path.stem: path for path in finished(folder, "*.safetensors")}
+    return PREDICTORS.shipped()
 
 
 def find_predictor(weights: str | Path) -> Path:
     """The file for a shipped name or a path."""
-    names = shipped_predictors()
-    if str(weights) in names:
-        return names[str(weights)]
-    path = Path(weights)
-    if not path.is_file():
-        listed = ", ".join(names) or "none"
-        raise MotionloomError(
-            f"no predictor {str(weights)!r}: there is no such file, and the shipped ones are {listed}"
-        )
-    return path
+    return PREDICTORS.find(weights)
 
 
 def save_predictor(predictor: Predictor, path: Path | str, *, half: bool = True) -> Path:
     """Write a predictor as a .safetensors file and give the path back; as float16 unless ``half`` is False."""
-    path = Path(path)
-    if path.suffix != ".safetensors":
-        raise MotionloomError(f"weights are written as .safetensors; {path.name} has another suffix")
-    kind = torch.float16 if half else torch.float32
-    tensors = {f"net.{k}": v.detach().cpu().to(kind).contiguous() for k, v in predictor.net.state_dict().items()}
-    tensors |= {name: getattr(predictor, name).detach().cpu().float().clone() for name in ("mean", "std", "pose")}
+    tensors = {f"net.{k}": v for k, v in halved(predictor.net.state_dict(), half).items()}
+    tensors |= {name: getattr(predictor, name).float().clone() for name in ("mean", "std", "pose")}
     about = {
-        "format": FORMAT,
         "net": asdict(predictor.net.config),
         "schedule": {"name": predictor.schedule.name, "steps": predictor.schedule.steps},
         "layout": predictor.layout.plain(),
@@ -158,25 +137,18 @@ def save_predictor(predictor: Predictor, path: Path | str, *, half: bool = True)
         "manner": predictor.manner,
         "card": asdict(predictor.card),
     }
-    save_tensors(tensors, path, metadata={"motionloom-predictor": json.dumps(about)})
-    return path
+    return PREDICTORS.write(path, tensors, about)
 
 
 def is_predictor(path: Path) -> bool:
     """True for a file of `save_predictor`, damaged or not, by what its head says."""
-    return is_signed(path, "motionloom-predictor")
+    return PREDICTORS.signed(path)
 
 
 def load_predictor(path: Path) -> Predictor:
     """Read a predictor; raises MotionloomError where the file is damaged, of another kind or of a newer format."""
-    tensors, metadata = read_tensors(path)
-    if "motionloom-predictor" not in metadata:
-        kind = "a prior" if "motionloom" in metadata else "something else"
-        raise MotionloomError(f"{path} is {kind}, not a predictor; name a file that 'motionloom train predictor' wrote")
-    try:
-        about = plain_json(metadata["motionloom-predictor"])
-        if about["format"] != FORMAT:
-            raise MotionloomError(f"{path} has format {about['format']}; this motionloom reads {FORMAT}: update it")
+    about, tensors = PREDICTORS.read(path)
+    with PREDICTORS.parsing(path):
         config, layout = NetConfig.parse(about["net"]), Layout.parse(about["layout"])
         basis = _basis(config.kept, about["frames"], about["dct"])
         schedule, card = _schedule(about["schedule"]), _card(about["card"])
@@ -186,10 +158,6 @@ def load_predictor(path: Path) -> Predictor:
             raise ValueError("frames that do not fit together")
         if layout.channels != config.channels or config.told != told[manner]:
             raise ValueError("a network that does not fit its layout")
-    except MotionloomError:
-        raise
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
-        raise MotionloomError(f"{path} does not describe a predictor ({error!r}); name a file that does") from None
     with unfilled():  # what a file only claims to hold takes no memory
         net = TransLinear(config)
     fill(net, {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}, str(path))

@@ -5,11 +5,9 @@ text encoder) and ``known.*`` (a table of training sentences), and JSON metadata
 sizes, schedule, features, text encoder, licence, provenance, known sentences. Nothing in it is ever executed.
 """
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -19,19 +17,15 @@ from torch import Tensor
 
 from motionloom.diffusion import SCHEDULES, Schedule
 from motionloom.errors import MotionloomError
-from motionloom.io.atomic import finished
-from motionloom.io.tensors import save_tensors
-from motionloom.io.text import plain_json
 from motionloom.nets.prior import Condition, NetConfig, PriorNet, condition
 from motionloom.nets.text import MiniLM, TextEncoder
 from motionloom.nets.text.known import Known, pack_known, unpack_known, with_sentences
 from motionloom.nets.text.published import TEXTS, PublishedText
 from motionloom.nets.unfilled import unfilled
 from motionloom.weights.adapter import Adapter, merged, origin
-from motionloom.weights.container import fill, is_signed
+from motionloom.weights.container import PRIORS, fill, halved, read_tensors
 
-FORMAT = 1
-MAX_BYTES = 2 << 30
+__all__ = ["read_tensors"]
 
 
 @dataclass(frozen=True)
@@ -115,20 +109,12 @@ def find_device(name: str | torch.device) -> torch.device:
 
 def shipped() -> dict[str, Path]:
     """Names and places of the priors inside the package."""
-    folder = Path(str(resources.files("motionloom"))) / "weights"
-    return {path.stem: path for path in finished(folder, "*.safetensors") if is_signed(path, "motionloom")}
+    return PRIORS.shipped()
 
 
 def find_weights(weights: str | Path) -> Path:
     """The file for a shipped name or a path."""
-    names = shipped()
-    if str(weights) in names:
-        return names[str(weights)]
-    path = Path(weights)
-    if not path.is_file():
-        listed = ", ".join(names) or "none"
-        raise MotionloomError(f"no weights {str(weights)!r}: there is no such file, and the shipped names are {listed}")
-    return path
+    return PRIORS.find(weights)
 
 
 def save_prior(prior: Prior, path: Path | str, *, half: bool = True) -> Path:
@@ -136,16 +122,11 @@ def save_prior(prior: Prior, path: Path | str, *, half: bool = True) -> Path:
 
     The embedded text encoder goes inside. Raises `MotionloomError` for another suffix or a place not to be written.
     """
-    path = Path(path)
-    if path.suffix != ".safetensors":
-        raise MotionloomError(f"weights are written as .safetensors; {path.name} has another suffix")
-    kind = torch.float16 if half else torch.float32
-    tensors = {f"net.{k}": v.detach().cpu().to(kind).contiguous() for k, v in prior.net.state_dict().items()}
-    tensors |= {"mean": prior.mean.cpu().float().clone(), "std": prior.std.cpu().float().clone()}
+    tensors = {f"net.{k}": v for k, v in halved(prior.net.state_dict(), half).items()}
+    tensors |= {"mean": prior.mean.float().clone(), "std": prior.std.float().clone()}
     if isinstance(prior.text, MiniLM):
-        tensors |= {f"text.{k}": v.contiguous() for k, v in prior.text.to_tensors().items()}
+        tensors |= {f"text.{k}": v for k, v in prior.text.to_tensors().items()}
     about = {
-        "format": FORMAT,
         "net": asdict(prior.net.config),
         "schedule": {"name": prior.schedule.name, "steps": prior.schedule.steps},
         "text": prior.text.name,
@@ -155,39 +136,22 @@ def save_prior(prior: Prior, path: Path | str, *, half: bool = True) -> Path:
     if prior.known is not None:
         table, about["known"] = pack_known(prior.known)
         tensors |= table
-    save_tensors(tensors, path, metadata={"motionloom": json.dumps(about)})
-    return path
-
-
-def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """Tensors and metadata of a safetensors file, sizes checked; pickles are refused by what they are."""
-    try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise MotionloomError(f"{path} is {size / 2**30:.1f} GiB large; weight files of at most 2 GiB are read")
-        with safe_open(path, framework="pt") as file:
-            return {key: file.get_tensor(key) for key in file.keys()}, dict(file.metadata() or {})  # noqa: SIM118
-    except (SafetensorError, OSError, ValueError, TypeError, KeyError, RuntimeError, AttributeError) as error:
-        if isinstance(error, MotionloomError):
-            raise
-        raise MotionloomError(
-            f"{path} is not a whole safetensors file ({error}); published .pt files come in through 'motionloom import'"
-        ) from None
+    return PRIORS.write(path, tensors, about)
 
 
 def read_card(path: Path) -> Card:
     """What a weight file says about itself, without its weights; raises MotionloomError as `load_prior` does."""
     try:
         with safe_open(path, framework="pt") as file:
-            return Card(**_about(path, dict(file.metadata() or {}))["card"])
+            return Card(**_about(path, PRIORS.describe(path, dict(file.metadata() or {})))["card"])
     except SafetensorError as error:
         raise MotionloomError(f"{path} is not a whole safetensors file ({error}); fetch the weights again") from None
 
 
 def load_prior(path: Path, device: str | torch.device = "cpu") -> Prior:
     """Read a prior; raises MotionloomError where the file is damaged, of another kind or of a newer format."""
-    tensors, metadata = read_tensors(path)
-    about = _about(path, metadata)
+    about, tensors = PRIORS.read(path)
+    about = _about(path, about)
     config = NetConfig.parse(about["net"])
     with unfilled():
         net = PriorNet(config)
@@ -210,15 +174,9 @@ def load_prior(path: Path, device: str | torch.device = "cpu") -> Prior:
     return prior if str(device) == "cpu" else prior.to(device)
 
 
-def _about(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
-    if "motionloom" not in metadata:  # such as an evaluator's or an adapter's
-        raise MotionloomError(f"{path} does not describe a motionloom prior; name a file that does")
-    try:
-        about = plain_json(metadata["motionloom"])
-        if about["format"] != FORMAT:
-            raise MotionloomError(
-                f"{path} has format {about['format']}; this motionloom reads format {FORMAT}: update it"
-            )
+def _about(path: Path, about: dict[str, Any]) -> dict[str, Any]:
+    """A description with every value of the right kind."""
+    with PRIORS.parsing(path):
         steps = about["schedule"]["steps"]
         known = about["schedule"]["name"] in SCHEDULES and type(steps) is int and 1 <= steps <= 100_000
         kinds = {"name": str, "licence": str, "data": str, "notes": dict}
@@ -229,14 +187,7 @@ def _about(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
             known and good_card and good_rate and isinstance(about["net"], dict) and isinstance(about["text"], str)
         ):
             raise ValueError("values of the wrong kind")
-        about["card"] = {k: about["card"][k] for k in ("name", "licence", "data", "notes") if k in about["card"]}
-        return about
-    except MotionloomError:
-        raise
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
-        raise MotionloomError(
-            f"{path} does not describe a motionloom prior ({error!r}); name a file that does"
-        ) from None
+        return {**about, "card": {k: card[k] for k in kinds if k in card}}
 
 
 def _text(path: Path, name: str, tensors: dict[str, Tensor]) -> TextEncoder:

@@ -38,14 +38,14 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
     """What the commands asked of the tasks, which make simple motions and stop where they are told."""
     seen: dict = {"stop": None, "problem": KeyboardInterrupt}
 
-    def predict(predictor, past, *, count, seconds, seed, hold, guidance, root, clean, progress, **walk):
+    def predict(predictor, past, *, count, seconds, seed, hold, guidance, root, foot_lock, progress, **walk):
         seen.update(past=past, count=count, seconds=seconds, seed=seed, hold=hold, guidance=guidance, root=root)
-        seen.update(clean=clean, walk=walk)
+        seen.update(foot_lock=foot_lock, walk=walk)
         progress(1, 1)
         return [stream.joined([past, future(past, seconds, i)]) for i in range(count)]
 
-    def predict_pieces(predictor, past, *, seconds, number, seed, hold, guidance, root, clean, **walk):
-        seen.update(past=past, seconds=seconds, seed=seed, hold=hold, root=root, clean=clean, walk=walk)
+    def predict_pieces(predictor, past, *, seconds, number, count, seed, hold, guidance, root, foot_lock, **walk):
+        seen.update(past=past, seconds=seconds, seed=seed, hold=hold, root=root, foot_lock=foot_lock, walk=walk)
         if (number, -1) == seen["stop"]:
             raise seen["problem"]
         yield past
@@ -55,7 +55,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
                 raise seen["problem"]
             yield whole.frames(at, at + 300)
 
-    def switch(predictor, past, target, *, count, seconds, seed, facing, guidance, clean, **walk):
+    def switch(predictor, past, target, *, count, seconds, seed, facing, guidance, foot_lock, **walk):
         seen.update(past=past, target=target, count=count, seconds=seconds, facing=facing, walk=walk)
         still = [replace(one, translations=None) for one in (past, target)]
         return [stream.joined([still[0], future(past, seconds, i), still[1]]) for i in range(count)]

@@ -37,8 +37,8 @@ def test_a_folder_holds_one_file_per_future_a_picture_and_a_film(weights, asked,
 def test_lines_ask_what_the_tasks_take(weights, asked):
     words = ["predict", "past.bvh", "--horizon", "3", "--out", "a.npz", "--seed", "5", "--guidance", "1.5"]
     walk = ["--steps", "4", "--temperature", "0"]
-    assert run(weights, *words, *walk, "--no-root", "--raw", "--count", "2") == 0
-    keys = ("seconds", "count", "seed", "walk", "guidance", "root", "clean", "hold")
+    assert run(weights, *words, *walk, "--no-root", "--no-foot-lock", "--count", "2") == 0
+    keys = ("seconds", "count", "seed", "walk", "guidance", "root", "foot_lock", "hold")
     assert [asked[key] for key in keys] == [3, 2, 5, {"steps": 4, "temperature": 0}, 1.5, False, False, None]
     assert run(weights, "predict", "past.bvh", "--no-picture") == 0
     assert [asked[key] for key in keys] == [2, 10, 0, {}, 1, True, True, None]

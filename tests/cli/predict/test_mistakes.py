@@ -86,7 +86,7 @@ def test_mistakes_are_one_sentence_and_nothing_is_written(weights, asked, words,
 
 def test_a_predictor_is_no_prior(weights, capsys):
     assert main(["generate", "walk", "--weights", weights]) == 2
-    assert "does not describe a motionloom prior" in capsys.readouterr().err
+    assert "is a predictor, not a prior" in capsys.readouterr().err
 
 
 def test_the_schema_is_printed_as_json(capsys):

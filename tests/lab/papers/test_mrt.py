@@ -132,7 +132,7 @@ def test_what_is_no_such_file_is_told(tmp_path: Path) -> None:
     with pytest.raises(MotionloomError, match="--train-mrt"):
         MrtFile.load(tmp_path / "none.safetensors")
     (tmp_path / "bad.safetensors").write_bytes(b"not weights")
-    with pytest.raises(MotionloomError, match="no multi-range transformer"):
+    with pytest.raises(MotionloomError, match="not a whole safetensors file"):
         MrtFile.load(tmp_path / "bad.safetensors")
     with pytest.raises(MotionloomError, match="sizes are not usable"):
         MrtConfig(dropout=1.0)

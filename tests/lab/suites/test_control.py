@@ -15,8 +15,9 @@ from motionloom.kinematics.ik import motion_from_positions
 from motionloom.lab.evaluator.evaluators import Caption
 from motionloom.lab.report import report
 from motionloom.lab.suites import control, control_kinds
-from motionloom.lab.suites.control_kinds import Kind, Wish, kind
+from motionloom.lab.suites.control_kinds import Kind, Target, kind
 from motionloom.lab.suites.control_methods import BASE, EXPORTED, METHODS, OURS, UNCONTROLLED, Made, groups, of_motion
+from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.items import Item
 from motionloom.lab.suites.parts import Parts
 from motionloom.lab.suites.protocol import Selection
@@ -47,18 +48,18 @@ def walker(k: int) -> Item:
 
 
 ITEMS = [walker(k) for k in range(6)]
-Way = Callable[[Wish, int], Made]
+Way = Callable[[Target, int], Made]
 
 
-def perfect(wish: Wish, seed: int) -> Made:
-    return Made(humanml.decode_positions(wish.known), wish.known)
+def perfect(target: Target, seed: int) -> Made:
+    return Made(humanml.decode_positions(target.known), target.known)
 
 
-def stubborn(wish: Wish, seed: int) -> Made:
+def stubborn(target: Target, seed: int) -> Made:
     """Walks straight ahead whatever is asked, a bit shakily."""
-    positions = walking(1.0, len(wish) / FPS + 0.2)[: len(wish)]
+    positions = walking(1.0, len(target) / FPS + 0.2)[: len(target)]
     positions = positions + 0.002 * np.random.default_rng(seed).standard_normal(positions.shape)
-    return Made(positions, wish.known)
+    return Made(positions, target.known)
 
 
 class Fakes:
@@ -73,11 +74,11 @@ class Fakes:
             raise MotionloomError("there is no such adapter")
         way = stubborn if name in BASE.values() else self.controlled
 
-        def draw(wishes: Sequence[Wish], *, seeds: Sequence[int]) -> list[Made]:
+        def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
             if self.stop_after is not None and len(self.calls) >= self.stop_after:
                 raise KeyboardInterrupt
             self.calls.append((one.name, name, tuple(seeds)))
-            return [way(wish, seed) for wish, seed in zip(wishes, seeds, strict=True)]
+            return [way(target, seed) for target, seed in zip(targets, seeds, strict=True)]
 
         return draw
 
@@ -95,16 +96,16 @@ def values(found: report.Report, row: str) -> dict[str, float]:
 @pytest.mark.parametrize("name", control_kinds.DEFAULT)
 def test_a_perfect_controller_has_no_error_and_fails_nowhere(name: str) -> None:
     one = kind(name)
-    wishes = [control_kinds.wish(one, item.features, "walks") for item in ITEMS]
-    found = control.met([perfect(wish, 0) for wish in wishes], wishes, np.ones(263))
+    targets = [control_kinds.target_of(one, item.features, "walks") for item in ITEMS]
+    found = control.met([perfect(target, 0) for target in targets], targets, np.ones(263))
     assert found
     assert max(found.values()) == pytest.approx(0, abs=1e-6)
 
 
 def test_who_ignores_the_goal_has_the_error_of_a_loop() -> None:
-    wishes = [control_kinds.wish(kind("trajectory+left_wrist"), item.features, "walks") for item in ITEMS]
-    made = [stubborn(wish, 3) for wish in wishes]
-    found = control.met(made, wishes, np.ones(263))
+    targets = [control_kinds.target_of(kind("trajectory+left_wrist"), item.features, "walks") for item in ITEMS]
+    made = [stubborn(target, 3) for target in targets]
+    found = control.met(made, targets, np.ones(263))
     root, joint = [], []
     for one, item in zip(made, ITEMS, strict=True):
         real = humanml.decode_positions(item.features)
@@ -121,11 +122,11 @@ def test_who_ignores_the_goal_has_the_error_of_a_loop() -> None:
 
 def test_where_a_goal_faces_is_where_its_features_say() -> None:
     """The yaw number is minus half the angle to the left, so 0.002 a frame is 0.004 to the right: atan2 of the body."""
-    wish = control_kinds.wish(kind("trajectory"), ITEMS[0].features, "walks")
+    target = control_kinds.target_of(kind("trajectory"), ITEMS[0].features, "walks")
     angle = ITEMS[0].features[:, 0]
-    assert wish.goal.facing == pytest.approx(-2 * np.concatenate([[0], np.cumsum(angle)[:-1]]))
-    body = physics.heading(wish.goal.positions)
-    assert np.diff(wish.goal.facing).mean() == pytest.approx(np.diff(body).mean(), rel=0.1)
+    assert target.goal.facing == pytest.approx(-2 * np.concatenate([[0], np.cumsum(angle)[:-1]]))
+    body = physics.heading(target.goal.positions)
+    assert np.diff(target.goal.facing).mean() == pytest.approx(np.diff(body).mean(), rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -141,8 +142,8 @@ def test_where_a_goal_faces_is_where_its_features_say() -> None:
 )
 def test_a_kind_asks_for_so_many_places_and_fixes_so_many_numbers(name: str, pairs: int, fixed: int) -> None:
     features = ITEMS[0].features
-    wish = control_kinds.wish(kind(name), np.concatenate([features, features])[:60], "walks")
-    assert (wish.goal.asked.any(axis=-1).sum(), wish.mask.sum()) == (pairs, fixed)
+    target = control_kinds.target_of(kind(name), np.concatenate([features, features])[:60], "walks")
+    assert (target.goal.asked.any(axis=-1).sum(), target.mask.sum()) == (pairs, fixed)
 
 
 def test_keyframes_are_whole_seconds_and_in_between_leaves_the_middle() -> None:
@@ -153,13 +154,13 @@ def test_keyframes_are_whole_seconds_and_in_between_leaves_the_middle() -> None:
 
 
 def test_the_published_numbers_are_the_published_masks() -> None:
-    wish = control_kinds.wish(kind("trajectory+left_wrist"), ITEMS[0].features, "walks")
-    assert (wish.mask == (mask("root_horizontal") | mask("left_wrist"))).all()
-    assert not wish.mask[:, LAYOUT["root_height"]].any()
+    target = control_kinds.target_of(kind("trajectory+left_wrist"), ITEMS[0].features, "walks")
+    assert (target.mask == (mask("root_horizontal") | mask("left_wrist"))).all()
+    assert not target.mask[:, LAYOUT["root_height"]].any()
 
 
 def test_a_joint_without_the_trajectory_is_asked_in_the_world_and_its_path_is_not() -> None:
-    goal = control_kinds.wish(kind("left_wrist"), ITEMS[2].features, "walks").goal
+    goal = control_kinds.target_of(kind("left_wrist"), ITEMS[2].features, "walks").goal
     assert goal.joints == ("left_wrist",)
     assert not goal.facing_asked.any()
     assert goal.asked[:, WRIST].all()
@@ -258,8 +259,8 @@ def test_only_the_asked_ways_and_what_they_are_held_against() -> None:
 def test_planted_faults_are_seen(fault: str) -> None:
     """One frame late, left and right exchanged, turned away, another unit, a frame too few."""
 
-    def faulty(wish: Wish, seed: int) -> Made:
-        right = perfect(wish, seed).positions
+    def faulty(target: Target, seed: int) -> Made:
+        right = perfect(target, seed).positions
         changed = {
             "late": np.concatenate([right[:1], right[:-1]]),
             "mirrored": right * [-1, 1, 1],
@@ -267,7 +268,7 @@ def test_planted_faults_are_seen(fault: str) -> None:
             "centimetres": 100 * right,
             "short": right[:-1],
         }
-        return Made(changed[fault], wish.known)
+        return Made(changed[fault], target.known)
 
     found = trial(Fakes(controlled=faulty))
     if fault == "short":
@@ -308,12 +309,12 @@ def test_a_kind_twice_is_refused() -> None:
 
 def test_without_a_set_it_says_what_is_missing() -> None:
     with pytest.raises(MotionloomError, match="name a set with --data"):
-        control.run(data=None)
+        control.run(Run())
 
 
 def test_an_unknown_way_is_refused() -> None:
     with pytest.raises(MotionloomError, match="the ways of control are"):
-        control.run(data=None, methods=["magic"])
+        control.run(Run(), methods=["magic"])
 
 
 def test_the_report_is_kept_as_data_and_told_as_tables() -> None:
@@ -328,6 +329,6 @@ def test_the_report_is_kept_as_data_and_told_as_tables() -> None:
 def test_standing_people_can_be_measured() -> None:
     """Where nothing slides there is no ratio, and nothing breaks."""
     still = humanml.positions_to_features(standing(2.5), FPS).astype(np.float64)
-    wish = control_kinds.wish(kind("trajectory"), still, "stands")
-    assert control.met([perfect(wish, 0)], [wish], np.ones(263))["root_error"] == pytest.approx(0, abs=1e-6)
-    assert control.physical([wish.goal.positions])["skate_share"] == 0
+    target = control_kinds.target_of(kind("trajectory"), still, "stands")
+    assert control.met([perfect(target, 0)], [target], np.ones(263))["root_error"] == pytest.approx(0, abs=1e-6)
+    assert control.physical([target.goal.positions])["skate_share"] == 0

@@ -5,14 +5,15 @@ from pathlib import Path
 import pytest
 
 from motionloom.lab.metrics.obedience import CHECKS
-from motionloom.lab.suites import obey, reference
+from motionloom.lab.report import files
+from motionloom.lab.suites import reference
 
 PAGE = Path(__file__).parents[3] / "docs" / "evaluate.md"
 
 
 @pytest.mark.parametrize("make", [reference.rates, reference.confusion_table])
 def test_the_tables_of_real_clips_are_the_shipped_numbers(make) -> None:
-    assert obey.markdown(make(reference.known())) in PAGE.read_text(encoding="utf-8")
+    assert files.markdown(make(reference.known())) in PAGE.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("one", CHECKS, ids=lambda c: c.name)

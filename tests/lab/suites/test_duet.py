@@ -20,6 +20,7 @@ from motionloom.lab.suites import duet_ways as ways
 from motionloom.lab.suites.duet import COLUMNS, ERRORS, LOOKS, How
 from motionloom.lab.suites.duet_blocks import Beside
 from motionloom.lab.suites.duet_ways import FRAMES, Crops
+from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.needs import NoData, pairs_of
 from motionloom.nets.pair import Talk, fitting
 from motionloom.nets.prior import condition
@@ -123,7 +124,7 @@ class Oracle:
 def test_a_sampler_that_knows_what_came_has_no_error(given: str, slots: int) -> None:
     positions = couple(6.0) + np.array([0.0, 0.3, 0.0])  # features call their lowest point 0, the world does not
     crops, prior = crops_of(positions), tiny.prior()
-    oracle, net = Oracle(crops), ways.silent_net(tiny.prior())
+    oracle, net = Oracle(crops), ways.no_communication_net(tiny.prior())
     way = ways.drawn(prior, net, given=given, steps=4, make=oracle)
     found = duet.score(crops, way, 1)
     assert max(float(np.abs(found[name]).max()) for name in ERRORS) < 1e-4
@@ -141,7 +142,7 @@ def test_a_sampler_that_knows_what_came_has_no_error(given: str, slots: int) -> 
 def test_noise_goes_by_crop_and_sample_whatever_crops_are_beside() -> None:
     crops, prior = crops_of(couple(6.0), 4), tiny.prior()
     oracle = Oracle(crops)
-    way = ways.drawn(prior, ways.silent_net(prior), steps=4, make=oracle)
+    way = ways.drawn(prior, ways.no_communication_net(prior), steps=4, make=oracle)
     way(crops, 0), way(crops.part(slice(2, 4)), 0), way(crops, 1)
     whole, part, again = (asked["seeds"] for asked in oracle.asked)
     assert whole[4:] == part
@@ -150,7 +151,7 @@ def test_noise_goes_by_crop_and_sample_whatever_crops_are_beside() -> None:
 
 def test_a_real_sampler_of_random_weights_keeps_the_given_second() -> None:
     crops, prior = crops_of(couple(6.0), 2), tiny.prior()
-    made = ways.drawn(prior, ways.silent_net(prior), steps=2)(crops, 0)
+    made = ways.drawn(prior, ways.no_communication_net(prior), steps=2)(crops, 0)
     assert made.shape == (2, 2, FRAMES, 22, 3)
     np.testing.assert_allclose(made[:, :, :20], crops.positions[:, :, :20], atol=2e-3)
     assert np.isfinite(made).all()
@@ -235,13 +236,13 @@ def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
         return perfect(crops, sample)
 
     how = How(crops=20, samples=1)
-    first = duet.measure(crops, {"ours": counted}, how, kinds=("ours",), folder=tmp_path)
+    first = duet.measure(crops, {"ours": counted}, how, kinds=("ours",), run=Run(folder=tmp_path))
     assert calls == [tuple(range(16)), (16, 17, 18, 19)]
-    assert duet.measure(crops, {"ours": counted}, how, kinds=("ours",), folder=tmp_path) == first
+    assert duet.measure(crops, {"ours": counted}, how, kinds=("ours",), run=Run(folder=tmp_path)) == first
     assert len(calls) == 2
     assert first.rows[0].values["root_1"].count == 20
     with pytest.raises(MotionloomError, match="other settings"):
-        duet.measure(crops, {"ours": counted}, replace(how, seed=1), kinds=("ours",), folder=tmp_path)
+        duet.measure(crops, {"ours": counted}, replace(how, seed=1), kinds=("ours",), run=Run(folder=tmp_path))
 
 
 def test_wishes_that_cannot_be_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -263,7 +264,7 @@ def test_wishes_that_cannot_be_are_told(tmp_path: Path, monkeypatch: pytest.Monk
         pairs_of(tmp_path)
     assert not isinstance(told.value, NoData)
     with pytest.raises(MotionloomError, match="the rows are"):
-        duet.run(data=tmp_path, kinds=("best",))
+        duet.run(Run(data=tmp_path), kinds=("best",))
 
 
 def test_a_transformer_from_its_file_is_a_row(tmp_path: Path) -> None:
@@ -292,7 +293,7 @@ def test_other_blocks_are_rows_by_their_names_and_sizes(tmp_path: Path) -> None:
         "layers2: 2 layers after layer 1, not aware", f"known: 1 layer after layer {last}"
     ]  # fmt: skip
     assert found[0].digest == hashlib.sha256(files[0].read_bytes()).hexdigest()[:12]
-    silent = ways.drawn(prior, ways.silent_net(prior), steps=2)
+    silent = ways.drawn(prior, ways.no_communication_net(prior), steps=2)
     made, alone = (way(crops_of(couple(6.0), 2), 0) for way in (found[0].way, silent))
     np.testing.assert_allclose(made, alone, atol=1e-4)  # a fresh block says nothing
 
@@ -327,7 +328,7 @@ def test_a_block_beside_has_one_sample_and_a_new_one_leaves_what_is_done(tmp_pat
         for name, digest, off in [("b", "1", 0.1), ("b", "1", 0.1), ("b", "2", 0.3)]
     )
     ours = {"ours": counted("ours", 0.0)}
-    made = duet.measure(crops, ours, how, kinds=kinds, beside=[first], folder=tmp_path)
+    made = duet.measure(crops, ours, how, kinds=kinds, beside=[first], run=Run(folder=tmp_path))
     here = [row for row in made.rows if not row.measured_on]
     assert [row.name for row in here] == ["ours, one sample", "ours, mean of 2 samples", "b: 1 layer"]
     assert here[2].values["root_2"].mean == pytest.approx(0.1)
@@ -336,9 +337,9 @@ def test_a_block_beside_has_one_sample_and_a_new_one_leaves_what_is_done(tmp_pat
     )
     assert made.protocol["blocks beside"] == {"b: 1 layer": "1"}
     assert calls == ["ours", "ours", "1"]
-    assert duet.measure(crops, ours, how, kinds=kinds, beside=[again], folder=tmp_path) == made
+    assert duet.measure(crops, ours, how, kinds=kinds, beside=[again], run=Run(folder=tmp_path)) == made
     assert len(calls) == 3
-    other = duet.measure(crops, ours, how, kinds=kinds, beside=[second], folder=tmp_path)
+    other = duet.measure(crops, ours, how, kinds=kinds, beside=[second], run=Run(folder=tmp_path))
     assert calls[3:] == ["2"]
     assert other.rows[2].values["root_2"].mean == pytest.approx(0.3)
 

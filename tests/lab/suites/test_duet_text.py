@@ -13,6 +13,7 @@ from motionloom.kinematics.ik import motion_from_positions
 from motionloom.lab.metrics import pair as mp
 from motionloom.lab.report import report as reports
 from motionloom.lab.suites import duet_answers, duet_long, duet_text
+from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.needs import NoData
 from tests.kinematics.people import FPS, standing
 from tests.lab.suites.duets import RECORDED, Person, block_over, couple, pair_of, partners
@@ -289,9 +290,9 @@ def test_every_part_is_made_by_its_own_module_and_told_with_its_command(
     asked: dict[str, Any] = {}
     for module in (duet_text, duet_answers, duet_long):
 
-        def run(weights: str, module: Any = module, **how: Any) -> reports.Report:
-            asked[module.__name__.rsplit("_")[-1]] = how
-            return reports.Report("duet-x", module.__name__, how["command"], {}, duet_text.COLUMNS, ())
+        def run(run: Run, module: Any = module, **how: Any) -> reports.Report:
+            asked[module.__name__.rsplit("_")[-1]] = {**how, "command": run.command}
+            return reports.Report("duet-x", module.__name__, run.command, {}, duet_text.COLUMNS, ())
 
         monkeypatch.setattr(module, "run", run)
     words = ["evaluate", "duet", "--data", str(tmp_path), "--quick", "--duets", "3", "--out", str(tmp_path / "out")]

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from motionloom.errors import MotionloomError
 from motionloom.lab.metrics.obedience import check
+from motionloom.lab.report import files
 from motionloom.lab.suites import obey
 from tests.kinematics.people import FPS, circling, jumping, moved, spun, standing, walking
 
@@ -126,7 +127,7 @@ def test_tables_have_a_row_per_prompt_and_json_is_plain(tmp_path: Path) -> None:
     rows = obey.table(results, real={"walk forward": {"held_out": "9/10", "all": "90/100"}})
     assert [row[0] for row in rows[1:]] == [FORWARD.prompt, STILL.prompt]
     assert rows[1][1:5] == ["1/2", "", "9/10", "90/100"]
-    assert obey.markdown(rows).count("\n") == 3
+    assert files.markdown(rows).count("\n") == 3
     assert json.loads((tmp_path / "obedience.json").read_text())["totals"]["prompts"] == 2
 
 

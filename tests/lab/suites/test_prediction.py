@@ -14,6 +14,7 @@ from motionloom.lab.report import report
 from motionloom.lab.report.report import REAL, SAME
 from motionloom.lab.suites import prediction
 from motionloom.lab.suites import prediction_trial as trials
+from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.prediction import How
 from motionloom.weights.predictor import save_predictor
 from tests.lab.suites.predicted import AHEAD, FPS, SEEN, predictor, protocol
@@ -102,7 +103,7 @@ def test_windows_of_a_single_future_are_skipped_when_asked() -> None:
 def test_the_table_has_every_row_and_everything_that_must_be_said(trial: trials.Trial, tmp_path: Path) -> None:
     lines: list[str] = []
     how = replace(FEW, replications=2)
-    made = prediction.measure(predictor(), trial, how, folder=tmp_path, progress=lines.append)
+    made = prediction.measure(predictor(), trial, how, run=Run("predictor", folder=tmp_path, progress=lines.append))
     here = [row for row in made.rows if not row.measured_on]
     assert [row.name for row in here] == [
         REAL, prediction.ZERO, prediction.CONSTANT, "predictor, 2 steps", "predictor, 3 steps",
@@ -115,10 +116,12 @@ def test_the_table_has_every_row_and_everything_that_must_be_said(trial: trials.
                 "seed", "replications"):  # fmt: skip
         assert key in made.protocol
     assert report.decode(json.loads(json.dumps(report.encode(made))))
-    again = prediction.measure(predictor(), trial, how, folder=tmp_path, progress=lambda line: pytest.fail(line))
+    again = prediction.measure(
+        predictor(), trial, how, run=Run("predictor", folder=tmp_path, progress=lambda line: pytest.fail(line))
+    )
     assert again == made
     with pytest.raises(MotionloomError, match="other settings"):
-        prediction.measure(predictor(), trial, FEW, folder=tmp_path)
+        prediction.measure(predictor(), trial, FEW, run=Run("predictor", folder=tmp_path))
 
 
 def test_ours_keeps_bones_and_the_published_sampler_does_not(trial: trials.Trial) -> None:

@@ -82,7 +82,7 @@ def test_a_kill_between_report_and_mark_is_measured_again(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr("motionloom.lab.suites.everything.obey.write_json", killed)
+        patched.setattr("motionloom.lab.suites.everything.files.write_json", killed)
         with pytest.raises(KeyboardInterrupt):
             run_all(replace(job, quick=True), tmp_path / "out", [one.suite()], again=True)
     (outcome,) = run_all(job, tmp_path / "out", [one.suite()])
@@ -273,7 +273,7 @@ def test_suites_with_a_judge_ask_for_what_was_said(
 
     def fake(*args: Any, **named: Any) -> Report:
         asked.update(signature.bind(*args, **named).arguments)
-        return replace(made(name), command=named.get("command", "another"))
+        return replace(made(name), command=asked["run"].command if "run" in asked else "another")
 
     monkeypatch.setattr(place, fake)
     monkeypatch.setattr("motionloom.lab.evaluator.evaluators.load_evaluator", lambda said: f"judge {said}")
@@ -284,11 +284,12 @@ def test_suites_with_a_judge_ask_for_what_was_said(
     found = suite.run(job, suite.settings(True))
     words = f"motionloom evaluate all --only {name} --weights default --data SET --evaluator mine.tar --quick"
     assert (found.suite, found.command) == (name, words)
-    assert asked["evaluator"] == (job.evaluator if name == "text" else f"judge {job.evaluator}")
+    judge = asked["run"].evaluator if name == "text" else asked["evaluator"]
+    assert judge == (job.evaluator if name == "text" else f"judge {job.evaluator}")
     if name != "evaluator":  # sha256 of abc, FIPS 180-2
         assert found.protocol["evaluator file"] == "ba7816bf8f01"
     if name == "text":
-        assert (asked["weights"], asked["data"], asked["protocol"].replications) == ("default", tmp_path, 2)
+        assert (asked["run"].weights, asked["run"].data, asked["protocol"].replications) == ("default", tmp_path, 2)
 
 
 # ---- obedience, realism and speed as reports ------------------------------------------------------------------------

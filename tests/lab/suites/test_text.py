@@ -240,6 +240,6 @@ def test_numbers_say_what_was_measured_and_how_small_samples_bias_them() -> None
 
 def test_a_run_is_known_again_by_its_items_and_not_by_digits_that_threads_change() -> None:
     real = trial(Painter()).real
-    assert text._identity(replace(real, motions=real.motions + 1e-9)) == text._identity(real)
+    assert text.identity(replace(real, motions=real.motions + 1e-9)) == text.identity(real)
     others = ({"names": real.names[::-1]}, {"frames": real.frames[::-1]}, {"physical": real.physical + 1})
-    assert len({text._identity(real), *(text._identity(replace(real, **other)) for other in others)}) == 4
+    assert len({text.identity(real), *(text.identity(replace(real, **other)) for other in others)}) == 4

@@ -16,6 +16,7 @@ from motionloom.features.layout import FPS
 from motionloom.lab.metrics.transitions import JERK_HUMANML3D
 from motionloom.lab.report import report
 from motionloom.lab.suites import long_baselines, real_seams, text_reference, transitions
+from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.long_baselines import DEFAULT, Long, methods, rows_of, titled
 from motionloom.lab.suites.parts import Parts
 from motionloom.lab.suites.protocol import Selection, Transitions, quick_transitions
@@ -311,9 +312,9 @@ def parsed(*words: str) -> argparse.Namespace:
 def test_the_command_asks_for_what_was_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys) -> None:
     asked = {}
 
-    def fake(weights: str, **named) -> report.Report:
-        asked.update(named, weights=weights)
-        return report.Report("transitions", "Long", named["command"], {}, transitions.COLUMNS, ())
+    def fake(run: Run, **named) -> report.Report:
+        asked.update(named, command=run.command)
+        return report.Report("transitions", "Long", run.command, {}, transitions.COLUMNS, ())
 
     monkeypatch.setattr(transitions, "run", fake)
     words = ["--methods", "ours,paper", "--intervals", "16", "--steps", "12", "--split", "test", "--out", str(tmp_path)]
@@ -335,9 +336,9 @@ def test_the_suite_runs_the_same_measurement(monkeypatch: pytest.MonkeyPatch, tm
 
     asked = {}
 
-    def fake(weights: str, **named) -> report.Report:
-        asked.update(named)
-        return report.Report("transitions", "Long", named["command"], {}, transitions.COLUMNS, ())
+    def fake(run: Run, **named) -> report.Report:
+        asked.update(named, command=run.command)
+        return report.Report("transitions", "Long", run.command, {}, transitions.COLUMNS, ())
 
     monkeypatch.setattr(transitions, "run", fake)
     (suite,) = chosen(["transitions"])

@@ -24,7 +24,7 @@ from motionloom.lab.papers.double_take import (
     second_take,
 )
 from motionloom.nets.prior import Bound
-from motionloom.tasks.long import TOGETHER, compose
+from motionloom.tasks.long import BATCH, compose
 from motionloom.tasks.text import SOLVER, SPACING
 from motionloom.weights.prior import Prior
 
@@ -118,7 +118,7 @@ def long_motion(
             progress(f"{len(some)} prompts: {peaks[-1]:.0f} MB")
     settings = {
         "prompts": len(texts[-1]), "seconds_each": course.each, "transition_s": TRANSITION, "steps": how.steps,
-        "guidance": how.guidance, "solver": SOLVER, "spacing": SPACING, "together": TOGETHER,
+        "guidance": how.guidance, "solver": SOLVER, "spacing": SPACING, "together": BATCH,
         "repeats": course.repeats, "published_mode": "published", "published_handshake": HANDSHAKE,
     }  # fmt: skip
     done = takes(first / course.steps, second / course.steps)

@@ -6,7 +6,6 @@ Why it is as it is: docs/decisions/0010-own-evaluator.md.
 """
 
 import hashlib
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
@@ -14,22 +13,18 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors import SafetensorError, safe_open
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT, WIDTH
-from motionloom.io.tensors import save_tensors
-from motionloom.io.text import plain_json
 from motionloom.nets.text import MiniLM, TextEncoder
-from motionloom.weights.container import check, shapes
+from motionloom.weights.container import Container, check, halved, shapes
 
-KEY = "motionloom_evaluator"
+EVALUATORS = Container("evaluator", "motionloom_evaluator", max_bytes=100 << 20)
+KEY = EVALUATORS.key
 """Metadata entry that tells the file's kind."""
-FORMAT = 1
-MAX_BYTES = 100 << 20
 INPUTS = 4 + 63 + 66 + 4
 """Numbers per frame that the motion encoder reads, see `inputs`."""
 STRIDE = 4
@@ -255,25 +250,15 @@ def text_digest(text: TextEncoder) -> str:
 
 def save_embedder(embedder: Embedder, path: Path | str) -> Path:
     """Write an evaluator (float16, without its text encoder, whose digest it keeps) and give the path back."""
-    tensors = {f"net.{k}": v.detach().cpu().half().contiguous() for k, v in embedder.net.state_dict().items()}
+    tensors = {f"net.{k}": v for k, v in halved(embedder.net.state_dict()).items()}
     tensors |= {"mean": embedder.mean.float().clone(), "std": embedder.std.float().clone()}
-    about = {
-        "format": FORMAT,
-        "net": asdict(embedder.net.config),
-        "text": text_digest(embedder.text),
-        "card": embedder.card,
-    }
-    save_tensors(tensors, path, metadata={KEY: json.dumps(about)})
-    return Path(path)
+    about = {"net": asdict(embedder.net.config), "text": text_digest(embedder.text), "card": embedder.card}
+    return EVALUATORS.write(path, tensors, about)
 
 
 def is_embedder(path: Path) -> bool:
     """True for a file of `save_embedder`, damaged or not, by what its head says."""
-    try:
-        with safe_open(path, framework="pt") as file:
-            return KEY in (file.metadata() or {})
-    except (SafetensorError, OSError):
-        return False
+    return EVALUATORS.signed(path)
 
 
 def load_embedder(path: Path | str, text: TextEncoder) -> Embedder:
@@ -300,22 +285,11 @@ def load_embedder(path: Path | str, text: TextEncoder) -> Embedder:
 
 
 def _read(path: Path) -> tuple[dict, dict[str, Tensor]]:
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise MotionloomError(f"{path} is larger than {MAX_BYTES >> 20} MiB; evaluators are not")
-        with safe_open(path, framework="pt") as file:
-            about = plain_json((file.metadata() or {})[KEY])
-            tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
-        if about["format"] != FORMAT:
-            raise MotionloomError(f"{path} has format {about['format']}; this motionloom reads {FORMAT}: update it")
+    about, tensors = EVALUATORS.read(path)
+    with EVALUATORS.parsing(path):
         names = {field.name for field in fields(EvaluatorConfig)}
         if set(about["net"]) != names or not isinstance(about["text"], str):
             raise ValueError("sizes of another kind")
         about["net"] = EvaluatorConfig(**about["net"])
         about["card"] = {name: str(about["card"][name])[:4000] for name in CARD}
         return about, tensors
-    except MotionloomError:
-        raise
-    except (SafetensorError, OSError, KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        reason = " ".join(str(error).split())[:120]
-        raise MotionloomError(f"{path} is not a whole evaluator file ({reason}); name a file that is") from None

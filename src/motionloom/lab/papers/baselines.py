@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from motionloom import rotations as rot
+from motionloom.blending import shares
 from motionloom.errors import MotionloomError
-from motionloom.kinematics.physics import heading
-from motionloom.motion import Motion
+from motionloom.motion import Motion, heading
 
 BLANK = 8
 """Frames between two segments that nobody generated (TEACH's own number)."""
@@ -30,7 +30,7 @@ def slerp_joined(motions: Sequence[Motion], *, blank: int = BLANK) -> Motion:
         if motion.fps != joined.fps or motion.skeleton.names != joined.skeleton.names:
             raise MotionloomError("only motions of one skeleton and one frame rate can be joined; retarget or resample")
         following = _put(motion, joined)
-        amount = np.linspace(0.0, 1.0, blank + 2)[1:-1]
+        amount = shares(blank)
         last, first = joined.rotations[-1], following.rotations[0]
         shape = (blank, *last.shape[:-1])
         between = rot.slerp(

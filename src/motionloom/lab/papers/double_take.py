@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Literal
+from typing import Literal, TypedDict, Unpack
 
 import numpy as np
 import torch
@@ -302,6 +302,14 @@ def restarted(way: Sequence[int], schedule: Schedule, share: float) -> list[int]
     return [level for level in way if level <= round(share * schedule.steps)]
 
 
+class TakeOptions(TypedDict, total=False):
+    """What of `double_take` may be asked otherwise."""
+
+    solver: Solver
+    """Ancestral sampling as published."""
+    second_take_only: bool
+
+
 def double_take(
     first: Denoiser,
     second: Denoiser,
@@ -312,14 +320,14 @@ def double_take(
     way: Sequence[int],
     schedule: Schedule,
     draws: tuple[Draw, Draw],
-    solver: Solver = DDPM,
-    second_take_only: bool = False,
+    **options: Unpack[TakeOptions],
 ) -> Takes:
-    """Both takes. ``first`` has the texts of the rows, ``second`` none; each is bound to the lengths it should know.
+    """Both takes; one interval is sampled as ever and has no second take.
 
-    x: noise (repetitions * intervals, longest interval, features) at ``way[0]``. draws: noise for the first and for the
-    second take. One interval is sampled as ever and has no second take.
+    ``first`` has the texts of the rows, ``second`` none; each is bound to the lengths it should know. ``x``: noise
+    (repetitions * intervals, longest interval, features) at ``way[0]``. ``draws``: noise for either take.
     """
+    solver, second_take_only = options.get("solver", DDPM), options.get("second_take_only", False)
     made = first_take(
         first, x, plan, way=way, schedule=schedule, draw=draws[0], solver=solver, join=not second_take_only
     )
@@ -333,6 +341,18 @@ def double_take(
     return Takes(made, inside, weights, refined, rebuilt, unfold(rebuilt, plan))
 
 
+class Settings(TypedDict, total=False):
+    """How `double_take_features` samples."""
+
+    steps: int
+    """Of the first take (1000); the second restarts at the nearest level at or below the mode's."""
+    guidance: float
+    solver: str
+    spacing: str
+    first_take_only: bool
+    second_take_only: bool
+
+
 @torch.inference_mode()
 def double_take_features(
     prior: Prior,
@@ -342,22 +362,30 @@ def double_take_features(
     mode: Literal["published", "paper"] = "published",
     handshake: int | Sequence[int] = HANDSHAKE,
     ramp: int | Sequence[int] | None = None,
-    steps: int = 1000,
     seed: int = 0,
-    guidance: float = GUIDANCE,
-    solver: str = SOLVER,
-    spacing: str = SPACING,
-    first_take_only: bool = False,
-    second_take_only: bool = False,
+    **settings: Unpack[Settings],
 ) -> tuple[Tensor, list[int]]:
-    """One long motion as features (frames, 263), not standardised, and where each interval ends (`Plan.ends`).
+    """One long motion. The second take's text is empty, and asked once per step.
 
-    frames: of each interval, its handshakes included, so that the motion has ``sum(frames) - sum(handshakes)``; an
-    interval needs two handshakes, two ramps and 10 frames. handshake, ramp: frames, one number or one per transition;
-    ramp None takes the mode's own (20 published, 10 paper). steps: of the first take; the second restarts at the
-    nearest level at or below the mode's. The second take's text is empty, and asked once per step.
-    Raises `MotionloomError` for what cannot be asked.
+    Args:
+        prior: the weights.
+        prompts: one per interval.
+        frames: of each interval, its handshakes included, so that the motion has ``sum(frames) - sum(handshakes)``; an
+            interval needs two handshakes, two ramps and 10 frames.
+        mode: published code or paper.
+        handshake: frames, one number or one per transition.
+        ramp: the same; None takes the mode's own (20 published, 10 paper).
+
+    Returns:
+        Features (frames, 263), not standardised, and where each interval ends (`Plan.ends`).
+
+    Raises:
+        MotionloomError: what cannot be asked.
     """
+    steps, guidance = settings.get("steps", 1000), settings.get("guidance", GUIDANCE)
+    solver, spacing = settings.get("solver", SOLVER), settings.get("spacing", SPACING)
+    first_take_only = settings.get("first_take_only", False)
+    second_take_only = settings.get("second_take_only", False)
     if mode not in MODES:
         raise MotionloomError(f"DoubleTake has no mode {mode!r}; there are {', '.join(MODES)}")
     if steps not in range(1, prior.schedule.steps + 1) or solver not in SOLVERS:

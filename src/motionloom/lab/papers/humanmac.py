@@ -12,7 +12,7 @@ Windows are (rows, frames, channels) metres, states (rows, kept, channels) coeff
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypedDict, Unpack
 
 import numpy as np
 import torch
@@ -78,26 +78,40 @@ class Target:
     """The share of the steps, at the end, in which it is not imposed; an int counts steps (20 as published)."""
 
 
-def published_completion(
-    denoise: Denoiser,
-    observed: Tensor,
-    rows: int,
-    *,
-    basis: Basis,
-    schedule: Schedule,
-    draw: Draw,
-    steps: int = 100,
-    padding: Padding = "last",
-    fixed: Fixed | None = None,
-    target: Target | None = None,
-    complete: bool = True,
-) -> tuple[State, Tensor]:
-    """DCT-Completion: ``rows`` states (rows, kept, channels) and their windows (rows, frames, channels).
+class Options(TypedDict, total=False):
+    """What of `published_completion` may be asked otherwise."""
 
-    ``observed`` (rows or 1, h, channels): with 1 (part control as published) all rows share known signal and noise.
-    ``denoise`` is bound to its condition, the spectrum of `padded`. Draws: the start, then in every step the noise of
-    the observation and that of the target. ``complete`` False leaves the observation to the condition alone.
+    steps: int
+    """Of the sampler; 100 as published."""
+    padding: Padding
+    """What stands for frames that were not observed; "last" as published."""
+    fixed: Fixed | None
+    target: Target | None
+    complete: bool
+    """False leaves the observation to the condition alone."""
+
+
+def published_completion(
+    denoise: Denoiser, observed: Tensor, rows: int, *, basis: Basis, schedule: Schedule, draw: Draw,
+    **options: Unpack[Options],
+) -> tuple[State, Tensor]:  # fmt: skip
+    """DCT-Completion.
+
+    Args:
+        denoise: bound to its condition, the spectrum of `padded`.
+        observed: (rows or 1, h, channels) metres; with 1 (part control as published) all rows share known signal and
+            noise.
+        rows: how many are sampled.
+        basis: the cosines.
+        schedule: of the noise.
+        draw: noise: for the start, then in every step for the observation and for the target.
+        options: see `Options`.
+
+    Returns:
+        States (rows, kept, channels) and their windows (rows, frames, channels).
     """
+    steps, padding = options.get("steps", 100), options.get("padding", "last")
+    fixed, target = options.get("fixed"), options.get("target")
     walk = published_levels(schedule, steps)
     known = padded(observed, basis.frames, padding)
     mask = torch.zeros(known.shape[1:], dtype=torch.bool, device=known.device)
@@ -106,7 +120,7 @@ def published_completion(
         own = torch.zeros_like(mask)
         own[:, 3 * fixed.joints[0] : 3 * fixed.joints[1]] = True
         known, mask = torch.where(own, fixed.signal, known), mask | own
-    held = [Held(basis.to_spectrum(known), mask)] if complete else []
+    held = [Held(basis.to_spectrum(known), mask)] if options.get("complete", True) else []
     if target is not None:
         held.append(_approached(target, rows, walk, basis))
     start = draw(observed.new_empty(rows, basis.kept, observed.shape[2]))

@@ -9,7 +9,6 @@ Written from the paper's description. Here: 22 joints at 20 frames a second (the
 from the middle of all people's last roots (there: absolute in a centred scene), and no discriminator.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -17,18 +16,15 @@ from typing import Any
 
 import numpy as np
 import torch
-from safetensors import SafetensorError, safe_open
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from motionloom.diffusion import Dct
 from motionloom.errors import MotionloomError
-from motionloom.io.tensors import save_tensors
-from motionloom.io.text import plain_json
 from motionloom.nets.prior import sinusoids
+from motionloom.weights.container import Container, check, shapes
 
-KEY = "motionloom-mrt"
-MAX_BYTES = 64 << 20
+FILES = Container("multi-range transformer", "motionloom-mrt", max_bytes=64 << 20)
 JOINTS = 22
 
 
@@ -190,13 +186,8 @@ class MrtFile:
 
     def save(self, path: Path | str) -> Path:
         """Write it as a .safetensors file; it appears whole or not at all."""
-        path = Path(path)
-        if path.suffix != ".safetensors":
-            raise MotionloomError(f"weights are written as .safetensors; {path.name} has another suffix")
         about = {"config": asdict(self.net.config), "licence": self.licence, "data": self.data, "notes": self.notes}
-        tensors = {k: v.detach().float().cpu().contiguous() for k, v in self.net.state_dict().items()}
-        save_tensors(tensors, path, metadata={KEY: json.dumps(about, default=dict)})
-        return path
+        return FILES.write(path, {key: value.float() for key, value in self.net.state_dict().items()}, about)
 
     @staticmethod
     def load(path: Path | str, *, device: str = "cpu") -> "MrtFile":
@@ -204,21 +195,13 @@ class MrtFile:
         path = Path(path)
         if not path.is_file():
             raise MotionloomError(f"there is no {path}; train one with --train-mrt STEPS")
-        try:
-            if path.stat().st_size > MAX_BYTES:
-                raise ValueError("too large")
-            with safe_open(path, framework="pt") as file:
-                about = plain_json((file.metadata() or {})[KEY])
-                tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+        about, tensors = FILES.read(path)
+        with FILES.parsing(path):
             with torch.device("meta"):
                 net = Mrt(MrtConfig(**about["config"]))
-            if not all(bool(value.isfinite().all()) for value in tensors.values()):
-                raise ValueError("numbers that are not finite")
+            check(tensors, shapes(net), str(path))
             net = net.to_empty(device="cpu")
             net.load_state_dict(tensors)
             told = MrtFile(net, str(about["licence"]), str(about["data"]), dict(about["notes"]))
-        except (SafetensorError, KeyError, TypeError, ValueError, RuntimeError, RecursionError, OSError) as error:
-            reason = " ".join(str(error).split())[:120]
-            raise MotionloomError(f"{path} holds no multi-range transformer ({reason}); train it again") from None
         told.net.to(device).eval().requires_grad_(False)
         return told

@@ -7,6 +7,7 @@ before it. Pairs are cropped, mirrored half of the time and turned any way.
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypedDict, Unpack
 
 import numpy as np
 import torch
@@ -63,19 +64,40 @@ class Seconds:
         return 1000 * ((said - wanted) ** 2).mean()
 
 
+class Settings(TypedDict, total=False):
+    """What of the recipe may be asked otherwise."""
+
+    steps: int
+    batch: int
+    seed: int
+
+
 def train_mrt(
     pairs: Sequence[Pair],
     folder: Path | str,
     *,
-    steps: int = RECIPE.steps,
-    batch: int = RECIPE.batch,
-    seed: int = 0,
     config: MrtConfig | None = None,
     device: str | None = None,
     stop: int | None = None,
     say: Callable[[str], None] = print,
+    **settings: Unpack[Settings],
 ) -> Path:
-    """Train (or go on training) on the ``train`` pairs at 20 frames per second; returns ``folder/mrt.safetensors``."""
+    """Train (or go on training) on the ``train`` pairs at 20 frames per second.
+
+    Args:
+        pairs: people who do something together.
+        folder: for the weights and the state of training.
+        config: sizes; None: the usual ones.
+        device: cpu, cuda, or None for what there is.
+        stop: make a break after so many steps.
+        say: told a line now and then.
+        settings: see `Settings`.
+
+    Returns:
+        ``folder/mrt.safetensors``.
+    """
+    steps, batch = settings.get("steps", RECIPE.steps), settings.get("batch", RECIPE.batch)
+    seed = settings.get("seed", 0)
     if device:
         find_device(device)
     recipe = replace(RECIPE, steps=steps, batch=batch, seed=seed)

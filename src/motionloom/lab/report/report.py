@@ -13,9 +13,9 @@ from typing import Any, Literal, cast
 
 from motionloom.errors import MotionloomError
 from motionloom.io.text import plain_json
-from motionloom.lab.suites.obey import check_report, write_json, write_text
-from motionloom.lab.suites.obey import markdown as table
-from motionloom.lab.suites.obey import plain as columns_of_text
+from motionloom.lab.report.files import check_report, write_json, write_text
+from motionloom.lab.report.files import markdown as table
+from motionloom.lab.report.files import plain as columns_of_text
 
 Better = Literal["up", "down", "real", ""]
 REAL = "real"

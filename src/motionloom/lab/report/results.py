@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from motionloom.errors import MotionloomError
+from motionloom.lab.report.files import write_text
 from motionloom.lab.report.report import Report, markdown
-from motionloom.lab.suites.obey import write_text
 
 PLACE = re.compile(r"(<!-- suite ([\w.-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 QUICK_MARK = "<!-- quick -->\n"

@@ -12,7 +12,6 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
@@ -21,24 +20,23 @@ from motionloom.features import humanml
 from motionloom.features.layout import FPS
 from motionloom.kinematics import physics
 from motionloom.kinematics.physics import Array
-from motionloom.lab.evaluator.evaluators import Caption, Evaluator, load_evaluator
+from motionloom.lab.evaluator.evaluators import Caption, Evaluator
 from motionloom.lab.metrics import control as metrics
 from motionloom.lab.metrics.control import ControlError
 from motionloom.lab.metrics.frechet import fid, fid_bias
-from motionloom.lab.metrics.retrieval import diversity, r_precision
+from motionloom.lab.metrics.retrieval import r_precision
 from motionloom.lab.metrics.skate import skate
 from motionloom.lab.report import published_rows
-from motionloom.lab.report.report import REAL, Column, Report, Row, Value
+from motionloom.lab.report.report import REAL, Column, Report
 from motionloom.lab.suites import control_kinds, text_reference
-from motionloom.lab.suites import text as text_suite
-from motionloom.lab.suites.control_kinds import Kind, Wish
+from motionloom.lab.suites.control_kinds import Kind, Target
 from motionloom.lab.suites.control_methods import BASE, METHODS, OURS, Made, Maker, Sampling, checked, fits, maker
+from motionloom.lab.suites.harness import Run, check_names, digest, diversity, row_of
 from motionloom.lab.suites.items import Item, fitting, pick, read_items, spread
-from motionloom.lab.suites.parts import Parts, fingerprint
+from motionloom.lab.suites.parts import Parts
 from motionloom.lab.suites.protocol import Protocol, Selection
 from motionloom.tasks.text import GUIDANCE, STEPS
 from motionloom.weights.adapter import adapters
-from motionloom.weights.prior import Prior, find_weights
 
 COUNT, REPLICATIONS = 32, 3
 RATIOS = {"share_ratio": "skate_share", "speed_ratio": "skate_speed", "slide_ratio": "skate_slide",
@@ -102,10 +100,10 @@ class Trial:
         said = [item.captions[k] for item, k in zip(self.items, picked, strict=True)]
         return said, np.stack([several[k] for several, k in zip(self.texts, picked, strict=True)])
 
-    def wishes(self, one: Kind, replication: int) -> list[Wish]:
+    def targets(self, one: Kind, replication: int) -> list[Target]:
         """What a kind asks of each motion of a replication."""
         said, _ = self.captions(replication)
-        return [control_kinds.wish(one, i.features, c.text) for i, c in zip(self.items, said, strict=True)]
+        return [control_kinds.target_of(one, i.features, c.text) for i, c in zip(self.items, said, strict=True)]
 
 
 def prepare(
@@ -131,12 +129,12 @@ def prepare(
 # ---- the numbers of one replication ----------------------------------------------------------------------------------
 
 
-def measured(trial: Trial, replication: int, made: Sequence[Made], wishes: Sequence[Wish]) -> dict[str, float]:
-    """What one motion per wish is worth; a number that has no meaning for this kind is left out."""
+def measured(trial: Trial, replication: int, made: Sequence[Made], targets: Sequence[Target]) -> dict[str, float]:
+    """What one motion per target is worth; a number that has no meaning for this kind is left out."""
     embedded = trial.evaluator.motions([one.features for one in made])
     return {
         **_judged(trial, replication, embedded),
-        **met(made, wishes, trial.scale),
+        **met(made, targets, trial.scale),
         **physical([one.positions for one in made]),
     }
 
@@ -147,26 +145,26 @@ def _judged(trial: Trial, replication: int, embedded: Array) -> dict[str, float]
     return {
         "r3": float(r_precision(texts[order], embedded[order], top=3, batch=trial.protocol.batch)[2]),
         "fid": fid(embedded, trial.everyone),
-        "diversity": diversity(
-            embedded, pairs=min(text_suite.DIVERSITY_PAIRS, len(embedded)), seed=replication
-        ),
-    }  # fmt: skip
+        "diversity": diversity(embedded, replication),
+    }
 
 
-def met(made: Sequence[Made], wishes: Sequence[Wish], scale: np.ndarray) -> dict[str, float]:
+def met(made: Sequence[Made], targets: Sequence[Target], scale: np.ndarray) -> dict[str, float]:
     """How far the motions are from what was asked: cm, shares, degrees, standard deviations."""
-    pairs = list(zip(made, wishes, strict=True))
-    apart = [metrics.distances(one.positions, wish.goal.positions, wish.goal.asked) for one, wish in pairs]
+    pairs = list(zip(made, targets, strict=True))
+    apart = [metrics.distances(one.positions, target.goal.positions, target.goal.asked) for one, target in pairs]
     root, joints, both = metrics.of_root(apart), metrics.of_joints(apart), metrics.control_error(apart)
     found = {**_error("root", root), **_error("joint", joints)}
     if both is not None:
         found |= {"worst": both.worst, "beyond_20": both.beyond_20, "beyond_50": both.beyond_50}
     turns = [
-        metrics.facing_error(one.positions, wish.goal.positions, wish.goal.facing_asked) for one, wish in pairs
+        metrics.facing_error(one.positions, target.goal.positions, target.goal.facing_asked) for one, target in pairs
     ]  # fmt: skip
     found["facing"] = float(np.mean(every)) if (every := np.concatenate(turns)).size else math.nan
     found["feature_error"] = metrics.feature_error(
-        [one.features / scale for one in made], [wish.known / scale for wish in wishes], [wish.mask for wish in wishes]
+        [one.features / scale for one in made],
+        [target.known / scale for target in targets],
+        [target.mask for target in targets],
     )
     return {name: number for name, number in found.items() if math.isfinite(number)}
 
@@ -195,19 +193,19 @@ def of_real(trial: Trial, replication: int) -> dict[str, float]:
 
 def of_method(trial: Trial, one: Kind, name: str, replication: int) -> dict[str, float]:
     """One way of control on one kind of goal; the time is that of making the motions."""
-    wishes = trial.wishes(one, replication)
-    made, seconds = trial.plain.get((name, replication)) or _made(trial, one, name, replication, wishes)
+    targets = trial.targets(one, replication)
+    made, seconds = trial.plain.get((name, replication)) or _made(trial, one, name, replication, targets)
     if name in BASE.values():
         trial.plain[name, replication] = made, seconds
-    return {**measured(trial, replication, made, wishes), "seconds": seconds / len(wishes)}
+    return {**measured(trial, replication, made, targets), "seconds": seconds / len(targets)}
 
 
-def _made(trial: Trial, one: Kind, name: str, replication: int, wishes: Sequence[Wish]) -> tuple[list[Made], float]:
-    """One motion per wish, and the seconds that all took."""
+def _made(trial: Trial, one: Kind, name: str, replication: int, targets: Sequence[Target]) -> tuple[list[Made], float]:
+    """One motion per target, and the seconds that all took."""
     make = trial.make(one, name)
     start = time.perf_counter()
-    made = make(wishes, seeds=trial.protocol.seeds(replication, len(wishes)))
-    return checked(made, wishes), time.perf_counter() - start
+    made = make(targets, seeds=trial.protocol.seeds(replication, len(targets)))
+    return checked(made, targets), time.perf_counter() - start
 
 
 # ---- the run ---------------------------------------------------------------------------------------------------------
@@ -230,7 +228,8 @@ def measure(
     """
     parts, count = parts or Parts(None, ""), range(trial.protocol.replications)
     wanted = {*methods, *(BASE[name] for name in methods)}
-    rows, missing = [_row(REAL, [of_real(trial, replication) for replication in count])], list[str]()
+    fixed = ("skate_share", "skate_speed", "skate_slide", "jerk", "penetration", "fid")  # the same motion each time
+    rows, missing = [row_of(REAL, [of_real(trial, r) for r in count], COLUMNS, fixed)], list[str]()
     for one in kinds:
         found: dict[str, list[dict[str, float]]] = {}
         for name in [name for name in METHODS if name in wanted and fits(one, name)]:
@@ -243,7 +242,8 @@ def measure(
                 missing.append(f"{one.title}, {name}: not measured ({error})")
                 progress(missing[-1])
         rows += [
-            _row(f"{one.title}, {name}", against(numbers, found.get(BASE[name]))) for name, numbers in found.items()
+            row_of(f"{one.title}, {name}", against(numbers, found.get(BASE[name])), COLUMNS)
+            for name, numbers in found.items()
         ]
     protocol = trial.protocol
     described = protocol.described(
@@ -286,13 +286,6 @@ def against(
     ]
 
 
-def _row(name: str, found: Sequence[dict[str, float]]) -> Row:
-    """Means and intervals over replications; what is the same real motion each time has no interval."""
-    fixed = ("skate_share", "skate_speed", "skate_slide", "jerk", "penetration", "fid") if name == REAL else ()
-    samples = {c.name: [numbers[c.name] for numbers in found if c.name in numbers] for c in COLUMNS}
-    return Row(name, {k: Value(v[0]) if k in fixed else Value.of(v) for k, v in samples.items() if v})
-
-
 def _notes(trial: Trial) -> tuple[str, ...]:
     count, every = len(trial.items), len(trial.everyone)
     bias = f"FID compares {count} motions with {every} real ones in {trial.everyone.shape[1]} dimensions"
@@ -314,46 +307,37 @@ def _notes(trial: Trial) -> tuple[str, ...]:
 
 
 def run(
-    weights: str = "default",
+    run: Run,
     *,
-    data: Path | str | None,
-    evaluator: str = "own",
     kinds: Sequence[str] = control_kinds.DEFAULT,
     methods: Sequence[str] = METHODS,
     selection: Selection | None = None,
     protocol: Protocol | None = None,
-    folder: Path | None = None,
-    device: str = "cpu",
-    command: str = "",
-    progress: Callable[[str], None] = lambda line: None,
 ) -> Report:
-    """Measure the control of weights (a shipped name or a file) on goals out of the real motions in ``data``.
+    """Measure the control of weights on goals out of the real motions of ``run.data``.
 
-    ``folder`` keeps what is done, so that the same call goes on after a stop. The report is not written here.
+    Args:
+        run: the weights, the data, who judges, and where pieces are kept.
+        kinds: names of kinds of goals.
+        methods: ways of control, a row each.
+        selection: which real motions of the data; None: the usual ones.
+        protocol: as of `settings`.
     """
     protocol, asked = protocol or settings(), control_kinds.kinds(kinds)
-    if not methods or not set(methods) <= set(METHODS):
-        raise MotionloomError(f"the ways of control are {', '.join(METHODS)}; got {', '.join(methods)[:200] or 'none'}")
-    if data is None:
+    check_names(methods, METHODS, "ways of control")
+    if run.data is None:
         raise MotionloomError("goals are taken out of real motions, and none are shipped; name a set with --data")
-    prior = Prior.load(weights, device=device)
-    text_suite.drawer(prior, protocol)  # what cannot be drawn is said before anything is read
-    judge, selection = load_evaluator(evaluator), fitting(data, selection)
+    prior = run.prior(protocol.steps[0])  # what cannot be drawn is said before anything is read
+    judge, selection = run.judge(), fitting(run.data, selection)
     how = Sampling(protocol.steps[0], protocol.guidance, protocol.solver, protocol.spacing)
     trial = prepare(
-        read_items(data, selection), judge, maker(prior, how), protocol,
+        read_items(run.data, selection), judge, maker(prior, how), protocol,
         scale=prior.std.cpu().numpy(), selection=selection,
     )  # fmt: skip
-    said = {
-        **protocol.drawn(), "steps": list(protocol.steps), "weights": text_suite._digest(find_weights(weights)),
-        "adapters": {name: text_suite._digest(path) for name, path in adapters().items()},
-        "evaluator": [judge.name, dict(judge.about), text_suite._judge_file(evaluator)], "items": identity(trial.items),
-        "device": device,
-    }  # fmt: skip
-    label = weights if find_weights(weights) != Path(weights) else Path(weights).stem
-    return measure(
-        trial, asked, methods, label=label, parts=Parts(folder, fingerprint(said)), command=command, progress=progress
-    )
+    files = {name: digest(path) for name, path in adapters().items()}
+    said = {**protocol.drawn(), "steps": list(protocol.steps), "adapters": files, "items": identity(trial.items)}
+    parts = run.parts({**said, **run.settings(judge)})
+    return measure(trial, asked, methods, label=run.label, parts=parts, command=run.command, progress=run.progress)
 
 
 def settings(

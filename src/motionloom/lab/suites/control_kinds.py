@@ -14,7 +14,8 @@ import numpy as np
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS, WIDTH, mask
-from motionloom.goals.goal import Goal, Placement
+from motionloom.goals.goal import Goal
+from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import Array
 from motionloom.skeleton import SMPL22
 
@@ -68,7 +69,7 @@ class Kind:
 
 
 @dataclass(frozen=True, eq=False)
-class Wish:
+class Target:
     """One motion that is asked for."""
 
     prompt: str
@@ -109,7 +110,7 @@ def kinds(names: Sequence[str]) -> tuple[Kind, ...]:
     return found
 
 
-def wish(one: Kind, features: np.ndarray, prompt: str) -> Wish:
+def target_of(one: Kind, features: np.ndarray, prompt: str) -> Target:
     """What a real motion (frames, 263), not standardised, asks of another with the same words."""
     known = np.asarray(features, dtype=np.float64)
     positions = humanml.decode_positions(known)
@@ -126,7 +127,7 @@ def wish(one: Kind, features: np.ndarray, prompt: str) -> Wish:
             asked[at, SMPL22.names.index(part)] = True
             fixed[at] |= mask(part)
     turns = at if {TRAJECTORY, WHOLE} & set(one.parts) else np.zeros(len(at), bool)
-    return Wish(prompt, Goal(positions, asked, facing(known), turns, start=Placement()), known, fixed)
+    return Target(prompt, Goal(positions, asked, facing(known), turns, start=GroundPose()), known, fixed)
 
 
 def facing(features: np.ndarray) -> Array:

@@ -1,4 +1,4 @@
-"""The rows of the suite `control`: ways to make a motion that meets a goal, each a function of wishes and seeds."""
+"""The rows of the suite `control`: ways to make a motion that meets a goal, each a function of targets and seeds."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,10 +11,13 @@ import torch
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.kinematics.physics import Array
-from motionloom.lab.suites.control_kinds import Kind, Wish
+from motionloom.lab.papers.diffusion_blending import control_features
+from motionloom.lab.suites.control_kinds import Kind, Target
 from motionloom.motion import Motion
-from motionloom.tasks.blending import Net, control_features
-from motionloom.tasks.text import ROWS, SOLVER, SPACING, sample_features, smooth, to_motion
+from motionloom.tasks.control import Net
+from motionloom.tasks.sampling import BATCH as ROWS
+from motionloom.tasks.sampling import Observed
+from motionloom.tasks.text import SOLVER, SPACING, sample_features, smooth, to_motion
 from motionloom.weights.adapter import Adapter, adapted
 from motionloom.weights.prior import Prior
 
@@ -39,9 +42,9 @@ class Made:
 
 
 class Method(Interface):
-    """Motion i of the answer meets wish i as well as it can, drawn from seed i alone."""
+    """Motion i of the answer meets target i as well as it can, drawn from seed i alone."""
 
-    def __call__(self, wishes: Sequence[Wish], *, seeds: Sequence[int]) -> list[Made]: ...
+    def __call__(self, targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]: ...
 
 
 Maker = Callable[[Kind, str], Method]
@@ -87,9 +90,9 @@ def maker(prior: Prior, how: Sampling) -> Maker:
 def uncontrolled(prior: Prior, how: Sampling, *, exported: bool) -> Method:
     """Goals are ignored: motions from the words alone, as the network draws them or as they are exported."""
 
-    def draw(wishes: Sequence[Wish], *, seeds: Sequence[int]) -> list[Made]:
+    def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
         drawn = sample_features(
-            prior, [wish.prompt for wish in wishes], [len(wish) for wish in wishes], seeds=seeds,
+            prior, [target.prompt for target in targets], [len(target) for target in targets], seeds=seeds,
             guidance=how.guidance, steps=how.steps, solver=how.solver, spacing=how.spacing,
         )  # fmt: skip
         features = [one.numpy().astype(np.float64) for one in drawn]
@@ -99,31 +102,31 @@ def uncontrolled(prior: Prior, how: Sampling, *, exported: bool) -> Method:
 
 
 def published(prior: Prior, how: Sampling, nets: Sequence[Net], *, noise_free: bool) -> Method:
-    """Control in the representation: the fixed numbers are written into every guess (`tasks.blending`)."""
+    """Control in the representation: the fixed numbers are written into every guess (`diffusion_blending`)."""
 
-    def draw(wishes: Sequence[Wish], *, seeds: Sequence[int]) -> list[Made]:
+    def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
         result: dict[int, Made] = {}
-        for rows in groups([len(wish) for wish in wishes]):
+        for rows in groups([len(target) for target in targets]):
             drawn = _controlled(
-                prior, how, nets, [wishes[row] for row in rows], [seeds[row] for row in rows], noise_free
+                prior, how, nets, [targets[row] for row in rows], [seeds[row] for row in rows], noise_free
             )
             result |= {row: of_features(one) for row, one in zip(rows, drawn, strict=True)}
-        return [result[row] for row in range(len(wishes))]
+        return [result[row] for row in range(len(targets))]
 
     return draw
 
 
 def _controlled(
-    prior: Prior, how: Sampling, nets: Sequence[Net], wishes: Sequence[Wish], seeds: Sequence[int],
+    prior: Prior, how: Sampling, nets: Sequence[Net], targets: Sequence[Target], seeds: Sequence[int],
     noise_free: bool,
 ) -> np.ndarray:  # fmt: skip
-    """(rows, frames, 263) not standardised, of wishes of one length."""
-    mask = torch.from_numpy(np.stack([wish.mask for wish in wishes])).to(prior.mean.device)
-    given = torch.from_numpy(np.stack([wish.known for wish in wishes])).to(prior.mean)
+    """(rows, frames, 263) not standardised, of targets of one length."""
+    mask = torch.from_numpy(np.stack([target.mask for target in targets])).to(prior.mean.device)
+    given = torch.from_numpy(np.stack([target.known for target in targets])).to(prior.mean)
     known = (given - prior.mean) / prior.std
     state = control_features(
-        prior, nets, [wish.prompt for wish in wishes], known, mask, weights=None, seeds=seeds,
-        guidance=how.guidance, steps=how.steps, solver=how.solver, spacing=how.spacing, noise_free=noise_free,
+        prior, nets, [target.prompt for target in targets], Observed(known, mask, noise_free), seeds=seeds,
+        guidance=how.guidance, steps=how.steps, solver=how.solver, spacing=how.spacing,
     )  # fmt: skip
     drawn = state * prior.std + prior.mean
     if prior.net.config.patch > 1:
@@ -134,13 +137,13 @@ def _controlled(
 def ours(prior: Prior, how: Sampling, *, exact: bool) -> Method:
     """`tasks.control.control` as it is by default, with or without its exact fit; as exported."""
 
-    def draw(wishes: Sequence[Wish], *, seeds: Sequence[int]) -> list[Made]:
+    def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
         from motionloom.tasks.control import control
 
         made = []
-        for wish, seed in zip(wishes, seeds, strict=True):
+        for target, seed in zip(targets, seeds, strict=True):
             (one,) = control(
-                prior, wish.prompt, wish.goal, count=1, seed=seed, guidance=how.guidance, steps=how.steps, exact=exact
+                prior, target.prompt, target.goal, seed=seed, guidance=how.guidance, steps=how.steps, fit=exact
             )
             made.append(of_motion(one.motion))
         return made
@@ -168,11 +171,11 @@ def groups(lengths: Sequence[int]) -> list[list[int]]:
     return [rows[at : at + ROWS] for rows in by_length.values() for at in range(0, len(rows), ROWS)]
 
 
-def checked(made: Sequence[Made], wishes: Sequence[Wish]) -> list[Made]:
+def checked(made: Sequence[Made], targets: Sequence[Target]) -> list[Made]:
     """The motions, if they have the lengths asked for; ValueError otherwise, since a number would be a lie."""
-    for one, wish in zip(made, wishes, strict=True):
-        if one.positions.shape != wish.goal.positions.shape or len(one.features) != len(wish):
-            raise ValueError(f"a motion of {one.positions.shape} for a goal of {wish.goal.positions.shape}")
+    for one, target in zip(made, targets, strict=True):
+        if one.positions.shape != target.goal.positions.shape or len(one.features) != len(target):
+            raise ValueError(f"a motion of {one.positions.shape} for a goal of {target.goal.positions.shape}")
         if not np.isfinite(one.positions).all():
             raise ValueError("a motion has numbers that are not finite")
     return list(made)

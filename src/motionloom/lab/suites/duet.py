@@ -6,7 +6,7 @@ much the completions move, touch and lie in each other, beside the real ones.
 
 import hashlib
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -24,8 +24,9 @@ from motionloom.lab.suites import duet_blocks
 from motionloom.lab.suites import duet_ways as ways
 from motionloom.lab.suites.duet_blocks import Beside
 from motionloom.lab.suites.duet_ways import FRAMES, GIVEN, Crops, Way
+from motionloom.lab.suites.harness import Run, Say, check_names, digest
 from motionloom.lab.suites.needs import NoData, pairs_of
-from motionloom.lab.suites.parts import Parts, fingerprint
+from motionloom.lab.suites.parts import Parts
 from motionloom.tasks.text import STEPS
 from motionloom.weights.pair import PairBlock, blocks
 from motionloom.weights.prior import Prior
@@ -82,9 +83,8 @@ QUICK = How(crops=6, samples=2, steps=6)
 
 
 def run(
-    weights: str | Path = "default",
+    run: Run,
     *,
-    data: Path | str | None,
     block: str | Path | None = None,
     communication: Path | None = None,
     mrt: Path | None = None,
@@ -92,34 +92,32 @@ def run(
     how: How | None = None,
     kinds: Sequence[str] = KINDS,
     with_published: bool = True,
-    folder: Path | None = None,
-    device: str = "cpu",
-    command: str = "",
-    progress: Callable[[str], None] = lambda line: None,
 ) -> Report:
-    """Measure a block (a shipped name, a file, or the shipped one) on the held-out pairs of ``data``.
+    """Measure a two-person block on the held-out pairs of ``run.data``.
 
-    communication: a block trained over `duet_ways.bare`; mrt: a file of `lab.papers.mrt_training`; without them their
-    rows are left out. beside: other blocks for the same prior, each a row of its own, of one sample. ``folder`` keeps
-    what is done, so that the same call goes on after a stop. The report is not written here.
+    Args:
+        run: the prior, the data, and where pieces are kept.
+        block: a shipped name or a file; None: the shipped one.
+        communication: a block trained over `duet_ways.bare`; None: no such row.
+        mrt: a file of `lab.papers.mrt_training`; None: no such row.
+        beside: other blocks for the same prior, each a row of its own, of one sample.
+        how: how completions are measured.
+        kinds: the rows, out of `KINDS`.
+        with_published: whether the report has what others published.
     """
     how = how or How()
-    if not kinds or not set(kinds) <= set(KINDS):
-        raise MotionloomError(f"the rows are {', '.join(KINDS)}; got {', '.join(kinds)[:200] or 'none'}")
-    prior = Prior.load(weights, device=device)
+    check_names(kinds, KINDS, "rows")
+    prior = Prior.load(run.weights, device=run.device)
     found = PairBlock.load(chosen_block(block), prior) if "ours" in kinds else None
-    made = ways_of(prior, found, how, kinds, communication=communication, mrt=mrt, device=device)
+    made = ways_of(prior, found, how, kinds, communication=communication, mrt=mrt, device=run.device)
     others = duet_blocks.beside(prior, beside, _asked(how))
-    crops = draw(held_out(pairs_of(data, captions=False, say=progress)), how)
+    crops = draw(held_out(pairs_of(run.data, captions=False, say=run.progress)), how)
     about = {
-        "weights": Path(weights).stem, "block": found.name if found else None, "device": device,
+        "weights": run.label, "block": found.name if found else None, "device": run.device,
         "files": {str(k): _digest(v) for k, v in (("communication", communication), ("mrt", mrt)) if v},
         "block file": _digest_of(found) if found else None,
     }  # fmt: skip
-    return measure(
-        crops, made, how, kinds=kinds, beside=others, with_published=with_published, folder=folder, command=command,
-        about=about, progress=progress,
-    )  # fmt: skip
+    return measure(crops, made, how, run=run, kinds=kinds, beside=others, with_published=with_published, about=about)
 
 
 def chosen_block(block: str | Path | None) -> str | Path:
@@ -165,7 +163,7 @@ def ways_of(
     """Every way that there are weights for, by its kind."""
     asked = _asked(how)
     found: dict[str, Way] = {"zero": ways.standing(), "constant": ways.gliding()}
-    found["silent"] = ways.drawn(prior, ways.silent_net(prior), **asked)
+    found["silent"] = ways.drawn(prior, ways.no_communication_net(prior), **asked)
     if communication is not None and "communication" in kinds:
         found["communication"] = ways.drawn(*ways.only_communication(prior, communication), **asked)
     if block is not None:
@@ -187,18 +185,17 @@ def measure(
     found: Mapping[str, Way],
     how: How,
     *,
+    run: Run | None = None,
     kinds: Sequence[str] = KINDS,
     beside: Sequence[Beside] = (),
     with_published: bool = True,
-    folder: Path | None = None,
-    command: str = "",
     about: Mapping[str, Any] | None = None,
-    progress: Callable[[str], None] = lambda line: None,
 ) -> Report:
     """The report of ways on crops. Pieces of blocks ``beside`` go by their own files: one more changes no other."""
+    run = run or Run()
     said = protocol_of(crops, how) | dict(about or {})
     settings = {**said, **asdict(how)}
-    parts = Parts(folder, fingerprint(settings))
+    parts = run.parts(settings)
     names = {"zero": ZERO, "constant": CONSTANT, "silent": SILENT, "communication": ALONE, "ours": "ours", "mrt": MRT}
     rows, errors = [], {}
     if "real" in kinds:
@@ -206,7 +203,7 @@ def measure(
     for kind in [kind for kind in KINDS if kind in kinds and kind in found]:
         drawn = kind in ("silent", "communication", "ours")
         samples = how.samples if drawn else 1
-        numbers = _measured(crops, found[kind], samples, parts, name=names[kind], progress=progress)
+        numbers = _measured(crops, found[kind], samples, parts, name=names[kind], progress=run.progress)
         one = f"{names[kind]}, one sample" if drawn else names[kind]
         errors[kind] = (names[kind], numbers)
         rows.append(_row(one, {name: numbers[name] for name in (*ERRORS, *LOOKS, "seconds")}))
@@ -214,14 +211,14 @@ def measure(
             mean = {name: numbers[f"mean_{name}"] for name in (*ERRORS, *LOOKS)}
             rows.append(_row(f"{names[kind]}, mean of {samples} samples", mean))
     for one in beside:
-        own = Parts(folder, fingerprint({**settings, "beside": one.digest}))
-        numbers = _measured(crops, one.way, 1, own, name=f"beside {one.digest} {one.row}", progress=progress)
+        own = run.parts({**settings, "beside": one.digest})
+        numbers = _measured(crops, one.way, 1, own, name=f"beside {one.digest} {one.row}", progress=run.progress)
         errors[one.row] = (one.row, numbers)
         rows.append(_row(one.row, {name: numbers[name] for name in (*ERRORS, *LOOKS, "seconds")}))
     said |= {"blocks beside": {one.row: one.digest for one in beside}} if beside else {}
     others = published("duet-completion", [column.name for column in COLUMNS]) if with_published else ()
     return Report(
-        "duet-completion", "Two people: three seconds after one", command, said, COLUMNS, (*rows, *others),
+        "duet-completion", "Two people: three seconds after one", run.command, said, COLUMNS, (*rows, *others),
         (*verdicts(errors), *NOTES),
     )  # fmt: skip
 
@@ -239,19 +236,17 @@ def _row(name: str, numbers: Mapping[str, Array]) -> Row:
     return Row(name, {column: Value.of([float(n) for n in values]) for column, values in numbers.items()})
 
 
-def _measured(
-    crops: Crops, way: Way, samples: int, parts: Parts, *, name: str, progress: Callable[[str], None]
-) -> dict[str, Array]:
+def _measured(crops: Crops, way: Way, samples: int, parts: Parts, *, name: str, progress: Say) -> dict[str, Array]:
     """(crops,) of every number, piece by piece."""
     pieces = []
     for start in range(0, len(crops.numbers), CHUNK):
-        kept = parts.find(f"{name} {start}")
-        if kept is None:
+
+        def scored(start: int = start) -> dict[str, float]:
             progress(f"{name}: crop {start + 1} of {len(crops.numbers)}")
             numbers = score(crops.part(slice(start, start + CHUNK)), way, samples)
-            kept = {f"{what} {i}": float(v) for what, values in numbers.items() for i, v in enumerate(values)}
-            parts.keep(f"{name} {start}", kept)
-        pieces.append(kept)
+            return {f"{what} {i}": float(v) for what, values in numbers.items() for i, v in enumerate(values)}
+
+        pieces.append(parts.once(f"{name} {start}", scored))
     whats = dict.fromkeys(key.rsplit(" ", 1)[0] for key in pieces[0])
     return {
         what: np.array([piece[f"{what} {i}"] for piece in pieces for i in range(len(piece) // len(whats))])
@@ -330,11 +325,11 @@ def protocol_of(crops: Crops, how: How) -> dict[str, Any]:
 
 
 def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:12] if path.is_file() else "missing"
+    return digest(path)[:12] if path.is_file() else "missing"
 
 
 def _digest_of(block: PairBlock) -> str:
-    digest = hashlib.sha256()
+    made = hashlib.sha256()
     for key in sorted(block.tensors):
-        digest.update(key.encode() + block.tensors[key].detach().cpu().contiguous().numpy().tobytes())
-    return digest.hexdigest()[:12]
+        made.update(key.encode() + block.tensors[key].detach().cpu().contiguous().numpy().tobytes())
+    return made.hexdigest()[:12]

@@ -1,6 +1,6 @@
 """Answers to somebody: one of a held-out pair is given, and a partner is drawn; judged as duets from words are."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from motionloom.lab.report.report import Column, Report, Value
 from motionloom.lab.suites import duet_text as judged
 from motionloom.lab.suites.duet import HELD_OUT
 from motionloom.lab.suites.duet_text import KINDS, NOTES, How, Make, Table
+from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.needs import NoData
 from motionloom.tasks.control import moved
 from motionloom.tasks.duet import react
@@ -73,27 +74,14 @@ class Windows:
         return [window for caption, count, seed in turns for window in self.draw(caption, count, seed)]
 
 
-def run(
-    weights: str | Path = "default",
-    *,
-    data: Path | str | None,
-    block: str | Path | None = None,
-    how: How | None = None,
-    kinds: Sequence[str] = KINDS,
-    device: str = "cpu",
-    command: str = "",
-    progress: Callable[[str], None] = lambda line: None,
-) -> Report:
-    """Measure a block (a shipped name, a file, or the shipped one) on people of the held-out pairs of ``data``."""
+def run(run: Run, *, block: str | Path | None = None, how: How | None = None, kinds: Sequence[str] = KINDS) -> Report:
+    """Measure a two-person block on people of the held-out pairs of ``run.data``; arguments as of `duet_text.run`."""
     how = how or How()
-    prior, found, pairs, about = judged.opened(
-        weights, data=data, block=block, kinds=kinds, device=device, progress=progress
-    )
+    prior, found, pairs, about = judged.opened(run, block, kinds)
     given = Windows.of(pairs, how)
     return judged.measure(
-        pairs, answers(prior, found, given, how), alone(prior, given, how), how, table=table(given, how), kinds=kinds,
-        command=command, about=about | {"given": "one of the two in random windows of validation and test pairs"},
-        progress=progress,
+        pairs, answers(prior, found, given, how), alone(prior, given, how), how, table=table(given, how), run=run,
+        kinds=kinds, about=about | {"given": "one of the two in random windows of validation and test pairs"},
     )  # fmt: skip
 
 
@@ -121,7 +109,7 @@ def answers(prior: Prior, block: PairBlock, given: Windows, how: How) -> Make:
         for number, window in enumerate(given.draw(caption, count, seed)):
             made += react(
                 prior, block, motion_from_positions(window[0], mp.FPS), caption, seed=own_seed(seed, number),
-                guidance=how.guidance, steps=how.steps, clean=how.clean,
+                guidance=how.guidance, steps=how.steps, foot_lock=how.clean,
             )  # fmt: skip
         return made
 
@@ -136,7 +124,7 @@ def alone(prior: Prior, given: Windows, how: How) -> Make:
         for number, window in enumerate(given.draw(caption, count, seed)):
             (partner,) = generate(
                 prior, caption, seconds=how.seconds, seed=own_seed(seed, number), guidance=how.guidance,
-                steps=how.steps, clean=how.clean,
+                steps=how.steps, foot_lock=how.clean,
             )  # fmt: skip
             begins = placement(two.encode(window).stands[1])
             made.append((motion_from_positions(window[0], mp.FPS), moved(partner, begins)))

@@ -1,6 +1,5 @@
 """Further two-person blocks for one prior, each a row of `lab.suites.duet`: other depths, other places, other seeds."""
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 from motionloom.errors import MotionloomError
 from motionloom.lab.suites import duet_ways as ways
 from motionloom.lab.suites.duet_ways import Way
+from motionloom.lab.suites.harness import digest
 from motionloom.weights.pair import PairBlock, blocks
 from motionloom.weights.prior import Prior
 
@@ -39,8 +39,7 @@ def beside(prior: Prior, files: Sequence[str | Path], asked: dict[str, Any]) -> 
         if name in found:
             raise MotionloomError(f"two of the blocks to stand beside are called {name!r}; give each a name of its own")
         path = blocks().get(str(file)) or Path(file)
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
-        found[name] = Beside(f"{name}: {sizes(block)}", digest, ways.drawn(prior, block.net(prior), **asked))
+        found[name] = Beside(f"{name}: {sizes(block)}", digest(path)[:12], ways.drawn(prior, block.net(prior), **asked))
     return tuple(found.values())
 
 

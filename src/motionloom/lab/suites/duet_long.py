@@ -3,7 +3,7 @@
 Their last stretch, and their first, are judged as duets from words are.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from motionloom.lab.report.report import Report
 from motionloom.lab.suites import duet_text as judged
 from motionloom.lab.suites.duet_answers import own_seed
 from motionloom.lab.suites.duet_text import KINDS, NOTES, Make, Table
+from motionloom.lab.suites.harness import Run
 from motionloom.motion import Motion
 from motionloom.tasks.control import moved
 from motionloom.tasks.duet import compose_pair
@@ -44,27 +45,14 @@ class How(judged.How):
 QUICK = How(duets=2, steps=6, segments=2)
 
 
-def run(
-    weights: str | Path = "default",
-    *,
-    data: Path | str | None,
-    block: str | Path | None = None,
-    how: How | None = None,
-    kinds: Sequence[str] = KINDS,
-    device: str = "cpu",
-    command: str = "",
-    progress: Callable[[str], None] = lambda line: None,
-) -> Report:
-    """Measure a block (a shipped name, a file, or the shipped one) in long duets for the captions of train pairs."""
+def run(run: Run, *, block: str | Path | None = None, how: How | None = None, kinds: Sequence[str] = KINDS) -> Report:
+    """Measure a two-person block on long duets for the captions of train pairs; arguments as of `duet_text.run`."""
     how = how or How()
-    prior, found, pairs, about = judged.opened(
-        weights, data=data, block=block, kinds=kinds, device=device, progress=progress
-    )
+    prior, found, pairs, about = judged.opened(run, block, kinds)
     said = judged.captions_of(pairs)
     return judged.measure(
-        pairs, ours(prior, found, said, how), alone(prior, pairs, said, how), how, table=table(said, how), kinds=kinds,
-        command=command, about=about | {"segments": how.segments, "whole": f"{how.segments * how.seconds:g} s"},
-        progress=progress,
+        pairs, ours(prior, found, said, how), alone(prior, pairs, said, how), how, table=table(said, how), run=run,
+        kinds=kinds, about=about | {"segments": how.segments, "whole": f"{how.segments * how.seconds:g} s"},
     )  # fmt: skip
 
 
@@ -88,7 +76,7 @@ def ours(prior: Prior, block: PairBlock, captions: Sequence[str], how: How) -> M
             pieces = list(
                 compose_pair(
                     prior, block, timeline(captions, caption, how), seed=own_seed(seed, number),
-                    guidance=how.guidance, steps=how.steps, clean=how.clean,
+                    guidance=how.guidance, steps=how.steps, foot_lock=how.clean,
                 )
             )  # fmt: skip
             made.append((_whole(first for first, _ in pieces), _whole(second for _, second in pieces)))
@@ -105,7 +93,7 @@ def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: How
         return _whole(
             compose(
                 prior, timeline(captions, caption, how), seed=seed, guidance=how.guidance, steps=how.steps,
-                clean=how.clean,
+                foot_lock=how.clean,
             )
         )  # fmt: skip
 

@@ -22,10 +22,20 @@ from motionloom.lab.metrics import pair as mp
 from motionloom.lab.metrics import pair_groups as groups
 from motionloom.lab.report.report import REAL, Column, Report, Row, Value
 from motionloom.lab.suites.duet import HELD_OUT, chosen_block
-from motionloom.lab.suites.duet_ways import silent_net
+from motionloom.lab.suites.duet_ways import no_communication_net
+from motionloom.lab.suites.harness import Run, Say, check_names
 from motionloom.lab.suites.needs import pairs_of
 from motionloom.tasks.control import moved
-from motionloom.tasks.pair import Duet, generate_pair, known_state, pair_features, person_seeds, placement
+from motionloom.tasks.pair import (
+    Duet,
+    PairEdits,
+    generate_pair,
+    known_state,
+    pair_features,
+    person_seeds,
+    placement,
+    stacked,
+)
 from motionloom.tasks.text import GUIDANCE, STEPS, finish, frames_in
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -118,47 +128,35 @@ class Table:
     """Further columns of all that was made, in the order of `turns`."""
 
 
-def run(
-    weights: str | Path = "default",
-    *,
-    data: Path | str | None,
-    block: str | Path | None = None,
-    how: How | None = None,
-    kinds: Sequence[str] = KINDS,
-    device: str = "cpu",
-    command: str = "",
-    progress: Callable[[str], None] = lambda line: None,
-) -> Report:
-    """Measure a block (a shipped name, a file, or the shipped one) against the pairs of ``data``, captions and all."""
+def run(run: Run, *, block: str | Path | None = None, how: How | None = None, kinds: Sequence[str] = KINDS) -> Report:
+    """Measure a two-person block against the pairs of ``run.data`` and their captions.
+
+    Args:
+        run: the prior and the data.
+        block: a shipped name or a file; None: the shipped one.
+        how: how duets are made and measured.
+        kinds: the rows, out of `KINDS`.
+    """
     how = how or How()
-    prior, found, pairs, about = opened(weights, data=data, block=block, kinds=kinds, device=device, progress=progress)
+    prior, found, pairs, about = opened(run, block, kinds)
     ours: Make = lambda caption, count, seed: generate_pair(  # noqa: E731
         prior, found, caption, seconds=how.seconds, count=count, seed=seed, guidance=how.guidance, steps=how.steps,
-        clean=how.clean,
+        foot_lock=how.clean,
     )  # fmt: skip
     return measure(
-        pairs, ours, beside(prior, pairs, how), how, table=text_table(pairs), kinds=kinds, command=command, about=about,
-        progress=progress,
+        pairs, ours, beside(prior, pairs, how), how, table=text_table(pairs), run=run, kinds=kinds, about=about
     )  # fmt: skip
 
 
 def opened(
-    weights: str | Path,
-    *,
-    data: Path | str | None,
-    block: str | Path | None,
-    kinds: Sequence[str],
-    device: str,
-    progress: Callable[[str], None],
+    run: Run, block: str | Path | None, kinds: Sequence[str]
 ) -> tuple[Prior, PairBlock, list[Pair], dict[str, Any]]:
     """The prior, the block and the pairs with their captions, and what the protocol says of them."""
-    if not kinds or not set(kinds) <= set(KINDS):
-        raise MotionloomError(f"the rows are {', '.join(KINDS)}; got {', '.join(kinds)[:200] or 'none'}")
-    prior = Prior.load(weights, device=device)
+    check_names(kinds, KINDS, "rows")
+    prior = Prior.load(run.weights, device=run.device)
     found = PairBlock.load(chosen_block(block), prior)
-    return prior, found, pairs_of(data, say=progress), {
-        "weights": Path(weights).stem, "block": found.name, "device": device
-    }  # fmt: skip
+    about = {"weights": run.label, "block": found.name, "device": run.device}
+    return prior, found, pairs_of(run.data, say=run.progress), about
 
 
 def text_table(pairs: Sequence[Pair]) -> Table:
@@ -169,7 +167,7 @@ def text_table(pairs: Sequence[Pair]) -> Table:
 
 def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
     """The prior without communication, its people beginning where partners of random train windows stand."""
-    frames, net, begun = frames_in(how.seconds, prior.fps), silent_net(prior), beginnings(pairs, how)
+    frames, net, begun = frames_in(how.seconds, prior.fps), no_communication_net(prior), beginnings(pairs, how)
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
         nothing = torch.zeros(2, 0, len(prior.mean))
@@ -177,13 +175,13 @@ def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
         features, stands = pair_features(
             prior, net, [caption] * (2 * count), frames,
             seeds=[s for number in range(count) for s in person_seeds(seed, number)],
-            known=torch.cat([state for state, _ in told]), mask=torch.cat([mask for _, mask in told]),
-            guidance=how.guidance, steps=how.steps,
+            edits=PairEdits(stacked(told)), guidance=how.guidance, steps=how.steps,
         )  # fmt: skip
         made = []
         for numbers, standing in zip(features, stands.double().numpy(), strict=True):
             first, second = (
-                moved(finish(prior, f, clean=how.clean), placement(s)) for f, s in zip(numbers, standing, strict=True)
+                moved(finish(prior, f, foot_lock=how.clean), placement(s))
+                for f, s in zip(numbers, standing, strict=True)
             )
             made.append((first, second))
         return made
@@ -210,19 +208,19 @@ def measure(
     how: How,
     *,
     table: Table,
+    run: Run | None = None,
     kinds: Sequence[str] = KINDS,
-    command: str = "",
     about: dict[str, Any] | None = None,
-    progress: Callable[[str], None] = lambda line: None,
 ) -> Report:
     """The report of duets made for captions, beside all pairs there are."""
+    run = run or Run()
     recorded = _recorded(pairs, frames_in(how.seconds, mp.FPS))
     real = list(recorded.values())
     rows = _real_rows(recorded, {pair.name for pair in pairs if pair.split in HELD_OUT}, kinds)
     for kind, make, name in (("ours", ours, "ours"), ("silent", silent, "prior without communication")):
         if make is None or not {kind, "our-strangers" if kind == "ours" else kind} & set(kinds):
             continue
-        made, seconds = _made(make, table.captions, how, lambda line, n=name: progress(f"{n}: {line}"))
+        made, seconds = _made(make, table.captions, how, lambda line, n=name: run.progress(f"{n}: {line}"))
         for end, cut in table.cuts if kind == "ours" else table.cuts[:1]:
             clips = [cut(duet) for duet in made]
             if kind in kinds:
@@ -232,7 +230,7 @@ def measure(
                 rows.append(_row(f"{name}{end}, partners shuffled", strangers, real, more=table.more(strangers)))
     said = protocol_of(recorded, table.captions, how) | (about or {})
     return Report(
-        table.suite, table.title, command, said, table.columns, tuple(rows), (*verdicts(rows), *table.notes)
+        table.suite, table.title, run.command, said, table.columns, tuple(rows), (*verdicts(rows), *table.notes)
     )  # fmt: skip
 
 
@@ -280,7 +278,7 @@ def turns(captions: Sequence[str], how: How) -> list[tuple[str, int, int]]:
 
 
 def _made(
-    make: Make, captions: Sequence[str], how: How, say: Callable[[str], None]
+    make: Make, captions: Sequence[str], how: How, say: Say
 ) -> tuple[list[Array], float]:  # fmt: skip
     """Positions of all duets, in the order of `turns`, and seconds for one."""
     made, began = [], time.perf_counter()

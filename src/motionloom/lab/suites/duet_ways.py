@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from motionloom.diffusion import row_seed
 from motionloom.features import pair as two
-from motionloom.goals.goal import Placement
+from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics.pair import PREFIX
 from motionloom.lab.metrics.prediction import constant_velocity, zero_velocity
@@ -22,7 +22,7 @@ from motionloom.lab.papers.mrt import Mrt, completed
 from motionloom.nets.pair import PairNet, Talk, fitting
 from motionloom.nets.prior import ModulatedBlock, PriorNet, PublishedBlock
 from motionloom.tasks.long import Past
-from motionloom.tasks.pair import known_state, pair_features, person_seeds
+from motionloom.tasks.pair import PairEdits, known_state, pair_features, person_seeds, stacked
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior, save_prior
 
@@ -117,12 +117,12 @@ def drawn(
             for one in known
         ]
         people = [torch.from_numpy(person) for one in known for person in one.features]
-        leaving = [Past(person.float(), Placement()).holder(prior, FRAMES) for person in people]
+        leaving = [Past(person.float(), GroundPose()).holder(prior, FRAMES) for person in people]
         features, _ = make(
             prior, net, [prompt] * len(people), FRAMES,
             seeds=[s for number in crops.numbers for s in person_seeds(row_seed(seed, sample), number)],
-            known=torch.cat([state for state, _ in told]), mask=torch.cat([mask for _, mask in told]),
-            change=leaving if given == "past" else None, still=[False] * len(people), guidance=guidance, steps=steps,
+            edits=PairEdits(stacked(told), leaving if given == "past" else None, frozen=[False] * len(people)),
+            guidance=guidance, steps=steps,
         )  # fmt: skip
         stands, floors = np.stack([one.stands for one in known]), np.stack([one.floors for one in known])
         return two.decode(features.double().numpy(), stands) + floors[..., None, None, None] * _UP
@@ -130,7 +130,7 @@ def drawn(
     return way
 
 
-def silent_net(prior: Prior) -> PairNet:
+def no_communication_net(prior: Prior) -> PairNet:
     """The prior without communication: a block that says nothing, and two motions that know nothing of each other."""
     return PairNet(
         prior.net, Talk(fitting(prior.net.config), prior.net.config).to(prior.mean.device), prior.schedule,

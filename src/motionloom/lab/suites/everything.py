@@ -11,9 +11,9 @@ from typing import Any, Literal
 
 from motionloom.errors import MotionloomError
 from motionloom.io.text import plain_json
+from motionloom.lab.report import files
 from motionloom.lab.report import report as reports
 from motionloom.lab.report.report import Report
-from motionloom.lab.suites import obey
 from motionloom.lab.suites.needs import NoData
 from motionloom.lab.suites.registry import SUITES, Job, Suite
 from motionloom.weights.prior import find_weights
@@ -56,7 +56,7 @@ def run_all(
     """
     find_weights(job.weights)
     for suite in suites:
-        obey.check_report(out / suite.name / "report.json")
+        files.check_report(out / suite.name / "report.json")
         for path in (out / suite.name / "report.json", *([keep / f"{suite.name}.json"] if keep else [])):
             if job.quick and not again and _is_full(path):
                 raise MotionloomError(f"{path} holds a full run; name another --out or say --again to replace it")
@@ -64,7 +64,7 @@ def run_all(
     for suite in suites:
         outcome = _one(suite, job, out / suite.name, again=again)
         if keep and outcome.report:
-            obey.write_json(keep / f"{suite.name}.json", reports.encode(outcome.report))
+            files.write_json(keep / f"{suite.name}.json", reports.encode(outcome.report))
         job.tools.progress(f"{suite.name}: {outcome.said}")
         outcomes.append(outcome)
     return outcomes
@@ -89,7 +89,7 @@ def _one(suite: Suite, job: Job, folder: Path, *, again: bool) -> Outcome:
             made = replace(made, protocol={**made.protocol, "quick": True}, notes=(QUICK, *made.notes))
         (folder / "done.json").unlink(missing_ok=True)  # a kill before the next line must not pair it with this report
         reports.write(made, folder)
-        obey.write_json(folder / "done.json", {"fingerprint": mark, "settings": dict(settings), "quick": job.quick})
+        files.write_json(folder / "done.json", {"fingerprint": mark, "settings": dict(settings), "quick": job.quick})
     except NoData as nothing:
         return Outcome(suite, None, "skipped", str(nothing))
     except MotionloomError as error:

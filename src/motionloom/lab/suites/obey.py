@@ -5,19 +5,17 @@ JSON file after every prompt; a run that was stopped goes on with the next one.
 """
 
 import hashlib
-import json
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path, check_place
 from motionloom.io.text import plain_json
 from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics.everyday.check import Everyday
 from motionloom.lab.metrics.obedience import CHECKS, Check
+from motionloom.lab.report.files import check_report, write_json
 
 ENOUGH = 0.9
 """Share of seeds that must obey for a prompt to count as obeyed."""
@@ -207,41 +205,3 @@ def table(
 def _median(values: Sequence[float]) -> float:
     ordered = sorted(values)
     return ordered[len(ordered) // 2] if ordered else float("nan")
-
-
-def markdown(rows: Sequence[Sequence[str]]) -> str:
-    """A table for a report."""
-    head, *body = [[cell.replace("|", "/") for cell in row] for row in rows]
-    return "\n".join("| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *body])
-
-
-def plain(rows: Sequence[Sequence[str]]) -> str:
-    """The same in columns for a terminal."""
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
-    )
-
-
-def check_report(path: Path) -> Path:
-    """The path, its folders made, if a report can be written there: ask before long work."""
-    try:
-        os.makedirs(path.parent, exist_ok=True)
-    except OSError as error:
-        raise MotionloomError(
-            f"cannot write {path}: the folder {path.parent} cannot be made ({error.strerror or error}); name another"
-        ) from None
-    check_place(path)
-    return path
-
-
-def write_json(path: Path, value: Any) -> Path:
-    """Whole or not at all, the folders made."""
-    return write_text(path, json.dumps(value, indent=1) + "\n")
-
-
-def write_text(path: Path, value: str) -> Path:
-    """Whole or not at all, the folders made."""
-    with atomic_path(check_report(path)) as temp:
-        temp.write_text(value, encoding="utf-8")
-    return path

@@ -7,14 +7,14 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from motionloom.errors import MotionloomError
 from motionloom.io.text import plain_json
-from motionloom.lab.suites.obey import write_json
+from motionloom.lab.report.files import write_json
 
 LARGEST = 1 << 20
 
@@ -62,3 +62,19 @@ class Parts:
         path = self.path(name)
         if path is not None:
             write_json(path, {"settings": self.settings, "numbers": dict(numbers)})
+
+    def once(
+        self,
+        name: str,
+        make: Callable[[], Mapping[str, float]],
+        told: Callable[[Mapping[str, float]], str] | None = None,
+        progress: Callable[[str], None] = lambda line: None,
+    ) -> dict[str, float]:
+        """The numbers of a piece: kept ones, or made and kept now, which ``told`` says in a line for ``progress``."""
+        found = self.find(name)
+        if found is None:
+            found = dict(make())
+            self.keep(name, found)
+            if told is not None:
+                progress(told(found))
+        return found

@@ -8,7 +8,6 @@ steps, and the same weights by the published recipe (`lab.papers.humanmac`). Eve
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
@@ -21,7 +20,7 @@ from motionloom.lab.report import report as reports
 from motionloom.lab.report.published_rows import published
 from motionloom.lab.report.report import REAL, SAME, Column, Report, Row, Value
 from motionloom.lab.suites import prediction_trial as trials
-from motionloom.lab.suites.parts import Parts, fingerprint
+from motionloom.lab.suites.harness import Run, check_names, check_steps, digest
 from motionloom.lab.suites.prediction_trial import Array, Trial, Way
 from motionloom.tasks.completion import SOLVER, SPACING, STEPS, futures
 from motionloom.weights.predictor import Predictor, find_predictor
@@ -86,47 +85,36 @@ QUICK = How(samples=6, windows=6, published_steps=20)
 
 
 def run(
-    weights: str | Path = "predictor",
+    run: Run,
     *,
-    data: Path | str | None,
     name: str | None = None,
     how: How | None = None,
     kinds: Sequence[str] = KINDS,
     with_published: bool = True,
-    folder: Path | None = None,
-    device: str = "cpu",
-    command: str = "",
-    progress: Callable[[str], None] = lambda line: None,
 ) -> Report:
-    """Measure weights (a shipped name or a file) on the test part of ``data``; ``name``: which data set that is.
+    """Measure a predictor on the test part of ``run.data``.
 
-    ``folder`` keeps rows that are done, so that the same call goes on after a stop. The report is not written here.
+    Args:
+        run: the predictor, the data, and where rows are kept.
+        name: which data set that is; None: recognised by its files.
+        how: how it is measured.
+        kinds: the rows, out of `KINDS`.
+        with_published: whether the report has what others published.
     """
     how = how or How()
-    if not kinds or not set(kinds) <= set(KINDS):
-        raise MotionloomError(f"the rows are {', '.join(KINDS)}; got {', '.join(kinds)[:200] or 'none'}")
-    if data is None:
+    check_names(kinds, KINDS, "rows")
+    if run.data is None:
         raise MotionloomError("futures are compared with what came, and no recordings are shipped; name some: --data")
-    predictor = Predictor.load(weights, device=device)
-    check_steps(predictor, how.steps, how.published_steps)
-    protocol = trials.read_test(data, name, say=progress)
+    predictor = Predictor.load(run.weights, device=run.device)
+    for steps in (how.steps, how.published_steps):
+        check_steps(steps, predictor.schedule.steps - 1)
+    protocol = trials.read_test(run.data, name, say=run.progress)
     trials.check_fit(predictor, protocol)
-    digest = hashlib.sha256(find_predictor(weights).read_bytes()).hexdigest()[:12]
-    found = measure(
-        predictor, trials.prepare(protocol, count=how.windows, singles=how.singles), how, kinds,
-        label=Path(weights).stem, with_published=with_published, folder=folder, command=command, progress=progress,
-        about={"weights file": digest, "device": device},
+    return measure(
+        predictor, trials.prepare(protocol, count=how.windows, singles=how.singles), how, kinds, run=run,
+        with_published=with_published,
+        about={"weights file": digest(find_predictor(run.weights))[:12], "device": run.device},
     )  # fmt: skip
-    return found
-
-
-def check_steps(predictor: Predictor, *steps: int) -> None:
-    """Raise MotionloomError where weights cannot be walked in so many steps."""
-    for one in steps:
-        if not 1 <= one < predictor.schedule.steps:
-            raise MotionloomError(
-                f"{one} steps cannot be taken; these weights take 1 to {predictor.schedule.steps - 1}"
-            )
 
 
 def measure(
@@ -135,35 +123,34 @@ def measure(
     how: How,
     kinds: Sequence[str] = KINDS,
     *,
-    label: str = "predictor",
+    run: Run | None = None,
     with_published: bool = True,
-    folder: Path | None = None,
-    command: str = "",
     about: Mapping[str, Any] | None = None,
-    progress: Callable[[str], None] = lambda line: None,
 ) -> Report:
-    """The report of a predictor on a trial."""
+    """The report of a predictor on a trial; ``about``: further settings that change the numbers."""
+    run = run or Run("predictor")
     said = protocol_of(trial, how, predictor) | dict(about or {})
-    parts = Parts(folder, fingerprint({**said, **asdict(how), "windows chosen": _identity(trial)}))
+    parts = run.parts({**said, **asdict(how), "windows chosen": _identity(trial)})
     rows = []
-    for title, way, repeats in _ways(predictor, trial, how, kinds, label=label):
+    for title, way, repeats in _ways(predictor, trial, how, kinds, label=run.label):
         numbers = []
         for k in range(repeats):
-            kept = parts.find(f"{title} {k}")
-            if kept is None:
-                progress(f"{title}: {len(trial.windows)} windows")
-                kept = trials.score(
+
+            def scored(k: int = k, title: str = title, way: Callable[[int], Way] | None = way) -> dict[str, float]:
+                run.progress(f"{title}: {len(trial.windows)} windows")
+                return trials.score(
                     trial, way(how.seed + k) if way else None, samples=how.samples,
                     root=predictor.layout.root or title in (ZERO, CONSTANT),
-                    say=lambda line, t=title: progress(f"{t}: {line}"),
+                    say=lambda line: run.progress(f"{title}: {line}"),
                 )  # fmt: skip
-                parts.keep(f"{title} {k}", kept)
-            numbers.append(kept)
+
+            numbers.append(parts.once(f"{title} {k}", scored))
         rows.append(Row(title, {c: Value.of([n[c] for n in numbers]) for c in SHOWN if c in numbers[0]}))
     shown = columns()
     others = _published(trial, how, [c.name for c in shown]) if with_published else ()
     return Report(
-        "prediction", "Prediction: many futures of what was seen", command, said, shown, (*rows, *others), _notes(trial)
+        "prediction", "Prediction: many futures of what was seen", run.command, said, shown, (*rows, *others),
+        _notes(trial),
     )  # fmt: skip
 
 
@@ -189,7 +176,7 @@ def drawn(
 ) -> Way:
     """Our own way of predicting."""
     return lambda past: futures(
-        predictor, past, count=samples, seed=seed, steps=steps, guidance=guidance, rows=trials.ROWS,
+        predictor, past, count=samples, seed=seed, steps=steps, guidance=guidance, batch_size=trials.ROWS,
         solver=solver, spacing=spacing,
     )  # fmt: skip
 

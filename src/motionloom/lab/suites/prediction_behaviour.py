@@ -13,23 +13,24 @@ from motionloom.data.prediction import Protocol
 from motionloom.diffusion import row_seed
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import SMPL_LAYOUT, Layout
-from motionloom.goals.hold import HeldPart, Hold
+from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.kinematics import physics
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.lab.metrics import prediction as metrics
 from motionloom.lab.metrics.prediction_body import seam
-from motionloom.lab.report.report import REAL, Column, Row, Value
+from motionloom.lab.report.report import REAL, Column, Row
 from motionloom.lab.suites import prediction_trial as trials
+from motionloom.lab.suites.harness import Say, plain_row, silent
 from motionloom.lab.suites.prediction_trial import Array, Trial, from_root
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.completion import STEPS, TEMPERATURE, Known, next_frames
+from motionloom.tasks.completion import Known, next_frames
 from motionloom.tasks.predict import predict, switch
-from motionloom.tasks.windows import Pen
+from motionloom.tasks.sampling import PredictionSampling
+from motionloom.tasks.windows import WindowSampler
 from motionloom.weights.predictor import Predictor
 
 Found = tuple[list[Column], list[Row], dict[str, Any]]
-Say = Callable[[str], None]
 POSES = 3000
 """Training poses that others are compared with."""
 GROUPS = ("left_arm", "right_arm", "left_leg", "right_leg", "torso", "lower_body", "upper_body")
@@ -44,13 +45,13 @@ def horizon(
     made = long_futures(predictor, trial, samples=samples, seed=seed, seconds=seconds, say=say)
     known = _known_poses(protocol)
     real = np.stack([trial.future(k) for k in range(len(trial.windows))])
-    rows = [_row(REAL, _lively(real, protocol, known) | {"spread": _spread(real[None], protocol.layout)})]
+    rows = [plain_row(REAL, _lively(real, protocol, known) | {"spread": _spread(real[None], protocol.layout)})]
     second = round(protocol.fps)
     for start in range(0, made.shape[2] - second + 1, second):
         part = made[:, :, start : start + second]
         numbers = _lively(part.reshape(-1, *part.shape[2:]), protocol, known)
         spread = {"spread": _spread(part, protocol.layout)} if samples > 1 else {}
-        rows.append(_row(f"second {start // second + 1}", numbers | spread))
+        rows.append(plain_row(f"second {start // second + 1}", numbers | spread))
     columns = [
         Column("speed", "joint speed m/s", "real", "of joints from the root, mean"),
         Column("root_speed", "root speed m/s", "real", "along the ground, mean"),
@@ -63,14 +64,14 @@ def horizon(
 
 
 def long_futures(
-    predictor: Predictor, trial: Trial, *, samples: int, seed: int, seconds: float, say: Say = lambda line: None
+    predictor: Predictor, trial: Trial, *, samples: int, seed: int, seconds: float, say: Say = silent
 ) -> Array:
     """(windows, samples, frames, joints, 3): every future goes on from its own end, as `tasks.predict` does."""
     count, fps = len(trial.windows), predictor.fps
     person = np.repeat(trial.pasts(0, count), samples, axis=0)
     turns, made = int(np.ceil(seconds * fps / (predictor.frames - predictor.observed) - 1e-9)), []
-    pen = Pen(predictor, STEPS, 1.0, TEMPERATURE, True)
-    for turn, new in enumerate(pen.windows(person, [(seed, i) for i in range(len(person))], None, turns)):
+    sampler = WindowSampler(predictor, PredictionSampling())
+    for turn, new in enumerate(sampler.windows(person, [(seed, i) for i in range(len(person))], None, turns)):
         say(f"window {turn + 1} of {turns}")
         made.append(new)
     whole = np.concatenate(made, axis=1)[:, : round(seconds * fps)]
@@ -132,7 +133,7 @@ def hold(
     rows = []
     for group in GROUPS:
         say(f"hold {group}: {len(trial.windows)} windows")
-        rows.append(_row(group, held_numbers(predictor, trial, group, samples=samples, seed=seed)))
+        rows.append(plain_row(group, held_numbers(predictor, trial, group, samples=samples, seed=seed)))
     columns = [
         Column("free", "ADE without m", "", "of the joints that are free, of the nearest future, nothing given"),
         Column("given", "ADE with m", "down", "the same with the group given"),
@@ -179,7 +180,7 @@ def held_rotations(predictor: Predictor, trial: Trial, number: int, group: str, 
         np.concatenate([trial.pasts(number, number + 1)[0], trial.future(number)]), predictor.fps
     )
     source = whole.frames(seen, len(whole))
-    held = Hold(source, (HeldPart((group,)),), align=False)
+    held = FixedJoints(source, (FixedPart((group,)),), align=False)
     seconds = len(source) / predictor.fps
     (made,) = predict(predictor, whole.frames(0, seen), count=1, seconds=seconds, seed=seed, hold=held)
     got, wanted = made.rotations[seen:, joints], source.rotations[:, joints]
@@ -208,13 +209,14 @@ def arrive(
     clips = [motion_from_positions(np.concatenate([trial.pasts(k, k + 1)[0], trial.future(k)]), predictor.fps)
              for k in range(count)]  # fmt: skip
     seen, pairs = protocol.observed, [(k, (k + count // 2) % count) for k in range(count)]
-    rows = [_row(REAL, _mean([_ends(c.positions(), seen, seen + protocol.future // 2, predictor.fps) for c in clips]))]
+    middle = seen + protocol.future // 2
+    rows = [plain_row(REAL, _mean([_ends(c.positions(), seen, middle, predictor.fps) for c in clips]))]
     cut = []
     for a, b in pairs:
         p, q = clips[a].positions()[:seen], clips[b].positions()[seen:]
         p, q = protocol.layout.place(p[-1]).into(p), protocol.layout.place(q[0]).into(q)
         cut.append(_seam(np.concatenate([p, q]), seen, predictor.fps, "start"))
-    rows.append(_row("cut", _mean(cut)))
+    rows.append(plain_row("cut", _mean(cut)))
     for length in TRANSITIONS:
         say(f"switch in {length:g} s: {len(pairs)} pairs")
         found = [
@@ -222,7 +224,7 @@ def arrive(
                      seed=seed + i)
             for a, b in pairs for i in range(samples)
         ]  # fmt: skip
-        rows.append(_row(f"{length:g} s", _mean(found)))
+        rows.append(plain_row(f"{length:g} s", _mean(found)))
     return list(SWITCHED), rows, {"weights": predictor.card.name, "pairs": len(pairs)}
 
 
@@ -252,10 +254,6 @@ def _mean(found: list[dict[str, float]]) -> dict[str, float]:
 def _need_person(predictor: Predictor) -> None:
     if predictor.layout.names != SMPL_LAYOUT.names or not predictor.layout.root:
         raise MotionloomError("this study needs weights that see the 22 joints and their way, such as the shipped ones")
-
-
-def _row(name: str, numbers: dict[str, float]) -> Row:
-    return Row(name, {key: Value(value) for key, value in numbers.items()})
 
 
 STUDIES: dict[str, Callable[..., Found]] = {"horizon": horizon, "hold": hold, "switch": arrive}

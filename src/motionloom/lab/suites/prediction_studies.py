@@ -14,11 +14,12 @@ from motionloom.data.prediction import Protocol
 from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
 from motionloom.lab.papers.benchmarks import find_protocol
-from motionloom.lab.report import plots
+from motionloom.lab.report import files, plots
 from motionloom.lab.report import report as reports
 from motionloom.lab.report.report import REAL, Column, Report, Row, Value
-from motionloom.lab.suites import obey, prediction, prediction_behaviour
+from motionloom.lab.suites import prediction, prediction_behaviour
 from motionloom.lab.suites import prediction_trial as trials
+from motionloom.lab.suites.harness import Run, Say, silent
 from motionloom.lab.suites.prediction_trial import Trial
 from motionloom.tasks.completion import SOLVER, SPACING, STEPS
 from motionloom.train.loop import changed
@@ -70,7 +71,7 @@ class Lab:
     keep: Path
     """Where trained networks lie."""
     device: str = "cpu"
-    progress: Callable[[str], None] = lambda line: None
+    progress: Say = silent
 
 
 def budget(
@@ -92,35 +93,39 @@ def budget(
     return replace(found, **{key: value for key, value in said.items() if value is not None})
 
 
-def run(
-    name: str,
-    weights: str | Path = "predictor",
-    *,
-    data: Path | str,
-    protocol: str | None = None,
-    folder: Path,
-    keep: Path,
-    budget: Budget,
-    device: str = "cpu",
-    command: str = "",
-    progress: Callable[[str], None] = lambda line: None,
-) -> Report:
-    """Do a study and write its table and picture; raises MotionloomError before any work if it cannot be done."""
+def run(name: str, run: Run, *, protocol: str | None = None, keep: Path, budget: Budget) -> Report:
+    """Do a study and write its table and picture into ``run.folder``.
+
+    Args:
+        name: the study, out of `TITLES`.
+        run: the predictor, the data, and the folder.
+        protocol: which data set that is; None: recognised by its files.
+        keep: where trained networks lie.
+        budget: how much is measured.
+
+    Raises:
+        MotionloomError: before any work if it cannot be done.
+    """
     if name not in TITLES:
         raise MotionloomError(f"there is no study {name!r}; the studies are {', '.join(TITLES)}")
-    obey.check_report(folder / f"{name}.json")
+    if run.data is None or run.folder is None:
+        raise MotionloomError("a study needs recordings and a folder for its table and picture")
+    files.check_report(run.folder / f"{name}.json")
     trained = name in STUDIED
-    predictor = None if trained else Predictor.load(weights, device=device)
+    predictor = None if trained else Predictor.load(run.weights, device=run.device)
     if trained or name == "horizon":
-        read = find_protocol(data, name=protocol, splits=("train", "val", "test") if trained else ("train", "test"),
-                             say=progress)  # fmt: skip
+        read = find_protocol(run.data, name=protocol, say=run.progress,
+                             splits=("train", "val", "test") if trained else ("train", "test"))  # fmt: skip
     else:
-        read = trials.read_test(data, protocol, say=progress)
+        read = trials.read_test(run.data, protocol, say=run.progress)
     if predictor is not None:
         trials.check_fit(predictor, read)
-    lab = Lab(read, budget, lambda: predictor or Predictor.load(weights, device=device), keep, device, progress)
-    found = replace(study(name, lab), command=command)
-    write(found, name, folder)
+    lab = Lab(
+        read, budget, lambda: predictor or Predictor.load(run.weights, device=run.device), keep, run.device,
+        run.progress,
+    )  # fmt: skip
+    found = replace(study(name, lab), command=run.command)
+    write(found, name, run.folder)
     return found
 
 
@@ -146,10 +151,10 @@ def study(name: str, lab: Lab) -> Report:
 
 def write(report: Report, name: str, folder: Path) -> None:
     """``NAME.png``, ``NAME.md`` and ``NAME.json``, each whole or not at all."""
-    path = obey.check_report(folder / f"{name}.json")
+    path = files.check_report(folder / f"{name}.json")
     plots.study(report, folder / f"{name}.png")
-    obey.write_text(folder / f"{name}.md", reports.markdown(report) + f"\n![{report.title}]({name}.png)\n")
-    obey.write_json(path, reports.encode(report))
+    files.write_text(folder / f"{name}.md", reports.markdown(report) + f"\n![{report.title}]({name}.png)\n")
+    files.write_json(path, reports.encode(report))
 
 
 # Networks that differ in one thing

@@ -28,11 +28,11 @@ from motionloom.lab.metrics.transitions import (
     mean_jerk,
     peak_jerk,
 )
+from motionloom.lab.suites.harness import embedded
 from motionloom.lab.suites.protocol import Transitions
 
 FORMAT = 1
 LARGEST_FILE = 1 << 20
-CHUNK = 64
 COUNTS = (7, 31, 62, 93)
 """Windows whose mean curve the shipped peaks and areas are of: a mean of more windows is flatter."""
 REPEATS = 20
@@ -75,8 +75,7 @@ class Crops:
         chosen = _windows(motions, window, np.random.default_rng((seed, 0)))
         embeddings = np.zeros((len(motions), 0))
         if evaluator is not None:
-            parts = [chosen.features[k : k + CHUNK] for k in range(0, len(motions), CHUNK)]
-            embeddings = np.concatenate([evaluator.motions(part) for part in parts])
+            embeddings = embedded(evaluator, chosen.features)
         return Crops(motions, window, embeddings, mean_jerk(chosen.positions))
 
     def again(self, count: int, *, seed: tuple[int, ...]) -> Windows:

@@ -4,7 +4,6 @@ A suite is a name and a function from a job to a report; a further one is one mo
 suite needs is imported by its function.
 """
 
-import hashlib
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,11 +14,8 @@ from motionloom.errors import MotionloomError
 from motionloom.lab.report.report import Report
 from motionloom.lab.suites import needs, obey, physical, realism
 from motionloom.lab.suites.control_kinds import QUICK, SUITE
+from motionloom.lab.suites.harness import Run, Say, digest, evaluator_file, silent
 from motionloom.weights.prior import Prior, shipped
-
-
-def _silent(line: str) -> None:
-    """Say nothing."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +30,7 @@ class Tools:
     """`motionloom.lab.bench.bench` as plain data, quick or not."""
     memory: Callable[[int], float]
     """Peak MB of a process that generates with so many steps."""
-    progress: Callable[[str], None] = _silent
+    progress: Say = silent
 
 
 @dataclass(frozen=True)
@@ -50,6 +46,13 @@ class Job:
     device: str = "cpu"
     folder: Path = Path()
     """Where a suite may keep what it has done so far; made by whoever writes there."""
+
+    def run(self, suite: str, weights: str | None = None) -> Run:
+        """For a suite of that name; ``weights`` instead of the job's."""
+        return Run(
+            weights or self.weights, self.data, self.evaluator, self.folder, self.device, command(suite, self),
+            self.tools.progress,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -85,19 +88,11 @@ def command(name: str, job: Job) -> str:
     return shlex.join([*words, *(["--quick"] if job.quick else [])])
 
 
-def _evaluator_file(job: Job) -> Path | None:
-    """Where the evaluator lies, if it is there."""
-    from motionloom.lab.evaluator import own
-
-    path = own.evaluators().get(own.SHIPPED) if job.evaluator == "own" else Path(job.evaluator)
-    return path if path and path.is_file() else None
-
-
 def _judge(job: Job) -> list[Path]:
     """The evaluator and the real motions that are shipped with it, where they are."""
     from motionloom.lab.suites import text_reference
 
-    return [path for path in (_evaluator_file(job), text_reference.shipped()) if path and path.is_file()]
+    return [path for path in (evaluator_file(job.evaluator), text_reference.shipped()) if path and path.is_file()]
 
 
 def _obedience(job: Job, settings: Mapping[str, Any]) -> Report:
@@ -125,19 +120,15 @@ def _speed(job: Job, settings: Mapping[str, Any]) -> Report:
 
 def _sealed(report: Report, job: Job) -> Report:
     """With the evaluator's content in the protocol: one trained anew under the same name is another measure."""
-    path = _evaluator_file(job)
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()[:12] if path else "unknown"
-    return replace(report, protocol={**report.protocol, "evaluator file": digest})
+    path = evaluator_file(job.evaluator)
+    return replace(report, protocol={**report.protocol, "evaluator file": digest(path)[:12] if path else "unknown"})
 
 
 def _text(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.lab.suites import protocol, text
 
     how = protocol.quick(protocol.Protocol()) if settings["quick"] else protocol.Protocol()
-    found = text.run(
-        job.weights, evaluator=job.evaluator, data=job.data, protocol=how, folder=job.folder, device=job.device,
-        memory=job.tools.memory, command=command("text", job), progress=job.tools.progress,
-    )  # fmt: skip
+    found = text.run(job.run("text"), protocol=how, memory=job.tools.memory)
     return _sealed(found, job)
 
 
@@ -145,10 +136,7 @@ def _transitions(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.lab.suites import protocol, transitions
 
     how = protocol.quick_transitions(protocol.Transitions()) if settings["quick"] else protocol.Transitions()
-    found = transitions.run(
-        job.weights, evaluator=job.evaluator, data=job.data, how=how, folder=job.folder, device=job.device,
-        command=command("transitions", job), progress=job.tools.progress,
-    )  # fmt: skip
+    found = transitions.run(job.run("transitions"), how=how)
     return _sealed(found, job)
 
 
@@ -162,11 +150,8 @@ def _real_seams(job: Job) -> list[Path]:
 def _control(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.lab.suites import control
 
-    found = control.run(
-        job.weights, data=job.data, evaluator=job.evaluator, kinds=settings["kinds"],
-        protocol=control.settings(count=settings["count"], replications=settings["replications"]),
-        folder=job.folder, device=job.device, command=command("control", job), progress=job.tools.progress,
-    )  # fmt: skip
+    protocol = control.settings(count=settings["count"], replications=settings["replications"])
+    found = control.run(job.run("control"), kinds=settings["kinds"], protocol=protocol)
     return _sealed(found, job)
 
 
@@ -180,10 +165,7 @@ def _controls(job: Job) -> list[Path]:
 def _prediction(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.lab.suites import prediction
 
-    return prediction.run(
-        "predictor", data=job.data, how=prediction.How(**settings), folder=job.folder, device=job.device,
-        command=command("prediction", job), progress=job.tools.progress,
-    )  # fmt: skip
+    return prediction.run(job.run("prediction", "predictor"), how=prediction.How(**settings))
 
 
 def _predictors(job: Job) -> list[Path]:
@@ -196,37 +178,25 @@ def _predictors(job: Job) -> list[Path]:
 def _completion(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.lab.suites import duet
 
-    return duet.run(
-        job.weights, data=job.data, how=duet.How(**settings), folder=job.folder, device=job.device,
-        command=command("duet-completion", job), progress=job.tools.progress,
-    )  # fmt: skip
+    return duet.run(job.run("duet-completion"), how=duet.How(**settings))
 
 
 def _duets(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.lab.suites import duet_text
 
-    return duet_text.run(
-        job.weights, data=job.data, how=duet_text.How(**settings), device=job.device,
-        command=command("duet-text", job), progress=job.tools.progress,
-    )  # fmt: skip
+    return duet_text.run(job.run("duet-text"), how=duet_text.How(**settings))
 
 
 def _answers(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.lab.suites import duet_answers
 
-    return duet_answers.run(
-        job.weights, data=job.data, how=duet_answers.How(**settings), device=job.device,
-        command=command("duet-answers", job), progress=job.tools.progress,
-    )  # fmt: skip
+    return duet_answers.run(job.run("duet-answers"), how=duet_answers.How(**settings))
 
 
 def _long_duets(job: Job, settings: Mapping[str, Any]) -> Report:
     from motionloom.lab.suites import duet_long
 
-    return duet_long.run(
-        job.weights, data=job.data, how=duet_long.How(**settings), device=job.device,
-        command=command("duet-long", job), progress=job.tools.progress,
-    )  # fmt: skip
+    return duet_long.run(job.run("duet-long"), how=duet_long.How(**settings))
 
 
 def _blocks(job: Job) -> list[Path]:

@@ -6,9 +6,8 @@ every row is kept in a small file as it is done; a run that was stopped goes on 
 
 import hashlib
 import json
-import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol as Interface
@@ -17,23 +16,22 @@ from typing import cast
 import numpy as np
 
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import FPS, WIDTH
 from motionloom.kinematics.physics import Array
-from motionloom.lab.evaluator import own
-from motionloom.lab.evaluator.evaluators import Caption, Evaluator, load_evaluator
+from motionloom.lab.evaluator.evaluators import Caption, Evaluator
 from motionloom.lab.metrics.frechet import fid, fid_bias
-from motionloom.lab.metrics.retrieval import diversity, matching_distance, multimodality_of, r_precision
+from motionloom.lab.metrics.retrieval import matching_distance, multimodality_of, r_precision
 from motionloom.lab.report import published_rows
 from motionloom.lab.report.report import REAL, Column, Report, Row, Value
 from motionloom.lab.suites import text_reference
+from motionloom.lab.suites.harness import Run, diversity, embedded, plain_words, readable, row_of
 from motionloom.lab.suites.items import fitting, pick, read_items, spread
-from motionloom.lab.suites.parts import Parts, fingerprint
+from motionloom.lab.suites.parts import Parts
 from motionloom.lab.suites.protocol import Protocol, Selection
 from motionloom.lab.suites.text_reference import PHYSICAL, TextReference
 from motionloom.tasks.text import sample_features
-from motionloom.weights.prior import Prior, find_weights
+from motionloom.weights.prior import Prior
 
-DIVERSITY_PAIRS, MULTIMODAL_PAIRS = 300, 10
+MULTIMODAL_PAIRS = 10
 CHANCE_ROWS = 500
 """Captions at most whose distances to all motions of others are averaged."""
 SHUFFLED, CHANCE = "real, captions shuffled", "chance"
@@ -136,7 +134,7 @@ def same_words_precision(texts: Array, motions: Array, said: Sequence[str], *, t
 
     Batches as in `r_precision`. A motion of other words exactly as near goes before: equal embeddings are no hits.
     """
-    words = np.array([" ".join(re.findall(r"\w+", text.lower())) for text in said])
+    words = np.array([plain_words(text) for text in said])
     size = batch or len(texts)
     hits = []
     for row in range(len(texts) // size * size):
@@ -157,7 +155,7 @@ def of_real(trial: Trial, replication: int, *, shuffled: bool = False) -> dict[s
         return matched(trial, texts[dealt][order], motions[order], [said[k] for k in dealt[order]])
     found = matched(trial, texts[order], motions[order], [said[k] for k in order])
     physical = text_reference.averaged(trial.real.physical, trial.real.frames)
-    return {**found, "fid": fid(motions, trial.real.motions), "diversity": _diversity(motions, replication), **physical}
+    return {**found, "fid": fid(motions, trial.real.motions), "diversity": diversity(motions, replication), **physical}
 
 
 def of_generated(trial: Trial, replication: int, steps: int) -> dict[str, float]:
@@ -167,10 +165,10 @@ def of_generated(trial: Trial, replication: int, steps: int) -> dict[str, float]
     start = time.perf_counter()
     drawn = _drawn(trial, said, frames, seeds=trial.protocol.seeds(replication, len(said)), steps=steps)
     seconds = time.perf_counter() - start
-    motions = _embedded(trial.evaluator, drawn)
+    motions = embedded(trial.evaluator, drawn)
     texts = np.stack([several[k] for several, k in zip(trial.read, chosen, strict=True)])
     found = matched(trial, texts[order], motions[order], [said[k] for k in order])
-    found["fid"], found["diversity"] = fid(motions, trial.real.motions), _diversity(motions, replication)
+    found["fid"], found["diversity"] = fid(motions, trial.real.motions), diversity(motions, replication)
     numbers = np.array([list(text_reference.physical(features).values()) for features in drawn])
     found |= text_reference.averaged(numbers, frames)
     found |= {"ms": 1000 * seconds / len(said), "per_second": len(said) / max(seconds, 1e-9)}
@@ -192,11 +190,6 @@ def _drawn(
     return [features[:length] for features, length in zip(drawn, frames, strict=True)]
 
 
-def _embedded(evaluator: Evaluator, drawn: Sequence[np.ndarray]) -> Array:
-    size = text_reference.CHUNK
-    return np.concatenate([evaluator.motions(drawn[k : k + size]) for k in range(0, len(drawn), size)])
-
-
 def _several(trial: Trial, replication: int, steps: int, *, captions: int, samples: int) -> float:
     """MultiModality of different motions of one caption: unlike the published draw, none is paired with itself."""
     chosen, order, rng = trial.shuffle(replication)
@@ -207,14 +200,10 @@ def _several(trial: Trial, replication: int, steps: int, *, captions: int, sampl
         trial, [said[k] for k in items for _ in range(samples)], [frames[k] for k in items for _ in range(samples)],
         seeds=seeds, steps=steps,
     )  # fmt: skip
-    motions = _embedded(trial.evaluator, drawn).reshape(len(items), samples, -1)
+    motions = embedded(trial.evaluator, drawn).reshape(len(items), samples, -1)
     pairs = min(MULTIMODAL_PAIRS, samples // 2)
     mixed = rng.permutation(samples)
     return multimodality_of(motions, mixed[:pairs], mixed[pairs : 2 * pairs])
-
-
-def _diversity(motions: Array, replication: int) -> float:
-    return diversity(motions, pairs=min(DIVERSITY_PAIRS, len(motions)), seed=replication)
 
 
 def of_chance(trial: Trial) -> dict[str, float]:
@@ -242,15 +231,22 @@ def measure(
     parts = parts or Parts(None, "")
     protocol, count = trial.protocol, range(trial.protocol.replications)
     rows = [
-        _row(REAL, [of_real(trial, r) for r in count]),
-        _row(SHUFFLED, [of_real(trial, r, shuffled=True) for r in count]),
-        _row(CHANCE, [of_chance(trial)]),
+        row_of(REAL, [of_real(trial, r) for r in count], COLUMNS, (*PHYSICAL, "fid")),
+        row_of(SHUFFLED, [of_real(trial, r, shuffled=True) for r in count], COLUMNS),
+        row_of(CHANCE, [of_chance(trial)], COLUMNS),
     ]
     for steps in protocol.steps:
-        found = [_kept(trial, parts, r, steps, progress=progress) for r in count]
-        values = dict(_row("", found).values)
+        found = [
+            parts.once(
+                f"{steps} steps {r}", lambda r=r, steps=steps: of_generated(trial, r, steps),
+                lambda n, r=r, steps=steps: f"{steps} steps, replication {r + 1} of {protocol.replications}: "
+                f"R@3 {n['r3']:.3f}, FID {n['fid']:.3f}, {n['ms']:.0f} ms per motion", progress,
+            ) for r in count
+        ]  # fmt: skip
+        values = dict(row_of("", found, COLUMNS).values)
         if memory is not None:
-            values["memory"] = Value(_memory(parts, steps, memory))
+            peak = parts.once(f"{steps} steps memory", lambda steps=steps: {"memory": memory(steps)})
+            values["memory"] = Value(peak["memory"])
         rows.append(Row(f"{label}, {steps} steps", values))
     return Report(
         "text",
@@ -265,43 +261,11 @@ def measure(
     )
 
 
-def _kept(
-    trial: Trial, parts: Parts, replication: int, steps: int, *, progress: Callable[[str], None]
-) -> dict[str, float]:
-    name = f"{steps} steps {replication}"
-    found = parts.find(name)
-    if found is None:
-        found = of_generated(trial, replication, steps)
-        parts.keep(name, found)
-        progress(
-            f"{steps} steps, replication {replication + 1} of {trial.protocol.replications}: "
-            f"R@3 {found['r3']:.3f}, FID {found['fid']:.3f}, {found['ms']:.0f} ms per motion"
-        )
-    return found
-
-
-def _memory(parts: Parts, steps: int, memory: Callable[[int], float]) -> float:
-    name = f"{steps} steps memory"
-    found = parts.find(name)
-    if found is None:
-        found = {"memory": memory(steps)}
-        parts.keep(name, found)
-    return found["memory"]
-
-
-def _row(name: str, found: Sequence[Mapping[str, float]]) -> Row:
-    """Means and intervals over replications; a number that never changes has no interval."""
-    names = [c.name for c in COLUMNS if any(c.name in numbers for numbers in found)]
-    samples = {column: [numbers[column] for numbers in found if column in numbers] for column in names}
-    fixed = (*PHYSICAL, "fid") if name == REAL else ()
-    return Row(name, {k: Value(v[0]) if k in fixed else Value.of(v) for k, v in samples.items()})
-
-
 def _notes(trial: Trial) -> tuple[str, ...]:
     real, protocol = trial.real, trial.protocol
     half = len(real.motions) // 2
     bias = fid_bias(real.motions, half, repeats=10, seed=protocol.seed)
-    said = [" ".join(re.findall(r"\w+", c.text.lower())) for several in real.captions for c in several]
+    said = [plain_words(caption.text) for several in real.captions for caption in several]
     return (
         f"FID compares {len(real.motions)} generated with {len(real.motions)} real motions in {real.motions.shape[1]} "
         f"dimensions, and so few make it large: two random halves of the real motions ({half} each) are {bias:.3f} "
@@ -321,39 +285,29 @@ def _about(evaluator: Evaluator) -> tuple[str, ...]:
 
 
 def run(
-    weights: str = "default",
+    run: Run,
     *,
-    evaluator: str = "own",
-    data: Path | str | None = None,
     selection: Selection | None = None,
     protocol: Protocol | None = None,
-    folder: Path | None = None,
-    device: str = "cpu",
     memory: Callable[[int], float] | None = None,
-    command: str = "",
-    progress: Callable[[str], None] = lambda line: None,
 ) -> Report:
-    """Measure weights (a shipped name or a file) against the shipped reference, or real motions in ``data``.
+    """Measure weights against the shipped reference, or the real motions of ``run.data``.
 
-    ``folder`` keeps what is done, so that the same call goes on after a stop. The report is not written here.
+    Args:
+        run: the weights, the data, who judges, and where pieces are kept.
+        selection: which real motions of the data; None: the usual ones.
+        protocol: how motions are generated and judged.
+        memory: the peak in MB of generating with so many steps; None: not measured.
     """
     protocol = protocol or Protocol()
-    draw = drawer(Prior.load(weights, device=device), protocol)  # what is quickly seen to be wrong goes first
-    judge = load_evaluator(evaluator)
+    draw = drawer(run.prior(max(protocol.steps)), protocol)  # what is quickly seen to be wrong goes first
+    judge = run.judge()
     if protocol.caption_length == "published":
         _as_published(judge, [text_reference.SENTENCE])
-    trial = prepare(draw, judge, reference(judge, data, selection, progress), protocol)
-    settings = {
-        **protocol.drawn(),
-        "weights": _digest(find_weights(weights)),
-        "evaluator": [judge.name, dict(judge.about), _judge_file(evaluator)],
-        "real": _identity(trial.real),
-        "device": device,
-    }
-    label = weights if find_weights(weights) != Path(weights) else Path(weights).stem
+    trial = prepare(draw, judge, reference(judge, run.data, selection, run.progress), protocol)
+    parts = run.parts({**protocol.drawn(), **run.settings(judge), "real": identity(trial.real)})
     return measure(
-        trial, label=label, parts=Parts(folder, fingerprint(settings)), memory=memory, command=command,
-        progress=progress,
+        trial, label=run.label, parts=parts, memory=memory, command=run.command, progress=run.progress
     )  # fmt: skip
 
 
@@ -364,24 +318,12 @@ def reference(
     if data is not None:
         selection = fitting(data, selection)
         return text_reference.measure(read_items(data, selection), judge, selection, progress)
-    if selection is not None:
-        raise MotionloomError("splits, sources and lengths are selected from real motions; name them with --data")
-    if not text_reference.shipped().is_file():
-        raise MotionloomError("this copy ships no reference of real motions; name some with --data")
-    return text_reference.load(text_reference.shipped(), judge)
+    return text_reference.load_shipped(judge, selection)
 
 
 def drawer(prior: Prior, protocol: Protocol) -> Draw:
     """A prior as `Draw`; MotionloomError for one that does not draw HumanML3D features at 20 frames per second."""
-    if len(prior.mean) != WIDTH or prior.fps != FPS:
-        raise MotionloomError(
-            f"these weights draw {len(prior.mean)} numbers at {prior.fps:g} frames per second; the evaluators read "
-            f"{WIDTH} at {FPS:g}"
-        )
-    if max(protocol.steps) > prior.schedule.steps:
-        raise MotionloomError(
-            f"{max(protocol.steps)} steps cannot be taken; these weights take 1 to {prior.schedule.steps}"
-        )
+    readable(prior, max(protocol.steps))
 
     def draw(prompts: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int) -> list[np.ndarray]:
         drawn = sample_features(
@@ -393,18 +335,7 @@ def drawer(prior: Prior, protocol: Protocol) -> Draw:
     return draw
 
 
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
-
-
-def _judge_file(evaluator: str) -> str:
-    """Digest of the evaluator's file; empty where it has none."""
-    path = own.evaluators().get(own.SHIPPED) if evaluator == "own" else Path(evaluator)
-    return _digest(path) if path and path.is_file() else ""
-
-
-def _identity(real: TextReference) -> str:
+def identity(real: TextReference) -> str:
     """Changes with the items; not with the embeddings, whose last digits depend on the number of threads."""
     said = json.dumps([real.names, [[c.text for c in several] for several in real.captions], real.frames])
     return hashlib.sha256(said.encode() + real.physical.astype(np.float32).tobytes()).hexdigest()[:16]

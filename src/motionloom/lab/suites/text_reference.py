@@ -24,6 +24,7 @@ from motionloom.kinematics import physics
 from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Caption, Evaluator
 from motionloom.lab.metrics.skate import skate
+from motionloom.lab.suites.harness import CHUNK
 from motionloom.lab.suites.items import Item, spread
 from motionloom.lab.suites.protocol import MOST_ITEMS, Protocol, Selection
 
@@ -34,8 +35,6 @@ PHYSICAL = ("skate_share", "skate_speed", "skate_slide", "penetration", "jerk", 
 SOURCE = "derived from mocap.cs.cmu.edu (free for any use) and HumanML3D's captions (MIT, Copyright (c) 2022 Chuan Guo)"
 _KINDS = {"motions": np.float16, "frames": np.int32, "physical": np.float32, "probe": np.float32}
 SENTENCE = Caption("a person walks forward.", ("a/DET", "person/NOUN", "walk/VERB", "forward/ADV"))
-CHUNK = 64
-"""Motions embedded at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +162,15 @@ def save(reference: TextReference, path: Path | str) -> Path:
 def shipped() -> Path:
     """Where the reference of the shipped evaluator lies."""
     return Path(str(resources.files("motionloom.lab.suites"))) / "text_reference.safetensors"
+
+
+def load_shipped(evaluator: Evaluator, selection: Selection | None) -> TextReference:
+    """The shipped numbers, which nobody can select from; MotionloomError where this copy ships none."""
+    if selection is not None:
+        raise MotionloomError("splits, sources and lengths are selected from real motions; name them with --data")
+    if not shipped().is_file():
+        raise MotionloomError("this copy ships no reference of real motions; name some with --data")
+    return load(shipped(), evaluator)
 
 
 def load(path: Path | str, evaluator: Evaluator) -> TextReference:

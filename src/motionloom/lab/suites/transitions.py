@@ -15,9 +15,9 @@ import numpy as np
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.kinematics.physics import Array
-from motionloom.lab.evaluator.evaluators import Caption, Evaluator, load_evaluator
+from motionloom.lab.evaluator.evaluators import Caption, Evaluator
 from motionloom.lab.metrics.frechet import fid, fid_bias
-from motionloom.lab.metrics.retrieval import diversity, matching_distance, r_precision
+from motionloom.lab.metrics.retrieval import matching_distance, r_precision
 from motionloom.lab.metrics.transitions import (
     JERK_HUMANML3D,
     area_under_jerk,
@@ -26,18 +26,17 @@ from motionloom.lab.metrics.transitions import (
     transition_distance,
 )
 from motionloom.lab.report import published_rows
-from motionloom.lab.report.report import REAL, Column, Report, Row, Value
+from motionloom.lab.report.report import REAL, Column, Report
 from motionloom.lab.suites import text_reference
+from motionloom.lab.suites.harness import Run, Say, diversity, embedded, row_of
 from motionloom.lab.suites.items import fitting, read_items
 from motionloom.lab.suites.long_baselines import Long, Method, methods, titled
-from motionloom.lab.suites.parts import Parts, fingerprint
+from motionloom.lab.suites.parts import Parts
 from motionloom.lab.suites.protocol import Selection, Transitions
 from motionloom.lab.suites.real_seams import Crops, Shipped, averaged, jerks, load_shipped
-from motionloom.lab.suites.text import _digest, _identity, _judge_file
+from motionloom.lab.suites.text import identity
 from motionloom.lab.suites.text_reference import TextReference
-from motionloom.weights.prior import Prior, find_weights
 
-DIVERSITY_PAIRS = 300
 LEAST_INSIDE = 8
 """Frames: what is left of a segment between its transitions is measured from so many on."""
 
@@ -149,7 +148,7 @@ def of_method(trial: Trial, method: Method, replication: int) -> dict[str, float
         around += [made.positions[part] for part in parts]
         inside += [made.positions[p] for p in cut(frames, how.window // 2) if p.stop - p.start >= LEAST_INSIDE]
         steps += transition_distance(made.positions, np.cumsum(frames)[:-1].tolist()).tolist()
-    found = _matched(trial, said, _embedded(trial.evaluator, middles), replication)
+    found = _matched(trial, said, embedded(trial.evaluator, middles), replication)
     found |= _around(trial, seams, np.stack(around), replication)
     found |= {"step": 1000 * float(np.mean(steps)), "cost": spent / total}
     if inside:
@@ -185,7 +184,7 @@ def _matched(trial: Trial, said: Sequence[Caption], motions: Array, replication:
         "r3": float(r_precision(texts, motions, top=3, batch=trial.how.intervals)[2]),
         "mm_dist": matching_distance(texts, motions, batch=trial.how.intervals),
         "fid": fid(motions, trial.real.motions),
-        "diversity": _diversity(motions, replication),
+        "diversity": diversity(motions, replication),
     }
 
 
@@ -196,9 +195,9 @@ def _around(trial: Trial, features: Sequence[np.ndarray], positions: np.ndarray,
         **{f"seam_{name}": value for name, value in averaged(list(positions)).items()},
     }
     if trial.crops is not None:
-        embeddings = _embedded(trial.evaluator, features)
+        embeddings = embedded(trial.evaluator, features)
         found["transition_fid"] = fid(embeddings, trial.crops.embeddings)
-        found["transition_diversity"] = _diversity(embeddings, replication)
+        found["transition_diversity"] = diversity(embeddings, replication)
     return found
 
 
@@ -207,15 +206,6 @@ def _check(made: Long, frames: int) -> None:
         raise ValueError(f"a method gave {made.features.shape} and {made.positions.shape} for {frames} frames")
     if not (np.isfinite(made.features).all() and np.isfinite(made.positions).all()):
         raise MotionloomError("a method drew numbers that are not finite; these weights cannot be measured so")
-
-
-def _embedded(evaluator: Evaluator, motions: Sequence[np.ndarray]) -> Array:
-    size = text_reference.CHUNK
-    return np.concatenate([evaluator.motions(motions[k : k + size]) for k in range(0, len(motions), size)])
-
-
-def _diversity(motions: Array, replication: int) -> float:
-    return diversity(motions, pairs=min(DIVERSITY_PAIRS, len(motions)), seed=replication)
 
 
 # ---- the run ---------------------------------------------------------------------------------------------------------
@@ -232,10 +222,18 @@ def measure(
 ) -> Report:
     """All rows: real motion, then every way by the name it was given."""
     parts, how = parts or Parts(None, ""), trial.how
-    rows = [_row(REAL, [of_real(trial, r) for r in range(how.replications)])]
+    real = [of_real(trial, r) for r in range(how.replications)]
+    looked_up = [name for name in real[0] if len({numbers.get(name) for numbers in real}) == 1]
+    rows = [row_of(REAL, real, COLUMNS, looked_up)]
     for name, method in ways.items():
-        found = [_kept(trial, parts, name, method, r, progress=progress) for r in range(how.replications)]
-        rows.append(_row(titled(name, how.steps), found))
+        found = [
+            parts.once(
+                f"{name} {r}", lambda r=r, method=method: of_method(trial, method, r),
+                lambda n, r=r, name=name: f"{name}, replication {r + 1} of {how.replications}: AUJ {n['auj']:.3f}, "
+                f"peak jerk {n['pj']:.4f}, FID {n['fid']:.3f}, {n['cost']:.2f} s per second", progress,
+            ) for r in range(how.replications)
+        ]  # fmt: skip
+        rows.append(row_of(titled(name, how.steps), found, COLUMNS))
     said = {
         "data": trial.real.data,
         **trial.real.selection.described(),
@@ -248,31 +246,6 @@ def measure(
         "transitions", f"Long motion and its transitions: {label}", command, said, COLUMNS,
         (*rows, *published_rows.published("long", [column.name for column in COLUMNS])), _notes(trial),
     )  # fmt: skip
-
-
-def _kept(
-    trial: Trial, parts: Parts, name: str, method: Method, replication: int, *, progress: Callable[[str], None]
-) -> dict[str, float]:
-    piece = f"{name} {replication}"
-    found = parts.find(piece)
-    if found is None:
-        found = of_method(trial, method, replication)
-        parts.keep(piece, found)
-        progress(
-            f"{name}, replication {replication + 1} of {trial.how.replications}: AUJ {found['auj']:.3f}, peak jerk "
-            f"{found['pj']:.4f}, FID {found['fid']:.3f}, {found['cost']:.2f} s per second"
-        )
-    return found
-
-
-def _row(name: str, found: Sequence[Mapping[str, float]]) -> Row:
-    """Means and intervals; a number that was only looked up has none."""
-    kept = {c.name: [numbers[c.name] for numbers in found if c.name in numbers] for c in COLUMNS}
-    fixed = name == REAL
-    return Row(
-        name,
-        {k: Value(v[0]) if fixed and len(set(v)) == 1 else Value.of(v) for k, v in kept.items() if v},
-    )
 
 
 def _notes(trial: Trial) -> tuple[str, ...]:
@@ -302,59 +275,35 @@ def _notes(trial: Trial) -> tuple[str, ...]:
 
 
 def run(
-    weights: str = "default",
+    run: Run,
     *,
-    evaluator: str = "own",
-    data: Path | str | None = None,
     selection: Selection | None = None,
     how: Transitions | None = None,
     names: Sequence[str] | None = None,
-    folder: Path | None = None,
-    device: str = "cpu",
-    command: str = "",
-    progress: Callable[[str], None] = lambda line: None,
 ) -> Report:
-    """Measure weights (a shipped name or a file) by the named ways (default `long_baselines.DEFAULT`).
+    """Measure weights by the named ways of making long motion (default `long_baselines.DEFAULT`).
 
-    ``folder`` keeps what is done, so that the same call goes on after a stop. The report is not written here.
+    Args:
+        run: the weights, the data, who judges, and where pieces are kept.
+        selection: which real motions of the data; None: the usual ones.
+        how: the protocol.
+        names: the rows.
     """
     how = how or Transitions()
-    prior = Prior.load(weights, device=device)
-    if len(prior.mean) != WIDTH or prior.fps != FPS or how.steps > prior.schedule.steps:
-        raise MotionloomError(
-            f"these weights draw {len(prior.mean)} numbers at {prior.fps:g} frames per second in at most "
-            f"{prior.schedule.steps} steps; the suite reads {WIDTH} at {FPS:g} and takes {how.steps} steps"
-        )
-    ways = methods(prior, how, names)
-    judge = load_evaluator(evaluator)
-    trial = real_motion(judge, data, selection, how, progress)
-    settings = {
-        **how.drawn(),
-        "weights": _digest(find_weights(weights)),
-        "evaluator": [judge.name, dict(judge.about), _judge_file(evaluator)],
-        "real": _identity(trial.real),
-        "windows": trial.crops is not None,
-        "device": device,
-    }
-    label = weights if find_weights(weights) != Path(weights) else Path(weights).stem
-    kept = Parts(folder, fingerprint(settings))
-    return measure(trial, ways, label=label, parts=kept, command=command, progress=progress)
+    ways = methods(run.prior(how.steps), how, names)
+    judge = run.judge()
+    trial = real_motion(judge, run.data, selection, how, run.progress)
+    windows = {"windows": trial.crops is not None}
+    parts = run.parts({**how.drawn(), **run.settings(judge), "real": identity(trial.real), **windows})
+    return measure(trial, ways, label=run.label, parts=parts, command=run.command, progress=run.progress)
 
 
 def real_motion(
-    judge: Evaluator,
-    data: Path | str | None,
-    selection: Selection | None,
-    how: Transitions,
-    progress: Callable[[str], None],
+    judge: Evaluator, data: Path | str | None, selection: Selection | None, how: Transitions, progress: Say
 ) -> Trial:
-    """Real motions out of ``data``, or the shipped numbers, which nobody can select from."""
+    """Real motions out of ``data``, or the shipped numbers."""
     if data is None:
-        if selection is not None:
-            raise MotionloomError("splits, sources and lengths are selected from real motions; name them with --data")
-        if not text_reference.shipped().is_file():
-            raise MotionloomError("this copy ships no reference of real motions; name some with --data")
-        return prepare(judge, text_reference.load(text_reference.shipped(), judge), how, None, load_shipped())
+        return prepare(judge, text_reference.load_shipped(judge, selection), how, None, load_shipped())
     chosen = fitting(data, selection)
     items = read_items(data, chosen)
     real = text_reference.measure(items, judge, chosen, progress)

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from motionloom.blending import crossfade, shares
 from motionloom.features.layout import FPS
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
@@ -131,8 +132,7 @@ def joined(parts: Sequence[Array], *, blend: int = 6) -> Array:
         turn = float(ph.heading(whole)[-1] - ph.heading(part)[0])
         here = ph.turned(part - part[0, 0] * [1.0, 0.0, 1.0], -turn)
         here = here + whole[-1, 0] * [1.0, 0.0, 1.0]
-        share = np.linspace(0, 1, blend + 2)[1:-1, None, None]
-        bridge = whole[-1] * (1 - share) + here[0] * share
+        bridge = crossfade(whole[-1], here[0], shares(blend)[:, None, None])
         whole = np.concatenate([whole, bridge, here])
     return whole
 

@@ -143,22 +143,27 @@ def unpack_known(tensors: Mapping[str, Tensor], about: Any, *, width: int) -> Kn
     """The inverse of `pack_known`. Raises ValueError for what is damaged, too large or of another text encoder."""
     if not isinstance(about, dict) or not isinstance(about.get("sentences"), list):
         raise ValueError("its table of known sentences has no sentences")
-    sentences, seconds = about["sentences"], about.get("seconds", {})
+    sentences, seconds = about["sentences"], _durations(about.get("seconds", {}))
     if not 0 < len(sentences) <= MAX_SENTENCES or not all(
         isinstance(text, str) and len(text) <= MAX_CHARACTERS for text in sentences
     ):
         raise ValueError(f"its table of known sentences holds something else, or more than {MAX_SENTENCES}")
-    if (
-        not isinstance(seconds, dict)
-        or len(seconds) > MAX_ACTIONS
-        or not all(isinstance(count, int | float) and 0 <= count < 1e9 for count in seconds.values())
-        or not all(len(action) <= MAX_CHARACTERS for action in seconds)
-    ):
-        raise ValueError("its table of known actions does not hold seconds")
     values, scale = tensors.get("known.vectors"), tensors.get("known.scale")
     if values is None or scale is None or values.dtype != torch.int8 or scale.dtype != torch.float16:
         raise ValueError("its table of known sentences lacks its vectors")
     if values.shape != (len(sentences), width) or scale.shape != (len(sentences),) or not bool(scale.isfinite().all()):
         raise ValueError(f"its table of known sentences has vectors of shape {tuple(values.shape)}")
     vectors = torch.nn.functional.normalize(dequantise(values, scale), dim=1)
-    return Known(tuple(sentences), vectors, {str(action): float(count) for action, count in seconds.items()})
+    return Known(tuple(sentences), vectors, seconds)
+
+
+def _durations(found: Any) -> dict[str, float]:
+    """Seconds of each action, checked; raises ValueError."""
+    if (
+        not isinstance(found, dict)
+        or len(found) > MAX_ACTIONS
+        or not all(isinstance(count, int | float) and 0 <= count < 1e9 for count in found.values())
+        or not all(len(action) <= MAX_CHARACTERS for action in found)
+    ):
+        raise ValueError("its table of known actions does not hold seconds")
+    return {str(action): float(count) for action, count in found.items()}

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.goal import FPS, Goal, Placement, body_facing, merged
+from motionloom.goals.goal import FPS, Goal, body_facing, merged
 from motionloom.goals.paths import root_path
+from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.server.mmcp.rigs import Rig
 from motionloom.skeleton import SMPL22
@@ -160,8 +161,8 @@ def as_goal(pose: Keyframe, frames: int) -> Goal:
 def standing_as(pose: Keyframe, person: Array) -> Keyframe:
     """A pose that does not say where it is, where and as a drawn person (22, 3) stands."""
 
-    def stand(places: Array) -> Placement:
-        return Placement(float(places[0, 0]), float(places[0, 2]), body_facing(places))
+    def stand(places: Array) -> GroundPose:
+        return GroundPose.of(places[0], body_facing(places))
 
     return replace(pose, places=stand(person).to_world(stand(pose.places).from_world(pose.places)), placed=True)
 

@@ -21,7 +21,7 @@ from motionloom.server.mmcp.asked import Asked, Clock, as_goal, read_constraints
 from motionloom.server.mmcp.rigs import Rig, read_rig
 from motionloom.tasks import long, text
 from motionloom.tasks.control import moved
-from motionloom.tasks.edit import edit
+from motionloom.tasks.edit import Change, Extend, Loop, Redraw, edit
 from motionloom.tasks.splice import carried_level, concatenated, standing
 
 Array = NDArray[np.float64]
@@ -215,11 +215,10 @@ def _performance(models: Models, segment: Any, rig: Rig, frames: int, seed: int,
     if len(clip) < 8:
         raise MotionloomError(f"a motion to be like is {len(clip) / FPS:.2f} s long; at least 0.4 s are needed")
     missing = frames - len(clip)
-    made = edit(
-        models.prior, clip, "", between=[(0.0, clip.seconds)], strength=VARIED, seed=seed,
-        extend=max(missing, 2) / FPS if missing > 0 else 0.0, **options,
-    )[0]  # fmt: skip
-    return made.frames(0, frames)
+    changes: list[Change] = [Redraw([(0.0, clip.seconds)], strength=VARIED)]
+    if missing > 0:
+        changes.append(Extend(max(missing, 2) / FPS))
+    return edit(models.prior, clip, "", changes, seed=seed, **options)[0].frames(0, frames)
 
 
 def _joined(models: Models, before: Motion, behind: Motion, seed: int, options: dict[str, Any]) -> Motion:
@@ -229,13 +228,13 @@ def _joined(models: Models, before: Motion, behind: Motion, seed: int, options: 
     whole = concatenated(before, behind)
     around = min(SEAM, before.seconds / 2, behind.seconds / 2)
     span = (seam - around, min(seam + around, whole.seconds))
-    return edit(models.prior, whole, "", between=[span], seed=seed, **options)[0]
+    return edit(models.prior, whole, "", Redraw([span]), seed=seed, **options)[0]
 
 
 def _looped(models: Models, motion: Motion, seed: int, options: dict[str, Any]) -> Motion:
     """A cycle: its last frame is its first one again, moved on by the way of one cycle."""
     blend = min(1.0, max(motion.seconds / 3, 0.1))
-    cycle = edit(models.prior, motion.frames(0, len(motion) - 1), loop=True, blend=blend, seed=seed, **options)[0]
+    cycle = edit(models.prior, motion.frames(0, len(motion) - 1), "", Loop(blend), seed=seed, **options)[0]
     last = cycle.frames(0, 1)
     step = (cycle.root[1] - cycle.root[0]) * np.array([1.0, 0.0, 1.0])
     place = cycle.root[-1:] + step

@@ -11,7 +11,7 @@ As published, but for one thing: nothing of the motion that the given numbers co
 """
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Unpack
 
 import torch
 from torch import Tensor
@@ -23,23 +23,17 @@ from motionloom.diffusion import (
     Schedule,
     Solver,
     Weight,
-    blend,
     chain,
-    guide,
     inpaint,
-    levels,
     observe,
     row_draw,
     run,
 )
 from motionloom.edits.steering import Correction, corrected
 from motionloom.errors import MotionloomError
-from motionloom.nets.prior import Condition, PriorNet
-from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS
-from motionloom.weights.adapter import AdaptedNet, show
+from motionloom.tasks.control import Net, blended
+from motionloom.tasks.sampling import Observed, Sampling, Settings
 from motionloom.weights.prior import Prior
-
-Net: TypeAlias = PriorNet | AdaptedNet
 
 
 @torch.no_grad()
@@ -47,30 +41,36 @@ def control_features(
     prior: Prior,
     nets: Sequence[Net],
     prompts: Sequence[str],
-    known: Tensor,
-    mask: Tensor,
+    observed: Observed,
     *,
     seeds: Sequence[int],
     weights: Sequence[Weight] | None = None,
-    guidance: float = GUIDANCE,
-    steps: int = STEPS,
-    solver: str = SOLVER,
-    spacing: str = SPACING,
-    noise_free: bool = True,
     corrections: Sequence[Correction | None] | None = None,
+    sampling: Sampling | None = None,
+    **settings: Unpack[Settings],
 ) -> Tensor:
-    """Motions in which the given numbers are exactly those of ``known``; (rows, frames, features) standardised.
+    """Motions in which the observed numbers are exact; (rows, frames, features) standardised.
 
-    nets: networks of this prior: its own, fine-tuned ones, `weights.adapter.adapted` ones; each is guided by itself.
-    prompts: one per row, "" for none. known, mask: (rows, frames, features), the mask bool (with several controls
-    their union); what is not given may hold anything. weights: one per network, a number or what broadcasts to the
-    motions, or either by level (`diffusion.blend`); the mean by default. They are used as they are. seeds: one per
-    row; a row's motion depends on no other row. noise_free False is MDM's inpainting: noise everywhere, and no
-    network is told what is given. corrections: change each row's blended guess before the given numbers are put in.
-    Raises MotionloomError for what does not fit together. (Shafir et al. 2024, algorithm 2 and section 4.3.)
+    Args:
+        nets: networks of this prior: its own, fine-tuned ones, `weights.adapter.adapted` ones; each is guided by
+            itself.
+        prompts: one per row, "" for none.
+        observed: what is given (with several controls their union); what is not may hold anything. Where it is not
+            ``noise_free`` this is MDM's inpainting: noise everywhere, and no network is shown what is given.
+        seeds: one per row; a row's motion depends on no other row.
+        weights: one per network, a number or what broadcasts to the motions, or either by level (`diffusion.blend`);
+            the mean by default. They are used as they are.
+        corrections: change each row's blended guess before the given numbers are put in.
+        sampling: or single settings of it as keywords.
+
+    Raises:
+        MotionloomError: for what does not fit together.
+
+    (Shafir et al. 2024, algorithm 2 and section 4.3.)
     """
-    mask = torch.as_tensor(mask, device=prior.mean.device)
-    known = _given(prior, known, mask)
+    chosen = Sampling.of(sampling, settings)
+    mask = torch.as_tensor(observed.mask, device=prior.mean.device)
+    known = _given(prior, observed.values, mask)
     if not nets or not len(prompts) == len(seeds) == len(known):
         raise MotionloomError(
             f"{len(nets)} networks, {len(prompts)} prompts and {len(seeds)} seeds do not fit {len(known)} motions; "
@@ -79,53 +79,35 @@ def control_features(
     weights = [1 / len(nets)] * len(nets) if weights is None else list(weights)
     if len(weights) != len(nets):
         raise MotionloomError(f"there are {len(weights)} weights for {len(nets)} networks; give one for each")
-    if solver not in SOLVERS or not 1 <= steps <= prior.schedule.steps:
-        raise MotionloomError(
-            f"{steps} steps of {solver!r} cannot be taken; there are 1 to {prior.schedule.steps} steps "
-            f"of {', '.join(SOLVERS)}"
-        )
-    shown = mask if noise_free else torch.zeros_like(mask)
-    denoise = blended(nets, prior.condition(list(prompts)), known, shown, weights=weights, guidance=guidance)
+    shown = mask if observed.noise_free else torch.zeros_like(mask)
+    denoise = blended(nets, prior.condition(list(prompts)), known, shown, weights=weights, guidance=chosen.guidance)
     if corrections is not None:
         denoise = corrected(denoise, corrections)
     return controlled(
-        denoise, known, mask, levels=levels(prior.schedule, steps, spacing=spacing), solver=SOLVERS[solver],
-        schedule=prior.schedule, draw=row_draw(seeds), noise_free=noise_free,
+        denoise, Observed(known, mask, observed.noise_free), levels=chosen.levels(prior.schedule),
+        solver=SOLVERS[chosen.solver], schedule=prior.schedule, draw=row_draw(seeds),
     )  # fmt: skip
-
-
-def blended(
-    nets: Sequence[Net], cond: Condition, known: Tensor, mask: Tensor, *, weights: Sequence[Weight], guidance: float
-) -> Denoiser:
-    """DiffusionBlending: networks guided by themselves, then their weighted sum; told what is given if they can be."""
-    null = cond.null()
-    guided = [
-        guide(net, show(net, net.bind(cond), known, mask), show(net, net.bind(null), known, mask), guidance)
-        for net in nets
-    ]
-    return guided[0] if len(nets) == 1 and weights[0] == 1.0 else blend(guided, weights)
 
 
 def controlled(
     denoise: Denoiser,
-    known: Tensor,
-    mask: Tensor,
+    observed: Observed,
     *,
     levels: Sequence[int],
     solver: Solver,
     schedule: Schedule,
     draw: Draw,
-    noise_free: bool = True,
     start: Tensor | None = None,
 ) -> Tensor:
     """The walk of algorithm 2 on any denoiser; (rows, frames, features).
 
     ``start`` is the clean motion that the free numbers are noised from: nothing (zeros) by default; the published code
-    starts from the motion that the given numbers were taken from. noise_free False: MDM's inpainting.
+    starts from the motion that the given numbers were taken from.
     """
+    known, mask = observed.values, observed.mask
     start = torch.zeros_like(known) if start is None else start
     x = schedule.noised(start, levels[0], draw(known))
-    hold = observe(known, mask, schedule, torch.zeros_like) if noise_free else chain()
+    hold = observe(known, mask, schedule, torch.zeros_like) if observed.noise_free else chain()
     return run(
         inpaint(denoise, known, mask), hold(x, levels[0]), levels=levels,
         solver=solver, schedule=schedule, draw=draw, constrain=hold,

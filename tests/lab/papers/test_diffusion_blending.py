@@ -9,7 +9,8 @@ import torch
 from motionloom.diffusion import SOLVERS, cosine, guide, levels, row_draw, run
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import mask
-from motionloom.tasks.blending import control_features, controlled
+from motionloom.lab.papers.diffusion_blending import control_features, controlled
+from motionloom.tasks.sampling import Observed
 from motionloom.weights.adapter import adapted
 from tests.nets import tiny
 from tests.weights.test_adapter import adapter_of, trained
@@ -33,7 +34,8 @@ def given(names: str = "left_wrist,root_horizontal") -> tuple[torch.Tensor, torc
 
 
 def draw_of(prior, nets, known, flags, **options):
-    return control_features(prior, nets, PROMPTS, known, flags, seeds=[5, 6], **({"steps": 6} | options))
+    given = Observed(known, flags, options.pop("noise_free", True))
+    return control_features(prior, nets, PROMPTS, given, seeds=[5, 6], **({"steps": 6} | options))
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -51,8 +53,8 @@ def test_the_walk_is_the_published_loop(seed, noise_free):
         return torch.tanh(x) + 0.1 * torch.roll(x, 1, dims=1) + 0.01 * level
 
     got = controlled(
-        guess, known, flags, levels=range(steps, -1, -1), solver=SOLVERS["ddpm"], schedule=schedule,
-        draw=lambda like: next(drawn), noise_free=noise_free,
+        guess, Observed(known, flags, noise_free), levels=range(steps, -1, -1), solver=SOLVERS["ddpm"],
+        schedule=schedule, draw=lambda like: next(drawn),
     )  # fmt: skip
     bars = [1.0, *torch.cumprod(1 - schedule.betas, 0).tolist()]
     free = (~flags).float() if noise_free else torch.ones_like(known)
@@ -138,7 +140,7 @@ def test_an_empty_mask_is_plain_sampling(prior):
 def test_rows_do_not_depend_on_each_other_and_nothing_leaks_from_what_is_not_given(prior, other):
     known, flags = given()
     both = draw_of(prior, [other], known, flags)
-    alone = control_features(prior, [other], PROMPTS[1:], known[1:], flags[1:], seeds=[6], steps=6)
+    alone = control_features(prior, [other], PROMPTS[1:], Observed(known[1:], flags[1:], True), seeds=[6], steps=6)
     torch.testing.assert_close(both[1:], alone, rtol=1e-4, atol=1e-5)
     hidden = torch.where(flags, known, 1e6)
     assert torch.equal(draw_of(prior, [other], hidden, flags), both)
@@ -181,6 +183,7 @@ MISTAKES = {
 def test_what_does_not_fit_together_is_refused_in_a_sentence(prior, mistake):
     known, flags = given()
     options = {"nets": [prior.net], "known": known, "mask": flags, "seeds": [1, 2]} | mistake(known, flags)
+    observed = Observed(options.pop("known"), options.pop("mask"), noise_free=True)
     with pytest.raises(MotionloomError) as caught:
-        control_features(prior, prompts=PROMPTS, **options)
+        control_features(prior, prompts=PROMPTS, observed=observed, **options)
     assert "\n" not in str(caught.value)

@@ -1,0 +1,143 @@
+"""What all suites share: where and how they measure, what is opened and refused first, and rows over replications."""
+
+import hashlib
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import FPS, WIDTH
+from motionloom.kinematics.physics import Array
+from motionloom.lab.evaluator import evaluators, own
+from motionloom.lab.evaluator.evaluators import Evaluator
+from motionloom.lab.metrics import retrieval
+from motionloom.lab.report.report import Column, Row, Value
+from motionloom.lab.suites.parts import Parts, fingerprint
+from motionloom.weights.prior import Prior, find_weights
+
+Say = Callable[[str], None]
+"""Told a line now and then."""
+CHUNK = 64
+"""Motions embedded at once."""
+DIVERSITY_PAIRS = 300
+
+
+def silent(line: str) -> None:
+    """Say nothing."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Where and how a suite measures. The report is given back, not written."""
+
+    weights: str | Path = "default"
+    """A shipped name or a file: a prior, or a predictor for suites of prediction."""
+    data: Path | str | None = None
+    """Real motion: a built set, recordings, or what a suite says."""
+    evaluator: str = "own"
+    """Who judges text: the shipped evaluator or a file."""
+    folder: Path | None = None
+    """Keeps what is done, so that the same run goes on after a stop; None: nothing is kept."""
+    device: str = "cpu"
+    command: str = ""
+    """The command line that measures the same again, for the report."""
+    progress: Say = silent
+
+    @property
+    def label(self) -> str:
+        """The weights in a row's name."""
+        return Path(self.weights).stem
+
+    def prior(self, steps: int) -> Prior:
+        """The weights; MotionloomError where they do not draw what the evaluators read, or not in so many steps."""
+        return readable(Prior.load(self.weights, device=self.device), steps)
+
+    def judge(self) -> Evaluator:
+        """The evaluator; MotionloomError for a file that is none."""
+        return evaluators.load_evaluator(self.evaluator)
+
+    def settings(self, judge: Evaluator) -> dict[str, Any]:
+        """What the weights, the evaluator and the device change, for `parts`."""
+        file = evaluator_file(self.evaluator)
+        return {
+            "weights": digest(find_weights(self.weights)),
+            "evaluator": [judge.name, dict(judge.about), digest(file) if file else ""],
+            "device": self.device,
+        }
+
+    def parts(self, settings: Mapping[str, Any]) -> Parts:
+        """Where pieces of this run are kept."""
+        return Parts(self.folder, fingerprint(settings))
+
+
+def readable(prior: Prior, steps: int) -> Prior:
+    """The prior; MotionloomError unless it draws HumanML3D features at 20 frames per second, in so many steps."""
+    if len(prior.mean) != WIDTH or prior.fps != FPS:
+        raise MotionloomError(
+            f"these weights draw {len(prior.mean)} numbers at {prior.fps:g} frames per second; the evaluators read "
+            f"{WIDTH} at {FPS:g}"
+        )
+    check_steps(steps, prior.schedule.steps)
+    return prior
+
+
+def check_steps(steps: int, most: int) -> None:
+    """Raise MotionloomError where weights cannot be sampled in so many steps."""
+    if not 1 <= steps <= most:
+        raise MotionloomError(f"{steps} steps cannot be taken; these weights take 1 to {most}")
+
+
+def check_names(names: Sequence[str], known: Collection[str], what: str) -> None:
+    """Raise MotionloomError for no name and for unknown ones; ``what`` they are, such as "rows"."""
+    if not names or not set(names) <= set(known):
+        raise MotionloomError(f"the {what} are {', '.join(known)}; got {', '.join(names)[:200] or 'none'}")
+
+
+def digest(path: Path) -> str:
+    """Changes with the content of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+
+
+def evaluator_file(evaluator: str) -> Path | None:
+    """Where an evaluator lies, if it is there."""
+    path = own.evaluators().get(own.SHIPPED) if evaluator == "own" else Path(evaluator)
+    return path if path and path.is_file() else None
+
+
+def embedded(evaluator: Evaluator, motions: Sequence[np.ndarray]) -> Array:
+    """(motions, width) of motions (frames, 263) each."""
+    return np.concatenate([evaluator.motions(motions[k : k + CHUNK]) for k in range(0, len(motions), CHUNK)])
+
+
+def diversity(motions: Array, replication: int) -> float:
+    """Mean distance of random pairs of embedded motions (motions, width), at most `DIVERSITY_PAIRS`."""
+    return retrieval.diversity(motions, pairs=min(DIVERSITY_PAIRS, len(motions)), seed=replication)
+
+
+def plain_words(text: str) -> str:
+    """A caption in lower case without punctuation."""
+    return " ".join(re.findall(r"\w+", text.lower()))
+
+
+def averaged(rows: Sequence[Mapping[str, float]], frames: Sequence[int]) -> dict[str, float]:
+    """Means of the numbers of several motions, weighted by their lengths."""
+    means = np.average(np.array([list(row.values()) for row in rows]), axis=0, weights=frames)
+    return dict(zip(rows[0], means.tolist(), strict=True))
+
+
+def row_of(
+    name: str, found: Sequence[Mapping[str, float]], columns: Sequence[Column], constant: Collection[str] = ()
+) -> Row:
+    """Means and intervals over replications; numbers that are ``constant`` have no interval."""
+    samples = {c.name: [numbers[c.name] for numbers in found if c.name in numbers] for c in columns}
+    return Row(name, {k: Value(v[0]) if k in constant else Value.of(v) for k, v in samples.items() if v})
+
+
+def plain_row(name: str, numbers: Mapping[str, float]) -> Row:
+    """Numbers that were measured once."""
+    return Row(name, {key: Value(value) for key, value in numbers.items()})

@@ -1,0 +1,89 @@
+"""Inpainting on the 263 features: a stretch of a person's motion sampled anew between frames that are known.
+
+The known numbers stay (Lugmayr et al., "RePaint", CVPR 2022, without its repetitions), and where the motion goes on
+behind the stretch, every guess is made to arrive there: the features tell velocities of the root, nothing else would.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from motionloom.diffusion import Denoiser
+from motionloom.edits.boundary import InpaintWindow, arrival, joining
+from motionloom.features import humanml
+from motionloom.features.layout import LAYOUT
+from motionloom.ground import GroundPose
+from motionloom.kinematics.physics import heading
+from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, Sampling, sample, smooth
+from motionloom.tasks.watching import View
+from motionloom.weights.prior import Prior
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Inpainted:
+    """A whole window with what was sampled in it, in the world of the old one."""
+
+    positions: Array
+    """(frames, 22, 3) metres at 20 fps; bones may breathe."""
+    contacts: Array
+    """(frames, 4) as in the features."""
+
+
+@torch.inference_mode()
+def inpaint_motion(
+    prior: Prior, window: InpaintWindow, text: str, sampling: Sampling, *, seed: int, progress: Progress | None = None
+) -> Inpainted:
+    """Sample the frames ``first`` to before ``last`` of a window by the text; the others come back to float32.
+
+    An empty text asks for nothing in particular. Frames from 0 on are placed by what follows them.
+    """
+    place = _placement(window.positions)
+    known = torch.from_numpy(humanml.encode(place.from_world(window.positions))).to(prior.mean)[None]
+    mask = torch.ones_like(known, dtype=torch.bool)
+    mask[:, window.first : window.last] = torch.from_numpy(window.keep).to(mask.device)
+    spread = torch.where(prior.std > 0, prior.std, 1.0)
+    meet, reach = joining(known, mask, window.first, window.last), arrival(known, mask, window)
+
+    def bent(denoise: Denoiser, _: Batch) -> Denoiser:
+        return lambda state, level: (
+            reach(meet(denoise(state, level) * spread + prior.mean)) - prior.mean
+        ) / spread  # fmt: skip
+
+    def poses(states: Tensor) -> Array:
+        features = (states[0] * spread + prior.mean).cpu().double()
+        return _placed(features, known[0].cpu().double(), window, place)[None, None]
+
+    observed = Observed((known - prior.mean) / spread, mask, strength=window.strength)
+    rows = Rows([text], [known.shape[1]], [seed])
+    [(_, state)] = sample(
+        prior, rows, sampling, edits=[bent], observed=observed, progress=progress, view=View(poses)
+    )  # fmt: skip
+    made = state[None] * spread + prior.mean
+    made = reach(meet(torch.where(mask, known, smooth(made) if prior.net.config.patch > 1 else made)))
+    features = made[0].cpu().double()
+    return Inpainted(_placed(features, known[0].cpu().double(), window, place), features[:, LAYOUT["contacts"]].numpy())
+
+
+def _placement(positions: Array) -> GroundPose:
+    return GroundPose(float(positions[0, 0, 0]), float(positions[0, 0, 2]), float(heading(positions[:1])[0]))
+
+
+def _placed(features: Tensor, known: Tensor, window: InpaintWindow, place: GroundPose) -> Array:
+    """(frames, 22, 3) in the world, where the frames before the stretch are, or else those behind it."""
+    positions = humanml.decode_positions(features).numpy()
+    if window.first == 0 and window.last < len(features):
+        there, here = (_standing(f, window.last) for f in (known, features))
+        turn = GroundPose(there.x, there.z, there.facing - here.facing)
+        positions = turn.to_world(positions - np.array([here.x, 0, here.z]))
+    return place.to_world(positions)
+
+
+def _standing(features: Tensor, frame: int) -> GroundPose:
+    turn, root = humanml.recover_root(features)
+    half = torch.atan2(turn[frame, 2], turn[frame, 0])
+    return GroundPose(float(root[frame, 0]), float(root[frame, 2]), -2 * float(half))

@@ -1,0 +1,71 @@
+"""One value for all settings, and old names that say the new ones."""
+
+import numpy as np
+import pytest
+
+from motionloom._moved import renamed
+from motionloom.errors import MotionloomError
+from motionloom.tasks.sampling import PairSampling, PredictionSampling, Sampling
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings", "said"),
+    [
+        (Sampling, {"steps": 0}, "0 steps"),
+        (Sampling, {"steps": 2.5}, "2.5 steps"),
+        (Sampling, {"solver": "euler"}, "no solver 'euler'"),
+        (Sampling, {"spacing": "wide"}, "no spacing 'wide'"),
+        (Sampling, {"guidance": float("nan")}, "guidance of nan"),
+        (Sampling, {"guidance": 101.0}, "guidance of 101"),
+        (Sampling, {"seed": -1}, "seed"),
+        (Sampling, {"seed": (0, 2**62)}, "seed"),
+        (Sampling, {"count": 0}, "count of 0"),
+        (Sampling, {"batch_size": 0}, "batch_size of 0"),
+        (PredictionSampling, {"temperature": 2.5}, "temperature"),
+        (PairSampling, {"pair_guidance": 1.5}, "together"),
+    ],
+)
+def test_a_value_checks_itself(kind: type[Sampling], settings: dict, said: str) -> None:
+    with pytest.raises(MotionloomError, match=said):
+        kind(**settings)
+    with pytest.raises(MotionloomError, match=said):
+        kind.of(None, settings)
+
+
+def test_single_settings_change_a_value() -> None:
+    chosen = Sampling.of(Sampling(steps=7, seed=3), {"seed": np.int64(5)})
+    assert (chosen.steps, chosen.seed, chosen.guidance) == (7, 5, Sampling().guidance)
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"), [("step", "'steps'"), ("guidence", "'guidance'"), ("xyz", "the settings are")]
+)
+def test_a_setting_that_there_is_not_is_said(name: str, meant: str) -> None:
+    with pytest.raises(TypeError, match=f"no setting '{name}'.*{meant}"):
+        Sampling.of(None, {name: 1})
+
+
+def test_what_another_kind_of_weights_takes_is_refused() -> None:
+    """A predictor's temperature says nothing to a prior, and 24 steps are not what a predictor takes."""
+    with pytest.raises(MotionloomError, match="PredictionSampling; got a Sampling"):
+        PredictionSampling.of(Sampling(), {})  # type: ignore[arg-type]
+    with pytest.raises(MotionloomError, match="Sampling; got a PredictionSampling"):
+        Sampling.of(PredictionSampling(), {})
+
+
+def test_seeds_of_motions_follow_each_other() -> None:
+    assert Sampling(seed=5).seeds(3) == [5, 6, 7]
+    with pytest.raises(MotionloomError, match="one person has one seed"):
+        Sampling(seed=(1, 2)).seeds(1)
+
+
+def test_an_old_keyword_is_the_new_one_and_says_so() -> None:
+    @renamed({"clean": "foot_lock"})
+    def task(*, foot_lock: bool = True) -> bool:
+        return foot_lock
+
+    with pytest.warns(FutureWarning, match="clean= is foot_lock= now") as caught:
+        assert task(clean=False) is False  # type: ignore[call-arg]
+    assert caught[0].filename == __file__
+    with pytest.raises(TypeError, match="'clean' and 'foot_lock'"):
+        task(clean=False, foot_lock=False)  # type: ignore[call-arg]
