@@ -24,6 +24,7 @@ FAMILIES = (
     "predict",
     "duet",
     "batch",
+    "serve",
     "files",
     "data",
     "teach",

@@ -5,7 +5,7 @@ clean. Here the network is told what is known, the walk ends clean, and what is 
 is led to it so that neither place nor velocity jumps, and bones keep the lengths of the past.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Unpack
 
@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from motionloom._moved import renamed
-from motionloom.diffusion import SOLVERS, guide, row_draw, row_seed, run
+from motionloom.diffusion import SOLVERS, guide, row_draw, row_seed, sample
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import bone_lengths, with_bones
 from motionloom.tasks.sampling import PredictionSampling, PredictionSettings
+from motionloom.tasks.watching import View
 from motionloom.weights.predictor import Predictor
 
 Array = NDArray[np.float64]
@@ -52,6 +53,7 @@ def complete(
     *,
     seeds: Sequence[int],
     sampling: PredictionSampling | None = None,
+    poses: Callable[[Tensor], Array] | None = None,
     **settings: Unpack[PredictionSettings],
 ) -> Tensor:
     """Windows (rows, frames, channels) with what is not known drawn; row i from ``seeds[i]``, alone or in a batch.
@@ -59,7 +61,8 @@ def complete(
     ``features`` are read where ``mask`` (rows, frames, parts) is above 0; ``pose`` (rows, channels) is the last
     observed one. Known numbers are those that are given, and the others leave them without a jump. ``sampling``, or
     single settings of it as keywords: a guidance above 1 exaggerates the condition, below 1 heeds it less; it needs a
-    second pass.
+    second pass. ``poses``: such windows as (rows, people, frames, 22, 3) metres, for who is `watching`; None: nobody
+    can.
     """
     chosen = PredictionSampling.of(sampling, settings)
     told = predictor.tell(features, mask, pose)
@@ -69,11 +72,17 @@ def complete(
         return predictor.denoiser(*cond)(x, level)
 
     draw = row_draw(seeds)
-    made = run(
-        guide(net, (told, yes), (told, no), chosen.guidance),
-        chosen.temperature * draw(torch.empty(len(told), *predictor.mean.shape, device=told.device)),
-        levels=chosen.levels(predictor.schedule), solver=SOLVERS[chosen.solver], schedule=predictor.schedule, draw=draw,
+    made = chosen.temperature * draw(torch.empty(len(told), *predictor.mean.shape, device=told.device))
+    way = chosen.levels(predictor.schedule)
+    walk = sample(
+        guide(net, (told, yes), (told, no), chosen.guidance), made,
+        levels=way, solver=SOLVERS[chosen.solver], schedule=predictor.schedule, draw=draw,
     )  # fmt: skip
+    if poses is not None:
+        view = View(lambda states: poses(predictor.to_features(states, pose)))
+        walk = view.reported(walk, len(way) - 1, range(len(told)))
+    for snapshot in walk:
+        made = snapshot.state
     return joined(predictor.to_features(made, pose), features, mask, ease=max(round(EASE * predictor.fps), 1))
 
 
@@ -157,11 +166,16 @@ def next_frames(
         count = min(given.shape[1], predictor.frames - h)
         seen[:, h : h + count], mask[h : h + count] = layout.encode(given[:, :count], place), known.mask[:count]
     features, like = torch.from_numpy(seen).to(predictor.mean), torch.from_numpy(mask).to(predictor.mean)
+
+    def placed(windows: Tensor) -> Array:
+        return layout.decode(windows[:, h : h + frames].cpu().double().numpy(), place)
+
     made = complete(
         predictor, features, like.expand(rows, -1, -1), features[:, h - 1],
         seeds=seeds, sampling=PredictionSampling.of(sampling, settings),
+        poses=lambda windows: placed(windows)[:, None],
     )  # fmt: skip
-    places = layout.decode(made[:, h : h + frames].cpu().double().numpy(), place)
+    places = placed(made)
     return with_bones(places, layout.parents, bone_lengths(past, layout.parents)) if exact else places
 
 

@@ -28,7 +28,7 @@ from motionloom.motion import Motion
 from motionloom.nets.prior import Condition, PriorNet
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.sampling import Batch, Progress, Rows, Sampling, Settings, sample, to_features
-from motionloom.tasks.text import check_prompts, to_motion
+from motionloom.tasks.text import alone, check_prompts, to_motion
 from motionloom.weights.adapter import AdaptedNet, Adapter, adapted, show
 from motionloom.weights.adapter import adapters as shipped
 from motionloom.weights.prior import Prior
@@ -145,7 +145,7 @@ def steered_features(
         return _seeing(shown, change, prior, mask)
 
     rows = Rows(prompts, [len(goal)] * len(prompts), seeds)
-    made = dict(sample(prior, rows, chosen, edits=[steer], progress=progress))
+    made = dict(sample(prior, rows, chosen, edits=[steer], progress=progress, view=alone(prior)))
     return [to_features(prior, made[row]).cpu() for row in range(len(prompts))]
 
 

@@ -51,6 +51,7 @@ from motionloom.tasks.pair import (
 from motionloom.tasks.sampling import Moves, PairSampling, PairSettings, Progress, sample_chain, smooth
 from motionloom.tasks.splice import apply_positions, person_at_20
 from motionloom.tasks.text import finish
+from motionloom.tasks.watching import ChainView
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
@@ -220,7 +221,8 @@ def duet_features(
     both = (chain_rows(prior, one, chosen.guidance, None) for one in segments)
     rows = denoise.rows(zip(*both, strict=True), segments, chosen.seeds(1)[0])
     made = sample_chain(
-        prior, rows, denoise, chosen, features=2 * (WIDTH + PLACE), batch_size=BATCH, progress=progress
+        prior, rows, denoise, chosen, features=2 * (WIDTH + PLACE), batch_size=BATCH, progress=progress,
+        view=ChainView(denoise.kept, denoise.poses),
     )  # fmt: skip
     for row, state in made:
         row.before = None  # what a finished row began with is needed no more
@@ -310,8 +312,7 @@ class _PairDenoiser:
             places, motion = part(one)
             people = zip(motion[:, :count], row.people, strict=True)
             motion = torch.stack([person.correct(guess, level) for guess, person in people])
-            begin = self._begin(row, level)
-            begin = self.net.talk.config.places.decode(places) if begin is None else begin
+            begin = self._begin_or(places, row, level)
             motion = self._led(row, level, motion, begin, state=state)
             made.append(_strung(motion, places))
             features = motion * self.prior.std + self.prior.mean
@@ -330,6 +331,22 @@ class _PairDenoiser:
         moves first must not matter."""
         step = self.levels.index(level)
         return row.before.ends.get(self.levels[step - 1]) if step and row.before else None
+
+    def _begin_or(self, places: Tensor, row: _PairRow, level: int) -> Tensor:
+        """The same; for the first row and at the first level what D (2, 4) says."""
+        begin = self._begin(row, level)
+        return self.net.talk.config.places.decode(places) if begin is None else begin
+
+    def kept(self, row: _PairRow, state: Tensor, level: int) -> tuple[Tensor, Tensor]:
+        """Features (2, frames, 263) of a denoised row between its seams, and where the two stand in the first one."""
+        motion, places = _parted(state)
+        features, one = motion * self.prior.std + self.prior.mean, row.people[0]
+        own = features[:, one.before : one.before + one.frames]
+        return own, two.later(features, self._begin_or(places, row, level), one.before)
+
+    def poses(self, kept: list[tuple[Tensor, Tensor]]) -> Array:
+        """(2, frames, 22, 3) of what was `kept` of rows."""
+        return torch.cat([two.decode(own, stands) for own, stands in kept], dim=1).cpu().numpy()
 
     def _led(self, row: _PairRow, level: int, motion: Tensor, begin: Tensor, *, state: Tensor) -> Tensor:
         """The guess of a row, its people moved to each other from where they begin."""

@@ -18,6 +18,7 @@ from motionloom.features.layout import LAYOUT
 from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import heading
 from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, Sampling, sample, smooth
+from motionloom.tasks.watching import View
 from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
@@ -53,9 +54,15 @@ def inpaint_motion(
             reach(meet(denoise(state, level) * spread + prior.mean)) - prior.mean
         ) / spread  # fmt: skip
 
+    def poses(states: Tensor) -> Array:
+        features = (states[0] * spread + prior.mean).cpu().double()
+        return _placed(features, known[0].cpu().double(), window, place)[None, None]
+
     observed = Observed((known - prior.mean) / spread, mask, strength=window.strength)
     rows = Rows([text], [known.shape[1]], [seed])
-    [(_, state)] = sample(prior, rows, sampling, edits=[bent], observed=observed, progress=progress)
+    [(_, state)] = sample(
+        prior, rows, sampling, edits=[bent], observed=observed, progress=progress, view=View(poses)
+    )  # fmt: skip
     made = state[None] * spread + prior.mean
     made = reach(meet(torch.where(mask, known, smooth(made) if prior.net.config.patch > 1 else made)))
     features = made[0].cpu().double()

@@ -37,6 +37,7 @@ from motionloom.tasks.adapting import AdaptedPriors, loaded
 from motionloom.tasks.body import Places, bodies
 from motionloom.tasks.sampling import Moves, Sampling, Settings, sample_chain
 from motionloom.tasks.splice import person_at_20
+from motionloom.tasks.watching import ChainView
 from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
@@ -140,11 +141,20 @@ def long_features(
     chosen = Sampling.of(sampling, settings)
     denoise = partial(_corrected, prior, chosen.levels(prior.schedule)[-2])
     rows = chain_rows(prior, segments, chosen.guidance, past)
+    place = past.end if past else GroundPose()
+
+    def features(row: Row, state: Tensor, _: int = 0) -> Tensor:
+        return (state[row.before : row.before + row.frames] * prior.std + prior.mean).cpu()
+
+    def poses(pieces: list[Tensor]) -> Array:
+        return decoded(torch.cat(pieces).numpy().astype(np.float64), place)[0][None]
+
     made = sample_chain(
-        prior, rows, denoise, chosen, features=len(prior.mean), batch_size=BATCH, progress=progress
+        prior, rows, denoise, chosen, features=len(prior.mean), batch_size=BATCH, progress=progress,
+        view=ChainView(features, poses),
     )  # fmt: skip
     for row, state in made:
-        yield (state[row.before : row.before + row.frames] * prior.std + prior.mean).cpu()
+        yield features(row, state)
 
 
 def _corrected(

@@ -46,6 +46,7 @@ from motionloom.tasks.sampling import (
 )
 from motionloom.tasks.splice import apply_positions, concatenated, kept_parts, splice
 from motionloom.tasks.text import finish, frames_in
+from motionloom.tasks.watching import View
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
@@ -128,10 +129,20 @@ def pair_features(
         )  # fmt: skip
         return lambda state, level: lead(state, corrected(denoise(state, level), batch.rows, level), level)
 
+    def poses(states: Tensor) -> np.ndarray:
+        places, motion = part(states)
+        stands = net.talk.config.places.decode(places.unflatten(0, (-1, 2)))
+        return two.decode((motion * prior.std + prior.mean).unflatten(0, (-1, 2)), stands).cpu().numpy()
+
     silent = not any(prompt.strip() for prompt in prompts)
     how = replace(chosen, batch_size=2 * chosen.batch(PAIRS), guidance=1.0 if silent else chosen.guidance)
     asked = Rows(prompts, [1 + frames] * rows, seeds, pair_draw)
-    made = dict(sample(prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress))
+    made = dict(
+        sample(
+            prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress,
+            view=View(poses, people=2),
+        )
+    )  # fmt: skip
     state = torch.stack([made[row] for row in range(rows)])
     if prior.net.config.patch > 1:
         state = torch.cat([state[:, :1], smooth(state[:, 1:])], dim=1)

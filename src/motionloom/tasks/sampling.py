@@ -33,6 +33,7 @@ from motionloom.diffusion import sample as denoising
 from motionloom.errors import MotionloomError
 from motionloom.nets.pair import PairNet
 from motionloom.nets.prior import Condition
+from motionloom.tasks.watching import ChainView, Latest, View
 from motionloom.weights.prior import Prior
 
 STEPS, SOLVER, SPACING, GUIDANCE = 24, "ddpm", "early", 2.5
@@ -269,11 +270,13 @@ def sample(
     edits: Sequence[Edit] = (),
     observed: Observed | None = None,
     progress: Progress | None = None,
+    view: View | None = None,
 ) -> Iterator[tuple[int, State]]:
     """Standardised states (tokens, features) with their rows' numbers, each as soon as its batch is finished.
 
     A row depends on its own prompt, length and seed alone. network: the prior's own unless given. edits: of each
-    batch's guided denoiser, after what is observed was put in, the first one first. Raises MotionloomError for more
+    batch's guided denoiser, after what is observed was put in, the first one first. view: how each network call is seen
+    by who is `watching`; None: nobody can. Raises MotionloomError for more
     steps than the weights have levels.
     """
     net = prior.net if network is None else network
@@ -295,10 +298,11 @@ def sample(
             state = constrain(state, way[0])
         for edit in edits:
             denoise = edit(denoise, batch)
-        for snapshot in denoising(
+        walk = denoising(
             denoise, state, levels=way, solver=SOLVERS[sampling.solver], schedule=prior.schedule, draw=draw,
             constrain=constrain,
-        ):  # fmt: skip
+        )  # fmt: skip
+        for snapshot in view.reported(walk, len(way) - 1, numbers) if view else walk:
             state, done = snapshot.state, done + 1
             if progress:
                 progress(done, len(batches) * (len(way) - 1))
@@ -353,14 +357,17 @@ def sample_chain(
     features: int,
     batch_size: int,
     progress: Moves | None = None,
+    view: ChainView[R] | None = None,
 ) -> Iterator[tuple[R, State]]:
     """Rows of a chain whose ends overlap, each with its clean state (length, features), in order.
 
     rows: read as sampling gets there; they may be endless. denoise: rows, their states and levels to the denoised
-    states. Row i is sampled from ``seed + i``. batch_size: rows in one call unless ``sampling`` says it.
+    states. Row i is sampled from ``seed + i``. batch_size: rows in one call unless ``sampling`` says it. view: how
+    the newest states are seen by who is `watching`; None: nobody can.
     """
     way, [first] = sampling.levels(prior.schedule), sampling.seeds(1)
     waiting: dict[int, R] = {}
+    seen = Latest(view, len(way) - 1) if view else None
 
     def links() -> Iterator[Link]:
         for number, row in enumerate(rows):
@@ -369,7 +376,11 @@ def sample_chain(
 
     def guess(numbers: Sequence[int], states: Sequence[State], at: Sequence[int]) -> Sequence[State]:
         here = [state.to(prior.mean) for state in states]  # the noise that rows begin with is the CPU's
-        return denoise([waiting[number] for number in numbers], here, at)
+        some = [waiting[number] for number in numbers]
+        denoised = denoise(some, here, at)
+        if seen:
+            seen.report(numbers, some, denoised, at)
+        return denoised
 
     made = staggered(
         links(), guess, levels=way, solver=SOLVERS[sampling.solver], schedule=prior.schedule, features=features,

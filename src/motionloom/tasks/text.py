@@ -25,6 +25,7 @@ from motionloom.tasks.sampling import SOLVER as SOLVER
 from motionloom.tasks.sampling import SPACING as SPACING
 from motionloom.tasks.sampling import STEPS as STEPS
 from motionloom.tasks.sampling import smooth as smooth
+from motionloom.tasks.watching import View
 from motionloom.weights.prior import Prior
 
 
@@ -67,7 +68,8 @@ def _sampled(
     check_prompts(prompts)
     if not all(0 <= seed < 2 * LARGEST_SEED for seed in seeds):
         raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {min(seeds)}")
-    for row, state in sample(prior, Rows(prompts, frames, seeds), sampling, progress=progress):
+    rows = Rows(prompts, frames, seeds)
+    for row, state in sample(prior, rows, sampling, progress=progress, view=alone(prior)):
         yield row, to_features(prior, state).cpu()
 
 
@@ -136,6 +138,19 @@ def generate_each(
     frames = [frames_in(length, prior.fps) for length in lengths for _ in range(count)]
     for row, features in _sampled(prior, said, frames, chosen.seeds(len(said)), chosen, progress):
         yield row, finish(prior, features, foot_lock=foot_lock)
+
+
+def alone(prior: Prior) -> View:
+    """One person to a row, as the network drew them."""
+    return View(lambda states: places_of(prior, states)[:, None])
+
+
+def places_of(prior: Prior, states: Tensor) -> np.ndarray:
+    """(rows, frames, 22, 3) metres of standardised states (rows, frames, numbers); bones may breathe."""
+    features = to_features(prior, states).cpu()
+    if features.shape[-1] == WIDTH:
+        return humanml.decode_positions(features).numpy()
+    return np.stack([finish(prior, row, foot_lock=False).positions() for row in features])
 
 
 @renamed({"clean": "foot_lock"})

@@ -1,0 +1,318 @@
+"""The HTTP application: routes, bodies and answers. What they mean stands in `docs/server.md`."""
+
+import asyncio
+import base64
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.background import BackgroundTask
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.routing import BaseRoute, Route
+
+from motionloom.errors import MotionloomError
+from motionloom.io.text import parse_json
+from motionloom.retarget.named import NAMED
+from motionloom.server import asking
+from motionloom.server import page as built
+from motionloom.server.bodies import body_of, file_of
+from motionloom.server.guard import Door, Guard
+from motionloom.server.limits import Limits
+from motionloom.server.mmcp.routes import capabilities_of
+from motionloom.server.mmcp.routes import routes as mmcp_routes
+from motionloom.server.openapi import as_page, document
+from motionloom.server.project import Project, Stored
+from motionloom.server.refusal import Refusal
+from motionloom.server.streaming import events
+from motionloom.server.worker import Worker
+from motionloom.skeleton import SMPL22
+
+FORMATS = ("bvh", "glb", "npz", "mp4", "png")
+
+
+@dataclass(eq=False)
+class Studio:
+    """What the routes share."""
+
+    project: Project
+    worker: Worker
+    limits: Limits
+    streams: int = 0
+    """Event streams that are open."""
+    files: asyncio.Semaphore = field(init=False)
+    """Held while a file is read or made: few at a time, and nobody else's answers wait for a thread."""
+
+    def __post_init__(self) -> None:
+        self.files = asyncio.Semaphore(self.limits.exports)
+
+
+def build(project: Project, worker: Worker, door: Door, *, more: Sequence[BaseRoute] = ()) -> Starlette:
+    """The application; the worker runs as long as it does. ``more``: further routes, also WebSockets."""
+    studio = Studio(project, worker, worker.limits)
+
+    @asynccontextmanager
+    async def lifespan(app: Starlette) -> AsyncIterator[None]:
+        worker.start()
+        yield
+        worker.stop()
+
+    app = Starlette(
+        routes=[*more, *routes()], lifespan=lifespan, middleware=[Middleware(Guard, door=door)],
+        exception_handlers={
+            Refusal: _refused, MotionloomError: _mistaken, HTTPException: _no_route, Exception: _failed,
+        },
+    )  # fmt: skip
+    app.state.studio = studio
+    return app
+
+
+def routes(*, page: bool = True) -> list[BaseRoute]:
+    """What is answered; ``page``: with the files of the studio's page."""
+    return [
+        Route("/health", health),
+        Route("/capabilities", capabilities),
+        Route("/jobs", make_job, methods=["POST"]),
+        Route("/jobs/{id}", job, methods=["GET", "DELETE"]),
+        Route("/jobs/{id}/events", job_events),
+        Route("/motions", upload_motion, methods=["POST"]),
+        Route("/motions/{name}", motion),
+        Route("/characters", upload_character, methods=["POST"]),
+        Route("/characters/{id}", character),
+        Route("/project", saved_project, methods=["GET", "PUT"]),
+        Route("/timeline.yaml", timeline_to_yaml, methods=["POST"]),
+        Route("/timeline.json", timeline_to_json, methods=["POST"]),
+        *mmcp_routes(),
+        Route("/openapi.json", openapi),
+        Route("/docs", docs),
+        *(built.routes() if page else ()),
+    ]
+
+
+def studio_of(request: Request) -> Studio:
+    """What the routes share."""
+    return request.app.state.studio
+
+
+# What is there
+
+
+async def health(request: Request) -> Response:
+    worker = studio_of(request).worker
+    about = {"ok": worker.problem is None, "version": version("motionloom"), "warm": worker.warm}
+    return JSONResponse(about | ({"error": worker.problem} if worker.problem else {}))
+
+
+async def capabilities(request: Request) -> Response:
+    studio = studio_of(request)
+    return JSONResponse(
+        {
+            "fps": 20, "joints": list(SMPL22.names), "parents": list(SMPL22.parents),
+            "offsets": SMPL22.offsets.tolist(), "groups": {name: list(at) for name, at in SMPL22.groups.items()},
+            "tasks": list(asking.TASKS), "limits": studio.limits.public(), "formats": list(FORMATS),
+            "skeletons": list(NAMED),
+        }
+        | await capabilities_of(request.app)
+    )  # fmt: skip
+
+
+async def openapi(request: Request) -> Response:
+    return JSONResponse(document(studio_of(request).limits))
+
+
+async def docs(request: Request) -> Response:
+    return HTMLResponse(as_page(document(studio_of(request).limits)))
+
+
+# Jobs
+
+
+async def make_job(request: Request) -> Response:
+    studio = studio_of(request)
+    body = parse_json(await body_of(request, studio.limits.body_bytes), "the body")
+    asked = await run_in_threadpool(asking.read_request, body, studio.project, studio.limits)
+    made = studio.worker.submit(asked, client_of(request))
+    return JSONResponse({"id": made.id}, status_code=202, headers={"Location": f"/jobs/{made.id}"})
+
+
+def client_of(request: Request) -> str:
+    """Who asks: the session that a page names in X-Client, else the address."""
+    address = request.client.host if request.client else "unknown"
+    named = request.headers.get("x-client", "")
+    return f"{address} {named[:64]}" if named else address
+
+
+async def job(request: Request) -> Response:
+    worker = studio_of(request).worker
+    found = worker.job(request.path_params["id"])
+    if request.method == "DELETE":
+        worker.cancel(found)
+    return JSONResponse(found.public())
+
+
+async def job_events(request: Request) -> Response:
+    studio = studio_of(request)
+    found = studio.worker.job(request.path_params["id"])
+    last = request.headers.get("last-event-id") or request.query_params.get("after") or "0"
+    if not (last.isascii() and last.isdecimal() and len(last) < 12):
+        raise Refusal(400, "Last-Event-ID is the number of an event of this job")
+    if studio.streams >= studio.limits.streams:
+        raise Refusal(503, f"{studio.limits.streams} event streams are open already; close some")
+
+    async def counted() -> AsyncIterator[bytes]:
+        studio.streams += 1
+        try:
+            async for one in events(found, int(last)):
+                yield one
+        finally:
+            studio.streams -= 1
+
+    headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
+    return StreamingResponse(counted(), media_type="text/event-stream", headers=headers)
+
+
+# Motions and characters
+
+
+async def upload_motion(request: Request) -> Response:
+    from motionloom.server import files
+
+    studio = studio_of(request)
+    asf = request.query_params.get("asf")
+    async with file_of(request, studio.project, (*files.UPLOADS, ".asf"), studio.limits) as (part, name):
+        if part.suffix == ".asf":
+            about = await _with_file(studio, lambda: files.read_skeleton(studio.project, part, name), part, name)
+            return JSONResponse(about, status_code=201)
+
+        def read() -> Stored:
+            return files.read_upload(studio.project, part, name, asf=asf, limits=studio.limits)
+
+        stored = await _with_file(studio, read, part, name)
+    first = stored.people[0]
+    about = {"id": stored.id, "fps": first.fps, "frames": len(first), "people": len(stored.people)}
+    return JSONResponse(about | {"seconds": round(first.seconds, 4), "name": name}, status_code=201)
+
+
+async def motion(request: Request) -> Response:
+    from motionloom.server import files
+
+    studio = studio_of(request)
+    name, dot, kind = request.path_params["name"].partition(".")
+    stored = await run_in_threadpool(studio.project.motion, name)
+    if not dot:
+        about = await run_in_threadpool(files.as_json, stored, lambda a: base64.b64encode(files.float32(a)).decode())
+        return JSONResponse(about)
+    if kind not in FORMATS:
+        raise Refusal(404, f"motions are given as {', '.join(FORMATS)}; got {kind[:20]!r}")
+    person, skeleton = _person(request), request.query_params.get("skeleton")
+
+    def made() -> Path:
+        return files.export(studio.project, stored, kind, skeleton=skeleton, person=person)
+
+    part = await _with_file(studio, made)
+    return FileResponse(
+        part, media_type=files.FORMATS[kind], filename=f"motion-{name[:8]}{part.suffix}",
+        background=BackgroundTask(part.unlink, missing_ok=True),
+    )  # fmt: skip
+
+
+def _person(request: Request) -> int | None:
+    said = request.query_params.get("person")
+    if said is None:
+        return None
+    if said not in tuple("01234567"):
+        raise Refusal(400, f"a person is a number counted from 0; got {said[:20]!r}")
+    return int(said)
+
+
+async def upload_character(request: Request) -> Response:
+    from motionloom.server import files
+
+    studio = studio_of(request)
+    async with file_of(request, studio.project, files.SUFFIXES, studio.limits) as (part, name):
+        about = await _with_file(studio, lambda: files.read_character(studio.project, part, name), part, name)
+    return JSONResponse(about, status_code=201)
+
+
+async def character(request: Request) -> Response:
+    path, name = studio_of(request).project.character(request.path_params["id"])
+    kinds = {".bvh": "text/plain; charset=utf-8", ".asf": "text/plain; charset=utf-8", ".gltf": "model/gltf+json"}
+    return FileResponse(path, media_type=kinds.get(path.suffix, "model/gltf-binary"), filename=name)
+
+
+async def _with_file(studio: Studio, call: Callable[[], Any], part: Path | None = None, name: str = "") -> Any:
+    """Read or make a file in a thread, few at a time; ``part`` is called ``name`` in what goes wrong."""
+    async with studio.files:
+        try:
+            return await run_in_threadpool(call)
+        except MotionloomError as error:
+            raise MotionloomError(str(error).replace(str(part), name) if part else str(error)) from None
+
+
+# The project and its timeline
+
+
+async def saved_project(request: Request) -> Response:
+    studio = studio_of(request)
+    if request.method == "GET":
+        data = await run_in_threadpool(studio.project.read_project)
+        return Response(data or b"null", media_type="application/json", headers={"Cache-Control": "no-store"})
+    data = await body_of(request, studio.limits.project_bytes)
+    parse_json(data, "the project")
+    await run_in_threadpool(studio.project.save_project, data)
+    return JSONResponse({"saved": len(data)})
+
+
+async def timeline_to_yaml(request: Request) -> Response:
+    studio = studio_of(request)
+    value = parse_json(await body_of(request, studio.limits.body_bytes), "the body")
+    text = asking.timeline_yaml(value)
+    await run_in_threadpool(asking.read_timeline_text, text, studio.project, studio.limits)
+    return PlainTextResponse(text, media_type="application/yaml")
+
+
+async def timeline_to_json(request: Request) -> Response:
+    studio = studio_of(request)
+    body = await body_of(request, studio.limits.body_bytes)
+    try:
+        text = body.decode("utf-8")
+    except UnicodeDecodeError:
+        raise MotionloomError("the timeline is not UTF-8 text; save it as UTF-8") from None
+    return JSONResponse(await run_in_threadpool(asking.timeline_json, text, studio.project, studio.limits))
+
+
+# What goes wrong
+
+
+def _answer(status: int, sentence: str, headers: Mapping[str, str] | None = None) -> Response:
+    return JSONResponse({"error": sentence}, status_code=status, headers=headers)
+
+
+async def _refused(request: Request, error: Exception) -> Response:
+    assert isinstance(error, Refusal)
+    return _answer(error.status, error.sentence, error.headers)
+
+
+async def _mistaken(request: Request, error: Exception) -> Response:
+    return _answer(400, studio_of(request).project.without_paths(str(error)))
+
+
+async def _no_route(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    if error.status_code == 405:
+        return _answer(405, f"{request.method} does not go with {request.url.path[:80]}; see /docs", error.headers)
+    return _answer(error.status_code, f"there is nothing at {request.url.path[:80]}; see /docs for what there is")
+
+
+async def _failed(request: Request, error: Exception) -> Response:
+    return _answer(500, f"the server failed ({type(error).__name__}); this is a fault of the program, see its log")
+
+
+__all__ = ["Studio", "build", "studio_of"]

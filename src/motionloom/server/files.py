@@ -1,0 +1,141 @@
+"""Motions as files and files as motions: what the server sends and takes beside JSON."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.io import GLTF, READS, load, load_scene, save, save_scene
+from motionloom.io.character import load_character
+from motionloom.motion import Motion
+from motionloom.retarget import joint_map, retarget, to_smpl22
+from motionloom.retarget.named import NAMED, named_skeleton
+from motionloom.server.limits import Limits
+from motionloom.server.project import Project, Stored
+from motionloom.server.refusal import Refusal
+from motionloom.skeleton import SMPL22
+
+FORMATS = {
+    "bvh": "text/plain; charset=utf-8",
+    "glb": "model/gltf-binary",
+    "npz": "application/octet-stream",
+    "mp4": "video/mp4",
+    "png": "image/png",
+}
+ONE_PERSON = ("bvh", "npz")
+UPLOADS = tuple(suffix for suffix in READS if suffix not in (".gltf", ".vrma"))
+SUFFIXES = (".glb", ".vrm", ".gltf", ".bvh")
+"""Of characters."""
+
+
+def as_json(stored: Stored, encode: Any) -> dict[str, Any]:
+    """A motion for a page: everybody as the 22-joint person; ``encode`` makes text of an array of float32."""
+    people = []
+    for person in stored.people:
+        uniform = person if person.skeleton == SMPL22 else to_smpl22(person)
+        people.append(
+            {
+                "positions": encode(uniform.positions()), "rotations": encode(uniform.rotations),
+                "root": encode(uniform.root),
+            }
+        )  # fmt: skip
+    first = stored.people[0]
+    about = {"id": stored.id, "fps": first.fps, "frames": len(first), "seconds": round(first.seconds, 4)}
+    return about | {"people": people, "about": stored.about}
+
+
+def export(project: Project, stored: Stored, kind: str, *, skeleton: str | None, person: int | None) -> Path:
+    """A file of a motion in the project's temporary folder; whoever asks for it removes it."""
+    people = list(stored.people)
+    if person is not None and not 0 <= person < len(people):
+        raise Refusal(400, f"the motion has {len(people)} people, counted from 0; there is no person {person}")
+    if person is not None or kind in ONE_PERSON:
+        people = [people[person or 0]]
+    caption = str(stored.about.get("prompt") or stored.about.get("name") or "")
+    if skeleton is not None and skeleton not in NAMED:
+        return _on_character(project, people, kind, skeleton, caption)
+    if skeleton is not None:
+        people = [retarget(one, named_skeleton(skeleton)) for one in people]
+    part = project.part(f".{kind}")
+    if len(people) > 1:
+        return save_scene(people, part, names=_names(people), captions=[caption] * len(people))
+    return save(people[0], part, captions=[caption])
+
+
+def _on_character(project: Project, people: Sequence[Motion], kind: str, skeleton: str, caption: str) -> Path:
+    path, _ = project.character(skeleton)
+    suffix = path.suffix
+    if suffix == ".bvh":
+        from motionloom.io.bvh import read_bvh
+
+        target = read_bvh(path).motion.skeleton
+    elif suffix == ".asf":
+        raise MotionloomError("an ASF skeleton belongs to AMC files; put motions on a .glb, .vrm, .gltf or .bvh")
+    else:
+        character = load_character(path)
+        if kind == "glb":
+            if len(people) > 1:
+                raise MotionloomError("a character's file holds one person; name one with person=0 or person=1")
+            moved = retarget(people[0], character.skeleton)
+            return character.save(moved, project.part(suffix), name=caption[:80] or None)
+        target = character.skeleton
+    moved = [retarget(one, target) for one in people]
+    part = project.part(f".{kind}")
+    return save(moved[0], part, captions=[caption]) if len(moved) == 1 else save_scene(moved, part)
+
+
+def _names(people: Sequence[Motion]) -> list[str]:
+    return ["first", "second"] if len(people) == 2 else [f"person {number + 1}" for number in range(len(people))]
+
+
+def read_upload(project: Project, part: Path, name: str, *, asf: str | None, limits: Limits) -> Stored:
+    """A motion file that arrived as ``part``, into the project."""
+    suffix = part.suffix
+    if suffix not in UPLOADS:
+        raise MotionloomError(f"{name} cannot be read: its name must end in {', '.join((*UPLOADS, '.asf'))}")
+    if suffix == ".amc":
+        if asf is None:
+            raise MotionloomError("an AMC file needs its skeleton: send the .asf first, then the AMC with &asf=ID")
+        skeleton, _ = project.character(asf)
+        people = [load(part, asf=skeleton)]
+    else:
+        people = load_scene(part) if suffix in GLTF else [load(part)]
+    if len(people) > limits.people:
+        raise MotionloomError(f"{name} holds {len(people)} people; at most {limits.people} are taken")
+    for motion in people:
+        if motion.seconds > limits.total_seconds:
+            raise MotionloomError(
+                f"{name} takes {motion.seconds:.0f} s; at most {limits.total_seconds:g} s are taken, so cut it first"
+            )
+        to_smpl22(motion.frames(0, 1))  # a body of which the 22 joints are not found helps nobody later
+    return project.add(people, {"task": "upload", "name": name})
+
+
+def read_character(project: Project, part: Path, name: str) -> dict[str, Any]:
+    """A character's file that arrived as ``part``, into the project: its id and which of its joints are which."""
+    suffix = part.suffix
+    if suffix not in SUFFIXES:
+        raise MotionloomError(f"{name} is no character: its name must end in {', '.join(SUFFIXES)}")
+    if suffix == ".bvh":
+        from motionloom.io.bvh import read_bvh
+
+        joints = joint_map(read_bvh(part).motion.skeleton)
+    else:
+        joints = load_character(part).joints
+    found = {joint: list(points) for joint, points in joints.names().items()}
+    return {"id": project.add_character(part, name, suffix), "name": name, "joints": found}
+
+
+def read_skeleton(project: Project, part: Path, name: str) -> dict[str, Any]:
+    """An ASF skeleton that arrived as ``part``, into the project."""
+    from motionloom.io.asf import load_skeleton
+
+    load_skeleton(part)
+    return {"id": project.add_character(part, name, ".asf"), "name": name, "skeleton": True}
+
+
+def float32(values: np.ndarray) -> bytes:
+    """The bytes of little-endian float32."""
+    return np.ascontiguousarray(values, dtype="<f4").tobytes()

@@ -1,0 +1,55 @@
+"""How much one server takes: every number that a request is refused by, in one place."""
+
+from dataclasses import asdict, dataclass
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds of requests, of the queue and of the project folder."""
+
+    seconds: float = 60.0
+    """Of one motion of one prompt."""
+    total_seconds: float = 600.0
+    """Of a long motion, of futures, and of a clip that is uploaded."""
+    count: int = 8
+    """Motions of one job."""
+    steps: int = 200
+    """Network calls of one motion."""
+    prompt: int = 2000
+    """Characters of a prompt."""
+    body_bytes: int = 4 << 20
+    """Of a JSON body."""
+    upload_bytes: int = 64 << 20
+    """Of a file that is sent."""
+    project_bytes: int = 16 << 20
+    """Of the project's JSON."""
+    queue: int = 256
+    """Jobs that wait, of all clients together."""
+    queue_per_client: int = 64
+    clients: int = 128
+    """Clients with jobs that wait."""
+    streams: int = 128
+    """Event streams that are open."""
+    kept_jobs: int = 500
+    """Finished jobs that are remembered."""
+    level_bytes: int = 64 << 20
+    """Poses of denoising that are remembered for streams, of all jobs together."""
+    level_bytes_per_job: int = 16 << 20
+    motions: int = 5000
+    """Motions in the project folder; the oldest that the project does not name go first."""
+    stored_bytes: int = 4 << 30
+    """Bytes of them, and of characters."""
+    uploads: int = 200
+    """Characters and ASF skeletons in the project folder."""
+    people: int = 8
+    """People of one file that is sent."""
+    body_seconds: float = 60.0
+    """In which a body must have arrived."""
+    exports: int = 2
+    """Files that are made at the same time."""
+
+    def public(self) -> dict[str, float]:
+        """What `/capabilities` says of them."""
+        names = ("seconds", "total_seconds", "count", "steps", "prompt", "body_bytes", "upload_bytes", "project_bytes",
+                 "queue", "queue_per_client", "people")  # fmt: skip
+        return {name: value for name, value in asdict(self).items() if name in names}

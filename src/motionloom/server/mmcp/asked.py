@@ -1,0 +1,179 @@
+"""What an MMCP request asks, as goals and segments of the library: frames to seconds, one body to another."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom.errors import MotionloomError
+from motionloom.goals.goal import FPS, Goal, body_facing, merged
+from motionloom.goals.paths import root_path
+from motionloom.ground import GroundPose
+from motionloom.motion import Motion
+from motionloom.server.mmcp.rigs import Rig
+from motionloom.skeleton import SMPL22
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Frames of a request, and those at 20 per second that they are drawn as."""
+
+    frames: int
+    fps: float
+
+    @property
+    def drawn(self) -> int:
+        """Frames at 20 per second that reach from the request's first to its last."""
+        return max(int(np.ceil((self.frames - 1) / self.fps * FPS - 1e-6)) + 1, 4)
+
+    def frame(self, asked: int) -> int:
+        """The drawn frame nearest to one of the request's."""
+        return min(round(asked / self.fps * FPS), self.drawn - 1)
+
+    def resampled(self, motion: Motion) -> Motion:
+        """A drawn motion at the request's frames."""
+        return motion.at(np.arange(self.frames) / self.fps * FPS, self.fps)
+
+
+@dataclass(frozen=True, eq=False)
+class Keyframe:
+    """A pose at a frame, of the uniform person."""
+
+    frame: int
+    places: Array
+    """(22, 3) metres; in the world if it is ``placed``."""
+    asked: NDArray[np.bool_]
+    """(22,) joints that are asked."""
+    placed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """The constraints of a request."""
+
+    goal: Goal
+    """Paths, targets and poses that say where they are."""
+    floating: tuple[Keyframe, ...]
+    """Poses that do not say where they are: they are asked where the person is at that time."""
+    ground: Array | None
+    """(points, 3) x, z and height."""
+    notes: tuple[dict[str, str], ...]
+
+
+def read_constraints(constraints: Sequence[Any], rig: Rig, clock: Clock) -> Asked:
+    """Constraints of `motionmcp.schemas`; raises `MotionloomError` for what contradicts itself or cannot be reached."""
+    size, nearest = rig.size, {joint: name for name, joint in rig.joints().items()}
+    goal, floating, ground, notes = Goal.nothing(clock.drawn), [], [], []
+    for one in constraints:
+        if one.type == "root_path":
+            goal = merged(goal, _path(one, size, clock))
+        elif one.type == "effector_target":
+            goal = merged(goal, _target(one, nearest, size, clock))
+            if one.rotations is not None:
+                notes.append(_note("rotation_ignored", f"the rotations of {one.joint} are not asked, its places are"))
+        elif one.type == "pose_keyframe":
+            pose = _pose(one, rig, size, clock)
+            if pose.placed:
+                goal = merged(goal, as_goal(pose, clock.drawn))
+            else:
+                floating.append(pose)
+        else:
+            ground += [(x / size, z / size, y / size) for x, z, y in one.points]
+    return Asked(goal, tuple(floating), np.array(ground) if ground else None, tuple(notes))
+
+
+def _note(code: str, message: str) -> dict[str, str]:
+    return {"code": code, "severity": "info", "message": message}
+
+
+def _path(one: Any, size: float, clock: Clock) -> Goal:
+    frames, points = _unique([clock.frame(frame) for frame in one.frames], one.positions_xz)
+    facing: Any = "along" if len(frames) > 1 else "free"
+    if one.heading_radians is not None:
+        _, turns = _unique([clock.frame(frame) for frame in one.frames], one.heading_radians)
+        facing = np.degrees(np.unwrap(np.asarray(turns, dtype=np.float64))).tolist()
+        facing = facing[0] if len(facing) == 1 else facing
+    times = [frame / FPS for frame in frames]
+    return root_path(np.asarray(points, dtype=np.float64) / size, times, frames=clock.drawn, facing=facing)
+
+
+def _unique(frames: Sequence[int], values: Sequence[Any]) -> tuple[list[int], list[Any]]:
+    """One value for each drawn frame: the last of those that fall on it."""
+    found = dict(zip(frames, values, strict=True))
+    return sorted(found), [found[frame] for frame in sorted(found)]
+
+
+def _target(one: Any, nearest: dict[str, str], size: float, clock: Clock) -> Goal:
+    if one.joint not in nearest:
+        raise MotionloomError(
+            f"the joint {one.joint!r} is none of the 22 that can be asked to be somewhere; on this skeleton they are "
+            f"{', '.join(sorted(nearest))}"
+        )
+    joint, goal = SMPL22.index(nearest[one.joint]), Goal.nothing(clock.drawn)
+    for frame, place in zip(one.frames, one.positions, strict=True):
+        at = clock.frame(frame)
+        goal.positions[at, joint], goal.asked[at, joint] = np.asarray(place, dtype=np.float64) / size, True
+    if not np.isfinite(goal.positions).all():
+        raise MotionloomError(f"the places of {one.joint} must be finite numbers")
+    return goal
+
+
+def _pose(one: Any, rig: Rig, size: float, clock: Clock) -> Keyframe:
+    names = list(one.joint_rotations)
+    turns = np.array([[one.joint_rotations[name] for name in names]], dtype=np.float64)
+    if not np.isfinite(turns).all() or (np.linalg.norm(turns, axis=-1) < 1e-3).any():
+        raise MotionloomError("the rotations of a pose must be quaternions that are not zero")
+    placed = one.root_position is not None
+    root = np.asarray(one.root_position if placed else rig.skeleton.offsets[0], dtype=np.float64)[None]
+    person = rig.person(rig.motion(names, turns, root, FPS))
+    places = person.positions()[0]
+    if placed:  # the uniform person is where the client's root was asked, in its own size
+        high = float(rig.joints()["pelvis"] == rig.skeleton.names[0])  # a root on the ground says nothing of the height
+        places = places + (root[0] / size - person.root[0]) * np.array([1.0, high, 1.0])
+    known = np.ones(len(SMPL22), dtype=bool) if one.fill_mode == "rest" else _known(names, rig)
+    return Keyframe(clock.frame(one.frame), places, known, placed)
+
+
+def _known(names: Sequence[str], rig: Rig) -> NDArray[np.bool_]:
+    """(22,) joints whose place the rotations say: all joints above them that turn on this skeleton are given."""
+    given, skeleton, said = set(names), rig.skeleton, rig.joints()
+    result = np.zeros(len(SMPL22), dtype=bool)
+    for number, name in enumerate(SMPL22.names):
+        joint = skeleton.parents[skeleton.index(said[name])]
+        while joint >= 0 and skeleton.names[joint] in given:
+            joint = skeleton.parents[joint]
+        result[number] = joint < 0
+    return result
+
+
+def as_goal(pose: Keyframe, frames: int) -> Goal:
+    """A pose in the world as a goal of so many frames."""
+    goal = Goal.nothing(frames)
+    goal.positions[pose.frame] = pose.places
+    goal.asked[pose.frame] = pose.asked[:, None]
+    return goal
+
+
+def standing_as(pose: Keyframe, person: Array) -> Keyframe:
+    """A pose that does not say where it is, where and as a drawn person (22, 3) stands."""
+
+    def stand(places: Array) -> GroundPose:
+        return GroundPose.of(places[0], body_facing(places))
+
+    return replace(pose, places=stand(person).to_world(stand(pose.places).from_world(pose.places)), placed=True)
+
+
+def whole_path(goal: Goal) -> Goal:
+    """The goal with a place for the pelvis in every frame: between and around those that are asked, straight on."""
+    asked = goal.asked[:, 0, [0, 2]].all(axis=-1)
+    frames = np.flatnonzero(asked)
+    positions, flags = goal.positions.copy(), goal.asked.copy()
+    for axis in (0, 2):
+        known = goal.positions[frames, 0, axis]
+        positions[:, 0, axis] = np.interp(np.arange(len(goal)), frames, known)
+        flags[:, 0, axis] = True
+    return replace(goal, positions=positions, asked=flags)

@@ -1,0 +1,270 @@
+"""An MMCP request drawn: segments and constraints to motions on the client's skeleton."""
+
+import secrets
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.edits.fitting import fit
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import FEET
+from motionloom.goals.goal import FPS, Goal, placement_of
+from motionloom.goals.segment import Segment
+from motionloom.kinematics.feet import planted_feet
+from motionloom.motion import Motion
+from motionloom.server.drawing import Models
+from motionloom.server.mmcp.asked import Asked, Clock, as_goal, read_constraints, standing_as, whole_path
+from motionloom.server.mmcp.rigs import Rig, read_rig
+from motionloom.tasks import long, text
+from motionloom.tasks.control import moved
+from motionloom.tasks.edit import Change, Extend, Loop, Redraw, edit
+from motionloom.tasks.splice import carried_level, concatenated, standing
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+TRANSITION = 1.0
+"""Seconds that two segments share where a request does not say."""
+POSE_SECONDS = 2.0
+"""Length of the motion that a single pose is taken from; it is its middle."""
+VARIED = 0.75
+"""How far a performance may be from the motion that it is like: the ``strength`` of `edit`."""
+SEAM = 0.4
+"""Seconds before and after the seam with a motion that is like another, which are drawn anew."""
+NEAR = 0.6
+"""Metres from a foot within which a point of the ground is under it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The samples of a request: rotations as MMCP tells them."""
+
+    rotations: Array
+    """(samples, frames, joints, 4) x, y, z, w."""
+    root: Array
+    """(samples, frames, 3)"""
+    translations: Array | None
+    boundaries: list[list[int]]
+    names: dict[str, str]
+    """The client's joint for each of the 22."""
+    notes: list[dict[str, str]]
+
+
+def answer(models: Models, request: Any, progress: Progress) -> Iterator[Answer]:
+    """Draw a `motionmcp.GenerateRequest`; one answer with all of its samples."""
+    rig = read_rig([joint.model_dump() for joint in request.skeleton.joints])
+    clock = Clock(request.total_frames, request.fps(FPS))
+    asked = read_constraints(request.constraints, rig, clock)
+    seed, count = _seed(request), request.options.num_samples if request.options else 1
+    motions = []
+    for number in range(count):
+        drawn = _sample(models, request, rig, clock, asked, seed + number)
+        motions.append(rig.put(clock.resampled(drawn)))
+        progress(number + 1, count)
+    places = [rig.told_places(motion) for motion in motions]
+    free = [one for one in places if one is not None]
+    yield Answer(
+        np.stack([rig.told(motion) for motion in motions]), np.stack([motion.root for motion in motions]),
+        np.stack(free) if len(free) == count else None,
+        [_boundaries(request)] * count, {} if rig.uniform else rig.joints(), list(asked.notes),
+    )  # fmt: skip
+
+
+def _seed(request: Any) -> int:
+    given = request.options.seed if request.options else None
+    return secrets.randbelow(2**31) if given is None else abs(given) % 2**61
+
+
+def _boundaries(request: Any) -> list[int]:
+    ends = np.cumsum([segment.duration_frames for segment in request.segments])
+    return [int(end) for end in ends[:-1]]
+
+
+def _sample(models: Models, request: Any, rig: Rig, clock: Clock, asked: Asked, seed: int) -> Motion:
+    """One motion of the uniform person at 20 per second."""
+    kinds = {segment.type for segment in request.segments}
+    options = _options(request)
+    if kinds == {"pose"}:
+        return _poses(models, request, seed, options)
+    if "pose" in kinds:
+        raise MotionloomError(
+            "a pose has one frame and no motion: ask for poses and for motion in requests of their own"
+        )
+    if "motion_reference" in kinds:
+        motion = _like(models, request, rig, clock, seed, options)
+        motion = _bent(motion, asked)
+    else:
+        segments = _segments(request, clock)
+        motion = _drawn(models, segments, asked, seed, options)
+    if request.options and request.options.loop:
+        motion = _looped(models, motion, seed, options)
+    return motion if asked.ground is None else on_ground(motion, asked.ground)
+
+
+def _options(request: Any) -> dict[str, Any]:
+    """Steps and guidance, where the request says them."""
+    found: dict[str, Any] = {}
+    if request.options is None:
+        return found
+    if "diffusion_steps" in request.options.model_fields_set:
+        found["steps"] = request.options.diffusion_steps
+    guidance = request.options.guidance
+    if guidance is not None:
+        found["guidance"] = guidance.weight[0] if guidance.weight else 1.0
+    return found
+
+
+def _segments(request: Any, clock: Clock) -> list[Segment]:
+    """Segments at 20 frames per second whose frames add up to those that are drawn."""
+    listed = request.segments or [None]
+    ends = [clock.drawn] if request.segments == [] else _ends(request, clock)
+    frames = np.diff([0, *ends]).tolist()
+    wanted = TRANSITION
+    if request.options is not None and "transition_frames" in request.options.model_fields_set:
+        wanted = max(request.options.transition_frames / clock.fps, 2 / FPS)
+    shared = [min(wanted, min(a, b) / FPS / 2) for a, b in zip(frames, [*frames[1:], frames[-1]], strict=True)]
+    if min(frames) < 4:
+        raise MotionloomError(f"a segment of {min(frames) / FPS:g} s is too short; 0.2 s is the least")
+    return [
+        Segment(getattr(one, "prompt", ""), count / FPS, transition=overlap)
+        for one, count, overlap in zip(listed, frames, shared, strict=True)
+    ]
+
+
+def _ends(request: Any, clock: Clock) -> list[int]:
+    ends = np.cumsum([segment.duration_frames for segment in request.segments])
+    return [*(clock.frame(int(end)) for end in ends[:-1]), clock.drawn]
+
+
+def _drawn(models: Models, segments: list[Segment], asked: Asked, seed: int, options: dict[str, Any]) -> Motion:
+    """The segments, steered to what is asked of them; poses without a place are asked where a first draw stands."""
+    goal = asked.goal
+    if asked.floating:
+        first = _steered(models, segments, goal, seed, options).positions()
+        for pose in asked.floating:
+            other = as_goal(standing_as(pose, first[pose.frame]), len(goal))
+            goal = replace(other, positions=np.where(goal.asked, goal.positions, other.positions),
+                           asked=goal.asked | other.asked, facing=goal.facing,
+                           facing_asked=goal.facing_asked)  # fmt: skip
+    return _steered(models, segments, goal, seed, options)
+
+
+def _steered(models: Models, segments: list[Segment], goal: Goal, seed: int, options: dict[str, Any]) -> Motion:
+    """One motion of the segments that meets a goal in the world."""
+    if goal.empty:
+        return concatenated(*long.compose(models.prior, segments, seed=seed, **options))
+    if len(segments) == 1:
+        place = placement_of(goal)
+        (only,) = segments
+        wanted = replace(only, goal=goal.seen_from(place))
+        return moved(concatenated(*long.compose(models.prior, [wanted], seed=seed, **options)), place)
+    on_path = goal.asked[:, 0, [0, 2]].all(axis=-1).any()
+    if on_path:
+        path = whole_path(goal)
+        return concatenated(*long.compose(models.prior, segments, seed=seed, path=path, **options))
+    return fit(concatenated(*long.compose(models.prior, segments, seed=seed, **options)), goal)
+
+
+def _bent(motion: Motion, asked: Asked) -> Motion:
+    """A motion that is drawn already, fitted to what is asked."""
+    goal = asked.goal
+    for pose in asked.floating:
+        other = as_goal(standing_as(pose, motion.positions()[pose.frame]), len(goal))
+        goal = replace(goal, positions=np.where(goal.asked, goal.positions, other.positions),
+                       asked=goal.asked | other.asked)  # fmt: skip
+    return motion if goal.empty else fit(motion, goal)
+
+
+def _poses(models: Models, request: Any, seed: int, options: dict[str, Any]) -> Motion:
+    """One frame for each prompt: the middle of a short motion, at the origin."""
+    made = text.generate(
+        models.prior, [segment.prompt for segment in request.segments], seconds=POSE_SECONDS, seed=seed, **options
+    )
+    middle = [motion.frames(len(motion) // 2, len(motion) // 2 + 1) for motion in made]
+    return concatenated(*middle, *[middle[-1]] * 4)  # the clock takes as many as it needs
+
+
+def _like(models: Models, request: Any, rig: Rig, clock: Clock, seed: int, options: dict[str, Any]) -> Motion:
+    """Segments of which some are said by a motion: each drawn by itself and put behind the one before."""
+    whole: Motion | None = None
+    begins = [0, *_ends(request, clock)]
+    for number, (segment, begin, end) in enumerate(zip(request.segments, begins, begins[1:], strict=False)):
+        frames = end - begin
+        if segment.type == "motion_reference":
+            part = _performance(models, segment, rig, frames, seed + number, options)
+        else:
+            one = Segment(getattr(segment, "prompt", ""), frames / FPS)
+            part = concatenated(*long.compose(models.prior, [one], seed=seed + number, **options))
+        whole = part if whole is None else _joined(models, whole, part, seed + number, options)
+    assert whole is not None
+    return whole
+
+
+def _performance(models: Models, segment: Any, rig: Rig, frames: int, seed: int, options: dict[str, Any]) -> Motion:
+    """A new performance of a clip, of so many frames: its middle varied, its end gone on from where it is short."""
+    own = read_rig([joint.model_dump() for joint in segment.skeleton.joints]) if segment.skeleton else rig
+    turns = np.array(segment.rotations, dtype=np.float64)
+    root = np.array(segment.root_positions, dtype=np.float64)
+    clip = own.person(own.motion(segment.joint_names, turns, root, segment.fps)).resample(FPS)
+    longest = 60 * FPS
+    clip = clip.frames(0, int(min(len(clip), max(frames, 8), longest)))
+    if len(clip) < 8:
+        raise MotionloomError(f"a motion to be like is {len(clip) / FPS:.2f} s long; at least 0.4 s are needed")
+    missing = frames - len(clip)
+    changes: list[Change] = [Redraw([(0.0, clip.seconds)], strength=VARIED)]
+    if missing > 0:
+        changes.append(Extend(max(missing, 2) / FPS))
+    return edit(models.prior, clip, "", changes, seed=seed, **options)[0].frames(0, frames)
+
+
+def _joined(models: Models, before: Motion, behind: Motion, seed: int, options: dict[str, Any]) -> Motion:
+    (end, facing), (begin, faced) = standing(before, len(before) - 1), standing(behind, 0)
+    behind = carried_level(behind, rot.multiply(facing, rot.inverse(faced)), begin, end)
+    seam = before.seconds
+    whole = concatenated(before, behind)
+    around = min(SEAM, before.seconds / 2, behind.seconds / 2)
+    span = (seam - around, min(seam + around, whole.seconds))
+    return edit(models.prior, whole, "", Redraw([span]), seed=seed, **options)[0]
+
+
+def _looped(models: Models, motion: Motion, seed: int, options: dict[str, Any]) -> Motion:
+    """A cycle: its last frame is its first one again, moved on by the way of one cycle."""
+    blend = min(1.0, max(motion.seconds / 3, 0.1))
+    cycle = edit(models.prior, motion.frames(0, len(motion) - 1), "", Loop(blend), seed=seed, **options)[0]
+    last = cycle.frames(0, 1)
+    step = (cycle.root[1] - cycle.root[0]) * np.array([1.0, 0.0, 1.0])
+    place = cycle.root[-1:] + step
+    place[:, 1] = last.root[:, 1]
+    return concatenated(cycle, replace(last, root=place))
+
+
+def on_ground(motion: Motion, ground: Array) -> Motion:
+    """The motion over a ground of points (x, z, height): planted feet stand on the point under them.
+
+    The body rises and sinks with the feet that stand, in between evenly; the legs are fitted to what is left. A foot
+    that no point is under (`NEAR`) is in the air, and nothing is asked of it.
+    """
+    positions = motion.positions()
+    planted = planted_feet(positions, motion.fps)
+    feet = positions[:, list(FEET)]
+    away = np.linalg.norm(feet[:, :, None, [0, 2]] - ground[None, None, :, :2], axis=-1)
+    near, height = away.min(axis=-1) < NEAR, ground[away.argmin(axis=-1), 2]
+    stands = planted & near
+    frames = np.flatnonzero(stands.any(axis=1))
+    if len(frames) == 0:
+        return motion
+    level = [float(height[frame][stands[frame]].mean()) for frame in frames]
+    rise = np.interp(np.arange(len(motion)), frames, level)
+    kernel = np.hanning(9)[1:-1] / np.hanning(9)[1:-1].sum()
+    rise = np.convolve(np.pad(rise, 3, mode="edge"), kernel, mode="valid")
+    raised = replace(motion, root=motion.root + rise[:, None] * [0.0, 1.0, 0.0])
+    goal, joints = Goal.nothing(len(motion)), list(FEET)
+    for foot, joint in enumerate(joints):
+        at = stands[:, foot]
+        goal.positions[at, joint] = feet[at, foot] + height[at, foot, None] * [0.0, 1.0, 0.0]
+        goal.asked[at, joint] = True
+    return fit(raised, goal)

@@ -1,0 +1,222 @@
+"""The project folder: motions, characters and the project's JSON, the only place that the server reads and writes.
+
+    project.json            what the page saves
+    motions/ID.npz          a motion; ID.2.npz, ID.3.npz, ... are the other people in its world
+    motions/ID.json         what is known of it; written last, so that a motion without it is not there
+    characters/ID.glb       a character (.glb, .gltf, .vrm, .bvh) or the skeleton of AMC files (.asf)
+    characters/ID.json      its name
+    temporary/              files on their way in or out; emptied at the start
+    exports/                files that an assistant asked for
+    lock                    held by the one server that has the folder open
+
+Names are made here and are 16 hexadecimal digits: nothing that a client sends becomes part of a path.
+"""
+
+import json
+import os
+import re
+import secrets
+import shutil
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from motionloom.errors import MotionloomError
+from motionloom.io.atomic import atomic_path
+from motionloom.server.limits import Limits
+from motionloom.server.refusal import Refusal
+
+if TYPE_CHECKING:
+    from motionloom.motion import Motion
+
+try:
+    import fcntl
+except ImportError:  # no such locks on this system
+    fcntl = None
+
+ID = re.compile(r"[0-9a-f]{16}")
+CHARACTERS = (".glb", ".gltf", ".vrm", ".bvh", ".asf")
+CACHED = 24
+"""Motions that stay in memory."""
+STALE = 3600.0
+"""Seconds after which a file on its way is not on its way any more: whoever waited for it is gone."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """A motion of the project, of one person or several in one world."""
+
+    id: str
+    people: "tuple[Motion, ...]"
+    about: dict[str, Any] = field(default_factory=dict)
+    """Task, prompt, seed and what else is known of it; plain JSON."""
+
+
+def _own(path: Path) -> int | None:
+    """Hold a lock on a file as long as the process lives; MotionloomError where another one does."""
+    if fcntl is None:
+        return None
+    file = os.open(path, os.O_CREAT | os.O_RDWR, 0o666)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(file)
+        raise MotionloomError(
+            f"another server has the project folder {path.parent} open; end it, or name another folder with --project"
+        ) from None
+    except OSError:  # a file system without locks
+        pass
+    return file
+
+
+class Project:
+    """A project folder that one server owns; safe to use from several threads."""
+
+    def __init__(self, folder: Path, limits: Limits) -> None:
+        self.folder, self.limits = folder.resolve(), limits
+        self.motions, self.characters = self.folder / "motions", self.folder / "characters"
+        self.temporary = self.folder / "temporary"
+        self._lock = threading.RLock()
+        self._cache: OrderedDict[str, Stored] = OrderedDict()
+        try:
+            for place in (self.motions, self.characters, self.temporary):
+                place.mkdir(parents=True, exist_ok=True)
+            self._owned = _own(self.folder / "lock")
+            for left in self.temporary.iterdir():
+                shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
+        except OSError as error:
+            raise MotionloomError(
+                f"the project folder {folder} cannot be used: {error.strerror or error}; name another with --project"
+            ) from None
+        self._sizes = {p.name: p.stat().st_size for p in sorted(self.motions.iterdir(), key=_age)}
+        self._order = [name[:-5] for name in self._sizes if name.endswith(".json")]
+
+    def part(self, suffix: str = "") -> Path:
+        """A fresh name in the folder for what is on its way; what others left there long ago is removed."""
+        for left in self.temporary.iterdir():
+            with suppress(OSError):
+                if time.time() - left.stat().st_mtime > STALE:
+                    left.unlink()
+        return self.temporary / f"{secrets.token_hex(8)}{suffix}"
+
+    def without_paths(self, sentence: str) -> str:
+        """A sentence of the library with the server's folders taken out of it."""
+        for place in (self.temporary, self.motions, self.characters, self.folder):
+            sentence = sentence.replace(f"{place}{os.sep}", "").replace(str(place), "the project folder")
+        return sentence
+
+    # -- motions
+
+    def add(self, people: "Sequence[Motion]", about: dict[str, Any]) -> Stored:
+        """Keep a motion; the oldest ones that the project does not name make room for it."""
+        from motionloom.io.npz import save_npz
+
+        stored = Stored(secrets.token_hex(8), tuple(people), about)
+        about = {**about, "people": len(stored.people)}
+        for number, person in enumerate(stored.people):
+            save_npz(person, self.motions / _file(stored.id, number))
+        self._write(self.motions / f"{stored.id}.json", json.dumps(about).encode())
+        with self._lock:
+            for number in range(len(stored.people)):
+                name = _file(stored.id, number)
+                self._sizes[name] = (self.motions / name).stat().st_size
+            self._sizes[f"{stored.id}.json"] = 0
+            self._order.append(stored.id)
+            self._remember(stored)
+            self._make_room(stored.id)
+        return stored
+
+    def motion(self, name: Any) -> Stored:
+        """The motion of that id; raises `Refusal` 404 where there is none."""
+        from motionloom.io.npz import load_npz
+
+        if not isinstance(name, str) or not ID.fullmatch(name):
+            raise Refusal(404, "there is no such motion: an id is 16 hexadecimal digits, as the server gave it")
+        with self._lock:
+            if name in self._cache:
+                self._cache.move_to_end(name)
+                return self._cache[name]
+        try:
+            about = json.loads((self.motions / f"{name}.json").read_bytes())
+            people = tuple(load_npz(self.motions / _file(name, number)) for number in range(about.pop("people")))
+        except (OSError, ValueError, KeyError):
+            raise Refusal(404, f"there is no motion {name}; it was never made, or made room for newer ones") from None
+        stored = Stored(name, people, about)
+        with self._lock:
+            self._remember(stored)
+        return stored
+
+    def _remember(self, stored: Stored) -> None:
+        self._cache[stored.id] = stored
+        while len(self._cache) > CACHED:
+            self._cache.popitem(last=False)
+
+    def _make_room(self, newest: str) -> None:
+        """Remove the oldest motions that the project does not name while there are too many or too much of them."""
+        while len(self._order) > self.limits.motions or sum(self._sizes.values()) > self.limits.stored_bytes:
+            named = self.read_project() or b""
+            old = next((one for one in self._order if one != newest and one.encode() not in named), None)
+            if old is None:
+                return
+            self._order.remove(old)
+            self._cache.pop(old, None)
+            for name in [name for name in self._sizes if name.startswith(old)][::-1]:
+                (self.motions / name).unlink(missing_ok=True)
+                del self._sizes[name]
+
+    # -- characters and skeletons
+
+    def add_character(self, part: Path, name: str, suffix: str) -> str:
+        """Take a file that `part` named into the project; gives its id."""
+        with self._lock:
+            if sum(1 for _ in self.characters.glob("*.json")) >= self.limits.uploads:
+                raise Refusal(507, f"the project holds {self.limits.uploads} characters already; begin another project")
+            found = secrets.token_hex(8)
+            os.replace(part, self.characters / f"{found}{suffix}")
+            self._write(self.characters / f"{found}.json", json.dumps({"name": name, "suffix": suffix}).encode())
+        return found
+
+    def character(self, name: Any) -> tuple[Path, str]:
+        """The file of that id and its name; raises `Refusal` 404 where there is none."""
+        if isinstance(name, str) and ID.fullmatch(name):
+            try:
+                about = json.loads((self.characters / f"{name}.json").read_bytes())
+                if about["suffix"] in CHARACTERS:
+                    return self.characters / f"{name}{about['suffix']}", about["name"]
+            except (OSError, ValueError, KeyError):
+                pass
+        raise Refusal(404, "there is no such character; send it first with POST /characters?name=hero.glb")
+
+    # -- the project's JSON
+
+    def read_project(self) -> bytes | None:
+        """What was saved last, or None."""
+        try:
+            return (self.folder / "project.json").read_bytes()
+        except FileNotFoundError:
+            return None
+
+    def save_project(self, data: bytes) -> None:
+        """Save the JSON: after a crash the folder holds the old or the new one, whole."""
+        with self._lock:
+            self._write(self.folder / "project.json", data, durable=True)
+
+    def _write(self, path: Path, data: bytes, *, durable: bool = False) -> None:
+        with atomic_path(path) as temporary, temporary.open("wb") as file:
+            file.write(data)
+            if durable:
+                file.flush()
+                os.fsync(file.fileno())
+
+
+def _file(name: str, number: int) -> str:
+    return f"{name}.npz" if number == 0 else f"{name}.{number + 1}.npz"
+
+
+def _age(path: Path) -> tuple[int, str]:
+    return path.stat().st_mtime_ns, path.name

@@ -1,0 +1,83 @@
+"""Starting the server: the project folder, the door, the worker and uvicorn around them."""
+
+import secrets
+import socket
+import sys
+import threading
+import webbrowser
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import uvicorn
+
+from motionloom.errors import MotionloomError
+from motionloom.server import page
+from motionloom.server.app import build
+from motionloom.server.guard import door, is_loopback
+from motionloom.server.limits import Limits
+from motionloom.server.project import Project
+from motionloom.server.worker import Worker
+
+CONNECTIONS = 512
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a server is started."""
+
+    project: Path
+    host: str = "127.0.0.1"
+    port: int = 8020
+    token: str | None = None
+    hosts: Sequence[str] = ()
+    origins: Sequence[str] = ()
+    weights: str = "default"
+    device: str = "cpu"
+    show: bool = False
+    """Open the page in a browser."""
+
+
+def serve(options: Options, *, limits: Limits | None = None) -> None:
+    """Serve until a signal ends it; raises `MotionloomError` for an address or folder that cannot be had."""
+    token = options.token
+    if token is None and not is_loopback(options.host):
+        token = secrets.token_urlsafe(24)
+    if token is not None and (len(token) < 8 or not token.isascii() or not token.isprintable()):
+        raise MotionloomError("a token has at least 8 printable letters or digits; leave --token out to get one made")
+    project = Project(options.project, limits or Limits())
+    worker = Worker(project, limits or Limits(), weights=options.weights, device=options.device)
+    known = door(options.host, token, hosts=options.hosts, origins=options.origins, page=page.files())
+    app = build(project, worker, known)
+    bound = _bound(options.host, options.port)
+    address = _address(options.host, bound.getsockname()[1], token)
+    print(f"motionloom: {address} (project: {project.folder})", file=sys.stderr, flush=True)
+    if options.show and page.files():
+        threading.Timer(0.3, webbrowser.open, [address]).start()
+    elif options.show:
+        print(f"motionloom: {page.MISSING}", file=sys.stderr, flush=True)
+    config = uvicorn.Config(
+        app, log_level="warning", access_log=False, server_header=False, limit_concurrency=CONNECTIONS,
+        timeout_graceful_shutdown=2, ws_max_size=1 << 16,
+    )  # fmt: skip
+    uvicorn.Server(config).run(sockets=[bound])
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    try:
+        family, kind, protocol, _, place = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        made = socket.socket(family, kind, protocol)
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        made.bind(place)
+        made.listen(128)  # who connects from now on waits until the application is up
+    except (OSError, OverflowError) as error:
+        problem = getattr(error, "strerror", None) or error
+        raise MotionloomError(
+            f"cannot serve at {host}, port {port}: {problem}; name another --port or --host"
+        ) from None
+    return made
+
+
+def _address(host: str, port: int, token: str | None) -> str:
+    shown = f"[{host}]" if ":" in host else host
+    return f"http://{shown}:{port}/" + (f"?token={token}" if token else "")

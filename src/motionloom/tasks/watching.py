@@ -1,0 +1,130 @@
+"""Watching a motion while it is denoised: after each network call, the poses that the network predicts for clean data.
+
+    def show(denoised: Denoised) -> None:
+        print(denoised.done, "of", denoised.of, denoised.positions().shape)
+
+    with watching(show):
+        generate(prior, ["a person jumps"])
+
+Whatever draws (every function of `motionloom.tasks`) reports to the callback of the `watching` block that it runs in.
+The poses are decoded only where `Denoised.positions` is called, so watching costs nothing unless one looks. An
+exception that the callback raises ends the drawing: that is how a motion is cancelled between two network calls.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from motionloom.diffusion.sampling import Snapshot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Denoised:
+    """What one network call predicted."""
+
+    done: int
+    """Moves made of this walk, from 1."""
+    of: int
+    """Moves of the walk; an edit of several stretches, or a batch of several lengths, takes several walks."""
+    rows: tuple[int, ...]
+    """Numbers of the motions that are drawn together in this walk; else 0."""
+    decode: Callable[[], np.ndarray]
+    """Gives what `positions` gives; any float type."""
+
+    def positions(self) -> Array:
+        """(rows, people, frames, 22, 3) metres, +Y up; bones may breathe.
+
+        Seen from where the (first) person starts, at the origin and facing +Z; `edit` shows its window, and `predict`
+        and `switch` what is behind the past, in the world.
+        """
+        return np.asarray(self.decode(), dtype=np.float64)
+
+
+OnDenoised = Callable[[Denoised], None]
+SHOWN = 64
+"""Segments of a long motion that are shown while it is drawn."""
+_callback: ContextVar[OnDenoised | None] = ContextVar("motionloom_on_denoised", default=None)
+
+
+@contextmanager
+def watching(on_denoised: OnDenoised) -> Iterator[None]:
+    """Call ``on_denoised`` after each network call of whatever is drawn inside the block, in the same thread.
+
+    Generators (`compose`, `compose_pair`) draw while they are read: read them inside the block.
+    """
+    token = _callback.set(on_denoised)
+    try:
+        yield
+    finally:
+        _callback.reset(token)
+
+
+@dataclass(frozen=True)
+class View:
+    """How the states of a task are looked at."""
+
+    poses: Callable[[Tensor], np.ndarray]
+    """Denoised states (rows, tokens, features) to (motions, people, frames, 22, 3)."""
+    people: int = 1
+    """Rows of one motion, which lie next to each other."""
+
+    def reported(self, walk: Iterator[Snapshot], of: int, rows: Sequence[int]) -> Iterator[Snapshot]:
+        """The snapshots of a walk of ``of`` moves, each reported before it is handed on; rows: their numbers."""
+        motions = [row // self.people for row in rows[:: self.people]]
+        for done, snapshot in enumerate(walk, start=1):
+            report(done, of, motions, lambda snapshot=snapshot: self.poses(snapshot.clean))
+            yield snapshot
+
+
+def report(done: int, of: int, rows: Sequence[int], decode: Callable[[], np.ndarray]) -> None:
+    """Tell whoever watches of one network call; nothing happens where nobody does."""
+    callback = _callback.get()
+    if callback is not None:
+        callback(Denoised(done, of, tuple(rows), decode))
+
+
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class ChainView(Generic[R]):
+    """How the rows of a long motion are looked at, which are at different levels at the same time."""
+
+    part: Callable[[R, Tensor, int], Any]
+    """A row, its denoised state and the level of that to what is kept of it."""
+    poses: Callable[[list[Any]], np.ndarray]
+    """What was kept of rows, from the first one on and in order, to (people, frames, 22, 3)."""
+
+
+class Latest(Generic[R]):
+    """The newest prediction for each segment of a long motion.
+
+    It is kept only where somebody watches, for at most `SHOWN` segments, the newest ones; so memory stays bounded.
+    """
+
+    def __init__(self, view: ChainView[R], steps: int) -> None:
+        self.view, self.steps = view, steps
+        self.parts: dict[int, Any] = {}
+        self.calls: Counter[int] = Counter()
+
+    def report(self, numbers: Sequence[int], rows: Sequence[R], states: Sequence[Tensor], at: Sequence[int]) -> None:
+        """Take in what was predicted for some rows, and tell of what is there if that begins with the first one."""
+        if _callback.get() is None:
+            return
+        for number, row, state, level in zip(numbers, rows, states, at, strict=True):
+            self.parts[number] = self.view.part(row, state, level)
+        self.calls.update(numbers)
+        for old in sorted(self.parts)[:-SHOWN]:
+            del self.parts[old], self.calls[old]
+        if self.parts and min(self.parts) == 0:
+            parts = [self.parts[number] for number in sorted(self.parts)]
+            report(min(self.calls.values()), self.steps, [0], lambda: self.view.poses(parts)[None])

@@ -1,0 +1,61 @@
+"""MCP through the SDK's own client: a process of its own, spoken to over its standard input and output."""
+
+import asyncio
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from motionloom import load
+
+mcp = pytest.importorskip("mcp", reason="needs the extra 'mcp': pip install 'motionloom[mcp]'", exc_type=ImportError)
+
+
+def talk(project: Path, *calls: tuple[str, dict[str, Any]]) -> tuple[list[str], list[Any]]:
+    """Names of the tools, and what each call answers."""
+
+    async def session() -> tuple[list[str], list[Any]]:
+        from mcp.client.stdio import StdioServerParameters
+
+        command = ["-m", "motionloom", "mcp", "--project", str(project), "--threads", "1"]
+        inherited = {k: v for k, v in os.environ.items() if k in ("PYTHONPATH", "OMP_NUM_THREADS", "PATH")}
+        async with mcp.Client(StdioServerParameters(command=sys.executable, args=command, env=inherited)) as client:
+            listed = await client.list_tools()
+            answers = [await client.call_tool(name, given) for name, given in calls]
+            return [tool.name for tool in listed.tools], answers
+
+    return asyncio.run(session())
+
+
+def plain(answer: Any) -> Any:
+    """The JSON of an answer."""
+    assert not answer.is_error, answer.content
+    found = answer.structured_content
+    return found["result"] if isinstance(found, dict) and set(found) == {"result"} else found
+
+
+def test_an_assistant_makes_motion_and_exports_it(tmp_path: Path) -> None:
+    names, (one, long) = talk(
+        tmp_path,
+        ("generate_motion", {"prompt": "a person jumps", "seconds": 1.0, "seed": 3, "count": 2}),
+        ("compose", {"segments": [{"text": "a person walks", "seconds": 1}, {"text": "a person waves", "seconds": 1}]}),
+    )
+    assert set(names) == {"generate_motion", "compose", "export"}
+    assert [take["seed"] for take in plain(one)] == [3, 4]
+    motion = plain(long)[0]["id"]
+    _, (written, refused, escaped) = talk(
+        tmp_path,
+        ("export", {"motion": motion, "format": "bvh", "name": "walk-and-wave"}),
+        ("export", {"motion": "0" * 16}),
+        ("export", {"motion": motion, "name": "../evil"}),
+    )
+    file = Path(plain(written)["file"])
+    assert file == (tmp_path / "exports" / "walk-and-wave.bvh").resolve()
+    assert load(file).seconds == pytest.approx(2.0)
+    assert refused.is_error
+    assert "there is no motion" in json.dumps(refused.model_dump(mode="json"))
+    assert escaped.is_error
+    assert not (tmp_path / "evil.bvh").exists()

@@ -1,0 +1,155 @@
+"""Files in and out: exports that read back, uploads, characters, and names that are no names."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionloom import load
+from motionloom.io import load_scene, save
+from motionloom.io.character import load_character
+from motionloom.motion import Motion
+from motionloom.retarget.named import named_skeleton
+from motionloom.skeleton import SMPL22
+from tests.server.serving import Server, decoded
+
+
+def fetched(server: Server, path: str, place: Path) -> Path:
+    status, _, data = server.ask("GET", path)
+    assert status == 200, data
+    place.write_bytes(data)
+    return place
+
+
+def places(server: Server, motion: str) -> np.ndarray:
+    _, found = server.json("GET", f"/motions/{motion}")
+    return decoded(found["people"][0]["positions"], found["frames"], 22, 3)
+
+
+@pytest.mark.parametrize("kind", ["bvh", "glb", "npz"])
+def test_an_exported_motion_reads_back_as_the_page_has_it(server: Server, walk: str, kind: str, tmp_path: Path) -> None:
+    back = load(fetched(server, f"/motions/{walk}.{kind}", tmp_path / f"walk.{kind}"))
+    own = [back.skeleton.index(name) for name in SMPL22.names]
+    assert np.abs(back.positions()[:, own] - places(server, walk)).max() < 1e-3
+
+
+def test_pictures_and_films_are_what_they_are_called(server: Server, walk: str) -> None:
+    for kind, begin in (("png", b"\x89PNG"), ("mp4", b"\x00\x00\x00")):
+        status, headers, data = server.ask("GET", f"/motions/{walk}.{kind}")
+        assert status == 200
+        assert data.startswith(begin)
+        assert headers["content-type"].endswith(kind)
+
+
+def test_rotations_and_root_give_the_places(server: Server, walk: str) -> None:
+    _, found = server.json("GET", f"/motions/{walk}")
+    (person,) = found["people"]
+    turns = decoded(person["rotations"], found["frames"], 22, 4).astype(np.float64)
+    root = decoded(person["root"], found["frames"], 3).astype(np.float64)
+    _, about = server.json("GET", "/capabilities")
+    assert about["joints"] == list(SMPL22.names)
+    assert np.allclose(about["offsets"], SMPL22.offsets)
+    again = Motion(SMPL22, found["fps"], root, turns / np.linalg.norm(turns, axis=-1, keepdims=True))
+    assert np.abs(again.positions() - places(server, walk)).max() < 1e-4
+
+
+def test_a_named_skeleton_is_that_of_the_file(server: Server, walk: str, tmp_path: Path) -> None:
+    back = load(fetched(server, f"/motions/{walk}.bvh?skeleton=mixamo", tmp_path / "walk.bvh"))
+    assert set(named_skeleton("mixamo").names) <= set(back.skeleton.names)
+
+
+def test_both_people_of_a_duet_are_in_one_file_or_alone(server: Server, tmp_path: Path) -> None:
+    (two,) = server.draw(task="duet", prompt="two people dance", seconds=1.0, steps=2)["results"]
+    both = load_scene(fetched(server, f"/motions/{two['id']}.glb", tmp_path / "two.glb"))
+    second = load(fetched(server, f"/motions/{two['id']}.npz?person=1", tmp_path / "second.npz"))
+    assert len(both) == 2
+    assert np.abs(second.positions() - both[1].positions()[:, :22]).max() < 1e-3
+
+
+def test_a_file_that_is_sent_can_be_drawn_from(server: Server, walk: str, tmp_path: Path) -> None:
+    data = fetched(server, f"/motions/{walk}.bvh", tmp_path / "walk.bvh").read_bytes()
+    status, sent = server.json("POST", "/motions?name=my%20walk.bvh", data)
+    assert (status, sent["frames"], sent["people"], sent["fps"]) == (201, 40, 1, 20.0)
+    made = server.draw(task="predict", motion=sent["id"], seconds=0.5, count=1)
+    assert made["results"][0]["frames"] == 50
+
+
+def test_a_character_is_given_back_and_moves(server: Server, walk: str, tmp_path: Path) -> None:
+    rig = tmp_path / "hero.glb"
+    body = named_skeleton("mixamo")
+    still = Motion(body, 20.0, np.tile([0.0, 1.0, 0.0], (2, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (2, len(body), 1)))
+    save(still, rig)
+    status, sent = server.json("POST", "/characters?name=hero.glb", rig.read_bytes())
+    assert status == 201, sent
+    assert sent["joints"]["left_knee"] == ["mixamorig:LeftLeg"]
+    assert server.ask("GET", f"/characters/{sent['id']}")[2] == rig.read_bytes()
+    moving = fetched(server, f"/motions/{walk}.glb?skeleton={sent['id']}", tmp_path / "moving.glb")
+    assert load_character(moving).skeleton.names == load_character(rig).skeleton.names
+    assert "a person walks" in load_character(moving).file.clips
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "said"),
+    [
+        ("walk.exe", b"x", "ending in"),
+        ("", b"x", "ending in"),
+        ("walk.bvh", b"", "empty"),
+        ("walk.bvh", b"HIERARCHY\nROOT", "walk.bvh has no MOTION part"),
+        ("walk.npz", b"PK\x03\x04junk", "npz"),
+        ("walk.glb", b"glTF" + b"\xff" * 40, "glb"),
+        ("walk.amc", b":FULLY-SPECIFIED\n", "send the .asf first"),
+        ("walk.vrm", b"\x00" * 100, "vrm"),
+    ],
+)
+def test_a_broken_file_is_refused_with_one_sentence(server: Server, name: str, data: bytes, said: str) -> None:
+    status, answer = server.json("POST", f"/motions?name={name}", data)
+    assert status == 400
+    assert said in answer["error"]
+    assert str(server.project) not in answer["error"]
+    assert not list((server.project / "temporary").iterdir())
+
+
+def test_a_character_without_a_person_in_it_is_refused(server: Server) -> None:
+    status, answer = server.json("POST", "/characters?name=box.bvh", b"HIERARCHY\nROOT box\n{\nOFFSET 0 0 0\n}\n")
+    assert status == 400
+    assert answer["error"]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/motions/../project.json", "/motions/..%2fproject.json", "/motions/%2e%2e%2fproject.json",
+        "/motions/....//project.json", "/motions//etc/passwd", "/motions/%00", "/motions/.json", "/characters/..",
+        "/characters/..%2f..%2fetc%2fpasswd", "/page/../app.py", "/..%2fserver%2fapp.py", "/motions/%c0%ae%c0%ae/x",
+        "/motions/" + "a" * 3000,
+    ],
+)  # fmt: skip
+def test_no_path_leads_out_of_the_project(server: Server, path: str) -> None:
+    status, _, data = server.ask("GET", path)
+    assert status in (400, 404)
+    assert b"root:" not in data
+    assert b"import" not in data
+
+
+def test_a_name_with_folders_in_it_is_a_name_only(server: Server, walk: str, tmp_path: Path) -> None:
+    data = fetched(server, f"/motions/{walk}.npz", tmp_path / "walk.npz").read_bytes()
+    status, sent = server.json("POST", "/motions?name=..%2f..%2f..%2ftmp%2fevil.npz", data)
+    assert (status, sent["name"]) == (201, "evil.npz")
+    assert (server.project / "motions" / f"{sent['id']}.npz").is_file()
+
+
+def test_exports_leave_nothing_behind(server: Server, walk: str) -> None:
+    server.ask("GET", f"/motions/{walk}.png")
+    status, answer = server.json("GET", f"/motions/{walk}.png?person=3")
+    assert (status, "there is no person 3" in answer["error"]) == (400, True)
+    assert not list((server.project / "temporary").iterdir())
+
+
+def test_an_unknown_format_or_skeleton_is_refused(server: Server, walk: str) -> None:
+    for path, said in (
+        (f"/motions/{walk}.fbx", "motions are given as"),
+        (f"/motions/{walk}.bvh?skeleton=x", "no such"),
+    ):
+        status, answer = server.json("GET", path)
+        assert status == 404
+        assert said in answer["error"]

@@ -1,0 +1,182 @@
+"""Every task over HTTP with the real prior, events, cancelling, and what is refused."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from motionloom import Prior, generate
+from tests.server.serving import Server, decoded
+
+PATH = {"path": {"points": [[0, 0], [0.5, 1], [0, 2]]}}
+
+
+def poses(server: Server, motion: str, person: int = 0) -> np.ndarray:
+    status, found = server.json("GET", f"/motions/{motion}")
+    assert status == 200
+    return decoded(found["people"][person]["positions"], found["frames"], 22, 3)
+
+
+def test_a_generated_motion_is_that_of_the_library_with_the_same_seed(server: Server) -> None:
+    made = server.draw(task="generate", prompt="a person jumps", seconds=2.0, seed=5, count=2, steps=6)
+    assert [one["seed"] for one in made["results"]] == [5, 6]
+    expected = generate(Prior.load(), "a person jumps", seconds=2.0, seed=5, count=2, steps=6)
+    for one, motion in zip(made["results"], expected, strict=True):
+        assert np.abs(poses(server, one["id"]) - motion.positions()).max() < 1e-3
+
+
+def test_every_level_arrives_in_order_and_ends_at_the_motion(server: Server) -> None:
+    job = server.submit(task="generate", prompt="a person walks", seconds=2.0, seed=2, steps=6)
+    events = list(server.events(job))
+    levels = [data for _, kind, data in events if kind == "level"]
+    assert [data["level"] for data in levels] == [1, 2, 3, 4, 5, 6]
+    assert [number for number, _, _ in events] == sorted({number for number, _, _ in events})
+    last = decoded(levels[-1]["positions"], 1, 40, 22, 3)[0]
+    motion = events[-1][2]["results"][0]["id"]
+    assert events[-1][1] == "done"
+    assert np.linalg.norm(last - poses(server, motion), axis=-1).mean() < 0.05
+
+
+def test_a_stream_goes_on_behind_the_event_that_was_seen_last(server: Server) -> None:
+    job = server.submit(task="generate", prompt="a person walks", seconds=2.0, seed=3, steps=6)
+    whole = [event for event in server.events(job) if event[1] != "progress"]  # of which only the latest is told again
+    middle = whole[len(whole) // 2][0]
+    again = [event for event in server.events(job, after=middle) if event[1] != "progress"]
+    assert again == [event for event in whole if event[0] > middle]
+
+
+def test_a_sentence_of_two_actions_is_parted_as_on_the_command_line(server: Server) -> None:
+    one = server.draw(task="generate", prompt="a person walks, then jumps", seconds=4.0, steps=4)
+    listed = [{"text": "a person walks", "seconds": 2.0}, {"text": "a person jumps", "seconds": 2.0}]
+    assert one["results"][0]["frames"] == sum(round(20 * part["seconds"]) for part in listed)
+
+
+def test_compose_follows_the_path_of_its_timeline(server: Server) -> None:
+    timeline = {"segments": [{"text": "a person walks", "seconds": 2}] * 2, "path": PATH, "seed": 4}
+    made = server.draw(task="compose", timeline=timeline, steps=6)
+    (result,) = made["results"]
+    assert (result["seed"], result["frames"]) == (4, 80)
+    assert result["measures"]["goals"]["path"]["mean_cm"] < 3
+    assert np.abs(poses(server, result["id"])[-1, 0, [0, 2]] - [0, 2]).max() < 0.1
+
+
+def test_control_measures_each_goal_and_names_what_is_missed(server: Server) -> None:
+    far = {"joint": "left_wrist", "points": [{"time": 1.0, "position": [0.4, 1.2, 1.0]}]}
+    made = server.draw(task="control", prompt="a person walks", seconds=2.0, steps=6, goals={**PATH, "joints": [far]})
+    measures = made["results"][0]["measures"]
+    assert set(measures["goals"]) == {"path", "joints[0]"}
+    assert measures["goals"]["joints[0]"]["worst_at"] == 1.0
+    assert measures["goals"]["path"]["worst_cm"] < 10
+
+
+def test_levels_of_a_controlled_motion_stand_in_the_world_of_its_goals(server: Server) -> None:
+    goals = {"start": {"position": [3, -2], "facing": 90}, "path": {"points": [[3, -2], [5, -2]]}}
+    job = server.submit(task="control", prompt="a person walks", seconds=2.0, steps=6, goals=goals)
+    levels = [data for _, kind, data in server.events(job) if kind == "level"]
+    last = decoded(levels[-1]["positions"], 1, 40, 22, 3)[0]
+    assert np.abs(last[0, 0, [0, 2]] - [3, -2]).max() < 0.2
+    assert np.abs(last[-1, 0, [0, 2]] - [5, -2]).max() < 0.4
+
+
+def test_an_edit_keeps_what_is_outside_of_its_stretch(server: Server, walk: str) -> None:
+    made = server.draw(task="edit", motion=walk, prompt="a person waves", redraw=[[0.5, 1.5]], steps=6, count=2)
+    before = poses(server, walk)
+    for one in made["results"]:
+        after = poses(server, one["id"])
+        assert np.abs(after[:10] - before[:10]).max() < 1e-5
+        assert np.abs(after[12:28] - before[12:28]).max() > 0.02
+
+
+def test_futures_begin_with_their_past(server: Server, walk: str) -> None:
+    made = server.draw(task="predict", motion=walk, seconds=1.0, count=3)
+    assert [one["frames"] for one in made["results"]] == [60, 60, 60]
+    for one in made["results"]:
+        assert np.abs(poses(server, one["id"])[:40] - poses(server, walk)).max() < 1e-5
+
+
+def test_a_switch_has_both_motions_and_what_is_between(server: Server, walk: str) -> None:
+    (other,) = server.draw(task="generate", prompt="a person waves", seconds=2.0, steps=6)["results"]
+    (made,) = server.draw(task="switch", motion=walk, to=other["id"], seconds=0.5)["results"]
+    assert made["frames"] == 40 + 10 + 40
+
+
+def test_a_duet_has_two_people_and_one_answers_somebody(server: Server, walk: str) -> None:
+    (two,) = server.draw(task="duet", prompt="two people dance", seconds=2.0, steps=4)["results"]
+    (answer,) = server.draw(task="duet", react_to=walk, steps=4)["results"]
+    assert (two["people"], answer["people"]) == (2, 2)
+    assert np.abs(poses(server, answer["id"], 0) - poses(server, walk)).max() < 1e-5
+    assert np.isfinite(poses(server, two["id"], 1)).all()
+
+
+def test_a_job_that_is_cancelled_ends_at_the_next_network_call(server: Server) -> None:
+    job = server.submit(task="generate", prompt="a person walks", seconds=10.0, count=8, steps=200)
+    for _, kind, _ in server.events(job):
+        if kind == "level":
+            break
+    status, answer = server.json("DELETE", f"/jobs/{job}")
+    assert (status, answer["state"]) == (200, "cancelled")
+    after = server.wait(server.submit(task="generate", prompt="a person walks", seconds=1.0, steps=1))
+    assert after["state"] == "done"
+    events = list(server.events(job))
+    assert events[-1][1] == "cancelled"
+    assert max(data["level"] for _, kind, data in events if kind == "level") < 100
+
+
+def test_a_job_that_waits_is_cancelled_at_once(server: Server) -> None:
+    long = server.submit(task="generate", prompt="a person walks", seconds=10.0, count=8, steps=200)
+    other = server.submit(task="compose", timeline={"segments": ["a person walks"]})
+    status, answer = server.json("DELETE", f"/jobs/{other}")
+    assert (status, answer["state"], answer["results"]) == (200, "cancelled", [])
+    server.json("DELETE", f"/jobs/{long}")
+
+
+BROKEN: list[tuple[Any, str]] = [
+    (b"{", "not JSON"),
+    (b"[1]", "JSON object"),
+    (b'{"task": "generate", "prompt": "a", "seconds": NaN}', "not JSON"),
+    (b"\xff\xfe", "not JSON"),
+    ({}, "no 'task'"),
+    ({"task": "dance"}, "there are generate"),
+    ({"task": "generate"}, "no 'prompt'"),
+    ({"task": "generate", "prompt": "  "}, "prompt is empty"),
+    ({"task": "generate", "prompt": "x" * 5000}, "characters"),
+    ({"task": "generate", "prompt": "a", "seconds": 1e9}, "must be 0 to"),
+    ({"task": "generate", "prompt": "a", "seconds": 61}, "at most 60"),
+    ({"task": "generate", "prompt": "a", "count": 9}, "from 1 to 8"),
+    ({"task": "generate", "prompt": "a", "count": True}, "whole number"),
+    ({"task": "generate", "prompt": "a", "seed": -1}, "whole number"),
+    ({"task": "generate", "prompt": "a", "steps": 10**6}, "from 1 to 200"),
+    ({"task": "generate", "prompt": "a", "secnds": 1}, "did you mean 'seconds'"),
+    ({"task": "compose", "timeline": {"segments": []}}, "at least one"),
+    ({"task": "compose", "timeline": {"segments": [{"text": "a", "seconds": "x"}]}}, "line 3"),
+    ({"task": "compose", "timeline": {"segments": ["a"], "start": "../../etc/passwd"}}, "leads out of the folder"),
+    ({"task": "compose", "timeline": {"segments": [{"text": "a", "seconds": 60}] * 20}}, "at most 600"),
+    ({"task": "control", "prompt": "a", "goals": {}}, "asks for nothing"),
+    ({"task": "control", "prompt": "a", "goals": {"path": {"svg": "/etc/passwd"}}}, "leads out of the folder"),
+    ({"task": "control", "prompt": "a", "goals": {"joints": [{"joint": "tail", "points": []}]}}, "tail"),
+    ({"task": "edit", "motion": "../../../etc/passwd"}, "no such motion"),
+    ({"task": "edit", "motion": "0" * 16}, "there is no motion"),
+    ({"task": "duet", "prompt": "a", "react_to": "0" * 16, "past": "0" * 16}, "different duets"),
+]
+
+
+@pytest.mark.parametrize(("body", "said"), BROKEN)
+def test_what_cannot_be_asked_is_answered_with_one_sentence(server: Server, body: Any, said: str) -> None:
+    status, answer = server.json("POST", "/jobs", body)
+    assert status in (400, 404)
+    assert said in answer["error"]
+    assert str(server.project) not in answer["error"]
+
+
+def test_what_only_the_library_can_refuse_fails_the_job_with_its_sentence(server: Server, walk: str) -> None:
+    job = server.submit(task="edit", motion=walk, redraw=[[1.0, 30.0]], prompt="a person waves")
+    found = server.wait(job)
+    assert found["state"] == "failed"
+    assert "no stretch from 1 to 30 s" in found["error"]
+
+
+def test_an_unknown_job_is_404(server: Server) -> None:
+    for method, path in (("GET", "/jobs/nothing"), ("DELETE", "/jobs/nothing"), ("GET", "/jobs/nothing/events")):
+        status, answer = server.json(method, path)
+        assert status == 404
+        assert "no such job" in answer["error"]

@@ -1,0 +1,103 @@
+"""The queue's rules, without drawing: turns, bounds, batches."""
+
+import pytest
+
+pytest.importorskip("starlette", reason="needs the extra 'studio'")
+
+from motionloom.server.asking import Request
+from motionloom.server.jobs import Job
+from motionloom.server.limits import Limits
+from motionloom.server.queue import Queue
+from motionloom.server.refusal import Refusal
+
+
+def job(client: str, *, count: int = 1, key: str | None = None) -> Job:
+    options = {"key": key}
+    return Job(Request("generate", 0, count, None, None, True, options), client, 1 << 20)
+
+
+def key(one: Job) -> str | None:
+    return one.request.options["key"]
+
+
+def test_clients_take_turns_however_many_jobs_they_have() -> None:
+    queue = Queue(Limits())
+    for client, count in (("a", 5), ("b", 2), ("c", 1)):
+        for _ in range(count):
+            queue.put(job(client))
+    order = [queue.take(key, 8)[0].client for _ in range(8)]
+    assert order == ["a", "b", "c", "a", "b", "a", "a", "a"]
+
+
+def test_jobs_of_one_kind_are_drawn_together_up_to_the_rows() -> None:
+    queue = Queue(Limits())
+    for client in "abcd":
+        queue.put(job(client, count=3, key="same"))
+    assert [one.client for one in queue.take(key, 8)] == ["a", "b"]
+    assert [one.client for one in queue.take(key, 8)] == ["c", "d"]
+
+
+def test_a_job_of_another_kind_is_not_passed_over_in_its_own_line() -> None:
+    queue = Queue(Limits())
+    queue.put(job("a", key="x"))
+    queue.put(job("b", key="y"))
+    queue.put(job("b", key="x"))
+    assert [(one.client, key(one)) for one in queue.take(key, 8)] == [("a", "x")]
+    assert [(one.client, key(one)) for one in queue.take(key, 8)] == [("b", "y")]
+
+
+def test_jobs_without_a_kind_are_drawn_alone() -> None:
+    queue = Queue(Limits())
+    queue.put(job("a"))
+    queue.put(job("b"))
+    assert len(queue.take(key, 8)) == 1
+
+
+def test_a_full_queue_says_so_and_when_to_come_again() -> None:
+    queue = Queue(Limits(queue=3, queue_per_client=2, clients=2))
+    queue.put(job("a"))
+    queue.put(job("a"))
+    with pytest.raises(Refusal) as own:
+        queue.put(job("a"))
+    queue.put(job("b"))
+    with pytest.raises(Refusal) as all_of_them:
+        queue.put(job("b"))
+    assert (own.value.status, all_of_them.value.status) == (429, 503)
+    assert own.value.headers["Retry-After"]
+
+
+def test_more_clients_than_may_wait_are_refused() -> None:
+    queue = Queue(Limits(clients=1))
+    queue.put(job("a"))
+    with pytest.raises(Refusal) as refused:
+        queue.put(job("b"))
+    assert refused.value.status == 503
+
+
+def test_a_removed_job_is_not_taken() -> None:
+    queue = Queue(Limits())
+    first, second = job("a"), job("a")
+    queue.put(first)
+    queue.put(second)
+    queue.remove(first)
+    assert queue.take(key, 8) == [second]
+    assert len(queue) == 0
+
+
+def test_the_log_of_a_job_stays_small_and_keeps_the_newest() -> None:
+    import numpy as np
+
+    one = Job(Request("generate", 0, 1, None, None, True, {}), "a", 10 * 100 * 22 * 12)
+    for level in range(1, 51):
+        one.level(level, 50, 0, np.zeros((1, 100, 22, 3)))
+    kept = [event.data["level"] for event in one.events_after(0)]
+    assert kept == list(range(41, 51))
+    assert one.log_bytes <= one.most_bytes
+
+
+def test_what_ended_stays_as_it_ended() -> None:
+    one = job("a")
+    assert one.end("cancelled")
+    assert not one.end("done")
+    assert not one.started()
+    assert one.public()["state"] == "cancelled"
