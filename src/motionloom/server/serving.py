@@ -8,16 +8,25 @@ import webbrowser
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import uvicorn
+from starlette.routing import WebSocketRoute
+from starlette.websockets import WebSocket
 
 from motionloom.errors import MotionloomError
+from motionloom.live.sessions import Sessions
+from motionloom.live.socket import live_session
 from motionloom.server import page
 from motionloom.server.app import build
 from motionloom.server.guard import door, is_loopback
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project
+from motionloom.server.refusal import Refusal
 from motionloom.server.worker import Worker
+
+if TYPE_CHECKING:
+    from motionloom.weights.prior import Prior
 
 CONNECTIONS = 512
 
@@ -48,7 +57,8 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
     project = Project(options.project, limits or Limits())
     worker = Worker(project, limits or Limits(), weights=options.weights, device=options.device)
     known = door(options.host, token, hosts=options.hosts, origins=options.origins, page=page.files())
-    app = build(project, worker, known)
+    sessions = Sessions(lambda: _prior(worker))
+    app = build(project, worker, known, more=[_live(sessions)])
     bound = _bound(options.host, options.port)
     address = _address(options.host, bound.getsockname()[1], token)
     print(f"motionloom: {address} (project: {project.folder})", file=sys.stderr, flush=True)
@@ -58,9 +68,28 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
         print(f"motionloom: {page.MISSING}", file=sys.stderr, flush=True)
     config = uvicorn.Config(
         app, log_level="warning", access_log=False, server_header=False, limit_concurrency=CONNECTIONS,
-        timeout_graceful_shutdown=2, ws_max_size=1 << 16,
+        timeout_graceful_shutdown=2, ws_max_size=1 << 18, ws_max_queue=16,
     )  # fmt: skip
-    uvicorn.Server(config).run(sockets=[bound])
+    try:
+        uvicorn.Server(config).run(sockets=[bound])
+    finally:
+        sessions.close()
+
+
+def _prior(worker: Worker) -> "Prior":
+    try:
+        return worker.prior()
+    except Refusal as refusal:
+        raise MotionloomError(refusal.sentence) from None
+
+
+def _live(sessions: Sessions) -> WebSocketRoute:
+    """Somebody who is steered while he moves (docs/live.md), behind the same door as everything else."""
+
+    async def live(websocket: WebSocket) -> None:
+        await live_session(websocket, sessions)
+
+    return WebSocketRoute("/live", live)
 
 
 def _bound(host: str, port: int) -> socket.socket:
