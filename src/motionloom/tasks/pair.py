@@ -129,7 +129,7 @@ def pair_features(
         )  # fmt: skip
         return lambda state, level: lead(state, corrected(denoise(state, level), batch.rows, level), level)
 
-    def poses(states: Tensor) -> np.ndarray:
+    def shown(states: Tensor) -> np.ndarray:
         places, motion = part(states)
         stands = net.talk.config.places.decode(places.unflatten(0, (-1, 2)))
         return two.decode((motion * prior.std + prior.mean).unflatten(0, (-1, 2)), stands).cpu().numpy()
@@ -140,7 +140,7 @@ def pair_features(
     made = dict(
         sample(
             prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress,
-            view=View(poses, people=2),
+            view=View(shown, people=2),
         )
     )  # fmt: skip
     state = torch.stack([made[row] for row in range(rows)])
