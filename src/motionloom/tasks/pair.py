@@ -129,20 +129,13 @@ def pair_features(
         )  # fmt: skip
         return lambda state, level: lead(state, corrected(denoise(state, level), batch.rows, level), level)
 
-    def poses(states: Tensor) -> np.ndarray:
-        places, motion = part(states)
-        stands = net.talk.config.places.decode(places.unflatten(0, (-1, 2)))
-        return two.decode((motion * prior.std + prior.mean).unflatten(0, (-1, 2)), stands).cpu().numpy()
-
     silent = not any(prompt.strip() for prompt in prompts)
     how = replace(chosen, batch_size=2 * chosen.batch(PAIRS), guidance=1.0 if silent else chosen.guidance)
     asked = Rows(prompts, [1 + frames] * rows, seeds, pair_draw)
-    made = dict(
-        sample(
-            prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress,
-            view=View(poses, people=2),
-        )
+    walk = sample(
+        prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress, view=_view(prior, net)
     )  # fmt: skip
+    made = dict(walk)
     state = torch.stack([made[row] for row in range(rows)])
     if prior.net.config.patch > 1:
         state = torch.cat([state[:, :1], smooth(state[:, 1:])], dim=1)
@@ -152,6 +145,17 @@ def pair_features(
     features = motion * prior.std + prior.mean
     poses = net.talk.config.places.decode(places.unflatten(0, (-1, 2)))
     return features.unflatten(0, (-1, 2)).cpu(), poses.cpu()
+
+
+def _view(prior: Prior, net: PairNet) -> View:
+    """Two rows to a motion, in the world of the first person."""
+
+    def poses(states: Tensor) -> Array:
+        places, motion = part(states)
+        stands = net.talk.config.places.decode(places.unflatten(0, (-1, 2)))
+        return two.decode((motion * prior.std + prior.mean).unflatten(0, (-1, 2)), stands).cpu().double().numpy()
+
+    return View(poses, people=2)
 
 
 def pair_draw(seeds: Sequence[int]) -> Draw:
