@@ -36,7 +36,7 @@ class Words:
 def prior(monkeypatch: pytest.MonkeyPatch) -> Iterator[Prior]:
     """A network whose guess is its input, and bodies that only stand where the pelvis is: nothing here costs time."""
 
-    def stands(places: Places, fps: float, *, clean: bool = True) -> Motion:
+    def stands(places: Places, fps: float, *, foot_lock: bool = True) -> Motion:
         turns = np.zeros((len(places), 22, 4))
         turns[..., 3] = 1.0
         return Motion(SMPL22, fps, places.positions[:, 0], turns)
