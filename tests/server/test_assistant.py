@@ -4,6 +4,7 @@ import asyncio
 import json
 import os
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,8 @@ def talk(project: Path, *calls: tuple[str, dict[str, Any]]) -> tuple[list[str], 
             answers = [await client.call_tool(name, given) for name, given in calls]
             return [tool.name for tool in listed.tools], answers
 
-    return asyncio.run(session())
+    with ThreadPoolExecutor(1) as thread:  # a browser's tests may have a loop running in this one
+        return thread.submit(asyncio.run, session()).result()
 
 
 def plain(answer: Any) -> Any:

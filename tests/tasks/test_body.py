@@ -136,7 +136,7 @@ def test_every_frame_comes_once(data: st.DataObject) -> None:
     with pytest.MonkeyPatch.context() as patch:
         for name, value in (("BLOCK", block), ("MARGIN", margin), ("FADE", fade)):
             patch.setattr(body, name, value)
-        patch.setattr(body, "posed", lambda places, fps, clean: standing(places.positions[:, 0]))
+        patch.setattr(body, "posed", lambda places, fps, foot_lock: standing(places.positions[:, 0]))
         whole = Places(np.arange(total)[:, None, None] * np.ones((1, 22, 3)), np.zeros((total, 4)), Goal.nothing(total))
         made = list(bodies(cut(whole, sizes), 20.0))
     assert np.allclose(strung(made).root[:, 0], np.arange(total))
@@ -151,7 +151,7 @@ def test_a_block_begins_as_the_one_before_saw_it(monkeypatch: pytest.MonkeyPatch
     """Bodies one metre further to the side in each block: the way there is smooth, and over after the fade."""
     count = 0
 
-    def aside(places: Places, fps: float, *, clean: bool) -> Motion:
+    def aside(places: Places, fps: float, *, foot_lock: bool) -> Motion:
         nonlocal count
         count += 1
         return standing(np.tile([float(count), 1.0, 0.0], (len(places), 1)))

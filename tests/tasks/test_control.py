@@ -118,7 +118,7 @@ def test_shipped_adapters_of_other_weights_and_damaged_ones_are_said(
 ) -> None:
     files = {"trajectory": adapter(prior).save(tmp_path / "trajectory.safetensors")}
     monkeypatch.setattr("motionloom.tasks.control.shipped", lambda: files)
-    monkeypatch.setattr("motionloom.weights.adapter.adapters", lambda: files)
+    monkeypatch.setattr("motionloom.weights.container.Container.shipped", lambda self: files)
     assert [found.name for found in fitting_adapters(prior, path())] == ["blank"]
     with pytest.raises(MotionloomError, match="belongs to the weights"):
         fitting_adapters(tiny.prior(seed=5), path())

@@ -4,6 +4,7 @@ Numbers are bounded by `Limits`; timelines and goals go through the readers of t
 are refused with the same sentences.
 """
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -309,11 +310,23 @@ def _without(goal: "Goal", other: "Goal") -> "Goal":
 # Timelines
 
 
+class _Quoting(yaml.SafeDumper):
+    """Writes in quotes what is not plain words: other readers of YAML know other numbers ("0o7")."""
+
+
+def _quoted(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    style = None if re.fullmatch(r"[^\W\d_][^\W\d_]*(?:[ _][^\W\d_]+)*", text) else '"'
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_Quoting.add_representer(str, _quoted)
+
+
 def timeline_yaml(value: Any) -> str:
     """A timeline's JSON as the text of its YAML file."""
     if not isinstance(value, Mapping):
         raise MotionloomError("a timeline is a mapping with 'segments', as its YAML file is")
-    return yaml.safe_dump(_plain(value), sort_keys=False, allow_unicode=True, width=120)
+    return yaml.dump(_plain(value), Dumper=_Quoting, sort_keys=False, allow_unicode=True, width=120)
 
 
 def read_timeline_text(text: str, project: Project, limits: Limits) -> Timeline:

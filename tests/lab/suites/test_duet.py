@@ -130,11 +130,12 @@ def test_a_sampler_that_knows_what_came_has_no_error(given: str, slots: int) -> 
     assert max(float(np.abs(found[name]).max()) for name in ERRORS) < 1e-4
     asked = oracle.asked[0]
     assert (asked["frames"], asked["prompts"]) == (FRAMES, [""] * 6)
-    assert asked["known"].shape == (6, 1 + FRAMES, 263)
-    assert asked["mask"][:, :, 0].sum(1).tolist() == [slots] * 6
+    known, mask = asked["edits"].observed.values, asked["edits"].observed.mask
+    assert known.shape == (6, 1 + FRAMES, 263)
+    assert mask[:, :, 0].sum(1).tolist() == [slots] * 6
     place = net.talk.config.places.encode(two.encode(crops.positions[1]).stands)
-    np.testing.assert_allclose(asked["known"][2:4, 0, :4], place, atol=1e-5)
-    held = ((asked["known"][:2, 1:slots] * prior.std) + prior.mean).numpy()
+    np.testing.assert_allclose(known[2:4, 0, :4], place, atol=1e-5)
+    held = ((known[:2, 1:slots] * prior.std) + prior.mean).numpy()
     local = oracle.features[0, :, : slots - 1].numpy()
     np.testing.assert_allclose(held[..., 4:67], local[..., 4:67], atol=1e-4)
 
