@@ -123,7 +123,7 @@ def test_shipped_adapters_of_other_weights_and_damaged_ones_are_said(
     with pytest.raises(MotionloomError, match="belongs to the weights"):
         fitting_adapters(tiny.prior(seed=5), path())
     files["trajectory"].write_bytes(b"not an adapter")
-    with pytest.raises(MotionloomError, match="not an adapter"):
+    with pytest.raises(MotionloomError, match="not a whole safetensors"):
         fitting_adapters(prior, path())
 
 
