@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from motionloom.errors import MotionloomError
 from motionloom.goals.drawing import MAX_PIECES, read_drawing
+from tests.work import ends
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg">{}</svg>'
 
@@ -145,3 +146,14 @@ def test_any_bytes_are_a_sentence(tmp_path: Path, data: bytes) -> None:
     (tmp_path / "d.svg").write_bytes(b"<svg>" + data)
     with pytest.raises(MotionloomError):
         read_drawing(tmp_path / "d.svg")
+
+
+@pytest.mark.parametrize("said", ["rotate(1){}x", "rotate(1){}(", "rotate{}x", "rotate(1 {} x)"])
+def test_a_transform_with_very_many_blanks_takes_no_endless_time(draw, said: str) -> None:
+    """Refused, and within seconds of the processor: blanks are never read twice."""
+
+    def refused() -> None:
+        with pytest.raises(MotionloomError, match=r"transform|number"):
+            draw(f'<line transform="{said.format(" " * 200_000)}" x2="1"/>')
+
+    assert ends(refused)
