@@ -40,7 +40,7 @@ def test_a_checkpoint_becomes_a_predictor_that_says_what_it_is(
     assert main([*START, "--licence", "research only", "--name", "humanmac", *half]) == 0
     assert capsys.readouterr().err == ""
     made = Predictor.load("a.safetensors")
-    assert (made.manner, made.observed, made.frames, made.card.name) == ("published", 25, 125, "humanmac")
+    assert (made.variant, made.observed, made.frames, made.card.name) == ("published", 25, 125, "humanmac")
     assert main(["weights", "a.safetensors"]) == 0
     said = capsys.readouterr().out
     assert all(word in said for word in ("research only", "Human3.6M", "17 joints", "100 frames after 25", "published"))

@@ -20,7 +20,7 @@ shares = [1.0]
 levels = 20
 save_every = 2
 [net]
-manner = "modulated"
+variant = "modulated"
 width = 32
 layers = 1
 heads = 2

@@ -252,7 +252,7 @@ amp = "bf16"
 prompts = ["a person walks.", "someone waves"]
 schedule = "cosine"
 [net]
-manner = "modulated"
+variant = "modulated"
 width = 64
 layers = 2
 heads = 2

@@ -31,7 +31,7 @@ class Words:
 @pytest.fixture(params=["published", "modulated"])
 def prior(request: pytest.FixtureRequest) -> Prior:
     sizes = {"features": 12, "width": 16, "layers": 2, "heads": 2, "hidden": 32, "text": 8}
-    net = PriorNet(NetConfig(manner=request.param, **sizes)).eval().requires_grad_(False)
+    net = PriorNet(NetConfig(variant=request.param, **sizes)).eval().requires_grad_(False)
     return Prior(net, cosine(50), torch.zeros(12), torch.ones(12), Words(), Card("tiny"))
 
 
@@ -152,7 +152,9 @@ def test_weights_that_are_not_there_are_one_sentence(tmp_path: Path, capsys: pyt
 
 
 def long_prior() -> Prior:
-    net = PriorNet(NetConfig(manner="modulated", features=263, width=16, layers=1, heads=2, hidden=16, text=8, patch=4))
+    net = PriorNet(
+        NetConfig(variant="modulated", features=263, width=16, layers=1, heads=2, hidden=16, text=8, patch=4)
+    )
     return Prior(
         net.eval().requires_grad_(False), cosine(20), torch.zeros(263), torch.full((263,), 0.01), Words(), Card("tiny")
     )

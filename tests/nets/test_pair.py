@@ -24,8 +24,8 @@ from tests.lab.papers.test_mdm import table
 from tests.nets import tiny
 from tests.nets.text.tiny import WIDTH as TEXT
 
-MANNERS = {"modulated": tiny.MODULATED, "published": tiny.PUBLISHED}
-manners = pytest.mark.parametrize("manner", sorted(MANNERS))
+VARIANTS = {"modulated": tiny.MODULATED, "published": tiny.PUBLISHED}
+variants = pytest.mark.parametrize("variant", sorted(VARIANTS))
 FRAMES = 18
 
 
@@ -42,16 +42,16 @@ def talk_of(prior: NetConfig, *, fresh: bool = False, seed: int = 5, **given) ->
     return talk.eval()
 
 
-def net_of(manner: str, **given) -> PairNet:
-    prior = tiny.prior(MANNERS[manner])
-    talk = talk_of(MANNERS[manner], **given)
+def net_of(variant: str, **given) -> PairNet:
+    prior = tiny.prior(VARIANTS[variant])
+    talk = talk_of(VARIANTS[variant], **given)
     return PairNet(prior.net, talk, prior.schedule, mean=prior.mean, std=prior.std).eval()
 
 
 def bound_of(net: PairNet, rows: int, seed: int = 1, lengths: list[int] | None = None) -> Bound:
     rng = torch.Generator().manual_seed(seed)
     words = torch.randn(rows, 5, TEXT, generator=rng)
-    tokens = words if net.config.manner == "modulated" else None
+    tokens = words if net.config.variant == "modulated" else None
     return net.bind(condition(words.mean(1), tokens=tokens, lengths=lengths))
 
 
@@ -63,9 +63,9 @@ def chosen(bound: Bound, rows: Tensor) -> Bound:
     return Bound(*(value[rows] for value in bound))
 
 
-@manners
-def test_the_prior_in_three_parts_is_the_prior(manner):
-    prior = tiny.net(MANNERS[manner])
+@variants
+def test_the_prior_in_three_parts_is_the_prior(variant):
+    prior = tiny.net(VARIANTS[variant])
     words = torch.randn(4, 5, TEXT)
     bound = prior.bind(condition(words.mean(1), tokens=words if prior.modulated else None, lengths=[18, 7, 11, -1]))
     x, level = state_of(4)[:, 1:], torch.tensor([3, 9, 20, 50])
@@ -74,22 +74,22 @@ def test_the_prior_in_three_parts_is_the_prior(manner):
     torch.testing.assert_close(parts, prior(x, level, bound), rtol=0, atol=0)
 
 
-@manners
+@variants
 @pytest.mark.parametrize("split", [0, 1, 2])
-def test_a_fresh_block_leaves_both_priors_exactly_as_they_are(manner, split):
-    net = net_of(manner, fresh=True, split=split)
+def test_a_fresh_block_leaves_both_priors_exactly_as_they_are(variant, split):
+    net = net_of(variant, fresh=True, split=split)
     x, bound = state_of(4), bound_of(net, 4)
     places, motion = part(net(x, 7, bound))
-    assert torch.equal(motion, tiny.net(MANNERS[manner])(x[:, 1:], 7, bound))
+    assert torch.equal(motion, tiny.net(VARIANTS[variant])(x[:, 1:], 7, bound))
     assert not places.any()
 
 
 @pytest.mark.parametrize("aware", [False, True], ids=["plain", "aware"])
-@manners
+@variants
 @settings(max_examples=4, deadline=None)
 @given(seed=st.integers(0, 1000), split=st.sampled_from([0, 1, 2]))
-def test_exchanged_people_have_exchanged_guesses(manner, aware, seed, split):
-    net = net_of(manner, split=split, aware=aware)
+def test_exchanged_people_have_exchanged_guesses(variant, aware, seed, split):
+    net = net_of(variant, split=split, aware=aware)
     x, bound, level = state_of(6, seed), bound_of(net, 6, seed), torch.tensor([3, 3, 20, 20, 50, 50])
     exchanged = other(torch.arange(6))
     there = net(x[exchanged], level, chosen(bound, exchanged))
@@ -97,9 +97,9 @@ def test_exchanged_people_have_exchanged_guesses(manner, aware, seed, split):
 
 
 @pytest.mark.parametrize("aware", [False, True], ids=["plain", "aware"])
-@manners
-def test_a_pair_alone_is_the_pair_in_a_batch_with_padding(manner, aware):
-    net = net_of(manner, aware=aware)
+@variants
+def test_a_pair_alone_is_the_pair_in_a_batch_with_padding(variant, aware):
+    net = net_of(variant, aware=aware)
     lengths = [18, 18, 10, 10]
     x, bound = state_of(4), bound_of(net, 4, lengths=lengths)
     batch = net(x, 9, bound)
@@ -108,9 +108,9 @@ def test_a_pair_alone_is_the_pair_in_a_batch_with_padding(manner, aware):
     torch.testing.assert_close(batch[2:, :11], single, rtol=0, atol=2e-5)
 
 
-@manners
-def test_what_one_person_does_reaches_the_other_and_nobody_else(manner):
-    net = net_of(manner)
+@variants
+def test_what_one_person_does_reaches_the_other_and_nobody_else(variant):
+    net = net_of(variant)
     x, bound = state_of(4), bound_of(net, 4)
     before = net(x, 9, bound)
     moved = x.clone()
@@ -121,9 +121,9 @@ def test_what_one_person_does_reaches_the_other_and_nobody_else(manner):
     torch.testing.assert_close(after[2:], before[2:], rtol=0, atol=1e-6)
 
 
-@manners
-def test_where_they_stand_reaches_both_and_the_other_numbers_of_that_slot_nobody(manner):
-    net = net_of(manner)
+@variants
+def test_where_they_stand_reaches_both_and_the_other_numbers_of_that_slot_nobody(variant):
+    net = net_of(variant)
     x, bound = state_of(2), bound_of(net, 2)
     before = net(x, 9, bound)
     moved = x.clone()
@@ -135,7 +135,7 @@ def test_where_they_stand_reaches_both_and_the_other_numbers_of_that_slot_nobody
     assert not before[:, 0, 4:].any()
 
 
-def test_an_aware_block_hears_where_the_others_head_and_wrists_are():
+def test_an_aware_block_sees_where_the_others_head_and_wrists_are():
     """Against the two motions decoded into one world by `features.pair`, each looked at from the other's root."""
     net = net_of("modulated", aware=True)
     bound, x = bound_of(net, 2), state_of(2)
@@ -144,21 +144,21 @@ def test_an_aware_block_hears_where_the_others_head_and_wrists_are():
     inner = base.through(base.enter(x[:, 1:], 1, bound), bound, slice(2))
     signal, noise = net.schedule.at(1)
     trust = signal * 0.49 / (0.49 * signal**2 + noise**2)
-    heard = net._heard(inner, bound, net.talk.config.places.encode(stands) / trust, FRAMES, 1)
-    assert heard.shape == (2, 5, 4 * 13)
-    heard = heard.reshape(2, 20, 13)
-    assert not heard[:, FRAMES:].any()
+    partner = net._other_seen(inner, bound, net.talk.config.places.encode(stands) / trust, FRAMES, 1)
+    assert partner.shape == (2, 5, 4 * 13)
+    partner = partner.reshape(2, 20, 13)
+    assert not partner[:, FRAMES:].any()
     guess = base(x[:, 1:], 1, bound) * std + mean
     world, way = decode(guess, stands), compose(stands[:, None], along(guess))
     for me, him in ((0, 1), (1, 0)):
         places = told_from(world[him], way[me][:, None])
         expected = torch.cat([seen(way[me], way[him]), places[:, [15, 20, 21]].flatten(1)], dim=-1)
-        torch.testing.assert_close(heard[me, :FRAMES], expected.clamp(-5, 5), rtol=0, atol=1e-4)
+        torch.testing.assert_close(partner[me, :FRAMES], expected.clamp(-5, 5), rtol=0, atol=1e-4)
 
 
-@manners
-def test_only_the_block_is_trained_and_nothing_is_dropped_in_the_prior(manner):
-    config = replace(MANNERS[manner], dropout=0.5)
+@variants
+def test_only_the_block_is_trained_and_nothing_is_dropped_in_the_prior(variant):
+    config = replace(VARIANTS[variant], dropout=0.5)
     prior = tiny.net(config).requires_grad_(True).train()
     talk = Talk(replace(fitting(config), dropout=0.0), config)
     net = PairNet(prior, talk, tiny.prior().schedule, mean=torch.zeros(263), std=torch.ones(263)).train()
@@ -174,9 +174,9 @@ def test_only_the_block_is_trained_and_nothing_is_dropped_in_the_prior(manner):
     assert set(net.state_dict()) == {f"talk.{key}" for key in talk.state_dict()}
 
 
-@manners
-def test_a_fresh_block_learns_where_people_stand_and_what_they_do(manner):
-    net = net_of(manner, fresh=True).train()
+@variants
+def test_a_fresh_block_learns_where_people_stand_and_what_they_do(variant):
+    net = net_of(variant, fresh=True).train()
     x, bound, goal = state_of(4), bound_of(net, 4), state_of(4, 9) * 0.3
     goal[:, 0, 4:] = 0
     optimizer = torch.optim.Adam(net.parameters(), lr=1e-2)
@@ -192,9 +192,9 @@ def test_a_fresh_block_learns_where_people_stand_and_what_they_do(manner):
     assert losses[-1][1] < 0.1 * losses[0][1]
 
 
-@manners
-def test_guidance_and_known_numbers_compose_in_the_one_loop(manner):
-    prior, net = tiny.prior(MANNERS[manner]), net_of(manner)
+@variants
+def test_guidance_and_known_numbers_compose_in_the_one_loop(variant):
+    prior, net = tiny.prior(VARIANTS[variant]), net_of(variant)
     known = state_of(4, 4)
     mask = torch.zeros_like(known, dtype=torch.bool)
     mask[:, :9], mask[0::2] = True, True  # the place and 8 frames; all of the first people
@@ -255,18 +255,18 @@ def test_other_blocks_that_do_not_fit():
 # The file
 
 
-def block_of(manner: str, **given) -> tuple[PairBlock, object]:
-    prior = tiny.prior(MANNERS[manner])
-    talk = talk_of(MANNERS[manner], **given)
+def block_of(variant: str, **given) -> tuple[PairBlock, object]:
+    prior = tiny.prior(VARIANTS[variant])
+    talk = talk_of(VARIANTS[variant], **given)
     made = PairBlock(
         "dance", talk.config, talk.state_dict(), "tiny", fingerprint(prior.net), "free", "two people", {"n": 1}
     )
     return made, prior
 
 
-@manners
-def test_a_block_comes_back_from_its_file(manner, tmp_path):
-    made, prior = block_of(manner, aware=True, layers=2)
+@variants
+def test_a_block_comes_back_from_its_file(variant, tmp_path):
+    made, prior = block_of(variant, aware=True, layers=2)
     back = PairBlock.load(made.save(tmp_path / "a.safetensors", half=False), prior)  # type: ignore[arg-type]
     assert (back.name, back.config, back.licence, back.notes) == ("dance", made.config, "free", {"n": 1})
     x, net = state_of(2), back.net(prior)  # type: ignore[arg-type]
@@ -278,7 +278,7 @@ def test_a_block_comes_back_from_its_file(manner, tmp_path):
 
 
 def test_a_block_of_the_default_prior_is_a_few_megabytes():
-    default = NetConfig(manner="modulated", width=320, layers=6, heads=5, hidden=1024, text=384, patch=4, dropout=0.02)
+    default = NetConfig(variant="modulated", width=320, layers=6, heads=5, hidden=1024, text=384, patch=4, dropout=0.02)
     with torch.device("meta"):
         talk = Talk(fitting(default, aware=True), default)
     assert 2 * sum(p.numel() for p in talk.parameters()) < 4e6

@@ -8,7 +8,7 @@ from motionloom.errors import MotionloomError
 from motionloom.nets.predictor import NetConfig, TransLinear, waves
 
 SMALL = NetConfig(channels=6, kept=5, layers=4, width=32, heads=2)
-BESIDE = NetConfig(channels=6, kept=5, layers=4, width=32, heads=2, told=(6, 8), beside=True)
+BESIDE = NetConfig(channels=6, kept=5, layers=4, width=32, heads=2, condition=(6, 8), beside=True)
 
 
 def awake(config: NetConfig, seed: int = 0) -> TransLinear:
@@ -25,7 +25,7 @@ def awake(config: NetConfig, seed: int = 0) -> TransLinear:
 def given(config: NetConfig, rows: int = 3) -> tuple[Tensor, Tensor, Tensor]:
     generator = torch.Generator().manual_seed(5)
     x = torch.randn(rows, config.kept, config.channels, generator=generator)
-    return x, torch.arange(1, rows + 1) * 100, torch.randn(rows, *config.told_shape, generator=generator)
+    return x, torch.arange(1, rows + 1) * 100, torch.randn(rows, *config.condition_shape, generator=generator)
 
 
 @pytest.mark.parametrize(
@@ -156,8 +156,9 @@ def test_beside_every_token_sees_its_own_row() -> None:
 @pytest.mark.parametrize(
     "values",
     [{"channels": 0}, {"channels": 1 << 20}, {"layers": 1 << 10}, {"width": 33}, {"heads": 7}, {"kept": 2.0},
-     {"kept": True}, {"dropout": 1.0}, {"dropout": float("nan")}, {"dropout": "x"}, {"told": 5}, {"told": "ab"},
-     {"told": [1]}, {"told": [3, 8], "beside": True}, {"beside": 1000}, {"breadth": 3}, {"width": None}],
+     {"kept": True}, {"dropout": 1.0}, {"dropout": float("nan")}, {"dropout": "x"},
+     {"condition": 5}, {"condition": "ab"}, {"condition": [1]}, {"condition": [3, 8], "beside": True}, {"beside": 1000},
+     {"breadth": 3}, {"width": None}],
     ids=str,
 )  # fmt: skip
 def test_sizes_that_cannot_be_are_refused(values: dict) -> None:

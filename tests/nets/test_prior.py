@@ -1,4 +1,4 @@
-"""The prior's network in both manners: what it must not look at, and what its null condition is."""
+"""The prior's network in both variants: what it must not look at, and what its null condition is."""
 
 from dataclasses import replace
 
@@ -170,8 +170,8 @@ def test_parameter_counts_are_the_published_ones(features: int, flags: bool, cou
         {"flags": 7},
         {"dropout": float("nan")},
         {"dropout": "much"},
-        {"manner": "other"},
-        {"manner": ["published"]},
+        {"variant": "other"},
+        {"variant": ["published"]},
         {"weight": 3},
     ],
     ids=str,

@@ -11,7 +11,9 @@ from motionloom.nets.text.minilm import pack
 from motionloom.weights.prior import Card, Prior
 from tests.nets.text import tiny
 
-MODULATED = NetConfig(manner="modulated", width=32, layers=2, heads=2, hidden=48, text=tiny.WIDTH, patch=4, dropout=0.0)
+MODULATED = NetConfig(
+    variant="modulated", width=32, layers=2, heads=2, hidden=48, text=tiny.WIDTH, patch=4, dropout=0.0
+)
 CLOCKED = replace(MODULATED, clock=True)
 PUBLISHED = NetConfig(width=32, layers=2, heads=4, hidden=48, text=tiny.WIDTH, dropout=0.0)
 

@@ -5,7 +5,7 @@ import torch
 from motionloom.diffusion import Dct, cosine
 from motionloom.features.positions import Layout
 from motionloom.nets.predictor import NetConfig, TransLinear
-from motionloom.weights.predictor import Predictor, told_shape
+from motionloom.weights.predictor import Predictor, condition_shape
 from motionloom.weights.prior import Card
 
 BODY = Layout(("root", "left", "right", "head"), (-1, 0, 0, 0), (0, 2, 1, 3), ((1, 2),))
@@ -14,12 +14,14 @@ BARE = Layout(BODY.names, BODY.parents, BODY.pairs, root=False, z_up=True)
 """As published: no way, +Z up."""
 
 
-def predictor(manner: str = "told", *, levels: int = 1000, frames: int = 20, kept: int = 8, seed: int = 0) -> Predictor:
+def predictor(
+    variant: str = "masked", *, levels: int = 1000, frames: int = 20, kept: int = 8, seed: int = 0
+) -> Predictor:
     """A predictor of ``frames`` frames, 5 of them observed, at 20 fps."""
-    told = manner == "told"
+    told = variant == "masked"
     layout = BODY if told else BARE
-    shape = told_shape(layout, kept) if told else None
-    config = NetConfig(channels=layout.channels, kept=kept, layers=2, width=16, heads=2, told=shape, beside=told)
+    shape = condition_shape(layout, kept) if told else None
+    config = NetConfig(channels=layout.channels, kept=kept, layers=2, width=16, heads=2, condition=shape, beside=told)
     with torch.random.fork_rng():
         torch.manual_seed(seed)
         net = TransLinear(config)
@@ -33,5 +35,5 @@ def predictor(manner: str = "told", *, levels: int = 1000, frames: int = 20, kep
     card = Card("tiny", "do what you like", "random numbers", {"steps": 3})
     return Predictor(
         net.eval().requires_grad_(False), cosine(levels), layout, Dct(frames, kept), 5, 20.0,
-        "told" if told else "published", mean, std, pose, card,
+        "masked" if told else "published", mean, std, pose, card,
     )  # fmt: skip

@@ -110,7 +110,7 @@ def test_guidance_one_is_the_told_pass_zero_the_untold_and_two_goes_beyond() -> 
         asked = {"steps": 1, "guidance": guidance, "temperature": temperature}
         return complete(PREDICTOR, features, mask, pose, seeds=[1, 2, 3], **asked)
 
-    rows = PREDICTOR.tell(features, mask, pose)
+    rows = PREDICTOR.condition(features, mask, pose)
     noise = torch.stack([torch.randn(16, 66, generator=torch.Generator().manual_seed(s)) for s in (1, 2, 3)])
     for guidance, scale in ((1.0, 1.0), (0.0, 1.0), (1.0, 0.5), (1.0, 0.0)):
         with torch.inference_mode():

@@ -41,7 +41,9 @@ def prior(monkeypatch: pytest.MonkeyPatch) -> Iterator[Prior]:
         turns[..., 3] = 1.0
         return Motion(SMPL22, fps, places.positions[:, 0], turns)
 
-    net = PriorNet(NetConfig(manner="modulated", features=263, width=16, layers=1, heads=2, hidden=16, text=8, patch=4))
+    net = PriorNet(
+        NetConfig(variant="modulated", features=263, width=16, layers=1, heads=2, hidden=16, text=8, patch=4)
+    )
     monkeypatch.setattr(net, "forward", lambda x, level, bound: 0.5 * x)
     monkeypatch.setattr(body, "posed", stands)
     threads = torch.get_num_threads()

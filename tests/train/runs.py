@@ -14,14 +14,14 @@ from motionloom.diffusion import SCHEDULES
 from motionloom.features import humanml as hml
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.train.loop import World, train
-from motionloom.train.objectives import CleanGuess, Conditioned, WordBank
+from motionloom.train.objectives import CleanError, Conditioned, WordBank
 from motionloom.train.recipe import Recipe
 from tests.kinematics import people
 from tests.nets import tiny
 from tests.nets.text.tiny import WIDTH
 
 NET = {
-    "manner": "modulated",
+    "variant": "modulated",
     "width": 32,
     "layers": 1,
     "heads": 2,
@@ -57,7 +57,7 @@ def losses(data: Path, out: Path, plan: Recipe, *, say=print) -> list[float]:
     motions = load_set(data, seed=plan.seed)
     batches = Batches(motions, windows=plan.windows, shares=plan.shares)
     words = WordBank(tiny.text(), motions.texts, progress=lambda line: None)
-    objective = CleanGuess(net, SCHEDULES[plan.schedule](plan.levels), batches, words)
+    objective = CleanError(net, SCHEDULES[plan.schedule](plan.levels), batches, words)
     seen: list[float] = []
 
     def on_step(step: int, loss: float, seconds: float) -> None:

@@ -13,7 +13,7 @@ from motionloom.diffusion import cosine
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import mask, ric
 from motionloom.skeleton import SMPL22
-from motionloom.train.control import ControlledGuess, train_control
+from motionloom.train.control import ControlledError, train_control
 from motionloom.train.masks import CONTROLS, NOTHING, draw_masks, some_frames
 from motionloom.train.objectives import WordBank
 from motionloom.weights.adapter import Adapter, adapted, show
@@ -94,7 +94,7 @@ def test_given_numbers_of_a_training_state_have_no_noise(data):
             seen.append((x, level, given, mask))
             return x
 
-    objective = ControlledGuess(Spy(), schedule, batches, words)
+    objective = ControlledError(Spy(), schedule, batches, words)
     objective.control = "left_wrist"
     first, again, later = (objective.loss(objective.net, 0, step, 16) for step in (1, 1, 2))
     assert first == again != later

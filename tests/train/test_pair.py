@@ -14,7 +14,7 @@ from motionloom.features.pair import decode, encode
 from motionloom.nets.pair import PairNet, Talk, other, part
 from motionloom.train.duets import KEEN, NEAR, Duets, Sight
 from motionloom.train.objectives import WEIGHTS
-from motionloom.train.pair import BEGUN, Drawn, Held, PairGuess, Parts, Settings, _over_rows, held_out, told
+from motionloom.train.pair import BEGUN, Drawn, Held, PairError, Parts, Settings, _over_rows, given_slots, held_out
 from motionloom.weights.prior import Prior
 from tests.kinematics import people
 from tests.nets import tiny
@@ -50,7 +50,7 @@ def objective(*, fresh: bool = False, settings: Settings | None = None, prior: P
         for value in () if fresh else talk.parameters():
             value.add_(torch.randn(value.shape) * 0.2)
     net = PairNet(prior.net, talk, prior.schedule, mean=prior.mean, std=prior.std)
-    return PairGuess(net, prior, Duets([pair(), pair("b", turn=2.0)]), settings=settings, recipe=recipe(**changes))
+    return PairError(net, prior, Duets([pair(), pair("b", turn=2.0)]), settings=settings, recipe=recipe(**changes))
 
 
 class Watch(nn.Module):
@@ -70,7 +70,7 @@ def test_a_window_decodes_to_the_recorded_places_above_each_person_s_floor():
     floor = recorded.positions[..., 1].min(axis=(1, 2))
     above = recorded.positions - floor[:, None, None, None] * [0.0, 1.0, 0.0]
     for row, start in enumerate((0, 17)):
-        seen = decode(crops.features[row].double(), crops.stands[row].double()).numpy()
+        seen = decode(crops.features[row].double(), crops.ground[row].double()).numpy()
         np.testing.assert_allclose(seen, above[:, start : start + 25], atol=2e-4)
 
 
@@ -87,7 +87,7 @@ def test_half_of_the_windows_are_of_mirrored_pairs_and_half_have_the_people_exch
     worlds = [pair().positions, mirrored(pair()).positions]
     plain = [encode(positions).features for positions in worlds]
     crops, found = duets.draw(np.random.default_rng(0), 30, 60), np.zeros((2, 2))
-    for window, stands in zip(crops.features.numpy(), crops.stands.numpy(), strict=True):
+    for window, stands in zip(crops.features.numpy(), crops.ground.numpy(), strict=True):
         for side, features in enumerate(plain):
             for exchanged, first in enumerate(features):
                 places = np.lib.stride_tricks.sliding_window_view(first, 30, axis=0).swapaxes(1, 2)
@@ -107,7 +107,7 @@ def test_recordings_are_drawn_by_the_root_of_their_length_and_windows_begin_anyw
     expected = np.sqrt(long.frames - 1) / (np.sqrt(long.frames - 1) + np.sqrt(short.frames - 1))
     assert np.mean([duets.texts[n] == "b" for n in crops.texts]) == pytest.approx(expected, abs=0.05)
     assert (crops.lengths == window).all()
-    some = crops.stands[torch.from_numpy(crops.texts == duets.texts.index("a"))].sort(dim=1).values
+    some = crops.ground[torch.from_numpy(crops.texts == duets.texts.index("a"))].sort(dim=1).values
     assert len(some.unique(dim=0)) == 3
 
 
@@ -129,7 +129,7 @@ def test_a_beginning_gives_both_people_and_d_and_a_reaction_one_person_without_d
     begun = np.array([True] * 300 + [False] * 200)
     react = np.array([False] * 300 + [True] * 100 + [False] * 100)
     lengths = np.array([80] * 400 + [30] * 100)
-    given = told(np.random.default_rng(0), begun, react, lengths, 80).reshape(500, 2, 81)
+    given = given_slots(np.random.default_rng(0), begun, react, lengths, 80).reshape(500, 2, 81)
     counts = given[:300].sum(-1)
     assert (counts[:, 0] == counts[:, 1]).all()
     assert given[:300, :, 0].all()
@@ -142,7 +142,7 @@ def test_a_beginning_gives_both_people_and_d_and_a_reaction_one_person_without_d
     assert (given[300:400].sum((1, 2)) == 80).all()
     assert 20 < given[300:400, 0, 1].sum() < 80
     assert not given[400:].any()
-    short = told(np.random.default_rng(0), begun, react, np.full(500, 30), 80).reshape(500, 2, 81)
+    short = given_slots(np.random.default_rng(0), begun, react, np.full(500, 30), 80).reshape(500, 2, 81)
     assert short[:300].sum(-1).max() == 16
     assert not short[..., 31:].any()
 
@@ -150,7 +150,7 @@ def test_a_beginning_gives_both_people_and_d_and_a_reaction_one_person_without_d
 def test_given_slots_have_no_noise_and_both_people_one_level_and_own_noise():
     made, watch = objective(settings=Settings(prefix=0.5, react=0.5)), Watch()
     drawn = made.drawn(1, 2, 8)
-    made.guess(watch, drawn)
+    made.denoised(watch, drawn)
     signal = made.schedule.signal[drawn.level].float()
     still = watch.state - signal[:, None, None] * drawn.clean
     assert still[drawn.given].abs().max() < 1e-6 < 0.01 < still[~drawn.given].abs().mean()
@@ -182,7 +182,7 @@ def test_texts_are_dropped_for_both_people_alike_and_early_levels_are_noisy():
 def test_a_fresh_block_costs_what_the_prior_alone_costs_and_the_square_of_d():
     made = objective(fresh=True, settings=Settings(prefix=0.0, react=0.0))
     drawn = made.drawn(3, 4, 4)
-    parts = made.parts(made.guess(made.net.eval(), drawn), drawn)
+    parts = made.parts(made.denoised(made.net.eval(), drawn), drawn)
     prior, motion = tiny.prior(), drawn.clean[:, 1:]
     noised = prior.schedule.noised(motion, drawn.level, drawn.noise[:, 1:])
     alone = prior.net(noised, drawn.level, prior.net.bind(drawn.cond))
@@ -198,7 +198,7 @@ def test_exchanged_people_cost_the_same(said):
     drawn = made.drawn(3, 4, 4)
     exchanged = Drawn(*(other(x) for x in drawn[:4]), drawn.cond, drawn.lengths)
     assert not torch.equal(exchanged.clean, drawn.clean)
-    before, after = (made.parts(made.guess(made.net.eval(), d), d) for d in (drawn, exchanged))
+    before, after = (made.parts(made.denoised(made.net.eval(), d), d) for d in (drawn, exchanged))
     for a, b in zip(before, after, strict=True):
         torch.testing.assert_close(a, b)
 
@@ -207,18 +207,18 @@ def test_what_is_given_and_what_lies_behind_the_end_costs_nothing():
     made = objective(settings=Settings(prefix=1.0, react=0.0), windows=[80], shares=[1.0])
     drawn = made.drawn(0, 0, 3)
     assert (drawn.lengths < 80).all()
-    guess = made.guess(made.net.eval(), drawn)
-    wrong = guess.clone()
+    denoised = made.denoised(made.net.eval(), drawn)
+    wrong = denoised.clone()
     wrong[drawn.given] += 7.0
     wrong[:, 1 + int(drawn.lengths.max()) :] += 7.0
-    for a, b in zip(made.parts(guess, drawn), made.parts(wrong, drawn), strict=True):
+    for a, b in zip(made.parts(denoised, drawn), made.parts(wrong, drawn), strict=True):
         torch.testing.assert_close(a, b)
     wrong[:, int(drawn.lengths.max())] += 700.0  # the last valid frame
-    assert made.parts(wrong, drawn).motion > made.parts(guess, drawn).motion + 0.1
-    seam = guess.clone()
+    assert made.parts(wrong, drawn).motion > made.parts(denoised, drawn).motion + 0.1
+    seam = denoised.clone()
     seam[torch.arange(6), drawn.given.sum(1)] += 700.0  # the first frame that is not given
-    assert made.parts(seam, drawn).motion > made.parts(guess, drawn).motion + 0.1
-    assert made.parts(guess, drawn).place == 0
+    assert made.parts(seam, drawn).motion > made.parts(denoised, drawn).motion + 0.1
+    assert made.parts(denoised, drawn).place == 0
 
 
 def test_what_they_see_of_each_other_is_that_of_the_world_and_counts_by_how_little_noise_there_is():
@@ -226,25 +226,25 @@ def test_what_they_see_of_each_other_is_that_of_the_world_and_counts_by_how_litt
     crops = duets.crops(np.array([0]), np.array([5]), 20)
     made = objective()
     code, features = made.net.talk.config.places, crops.features[0].double()
-    places, sight = code.encode(crops.stands[0].double()), Sight(code)
-    world = decode(features, crops.stands[0].double())[:, :, list(KEEN)].numpy()
+    places, sight = code.encode(crops.ground[0].double()), Sight(code)
+    world = decode(features, crops.ground[0].double())[:, :, list(KEEN)].numpy()
     seen = sight.joints(places, features)
     for person in (0, 1):
         wanted = np.linalg.norm(world[1 - person][:, None, :] - world[person][:, :, None], axis=-1)
         np.testing.assert_allclose(seen[person].norm(dim=-1).numpy(), wanted, atol=1e-5)
     first = world[0, 0, :, None] - world[1, 0, None, :]  # at frame 0 the own heading is the stand's
-    cos, sin = crops.stands[0, 1, :2].double().numpy()
+    cos, sin = crops.ground[0, 1, :2].double().numpy()
     np.testing.assert_allclose(seen[1, 0, :, :, 0].numpy().T, cos * first[..., 0] - sin * first[..., 2], atol=1e-5)
     moved = places + torch.tensor([0.0, 0.0, 0.3, 0.0])
     away = sight.error(moved, features, places, features)
     near = np.exp(-0.5 * (seen**2).sum(-1).numpy() / NEAR**2)
     np.testing.assert_allclose(away.numpy(), 0.09 * (1 + 4 * near).mean((-1, -2)), rtol=1e-6)
     drawn = made.drawn(0, 1, 2)
-    guess, low = made.guess(made.net.eval(), drawn), drawn._replace(level=torch.ones_like(drawn.level))
+    denoised, low = made.denoised(made.net.eval(), drawn), drawn._replace(level=torch.ones_like(drawn.level))
     high = drawn._replace(level=torch.full_like(drawn.level, 50))
     faint = made.settings.faint  # what is left of it near pure noise
     with torch.no_grad():
-        far, near_clean = (float(made.parts(guess, one).sight) for one in (high, low))
+        far, near_clean = (float(made.parts(denoised, one).sight) for one in (high, low))
     assert far == pytest.approx(faint * near_clean, rel=0.02)
 
 
@@ -297,7 +297,7 @@ def test_partners_held_out_are_off_by_metres_where_nothing_is_given(monkeypatch)
     drawn.given[given, 1:] = True
     wrong = drawn.clean.clone()
     wrong[:, 0, 2] += torch.where(given, 0.6, 0.3) / made.net.talk.config.places.ground
-    monkeypatch.setattr(made, "guess", lambda net, drawn: wrong)
+    monkeypatch.setattr(made, "denoised", lambda net, drawn: wrong)
     assert Held(made, drawn).report(made.net).root == pytest.approx(0.3, abs=1e-3)
 
 
@@ -326,7 +326,7 @@ def test_a_wrong_guess_of_where_they_stand_is_seen_by_both_even_by_whom_nothing_
 def test_texts_are_dropped_of_who_reacts_too_and_of_whom_nobody_described():
     made = objective(settings=Settings(prefix=0.0, react=1.0, silent=1.0), windows=[20], shares=[1.0])
     assert made.drawn(0, 0, 20).cond.pooled.abs().sum() == 0
-    undescribed = PairGuess(
+    undescribed = PairError(
         made.net, tiny.prior(), Duets([pair(captions=()), pair("b", turn=2.0)]), settings=Settings(prefix=0, react=0),
         recipe=recipe(drop_text=0.0),
     )  # fmt: skip

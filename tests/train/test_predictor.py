@@ -32,7 +32,7 @@ def recipe(**changes) -> Recipe:
 
 
 def test_a_window_is_told_from_where_its_last_observed_pose_stands_and_faces():
-    drawn = Windows(protocol().split("train"), protocol(), manner="told").draw(1, 2, 64)
+    drawn = Windows(protocol().split("train"), protocol(), variant="masked").draw(1, 2, 64)
     feet = drawn.features.unflatten(-1, (22, 3))
     for row, mask in enumerate(drawn.mask):
         past = int(mask.all(-1).int().cumprod(0).sum())
@@ -45,7 +45,7 @@ def test_a_window_is_told_from_where_its_last_observed_pose_stands_and_faces():
 
 
 def test_masks_of_all_kinds_are_drawn_and_always_begin_with_a_past():
-    masks = Windows(protocol().split("train"), protocol(), manner="told").draw(0, 0, 400).mask
+    masks = Windows(protocol().split("train"), protocol(), variant="masked").draw(0, 0, 400).mask
     assert masks[:, :2].all()
     future = masks[:, 8:]
     only_past = (future.sum((1, 2)) == 0).float().mean()
@@ -56,7 +56,7 @@ def test_masks_of_all_kinds_are_drawn_and_always_begin_with_a_past():
 
 
 def test_the_same_seed_and_step_draw_the_same_windows_and_others_draw_others():
-    windows = Windows(protocol().split("train"), protocol(), manner="told")
+    windows = Windows(protocol().split("train"), protocol(), variant="masked")
     a, b, c = windows.draw(1, 2, 8), windows.draw(1, 2, 8), windows.draw(1, 3, 8)
     assert torch.equal(a.features, b.features)
     assert torch.equal(a.mask, b.mask)
@@ -69,15 +69,15 @@ def test_half_of_the_windows_are_mirror_images():
     one = Protocol(
         "one", 20.0, 8, 12, SMPL_LAYOUT, (Recording("a", "a", "a", "train", still.astype(np.float32)),), "free"
     )
-    places = Windows(one.recordings, one, manner="told").draw(0, 0, 200).features.unflatten(-1, (22, 3))
+    places = Windows(one.recordings, one, variant="masked").draw(0, 0, 200).features.unflatten(-1, (22, 3))
     higher = (places[:, :, 20, 1] > places[:, :, 21, 1]).float().mean()
     assert 0.4 < higher < 0.6
 
 
 def test_a_smoothed_past_is_what_is_told_and_the_recorded_one_is_what_is_guessed():
     data = protocol()
-    plain = Windows(data.split("train"), data, manner="told").draw(1, 1, 40)
-    smooth = Windows(data.split("train"), data, manner="told", smoothed=1.0).draw(1, 1, 40)
+    plain = Windows(data.split("train"), data, variant="masked").draw(1, 1, 40)
+    smooth = Windows(data.split("train"), data, variant="masked", smoothed=1.0).draw(1, 1, 40)
     assert torch.equal(plain.features, plain.shown)
     assert torch.equal(plain.mask, smooth.mask)
     rough, told = smooth.features[:, :2], smooth.shown[:, :2]
@@ -88,7 +88,7 @@ def test_a_smoothed_past_is_what_is_told_and_the_recorded_one_is_what_is_guessed
 
 def test_a_straight_way_is_as_it_was_when_smoothed():
     data = protocol()
-    windows = Windows(data.split("train"), data, manner="told", smoothed=1.0)
+    windows = Windows(data.split("train"), data, variant="masked", smoothed=1.0)
     ramp = np.arange(20.0)[None, :, None, None] * np.array([0.1, 0.02, -0.3]) + np.zeros((3, 20, 22, 3))
     past = np.array([8, 5, 2])
     kept = windows._smoothed(np.random.default_rng(0), ramp, past)
@@ -97,7 +97,7 @@ def test_a_straight_way_is_as_it_was_when_smoothed():
 
 def test_published_windows_drop_the_way_and_are_seen_from_anywhere():
     published = protocol(H36M_LAYOUT)
-    drawn = Windows(published.split("train"), published, manner="published").draw(0, 0, 100)
+    drawn = Windows(published.split("train"), published, variant="published").draw(0, 0, 100)
     assert drawn.features.shape == (100, 20, 48)
     assert bool((drawn.mask.sum((1, 2)) == 8 * 16).all())
     facing = torch.atan2(drawn.pose[:, 1], drawn.pose[:, 0])  # x and y of the right hip, +Z up
@@ -106,17 +106,17 @@ def test_published_windows_drop_the_way_and_are_seen_from_anywhere():
 
 def test_the_first_loss_of_the_published_training_is_that_of_guessing_no_noise():
     data = protocol(H36M_LAYOUT)
-    windows = Windows(data.split("train"), data, manner="published")
-    settings = Settings.parse(SMALL | {"manner": "published"})
+    windows = Windows(data.split("train"), data, variant="published")
+    settings = Settings.parse(SMALL | {"variant": "published"})
     predictor = new_predictor(data, settings, windows, schedule="cosine", levels=1000)
     with torch.no_grad():
-        loss = float(Completion(predictor, windows, untold=0.2).loss(predictor.net, 0, 0, 512))
+        loss = float(Completion(predictor, windows, condition_dropout=0.2).loss(predictor.net, 0, 0, 512))
     assert loss == pytest.approx(1.0, abs=0.03)
 
 
 def test_states_of_the_other_manner_are_standardised():
     data = protocol()
-    windows = Windows(data.split("train"), data, manner="told")
+    windows = Windows(data.split("train"), data, variant="masked")
     predictor = new_predictor(data, Settings.parse(SMALL), windows, schedule="cosine", levels=1000)
     drawn = windows.draw(9, 9, 2000)
     state = predictor.to_state(drawn.features, drawn.pose)
@@ -159,8 +159,8 @@ def test_training_goes_on_from_another_file_and_refuses_other_windows(tmp_path):
         ({"wdith": 3}, "no setting"),
         ({"width": "wide"}, "kind int"),
         ({"width": True}, "kind int"),
-        ({"manner": "best"}, "published"),
-        ({"untold": 1}, "shares"),
+        ({"variant": "best"}, "published"),
+        ({"condition_dropout": 1}, "shares"),
         ({"smoothed": 2}, "shares"),
         ({"dct": 1}, "kind bool"),
     ],
@@ -172,4 +172,4 @@ def test_settings_that_cannot_be_are_refused_in_one_sentence(values, says):
 
 def test_recordings_shorter_than_a_window_are_refused():
     with pytest.raises(MotionloomError, match="20 frames"):
-        Windows(protocol(seconds=0.5).recordings, protocol(), manner="told")
+        Windows(protocol(seconds=0.5).recordings, protocol(), variant="masked")

@@ -25,7 +25,7 @@ from tests.lab.papers.test_mdm import Bomb
 from tests.nets import tiny
 from tests.nets.tiny_predictor import predictor
 
-MANNERS = ["told", "published"]
+VARIANTS = ["masked", "published"]
 
 
 def some(*shape: int, seed: int = 0) -> Tensor:
@@ -35,9 +35,9 @@ def some(*shape: int, seed: int = 0) -> Tensor:
 # Windows and states
 
 
-@pytest.mark.parametrize("manner", MANNERS)
-def test_motion_that_the_basis_holds_comes_back_from_its_state(manner: str) -> None:
-    made, pose = predictor(manner), some(3, predictor(manner).layout.channels, seed=1)
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_motion_that_the_basis_holds_comes_back_from_its_state(variant: str) -> None:
+    made, pose = predictor(variant), some(3, predictor(variant).layout.channels, seed=1)
     features = made.basis.to_time(some(3, 8, made.layout.channels))
     torch.testing.assert_close(made.to_features(made.to_state(features, pose), pose), features, atol=1e-5, rtol=1e-5)
     state = some(3, 8, made.layout.channels, seed=2)
@@ -63,15 +63,15 @@ def test_published_networks_are_told_the_spectrum_of_the_padded_observation() ->
     mask = torch.zeros(2, 20, 3)
     mask[:, :5] = 1
     padded = torch.cat([features[:, :5], features[:, 4:5].expand(-1, 15, -1)], dim=1)
-    torch.testing.assert_close(made.tell(features, mask, features[:, 4]), made.basis.to_spectrum(padded))
+    torch.testing.assert_close(made.condition(features, mask, features[:, 4]), made.basis.to_spectrum(padded))
 
 
 def test_ours_is_told_what_is_known_where_and_from_which_pose() -> None:
     made, features = predictor(), some(2, 20, 12)
     pose, mask = features[:, 4], torch.zeros(2, 20, 4)
     mask[:, :5], mask[0, 12:, 2] = 1, 1
-    told = made.tell(features, mask, pose)
-    assert told.shape == (2, *(made.net.config.told or ()))
+    told = made.condition(features, mask, pose)
+    assert told.shape == (2, *(made.net.config.condition or ()))
     seen = told[:, :8, :12] * made.std  # known numbers from the pose, zero elsewhere
     offset = features - pose[:, None]
     for part in range(4):
@@ -86,19 +86,19 @@ def test_ours_is_told_what_is_known_where_and_from_which_pose() -> None:
 
 def test_all_known_has_a_share_of_one() -> None:
     made = predictor()
-    told = made.tell(some(1, 20, 12), torch.ones(1, 20, 4), some(1, 12))
+    told = made.condition(some(1, 20, 12), torch.ones(1, 20, 4), some(1, 12))
     assert told[0, :8, 12:].flatten().tolist() == pytest.approx([1.0] * 4 + [0.0] * 28, abs=1e-6)
 
 
-@pytest.mark.parametrize("manner", MANNERS)
+@pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("fill", [7.0, -3.0])
-def test_numbers_that_are_not_known_are_not_told(manner: str, fill: float) -> None:
-    made = predictor(manner)
+def test_numbers_that_are_not_known_are_not_told(variant: str, fill: float) -> None:
+    made = predictor(variant)
     features, mask = some(2, 20, made.layout.channels), torch.zeros(2, 20, made.layout.parts)
     mask[:, :5] = 1
     other = features.clone()
     other[:, 5:] = fill
-    assert torch.equal(made.tell(features, mask, features[:, 4]), made.tell(other, mask, features[:, 4]))
+    assert torch.equal(made.condition(features, mask, features[:, 4]), made.condition(other, mask, features[:, 4]))
 
 
 @pytest.mark.parametrize("level", [1, 500, 1000])
@@ -112,10 +112,10 @@ def test_a_published_guess_is_clean_where_its_noise_is_right(level: int) -> None
     assert torch.equal(ours.denoiser(None)(y, level), ours.net(y, torch.full((2,), level - 1)))
 
 
-@pytest.mark.parametrize("manner", MANNERS)
-def test_who_is_not_told_is_as_one_who_hears_nothing(manner: str) -> None:
-    made, x = predictor(manner), some(3, 8, predictor(manner).layout.channels)
-    told = some(3, *made.net.config.told_shape, seed=1)
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_who_is_not_told_is_as_one_who_hears_nothing(variant: str) -> None:
+    made, x = predictor(variant), some(3, 8, predictor(variant).layout.channels)
+    told = some(3, *made.net.config.condition_shape, seed=1)
     every, nobody = made.denoiser(told)(x, 9), made.denoiser(None)(x, 9)
     assert (every - nobody).abs().amax((1, 2)).min() > 1e-3
     some_of_them = made.denoiser(told, torch.tensor([1.0, 0.0, 1.0]))(x, 9)
@@ -130,16 +130,16 @@ def test_all_numbers_go_to_another_device() -> None:
 # The weight file
 
 
-@pytest.mark.parametrize("manner", MANNERS)
+@pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("half", [False, True])
-def test_a_saved_predictor_comes_back(tmp_path: Path, manner: str, half: bool) -> None:
-    made = predictor(manner)
+def test_a_saved_predictor_comes_back(tmp_path: Path, variant: str, half: bool) -> None:
+    made = predictor(variant)
     back = Predictor.load(save_predictor(made, tmp_path / "a.safetensors", half=half))
-    assert (back.layout, back.basis, back.observed, back.fps, back.manner) == (
-        made.layout, made.basis, made.observed, made.fps, made.manner,
+    assert (back.layout, back.basis, back.observed, back.fps, back.variant) == (
+        made.layout, made.basis, made.observed, made.fps, made.variant,
     )  # fmt: skip
     assert (back.card, back.net.config, back.schedule.name) == (made.card, made.net.config, made.schedule.name)
-    x, told = some(2, 8, made.layout.channels), some(2, *made.net.config.told_shape)
+    x, told = some(2, 8, made.layout.channels), some(2, *made.net.config.condition_shape)
     near = 2e-2 if half else 0
     torch.testing.assert_close(back.denoiser(told)(x, 9), made.denoiser(told)(x, 9), atol=near, rtol=near)
     assert all(torch.equal(getattr(back, name), getattr(made, name)) for name in ("mean", "std", "pose"))
@@ -191,7 +191,7 @@ def test_the_unchanged_copy_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "key", ["format", "net", "schedule", "layout", "frames", "observed", "dct", "fps", "manner", "card"]
+    "key", ["format", "net", "schedule", "layout", "frames", "observed", "dct", "fps", "variant", "card"]
 )
 @pytest.mark.parametrize(
     "value", [None, [], {}, "x", -1, 0, 1e300, float("nan"), 10**30, [[[]]], {"name": []}], ids=str
@@ -204,9 +204,10 @@ def test_descriptions_that_make_no_sense_are_refused(tmp_path: Path, key: str, v
 
 @pytest.mark.parametrize(
     ("part", "key", "value"),
-    [("net", "layers", 4), ("net", "width", 8192), ("net", "channels", 8190), ("net", "kept", 7), ("net", "told", None),
-     ("net", "beside", False), ("net", "extra", 1), ("schedule", "steps", 10**9), ("schedule", "steps", 0),
-     ("schedule", "name", "x"), ("schedule", "name", []), ("layout", "parents", [-1, 0, 0, 5]),
+    [("net", "layers", 4), ("net", "width", 8192), ("net", "channels", 8190), ("net", "kept", 7),
+     ("net", "condition", None), ("net", "beside", False), ("net", "extra", 1), ("schedule", "steps", 10**9),
+     ("schedule", "steps", 0), ("schedule", "name", "x"), ("schedule", "name", []),
+     ("layout", "parents", [-1, 0, 0, 5]),
      ("layout", "parents", [-1, 1, 0, 0]), ("layout", "names", ["a"] * 300), ("layout", "pairs", [0, 1, 2, 9]),
      ("layout", "root", False), ("layout", "across", [[1, 9]]), ("layout", "z_up", True), ("card", "name", 3),
      ("card", "licence", None), ("card", "notes", 3), ("card", "extra", 3)],
@@ -293,7 +294,7 @@ def test_a_published_checkpoint_is_a_predictor_of_its_data_set(
 ) -> None:
     path = checkpoint(tmp_path, channels, kept)
     made = import_humanmac(path, licence="research only")
-    assert (made.layout, made.fps, made.observed, made.frames, made.manner) == (
+    assert (made.layout, made.fps, made.observed, made.frames, made.variant) == (
         layout, fps, observed, frames, "published",
     )  # fmt: skip
     assert (made.card.name, made.card.licence) == ("ckpt_ema_550", "research only")
@@ -302,7 +303,7 @@ def test_a_published_checkpoint_is_a_predictor_of_its_data_set(
     assert is_humanmac(state)
     assert all(torch.equal(value, state[key]) for key, value in made.net.state_dict().items())
     back = Predictor.load(save_predictor(made, tmp_path / "a.safetensors"))
-    assert (back.layout, back.frames, back.manner) == (layout, frames, "published")
+    assert (back.layout, back.frames, back.variant) == (layout, frames, "published")
 
 
 @pytest.mark.parametrize("how", ["missing", "unknown", "shape", "nan", "channels", "kept", "odd", "flat", "nothing"])

@@ -190,7 +190,7 @@ def _prior(path: Path) -> dict[str, Any]:
 
     prior = load_prior(path)
     config = prior.net.config
-    about = _network(prior, "prior", config.manner, sizes={"patch": config.patch}, seen={"features": config.features})
+    about = _network(prior, "prior", config.variant, sizes={"patch": config.patch}, seen={"features": config.features})
     return about | {"text": prior.text.name, "notes": prior.card.notes}
 
 
@@ -201,11 +201,11 @@ def _predictor(path: Path) -> dict[str, Any]:
     frames = {"observed": predictor.observed, "predicted": predictor.frames - predictor.observed}
     seen = {"joints": list(predictor.layout.names), "frames": frames}
     sizes = {"frequencies": predictor.net.config.kept}
-    return _network(predictor, "predictor", predictor.manner, sizes=sizes, seen=seen) | {"notes": predictor.card.notes}
+    return _network(predictor, "predictor", predictor.variant, sizes=sizes, seen=seen) | {"notes": predictor.card.notes}
 
 
 def _network(
-    whole: "Prior | Predictor", kind: str, manner: str, *, sizes: dict[str, int], seen: dict[str, Any]
+    whole: "Prior | Predictor", kind: str, variant: str, *, sizes: dict[str, int], seen: dict[str, Any]
 ) -> dict[str, Any]:
     """What there is to say of both kinds of networks, with their own ``sizes`` and what they see of a motion."""
     config = whole.net.config
@@ -214,7 +214,7 @@ def _network(
         "kind": kind,
         "licence": whole.card.licence,
         "data": whole.card.data,
-        "manner": manner,
+        "variant": variant,
         "parameters": sum(p.numel() for p in whole.net.parameters()),
         "sizes": {"layers": config.layers, "width": config.width, "heads": config.heads} | sizes,
         **seen,
@@ -233,7 +233,7 @@ def _block(path: Path) -> dict[str, Any]:
         "kind": "two-person block",
         "licence": block.licence,
         "data": block.data,
-        "manner": "aware" if config.aware else f"corrects {config.adds}",
+        "variant": "aware" if config.aware else f"corrects {config.adds}",
         "parameters": sum(value.numel() for value in block.tensors.values()),
         "sizes": {"layers": config.layers, "behind": config.split, "width": config.width, "heads": config.heads},
         "belongs_to": {"name": block.base, "fingerprint": block.fingerprint},
@@ -250,7 +250,7 @@ def _adapter(path: Path) -> dict[str, Any]:
         "kind": "taught adapter" if adapter.taught else "control adapter",
         "licence": adapter.licence,
         "data": adapter.data,
-        "manner": "low rank" if adapter.taught else f"low rank, {adapter.control}",
+        "variant": "low rank" if adapter.taught else f"low rank, {adapter.control}",
         "parameters": sum(value.numel() for value in adapter.tensors.values()),
         "sizes": {"rank": adapter.rank} | ({"given rank": adapter.given_rank} if adapter.sees_given else {}),
         "belongs_to": {"name": adapter.base, "fingerprint": adapter.fingerprint},
@@ -266,7 +266,7 @@ def _card(about: dict[str, Any]) -> str:
         "file": f"{about['file']} ({about['megabytes']} MB)",
         "licence": about["licence"],
         "data": about["data"],
-        "network": f"{about['manner']}, {about['parameters']:,} parameters ({sizes})",
+        "network": f"{about['variant']}, {about['parameters']:,} parameters ({sizes})",
     }
     if "belongs_to" in about:
         rows["prior"] = f"{about['belongs_to']['name']} ({about['belongs_to']['fingerprint'][:12]}), no other"

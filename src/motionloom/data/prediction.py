@@ -31,7 +31,7 @@ class Recording:
     name: str
     subject: str
     action: str
-    """The class that `CMD` is told for."""
+    """The class that `CMD` is computed for."""
     split: str
     """``train``, ``val`` or ``test``."""
     positions: NDArray[np.float32]
@@ -95,7 +95,7 @@ def read_cmu(
 ) -> Protocol:
     """The CMU part of the mocap pack (or a CMU download), whole subjects held out, as the uniform person at 30 fps.
 
-    One second is observed and two are predicted. Recordings that cannot be read are left out and told.
+    One second is observed and two are predicted. Recordings that cannot be read are left out and reported.
     """
     takes = [take for take in find_takes(folder) if take.source == "cmu" and cmu_split(take) in splits]
     recordings = tuple(_read(takes, 30.0, cmu_split, lambda take: take.name.split("_")[0], say))

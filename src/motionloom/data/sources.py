@@ -26,7 +26,7 @@ UNKNOWN_LICENCE = "not stated: as the owner of the recordings allows"
 HUMANML3D_LICENCE = "HumanML3D / AMASS: research use under the licences of AMASS and its subsets"
 
 LATEST = 1e6
-"""Seconds: nothing that is told of a recording begins later."""
+"""Seconds: no label of a recording begins later."""
 _MAX_LIST = 64 << 20
 _MAX_LINE = 1 << 20
 _PACKED = 32

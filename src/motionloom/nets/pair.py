@@ -2,7 +2,7 @@
 
 Both people go through the same frozen network. After some of its layers the block sees what became of the one and of
 the other, and corrects the one; the roles exchanged, with the same weights, it corrects the other. A state has one slot
-before the frames, whose first four numbers are the person's part of D: where the two stand to each other at frame 0
+before the frames, whose first four numbers are the person's part of D: their relative ground pose at frame 0
 (`features.pair.PlaceCode`). So D is drawn along with the motion, and whatever holds, guides or edits rows of a state
 (guidance, inpainting, `observe`) does it here too.
 
@@ -24,18 +24,19 @@ from torch.nn import functional as F
 from motionloom.diffusion import Schedule
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import WIDTH, ric
-from motionloom.features.pair import PlaceCode, along, compose, put, seen
+from motionloom.features.pair import PlaceCode, along
+from motionloom.ground import compose, relative, to_world
 from motionloom.nets.prior import Bound, Condition, Inner, NetConfig, PriorNet, valid_frames
 from motionloom.nets.prior import PublishedBlock as EncoderBlock
 
 PLACE = 4
 """Numbers of D per person."""
-HEARD = (15, 20, 21)
-"""Joints of the other person whose way an ``aware`` block is told: head and wrists."""
+SEEN = (15, 20, 21)
+"""Joints of the other person that an ``aware`` block sees: head and wrists."""
 _SPREAD = 0.7
 """Standard deviation of the numbers of D, roughly: how far a noisy one is trusted."""
 _FAR = 5.0
-"""Metres beyond which the other person is told to be no further."""
+"""Metres beyond which the other person is shown no further away."""
 
 
 @dataclass(frozen=True)
@@ -50,9 +51,9 @@ class PairConfig:
     hidden: int = 1024
     dropout: float = 0.1
     adds: Literal["all", "condition"] = "all"
-    """What is corrected: all tokens, or the condition token alone (manner ``published`` only)."""
+    """What is corrected: all tokens, or the condition token alone (variant ``published`` only)."""
     aware: bool = False
-    """Whether it is also told where the other person is, frame by frame, by what the priors alone would make."""
+    """Whether its input also says where the other person is, frame by frame, by what the priors alone would make."""
     places: PlaceCode = field(default_factory=PlaceCode)
 
     def __post_init__(self) -> None:
@@ -84,11 +85,11 @@ class PairConfig:
             )
         if prior.flags or prior.features < PLACE:
             raise MotionloomError("two people need weights without transition flags; use others")
-        if prior.manner == "published" and self.width != prior.width:
+        if prior.variant == "published" and self.width != prior.width:
             raise MotionloomError(
                 f"a communication block of width {self.width} does not fit a prior of width {prior.width}"
             )
-        if self.adds == "condition" and prior.manner != "published":
+        if self.adds == "condition" and prior.variant != "published":
             raise MotionloomError("this prior has no condition token to correct; let the block add to all tokens")
         if self.aware and (prior.features != WIDTH or self.places.kind != "mutual"):
             raise MotionloomError(f"an aware block needs HumanML3D's {WIDTH} numbers and places of the kind mutual")
@@ -107,18 +108,18 @@ def fitting(prior: NetConfig, *, layers: int = 1, split: int | None = None, awar
 class Talk(nn.Module):
     """The communication block: the weights that are trained, and nothing else.
 
-    Fresh it says nothing: the correction is 0, so both priors are what they were, and the guess of D is 0.
+    Fresh it says nothing: the correction is 0, so both priors are what they were, and the estimate of D is 0.
     """
 
     def __init__(self, config: PairConfig, prior: NetConfig) -> None:
         super().__init__()
         config.check(prior)
         self.config = config
-        self.normed = prior.manner == "modulated"
-        heard = prior.patch * (PLACE + 3 * len(HEARD)) if config.aware else 0
+        self.normed = prior.variant == "modulated"
+        partner = prior.patch * (PLACE + 3 * len(SEEN)) if config.aware else 0
         sizes = NetConfig(width=config.width, heads=config.heads, hidden=config.hidden, dropout=config.dropout)
         self.places = nn.Linear(2 * PLACE, config.width)
-        self.both = nn.Linear(2 * prior.width + heard, config.width)
+        self.both = nn.Linear(2 * prior.width + partner, config.width)
         self.blocks = nn.ModuleList(EncoderBlock(sizes) for _ in range(config.layers))
         self.place = nn.Linear(config.width, PLACE)
         self.out = nn.Linear(config.width, prior.width) if self.normed else None
@@ -128,15 +129,15 @@ class Talk(nn.Module):
             nn.init.zeros_(layer.bias)  # type: ignore[arg-type]
 
     def forward(
-        self, tokens: Tensor, places: Tensor, mask: Tensor | None, heard: Tensor | None
+        self, tokens: Tensor, places: Tensor, mask: Tensor | None, partner: Tensor | None
     ) -> tuple[Tensor, Tensor]:
-        """Activations (rows, 1 + tokens, width), condition first, and D (rows, 4), to a correction and a guess of D.
+        """Activations (rows, 1 + tokens, width), condition first, and D (rows, 4): a correction, and an estimate of D.
 
-        Rows 2k and 2k + 1 are two people. mask (rows, 1, 1, 1 + tokens): True where there is something. heard: see
-        `PairNet._heard`.
+        Rows 2k and 2k + 1 are two people. mask (rows, 1, 1, 1 + tokens): True where there is something. partner: see
+        `PairNet._other_seen`.
         """
         own = F.layer_norm(tokens, tokens.shape[-1:]) if self.normed else tokens
-        together = [own, other(own)] + ([] if heard is None else [F.pad(heard, (0, 0, 1, 0))])
+        together = [own, other(own)] + ([] if partner is None else [F.pad(partner, (0, 0, 1, 0))])
         start = self.places(torch.cat([places, other(places)], dim=-1))[:, None]
         x = torch.cat([start, self.both(torch.cat(together, dim=-1))], dim=1)
         mask = None if mask is None else F.pad(mask, (1, 0), value=True)
@@ -194,7 +195,7 @@ class PairNet(nn.Module):
         return self._base[0].bind(cond)
 
     def forward(self, x: Tensor, level: int | Tensor, bound: Bound) -> Tensor:
-        """States (2 * pairs, 1 + frames, numbers) at ``level``, one or one per row, to the clean guess.
+        """States (2 * pairs, 1 + frames, numbers) at ``level``, one or one per row, to the denoised estimate.
 
         The slot of D comes back with zeros behind its four numbers.
         """
@@ -204,31 +205,32 @@ class PairNet(nn.Module):
         places, motion = part(x)
         with torch.no_grad():
             inner = base.through(base.enter(motion, level, bound), bound, slice(split))
-            heard = self._heard(inner, bound, places, motion.shape[1], level) if self.talk.config.aware else None
+            partner = self._other_seen(inner, bound, places, motion.shape[1], level) if self.talk.config.aware else None
         first = base.modulated  # the condition is no token there
         tokens = torch.cat([inner.condition[:, None], inner.x], dim=1) if first else inner.x
         mask = F.pad(inner.mask, (1, 0), value=True) if first and inner.mask is not None else inner.mask
-        change, place = self.talk(tokens, places, mask, heard)
+        change, place = self.talk(tokens, places, mask, partner)
         inner = inner._replace(x=inner.x + change[:, first:])
-        guess = base.leave(base.through(inner, bound, slice(split, None)), motion.shape[1])
-        return join(place, guess)
+        denoised = base.leave(base.through(inner, bound, slice(split, None)), motion.shape[1])
+        return join(place, denoised)
 
-    def _heard(self, inner: Inner, bound: Bound, places: Tensor, frames: int, level: int | Tensor) -> Tensor:
+    def _other_seen(self, inner: Inner, bound: Bound, places: Tensor, frames: int, level: int | Tensor) -> Tensor:
         """(rows, tokens, patch * 13): where the other stands, faces, and has head and wrists, as the person sees it.
 
-        By the guesses of the two priors alone and by the D of the state, trusted as far as its noise lets one; numbers
+        By what the two priors alone estimate and by the D of the state, trusted as far as its noise lets one; numbers
         of a person in metres, `PlaceCode` mutual.
         """
         base, mean, std, signals = self._base
-        guess = base.leave(base.through(inner, bound, slice(self.talk.config.split, None)), frames) * std + mean
-        rows = len(guess)
+        denoised = base.leave(base.through(inner, bound, slice(self.talk.config.split, None)), frames) * std + mean
+        rows = len(denoised)
         signal = signals[torch.as_tensor(level, device=signals.device).expand(rows)][:, None]
         trust = signal * _SPREAD**2 / (signal**2 * _SPREAD**2 + 1 - signal**2)
-        way = along(guess)
-        stand = seen(way, compose(self.talk.config.places.raw(trust * places)[:, None], other(way)))
-        joints = torch.stack([guess[..., ric(j)] for j in HEARD], dim=-2)
-        told = torch.cat([stand, put(other(joints), stand[..., None, :]).flatten(-2)], dim=-1).clamp(-_FAR, _FAR)
+        way = along(denoised)
+        place = relative(way, compose(self.talk.config.places.raw(trust * places)[:, None], other(way)))
+        joints = torch.stack([denoised[..., ric(j)] for j in SEEN], dim=-2)
+        theirs = to_world(other(joints), place[..., None, :]).flatten(-2)
+        partner = torch.cat([place, theirs], dim=-1).clamp(-_FAR, _FAR)
         valid = valid_frames(bound.lengths, frames)
-        told = told if valid is None else told * valid[..., None]
+        partner = partner if valid is None else partner * valid[..., None]
         patch = base.config.patch
-        return F.pad(told, (0, 0, 0, -frames % patch)).reshape(rows, -1, patch * told.shape[-1])
+        return F.pad(partner, (0, 0, 0, -frames % patch)).reshape(rows, -1, patch * partner.shape[-1])

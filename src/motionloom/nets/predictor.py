@@ -1,7 +1,7 @@
 """TransLinear, the network of HumanMAC (Chen et al. 2023, section 3.3): a transformer whose tokens are frequencies.
 
 As published, with the published names of its weights, so that published checkpoints load; or with two additions of
-ours (`NetConfig.beside`, `NetConfig.told`) for networks that are told which numbers are given.
+ours (`NetConfig.beside`, `NetConfig.condition`) for networks conditioned on a mask of the numbers that are known.
 """
 
 import math
@@ -28,13 +28,13 @@ class NetConfig:
     width: int = 512
     heads: int = 8
     dropout: float = 0.2
-    told: tuple[int, int] | None = None
-    """Rows and channels of what the network is told; None: the spectrum of the observation, (kept, channels)."""
+    condition: tuple[int, int] | None = None
+    """Rows and channels of the condition; None: the spectrum of the observation, (kept, channels)."""
     beside: bool = False
-    """Whether every token also sees its own row of what is told (the first ``kept`` rows). Not published."""
+    """Whether every token also sees its own row of the condition (the first ``kept`` rows). Not published."""
 
     def __post_init__(self) -> None:
-        sizes = (self.channels, self.kept, self.layers, self.width, self.heads, *self.told_shape)
+        sizes = (self.channels, self.kept, self.layers, self.width, self.heads, *self.condition_shape)
         small = all(isinstance(n, int) and not isinstance(n, bool) and 0 < n <= 8192 for n in sizes)
         small = small and isinstance(self.beside, bool) and self.layers <= 128
         if not small or self.width % (2 * self.heads) or not 0 <= self.dropout < 1:
@@ -43,37 +43,42 @@ class NetConfig:
             raise MotionloomError(
                 f"the number of layers must be even, for the first half feeds the second; got {self.layers}"
             )
-        if self.beside and self.told_shape[0] < self.kept:
-            raise MotionloomError(f"{self.kept} tokens cannot each see one of {self.told_shape[0]} rows")
+        if self.beside and self.condition_shape[0] < self.kept:
+            raise MotionloomError(f"{self.kept} tokens cannot each see one of {self.condition_shape[0]} rows")
 
     @property
-    def told_shape(self) -> tuple[int, int]:
-        """Rows and channels of what the network is told."""
-        return self.told or (self.kept, self.channels)
+    def condition_shape(self) -> tuple[int, int]:
+        """Rows and channels of the condition."""
+        return self.condition or (self.kept, self.channels)
 
     @staticmethod
     def parse(values: dict[str, Any]) -> "NetConfig":
-        """From plain data out of a recipe or a weight file; raises MotionloomError."""
+        """From plain data out of a recipe or a weight file, where ``condition`` was ``told``.
+
+        Raises MotionloomError.
+        """
         try:
-            settings: dict[str, Any] = dict(values)
-            if settings.get("told") is not None:
-                settings["told"] = settings["told"][0], settings["told"][1]
+            settings: dict[str, Any] = {
+                {"told": "condition"}.get(key, key): value for key, value in dict(values).items()
+            }
+            if settings.get("condition") is not None:
+                settings["condition"] = settings["condition"][0], settings["condition"][1]
             return NetConfig(**settings)
         except (TypeError, ValueError, IndexError, KeyError) as error:
             raise MotionloomError(f"the network's settings are not usable: {error}") from None
 
 
 class TransLinear(nn.Module):
-    """``net(x, t, told)``: the guess of the noise (published) or of the clean spectrum, of x's shape.
+    """``net(x, t, condition)``: the estimate of the noise (published) or of the clean spectrum (x0), of x's shape.
 
-    x (rows, kept, channels); t (rows,) the published counting of noise levels, 0 the first noisy one; told (rows,
-    *config.told_shape) or None. ``keep`` (rows,) bool: the rows that are told; the others are treated as with None.
+    x (rows, kept, channels); t (rows,) the published counting of noise levels, 0 the first noisy one; condition (rows,
+    *config.condition_shape) or None. ``keep`` (rows,) bool: the rows that get the condition; the others go without.
     """
 
     def __init__(self, config: NetConfig) -> None:
         super().__init__()
         self.config = config
-        width, (rows, channels) = config.width, config.told_shape
+        width, (rows, channels) = config.width, config.condition_shape
         self.sequence_embedding = nn.Parameter(torch.randn(config.kept, width))
         self.joint_embed = nn.Linear(config.channels + config.beside * channels, width)
         self.time_embed = nn.Sequential(nn.Linear(width, width), nn.SiLU(), nn.Linear(width, width))
@@ -81,13 +86,13 @@ class TransLinear(nn.Module):
         self.temporal_decoder_blocks = nn.ModuleList(_Block(config) for _ in range(config.layers))
         self.out = _zeroed(nn.Linear(width, config.channels))
 
-    def forward(self, x: Tensor, t: Tensor, told: Tensor | None = None, keep: Tensor | None = None) -> Tensor:
+    def forward(self, x: Tensor, t: Tensor, condition: Tensor | None = None, keep: Tensor | None = None) -> Tensor:
         style = self.time_embed(waves(t, self.config.width).to(x))
-        if told is not None:
-            asked = self.cond_embed(told.flatten(1))
+        if condition is not None:
+            asked = self.cond_embed(condition.flatten(1))
             style = style + (asked if keep is None else asked * keep[:, None])
         if self.config.beside:
-            x = torch.cat([x, self._beside(x, told, keep)], dim=-1)
+            x = torch.cat([x, self._beside(x, condition, keep)], dim=-1)
         h = self.joint_embed(x) + self.sequence_embedding
         half, given = self.config.layers // 2, []
         for number, block in enumerate(self.temporal_decoder_blocks):
@@ -98,10 +103,10 @@ class TransLinear(nn.Module):
                 h = block(h, style) + given.pop()
         return self.out(h)
 
-    def _beside(self, x: Tensor, told: Tensor | None, keep: Tensor | None) -> Tensor:
-        if told is None:
-            return x.new_zeros(*x.shape[:2], self.config.told_shape[1])
-        own = told[:, : self.config.kept]
+    def _beside(self, x: Tensor, condition: Tensor | None, keep: Tensor | None) -> Tensor:
+        if condition is None:
+            return x.new_zeros(*x.shape[:2], self.config.condition_shape[1])
+        own = condition[:, : self.config.kept]
         return own if keep is None else own * keep[:, None, None]
 
 

@@ -1,4 +1,4 @@
-"""The prior's network: a transformer over frames that guesses the clean motion. One code, two manners.
+"""The prior's network: a transformer over frames that estimates the clean motion (x0). One code, two variants.
 
 `published`: the MDM encoder (Tevet et al. 2023, "Human Motion Diffusion Model"; also the network of Shafir et al.
 2024): one condition token (noise level + pooled text) before one token per frame, post-norm blocks. Published
@@ -6,7 +6,7 @@ checkpoints load.
 
 `modulated`: the default. Several frames make one token; text is attended word by word, because pooled sentence vectors
 of "turn left" and "turn right" nearly coincide; the noise level and the pooled text shift and scale every block
-(adaptive layer norm in the manner of Peebles & Xie 2023, with one shared projection as in Chen et al. 2024).
+(adaptive layer norm after Peebles & Xie 2023, with one shared projection as in Chen et al. 2024).
 
 Both: ``net(state, level, bound)`` with ``bound = net.bind(condition)`` made once per sample, before the loop, so that
 everything that depends on the text alone (projections, keys, values) is computed once.
@@ -28,7 +28,7 @@ from motionloom.errors import MotionloomError
 class NetConfig:
     """Sizes of a prior network; the defaults are the published HumanML3D model."""
 
-    manner: Literal["published", "modulated"] = "published"
+    variant: Literal["published", "modulated"] = "published"
     features: int = 263
     """Numbers per frame."""
     width: int = 512
@@ -48,8 +48,8 @@ class NetConfig:
 
     def __post_init__(self) -> None:
         numbers = (self.features, self.width, self.layers, self.heads, self.hidden, self.text, self.patch)
-        if self.manner not in ("published", "modulated"):
-            raise MotionloomError(f"no network manner {self.manner!r}; there are published and modulated")
+        if self.variant not in ("published", "modulated"):
+            raise MotionloomError(f"no network variant {self.variant!r}; there are published and modulated")
         if (
             any(type(n) is not int or not 0 < n <= 65536 for n in numbers)
             or self.layers > 256
@@ -63,10 +63,11 @@ class NetConfig:
 
     @staticmethod
     def parse(values: dict[str, Any]) -> "NetConfig":
-        """From plain data out of a recipe or a weight file."""
+        """From plain data out of a recipe or a weight file; ``variant`` was called ``manner``."""
         try:
-            return NetConfig(**values)
-        except TypeError as error:
+            plain = dict(values)
+            return NetConfig(**{{"manner": "variant"}.get(key, key): value for key, value in plain.items()})
+        except (TypeError, ValueError) as error:
             raise MotionloomError(f"the network's settings are not usable: {error}") from None
 
 
@@ -233,7 +234,7 @@ class PriorNet(nn.Module):
         self.out = nn.Linear(width, config.patch * config.features)
         self.drop = nn.Dropout(config.dropout)
         self.flag = nn.Embedding(2, 4) if config.flags else None
-        self.modulated = config.manner == "modulated"
+        self.modulated = config.variant == "modulated"
         if self.modulated:
             self.blocks = nn.ModuleList(ModulatedBlock(config) for _ in range(config.layers))
             self.words = nn.Linear(config.text, 2 * width * config.layers)
@@ -265,7 +266,7 @@ class PriorNet(nn.Module):
         return Bound(self.text(cond.pooled), keys, values, cond.words[:, None, None], cond.lengths, cond.flags)
 
     def forward(self, x: Tensor, level: int | Tensor, bound: Bound) -> Tensor:
-        """(rows, frames, features) standardised, at ``level`` (one, or one per row; 1..T) to the clean guess."""
+        """(rows, frames, features) standardised, at ``level`` (one, or one per row; 1..T) to the denoised estimate."""
         return self.leave(self.through(self.enter(x, level, bound), bound), x.shape[1])
 
     def enter(self, x: Tensor, level: int | Tensor, bound: Bound) -> Inner:
@@ -284,8 +285,8 @@ class PriorNet(nn.Module):
         both, change = time + bound.text, x.new_zeros(rows, 0)
         last = change
         if self.modulated:
-            told = F.silu(both)
-            change, last = self.change(told).view(rows, 6, -1), self.last(told)[:, None]
+            shaping = F.silu(both)
+            change, last = self.change(shaping).view(rows, 6, -1), self.last(shaping)[:, None]
         else:
             tokens = torch.cat([both[:, None], tokens], dim=1)
         places = torch.arange(tokens.shape[1], device=x.device) * self.config.patch

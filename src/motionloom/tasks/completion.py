@@ -65,7 +65,7 @@ def complete(
     can.
     """
     chosen = PredictionSampling.of(sampling, settings)
-    told = predictor.tell(features, mask, pose)
+    told = predictor.condition(features, mask, pose)
     yes, no = (torch.full((len(told),), flag, device=told.device) for flag in (True, False))
 
     def net(x: Tensor, level: int, cond: tuple[Tensor, Tensor]) -> Tensor:

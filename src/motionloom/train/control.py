@@ -1,9 +1,9 @@
 """Training control: algorithm 1 of Shafir et al. 2024 ("Human Motion Diffusion as a Generative Prior").
 
-    noise <- noise * (1 - M);   x_t = signal * x_0 + noise_t * noise;   loss over all numbers of the clean guess
+    noise <- noise * (1 - M);   x_t = signal * x_0 + noise_t * noise;   loss over all numbers of the denoised estimate
 
 The given numbers M of a state are thus signal * x_0, without noise. From a finished prior, either all its weights are
-trained on (``full``, as published) or a low-rank adapter that is also told what is given (`weights.adapter`).
+trained on (``full``, as published) or a low-rank adapter whose input also says what is given (`weights.adapter`).
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from motionloom.nets.prior import Condition, PriorNet
 from motionloom.nets.text import TextEncoder
 from motionloom.train.loop import Average, Log, World, changed, train
 from motionloom.train.masks import check_control, draw_masks
-from motionloom.train.objectives import CleanGuess, WordBank
+from motionloom.train.objectives import CleanError, WordBank
 from motionloom.train.prior import restandardised
 from motionloom.train.recipe import Recipe
 from motionloom.weights.adapter import Adapter, AdapterNet, adapted, fingerprint, show, tensors_of
@@ -31,7 +31,7 @@ HELD_WINDOW, HELD_ROWS = 80, 48
 
 
 class Shown(nn.Module):
-    """A network in training that binds its condition and is told what is given, if it can be, in one call."""
+    """A network in training that binds its condition and takes what is given, if it can, in one call."""
 
     def __init__(self, net: PriorNet | AdapterNet) -> None:
         super().__init__()
@@ -41,8 +41,8 @@ class Shown(nn.Module):
         return self.net(x, level, show(self.net, self.net.bind(cond), given, mask))
 
 
-class ControlledGuess(CleanGuess):
-    """`CleanGuess` of states whose given numbers are free of noise; the masks of a step follow from (seed, step)."""
+class ControlledError(CleanError):
+    """`CleanError` of states whose given numbers are free of noise; the masks of a step follow from (seed, step)."""
 
     control = "any"
     early = False
@@ -76,9 +76,9 @@ class Held:
 
     @torch.no_grad()
     def errors(self, net: nn.Module) -> tuple[float, float]:
-        """Mean squared error of the clean guess over the given and over the free numbers, standardised."""
-        guess = net(self.noised, self.level, show(net, net.bind(self.cond), self.clean, self.mask))  # type: ignore[operator]
-        error = (guess - self.clean) ** 2
+        """Mean squared error of the denoised estimate over the given and over the free numbers, standardised."""
+        denoised = net(self.noised, self.level, show(net, net.bind(self.cond), self.clean, self.mask))  # type: ignore[operator]
+        error = (denoised - self.clean) ** 2
         return float(error[self.mask].mean()), float(error[~self.mask].mean())
 
 
@@ -131,7 +131,7 @@ def train_control(
     net = _trained(recipe, prior, world.device)
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
     words = WordBank(text, motions.texts, progress=say if world.rank == 0 else lambda line: None)
-    objective = ControlledGuess(
+    objective = ControlledError(
         net, prior.schedule, batches, words,
         drop_text=recipe.drop_text, displacement=recipe.displacement, device=world.device,
     )  # fmt: skip

@@ -10,7 +10,8 @@ from torch import Tensor
 
 from motionloom.data.pairs import Pair, mirrored
 from motionloom.features import humanml
-from motionloom.features.pair import PlaceCode, along, compose, encode, put, seen, told_from
+from motionloom.features.pair import PlaceCode, along, encode
+from motionloom.ground import compose, from_world, relative, to_world
 from motionloom.nets.pair import other
 
 KEEN = (0, 15, 20, 21)
@@ -24,8 +25,8 @@ class Crops(NamedTuple):
 
     features: Tensor
     """(pairs, 2, frames, 263) float32, not standardised; zeros behind a short pair's end."""
-    stands: Tensor
-    """(pairs, 2, 4) of the window's first frame."""
+    ground: Tensor
+    """(pairs, 2, 4) ground poses (cos f, sin f, x, z) at the window's first frame."""
     lengths: np.ndarray
     """(pairs,) valid frames."""
     texts: np.ndarray
@@ -33,37 +34,37 @@ class Crops(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class _Told:
+class _Encoded:
     features: Tensor
-    stands: Tensor
+    ground: Tensor
     texts: tuple[int, ...]
 
 
 class Duets:
-    """Pairs and their mirror images, told once; crops of them are slices."""
+    """Pairs and their mirror images, encoded once; crops of them are slices."""
 
     def __init__(self, pairs: Sequence[Pair], *, mirror: bool = True, texts: Sequence[str] = ()) -> None:
         pairs = [*pairs, *(mirrored(pair) for pair in pairs)] if mirror else pairs
         self.texts = tuple(texts) or ("", *dict.fromkeys(text for pair in pairs for text in pair.captions))
-        self.told = [self._tell(pair) for pair in pairs]
-        self.lengths = np.array([told.features.shape[1] for told in self.told])
+        self.encoded = [self._encode(pair) for pair in pairs]
+        self.lengths = np.array([pair.features.shape[1] for pair in self.encoded])
 
-    def _tell(self, pair: Pair) -> _Told:
-        features, stands, _ = encode(pair.positions)
-        features, stands = torch.from_numpy(features).double(), torch.from_numpy(stands)
-        ways = compose(stands[:, None], along(features))
+    def _encode(self, pair: Pair) -> _Encoded:
+        features, ground, _ = encode(pair.positions)
+        features, ground = torch.from_numpy(features).double(), torch.from_numpy(ground)
+        ways = compose(ground[:, None], along(features))
         known = {text: number for number, text in enumerate(self.texts)}
-        return _Told(features.float(), ways.float(), tuple(known[t] for t in pair.captions if t in known) or (0,))
+        return _Encoded(features.float(), ways.float(), tuple(known[t] for t in pair.captions if t in known) or (0,))
 
     def draw(self, rng: np.random.Generator, window: int, rows: int) -> Crops:
         """Windows anywhere in recordings drawn by the root of their length; half of them with the people exchanged."""
-        which = rng.choice(len(self.told), rows, p=np.sqrt(self.lengths) / np.sqrt(self.lengths).sum())
+        which = rng.choice(len(self.encoded), rows, p=np.sqrt(self.lengths) / np.sqrt(self.lengths).sum())
         starts = rng.integers(0, np.maximum(self.lengths[which] - window, 0) + 1)
         crops = self.crops(which, starts, window, rng=rng)
         flip = torch.from_numpy(rng.random(rows) < 0.5)
         features = torch.where(flip[:, None, None, None], crops.features.flip(1), crops.features)
         return crops._replace(
-            features=features, stands=torch.where(flip[:, None, None], crops.stands.flip(1), crops.stands)
+            features=features, ground=torch.where(flip[:, None, None], crops.ground.flip(1), crops.ground)
         )
 
     def crops(
@@ -72,13 +73,13 @@ class Duets:
         """The windows that begin at ``starts``; without ``rng`` with the first caption of each."""
         features = torch.zeros(len(which), 2, window, humanml.WIDTH)
         lengths = np.minimum(self.lengths[which] - starts, window)
-        stands, texts = [], []
+        ground, texts = [], []
         for row, (number, start, length) in enumerate(zip(which, starts, lengths, strict=True)):
-            told = self.told[number]
-            features[row, :, :length] = told.features[:, start : start + length]
-            stands.append(told.stands[:, start])
-            texts.append(told.texts[int(rng.integers(len(told.texts))) if rng else 0])
-        return Crops(features, torch.stack(stands), lengths, np.array(texts))
+            pair = self.encoded[number]
+            features[row, :, :length] = pair.features[:, start : start + length]
+            ground.append(pair.ground[:, start])
+            texts.append(pair.texts[int(rng.integers(len(pair.texts))) if rng else 0])
+        return Crops(features, torch.stack(ground), lengths, np.array(texts))
 
 
 @dataclass(frozen=True)
@@ -87,28 +88,28 @@ class Sight:
 
     code: PlaceCode
 
-    def stand(self, places: Tensor) -> Tensor:
-        """D (rows, 4), exact or guessed, to the other's stand at frame 0 as each sees it; (rows, 4), not `upright`.
+    def ground(self, places: Tensor) -> Tensor:
+        """D (rows, 4), exact or estimated, to the other's ground pose at frame 0 as each sees it, not `normalized`.
 
-        (Making a direction of a guess near zero would have gradients without bounds.)
+        (Making a direction of an estimate near zero would have gradients without bounds.)
         """
         raw = self.code.raw(places)
-        return raw if self.code.kind == "mutual" else seen(raw, other(raw))
+        return raw if self.code.kind == "mutual" else relative(raw, other(raw))
 
     def partner(self, places: Tensor, features: Tensor) -> Tensor:
-        """D (rows, 4) and features (rows, frames, 263) to the other's stand as each sees it, (rows, frames, 4)."""
+        """D (rows, 4), features (rows, frames, 263) to the other's ground pose as each sees it, (rows, frames, 4)."""
         way = along(features)
-        return seen(way, compose(self.stand(places)[:, None], other(way)))
+        return relative(way, compose(self.ground(places)[:, None], other(way)))
 
     def joints(self, places: Tensor, features: Tensor) -> Tensor:
         """(rows, frames, 4, 4, 3) metres: from each joint of `KEEN` to each of the other person, in the own heading."""
         way = along(features)[..., None, :]
         own = humanml.decode_positions(features)[..., list(KEEN), :]
-        theirs = put(other(own), self.stand(places)[:, None, None])
-        return told_from(theirs, way)[..., None, :, :] - told_from(own, way)[..., :, None, :]
+        theirs = to_world(other(own), self.ground(places)[:, None, None])
+        return from_world(theirs, way)[..., None, :, :] - from_world(own, way)[..., :, None, :]
 
     def error(self, places: Tensor, features: Tensor, true_places: Tensor, true_features: Tensor) -> Tensor:
-        """(rows, frames) square metres of guessed `joints`; what is `NEAR` counts up to five times as much."""
+        """(rows, frames) square metres of estimated `joints`; what is `NEAR` counts up to five times as much."""
         true = self.joints(true_places, true_features)
         near = torch.exp(-0.5 * true.square().sum(-1) / NEAR**2)
         away = (self.joints(places, features) - true).square().sum(-1)

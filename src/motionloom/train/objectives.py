@@ -82,8 +82,8 @@ class Drawn(NamedTuple):
     cond: Condition
 
 
-class CleanGuess:
-    """Mean squared error of the clean guess at a uniformly drawn level (Tevet et al. 2023, eq. 2), blocks weighted.
+class CleanError:
+    """Mean squared error of the estimate of x0 at a uniformly drawn level (Tevet et al. 2023, eq. 2), blocks weighted.
 
     The mean is over valid frames and numbers of each row, then over rows, as published (specification of MDM's loss).
     ``early``: share of the samples whose level is drawn as often as samplers go there, most of them near pure noise,
@@ -126,11 +126,11 @@ class CleanGuess:
         often = (self.schedule.steps * (1 - torch.rand(rows, generator=generator) ** 2)).ceil().clamp(min=1).long()
         return torch.where(torch.rand(rows, generator=generator) < self.early_share, often, level)
 
-    def error(self, guess: Tensor, drawn: Drawn) -> Tensor:
-        """What a guess of the clean data costs."""
-        error = masked_error(guess, drawn.clean, drawn.cond.lengths, self.scale)
+    def error(self, denoised: Tensor, drawn: Drawn) -> Tensor:
+        """What an estimate of the clean data costs."""
+        error = masked_error(denoised, drawn.clean, drawn.cond.lengths, self.scale)
         if self.displacement:
-            moved = displacement_error(guess, drawn.clean, drawn.cond.lengths, self.mean, self.std)
+            moved = displacement_error(denoised, drawn.clean, drawn.cond.lengths, self.mean, self.std)
             error = error + self.displacement * moved
         return error
 
@@ -156,10 +156,10 @@ class Conditioned(nn.Module):
         return self.net(x, level, self.net.bind(cond))
 
 
-def masked_error(guess: Tensor, clean: Tensor, lengths: Tensor, scale: Tensor) -> Tensor:
+def masked_error(denoised: Tensor, clean: Tensor, lengths: Tensor, scale: Tensor) -> Tensor:
     """Weighted squared error over valid frames: (rows, frames, features) twice, (rows,), (features,) to one number."""
     valid = torch.arange(clean.shape[1], device=clean.device) < lengths[:, None]
-    error = ((guess.float() - clean) ** 2 * scale).mean(-1)
+    error = ((denoised.float() - clean) ** 2 * scale).mean(-1)
     return ((error * valid).sum(1) / lengths.clamp(min=1)).mean()
 
 
@@ -167,7 +167,7 @@ PLANTED = 4.0
 """How much more a foot that is planted counts in `displacement_error`."""
 
 
-def displacement_error(guess: Tensor, clean: Tensor, lengths: Tensor, mean: Tensor, std: Tensor) -> Tensor:
+def displacement_error(denoised: Tensor, clean: Tensor, lengths: Tensor, mean: Tensor, std: Tensor) -> Tensor:
     """Squared error of how far each joint goes from frame to frame, as positions decode it, in units of its spread.
 
     (rows, frames, features) standardised twice, (rows,), (features,) twice, to one number. Four frames share a token:
@@ -175,7 +175,7 @@ def displacement_error(guess: Tensor, clean: Tensor, lengths: Tensor, mean: Tens
     """
     block = LAYOUT["joint_velocity"]
     wanted = (clean[:, :-1, block] * std[block] + mean[block]).unflatten(-1, (22, 3))
-    error = ((displacements(guess.float() * std + mean) - wanted) ** 2).sum(-1) / (3 * std[block].mean() ** 2)
+    error = ((displacements(denoised.float() * std + mean) - wanted) ** 2).sum(-1) / (3 * std[block].mean() ** 2)
     planted = clean[:, :-1, LAYOUT["contacts"]] * std[LAYOUT["contacts"]] + mean[LAYOUT["contacts"]] > 0.5
     weight = torch.ones_like(error)
     weight[..., list(FEET)] += (PLANTED - 1) * planted

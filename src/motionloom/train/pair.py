@@ -89,7 +89,7 @@ class Drawn(NamedTuple):
     """(rows, 1 + frames, 263) states: D in the first slot, standardised frames behind it."""
     noise: Tensor
     given: Tensor
-    """(rows, 1 + frames) bool: slots that are told, free of noise."""
+    """(rows, 1 + frames) bool: slots that are given, free of noise."""
     level: Tensor
     """(rows,) the same for both people."""
     cond: Condition
@@ -98,7 +98,7 @@ class Drawn(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """What a guess costs."""
+    """What an estimate costs."""
 
     motion: Tensor
     place: Tensor
@@ -106,8 +106,8 @@ class Parts(NamedTuple):
     displacement: Tensor
 
 
-class PairGuess:
-    """Squared error of the clean guess of two people: see `train.objectives.Objective`."""
+class PairError:
+    """Squared error of the denoised estimate of two people: see `train.objectives.Objective`."""
 
     def __init__(self, net: PairNet, prior: Prior, duets: Duets, *, settings: Settings, recipe: Recipe) -> None:
         self._net, self.schedule, self.duets = net, prior.schedule, duets
@@ -129,7 +129,7 @@ class PairGuess:
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `Objective.loss`; rows: pairs."""
         drawn = self.drawn(seed, step, rows)
-        return self.total(self.parts(self.guess(net, drawn), drawn))
+        return self.total(self.parts(self.denoised(net, drawn), drawn))
 
     def drawn(self, seed: int, step: int, pairs: int) -> Drawn:
         """What a step looks at, from ``(seed, step)`` alone."""
@@ -144,7 +144,7 @@ class PairGuess:
         frames = crops.features.shape[2]
         kind = rng.random(pairs)
         begun, react = kind < said.prefix, (kind >= said.prefix) & (kind < said.prefix + said.react)
-        given = told(rng, begun, react, crops.lengths, frames)
+        given = given_slots(rng, begun, react, crops.lengths, frames)
         dropped = np.where(begun | react, said.silent, self.recipe.drop_text)
         keep = (rng.random(pairs) >= dropped) & (crops.texts > 0)
         at = rng.random(pairs)
@@ -153,7 +153,7 @@ class PairGuess:
         both = [torch.from_numpy(np.repeat(x, 2)) for x in (crops.lengths, crops.texts, keep, level)]
         lengths, texts, keeps, levels = (x.to(self.device) for x in both)
         cond = self.words.condition(texts.cpu(), lengths.cpu()).choose(keeps.cpu())
-        places = self._net.talk.config.places.encode(crops.stands).flatten(0, 1)
+        places = self._net.talk.config.places.encode(crops.ground).flatten(0, 1)
         clean = join(places.to(self.mean), ((crops.features.to(self.mean) - self.mean) / self.std).flatten(0, 1))
         valid = torch.arange(frames, device=self.device) < lengths[:, None]
         clean[:, 1:] *= valid[..., None]
@@ -161,14 +161,14 @@ class PairGuess:
         cond = Condition(*(x.to(self.device) for x in cond))
         return Drawn(clean, noise, torch.from_numpy(given).to(self.device), levels, cond, lengths)
 
-    def guess(self, net: nn.Module, drawn: Drawn) -> Tensor:
-        """The network's guess of the clean states."""
+    def denoised(self, net: nn.Module, drawn: Drawn) -> Tensor:
+        """The network's estimate of the clean states."""
         state = self.schedule.noised(drawn.clean, drawn.level, drawn.noise * ~drawn.given[..., None])
         return net(state, drawn.level, self._net.bind(drawn.cond))
 
-    def parts(self, guess: Tensor, drawn: Drawn) -> Parts:
-        """What a guess of the clean states costs; told slots are as they are told."""
-        shown = torch.where(drawn.given[..., None], drawn.clean, guess.float())
+    def parts(self, denoised: Tensor, drawn: Drawn) -> Parts:
+        """What an estimate of the clean states costs; given slots are as they are given."""
+        shown = torch.where(drawn.given[..., None], drawn.clean, denoised.float())
         valid = torch.arange(shown.shape[1] - 1, device=shown.device) < drawn.lengths[:, None]
         free = valid & ~drawn.given[:, 1:]
         error = ((shown - drawn.clean) ** 2)[:, 1:]
@@ -198,7 +198,7 @@ def _over_rows(error: Tensor, free: Tensor) -> Tensor:
     return mean.sum() / (count > 0).sum().clamp(min=1)
 
 
-def told(
+def given_slots(
     rng: np.random.Generator, begun: np.ndarray, react: np.ndarray, lengths: np.ndarray, frames: int
 ) -> np.ndarray:
     """(2 * pairs, 1 + frames) bool, what is given: D and a beginning of 10 to 40 frames (half of the time 20, and at
@@ -217,7 +217,7 @@ def told(
 
 @dataclass(frozen=True)
 class Report:
-    """Errors of guesses on held-out pairs, at fixed windows, levels and noise."""
+    """Errors of estimates on held-out pairs, at fixed windows, levels and noise."""
 
     loss: float
     motion: float
@@ -225,7 +225,7 @@ class Report:
     place: float
     """Squared, of D."""
     root: float
-    """Metres on the ground from where a partner is seen to where that is guessed, mean over free frames."""
+    """Metres on the ground from where a partner is seen to where that is estimated, mean over free frames."""
 
     def __str__(self) -> str:
         return f"motion {self.motion:.4f}, places {self.place:.4f}, partner {self.root:.3f} m off"
@@ -235,22 +235,22 @@ class Report:
 class Held:
     """Windows of pairs that no training saw."""
 
-    objective: PairGuess
+    objective: PairError
     drawn: Drawn
 
     @torch.no_grad()
     def report(self, net: PairNet) -> Report:
         """How well a block does on them."""
-        guess = self.objective.guess(net.eval(), self.drawn)
-        parts, drawn = self.objective.parts(guess, self.drawn), self.drawn
-        shown = torch.where(drawn.given[..., None], drawn.clean, guess.float())
+        denoised = self.objective.denoised(net.eval(), self.drawn)
+        parts, drawn = self.objective.parts(denoised, self.drawn), self.drawn
+        shown = torch.where(drawn.given[..., None], drawn.clean, denoised.float())
         mean, std = self.objective.mean, self.objective.std
         ways = [self.objective.sight.partner(d, x * std + mean) for d, x in (part(shown), part(drawn.clean))]
         off = (ways[0] - ways[1])[..., 2:].norm(dim=-1)[~drawn.given[:, 1:]].mean()
         return Report(float(self.objective.total(parts)), float(parts.motion), float(parts.place), float(off))
 
 
-def held_out(objective: PairGuess, pairs: Sequence[Pair]) -> Held | None:
+def held_out(objective: PairError, pairs: Sequence[Pair]) -> Held | None:
     """Windows of the pairs for validation; None where there are none."""
     pairs = [pair for pair in pairs if pair.split == "val"]
     frames = min([HELD_FRAMES, *(pair.frames - 1 for pair in pairs)])
@@ -292,7 +292,7 @@ def train_pair(
     torch.manual_seed(recipe.seed)
     config = settings.config(prior)
     net = PairNet(prior.net, Talk(config, prior.net.config), prior.schedule, mean=prior.mean, std=prior.std)
-    objective = PairGuess(net, prior, Duets(seen), settings=settings, recipe=recipe)
+    objective = PairError(net, prior, Duets(seen), settings=settings, recipe=recipe)
     seconds = sum(pair.frames for pair in seen) / FPS
     say(f"{sum(p.numel() for p in net.parameters()):,} trained parameters, {len(seen)} pairs of {seconds:.0f} s")
     for line in changed(folder, recipe) if world.rank == 0 else ():

@@ -1,9 +1,9 @@
-"""Training a predictor: windows of recordings, what of them is told, and the weight file that comes out.
+"""Training a predictor: windows of recordings, what the condition shows of them, and the weight file that comes out.
 
-Manner `published` is HumanMAC's training (Chen et al. 2023, section 3.2): noise prediction on raw spectra, the padded
-observation told to four samples in five (one coin per sample; the published code throws one per batch). Manner `told`
-trains one network for every mask: most rows are told a past, some also the end of the window, some joints or the root's
-way in the future.
+Variant `published` is HumanMAC's training (Chen et al. 2023, section 3.2): noise prediction on raw spectra, the padded
+observation as the condition of four samples in five (one coin per sample; the published code throws one per batch).
+Variant `masked` trains one network for every mask: most rows are given a past, some also the end of the window, some
+joints or the root's path in the future.
 """
 
 from collections.abc import Callable
@@ -16,6 +16,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from motionloom._moved import say
 from motionloom.data.prediction import Protocol, Recording
 from motionloom.diffusion import SCHEDULES, Dct, Frames
 from motionloom.errors import MotionloomError
@@ -23,24 +24,26 @@ from motionloom.features.positions import Place
 from motionloom.nets.predictor import NetConfig, TransLinear
 from motionloom.train.loop import Average, Log, World, changed, train
 from motionloom.train.recipe import Recipe
-from motionloom.weights.predictor import Predictor, find_predictor, load_predictor, save_predictor, told_shape
+from motionloom.weights.predictor import Predictor, condition_shape, find_predictor, load_predictor, save_predictor
 from motionloom.weights.prior import Card, find_device
 
 WHOLE_PAST = 0.75
-"""How often all of the past is told; else its last 2 frames or more."""
-KINDS = {"past": 0.6, "end": 0.15, "joints": 0.1, "way": 0.05, "scattered": 0.1}
-"""How often what is told, manner `told`: the past alone; and the window's end; some joints in all of the future; the
-root's way in the future; some joints in some stretches."""
+"""How often all of the past is given; else its last 2 frames or more."""
+KINDS = {"past": 0.6, "end": 0.15, "joints": 0.1, "path": 0.05, "scattered": 0.1}
+"""How often what is given, variant `masked`: the past alone; also the window's end; some joints in all of the future;
+the root's path in the future; some joints in some stretches."""
 STATISTICS = 4096
 """Windows that mean and spread are measured on."""
 HELD = 256
+FORMERLY = {"manner": "variant", "untold": "condition_dropout"}
+"""Old names of settings; the variant ``told`` is ``masked`` now."""
 
 
 @dataclass(frozen=True)
 class Settings:
     """The ``[predictor]`` table of a recipe."""
 
-    manner: Literal["published", "told"] = "told"
+    variant: Literal["published", "masked"] = "masked"
     kept: int = 24
     """Frequencies."""
     dct: bool = True
@@ -49,31 +52,45 @@ class Settings:
     width: int = 256
     heads: int = 8
     dropout: float = 0.1
-    untold: float = 0.1
-    """Share of samples that are told nothing (published: 0.2)."""
+    condition_dropout: float = 0.1
+    """Share of samples without a condition (published: 0.2)."""
     smoothed: float = 0.0
-    """Share of samples whose past is told smoothed, as pasts are that the network drew itself: else it takes their
+    """Share of samples whose past is given smoothed, as pasts are that the network drew itself: else it takes their
     smoothness for calm, and long motions come to rest."""
 
     @staticmethod
     def parse(values: dict[str, Any]) -> "Settings":
         """From a recipe's table; raises MotionloomError for what there is not and for values of the wrong kind."""
         hints = get_type_hints(Settings)
+        values = _today(values)
         for key, value in values.items():
             if key not in hints:
                 known = ", ".join(f.name for f in fields(Settings))
                 raise MotionloomError(f"[predictor] has no setting {key!r}; the settings are {known}")
-            kind = str if key == "manner" else hints[key]
+            kind = str if key == "variant" else hints[key]
             fits = isinstance(value, (int, float) if kind is float else kind)
             if not fits or (kind is not bool and isinstance(value, bool)):
                 raise MotionloomError(f"[predictor] {key} must be of kind {kind.__name__}; got {value!r}")
         settings = Settings(**values)
-        shares = 0 <= settings.untold < 1 and 0 <= settings.smoothed <= 1
-        if settings.manner not in ("published", "told") or not shares:
-            raise MotionloomError("[predictor] manner is 'published' or 'told', untold and smoothed are shares")
+        shares = 0 <= settings.condition_dropout < 1 and 0 <= settings.smoothed <= 1
+        if settings.variant not in ("published", "masked") or not shares:
+            raise MotionloomError(
+                "[predictor] variant is 'published' or 'masked', condition_dropout and smoothed are shares"
+            )
         if not 1 <= settings.kept <= 8192:
             raise MotionloomError("[predictor] kept is a number of frequencies, from 1 to the frames of a window")
         return settings
+
+
+def _today(values: dict[str, Any]) -> dict[str, Any]:
+    """A recipe's table under the names of today, with a warning for each old one."""
+    for old in FORMERLY.keys() & values.keys():
+        say(f"[predictor] {old}", FORMERLY[old], above=4)
+    values = {FORMERLY.get(key, key): value for key, value in values.items()}
+    if values.get("variant") == "told":
+        say("[predictor] variant 'told'", "'masked'", above=4)
+        values["variant"] = "masked"
+    return values
 
 
 class Drawn(NamedTuple):
@@ -82,30 +99,30 @@ class Drawn(NamedTuple):
     features: Tensor
     """(rows, frames, channels)"""
     shown: Tensor
-    """The same as it is told: some pasts are smoothed."""
+    """The same as the condition shows it: some pasts are smoothed."""
     pose: Tensor
     """(rows, channels) the last observed pose."""
     mask: Tensor
-    """(rows, frames, parts) what is told."""
+    """(rows, frames, parts) 1 where it is given."""
 
 
 class Windows:
     """Random windows of recordings; recordings are drawn by the root of their length, windows in them evenly."""
 
     def __init__(
-        self, recordings: tuple[Recording, ...], protocol: Protocol, *, manner: str, smoothed: float = 0.0
+        self, recordings: tuple[Recording, ...], protocol: Protocol, *, variant: str, smoothed: float = 0.0
     ) -> None:
         long = [r.positions for r in recordings if len(r.positions) >= protocol.frames]
         if not long:
             raise MotionloomError(f"no recording to train on has the {protocol.frames} frames of a window")
-        self.protocol, self.layout, self.manner, self.smoothed = protocol, protocol.layout, manner, smoothed
+        self.protocol, self.layout, self.variant, self.smoothed = protocol, protocol.layout, variant, smoothed
         self.positions = np.concatenate(long)
         self.lengths = np.array([len(p) for p in long])
         self.starts = np.cumsum(self.lengths) - self.lengths
         self.shares = np.sqrt(self.lengths) / np.sqrt(self.lengths).sum()
 
     def draw(self, seed: int, step: int, rows: int) -> Drawn:
-        """Windows, mirrored half of the time, and what is told of them; from ``(seed, step)`` alone."""
+        """Windows, mirrored half of the time, and what is given of them; from ``(seed, step)`` alone."""
         rng = np.random.default_rng((seed, step))
         frames, layout = self.protocol.frames, self.layout
         which = rng.choice(len(self.lengths), rows, p=self.shares)
@@ -117,7 +134,7 @@ class Windows:
         given = self._smoothed(np.random.default_rng((seed, step, 3)), places, past) if self.smoothed else places
         place = self._place(rng, given[np.arange(rows), past - 1])
         features, shown = layout.encode(places, place), layout.encode(given, place)
-        mask = np.stack([self._told(rng, int(h)) for h in past])
+        mask = np.stack([self._mask(rng, int(h)) for h in past])
         pose = shown[np.arange(rows), past - 1]
         drawn = (features, shown, pose, mask)
         return Drawn(*(torch.from_numpy(np.ascontiguousarray(x, dtype=np.float32)) for x in drawn))
@@ -141,30 +158,30 @@ class Windows:
 
     def _pasts(self, rng: np.random.Generator, rows: int) -> NDArray[np.int64]:
         whole = np.full(rows, self.protocol.observed)
-        if self.manner == "published":
+        if self.variant == "published":
             return whole
         return np.where(rng.random(rows) < WHOLE_PAST, whole, rng.integers(2, self.protocol.observed + 1, rows))
 
     def _place(self, rng: np.random.Generator, last: NDArray[np.float64]) -> Place:
-        """Where the window is told from; seen from anywhere where the layout does not turn the person itself."""
+        """The origin and heading of the window; seen from anywhere where the layout does not turn the person itself."""
         place = self.layout.place(last)
         if self.layout.across:
             return place
         turn = np.where(rng.random(len(last)) < 0.5, rng.uniform(0, 2 * np.pi, len(last)), 0.0)
         return Place(place.origin, turn)
 
-    def _told(self, rng: np.random.Generator, past: int) -> NDArray[np.float32]:
+    def _mask(self, rng: np.random.Generator, past: int) -> NDArray[np.float32]:
         frames, parts = self.protocol.frames, self.layout.parts
         mask = np.zeros((frames, parts), dtype=np.float32)
         mask[:past] = 1
-        kind = "past" if self.manner == "published" else rng.choice(list(KINDS), p=list(KINDS.values()))
+        kind = "past" if self.variant == "published" else rng.choice(list(KINDS), p=list(KINDS.values()))
         if kind == "end":
             mask[
                 frames - rng.integers(1, max(2, (frames - past) * 2 // 3)) :, rng.random() < 0.5 and self.layout.root :
             ] = 1
         elif kind == "joints":
             mask[past:, rng.choice(parts, rng.integers(1, parts), replace=False)] = 1
-        elif kind == "way" and self.layout.root:
+        elif kind == "path" and self.layout.root:
             mask[past:, 0] = 1
         elif kind == "scattered":
             for _ in range(rng.integers(1, 4)):
@@ -174,11 +191,18 @@ class Windows:
 
 
 class Completion:
-    """Mean squared error of the network's guess at a uniformly drawn level."""
+    """Mean squared error of the network's estimate at a uniformly drawn level."""
 
-    def __init__(self, predictor: Predictor, windows: Windows, *, untold: float, device: str = "cpu") -> None:
-        self.predictor, self.windows, self.untold, self.device = predictor.to(device), windows, untold, device
-        scale = predictor.std if predictor.manner == "told" else torch.ones_like(predictor.std)
+    def __init__(
+        self, predictor: Predictor, windows: Windows, *, condition_dropout: float, device: str = "cpu"
+    ) -> None:
+        self.predictor, self.windows, self.condition_dropout, self.device = (
+            predictor.to(device),
+            windows,
+            condition_dropout,
+            device,
+        )
+        scale = predictor.std if predictor.variant == "masked" else torch.ones_like(predictor.std)
         self.scale = (scale / scale.mean()).to(device)
 
     @property
@@ -193,15 +217,15 @@ class Completion:
         """
         p, drawn = self.predictor, Drawn(*(x.to(self.device) for x in self.windows.draw(seed, step, rows)))
         generator = torch.Generator().manual_seed(int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0]))
-        low = 2 if p.manner == "published" else 1  # the published code never trains its first noisy level
+        low = 2 if p.variant == "published" else 1  # the published code never trains its first noisy level
         level = torch.randint(low, p.schedule.steps + 1, (rows,), generator=generator).to(self.device)
         clean = p.to_state(drawn.features, drawn.pose)
         noise = torch.randn(clean.shape, generator=generator).to(self.device)
-        keep = (torch.rand(rows, generator=generator) >= self.untold).to(self.device)
-        told = p.tell(drawn.shown, drawn.mask, drawn.pose)
-        guess = net(p.schedule.noised(clean, level, noise), level - 1, told, keep)
-        wanted = noise if p.manner == "published" else clean
-        return ((guess.float() - wanted) ** 2 * self.scale).mean()
+        keep = (torch.rand(rows, generator=generator) >= self.condition_dropout).to(self.device)
+        condition = p.condition(drawn.shown, drawn.mask, drawn.pose)
+        predicted = net(p.schedule.noised(clean, level, noise), level - 1, condition, keep)
+        wanted = noise if p.variant == "published" else clean
+        return ((predicted.float() - wanted) ** 2 * self.scale).mean()
 
 
 def new_predictor(protocol: Protocol, settings: Settings, windows: Windows, *, schedule: str, levels: int) -> Predictor:
@@ -211,18 +235,25 @@ def new_predictor(protocol: Protocol, settings: Settings, windows: Windows, *, s
         raise MotionloomError(f"[predictor] kept is {settings.kept}, and a window has {frames} frames; keep fewer")
     basis = Dct(frames, settings.kept) if settings.dct else Frames(frames)
     kept = basis.kept
-    told = told_shape(layout, kept) if settings.manner == "told" else None
+    condition = condition_shape(layout, kept) if settings.variant == "masked" else None
     config = NetConfig(
-        layout.channels, kept, settings.layers, settings.width, settings.heads, settings.dropout, told, told is not None
+        layout.channels,
+        kept,
+        settings.layers,
+        settings.width,
+        settings.heads,
+        settings.dropout,
+        condition,
+        condition is not None,
     )
     drawn = windows.draw(2**31 - 1, 0, STATISTICS)
     pose = torch.stack([drawn.pose.mean(0), drawn.pose.std(0).clamp(min=1e-3)])
     plain = torch.zeros(kept, layout.channels)
     predictor = Predictor(
         TransLinear(config), SCHEDULES[schedule](levels), layout, basis, protocol.observed, protocol.fps,
-        settings.manner, plain, torch.ones_like(plain), pose, Card("predictor"),
+        settings.variant, plain, torch.ones_like(plain), pose, Card("predictor"),
     )  # fmt: skip
-    if settings.manner == "published":
+    if settings.variant == "published":
         return predictor
     state = predictor.to_state(drawn.features, drawn.pose)
     return replace(predictor, mean=state.mean(0), std=state.std(0).clamp(min=1e-4))
@@ -245,7 +276,7 @@ def train_predictor(
         find_device(device)
     world, folder = World.join(device), Path(folder)
     settings = Settings.parse(recipe.predictor)
-    windows = Windows(protocol.split("train"), protocol, manner=settings.manner, smoothed=settings.smoothed)
+    windows = Windows(protocol.split("train"), protocol, variant=settings.variant, smoothed=settings.smoothed)
     torch.manual_seed(recipe.seed)
     if recipe.start:
         predictor = load_predictor(find_predictor(recipe.start))
@@ -260,7 +291,7 @@ def train_predictor(
     say(f"{sum(p.numel() for p in predictor.net.parameters()):,} parameters, {minutes:.0f} minutes recorded")
     for line in changed(folder, recipe) if world.rank == 0 else ():
         say(f"going on with another recipe than before: {line}")
-    objective = Completion(predictor, windows, untold=settings.untold, device=world.device)
+    objective = Completion(predictor, windows, condition_dropout=settings.condition_dropout, device=world.device)
     place = folder / f"{recipe.name}.safetensors"
     held = _held(protocol, settings)
 
@@ -281,14 +312,14 @@ def _wrap(recipe: Recipe) -> Callable[[nn.Module], nn.Module]:
 
 def _held(protocol: Protocol, settings: Settings) -> Windows | None:
     try:
-        return Windows(protocol.split("val"), protocol, manner=settings.manner)
+        return Windows(protocol.split("val"), protocol, variant=settings.variant)
     except MotionloomError:
         return None
 
 
 @torch.no_grad()
 def _held_loss(made: Predictor, held: Windows, settings: Settings) -> float:
-    return float(Completion(made, held, untold=settings.untold).loss(made.net, 0, 0, HELD))
+    return float(Completion(made, held, condition_dropout=settings.condition_dropout).loss(made.net, 0, 0, HELD))
 
 
 def _finished(

@@ -14,7 +14,7 @@ from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.nets.text import MiniLM, TextEncoder
 from motionloom.train.known import known_table
 from motionloom.train.loop import Average, Log, World, changed, train
-from motionloom.train.objectives import CleanGuess, Conditioned, WordBank
+from motionloom.train.objectives import CleanError, Conditioned, WordBank
 from motionloom.train.recipe import Recipe
 from motionloom.weights.prior import (
     Card,
@@ -55,7 +55,7 @@ def train_prior(
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
     words = WordBank(text, motions.texts, progress=say if world.rank == 0 else lambda line: None)
-    objective = CleanGuess(
+    objective = CleanError(
         net, schedule, batches, words,
         drop_text=recipe.drop_text, displacement=recipe.displacement, early=recipe.early,
         heights=recipe.heights, device=world.device,

@@ -77,7 +77,7 @@ class Recipe:
     rank: int = 12
     """Rank of an adapter."""
     given_rank: int = 64
-    """Rank of an adapter's input for what is given; 0: the network is not told, as published."""
+    """Rank of an adapter's input for what is given; 0: the network does not see it, as published."""
     spacing: str = "index"
     """Control training: levels evenly drawn (``index``, as published), or as often as samplers go there (``early``)."""
     adapter: str = ""

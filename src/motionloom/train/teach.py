@@ -2,7 +2,7 @@
 
 A step sees two kinds of rows. Some show a clip, with its caption, and cost what a clip costs in training a prior. The
 others show what the prior itself draws for sentences it knows, some of them without their sentence, and cost what the
-changed network's guess differs from the unchanged one's (learning without forgetting, Li & Hoiem 2016; prior
+changed network's estimate differs from the unchanged one's (learning without forgetting, Li & Hoiem 2016; prior
 preservation, Ruiz et al. 2023). Since nothing is taught without words, guidance strengthens what was taught.
 """
 
@@ -179,12 +179,12 @@ class Teaching:
         cond = self.words.condition(torch.tensor(texts), torch.tensor(lengths)).choose(speaks)
         cond = Condition(*(part.to(self.device) for part in cond))
         level, noised = level.to(self.device), self.schedule.noised(clean, level.to(self.device), noise)
-        guess, before = net(noised, level, cond), clean[rows - kept :]
+        denoised, before = net(noised, level, cond), clean[rows - kept :]
         if kept:
             with torch.no_grad():
                 old = Condition(*(part[rows - kept :] for part in cond))
                 before = self.base(noised[rows - kept :], level[rows - kept :], self.base.bind(old))
-        return self._error(guess, clean, before, cond.lengths, rows - kept)
+        return self._error(denoised, clean, before, cond.lengths, rows - kept)
 
     def _rows(self, rng: np.random.Generator, window: int, rows: int, kept: int) -> tuple[Tensor, list[int], list[int]]:
         """Windows (rows, window, 263), first those of examples, then what the prior drew; their texts and lengths."""
@@ -206,12 +206,14 @@ class Teaching:
             lengths.append(length)
         return clean, texts, lengths
 
-    def _error(self, guess: Tensor, clean: Tensor, before: Tensor, lengths: Tensor, own: int) -> Tensor:
-        error = masked_error(guess[:own], clean[:own], lengths[:own], self.scale)
-        error = error + DISPLACEMENT * displacement_error(guess[:own], clean[:own], lengths[:own], self.mean, self.std)
-        if own == len(guess):
+    def _error(self, denoised: Tensor, clean: Tensor, before: Tensor, lengths: Tensor, own: int) -> Tensor:
+        error = masked_error(denoised[:own], clean[:own], lengths[:own], self.scale)
+        error = error + DISPLACEMENT * displacement_error(
+            denoised[:own], clean[:own], lengths[:own], self.mean, self.std
+        )
+        if own == len(denoised):
             return error
-        changed = masked_error(guess[own:], before.float(), lengths[own:], self.scale)
+        changed = masked_error(denoised[own:], before.float(), lengths[own:], self.scale)
         return error + KEEP_WEIGHT * changed
 
 

@@ -1,13 +1,14 @@
 """`Predictor`: a network that completes motion from what is known of it, and the weight file it lives in.
 
 It sees a window of ``frames`` joint places (`features.positions`), the first ``observed`` of them usually known, as the
-lowest frequencies of their cosine transform. Two manners:
+lowest frequencies of their cosine transform. Two variants:
 
-`published`: HumanMAC (Chen et al. 2023). Metres as they are; the network guesses the noise and is told the spectrum of
-the observation padded with its last pose. Published checkpoints are of this manner.
+`published`: HumanMAC (Chen et al. 2023). Metres as they are; the network predicts the noise and its condition is the
+spectrum of the observation padded with its last pose. Published checkpoints are of this variant.
 
-`told`: ours. Everything is relative to the last observed pose and standardised frequency by frequency; the network
-guesses the clean spectrum, and is told what is known, which joints in which frames that is, and the pose itself.
+`masked`: ours. Everything is relative to the last observed pose and standardised frequency by frequency; the network
+predicts the clean spectrum (x0), and its condition is what is known, the mask of joints and frames where that is, and
+the pose itself.
 """
 
 import math
@@ -41,11 +42,11 @@ class Predictor:
     observed: int
     """Frames at the beginning of the window that are usually known."""
     fps: float
-    manner: Literal["published", "told"]
+    variant: Literal["published", "masked"]
     mean: Tensor
-    """(kept, channels) of the state; zeros for the published manner."""
+    """(kept, channels) of the state; zeros for the published variant."""
     std: Tensor
-    """(kept, channels); ones for the published manner."""
+    """(kept, channels); ones for the published variant."""
     pose: Tensor
     """(2, channels) mean and spread of last observed poses."""
     card: Card
@@ -73,23 +74,23 @@ class Predictor:
 
     def to_state(self, features: Tensor, pose: Tensor) -> State:
         """Windows as states; ``pose`` (rows, channels) is the last observed one."""
-        x = features - pose[:, None] if self.manner == "told" else features
+        x = features - pose[:, None] if self.variant == "masked" else features
         return (self.basis.to_spectrum(x) - self.mean) / self.std
 
     def to_features(self, state: State, pose: Tensor) -> Tensor:
         """The inverse of `to_state`, without the frequencies that were dropped."""
         x = self.basis.to_time(state * self.std + self.mean)
-        return x + pose[:, None] if self.manner == "told" else x
+        return x + pose[:, None] if self.variant == "masked" else x
 
-    def tell(self, features: Tensor, mask: Tensor, pose: Tensor) -> Tensor:
-        """What the network is told of windows (rows, frames, channels) known where ``mask`` (rows, frames, parts) is 1.
+    def condition(self, features: Tensor, mask: Tensor, pose: Tensor) -> Tensor:
+        """The condition of windows (rows, frames, channels) known where ``mask`` (rows, frames, parts) is 1.
 
         Unknown numbers are those of ``pose`` (rows, channels), the last observed one.
         """
         mask = mask.to(features)
         each = mask.repeat_interleave(3, dim=-1)
         known = each * (features - pose[:, None])
-        if self.manner == "published":
+        if self.variant == "published":
             return self.basis.to_spectrum(known + pose[:, None])
         spectrum = self.basis.to_spectrum(known) / self.std
         shares = self.basis.to_spectrum(mask) / math.sqrt(self.frames)
@@ -98,18 +99,25 @@ class Predictor:
         last[..., : pose.shape[-1]] = ((pose - self.pose[0]) / self.pose[1])[:, None]
         return torch.cat([rows, last], dim=1)
 
-    def denoiser(self, told: Tensor | None, keep: Tensor | None = None) -> Denoiser:
-        """The network's guess of the clean state, told something or nothing; ``keep`` (rows,): which rows are told."""
+    def denoiser(self, condition: Tensor | None, keep: Tensor | None = None) -> Denoiser:
+        """The network's estimate of the clean state, under a condition or none; ``keep`` (rows,): which rows get it."""
 
-        def guess(x: State, level: int) -> State:
-            return self.net(x, torch.full((len(x),), level - 1, device=x.device), told, keep)
+        def estimate(x: State, level: int) -> State:
+            return self.net(x, torch.full((len(x),), level - 1, device=x.device), condition, keep)
 
-        return from_noise(guess, self.schedule) if self.manner == "published" else guess
+        return from_noise(estimate, self.schedule) if self.variant == "published" else estimate
 
 
-def told_shape(layout: Layout, kept: int) -> tuple[int, int]:
-    """Rows and channels of what a network of the manner `told` is told."""
+def condition_shape(layout: Layout, kept: int) -> tuple[int, int]:
+    """Rows and channels of the condition of a network of the variant `masked`."""
     return kept + 1, layout.channels + layout.parts
+
+
+def _variant(about: dict[str, Any]) -> Literal["published", "masked"]:
+    """What a file says of its variant, which was called ``manner``, and ``masked`` then ``told``."""
+    names: dict[str, Literal["published", "masked"]]
+    names = {"published": "published", "masked": "masked", "told": "masked"}
+    return names[about["variant"] if "variant" in about else about["manner"]]
 
 
 def shipped_predictors() -> dict[str, Path]:
@@ -134,7 +142,7 @@ def save_predictor(predictor: Predictor, path: Path | str, *, half: bool = True)
         "observed": predictor.observed,
         "dct": isinstance(predictor.basis, Dct),
         "fps": predictor.fps,
-        "manner": predictor.manner,
+        "variant": predictor.variant,
         "card": asdict(predictor.card),
     }
     return PREDICTORS.write(path, tensors, about)
@@ -152,17 +160,17 @@ def load_predictor(path: Path) -> Predictor:
         config, layout = NetConfig.parse(about["net"]), Layout.parse(about["layout"])
         basis = _basis(config.kept, about["frames"], about["dct"])
         schedule, card = _schedule(about["schedule"]), _card(about["card"])
-        fps, observed, manner = float(about["fps"]), about["observed"], about["manner"]
-        told = {"told": told_shape(layout, config.kept), "published": None}
+        fps, observed, variant = float(about["fps"]), about["observed"], _variant(about)
+        condition = {"masked": condition_shape(layout, config.kept), "published": None}
         if not (math.isfinite(fps) and 1 <= fps <= 1000 and type(observed) is int and 2 <= observed < basis.frames):
             raise ValueError("frames that do not fit together")
-        if layout.channels != config.channels or config.told != told[manner]:
+        if layout.channels != config.channels or config.condition != condition[variant]:
             raise ValueError("a network that does not fit its layout")
     with unfilled():  # what a file only claims to hold takes no memory
         net = TransLinear(config)
     fill(net, {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}, str(path))
     return Predictor(
-        net.eval().requires_grad_(False), schedule, layout, basis, observed, fps, manner,
+        net.eval().requires_grad_(False), schedule, layout, basis, observed, fps, variant,
         *_statistics(path, tensors, config), card,
     )  # fmt: skip
 

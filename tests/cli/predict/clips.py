@@ -11,7 +11,7 @@ from motionloom.features.positions import SMPL_LAYOUT
 from motionloom.motion import Motion
 from motionloom.nets.predictor import NetConfig, TransLinear
 from motionloom.skeleton import SMPL22, Skeleton
-from motionloom.weights.predictor import Predictor, told_shape
+from motionloom.weights.predictor import Predictor, condition_shape
 from motionloom.weights.prior import Card
 
 KEPT, OBSERVED, FRAMES, FPS = 24, 15, 75, 30.0
@@ -20,12 +20,14 @@ KEPT, OBSERVED, FRAMES, FPS = 24, 15, 75, 30.0
 def tiny_predictor() -> Predictor:
     """Random weights that move a person a little: half a second seen, two seconds made."""
     torch.manual_seed(3)
-    shape = told_shape(SMPL_LAYOUT, KEPT)
-    net = TransLinear(NetConfig(channels=66, kept=KEPT, layers=2, width=32, heads=2, told=shape, beside=True)).eval()
+    shape = condition_shape(SMPL_LAYOUT, KEPT)
+    net = TransLinear(
+        NetConfig(channels=66, kept=KEPT, layers=2, width=32, heads=2, condition=shape, beside=True)
+    ).eval()
     zeros = torch.zeros(KEPT, 66)
     pose = torch.stack([torch.zeros(66), torch.ones(66)])
     return Predictor(
-        net.requires_grad_(False), linear(100), SMPL_LAYOUT, Dct(FRAMES, KEPT), OBSERVED, FPS, "told",
+        net.requires_grad_(False), linear(100), SMPL_LAYOUT, Dct(FRAMES, KEPT), OBSERVED, FPS, "masked",
         zeros, zeros + 0.01, pose, Card("tiny"),
     )  # fmt: skip
 

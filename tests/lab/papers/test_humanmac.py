@@ -27,7 +27,7 @@ from motionloom.weights.predictor import Predictor
 from tests.nets.tiny_predictor import predictor
 
 SCHEDULE = cosine(1000)
-MANNERS = ["told", "published"]
+VARIANTS = ["masked", "published"]
 
 
 def some(*shape: int, seed: int = 0) -> Tensor:
@@ -165,9 +165,9 @@ def pasts(made: Predictor, windows: int = 3, seed: int = 0) -> np.ndarray:
     return rng.normal(size=(windows, 1, made.layout.joints, 3)) + steps
 
 
-@pytest.mark.parametrize("manner", MANNERS)
-def test_futures_have_their_shape_and_come_again(manner: str) -> None:
-    made = predictor(manner)
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_futures_have_their_shape_and_come_again(variant: str) -> None:
+    made = predictor(variant)
     first, again = (published_futures(made, pasts(made), count=2, seed=5, steps=4) for _ in range(2))
     assert first.shape == (3, 2, 15, 4, 3)
     np.testing.assert_array_equal(first, again)
@@ -175,10 +175,10 @@ def test_futures_have_their_shape_and_come_again(manner: str) -> None:
     assert np.abs(first - published_futures(made, pasts(made), count=2, seed=6, steps=4)).max() > 0.01
 
 
-@pytest.mark.parametrize("manner", MANNERS)
-def test_a_future_does_not_depend_on_the_others(manner: str) -> None:
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_future_does_not_depend_on_the_others(variant: str) -> None:
     """Neither on how many rows go at a time, nor on the later windows and samples."""
-    made = predictor(manner)
+    made = predictor(variant)
     whole = published_futures(made, pasts(made), count=4, seed=5, steps=4, told_share=0.5)
     np.testing.assert_allclose(
         published_futures(made, pasts(made), count=4, seed=5, steps=4, told_share=0.5, rows=5), whole, atol=1e-4
@@ -188,12 +188,12 @@ def test_a_future_does_not_depend_on_the_others(manner: str) -> None:
 
 
 def oracle(made: Predictor, answer: Callable[[Tensor], Tensor]) -> Predictor:
-    """A predictor whose network names what it is answered by the clean state of all rows, as its manner asks."""
+    """A predictor whose network names what it is answered by the clean state of all rows, as its variant asks."""
 
     class Perfect(TransLinear):
         def forward(self, x: Tensor, t: Tensor, told: Tensor | None = None, keep: Tensor | None = None) -> Tensor:
             clean = answer(x)
-            if made.manner == "told":
+            if made.variant == "masked":
                 return clean
             a, b = made.schedule.at(int(t[0]) + 1)
             return (x - a * clean) / b
@@ -201,10 +201,10 @@ def oracle(made: Predictor, answer: Callable[[Tensor], Tensor]) -> Predictor:
     return replace(made, net=Perfect(made.net.config).eval())
 
 
-@pytest.mark.parametrize("manner", MANNERS)
-def test_a_perfect_guess_gives_the_true_future_but_for_the_noise_that_is_left(manner: str) -> None:
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_perfect_guess_gives_the_true_future_but_for_the_noise_that_is_left(variant: str) -> None:
     """With every frequency kept, so that mixing loses nothing; without the root's way it stays where it was seen."""
-    made = predictor(manner, kept=20)
+    made = predictor(variant, kept=20)
     world = pasts(replace(made, observed=20), 1)
     if not made.layout.root:
         world += world[:, 4:5, :1] - world[:, :, :1]
@@ -231,9 +231,9 @@ def test_the_published_manner_is_the_sampler_on_plain_tensors() -> None:
     np.testing.assert_allclose(found, expected.numpy(), atol=1e-4)
 
 
-@pytest.mark.parametrize("manner", MANNERS)
-def test_the_network_is_called_once_per_step_and_rows_are_told_as_asked(manner: str) -> None:
-    made, calls = predictor(manner), []
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_the_network_is_called_once_per_step_and_rows_are_told_as_asked(variant: str) -> None:
+    made, calls = predictor(variant), []
 
     class Spy(TransLinear):
         def forward(self, x: Tensor, t: Tensor, told: Tensor | None = None, keep: Tensor | None = None) -> Tensor:

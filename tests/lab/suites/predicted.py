@@ -8,7 +8,7 @@ from motionloom.diffusion import SCHEDULES, Dct
 from motionloom.features.positions import SMPL_LAYOUT, Layout
 from motionloom.nets.predictor import NetConfig, TransLinear
 from motionloom.skeleton import SMPL22
-from motionloom.weights.predictor import Predictor, told_shape
+from motionloom.weights.predictor import Predictor, condition_shape
 from motionloom.weights.prior import Card
 
 FPS, SEEN, AHEAD = 30.0, 10, 14
@@ -56,8 +56,8 @@ def predictor(
     ahead: int = AHEAD,
     fps: float = FPS,
 ) -> Predictor:
-    """Random weights, of the manner ``told``."""
-    config = NetConfig(layout.channels, kept, 2, 16, 2, 0.0, told_shape(layout, kept), True)
+    """Random weights, of the variant ``told``."""
+    config = NetConfig(layout.channels, kept, 2, 16, 2, 0.0, condition_shape(layout, kept), True)
     with torch.random.fork_rng():
         torch.manual_seed(seed)
         net = TransLinear(config)
@@ -66,6 +66,6 @@ def predictor(
     nothing = torch.zeros(kept, layout.channels)
     pose = torch.stack([nothing[0], torch.ones(layout.channels)])
     return Predictor(
-        net.eval().requires_grad_(False), SCHEDULES["cosine"](1000), layout, Dct(seen + ahead, kept), seen, fps, "told",
-        nothing, 0.1 + torch.ones_like(nothing), pose, Card("tiny", data="made up"),
+        net.eval().requires_grad_(False), SCHEDULES["cosine"](1000), layout, Dct(seen + ahead, kept), seen, fps,
+        "masked", nothing, 0.1 + torch.ones_like(nothing), pose, Card("tiny", data="made up"),
     )  # fmt: skip

@@ -163,7 +163,7 @@ def test_layers_of_the_bare_prior_do_nothing(config) -> None:
     """What one frame says reaches no other, and words only through what all frames share."""
     prior = ways.bare(tiny.prior(config))
     words = torch.randn(1, 5, TEXT)
-    bound = prior.net.bind(condition(words.mean(1), tokens=words if config.manner == "modulated" else None))
+    bound = prior.net.bind(condition(words.mean(1), tokens=words if config.variant == "modulated" else None))
     x = torch.randn(1, 16, 263)
     other = x.clone()
     other[:, 4:8] += 1.0

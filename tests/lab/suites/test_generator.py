@@ -30,7 +30,7 @@ class Words:
 def prior() -> Prior:
     """An untrained network around the features of a walk: people that tremble."""
     torch.manual_seed(0)
-    net = PriorNet(NetConfig(manner="modulated", width=16, layers=1, heads=2, hidden=16, text=8, patch=4))
+    net = PriorNet(NetConfig(variant="modulated", width=16, layers=1, heads=2, hidden=16, text=8, patch=4))
     features = torch.from_numpy(humanml.encode(walking(1.0), heading="corrected"))
     return Prior(
         net.eval().requires_grad_(False), cosine(50), features.mean(0), features.std(0) + 0.01, Words(), Card("tiny")

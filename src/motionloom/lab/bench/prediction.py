@@ -64,7 +64,7 @@ def _standing(frames: int, joints: int) -> np.ndarray:
 def _published() -> Predictor:
     standing = Recording("standing", "", "", "train", _standing(200, 17).astype(np.float32))
     protocol = Protocol("h36m", 50.0, 25, 100, H36M_LAYOUT, (standing,), "none")
-    windows = Windows(protocol.recordings, protocol, manner="published")
+    windows = Windows(protocol.recordings, protocol, variant="published")
     settings = Settings("published", 20, width=512)
     made = new_predictor(protocol, settings, windows, schedule="cosine", levels=1000)
     return replace(made, net=made.net.eval().requires_grad_(False))

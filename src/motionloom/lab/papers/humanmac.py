@@ -191,9 +191,9 @@ def published_futures(
 ) -> NDArray[np.float64]:
     """``count`` futures of every past (windows, observed, joints, 3), metres in the world, +Y up, by the recipe above.
 
-    (windows, count, frames - observed, joints, 3). Any predictor: one of the manner `told` takes the same walk with the
-    same mixing, in its own coefficients. ``rows`` rows at a time; a row's noise comes from (seed, window, sample) and
-    depends on no other row. Raises MotionloomError where the past is not as long as the predictor observes.
+    (windows, count, frames - observed, joints, 3). Any predictor; one of the variant `masked` takes the same walk with
+    the same mixing, in its own coefficients. ``rows`` rows at a time; a row's noise comes from (seed, window, sample)
+    and depends on no other row. Raises MotionloomError where the past is not as long as the predictor observes.
     """
     past = np.asarray(past, dtype=np.float64)
     wanted = (predictor.observed, predictor.layout.joints, 3)
@@ -224,7 +224,7 @@ def _complete(predictor: Predictor, observed: Tensor, keep: Tensor, *, draw: Dra
     mask = torch.zeros(rows, predictor.frames, channels, device=observed.device)
     mask[:, :h] = 1
     known = predictor.to_state(window, pose)
-    told = predictor.tell(window, mask[..., ::3], pose) if bool(keep.any()) else None
+    told = predictor.condition(window, mask[..., ::3], pose) if bool(keep.any()) else None
     denoise = predictor.denoiser(told, None if bool(keep.all()) else keep.to(observed.device))
     constrain = mixed_in_time(
         [Held(known, mask.bool())], lambda x: predictor.to_features(x, pose), lambda x: predictor.to_state(x, pose),

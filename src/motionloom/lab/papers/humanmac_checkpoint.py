@@ -27,7 +27,7 @@ def is_humanmac(state: dict[str, Tensor]) -> bool:
 
 
 def import_humanmac(path: Path | str, *, name: str | None = None, licence: str | None = None) -> Predictor:
-    """A published HumanMAC checkpoint (a plain state dict, ``.pt``) as a predictor of the manner `published`.
+    """A published HumanMAC checkpoint (a plain state dict, ``.pt``) as a predictor of the variant `published`.
 
     Its sizes tell the data set: Human3.6M (50 fps, 25 + 100 frames) or HumanEva-I (60 fps, 15 + 60 frames), cosine
     schedule of 1000 levels. Raises MotionloomError for anything but such weights.

@@ -78,7 +78,7 @@ def from_published(state: dict[str, Tensor]) -> PriorNet:
             )
     layers = len({key.split(".")[1] for key in renamed if key.startswith("blocks.")})
     config = NetConfig(
-        manner="published",
+        variant="published",
         features=renamed["out.weight"].shape[0],
         width=renamed["embed.weight"].shape[0],
         layers=layers,

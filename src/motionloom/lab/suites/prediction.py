@@ -225,7 +225,7 @@ def protocol_of(trial: Trial, how: How, predictor: Predictor) -> dict[str, Any]:
         "windows with one future": how.singles.replace("_", " "), "frames per second": p.fps,
         "frames": f"{p.observed} seen, {p.future} predicted",
         "representation": f"places of {p.layout.joints - 1} joints from the root, metres, axes of the world",
-        "statistics": "those of the weights", "trained on": predictor.card.data, "manner": predictor.manner,
+        "statistics": "those of the weights", "trained on": predictor.card.data, "variant": predictor.variant,
         "bones": "ours: as long as the past's; published sampler: as drawn",
         "CMD": f"{len(classes)} classes, speeds {'published' if classes <= p.speeds.keys() else 'of the real futures'}",
         "samples": how.samples, "sampler": f"{SOLVER}, {SPACING} spacing", "steps": how.steps,
