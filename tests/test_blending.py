@@ -26,14 +26,6 @@ def test_decays_begin_with_the_difference_and_its_slope_and_end_with_neither(dec
     assert decay(1 - step) == pytest.approx((0, 0), abs=1e-8)
 
 
-def test_inertialization_goes_on_without_a_jump() -> None:
-    """Behind a border the sum goes on from the value and, nearly, the change per frame before it."""
-    added = blending.inertialize(np.array([2.0]), np.array([0.1]), 99)[:, 0]
-    assert added[0] == pytest.approx(2.1, abs=5e-3)
-    assert added[1] - added[0] == pytest.approx(0.1, abs=1e-2)
-    assert added[-1] == pytest.approx(0, abs=5e-3)
-
-
 def test_hermite_weights_give_back_a_cubic() -> None:
     u = np.linspace(0, 1, 7)
     first, slope, last, end = blending.hermite(u)

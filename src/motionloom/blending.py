@@ -46,21 +46,6 @@ def quintic_decay(u: Any) -> tuple[Any, Any]:
     return 1 - 10 * u**3 + 15 * u**4 - 6 * u**5, u - 6 * u**3 + 8 * u**4 - 3 * u**5
 
 
-def inertialize(offset: Array, slope: Array, frames: int) -> Array:
-    """What to add to ``frames`` frames behind a border.
-
-    Args:
-        offset: (...) the difference at the border.
-        slope: (...) its change per frame there.
-        frames: over how many frames both die down.
-
-    Returns:
-        (frames, ...) from the first frame behind the border on.
-    """
-    u = shares(frames).reshape(-1, *[1] * offset.ndim)
-    return (1 - u) ** 2 * ((1 + 2 * u) * offset + u * (frames + 1) * slope)
-
-
 def shares(count: int) -> Array:
     """(count,) evenly spread numbers strictly between 0 and 1."""
     return np.arange(1, count + 1) / (count + 1)

@@ -8,6 +8,7 @@ import pytest
 from motionloom.cli import generate, main, parser
 from motionloom.errors import MotionloomError
 from motionloom.lab.suites import obey
+from motionloom.lab.suites.harness import Run
 
 
 @pytest.fixture(autouse=True)
@@ -116,4 +117,4 @@ def test_captions_that_are_none_are_told_in_one_short_sentence(folder, content, 
 def test_a_report_with_no_place_is_refused_before_any_motion_is_made(folder, capsys):
     (folder / "taken").write_text("")
     with pytest.raises(MotionloomError, match=r"cannot write '?taken"):
-        obey.run(lambda *_, **__: pytest.fail("a motion was made"), folder=Path("taken"))
+        obey.run(Run(folder=Path("taken")), generate=lambda *_, **__: pytest.fail("a motion was made"))

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from motionloom.edits.stances import FAR, carried, runs, stilled
+from motionloom.edits.stances import FAR, carried, stilled
+from motionloom.kinematics.gestures import true_spans
 
 RNG = np.random.default_rng(0)
 FRAMES = 60
@@ -17,8 +18,8 @@ def sliding(size: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_runs_are_half_open() -> None:
-    assert runs(np.array([True, False, True, True, False])) == [(0, 1), (2, 4)]
-    assert runs(np.zeros(3, dtype=bool)) == []
+    assert true_spans(np.array([True, False, True, True, False])) == [(0, 1), (2, 4)]
+    assert true_spans(np.zeros(3, dtype=bool)) == []
 
 
 def test_what_stands_does_not_move_and_keeps_its_mean_place() -> None:

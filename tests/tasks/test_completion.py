@@ -11,7 +11,7 @@ from torch import Tensor
 from motionloom.diffusion import row_seed
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import SMPL_LAYOUT, bone_lengths
-from motionloom.tasks.completion import Known, _quintic, complete, futures, joined, next_frames
+from motionloom.tasks.completion import Known, complete, futures, joined, next_frames
 from tests.tasks.small_predictor import FRAMES, OBSERVED, small_predictor
 from tests.tasks.test_edit import person
 
@@ -24,15 +24,6 @@ def some(*shape: int, seed: int = 0) -> Tensor:
 
 
 # Led from what is known
-
-
-def test_the_lead_is_the_quintic_with_the_slopes_and_no_curvature_at_either_end() -> None:
-    value, change = _quintic(9, some(1))
-    u = np.arange(1, 10) / 10
-    straight = BPoly.from_derivatives([0, 1], [[1, 0, 0], [0, 0, 0]])
-    leaning = BPoly.from_derivatives([0, 1], [[0, 1, 0], [0, 0, 0]])
-    np.testing.assert_allclose(value[:, 0], straight(u), atol=1e-12)
-    np.testing.assert_allclose(change[:, 0], 10 * leaning(u), atol=1e-12)
 
 
 @pytest.mark.parametrize("known", [(0, 5), (20, 30), (12, 20), (29, 30), (0, 1)])

@@ -7,18 +7,10 @@ from scipy.interpolate import BPoly
 from motionloom import rotations as rot
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.splice import Kept, _fading, splice
+from motionloom.tasks.splice import Kept, splice
 from tests.tasks.test_edit import person
 
 OLD = person(2.0, 30.0)
-
-
-@pytest.mark.parametrize("ease", [1, 2, 9])
-def test_a_difference_fades_as_the_cubic_that_leaves_its_value_and_slope_and_ends_at_rest(ease: int) -> None:
-    offset, slope = np.array([0.3, -1.0, 0.0]), np.array([0.02, 0.1, -0.5])
-    cubic = [BPoly.from_derivatives([0, ease + 1], [[o, s], [0, 0]]) for o, s in zip(offset, slope, strict=True)]
-    expected = np.stack([curve(np.arange(1, ease + 1)) for curve in cubic], axis=1)
-    np.testing.assert_allclose(_fading(offset, slope, ease), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(("first", "last"), [(20, 40), (20, 60), (0, 40), (59, 60), (30, 31)])

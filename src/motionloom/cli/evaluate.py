@@ -78,6 +78,13 @@ def _generator(arguments: argparse.Namespace):
     )
 
 
+def _run(arguments: argparse.Namespace):
+    """Where and how it is measured, for the suites."""
+    from motionloom.lab.suites.harness import Run
+
+    return Run(arguments.weights, folder=arguments.out, device=arguments.device, progress=say)
+
+
 def _settings(arguments: argparse.Namespace) -> dict:
     return {name: getattr(arguments, name) for name in ("weights", "steps", "guidance", "solver", "finished")}
 
@@ -98,8 +105,8 @@ def _obedience(arguments: argparse.Namespace) -> None:
     settings = _settings(arguments)
     generate = everyday.FirstDraws(_generator(arguments))
     results = obey.run(
-        generate, checks, seeds=arguments.seeds, first_seed=seed,
-        paraphrases=arguments.paraphrases, settings=settings, folder=arguments.out, progress=say,
+        _run(arguments), checks, generate=generate, seeds=arguments.seeds, first_seed=seed,
+        paraphrases=arguments.paraphrases, settings=settings,
     )  # fmt: skip
     rows = obey.table(results, checks, real=known()["checks"] if arguments.prompts != "everyday" else None)
     themes = everyday.themes(results)
@@ -151,7 +158,7 @@ def _realism(arguments: argparse.Namespace) -> None:
         wanted, real = realism.orders(chosen), [clip.positions for clip in chosen]
     else:
         wanted, real = realism.everyday(arguments.count), known()["realism"]["held_out"]
-    made, fps = realism.run(_generator(arguments), wanted, seed=arguments.seed, progress=say)
+    made, fps = realism.run(_run(arguments), wanted, generate=_generator(arguments), seed=arguments.seed)
     found = {"settings": _settings(arguments), **realism.judge(made, fps, real)}
     rows = realism.table(found)
     said = f"{found['passed']} of {len(rows) - 1} numbers within 1.5 times of real (or too small to see)"

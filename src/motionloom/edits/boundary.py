@@ -1,20 +1,27 @@
-"""Known frames beside a stretch that is drawn: guesses leave them, come to them and arrive without a jump."""
+"""Known frames beside frames that are sampled: what is sampled leaves them, comes to them and arrives without a jump.
+
+`match_boundary` is how, for whatever is sampled: features within the loop, joint places, a root's path, rotations.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from motionloom import rotations as rot
+from motionloom.blending import cubic_decay
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT
 
 Array = NDArray[np.float64]
+Numbers = TypeVar("Numbers", bound=Any)
 
 JOIN = 10
-"""Frames over which what the network draws is led from the known frames' course to its own."""
+"""Frames over which what the network samples goes over from the known frames' course to its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +43,48 @@ class InpaintWindow:
 
     def __len__(self) -> int:
         return len(self.positions) - 1
+
+
+def match_boundary(
+    lack: Numbers, slope: Numbers, frames: int, *, first: int = 1, decay: Callable[[Any], Any] = cubic_decay
+) -> Numbers:
+    """What to add to the frames beside a boundary, so that neither value nor velocity jumps there.
+
+    Args:
+        lack: (...) what the sampled motion lacks to the known one at the boundary, an array or a tensor.
+        slope: (...) by how much that grows per frame on the way to the boundary.
+        frames: over how many frames both die down to nothing.
+        first: 1: the boundary is the last known frame; 0: it is the first sampled frame, which lacks so much.
+        decay: `blending.cubic_decay` or `blending.quintic_decay`.
+
+    Returns:
+        (frames, ...) for the frames one after the other, away from the boundary.
+    """
+    shape, over = (frames, *[1] * lack.ndim), frames + first
+    if isinstance(lack, Tensor):
+        u = torch.arange(first, over, device=lack.device, dtype=lack.dtype).reshape(shape) / max(over, 1)
+    else:
+        u = np.arange(first, over).reshape(shape) / max(over, 1)
+    value, change = decay(u)
+    return value * lack + change * over * slope
+
+
+def match_rotations(made: Array, known: Array, border: int, step: int, frames: int) -> Array:
+    """Rotations with the frames beside a boundary turned, so that neither direction nor angular velocity jumps.
+
+    Args:
+        made: (frames, joints, 4) unit quaternions, which stay but for the frames beside the boundary.
+        known: the same, or more or fewer frames; read at ``border`` and one frame further from what is sampled.
+        border: the last known frame.
+        step: 1: what is sampled follows it; -1: it comes before.
+        frames: over how many frames the difference dies down.
+    """
+    beside = [at for at in (border - step, border) if 0 <= at < len(known)]
+    lack = rot.quat_to_rotvec(rot.multiply(known[beside], rot.inverse(made[beside])))
+    slope = lack[1] - lack[0] if len(lack) == 2 else np.zeros_like(lack[0])
+    at, result = border + step * np.arange(1, frames + 1), made.copy()
+    result[at] = rot.multiply(rot.rotvec_to_quat(match_boundary(lack[-1], slope, frames)), made[at])
+    return result
 
 
 def arrival(known: Tensor, mask: Tensor, window: InpaintWindow) -> Callable[[Tensor], Tensor]:
@@ -81,8 +130,6 @@ def joining(known: Tensor, mask: Tensor, first: int, last: int) -> Callable[[Ten
     """
     frames = known.shape[1]
     reach = min(JOIN, (last - first) // 2)
-    u = torch.arange(reach, device=known.device, dtype=known.dtype)[:, None] / max(reach, 1)
-    value, change = (1 - u) ** 2 * (1 + 2 * u), (1 - u) ** 2 * u * reach
     free = ~mask
     free[..., LAYOUT["contacts"]] = False
     borders = [(first - 1, 1)] * (first >= 2) + [(last, -1)] * (last <= frames - 2)
@@ -95,7 +142,7 @@ def joining(known: Tensor, mask: Tensor, first: int, last: int) -> Callable[[Ten
             lack = known[:, border] + pace - features[:, start]
             slope = pace - (features[:, start + step] - features[:, start])
             at = start + step * torch.arange(reach, device=known.device)
-            bent[:, at] += value * lack[:, None] + change * slope[:, None]
+            bent[:, at] += match_boundary(lack, slope, reach, first=0).transpose(0, 1)
         return torch.where(free, bent, features)
 
     return join

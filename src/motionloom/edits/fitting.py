@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom.edits.stances import carried, runs
+from motionloom.edits.stances import carried
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FEET
 from motionloom.goals.goal import Goal
 from motionloom.kinematics import costs
 from motionloom.kinematics.feet import planted_feet
+from motionloom.kinematics.gestures import true_spans
 from motionloom.kinematics.ik import LIMBS
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
@@ -111,7 +112,7 @@ def _wishes(goal: Goal, part: slice) -> _Wishes:
 def _windows(goal: Goal) -> Iterator[tuple[int, int]]:
     """Stretches of frames around wishes."""
     asked = goal.asked.any(axis=(1, 2)).astype(float)
-    yield from runs(np.convolve(asked, np.ones(2 * ROUND + 1))[ROUND:-ROUND] > 0.5)
+    yield from true_spans(np.convolve(asked, np.ones(2 * ROUND + 1))[ROUND:-ROUND] > 0.5)
 
 
 def _in_reach(places: Array, goal: Goal) -> Array:

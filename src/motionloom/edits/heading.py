@@ -8,6 +8,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from motionloom.blending import smoothstep
 from motionloom.edits.steering import Correction
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT
@@ -45,8 +46,7 @@ def heading_for(direction: float, prior: Prior, *, first: int) -> Correction:
         before[:] = [float(np.median(lack))]
         if not over:
             over.append(SOONEST + (LONGEST - SOONEST) * min(abs(before[0]) / np.pi, 1.0))
-        u = (np.arange(len(lack)) / over[0]).clip(0, 1)
-        turn = np.concatenate([np.zeros(first), lack * u * u * (3 - 2 * u)])
+        turn = np.concatenate([np.zeros(first), lack * smoothstep(np.arange(len(lack)) / over[0])])
         changed = guess.clone()
         step = torch.from_numpy(-np.diff(turn) / 2 / spread[0]).to(guess)
         changed[: len(step), 0] += step

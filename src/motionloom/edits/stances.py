@@ -3,6 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from motionloom.blending import smoothstep
+from motionloom.kinematics.gestures import true_spans
+
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -14,18 +17,12 @@ BEYOND = 30
 """Frames before the first stance and after the last over which a foot comes back to going with the body."""
 
 
-def runs(flags: Flags) -> list[tuple[int, int]]:
-    """Half-open intervals of consecutive True of flags (frames,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-
-
 def carried(shift: Array, standing: Flags) -> Array:
     """(frames, 3) metres that a foot goes when the body goes by ``shift``: through every stance by the mean of it.
 
     standing: (frames,) flags. Between stances it goes with the body and what leads from one to the other.
     """
-    stances = runs(standing)
+    stances = true_spans(standing)
     extra = [shift[start:stop].mean(0) - shift[start:stop] for start, stop in stances]
     return shift + _between(len(shift), stances, extra, BEYOND)
 
@@ -40,7 +37,7 @@ def stilled(ankle: Array, toe: Array, planted: Flags) -> Array:
         both = flags[1:] & flags[:-1]
         steps[both] = -np.diff(place, axis=0)[both]  # toes last: the foot turns about them while all of it stands
     steps[:, 1] = 0
-    stances, paths = runs(planted[:, 0] | planted[:, 1]), []
+    stances, paths = true_spans(planted[:, 0] | planted[:, 1]), []
     for start, stop in stances:
         path = np.concatenate([np.zeros((1, 3)), np.cumsum(steps[start : stop - 1], axis=0)])
         path -= path.mean(0)
@@ -60,15 +57,10 @@ def _between(frames: int, stances: list[tuple[int, int]], values: list[Array], e
         left, right = ends[i][1] - 1, ends[i + 1][0]
         at = np.arange(max(left + 1, 0), min(right, frames))
         if right - left <= 2 * ease:
-            fading, coming = 1 - _smooth((at - left) / (right - left)), _smooth((at - left) / (right - left))
+            fading, coming = 1 - smoothstep((at - left) / (right - left)), smoothstep((at - left) / (right - left))
         else:
-            fading, coming = 1 - _smooth((at - left) / ease), 1 - _smooth((right - at) / ease)
+            fading, coming = 1 - smoothstep((at - left) / ease), 1 - smoothstep((right - at) / ease)
         result[at] = fading[:, None] * known[i][-1] + coming[:, None] * known[i + 1][0]
     for (start, stop), path in zip(stances, values, strict=True):
         result[start:stop] = path
     return result
-
-
-def _smooth(x: Array) -> Array:
-    u = np.clip(x, 0.0, 1.0)
-    return u * u * (3 - 2 * u)

@@ -15,6 +15,7 @@ from motionloom import rotations as rot
 from motionloom.blending import hermite, shares, smoothstep
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FEET
+from motionloom.kinematics.gestures import true_spans
 from motionloom.kinematics.ik import LIMBS, Limb, aim, hinge_frame, reach
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
@@ -92,7 +93,7 @@ def planted_feet(positions: np.ndarray, fps: float, *, contacts: np.ndarray | No
     least, gap = max(2, round(0.12 * fps)), max(1, round(0.1 * fps))
     result = np.zeros_like(may)
     for k in range(4):
-        runs = [run for run in _runs(may[:, k]) if sure[slice(*run), k].any()]
+        runs = [run for run in true_spans(may[:, k]) if sure[slice(*run), k].any()]
         for start, stop in _joined(runs, gap):
             result[start:stop, k] = stop - start >= least
     return result
@@ -103,12 +104,6 @@ def _told(contacts: np.ndarray, frames: int) -> Flags:
     if contacts.ndim != 2 or contacts.shape[1] != 4 or len(contacts) not in (frames, frames - 1):
         raise MotionloomError(f"contacts must be ({frames}, 4) or ({frames - 1}, 4); got {contacts.shape}")
     return np.concatenate([contacts, contacts[-1:]])[:frames] > 0.5
-
-
-def _runs(flags: Flags) -> list[tuple[int, int]]:
-    """Half-open intervals of consecutive True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
 
 
 def _joined(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
@@ -133,7 +128,7 @@ def _coming(frames: int, shown: int, ease: int) -> Array:
 def _steady_direction(foot: Array, flat: Flags, fps: float, shown: int = 0) -> Array:
     """Unit directions ankle to toes (frames, 3); one direction while the whole foot is on the floor."""
     unit = foot / np.linalg.norm(foot, axis=-1, keepdims=True).clip(1e-9)
-    result, runs, ease = unit.copy(), _runs(flat), max(1, round(_TURN_EASE * fps))
+    result, runs, ease = unit.copy(), true_spans(flat), max(1, round(_TURN_EASE * fps))
     frames = np.arange(len(foot))
     for i, (start, stop) in enumerate(runs):
         # the easing never reaches into the neighbouring stance
@@ -176,7 +171,7 @@ def _correction(ankle: Array, toe: Array, planted: Flags, fps: float, *, held: b
 
 def _pieces(steps: Array, standing: Flags, hole: int) -> Iterator[tuple[int, Array]]:
     """First frame and correction (frames, 3) of each stance, of mean 0; stances that stray are split at the fastest."""
-    waiting = _runs(standing)[::-1]
+    waiting = true_spans(standing)[::-1]
     while waiting:
         start, stop = waiting.pop()
         if stop - start < 2:

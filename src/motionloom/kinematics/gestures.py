@@ -43,14 +43,15 @@ class Flight:
     """Metres: greatest height of the pelvis over its median height in the clip."""
 
 
-def _spans(mask: np.ndarray | np.bool_) -> list[tuple[int, int]]:
+def true_spans(mask: np.ndarray | np.bool_) -> list[tuple[int, int]]:
+    """Half-open ranges of consecutive True in flags (frames,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, dtype=int), [0]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def longest(mask: np.ndarray | np.bool_) -> int:
     """Frames of the longest unbroken stretch of True."""
-    return max((stop - start for start, stop in _spans(mask)), default=0)
+    return max((stop - start for start, stop in true_spans(mask)), default=0)
 
 
 def airborne(positions: np.ndarray, *, clearance: float = 0.05) -> list[Flight]:
@@ -63,7 +64,8 @@ def airborne(positions: np.ndarray, *, clearance: float = 0.05) -> list[Flight]:
     lowest = (p[:, FEET, 1] - stand).min(axis=1)
     usual = np.median(p[:, 0, 1])
     return [
-        Flight(a, b, float(lowest[a:b].max()), float(p[a:b, 0, 1].max() - usual)) for a, b in _spans(lowest > clearance)
+        Flight(a, b, float(lowest[a:b].max()), float(p[a:b, 0, 1].max() - usual))
+        for a, b in true_spans(lowest > clearance)
     ]
 
 
@@ -159,7 +161,7 @@ def wrist_swings(
     for wrist, shoulder in zip(WRISTS, (J["left_shoulder"], J["right_shoulder"]), strict=True):
         raised = hands_height(positions, over=above)[:, 0 if wrist == WRISTS[0] else 1] > 0
         arm = body[:, wrist] - body[:, shoulder]
-        counts.append(sum(_swings(arm[a:b], amplitude) for a, b in _spans(raised) if b - a > fps / 4))
+        counts.append(sum(_swings(arm[a:b], amplitude) for a, b in true_spans(raised) if b - a > fps / 4))
     return counts[0], counts[1]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom.edits.boundary import JOIN
+from motionloom.edits.boundary import JOIN, match_boundary, match_rotations
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
@@ -54,21 +54,10 @@ def _led(drawn: Motion, shown: Motion) -> Motion:
     """The shown frames, and the drawn ones behind them, led over from what was shown."""
     count, behind = len(shown), len(drawn) - len(shown)
     reach = min(JOIN, behind)
-    u = (np.arange(1, behind + 1) / (reach + 1)).clip(0, 1)
-    value, change = (1 - u) ** 2 * (1 + 2 * u), (1 - u) ** 2 * u * (reach + 1)
     off = shown.root - drawn.root[:count]
     root = drawn.root.copy()
     root[:count] = shown.root
-    root[count:] += value[:, None] * off[-1] + change[:, None] * (off[-1] - off[-2])
-    last = [rot.quat_to_rotvec(_nearest(rot.multiply(shown.rotations[k], rot.inverse(drawn.rotations[k])))) for k in
-            (count - 2, count - 1)]  # fmt: skip
-    turn = value[:, None, None] * last[1] + change[:, None, None] * (last[1] - last[0])
-    turns = drawn.rotations.copy()
+    root[count : count + reach] += match_boundary(off[-1], off[-1] - off[-2], reach)
+    turns = match_rotations(drawn.rotations, shown.rotations, count - 1, 1, reach)
     turns[:count] = shown.rotations
-    turns[count:] = rot.multiply(rot.rotvec_to_quat(turn), drawn.rotations[count:])
     return replace(drawn, root=root, rotations=rot.unroll(rot.normalize(turns)))
-
-
-def _nearest(quaternions: Array) -> Array:
-    """Both signs are one turn: those of the shorter way."""
-    return np.where(quaternions[..., :1] < 0, -quaternions, quaternions)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from motionloom.blending import smoothstep
 from motionloom.goals.goal import Goal, Placement, turn_between
 from motionloom.goals.paths import WALKING, even, lengths_along
 from motionloom.live.commands import Path, Steer
@@ -50,7 +51,7 @@ def steered(course: Course, steer: Steer, frames: int, fps: float) -> Goal:
         _ask(goal, at, way)
     if steer.facing is not None:
         turn = float(turn_between(steer.facing, course.place.facing))
-        goal.facing[:] = course.place.facing + turn * _eased(np.arange(frames), _turning(turn))
+        goal.facing[:] = course.place.facing + turn * smoothstep(np.arange(frames) / _turning(turn))
         goal.facing_asked[at] = True
     return goal
 
@@ -68,19 +69,14 @@ def _walked(course: Course, direction: float, step: float, frames: int) -> Array
     start = math.atan2(x, z) if pace > 0.01 else course.place.facing
     turn = float(turn_between(direction, start))
     count = np.arange(frames)
-    angle = start + turn * _eased(count, _turning(turn))
-    size = pace + (step - pace) * _eased(count, PICK_UP)
+    angle = start + turn * smoothstep(count / _turning(turn))
+    size = pace + (step - pace) * smoothstep(count / PICK_UP)
     steps = np.stack([size * np.sin(angle), size * np.cos(angle)], axis=-1)
     return np.array([course.place.x, course.place.z]) + np.concatenate([np.zeros((1, 2)), steps[:-1].cumsum(0)])
 
 
 def _turning(turn: float) -> float:
     return 8.0 + (TURN - 8.0) * min(abs(turn) / math.pi, 1.0)
-
-
-def _eased(count: NDArray[np.int_], over: float) -> Array:
-    u = (count / over).clip(0, 1)
-    return u * u * (3 - 2 * u)
 
 
 class Trail:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.blending import shares, smoothstep
 from motionloom.edits.fitting import fit
 from motionloom.goals.goal import Goal, joined
 from motionloom.kinematics.feet import clean_feet
@@ -96,8 +97,7 @@ def _faded(old: Motion | None, new: Motion) -> Motion:
     if old is None:
         return new
     count = min(len(old), len(new))
-    u = (np.arange(count) + 1) / (count + 1)
-    share = u * u * (3 - 2 * u)
+    share = smoothstep(shares(count))
     root, turns = new.root.copy(), new.rotations.copy()
     root[:count] = old.root[:count] + share[:, None] * (root[:count] - old.root[:count])
     mixed = old.rotations[:count] + share[:, None, None] * (turns[:count] - old.rotations[:count])

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from motionloom._moved import renamed
+from motionloom.blending import quintic_decay
 from motionloom.diffusion import SOLVERS, guide, row_draw, row_seed, sample
+from motionloom.edits.boundary import match_boundary
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import bone_lengths, with_bones
 from motionloom.tasks.sampling import PredictionSampling, PredictionSettings
@@ -114,9 +116,9 @@ def _lead(made: Tensor, known: Tensor, sure: NDArray[np.bool_], ease: int) -> Te
             here = lack[:, border][:, channels]
             behind = border - step
             slope = here - lack[:, behind][:, channels] if 0 <= behind < len(course) and course[behind] else 0 * here
-            value, change = _quintic(room, made)
             frames = border + step * torch.arange(1, room + 1, device=made.device)
-            added[:, frames[:, None], channels] += value * here[:, None] + change * slope[:, None]
+            fading = match_boundary(here, slope, room, decay=quintic_decay).transpose(0, 1)
+            added[:, frames[:, None], channels] += fading
     return added
 
 
@@ -128,13 +130,6 @@ def _borders(course: NDArray[np.bool_], ease: int) -> list[tuple[int, int, int]]
         (edge, 1, min(ease, behind - edge)) if course[edge] else (edge + 1, -1, min(ease, edge - before))
         for before, edge, behind in zip(ends, edges, ends[2:])
     ]
-
-
-def _quintic(room: int, like: Tensor) -> tuple[Tensor, Tensor]:
-    """(room, 1) from one frame behind the border on: from 1 with slope 0, and from 0 with slope 1 per frame, to 0."""
-    u = torch.arange(1, room + 1, device=like.device, dtype=like.dtype)[:, None] / (room + 1)
-    value = 1 - 10 * u**3 + 15 * u**4 - 6 * u**5
-    return value, (u - 6 * u**3 + 8 * u**4 - 3 * u**5) * (room + 1)
 
 
 def next_frames(

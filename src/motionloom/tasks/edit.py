@@ -120,7 +120,7 @@ class Extend:
         added = max(round(self.seconds * clip.fps), 1)
         window = concatenated(tail, *[tail.frames(len(tail) - 1, len(tail))] * added)
         made = sampler.sample(window, _window(window, len(tail), len(window)), seed)
-        spliced = splice(window, made, len(tail), last=len(window), kept=kept_joints(clip, ()))
+        spliced = splice(window, made, len(tail))
         return concatenated(clip, spliced.frames(len(tail), len(window)))
 
 
@@ -320,7 +320,7 @@ def _looped(sampler: _Sampler, motion: Motion, blend: float, seed: int) -> Motio
         (to, drawn), (begin, faced) = standing(made, last), standing(window, last)
         turn = rot.IDENTITY if straight else rot.multiply(drawn, rot.inverse(faced))
         window = concatenated(tail, gap, carried_level(head, turn, begin, to))
-    spliced = splice(window, made, first, last=last, kept=kept_joints(motion, ()))
+    spliced = splice(window, made, first, last=last)
     return concatenated(motion.frames(0, rest), spliced.frames(first, last))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.blending import smoothstep
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import positions_at
 from motionloom.goals.hold import FixedJoints, FixedPart
@@ -57,14 +58,12 @@ class Given:
         return concatenated(held, new.frames(count, len(new))) if count < len(new) else held
 
 
-def given(predictor: Predictor, seen: Past, hold: FixedJoints | None, seconds: float) -> Given | None:
+def given(predictor: Predictor, seen: Past, hold: FixedJoints, seconds: float) -> Given:
     """A hold made ready for a past and a horizon; raises MotionloomError for what cannot be held."""
-    if hold is None:
-        return None
     past = seen.motion
     check_like(past, hold.source, "motion that parts are held to")
     _check_parts(hold, seconds)
-    rate, total = seen.rate, seen.frames(seconds)
+    rate, total = seen.rate, max(round(seconds * past.fps), 1)
     source = _placed(past, hold.source) if hold.align else hold.source
     source = source.frames(0, total + int(np.ceil(predictor.frames / rate)))  # the last window looks further
     end = len(source) / past.fps
@@ -91,9 +90,8 @@ def given(predictor: Predictor, seen: Past, hold: FixedJoints | None, seconds: f
 
 def _own_joints(past: Motion, chosen: frozenset[int] | set[int]) -> Array:
     """(joints,) 1 for the joints of the past's skeleton that some of the 22 stand for, and for what hangs on them."""
-    none = np.zeros(3, dtype=bool)
-    always = kept_parts(past.skeleton, frozenset(), none).joints
-    flags = kept_parts(past.skeleton, frozenset(chosen), none).joints & ~always
+    always = kept_parts(past.skeleton).joints
+    flags = kept_parts(past.skeleton, frozenset(chosen)).joints & ~always
     for joint, parent in enumerate(past.skeleton.parents):
         flags[joint] |= always[joint] and parent >= 0 and flags[parent]
     return flags.astype(np.float64)
@@ -104,8 +102,7 @@ def _weights(spans: Sequence[tuple[float, float]], times: Array, ramp: float) ->
     weight = np.zeros(len(times))
     for begin, end in spans:
         outside = (np.maximum(begin - times, times - end) - 1e-6).clip(0)
-        u = (1 - outside / ramp).clip(0, 1) if ramp else (outside == 0).astype(float)
-        weight = np.maximum(weight, u * u * (3 - 2 * u))
+        weight = np.maximum(weight, smoothstep(1 - outside / ramp) if ramp else outside == 0)
     return weight
 
 

@@ -44,7 +44,7 @@ from motionloom.tasks.sampling import (
     sample,
     smooth,
 )
-from motionloom.tasks.splice import apply_positions, concatenated, kept_parts, splice
+from motionloom.tasks.splice import concatenated, continued
 from motionloom.tasks.text import finish, frames_in
 from motionloom.tasks.watching import View
 from motionloom.weights.pair import PairBlock
@@ -411,11 +411,8 @@ class Ground:
         motion = self.motions[person]
         shown = int((seen - 1) / FPS * motion.fps + 1e-6) + 1
         tail = motion.frames(len(motion) - shown, len(motion))
-        old = concatenated(tail, *[tail.frames(shown - 1, shown)] * max(added, LEAST))
-        at = (np.arange(len(old)) - (shown - 1)) / motion.fps * FPS + seen - 1
+        at = (np.arange(shown + max(added, LEAST)) - (shown - 1)) / motion.fps * FPS + seen - 1
         nearest = np.clip(at.round().astype(int), 0, len(contacts) - 1)
         drawn = positions_at(self.own(person, places), at)
-        made = apply_positions(drawn, old, contacts=contacts[nearest], foot_lock=foot_lock, known=shown)
-        nothing = kept_parts(motion.skeleton, frozenset(), np.zeros(3, dtype=bool))
-        new = splice(old, made, shown, last=len(old), kept=nothing).frames(shown, shown + added)
-        return concatenated(motion, new)
+        new = continued(tail, drawn, contacts=contacts[nearest], foot_lock=foot_lock)
+        return concatenated(motion, new.frames(0, added))

@@ -24,7 +24,7 @@ from motionloom.retarget import to_smpl22
 from motionloom.tasks.completion import FUTURES, Known
 from motionloom.tasks.held import Given, check_like, given
 from motionloom.tasks.sampling import PredictionSampling, PredictionSettings, Progress
-from motionloom.tasks.splice import apply_positions, carried_level, concatenated, kept_parts, splice, standing
+from motionloom.tasks.splice import apply_positions, carried_level, concatenated, continued, splice, standing
 from motionloom.tasks.windows import CONTEXT, Past, WindowSampler, windows_for
 from motionloom.weights.predictor import Predictor
 
@@ -82,7 +82,8 @@ def predict(
     count = chosen.number(FUTURES)
     _check(predictor, past, seconds, count=count, sampling=chosen, longest=WHOLE)
     seen = Past.of(predictor, past)
-    parts, total = given(predictor, seen, hold, seconds), seen.frames(seconds)
+    total = max(round(seconds * past.fps), 1)
+    parts = given(predictor, seen, hold, seconds) if hold else None
     [seed], count_of = replace(chosen, first=0).seeds(1), windows_for(predictor, total / past.fps)
     sampler = WindowSampler(predictor, chosen, root)
     person = np.broadcast_to(seen.person, (count, *seen.person.shape))
@@ -118,7 +119,8 @@ def predict_pieces(
     chosen = PredictionSampling.of(sampling, settings).alone()
     _check(predictor, past, seconds, count=1, sampling=chosen, longest=LONGEST)
     seen = Past.of(predictor, past)
-    parts, total = given(predictor, seen, hold, seconds), seen.frames(seconds)
+    total = max(round(seconds * past.fps), 1)
+    parts = given(predictor, seen, hold, seconds) if hold else None
     windows = WindowSampler(predictor, chosen, root).windows(
         seen.person[None], [(chosen.seeds(1)[0], number)], parts and parts.known,
         windows_for(predictor, total / past.fps),
@@ -204,8 +206,7 @@ def _arriving(
     begin, to = standing(target, 0)[0], standing(made, first)[0]
     moved = carried_level(target, rot.rotvec_to_quat(np.array([0.0, turn, 0.0])), begin, to)
     window = concatenated(tail, pads.frames(len(tail), first), moved.frames(0, behind))
-    nothing = kept_parts(past.skeleton, frozenset(), np.zeros(3, dtype=bool))
-    spliced = splice(window, made, len(tail), last=first, kept=nothing)
+    spliced = splice(window, made, len(tail), last=first)
     return concatenated(past, spliced.frames(len(tail), first), moved)
 
 
@@ -219,18 +220,14 @@ def _on_past(
     needed."""
     fps, rate, tail, grid = past.motion.fps, past.rate, past.tail, past.person
     seen, kept, done = len(tail), 2 * past.observed, 0
-    nothing = kept_parts(tail.skeleton, frozenset(), np.zeros(3, dtype=bool))
     zero = len(grid) - 1  # the grid's index of the past's last frame
     for places in windows:
         grid = np.concatenate([grid, places])
         ready = min(int((len(grid) - 1 - zero) / rate + 1e-6), total)
         if ready < total and ready - done < CHUNK * fps:
             continue
-        last = tail.frames(len(tail) - 1, len(tail))
-        old = concatenated(tail, *[last] * (ready - done))
-        at = (done + np.arange(len(old)) - (len(tail) - 1)) * rate + zero
-        made = apply_positions(positions_at(grid, at), old, foot_lock=foot_lock, known=len(tail))
-        new = splice(old, made, len(tail), last=len(old), kept=nothing).frames(len(tail), len(old))
+        at = (done + np.arange(len(tail) + ready - done) - (len(tail) - 1)) * rate + zero
+        new = continued(tail, positions_at(grid, at), foot_lock=foot_lock)
         new = hold.laid_over(new, done) if hold else new
         yield new
         done = ready

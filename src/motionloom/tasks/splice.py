@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.blending import smoothstep
+from motionloom.edits.boundary import match_boundary, match_rotations
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import resample_positions
 from motionloom.features.layout import FEET, FPS
@@ -40,8 +42,11 @@ class Kept:
     """(3,) which coordinates of the root stay."""
 
 
-def kept_parts(skeleton: Skeleton, joints: frozenset[int], place: Flags) -> Kept:
-    """The skeleton's own joints for some of the 22; joints that none of the 22 stands for (fingers) always stay."""
+def kept_parts(skeleton: Skeleton, joints: frozenset[int] = frozenset(), place: Flags | None = None) -> Kept:
+    """The skeleton's own joints for some of the 22; joints that correspond to none of them (fingers) always stay.
+
+    place: (3,) which coordinates of the root stay; None: none.
+    """
     drivers = read_body(skeleton).drivers
     first = {driver: j for j, driver in reversed(list(enumerate(drivers))) if driver is not None}
     inner = set(first)
@@ -52,7 +57,7 @@ def kept_parts(skeleton: Skeleton, joints: frozenset[int], place: Flags) -> Kept
     for k in sorted(inner):
         above = flags[skeleton.parents[k]] if k else 0 in joints
         flags[k] = first[k] in joints if k in first else above
-    return Kept(flags, place | (0 in joints))
+    return Kept(flags, (np.zeros(3, dtype=bool) if place is None else place) | (0 in joints))
 
 
 def person_at_20(motion: Motion) -> Array:
@@ -93,15 +98,11 @@ def apply_positions(
     if np.median(np.abs(apart[:, 0])) < np.cos(np.radians(30)):
         raise MotionloomError("the clip does not stand upright along +Y; say which axis of its file is up (--up z)")
     apart = (_place(seen) - _place(back)).mean(axis=0)
-    if not known:
-        return _moved(made, apart)
-    apart[1] = (_feet(seen) - _feet(back)).mean()  # legs of another build stand as high, their hips need not
-    return _moved(_held_alike(made, old, known), apart)
-
-
-def _feet(motion: Motion) -> Array:
-    """(frames,) metres: the height of the lowest joint of the feet."""
-    return joints22(motion)[:, list(FEET), 1].min(axis=1)
+    if known:
+        lowest, own = (joints22(motion)[:, list(FEET), 1].min(axis=1) for motion in (back, seen))
+        apart[1] = (own - lowest).mean()  # legs of another build stand as high, their hips need not
+        made = _held_alike(made, old, known)
+    return _with_place(made, _place(made) + apart)
 
 
 def _held_alike(made: Motion, old: Motion, known: int) -> Motion:
@@ -141,21 +142,44 @@ def match_root(old: Motion, made: Motion) -> Motion:
     return Motion(old.skeleton, old.fps, old.root, rotations, translations)
 
 
-def splice(old: Motion, made: Motion, first: int, *, last: int, kept: Kept) -> Motion:
-    """``old`` with the frames ``first`` to before ``last`` of ``made`` (same skeleton, rate, length, manner) in it.
+def splice(old: Motion, made: Motion, first: int, *, last: int | None = None, kept: Kept | None = None) -> Motion:
+    """``old`` with the frames ``first`` to before ``last`` (the end) of ``made`` in it.
 
-    Frames outside are the old ones bit for bit, kept parts are the old ones inside too.
+    Args:
+        old, made: of one skeleton, frame rate and length, and both with or both without moving bones.
+        first, last: frames outside are the old ones bit for bit.
+        kept: parts that are the old ones inside too; None: only joints that correspond to none of the 22.
     """
+    last, kept = len(old) if last is None else last, kept or kept_parts(old.skeleton)
     ease = min(max(2, round(min(EASE * old.fps, (last - first) / 2))), last - first)
-    inside = slice(first, last)
-    rotations = old.rotations.copy()
-    eased = _eased_turns(old.rotations, made.rotations, first, last, ease)
-    drawn = np.where(kept.joints[:, None], old.rotations, eased)
-    rotations[inside] = _same_half(drawn[inside], old.rotations[max(first - 1, 0)])
-    way = _eased_places(_place(old), _place(made), first, last, ease)
-    place = _place(old).copy()
+    turns = made.rotations
+    for border, step in ((first - 1, 1), (last, -1)):
+        if 0 <= border < len(old):
+            turns = match_rotations(turns, old.rotations, border, step, ease)
+    inside, before = slice(first, last), max(first - 1, 0)
+    turns = np.where(kept.joints[:, None], old.rotations, turns)
+    rotations, place = old.rotations.copy(), _place(old).copy()
+    rotations[inside] = rot.unroll(np.concatenate([old.rotations[before : before + 1], turns[inside]]))[1:]
+    way = _eased_places(place, _place(made), first, last, ease)
     place[inside] = np.where(kept.place, place, way)[inside]
     return _with_place(replace(old, rotations=rotations), place)
+
+
+def continued(tail: Motion, places: Array, *, foot_lock: bool, contacts: Array | None = None) -> Motion:
+    """What comes behind a motion, on its skeleton and over its floor, without a jump.
+
+    Args:
+        tail: its last frames, 2 or more.
+        places: (frames, 22, 3) metres of the uniform person that it is; the first ``len(tail)`` are the tail's own.
+        foot_lock: keep planted feet still.
+        contacts: (frames, 4) as in the features; None: by what the feet do.
+
+    Returns:
+        The frames behind the tail.
+    """
+    old = concatenated(tail, *[tail.frames(len(tail) - 1, len(tail))] * (len(places) - len(tail)))
+    made = apply_positions(places, old, contacts=contacts, foot_lock=foot_lock, known=len(tail))
+    return splice(old, made, len(tail)).frames(len(tail), len(old))
 
 
 def overlaid(motion: Motion, source: Motion, joints: Array, place: Array) -> Motion:
@@ -224,50 +248,17 @@ def _with_place(motion: Motion, place: Array) -> Motion:
     return replace(motion, translations=translations)
 
 
-def _moved(motion: Motion, by: Array) -> Motion:
-    return _with_place(motion, _place(motion) + by)
-
-
-def _fading(offset: Array, slope: Array, ease: int) -> Array:
-    """(ease, ...) from one frame behind the border on: a cubic from offset and slope per frame to nothing."""
-    u = (np.arange(1, ease + 1) / (ease + 1)).reshape(-1, *[1] * offset.ndim)
-    return (1 - u) ** 2 * ((1 + 2 * u) * offset + u * (ease + 1) * slope)
-
-
-def _eased_turns(old: Array, made: Array, first: int, last: int, ease: int) -> Array:
-    """``made`` (frames, joints, 4) with what it lacks at the borders, fading."""
-    result = made.copy()
-    for border, step in ((first - 1, 1), (last, -1)):
-        if not 0 <= border < len(old):
-            continue
-        lack = (
-            rot.quat_to_rotvec(rot.multiply(old, rot.inverse(made))[[border - step, border]])
-            if 0 <= border - step < len(old)
-            else None
-        )
-        now = lack[1] if lack is not None else rot.quat_to_rotvec(rot.multiply(old[border], rot.inverse(made[border])))
-        slope = np.zeros_like(now) if lack is None else lack[1] - lack[0]
-        frames = border + step * np.arange(1, ease + 1)
-        result[frames] = rot.multiply(rot.rotvec_to_quat(_fading(now, slope, ease)), result[frames])
-    return result
-
-
 def _eased_places(old: Array, made: Array, first: int, last: int, ease: int) -> Array:
-    """``made`` (frames, 3) with what it lacks at the borders; a way through the stretch spreads over all of it."""
+    """``made`` (frames, 3) with what it lacks at the borders; what they lack differently spreads over the stretch."""
     lack, frames = old - made, len(old)
     before, behind = first > 0, last < frames
-    level = np.array([1.0, 0.0, 1.0])  # with one border only, the other end is at the height that was drawn
+    level = np.array([1.0, 0.0, 1.0])  # with one border only, the other end is at the height that was sampled
     left = lack[first - 1] if before else level * lack[last] if behind else np.zeros(3)
     right = lack[last] if behind else level * left
-    u = ((np.arange(frames) - first + 1) / (last - first + 1)).clip(0, 1)[:, None]
-    result = made + left + u * u * (3 - 2 * u) * (right - left)
+    u = ((np.arange(frames) - first + 1) / (last - first + 1))[:, None]
+    result = made + left + smoothstep(u) * (right - left)
     for border, step, there in ((first - 1, 1, before), (last, -1, behind)):
         if there and 0 <= border - step < frames:
             slope = lack[border] - lack[border - step]
-            result[border + step * np.arange(1, ease + 1)] += _fading(np.zeros(3), slope, ease)
+            result[border + step * np.arange(1, ease + 1)] += match_boundary(np.zeros(3), slope, ease)
     return result
-
-
-def _same_half(turns: Array, before: Array) -> Array:
-    """Signs so that neighbouring frames, and the frame before, lie in the same half of the sphere."""
-    return rot.unroll(np.concatenate([before[None], turns]))[1:]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from motionloom.blending import smoothstep
 from motionloom.diffusion import row_seed
 from motionloom.features.humanml import positions_at
 from motionloom.kinematics.feet import envelope
@@ -53,10 +54,6 @@ class Past:
         tail = motion.frames(max(len(motion) - seen, 0), len(motion))
         return Past(motion, tail, person, predictor.fps / motion.fps, predictor.observed)
 
-    def frames(self, seconds: float) -> int:
-        """Frames of so many seconds at the clip's rate, at least 1."""
-        return max(round(seconds * self.motion.fps), 1)
-
 
 @dataclass(frozen=True)
 class WindowSampler:
@@ -103,8 +100,7 @@ def _lift(person: Array, made: Array, fps: float) -> Array:
     lowest = np.minimum(person[:, -1, :, 1].min(axis=-1), -SUNK)  # who is lower already stays there
     under = (lowest[:, None] - made[..., 1].min(axis=-1)).clip(0)
     ease = max(round(EASE * fps), 1)
-    u = (np.arange(1, made.shape[1] + 1) / (2 * ease)).clip(0, 1)
-    return envelope(under, ease // 2) * u * u * (3 - 2 * u)
+    return envelope(under, ease // 2) * smoothstep(np.arange(1, made.shape[1] + 1) / (2 * ease))
 
 
 def windows_for(predictor: Predictor, seconds: float) -> int:

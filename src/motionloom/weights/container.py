@@ -38,6 +38,8 @@ class Container:
     folder: str = ""
     """Of the shipped files, inside the package's ``weights``."""
     max_bytes: int = MAX_BYTES
+    kind: str = ""
+    """What the description says it is of, where another kind has the same key."""
 
     def shipped(self) -> dict[str, Path]:
         """Names and places of the files of this kind inside the package."""
@@ -59,8 +61,9 @@ class Container:
         """Whether a file, damaged or not, is of this kind, by what its head says."""
         try:
             with safe_open(path, framework="pt") as file:
-                return self.key in (file.metadata() or {})
-        except (SafetensorError, OSError):
+                head = file.metadata() or {}
+            return self.key in head and (not self.kind or plain_json(head[self.key])["kind"] == self.kind)
+        except (SafetensorError, OSError, *_WRONG):
             return False
 
     def read(self, path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
@@ -75,6 +78,8 @@ class Container:
                 kind = next((_a(other.noun) for other in KINDS if other.key in head), "something else")
                 raise MotionloomError(f"{path} is {kind}, not {_a(self.noun)}; name weights of that kind")
             about = plain_json(head[self.key])
+            if self.kind and about["kind"] != self.kind:
+                raise MotionloomError(f"{path} is {about['kind']!r}, not {_a(self.noun)}; name weights of that kind")
             if about.get("format", FORMAT) != FORMAT:
                 raise MotionloomError(
                     f"{path} has the {self.noun} format {about['format']!r}; this motionloom reads {FORMAT}: update it"
@@ -99,8 +104,9 @@ class Container:
         path = Path(path)
         if path.suffix != ".safetensors":
             raise MotionloomError(f"weights are written as .safetensors; {path.name} has another suffix")
+        about = {"format": FORMAT, **({"kind": self.kind} if self.kind else {}), **about}
         kept = {key: value.detach().cpu().contiguous() for key, value in tensors.items()}
-        return save_tensors(kept, path, metadata={self.key: json.dumps({"format": FORMAT, **about}, default=dict)})
+        return save_tensors(kept, path, metadata={self.key: json.dumps(about, default=dict)})
 
 
 def _a(noun: str) -> str:

@@ -13,6 +13,7 @@ from motionloom.errors import MotionloomError
 from motionloom.lab.metrics.obedience import check
 from motionloom.lab.report import files
 from motionloom.lab.suites import obey
+from motionloom.lab.suites.harness import Run
 from tests.kinematics.people import FPS, circling, jumping, moved, spun, standing, walking
 
 FORWARD, STILL = check("walk forward"), check("stand still")
@@ -30,7 +31,7 @@ class Walker:
 
 
 def test_each_seed_is_judged_by_itself() -> None:
-    forward, still = obey.run(Walker(), [FORWARD, STILL], seeds=4)
+    forward, still = obey.run(Run(), [FORWARD, STILL], generate=Walker(), seeds=4)
     assert [a.obeyed for a in forward.attempts] == [True, False, True, False]
     assert [a.obeyed for a in still.attempts] == [False, True, False, True]
     assert [a.seed for a in forward.attempts] == [0, 1, 2, 3]
@@ -40,12 +41,12 @@ def test_a_prompt_counts_when_nine_of_ten_seeds_obey() -> None:
     def nearly(prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[np.ndarray], float]:
         return [standing(seconds), *[walking(1.2, seconds)] * (len(prompts) - 1)], FPS
 
-    assert obey.totals(obey.run(nearly, [FORWARD], seeds=10), [FORWARD])["prompts_obeyed"] == 1
-    assert obey.totals(obey.run(nearly, [FORWARD], seeds=9), [FORWARD])["prompts_obeyed"] == 0
+    assert obey.totals(obey.run(Run(), [FORWARD], generate=nearly, seeds=10), [FORWARD])["prompts_obeyed"] == 1
+    assert obey.totals(obey.run(Run(), [FORWARD], generate=nearly, seeds=9), [FORWARD])["prompts_obeyed"] == 0
 
 
 def test_paraphrases_are_tried_and_counted_apart() -> None:
-    results = obey.run(Walker(), [FORWARD], seeds=2, paraphrases=True)
+    results = obey.run(Run(), [FORWARD], generate=Walker(), seeds=2, paraphrases=True)
     found = obey.totals(results, [FORWARD])
     assert len(results[0].attempts) == 2 * (1 + len(FORWARD.paraphrases))
     assert found["seeds_obeyed_share"] == found["paraphrases_obeyed_share"] == 0.5
@@ -59,26 +60,26 @@ def test_a_stopped_run_goes_on_without_doing_anything_twice(tmp_path: Path) -> N
             return super().__call__(prompts, seconds=seconds, seed=seed)
 
     with pytest.raises(KeyboardInterrupt):
-        obey.run(Stops(), [FORWARD, STILL], seeds=2, folder=tmp_path)
+        obey.run(Run(folder=tmp_path), [FORWARD, STILL], generate=Stops(), seeds=2)
     second = Walker()
-    resumed = obey.run(second, [FORWARD, STILL], seeds=2, folder=tmp_path)
+    resumed = obey.run(Run(folder=tmp_path), [FORWARD, STILL], generate=second, seeds=2)
     assert second.calls == [(STILL.prompt, 2)]
     assert obey.summary(resumed, settings={}) == obey.summary(
-        obey.run(Walker(), [FORWARD, STILL], seeds=2), settings={}
+        obey.run(Run(), [FORWARD, STILL], generate=Walker(), seeds=2), settings={}
     )
 
 
 def test_results_of_other_settings_are_not_mixed_in(tmp_path: Path) -> None:
-    obey.run(Walker(), [FORWARD], seeds=2, folder=tmp_path, settings={"steps": 10})
+    obey.run(Run(folder=tmp_path), [FORWARD], generate=Walker(), seeds=2, settings={"steps": 10})
     with pytest.raises(MotionloomError, match="other settings"):
-        obey.run(Walker(), [FORWARD], seeds=2, folder=tmp_path, settings={"steps": 20})
+        obey.run(Run(folder=tmp_path), [FORWARD], generate=Walker(), seeds=2, settings={"steps": 20})
 
 
 @pytest.mark.parametrize("damage", ["", "{}", "[]", '{"settings": 1', "null"])
 def test_a_damaged_result_file_is_one_clear_sentence(tmp_path: Path, damage: str) -> None:
     (tmp_path / "obedience.json").write_text(damage)
     with pytest.raises(MotionloomError, match=r"obedience\.json"):
-        obey.run(Walker(), [FORWARD], seeds=1, folder=tmp_path)
+        obey.run(Run(folder=tmp_path), [FORWARD], generate=Walker(), seeds=1)
 
 
 _JSON = st.recursive(
@@ -119,11 +120,11 @@ def test_a_changed_bound_changes_the_fingerprint() -> None:
 
 def test_no_seeds_is_a_mistake() -> None:
     with pytest.raises(MotionloomError, match="seeds"):
-        obey.run(Walker(), [FORWARD], seeds=0)
+        obey.run(Run(), [FORWARD], generate=Walker(), seeds=0)
 
 
 def test_tables_have_a_row_per_prompt_and_json_is_plain(tmp_path: Path) -> None:
-    results = obey.run(Walker(), [FORWARD, STILL], seeds=2, folder=tmp_path)
+    results = obey.run(Run(folder=tmp_path), [FORWARD, STILL], generate=Walker(), seeds=2)
     rows = obey.table(results, real={"walk forward": {"held_out": "9/10", "all": "90/100"}})
     assert [row[0] for row in rows[1:]] == [FORWARD.prompt, STILL.prompt]
     assert rows[1][1:5] == ["1/2", "", "9/10", "90/100"]

@@ -9,6 +9,7 @@ from motionloom.lab.metrics.obedience import CHECKS
 from motionloom.lab.metrics.realism import NUMBERS
 from motionloom.lab.suites import realism
 from motionloom.lab.suites.clips import RealClip
+from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.reference import confusion_table, known, rates, reference
 from tests.kinematics.people import FPS, moved, standing, walking
 
@@ -37,7 +38,7 @@ def test_seeds_never_repeat_between_orders() -> None:
         seen.extend(range(seed, seed + len(prompts)))
         return [standing(seconds)] * len(prompts), FPS
 
-    made, _ = realism.run(fake, realism.everyday(40), seed=5)
+    made, _ = realism.run(Run(), realism.everyday(40), generate=fake, seed=5)
     assert len(made) == 40
     assert seen == list(range(5, 45))
 

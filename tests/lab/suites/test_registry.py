@@ -18,6 +18,7 @@ from motionloom.lab.report.report import Column, Report, Row, Value, encode, mar
 from motionloom.lab.suites import needs, obey, physical
 from motionloom.lab.suites.clips import RealClip
 from motionloom.lab.suites.everything import QUICK, Outcome, run_all
+from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.registry import SUITES, Job, Suite, Tools, chosen, command
 from tests.kinematics.people import FPS, moved, standing, walking
 
@@ -302,7 +303,7 @@ def test_obedience_as_shares_of_seeds() -> None:
         return [standing(seconds) if (seed + k) % 2 else walking(1.2, seconds) for k in range(len(prompts))], FPS
 
     checks = [check("walk forward"), check("stand still")]
-    found = obey.run(half, checks, seeds=4, paraphrases=True)
+    found = obey.run(Run(), checks, generate=half, seeds=4, paraphrases=True)
     made = physical.obedience_report(found, checks, command="c", settings={"seeds": 4})
     rows = {row.name: row.values for row in made.rows}
     assert rows["a person walks forward"]["obeyed"] == Value(0.5, count=4)

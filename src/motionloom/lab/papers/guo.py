@@ -5,7 +5,6 @@ vectors are the user's own files; `motionloom import finest.tar` makes one file 
 """
 
 import itertools
-import json
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,21 +13,17 @@ from typing import Any, Literal
 
 import numpy as np
 import torch
-from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
-from motionloom.io.tensors import save_tensors
-from motionloom.io.text import plain_json
 from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Caption
 from motionloom.lab.papers.guo_nets import UNIT, GuoNets, from_state_dict, read_guo
 from motionloom.lab.papers.guo_words import SPECIAL, TAGS, TOKENS, Words, padded, read_array, read_words
-from motionloom.weights.prior import read_tensors
+from motionloom.weights.container import Container
 
 CapLen = Literal["true", "published"]
-FORMAT = 1
-KIND = "guo-evaluator"
+GUO = Container("evaluator of Guo's", "motionloom", kind="guo-evaluator")
 WINDOW = 196
 """Frames to which the published loader fills a clip with zeros."""
 CONTACTS = 4
@@ -213,10 +208,7 @@ def read_published(
 
 def save_guo(evaluator: GuoEvaluator, path: Path | str) -> Path:
     """Write the whole evaluator as one .safetensors file (float32) and give the path back."""
-    path = Path(path)
-    if path.suffix != ".safetensors":
-        raise MotionloomError(f"an evaluator is written as .safetensors; {path.name} has another suffix")
-    tensors = {f"net.{k}": v.detach().cpu().contiguous() for k, v in evaluator.nets.state_dict().items()}
+    tensors = {f"net.{k}": v for k, v in evaluator.nets.state_dict().items()}
     if evaluator.mean is not None and evaluator.std is not None:
         tensors |= {"mean": torch.from_numpy(evaluator.mean.copy()), "std": torch.from_numpy(evaluator.std.copy())}
     special = None
@@ -225,22 +217,13 @@ def save_guo(evaluator: GuoEvaluator, path: Path | str) -> Path:
         tensors |= {"words.text": torch.from_numpy(text.copy())}
         tensors |= {"words.vectors": torch.from_numpy(np.ascontiguousarray(evaluator.words.vectors, dtype=np.float32))}
         special = None if evaluator.words.special is None else dict(evaluator.words.special)
-    about = {"format": FORMAT, "kind": KIND, "card": dict(evaluator.card), "special": special}
-    save_tensors(tensors, path, metadata={"motionloom": json.dumps(about)})
-    return path
+    return GUO.write(path, tensors, {"card": dict(evaluator.card), "special": special})
 
 
 def is_guo(path: Path | str) -> bool:
     """Whether a file calls itself Guo's evaluator: a ``.tar``, or a .safetensors file that `save_guo` wrote."""
     path = Path(path)
-    if path.suffix != ".safetensors":
-        return path.suffix == ".tar"
-    try:
-        with safe_open(path, framework="pt") as file:
-            about = plain_json((file.metadata() or {}).get("motionloom", "{}"))
-        return isinstance(about, dict) and about.get("kind") == KIND
-    except (SafetensorError, OSError, ValueError, RecursionError):
-        return False
+    return path.suffix == ".tar" or (path.suffix == ".safetensors" and GUO.signed(path))
 
 
 def load_guo(path: Path | str, *, cap_len: CapLen = "true") -> GuoEvaluator:
@@ -253,29 +236,20 @@ def load_guo(path: Path | str, *, cap_len: CapLen = "true") -> GuoEvaluator:
         return read_published(path).with_caption_length(cap_len)
     if not path.is_file():
         raise MotionloomError(f"there is no evaluator {path}")
-    tensors, metadata = read_tensors(path)
-    about = _about(path, metadata)
+    about, tensors = GUO.read(path)
+    with GUO.parsing(path):
+        _check_about(about)
     nets = from_state_dict({key[4:]: value for key, value in tensors.items() if key.startswith("net.")})
     mean, std = (_numbers(tensors, key) for key in ("mean", "std"))
     return GuoEvaluator(nets, mean, std, _words(path, tensors, about["special"]), cap_len, about["card"])
 
 
-def _about(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
-    try:
-        about = plain_json(metadata["motionloom"])
-        if about["kind"] != KIND or about["format"] != FORMAT:
-            raise ValueError("another kind or format")
-        special = about["special"]
-        if not _texts(about["card"]) or not (special is None or _texts(special)):
-            raise ValueError("values of the wrong kind")
-        if not set((special or {}).values()) <= set(SPECIAL):
-            raise ValueError("an unknown class of words")
-        return about
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        reason = " ".join(str(error).split())[:120]
-        raise MotionloomError(
-            f"{path} does not describe a Guo evaluator of format {FORMAT} ({reason}); make it with 'motionloom import'"
-        ) from None
+def _check_about(about: dict[str, Any]) -> None:
+    special = about["special"]
+    if not _texts(about["card"]) or not (special is None or _texts(special)):
+        raise ValueError("values of the wrong kind")
+    if not set((special or {}).values()) <= set(SPECIAL):
+        raise ValueError("an unknown class of words")
 
 
 def _texts(values: object) -> bool:

@@ -8,6 +8,7 @@ from motionloom.kinematics.ik import motion_from_positions
 from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics.everyday.sets import THEMES
 from motionloom.lab.suites import obey
+from motionloom.lab.suites.harness import Generate
 from motionloom.viz import draw
 from motionloom.viz.grid import draw_grid
 
@@ -31,7 +32,7 @@ def themes(results: Sequence[obey.Result]) -> list[list[str]]:
 class FirstDraws:
     """A generator that remembers the first motion of every prompt, for the picture."""
 
-    def __init__(self, generate: obey.Generate) -> None:
+    def __init__(self, generate: Generate) -> None:
         self._generate = generate
         self._kept: dict[str, tuple[Array, float]] = {}
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from motionloom.features import humanml
 from motionloom.kinematics.physics import Array
-from motionloom.lab.suites.obey import Generate
+from motionloom.lab.suites.harness import Generate
 from motionloom.tasks.text import sample_features, to_motion
 from motionloom.weights.prior import Prior
 

@@ -3,12 +3,14 @@
 import hashlib
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from motionloom._moved import say
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.kinematics.physics import Array
@@ -24,6 +26,15 @@ Say = Callable[[str], None]
 CHUNK = 64
 """Motions embedded at once."""
 DIVERSITY_PAIRS = 300
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Generate(Protocol):
+    """Motions for prompts, row i from seed ``seed + i``."""
+
+    def __call__(self, prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[Array], float]:
+        """One (frames, 22, 3) array in metres per prompt, and their frames per second."""
+        ...
 
 
 def silent(line: str) -> None:
@@ -72,6 +83,31 @@ class Run:
     def parts(self, settings: Mapping[str, Any]) -> Parts:
         """Where pieces of this run are kept."""
         return Parts(self.folder, fingerprint(settings))
+
+
+def takes_run(*, place: int = 0, first: str = "weights", weights: str = "default") -> Callable[[F], F]:
+    """Let a suite that takes a `Run` take, for one release, what it took before: settings of the run as keywords.
+
+    Args:
+        place: of the run among the arguments.
+        first: what was there instead of it: a field of the run or another keyword.
+        weights: those that were meant where none were named.
+    """
+
+    def wrap(suite: F) -> F:
+        @wraps(suite)
+        def call(*args: Any, **given: Any) -> Any:
+            if "run" in given or any(isinstance(one, Run) for one in args):
+                return suite(*args, **given)
+            say(f"{suite.__module__}.{suite.__name__} with {first}, data and the like", "one with a Run of them")
+            if len(args) > place:
+                given[first] = args[place]
+            kept = {field.name: given.pop(field.name) for field in fields(Run) if field.name in given}
+            return suite(*args[:place], Run(**{"weights": weights, **kept}), *args[place + 1 :], **given)
+
+        return call  # type: ignore[return-value]
+
+    return wrap
 
 
 def readable(prior: Prior, steps: int) -> Prior:

@@ -1,21 +1,23 @@
 """The obedience run: every check's prompt on several seeds, and the tables that come out of it.
 
-Generation comes in as a function, so that a fake one can be tested and any prior measured. What was done is kept in one
-JSON file after every prompt; a run that was stopped goes on with the next one.
+What makes the motions may come in as a function, so that a fake one can be tested. What was done is kept in one JSON
+file after every prompt; a run that was stopped goes on with the next one.
 """
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from motionloom.errors import MotionloomError
 from motionloom.io.text import plain_json
-from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics.everyday.check import Everyday
 from motionloom.lab.metrics.obedience import CHECKS, Check
 from motionloom.lab.report.files import check_report, write_json
+from motionloom.lab.suites.generator import generator
+from motionloom.lab.suites.harness import Generate, Run, takes_run
+from motionloom.weights.prior import Prior
 
 ENOUGH = 0.9
 """Share of seeds that must obey for a prompt to count as obeyed."""
@@ -23,14 +25,6 @@ MOSTLY = 0.7
 """Share of seeds that must obey for a prompt to count as mostly obeyed."""
 Judge = Check | Everyday
 """What has a prompt and limits, of either set."""
-
-
-class Generate(Protocol):
-    """Motions for prompts, row i from seed ``seed + i``."""
-
-    def __call__(self, prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[Array], float]:
-        """One (frames, 22, 3) array in metres per prompt, and their frames per second."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -71,31 +65,45 @@ def attempts(check: Judge, generate: Generate, prompt: str, *, seeds: int, first
     return found
 
 
+@takes_run(first="generate")
 def run(
-    generate: Generate,
+    run: Run,
     checks: Sequence[Judge] = CHECKS,
     *,
+    generate: Generate | None = None,
     seeds: int = 10,
     first_seed: int = 0,
     paraphrases: bool = False,
     settings: dict[str, Any] | None = None,
-    folder: Path | None = None,
-    progress: Callable[[str], None] = lambda line: None,
 ) -> list[Result]:
-    """Every check, resumed from ``folder/obedience.json`` where the settings are the same; writes it as it goes."""
+    """Every check's prompt on several seeds.
+
+    Args:
+        run: where and how; goes on from ``obedience.json`` in its folder, which is written after every prompt.
+        checks: what is asked and what must hold.
+        generate: makes the motions; None: the run's weights with their usual settings.
+        seeds, first_seed: how many, from which on.
+        paraphrases: try the checks' other wordings too.
+        settings: what else the results depend on; kept results of other settings are refused.
+
+    Raises:
+        MotionloomError: for an impossible number of seeds, and kept results that are damaged or of other settings.
+    """
     if not 1 <= seeds <= 10_000:
         raise MotionloomError(f"the number of seeds must be from 1 to 10000; got {seeds}")
     asked = {**(settings or {}), "seeds": seeds, "first_seed": first_seed, "checks": fingerprint(checks)}
-    done = _read(check_report(folder / "obedience.json"), asked) if folder else {}
+    kept = check_report(run.folder / "obedience.json") if run.folder else None
+    done = _read(kept, asked) if kept else {}
+    generate = generate or generator(Prior.load(run.weights, device=run.device))
     for check in checks:
         for prompt in (check.prompt, *(check.paraphrases if paraphrases else ())):
             if any(a.prompt == prompt for a in done.get(check.name, ())):
                 continue
             found = attempts(check, generate, prompt, seeds=seeds, first_seed=first_seed)
             done.setdefault(check.name, []).extend(found)
-            progress(f"{sum(a.obeyed for a in found):3d}/{seeds}  {prompt}")
-            if folder:
-                write_json(folder / "obedience.json", summary(_results(checks, done), checks, settings=asked))
+            run.progress(f"{sum(a.obeyed for a in found):3d}/{seeds}  {prompt}")
+            if kept:
+                write_json(kept, summary(_results(checks, done), checks, settings=asked))
     return _results(checks, done)
 
 

@@ -1,7 +1,7 @@
 """The realism run: generated motions beside real held-out clips of the same words and length."""
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,9 @@ from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics.obedience import CHECKS
 from motionloom.lab.metrics.realism import NUMBERS, average, compare, speed_distance
 from motionloom.lab.suites.clips import RealClip
-from motionloom.lab.suites.obey import Generate
+from motionloom.lab.suites.generator import generator
+from motionloom.lab.suites.harness import Generate, Run, takes_run
+from motionloom.weights.prior import Prior
 
 SHORTEST, LONGEST = 2.0, 9.8
 """Seconds of the real stretches that are compared with."""
@@ -49,20 +51,21 @@ def everyday(count: int) -> list[Order]:
     return [Order((check.prompt,) * max(1, count // len(CHECKS)), check.seconds) for check in CHECKS]
 
 
+@takes_run(first="generate")
 def run(
-    generate: Generate,
-    wanted: Sequence[Order],
-    *,
-    seed: int = 0,
-    progress: Callable[[str], None] = lambda line: None,
+    run: Run, wanted: Sequence[Order], *, generate: Generate | None = None, seed: int = 0
 ) -> tuple[list[Array], float]:
-    """Generate all orders; the motions and their frames per second."""
+    """Generate all orders from seeds ``seed`` on: motions (frames, 22, 3) in metres, and their frames per second.
+
+    generate: makes the motions; None: the run's weights with their usual settings.
+    """
+    generate = generate or generator(Prior.load(run.weights, device=run.device))
     made: list[Array] = []
     fps = float(FPS)
     for order in wanted:
         motions, fps = generate(order.prompts, seconds=order.seconds, seed=seed + len(made))
         made += motions
-        progress(f"{len(made)} of {sum(len(o.prompts) for o in wanted)} motions")
+        run.progress(f"{len(made)} of {sum(len(o.prompts) for o in wanted)} motions")
     return made, fps
 
 

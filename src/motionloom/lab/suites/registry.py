@@ -14,7 +14,7 @@ from motionloom.errors import MotionloomError
 from motionloom.lab.report.report import Report
 from motionloom.lab.suites import needs, obey, physical, realism
 from motionloom.lab.suites.control_kinds import QUICK, SUITE
-from motionloom.lab.suites.harness import Run, Say, digest, evaluator_file, silent
+from motionloom.lab.suites.harness import Generate, Run, Say, digest, evaluator_file, silent
 from motionloom.weights.prior import Prior, shipped
 
 
@@ -22,7 +22,7 @@ from motionloom.weights.prior import Prior, shipped
 class Tools:
     """What a suite cannot make itself: the command line hands it in, a test hands in fakes."""
 
-    generator: Callable[[bool], obey.Generate]
+    generator: Callable[[bool], Generate]
     """Motions of the weights under test, as drawn (False) or as exported (True)."""
     prior: Callable[[], Prior]
     """The weights under test, loaded once."""
@@ -96,22 +96,21 @@ def _judge(job: Job) -> list[Path]:
 
 
 def _obedience(job: Job, settings: Mapping[str, Any]) -> Report:
+    run = job.run("obedience")
     results = obey.run(
-        job.tools.generator(False), seeds=settings["seeds"], paraphrases=settings["paraphrases"],
-        folder=job.folder, progress=job.tools.progress,
-    )  # fmt: skip
-    return physical.obedience_report(results, command=command("obedience", job), settings={"seeds": settings["seeds"]})
+        run, generate=job.tools.generator(False), seeds=settings["seeds"], paraphrases=settings["paraphrases"]
+    )
+    return physical.obedience_report(results, command=run.command, settings={"seeds": settings["seeds"]})
 
 
 def _realism(job: Job, settings: Mapping[str, Any]) -> Report:
     wanted, real, about = physical.realism_orders(job.data, settings["count"])
     if not wanted:
         raise needs.NoData(f"{job.data} has no held-out captioned clips of 2 to 10 s; leave --data out")
-    made, fps = {}, 0.0
+    run, made, fps = job.run("realism"), {}, 0.0
     for name, finished in ((physical.AS_DRAWN, False), (physical.AS_EXPORTED, True)):
-        made[name], fps = realism.run(job.tools.generator(finished), wanted, progress=job.tools.progress)
-    said = command("realism", job)
-    return physical.realism_report(made, fps, real, command=said, protocol={**settings, **about})
+        made[name], fps = realism.run(run, wanted, generate=job.tools.generator(finished))
+    return physical.realism_report(made, fps, real, command=run.command, protocol={**settings, **about})
 
 
 def _speed(job: Job, settings: Mapping[str, Any]) -> Report:
