@@ -8,10 +8,13 @@ import torch
 
 from motionloom.diffusion import cosine
 from motionloom.features import humanml
+from motionloom.goals.timeline import timeline_of
 from motionloom.kinematics.physics import bone_length_error
 from motionloom.lab.suites.generator import generator
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.nets.text import TextEmbedding
+from motionloom.tasks.long import compose
+from motionloom.tasks.splice import concatenated
 from motionloom.weights.prior import Card, Prior
 from tests.kinematics.people import walking
 
@@ -51,3 +54,15 @@ def test_finished_motions_have_constant_bones_and_drawn_ones_need_not(prior: Pri
     (drawn,), _ = generator(prior, steps=2)(["a"], seconds=2.0, seed=0)
     (finished,), _ = generator(prior, steps=2, finished=True)(["a"], seconds=2.0, seed=0)
     assert bone_length_error(finished) < 1e-9 < bone_length_error(drawn)
+
+
+def test_actions_that_follow_each_other_are_the_long_motion_that_generate_makes(prior: Prior) -> None:
+    prompt = "a person walks forward, then sits down"
+    made, _ = generator(prior, steps=2)(["a", prompt], seconds=4.0, seed=5)
+    segments = timeline_of(prompt, 4.0).segments
+    assert [segment.text for segment in segments] == ["a person walks forward", "a person sits down"]
+    expected = concatenated(*compose(prior, segments, seed=6, steps=2)).positions()
+    assert made[1].shape == (80, 22, 3)
+    np.testing.assert_array_equal(made[1], expected)
+    np.testing.assert_array_equal(generator(prior, steps=2)([prompt], seconds=4.0, seed=6)[0][0], expected)
+    np.testing.assert_allclose(made[0], generator(prior, steps=2)(["a"], seconds=4.0, seed=5)[0][0], atol=1e-5)
