@@ -138,7 +138,7 @@ def measure(case: Case, prior: Prior, out: Path, seeds: Sequence[int]) -> dict[s
         "asked": int(goal.asked.any(axis=-1).sum()),
         "mean_cm": 100 * float(np.mean([one.error for one in made])),
         "worst_cm": 100 * max(one.worst for one in made),
-        "drawn_cm": 100 * float(np.mean([off(one.drawn, goal) for one in made])),
+        "drawn_cm": 100 * float(np.mean([off(one.sampled, goal) for one in made])),
         "controlled": own, "uncontrolled": base,
         "ratios": {name: own[name] / base[name] if base[name] > seen else None for name, seen in NUMBERS.items()},
         "seconds": seconds, "seconds_uncontrolled": alone,

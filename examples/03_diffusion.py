@@ -36,6 +36,6 @@ known, mask = torch.full_like(start, 3.0), torch.zeros_like(start)
 mask[:, 0] = 1
 held = observe(known, mask, schedule, row_draw(range(rows)))
 few = levels(schedule, 25)
-guess = run(inpaint(exact, known, mask), start, levels=few, solver=Ddim(), schedule=schedule, draw=draw)
+edited = run(inpaint(exact, known, mask), start, levels=few, solver=Ddim(), schedule=schedule, draw=draw)
 state = run(exact, start, levels=few, solver=Ddim(), schedule=schedule, draw=draw, constrain=held)
-print(f"token 0 by editing the guess: {guess[:, 0].mean():.3f}, by editing the state: {state[:, 0].mean():.3f}")
+print(f"token 0 by editing the estimate: {edited[:, 0].mean():.3f}, by editing the state: {state[:, 0].mean():.3f}")

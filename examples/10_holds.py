@@ -1,6 +1,6 @@
 """A sampling loop of one's own: a known past and known legs are held while a goal leads a hand.
 
-What `edit`, `control` and prediction do in their ways stands here on one loop: edits of the guess (guidance, steering,
+What `edit`, `control` and prediction do in their ways is here on one loop: edits of the estimate (guidance, steering,
 inpainting) are functions around the denoiser, edits of the state (observations) a chain behind each move.
 
     python examples/10_holds.py

@@ -1,6 +1,6 @@
 """Copy the measured tables of benchmarks/ into README.md, so that no number there was typed by hand.
 
-README.md holds pairs of lines, ``<!-- filled from benchmarks/NAME -->`` and ``<!-- end -->``; what stands between
+README.md holds pairs of lines, ``<!-- filled from benchmarks/NAME -->`` and ``<!-- end -->``; what is between
 them is replaced by that file: Markdown without its title, anything else as preformatted text. A missing file leaves
 its place as it is. ``NAME: COLUMN, COLUMN`` takes only these columns of the tables in a Markdown file.
 
@@ -15,7 +15,7 @@ PLACE = re.compile(r"(<!-- filled from ([^\s:]+)(?:: ([^\n]+?))? -->\n)(.*?)(<!-
 
 
 def places(text: str) -> dict[str, str]:
-    """What stands now between each pair of markers, by the file it comes from."""
+    """What is now between each pair of markers, by the file it comes from."""
     return {found[2]: found[4].strip() for found in PLACE.finditer(text)}
 
 

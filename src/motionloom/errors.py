@@ -5,7 +5,7 @@ class MotionloomError(ValueError):
     """A mistake in what came from outside: a file, a prompt, an option.
 
     The message is one sentence (what was wrong, what was there, what to do); the command line prints it
-    to stderr and exits with 2. Programming errors stay ordinary exceptions. Whatever names and values it tells of, it
+    to stderr and exits with 2. Programming errors stay ordinary exceptions. Whatever names and values it mentions, it
     is shown as one line of at most `LONGEST_MESSAGE` characters.
     """
 

@@ -235,7 +235,7 @@ def test_options_that_cannot_be_are_refused_before_anything_is_written(
 
 
 @pytest.mark.parametrize("change", [{"steps": 0}, {"device": "toaster"}], ids=str)
-def test_what_only_a_process_finds_out_is_told_in_its_sentence(
+def test_what_only_a_process_finds_out_is_reported_in_its_sentence(
     weights: str, folder: Path, change: dict[str, Any]
 ) -> None:
     asked = Options(**{"weights": weights, "steps": 2, **change})

@@ -88,6 +88,6 @@ def test_the_judge_of_prompts_knows_some_and_says_so_of_others() -> None:
 
 
 @pytest.mark.parametrize("name", ["", "absent:judge", "motionloom.errors:absent"])
-def test_a_judge_that_is_not_there_is_told(name: str) -> None:
+def test_a_judge_that_is_not_there_is_reported(name: str) -> None:
     with pytest.raises(MotionloomError, match="judge"):
         find_judge(name)

@@ -80,7 +80,7 @@ def test_the_id_changes_with_a_timeline_and_with_a_skeleton(folder: Path) -> Non
     ],
     ids=lambda row: str(row)[:40],
 )  # fmt: skip
-def test_what_a_row_cannot_ask_is_told_in_a_sentence(row: dict[str, Any]) -> None:
+def test_what_a_row_cannot_ask_is_reported_in_a_sentence(row: dict[str, Any]) -> None:
     with pytest.raises(MotionloomError):
         parse(json.dumps(row).encode())
 

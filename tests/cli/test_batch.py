@@ -60,7 +60,7 @@ def test_what_was_taught_is_in_the_motions_and_in_their_names(weights: str, caps
     assert "there is no adapter none.safetensors" in capsys.readouterr().err
 
 
-def test_failed_rows_are_told_and_the_exit_code_says_so(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_failed_rows_are_reported_and_the_exit_code_says_so(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
     written(Path("jobs.jsonl"), [*rows(2), {"prompt": "a", "seconds": 99}])
     assert command(weights, "jobs.jsonl", "--filter", "travel < 0") == 1
     said = capsys.readouterr()
@@ -101,7 +101,7 @@ def test_mistakes_are_one_sentence_and_nothing_is_written(
     assert not Path("out").exists()
 
 
-def test_a_column_that_is_none_is_told_before_the_work(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_column_that_is_none_is_reported_before_the_work(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
     written(Path("jobs.jsonl"), [{"prompt": "a", "sead": 3}])
     assert command(weights, "jobs.jsonl") == 2
     assert "unknown column 'sead'" in complaint(capsys)

@@ -198,7 +198,7 @@ LINES = {
 
 
 @pytest.mark.parametrize("name", sorted(LINES))
-def test_a_wrong_timeline_is_told_with_its_line(files: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+def test_a_wrong_timeline_is_reported_with_its_line(files: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     text, place = LINES[name]
     Path("t.yaml").write_text(text, encoding="utf-8")
     Path("a.bvh").write_bytes((files / "a.bvh").read_bytes())

@@ -108,7 +108,7 @@ def test_mistakes_are_one_sentence_and_nothing_is_written(
 
 
 @pytest.mark.parametrize("clip", ["absent.bvh", "clip.xyz", "."])
-def test_a_clip_that_cannot_be_read_is_told(weights: str, clip: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_clip_that_cannot_be_read_is_reported(weights: str, clip: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["edit", clip, "walk", "--weights", weights]) == 2
     complaint(capsys)
     assert not written()

@@ -112,7 +112,7 @@ def test_numbers_out_of_range_are_refused(weights: str, options: list[str], caps
     assert not written()
 
 
-def test_a_folder_that_may_not_be_written_is_told_before_the_work(
+def test_a_folder_that_may_not_be_written_is_reported_before_the_work(
     weights: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("locked").write_text("a file where a folder should be")
@@ -121,7 +121,7 @@ def test_a_folder_that_may_not_be_written_is_told_before_the_work(
     assert written() == {"locked"}
 
 
-def test_a_damaged_weight_file_is_told(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_damaged_weight_file_is_reported(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.copy(weights, "cut.safetensors")
     Path("cut.safetensors").write_bytes(Path("cut.safetensors").read_bytes()[:-10])
     assert main(["generate", "walk", "--weights", "cut.safetensors"]) == 2

@@ -103,7 +103,7 @@ def test_a_warning_is_one_line_without_a_place_in_the_source(monkeypatch, capsys
     ("content", "message"),
     [(None, "motionloom: there is no caption file said.jsonl"), (b"\xff" * 5000, "line 1 is not JSON")],
 )
-def test_captions_that_are_none_are_told_in_one_short_sentence(folder, content, message, capsys):
+def test_captions_that_are_none_are_reported_in_one_short_sentence(folder, content, message, capsys):
     (folder / "walk.bvh").write_text("HIERARCHY")
     if content:
         (folder / "said.jsonl").write_bytes(content)

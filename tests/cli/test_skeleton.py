@@ -59,7 +59,7 @@ def test_commands_that_draw_write_the_character(weights: str, words: tuple[str, 
 
 
 def test_predictions_are_put_on_the_character(tmp_path: Path) -> None:
-    from motionloom.predictor import save_predictor
+    from motionloom.weights.predictor import save_predictor
 
     weights = str(save_predictor(tiny_predictor(), tmp_path / "tiny.safetensors"))
     more = ["--weights", weights, "--steps", "2", "--skeleton", "hero.glb", "--clip-name", "ours", "--count", "2"]

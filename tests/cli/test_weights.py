@@ -280,7 +280,7 @@ def test_wrong_files_of_an_evaluator_are_one_sentence(folder: Path, capsys: pyte
     assert "together" in refused(capsys, *EVALUATOR)
 
 
-def test_word_files_with_another_checkpoint_are_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_word_files_with_another_checkpoint_are_reported(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(folder, state())
     start = ["import", "model000200000.pt", "--out", "a.safetensors", *STATISTICS]
     assert "finest.tar" in refused(capsys, *start, "--glove", ".")

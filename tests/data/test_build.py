@@ -327,7 +327,7 @@ def test_folders_with_nothing_in_them_are_refused(tmp_path: Path) -> None:
         find_takes(tmp_path / "absent")
 
 
-def test_the_same_name_twice_is_told(tmp_path: Path) -> None:
+def test_the_same_name_twice_is_reported(tmp_path: Path) -> None:
     for part in ("a", "b"):
         made.write_bvh(tmp_path / part / "same.bvh", made.walker(seconds=2.0))
     said: list[str] = []
@@ -339,7 +339,7 @@ def die(job: building.Job) -> None:
     os._exit(1)
 
 
-def test_a_worker_that_dies_is_told(pack: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_that_dies_is_reported(pack: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Several takes and workers, one of which is killed: one sentence, and finished takes are kept."""
     monkeypatch.setattr(building, "_prepare", die)
     with pytest.raises(MotionloomError, match="worker"):

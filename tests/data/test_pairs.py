@@ -419,7 +419,7 @@ def test_a_sequence_that_would_run_code_is_refused_and_does_not_run(tmp_path):
     assert not mark.exists()
 
 
-def test_folders_without_sequences_or_pairs_are_told(tmp_path):
+def test_folders_without_sequences_or_pairs_are_reported(tmp_path):
     with pytest.raises(MotionloomError, match="sequenceFiles"):
         threedpw.read_3dpw(tmp_path)
     write_sequence(tmp_path / "train/x.pkl", at_30(1.0)[:1], np.zeros((30, 3)))

@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from motionloom.diffusion import SOLVERS, Guess, Link, cosine, handshake, levels, row_draw, run, staggered
+from motionloom.diffusion import SOLVERS, Link, RowsDenoiser, cosine, handshake, levels, row_draw, run, staggered
 
 SCHEDULE, FEATURES = cosine(40), 3
 KINDS = ["ddpm", "ddim", "dpm2m"]
 
 
 def near(rows: Tensor, level: int) -> Tensor:
-    """(rows, frames, features) to guesses that mix neighbouring frames, and differ between first and last frames."""
+    """(rows, frames, features) to estimates that mix neighbouring frames, and differ between first and last frames."""
     mixed = rows + 0.5 * rows.roll(1, -2) - 0.3 * rows.roll(-2, -2)
     return torch.tanh(mixed) + 0.1 * torch.sin(torch.arange(rows.shape[-2]) + 0.01 * level)[:, None]
 
@@ -27,10 +27,17 @@ def alone(numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -
     return [near(s[None], level)[0] + 0.05 * number for number, s, level in zip(numbers, states, at, strict=True)]
 
 
-def walk(links, *, guess: Guess = alone, kind: str = "ddpm", steps: int = 6, together: int = 16, **more):
+def walk(links, *, denoise: RowsDenoiser = alone, kind: str = "ddpm", steps: int = 6, together: int = 16, **more):
     way = levels(SCHEDULE, steps)
     return staggered(
-        links, guess, levels=way, solver=SOLVERS[kind], schedule=SCHEDULE, features=FEATURES, together=together, **more
+        links,
+        denoise,
+        levels=way,
+        solver=SOLVERS[kind],
+        schedule=SCHEDULE,
+        features=FEATURES,
+        together=together,
+        **more,
     )
 
 
@@ -71,8 +78,8 @@ def test_one_row_is_plain_sampling(kind: str) -> None:
         near, draw(torch.empty(1, 9, FEATURES)), levels=levels(SCHEDULE, 5), solver=SOLVERS[kind],
         schedule=SCHEDULE, draw=draw,
     )  # fmt: skip
-    guess: Guess = lambda numbers, states, at: [near(states[0][None], at[0])[0]]  # noqa: E731
-    made = list(walk([Link(9, 400, 7)], guess=guess, kind=kind, steps=5))
+    denoise: RowsDenoiser = lambda numbers, states, at: [near(states[0][None], at[0])[0]]  # noqa: E731
+    made = list(walk([Link(9, 400, 7)], denoise=denoise, kind=kind, steps=5))
     assert len(made) == 1
     torch.testing.assert_close(made[0], expected[0])
 
@@ -100,9 +107,9 @@ def test_who_walks_together_changes_nothing(links: list[Link], kind: str) -> Non
 
 def test_neighbours_without_an_overlap_know_nothing_of_each_other() -> None:
     links = [Link(5, 0, 1), Link(6, 0, 2), Link(7, 0, 3)]
-    together = list(walk(links, guess=lambda n, s, at: alone([0] * len(n), s, at)))
+    together = list(walk(links, denoise=lambda n, s, at: alone([0] * len(n), s, at)))
     for link, row in zip(links, together, strict=True):
-        assert torch.equal(row, next(walk([link], guess=lambda n, s, at: alone([0], s, at))))
+        assert torch.equal(row, next(walk([link], denoise=lambda n, s, at: alone([0], s, at))))
 
 
 @pytest.mark.parametrize("together", [1, 4, 16])
@@ -117,7 +124,7 @@ def test_a_long_chain_takes_no_more_memory_than_a_short_one(together: int) -> No
         for read in range(1, 501):
             yield Link(6, 2, read)
 
-    def guess(numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
+    def denoise(numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
         nonlocal most
         assert 0 < len(numbers) <= together
         for state in states:
@@ -125,7 +132,7 @@ def test_a_long_chain_takes_no_more_memory_than_a_short_one(together: int) -> No
         most = max(most, len(alive))
         return alone(numbers, states, at)
 
-    for number, _ in enumerate(walk(links(), guess=guess, steps=steps, together=together, moved=said.append)):
+    for number, _ in enumerate(walk(links(), denoise=denoise, steps=steps, together=together, moved=said.append)):
         ahead = max(ahead, read - number)
     assert number == 499
     assert sum(said) == 500 * steps
@@ -168,7 +175,7 @@ def test_no_rows_make_nothing() -> None:
     ],
     ids=["first", "both sides", "last", "negative", "late"],
 )
-def test_overlaps_that_do_not_fit_are_told(links: list[Link], row: int) -> None:
+def test_overlaps_that_do_not_fit_are_reported(links: list[Link], row: int) -> None:
     with pytest.raises(ValueError, match=f"row {row} of {links[row].length} frames"):
         list(walk(links, together=2))
     assert len(list(walk([Link(5, 2, 1), Link(5, 3, 2), Link(3, 99, 3)]))) == 3
@@ -184,38 +191,38 @@ def test_a_walk_that_would_never_end_is_refused(way: list[int], together: int) -
 
 
 def test_noise_keeps_its_spread_in_the_middle_of_an_overlap() -> None:
-    """Normal data of spread 1, of which the best guess is signal * state: the spread is the same everywhere.
+    """Normal data of spread 1, of which the best estimate is signal * state: the spread is the same everywhere.
 
     Averages of independent noise would have 0.7 of it in the middle.
     """
     spreads = []
 
-    def guess(numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
+    def denoise(numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
         spreads.extend(float(state[-100:].std()) for state in states)
         return [SCHEDULE.at(level)[0] * state for state, level in zip(states, at)]
 
-    made = list(walk([Link(300, 100, 1), Link(300, 100, 2), Link(300, 0, 3)], guess=guess, steps=20))
+    made = list(walk([Link(300, 100, 1), Link(300, 100, 2), Link(300, 0, 3)], denoise=denoise, steps=20))
     middle, own = torch.cat([row[35:65] for row in made[1:]]), torch.cat([row[100:200] for row in made])
     assert abs(float(middle.std() / own.std()) - 1) < 0.1
     assert all(abs(spread - 1) < 0.2 for spread in spreads)
 
 
 def test_overlaps_go_from_the_row_before_to_the_row_behind() -> None:
-    """Guesses 0, 1 and 5 of three rows: at the end an overlap of four holds 0, 1/4, 1/2, 3/4 of the way."""
+    """Estimates 0, 1 and 5 of three rows: at the end an overlap of four holds 0, 1/4, 1/2, 3/4 of the way."""
     value = {0: 0.0, 1: 1.0, 2: 5.0}
-    guess: Guess = lambda n, s, at: [torch.full_like(x, value[i]) for i, x in zip(n, s)]  # noqa: E731
-    a, b, c = walk([Link(6, 4, 1), Link(9, 4, 2), Link(6, 0, 3)], guess=guess, kind="ddim")
+    denoise: RowsDenoiser = lambda n, s, at: [torch.full_like(x, value[i]) for i, x in zip(n, s)]  # noqa: E731
+    a, b, c = walk([Link(6, 4, 1), Link(9, 4, 2), Link(6, 0, 3)], denoise=denoise, kind="ddim")
     assert a[:, 0].tolist() == pytest.approx([0, 0, 0, 0.25, 0.5, 0.75], abs=1e-5)
     assert b[:, 0].tolist() == pytest.approx([0, 0.25, 0.5, 0.75, 1, 1, 2, 3, 4], abs=1e-5)
     assert c[:, 0].tolist() == pytest.approx([1, 2, 3, 4, 5, 5], abs=1e-5)
 
 
-def test_rows_live_where_the_guesses_do() -> None:
+def test_rows_live_where_the_estimates_do() -> None:
     """Noise is drawn on the CPU; a network elsewhere must not meet it there. (`meta` stands for any other device.)"""
 
-    def guess(numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
+    def denoise(numbers: Sequence[int], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
         assert all((state.device.type == "cpu") == (level == 40) for state, level in zip(states, at))
         return [state.to("meta") for state in states]
 
-    made = list(walk(chain([Link(6, 2, 1)], repeat(Link(7, 2, 2), 5)), guess=guess, together=2))
+    made = list(walk(chain([Link(6, 2, 1)], repeat(Link(7, 2, 2), 5)), denoise=denoise, together=2))
     assert [(len(row), row.device.type) for row in made] == [(6, "meta"), *[(7, "meta")] * 5]

@@ -48,7 +48,7 @@ def lengths(motion: Motion) -> NDArray[np.float64]:
     return np.linalg.norm(places[:, 1:] - places[:, list(SMPL22.parents[1:])], axis=-1)
 
 
-def test_no_wish_and_a_wish_that_is_met_leave_the_motion_alone() -> None:
+def test_no_target_and_a_target_that_is_met_leave_the_motion_alone() -> None:
     motion = standing()
     assert fit(motion, Goal.nothing(100)) is motion
     goal = replace(Goal.nothing(100), positions=motion.positions(), asked=np.ones((100, 22, 3), bool))

@@ -59,11 +59,11 @@ def led(prior: Prior, block: PairBlock, places: Places, weight: float = 1.0) -> 
     """Ways (2, frames, 4) in the world before and after."""
     net, spread = block.net(prior), torch.where(prior.std > 0, prior.std, 1.0)
     told, code, before = Told(net), net.talk.config.places, drifting(prior)
-    guess = join(code.encode(BESIDE), (before - prior.mean) / spread)
-    made = places.led(
-        prior, told, net.bind(prior.condition(SAID)), state=guess, guess=guess, level=25, weight=weight  # type: ignore
+    denoised = join(code.encode(BESIDE), (before - prior.mean) / spread)
+    made = places.guided(
+        prior, told, net.bind(prior.condition(SAID)), state=denoised, denoised=denoised, level=25, weight=weight  # type: ignore
     )  # fmt: skip
-    assert torch.equal(made[:, 0], guess[:, 0])
+    assert torch.equal(made[:, 0], denoised[:, 0])
     after = made[:, 1:] * spread + prior.mean
     torch.testing.assert_close(after[..., 3:], before[..., 3:], rtol=0, atol=1e-5)
     ways = [two.compose(BESIDE[:, None], two.along(one)) for one in (before, after)]
@@ -71,7 +71,7 @@ def led(prior: Prior, block: PairBlock, places: Places, weight: float = 1.0) -> 
 
 
 @pytest.mark.parametrize("weight", [1.0, 0.0], ids=["led", "free"])
-def test_a_drift_is_gone_at_the_knots(prior: Prior, block: PairBlock, weight: float) -> None:
+def test_a_drift_is_gone_at_the_anchors(prior: Prior, block: PairBlock, weight: float) -> None:
     before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2), weight)
     expected = two.seen(BESIDE[0], BESIDE[1])
     for knot in (40, 80):
@@ -83,7 +83,7 @@ def test_a_drift_is_gone_at_the_knots(prior: Prior, block: PairBlock, weight: fl
 
 
 def test_half_led_is_half_of_the_way(prior: Prior, block: PairBlock) -> None:
-    """At the knots, from one to the other on the ground and in how they face."""
+    """At the anchors, from one to the other on the ground and in how they face."""
     places = Places.of([1, 2], FRAMES, [0], [False] * 2)
     free, half, whole = (led(prior, block, places, weight)[1][:, [40, 80]] for weight in (0.0, 0.5, 1.0))
     way = [(one[1] - one[0])[:, 2:] for one in (free, half, whole)]
@@ -120,7 +120,7 @@ def test_frames_before_the_beginning_stay(prior: Prior, block: PairBlock) -> Non
     torch.testing.assert_close(two.seen(after[0, 80], after[1, 80]), two.seen(BESIDE[0], BESIDE[1]), rtol=0, atol=1e-4)
 
 
-def test_the_network_is_shown_crops_that_begin_at_the_knots(prior: Prior, block: PairBlock) -> None:
+def test_the_network_is_shown_crops_that_begin_at_the_anchors(prior: Prior, block: PairBlock) -> None:
     _, _, told = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2))
     [(x, lengths)] = told.shown
     motion = (drifting(prior) - prior.mean) / torch.where(prior.std > 0, prior.std, 1.0)
@@ -189,18 +189,18 @@ class Asked(Told):
         return super().__call__(x, level, bound)
 
 
-def test_every_question_is_of_its_own_pair_at_its_own_level_and_told_the_noised_guess(
+def test_every_question_is_of_its_own_pair_at_its_own_level_and_given_the_noised_estimate(
     prior: Prior, block: PairBlock
 ) -> None:
-    """Two pairs, with knots at frames 40 and 80, and at 80."""
+    """Two pairs, with anchors at frames 40 and 80, and at 80."""
     net, said = block.net(prior), [*SAID, "a person jumps", "a person sits down"]
     bound, told = net.bind(prior.condition(said)), Asked(net)
     drift, spread = drifting(prior), torch.where(prior.std > 0, prior.std, 1.0)
-    guess = join(net.talk.config.places.encode(BESIDE).repeat(2, 1), ((drift - prior.mean) / spread).repeat(2, 1, 1))
-    state = torch.randn(guess.shape, generator=torch.Generator().manual_seed(2))
+    denoised = join(net.talk.config.places.encode(BESIDE).repeat(2, 1), ((drift - prior.mean) / spread).repeat(2, 1, 1))
+    state = torch.randn(denoised.shape, generator=torch.Generator().manual_seed(2))
     places = Places.of([1, 2, 3, 4], FRAMES, [0, 40], [False] * 4)
     level = torch.tensor([7, 7, 30, 30])
-    made = places.led(prior, told, bound, state=state, guess=guess, level=level, weight=1.0)  # type: ignore
+    made = places.guided(prior, told, bound, state=state, denoised=denoised, level=level, weight=1.0)  # type: ignore
     asked = [(row, frame) for frame in (40, 80) for row in (0, 1)] + [(2, 80), (3, 80)]
     assert torch.as_tensor(told.level).tolist() == [7, 7, 7, 7, 30, 30]
     assert told.bound.lengths.tolist() == [min(60, FRAMES - frame) for _, frame in asked]
@@ -217,8 +217,8 @@ def test_every_question_is_of_its_own_pair_at_its_own_level_and_told_the_noised_
         rows = slice(2 * pair, 2 * pair + 2)
         alone = Places.of([[1, 2], [3, 4]][pair], FRAMES, [begin], [False] * 2)
         assert torch.equal(alone.noise, places.noise[kept])
-        one = alone.led(
-            prior, Told(net), net.bind(prior.condition(said[rows])), state=state[rows], guess=guess[rows],  # type: ignore
+        one = alone.guided(
+            prior, Told(net), net.bind(prior.condition(said[rows])), state=state[rows], denoised=denoised[rows],  # type: ignore
             level=level[rows], weight=1.0,
         )  # fmt: skip
         torch.testing.assert_close(made[rows], one, rtol=0, atol=1e-5)
@@ -228,33 +228,35 @@ def test_every_question_is_of_its_own_pair_at_its_own_level_and_told_the_noised_
 def test_who_is_moved_differs_from_pair_to_pair(prior: Prior, block: PairBlock) -> None:
     net = block.net(prior)
     drift, spread = drifting(prior), torch.where(prior.std > 0, prior.std, 1.0)
-    guess = join(net.talk.config.places.encode(BESIDE).repeat(2, 1), ((drift - prior.mean) / spread).repeat(2, 1, 1))
+    denoised = join(net.talk.config.places.encode(BESIDE).repeat(2, 1), ((drift - prior.mean) / spread).repeat(2, 1, 1))
     places = Places.of([1, 2, 3, 4], FRAMES, [0, 0], [True, False, False, True])
-    made = places.led(
-        prior, Told(net), net.bind(prior.condition(SAID * 2)), state=guess, guess=guess, level=25, weight=1.0  # type: ignore
+    made = places.guided(
+        prior, Told(net), net.bind(prior.condition(SAID * 2)), state=denoised, denoised=denoised, level=25, weight=1.0  # type: ignore
     )  # fmt: skip
-    moved = (made - guess).abs().amax((1, 2))
+    moved = (made - denoised).abs().amax((1, 2))
     assert moved[[0, 3]].max() < 1e-5
     assert moved[[1, 2]].min() > 0.1
 
 
 @pytest.mark.parametrize(
-    ("begin", "frames", "knots"),
+    ("begin", "frames", "anchors"),
     [(0, 39, ()), (0, 40, (20,)), (0, 60, (40,)), (0, 61, (20, 41)), (0, 100, (40, 80)), (10, 100, (45, 80)),
      (0, 120, (33, 67, 100)), (10, 110, (50, 90)), (60, 99, ()), (60, 100, (80,))],
 )  # fmt: skip
-def test_knots_stand_evenly_up_to_twenty_frames_before_the_end(begin: int, frames: int, knots: tuple[int, ...]) -> None:
-    assert Places.of([1, 2], frames, [begin], [False] * 2).knots == (knots,)
+def test_anchors_stand_evenly_up_to_twenty_frames_before_the_end(
+    begin: int, frames: int, anchors: tuple[int, ...]
+) -> None:
+    assert Places.of([1, 2], frames, [begin], [False] * 2).anchors == (anchors,)
 
 
 def leads(prior: Prior, block: PairBlock, mask: Tensor, frozen=(False, False)) -> tuple[Tensor, Tensor, Told]:
-    """A guess before and after the guidance, where ``mask`` (2, 1 + frames) tells what is known."""
+    """An estimate before and after the guidance, where ``mask`` (2, 1 + frames) says what is known."""
     net, spread = block.net(prior), torch.where(prior.std > 0, prior.std, 1.0)
     told = Told(net)
-    guess = join(net.talk.config.places.encode(BESIDE), (drifting(prior) - prior.mean) / spread)
-    known = mask[..., None].expand(guess.shape)
+    denoised = join(net.talk.config.places.encode(BESIDE), (drifting(prior) - prior.mean) / spread)
+    known = mask[..., None].expand(denoised.shape)
     lead = relative_pose_guidance(prior, told, net.bind(prior.condition(SAID)), seeds=[1, 2], mask=known, frozen=frozen)  # type: ignore
-    return guess, lead(guess, guess, 25), told
+    return denoised, lead(denoised, denoised, 25), told
 
 
 Spans: TypeAlias = tuple[tuple[int, int], ...]
@@ -269,11 +271,11 @@ KNOWN: dict[str, tuple[tuple[Spans, Spans], list[int] | None, list[bool]]] = {
     "both": ((((0, 101),), ((0, 101),)), None, [False, False]),
 }
 """Slots that are known of both people (slot 0 is D), frames shown from each knot on, and who is moved. 100 frames: from
-0 on knots are at 40 and 80, 40 frames behind 20 or 10 known ones there is one at 80, behind 22 there is none."""
+0 on anchors are at 40 and 80, 40 frames behind 20 or 10 known ones there is one at 80, behind 22 there is none."""
 
 
 @pytest.mark.parametrize("case", list(KNOWN))
-def test_knots_begin_two_seconds_behind_the_common_beginning_and_known_numbers_stay(
+def test_anchors_begin_two_seconds_behind_the_common_beginning_and_known_numbers_stay(
     case: str, prior: Prior, block: PairBlock
 ) -> None:
     spans, lengths, moves = KNOWN[case]

@@ -45,7 +45,7 @@ def decoded(row: Tensor, prior: Prior, first: int = 0) -> np.ndarray:
     return Placement(float(root[first, 0]), float(root[first, 2]), float(facing)).from_world(places)
 
 
-def wish(frames: int, joint: int, at: dict[int, tuple[float, float, float]]) -> Goal:
+def asking(frames: int, joint: int, at: dict[int, tuple[float, float, float]]) -> Goal:
     goal = Goal.nothing(frames)
     for frame, place in at.items():
         goal.positions[frame, joint] = place
@@ -60,7 +60,7 @@ def test_no_goal_is_the_same_guess_bit_for_bit(prior: Prior) -> None:
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_a_keyframe_of_the_pelvis_is_met(prior: Prior, level: int) -> None:
-    goal = wish(60, 0, {40: (1.0, 0.0, 2.0)})
+    goal = asking(60, 0, {40: (1.0, 0.0, 2.0)})
     after = decoded(toward(goal, prior)(guess(), level), prior)
     np.testing.assert_allclose(after[40, 0, [0, 2]], [1.0, 2.0], atol=1e-3)
 
@@ -70,7 +70,7 @@ def test_a_keyframe_bends_a_stretch_and_leaves_no_spike(prior: Prior, level: int
     """A wrist 20 cm off: the largest second difference of the change is that of a curve, not of a spike (0.4)."""
     row = guess()
     before = decoded(row, prior)
-    goal = wish(60, WRIST, {30: tuple(before[30, WRIST] + [0.0, 0.2, 0.0])})
+    goal = asking(60, WRIST, {30: tuple(before[30, WRIST] + [0.0, 0.2, 0.0])})
     change = (decoded(toward(goal, prior)(row, level), prior) - before)[:, WRIST, 1]
     assert abs(change[30] - 0.2) < 1e-3
     assert np.abs(np.diff(change, n=2)).max() < 0.03
@@ -81,7 +81,7 @@ def test_a_keyframe_bends_a_stretch_and_leaves_no_spike(prior: Prior, level: int
 def test_the_elbow_follows_the_wrist_and_the_other_arm_does_not(prior: Prior) -> None:
     row = guess()
     before = decoded(row, prior)
-    goal = wish(60, WRIST, {30: tuple(before[30, WRIST] + [0.0, 0.2, 0.0])})
+    goal = asking(60, WRIST, {30: tuple(before[30, WRIST] + [0.0, 0.2, 0.0])})
     moved = np.linalg.norm(decoded(toward(goal, prior)(row, 1), prior) - before, axis=-1)[30]
     elbow, other = moved[SMPL22.index("right_elbow")], moved[SMPL22.index("left_elbow")]
     assert 0.05 < elbow < moved[WRIST]
@@ -91,7 +91,7 @@ def test_the_elbow_follows_the_wrist_and_the_other_arm_does_not(prior: Prior) ->
 def test_a_head_that_goes_down_leaves_the_feet_where_they_are(prior: Prior) -> None:
     row = guess()
     before = decoded(row, prior)
-    goal = wish(60, HEAD, {30: tuple(before[30, HEAD] - [0.0, 0.3, 0.0])})
+    goal = asking(60, HEAD, {30: tuple(before[30, HEAD] - [0.0, 0.3, 0.0])})
     moved = (decoded(toward(goal, prior)(row, 1), prior) - before)[30, :, 1]
     assert moved[0] < -0.1
     assert np.abs(moved[[10, 11]]).max() < 0.03
@@ -109,7 +109,7 @@ def test_a_dense_path_is_followed_and_the_body_turns_with_it(prior: Prior) -> No
     """A quarter circle of radius 1 m to the left: who walks ahead at 3 cm a frame still walks ahead on it."""
     frames = 60
     angle = np.linspace(0, np.pi / 2, frames)
-    goal = wish(frames, 0, {k: (1 - np.cos(a), 0.0, np.sin(a)) for k, a in enumerate(angle)})
+    goal = asking(frames, 0, {k: (1 - np.cos(a), 0.0, np.sin(a)) for k, a in enumerate(angle)})
     row = toward(goal, prior)(torch.zeros(frames, 263), 25)
     after = decoded(row, prior)
     np.testing.assert_allclose(after[:, 0, [0, 2]], goal.positions[:, 0, [0, 2]], atol=0.01)
@@ -126,7 +126,7 @@ def test_facing_asked_is_faced(prior: Prior) -> None:
 def test_a_goal_may_begin_inside_a_row(prior: Prior) -> None:
     """Frame 10 of a goal from frame 20 of the row is frame 30; what was before stays."""
     row = guess()
-    goal = wish(100, 0, {10: (0.5, 0.0, 0.3)})
+    goal = asking(100, 0, {10: (0.5, 0.0, 0.3)})
     changed = toward(goal, prior, first=20)(row, 1)
     np.testing.assert_allclose(decoded(changed, prior, 20)[30, 0, [0, 2]], [0.5, 0.3], atol=1e-3)
     np.testing.assert_allclose(changed[:1], row[:1], atol=0.3)
@@ -142,7 +142,7 @@ def planted(row: Tensor, prior: Prior, standing: slice) -> Tensor:
 def test_a_foot_in_contact_stands_while_the_path_is_moved(prior: Prior) -> None:
     """A path of 3 cm a frame, aside too, moves the body; the toes told to stand do not slide, the others do."""
     row = planted(guess() / 5, prior, slice(20, 27))
-    goal = wish(60, 0, {k: (0.3 * k / 60, 0.0, 0.03 * k) for k in range(60)})
+    goal = asking(60, 0, {k: (0.3 * k / 60, 0.0, 0.03 * k) for k in range(60)})
     after = decoded(toward(goal, prior)(row, 25), prior)[20:27]
     slid = np.linalg.norm(np.diff(after[:, [10, 11]][..., [0, 2]], axis=0), axis=-1).max(axis=0)
     assert slid[0] < 0.2 * slid[1]
@@ -152,14 +152,14 @@ def test_a_foot_in_contact_stands_while_the_path_is_moved(prior: Prior) -> None:
 def test_a_foot_in_contact_that_is_asked_elsewhere_goes_there(prior: Prior) -> None:
     row = planted(guess(), prior, slice(20, 50))
     place = decoded(row, prior)[30, 10] + [0.05, 0.03, 0.0]
-    after = decoded(toward(wish(60, 10, {30: tuple(place)}), prior)(row, 1), prior)
+    after = decoded(toward(asking(60, 10, {30: tuple(place)}), prior)(row, 1), prior)
     np.testing.assert_allclose(after[30, 10], place, atol=2e-3)
 
 
 def test_the_displacements_stay_those_of_the_places(prior: Prior) -> None:
     """The joint velocities change by as much as the displacements that the places show."""
     row = guess()
-    goal = wish(60, 0, {40: (1.0, 0.0, 2.0)})
+    goal = asking(60, 0, {40: (1.0, 0.0, 2.0)})
     changed = toward(goal, prior)(row, 25)
     before, after = ((part * prior.std + prior.mean).double() for part in (row, changed))
     shown = humanml.displacements(after) - humanml.displacements(before)
@@ -170,14 +170,14 @@ def test_the_displacements_stay_those_of_the_places(prior: Prior) -> None:
 def test_what_is_out_of_reach_moves_limbs_by_less_than_a_metre(prior: Prior) -> None:
     row = guess()
     before = decoded(row, prior)
-    goal = wish(60, WRIST, {30: tuple(before[30, WRIST] + [0.0, 50.0, 0.0])})
+    goal = asking(60, WRIST, {30: tuple(before[30, WRIST] + [0.0, 50.0, 0.0])})
     assert np.abs(decoded(toward(goal, prior)(row, 25), prior) - before).max() < 1.0
 
 
 def test_rows_are_corrected_alone(prior: Prior) -> None:
     """Each row gets its own correction; a row without one is the network's guess bit for bit."""
     rows = torch.stack([guess(seed=0), guess(seed=1), guess(seed=2)])
-    change: Correction = toward(wish(60, 0, {40: (1.0, 0.0, 2.0)}), prior)
+    change: Correction = toward(asking(60, 0, {40: (1.0, 0.0, 2.0)}), prior)
     edited = corrected(lambda state, level: rows, [None, change, None])(rows, 25)
     assert torch.equal(edited[[0, 2]], rows[[0, 2]])
     assert torch.equal(edited[1], change(rows[1], 25))
@@ -187,7 +187,7 @@ def test_rows_are_corrected_alone(prior: Prior) -> None:
         corrected(denoise, [change])(rows, 25)
 
 
-def test_many_wishes_are_thinned_and_still_met(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_targets_are_thinned_and_still_met(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("motionloom.edits.steering.MOST", 100)
     row, other = guess(seed=0), guess(seed=1)
     goal = replace(Goal.nothing(60), positions=decoded(other, prior))

@@ -118,7 +118,7 @@ def test_the_whole_pipeline_takes_a_motion_at_any_rate() -> None:
     assert np.isfinite(features).all()
 
 
-def test_mistakes_are_told_in_one_sentence() -> None:
+def test_mistakes_are_reported_in_one_sentence() -> None:
     with pytest.raises(MotionloomError, match="positions must be"):
         humanml.encode(np.zeros((5, 21, 3)))
     with pytest.raises(MotionloomError, match="not finite"):

@@ -51,7 +51,7 @@ def test_a_stand_faces_where_it_says():
 def test_two_people_come_back_to_a_hundredth_of_a_millimetre():
     world = people()
     made = pair.encode(world)
-    back = pair.decode(made.features.astype(np.float64), made.stands)
+    back = pair.decode(made.features.astype(np.float64), made.poses)
     back[..., 1] += made.floors[:, None, None]
     assert np.abs(back - world[:, :-1]).max() < 1e-5
     between = np.linalg.norm(world[0, :-1, :, None] - world[1, :-1, None], axis=-1)
@@ -69,37 +69,37 @@ def test_exchanged_people_have_exchanged_features_stands_and_numbers():
     world = people(5)
     made, other = pair.encode(world), pair.encode(world[::-1])
     np.testing.assert_array_equal(other.features, made.features[::-1])
-    np.testing.assert_array_equal(other.stands, made.stands[::-1])
+    np.testing.assert_array_equal(other.poses, made.poses[::-1])
     for code in CODES:
-        np.testing.assert_array_equal(code.encode(other.stands), code.encode(made.stands)[::-1])
+        np.testing.assert_array_equal(code.encode(other.poses), code.encode(made.poses)[::-1])
 
 
 @pytest.mark.parametrize("start", [1, 17, 30])
 def test_a_crop_has_the_stands_of_its_own_first_frame(start):
     made = pair.encode(people(7))
     features = made.features.astype(np.float64)
-    whole = pair.decode(features, made.stands)
-    cut = pair.later(features, made.stands, start)
+    whole = pair.decode(features, made.poses)
+    cut = pair.later(features, made.poses, start)
     np.testing.assert_allclose(pair.decode(features[:, start:], cut), whole[:, start:], atol=1e-9)
-    assert np.abs(pair.decode(features[:, start:], made.stands) - whole[:, start:]).max() > 0.02  # the published bug
+    assert np.abs(pair.decode(features[:, start:], made.poses) - whole[:, start:]).max() > 0.02  # the published bug
 
 
 def test_the_root_of_a_crop_stands_where_its_features_begin():
     made = pair.encode(people(8))
-    cut = pair.later(made.features.astype(np.float64), made.stands, 20)
+    cut = pair.later(made.features.astype(np.float64), made.poses, 20)
     np.testing.assert_allclose(cut[:, 2:], people(8)[:, 20, 0, [0, 2]], atol=1e-5)
 
 
 def test_frame_zero_is_later_by_nothing():
     made = pair.encode(people(9))
-    np.testing.assert_allclose(pair.later(made.features.astype(np.float64), made.stands, 0), made.stands, atol=1e-12)
+    np.testing.assert_allclose(pair.later(made.features.astype(np.float64), made.poses, 0), made.poses, atol=1e-12)
 
 
 def test_mirrored_stands_belong_to_mirrored_features():
     made = pair.encode(people(11))
     features = made.features.astype(np.float64)
-    there = pair.decode(humanml.mirror(features).astype(np.float64), pair.mirrored(made.stands))
-    plain = pair.decode(features, made.stands)
+    there = pair.decode(humanml.mirror(features).astype(np.float64), pair.mirrored(made.poses))
+    plain = pair.decode(features, made.poses)
     expected = plain[..., list(SMPL22.mirror_pairs()), :] * np.array([-1.0, 1.0, 1.0])
     np.testing.assert_allclose(there, expected, atol=1e-5)
 
@@ -151,7 +151,7 @@ def test_the_published_drawing_is_right_where_the_first_person_faces_ahead_and_o
 
 def test_tensors_and_arrays_agree():
     made = pair.encode(people(13))
-    features, stands = made.features.astype(np.float64), made.stands
+    features, stands = made.features.astype(np.float64), made.poses
     there = pair.decode(torch.from_numpy(features), torch.from_numpy(stands))
     np.testing.assert_allclose(there.numpy(), pair.decode(features, stands), atol=1e-12)
     for code in CODES:

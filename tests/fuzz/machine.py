@@ -25,7 +25,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.errors import MotionloomError
-from tests.fuzz.mutations import mutated, prepare
+from tests.fuzz.container_mutations import prepare
+from tests.fuzz.mutations import mutated
 
 if TYPE_CHECKING:
     from tests.fuzz.readers import Reader

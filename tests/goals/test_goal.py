@@ -1,4 +1,4 @@
-"""Goals as values: turning the world, putting wishes together, where the person starts."""
+"""Goals as values: turning the world, putting targets together, where the person starts."""
 
 from dataclasses import replace
 
@@ -82,7 +82,7 @@ def test_parts_of_a_goal_keep_their_frames() -> None:
     assert Goal.nothing(3).empty
 
 
-def test_both_wishes_stand_in_merged_goals() -> None:
+def test_both_targets_are_in_merged_goals() -> None:
     both = merged(asking(3, "head", [1, 2, 3]), merged(asking(4, "neck", [4, 5, 6]), facing(2, 1.5)))
     assert both.positions[3, 15].tolist() == [1, 2, 3]
     assert both.positions[4, 12].tolist() == [4, 5, 6]
@@ -99,7 +99,7 @@ def test_both_wishes_stand_in_merged_goals() -> None:
     ],
     ids=["place", "facing", "start", "length"],
 )
-def test_contradictions_are_told(second: Goal, said: str) -> None:
+def test_contradictions_are_reported(second: Goal, said: str) -> None:
     first = replace(merged(asking(3, "head", [1, 2, 3]), facing(3, 0)), start=Placement())
     with pytest.raises(MotionloomError, match=said):
         merged(first, second)

@@ -217,7 +217,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("name", MISTAKES)
-def test_mistakes_are_told_by_their_key(name: str, read, folder: Path) -> None:
+def test_mistakes_are_reported_by_their_key(name: str, read, folder: Path) -> None:
     keys, said = MISTAKES[name]
     with pytest.raises(MotionloomError, match=said) as error:
         read(**keys)

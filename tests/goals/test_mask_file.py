@@ -97,7 +97,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("text", "line", "message"), REFUSED, ids=[f"case{i}" for i in range(len(REFUSED))])
-def test_what_is_wrong_is_told_with_its_line(read, tmp_path, text, line, message):
+def test_what_is_wrong_is_reported_with_its_line(read, tmp_path, text, line, message):
     with pytest.raises(MotionloomError) as refused:
         read(text)
     said = str(refused.value)
@@ -108,7 +108,7 @@ def test_what_is_wrong_is_told_with_its_line(read, tmp_path, text, line, message
 
 
 @pytest.mark.parametrize(("text", "message"), [("", "is empty"), ("a\0b", "binary"), (" " * 4_000_001, "MB")])
-def test_what_has_no_lines_is_told_without_one(read, text, message):
+def test_what_has_no_lines_is_reported_without_one(read, text, message):
     with pytest.raises(MotionloomError, match=message):
         read(text)
 

@@ -186,7 +186,7 @@ REFUSED = [
 
 @pytest.mark.parametrize(("text", "line", "message"), REFUSED, ids=[f"case{i}" for i in range(len(REFUSED))])
 @pytest.mark.parametrize("loader", ["C", "Python"])
-def test_what_is_wrong_is_told_with_its_line(read, tmp_path, monkeypatch, text, line, message, loader):
+def test_what_is_wrong_is_reported_with_its_line(read, tmp_path, monkeypatch, text, line, message, loader):
     """By the quick parser and by the one that is there without a compiler."""
     if loader == "Python":
         monkeypatch.setattr(lined_yaml, "_loader", lambda: yaml.SafeLoader)
@@ -208,7 +208,7 @@ def test_what_is_wrong_is_told_with_its_line(read, tmp_path, monkeypatch, text, 
     [("", "is empty"), ("# nothing\n", "nothing but comments"), ("a\0b", "binary data"), ("a: 1\n" * 6_500_000, "32")],
     ids=["empty", "comments", "binary", "large"],
 )
-def test_what_has_no_lines_is_told_without_one(read, text, message):
+def test_what_has_no_lines_is_reported_without_one(read, text, message):
     with pytest.raises(MotionloomError, match=message):
         read(text)
 

@@ -186,7 +186,7 @@ def test_pieces_resampled_together_are_the_resampled_whole(frames, places, fps):
         ("a.npz", 10**7, "split it"),
     ],
 )
-def test_what_a_file_cannot_hold_is_told_before_the_work(tmp_path, name, total, message):
+def test_what_a_file_cannot_hold_is_reported_before_the_work(tmp_path, name, total, message):
     with pytest.raises(MotionloomError, match=message):
         open_stream(tmp_path / name, total=total)
 

@@ -144,7 +144,7 @@ def test_noisy_features_are_cleaned_by_their_own_contacts(clip: str) -> None:
     assert depth(clean) < 1e-4
 
 
-def test_mistakes_are_told() -> None:
+def test_mistakes_are_reported() -> None:
     with pytest.raises(MotionloomError, match="retarget it first"):
         clean_feet(Motion(Skeleton(("a",), (-1,), np.zeros((1, 3))), FPS, np.zeros((4, 3)), np.eye(4)[:, None]))
     with pytest.raises(MotionloomError, match=r"contacts must be \(60, 4\) or \(59, 4\); got \(3, 4\)"):

@@ -210,7 +210,7 @@ def test_real_people_are_followed(clip: str) -> None:
     assert np.abs(np.linalg.norm(bones, axis=-1) - SMPL22.bone_lengths()[1:]).max() < 1e-9
 
 
-def test_mistakes_are_told() -> None:
+def test_mistakes_are_reported() -> None:
     with pytest.raises(MotionloomError, match="positions must be"):
         motion_from_positions(np.zeros((4, 21, 3)), FPS)
     with pytest.raises(MotionloomError, match="not finite"):

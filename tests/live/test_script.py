@@ -81,7 +81,7 @@ def test_commands_are_asked_before_the_frame_of_their_time() -> None:
         ("seconds: 2\ncommands:\n- {at: 1, reach: {joint: tail, position: [0, 1, 0]}}", "line 3: no joint 'tail'"),
     ],
 )
-def test_mistakes_are_told_with_file_and_line(tmp_path: Path, text: str, said: str) -> None:
+def test_mistakes_are_reported_with_file_and_line(tmp_path: Path, text: str, said: str) -> None:
     with pytest.raises(MotionloomError, match=r"a\.yaml, ") as found:
         read(tmp_path, text)
     assert said in str(found.value)

@@ -38,7 +38,7 @@ def test_a_timeline_goes_to_yaml_and_back(server: Server) -> None:
     assert server.json("POST", "/timeline.json", text) == (200, TIMELINE)
 
 
-def test_a_mistake_in_a_timeline_is_told_with_its_line(server: Server) -> None:
+def test_a_mistake_in_a_timeline_is_reported_with_its_line(server: Server) -> None:
     status, answer = server.json("POST", "/timeline.yaml", {"segments": [{"text": "a", "transition": 9}]})
     assert (status, answer["error"].startswith("the timeline, line 3")) == (400, True)
     status, answer = server.json("POST", "/timeline.json", b"segments: [a\n")

@@ -62,7 +62,7 @@ def test_a_project_file_is_saved_and_opened(studio: Studio, tmp_path: Path):
     assert len(studio.blocks()) == 2
 
 
-def test_a_file_that_is_no_project_is_told(studio: Studio, tmp_path: Path):
+def test_a_file_that_is_no_project_is_reported(studio: Studio, tmp_path: Path):
     file = tmp_path / "broken.json"
     file.write_text('{"version": 1, "segments": [{"id": "a", "text": 5}]}')
     before = studio.blocks()
@@ -81,7 +81,7 @@ def test_a_tab_that_is_closed_finds_its_project_again(studio: Studio):
     assert after["takes"] == before["takes"]
 
 
-def test_a_server_that_is_away_is_told_and_nothing_is_lost(studio: Studio):
+def test_a_server_that_is_away_is_reported_and_nothing_is_lost(studio: Studio):
     studio.page.route("**/*", lambda route: route.abort())
     studio.key("d")
     studio.page.wait_for_selector(".notice.away")

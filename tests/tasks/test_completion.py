@@ -201,7 +201,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("name", sorted(MISTAKES))
-def test_what_cannot_be_completed_is_told(name: str) -> None:
+def test_what_cannot_be_completed_is_reported(name: str) -> None:
     with pytest.raises(MotionloomError, match=r"got|a count of 0"):
         futures(PREDICTOR, **{"past": PAST, "count": 1} | MISTAKES[name])
 
@@ -209,7 +209,7 @@ def test_what_cannot_be_completed_is_told(name: str) -> None:
 @pytest.mark.parametrize(
     ("given", "mask"), [((30, 22, 3), (30, 21)), ((29, 22, 3), (30, 22)), ((3, 30, 22, 3), (30, 22))]
 )
-def test_a_mask_that_does_not_fit_is_told(given: tuple[int, ...], mask: tuple[int, ...]) -> None:
+def test_a_mask_that_does_not_fit_is_reported(given: tuple[int, ...], mask: tuple[int, ...]) -> None:
     known = Known(np.zeros(given), np.zeros(mask, dtype=np.float32))
     with pytest.raises(MotionloomError, match="known"):
         next_frames(PREDICTOR, PAST, seeds=[0, 1], known=known)

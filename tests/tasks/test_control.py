@@ -39,7 +39,7 @@ def path(frames: int = 24, *, turn: float = 0.0) -> Goal:
     return replace(goal, positions=place.to_world(goal.positions), start=place)
 
 
-def test_no_wishes_make_what_generate_makes(prior: Prior) -> None:
+def test_no_targets_make_what_generate_makes(prior: Prior) -> None:
     goal = replace(Goal.nothing(24), start=Placement())
     made = control(prior, "a person walks", goal, seed=4, steps=3, adapters="none")[0]
     plain = generate(prior, "a person walks", seconds=1.2, seed=4, steps=3)[0]
@@ -94,7 +94,7 @@ def test_the_numbers_that_a_goal_is_about() -> None:
     assert mask[3].nonzero().ravel().tolist() == [0, 1, 2, 64, 65, 66]
 
 
-def test_adapters_are_told_the_last_steered_guess_and_none_that_change_nothing_change_little(prior: Prior) -> None:
+def test_adapters_are_reported_the_last_steered_guess_and_none_that_change_nothing_change_little(prior: Prior) -> None:
     """An adapter of zeros is the prior; what it is shown is the steered guess in the numbers asked, noise-free."""
     blank = adapter(prior)
     made = control(prior, "a person walks", path(), seed=1, steps=3, adapters=[(blank, 0.25), (blank, 0.75)])[0]

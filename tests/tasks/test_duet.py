@@ -61,7 +61,7 @@ def test_whoever_is_given_stays_and_the_other_stands_where_he_was_drawn(
         asked.update(how)
         uniform = np.stack([person_at_20(motion) for motion in (given, partner)])
         encoded = two.encode(uniform)
-        elsewhere = two.compose(np.array([0.0, 1.0, 7.0, -3.0]), encoded.stands)
+        elsewhere = two.compose(np.array([0.0, 1.0, 7.0, -3.0]), encoded.poses)
         return torch.from_numpy(encoded.features)[None], torch.from_numpy(elsewhere)[None]
 
     monkeypatch.setattr(tasks, "pair_features", true)
@@ -115,7 +115,7 @@ def test_rows_denoised_together_or_alone_make_the_same(prior: Prior, block: Pair
     assert again.abs().max() > 1e-3
 
 
-def test_only_who_listens_hears_what_the_other_is_told(prior: Prior, block: PairBlock) -> None:
+def test_only_who_listens_hears_what_the_other_is_reported(prior: Prior, block: PairBlock) -> None:
     changed = [SEGMENTS[0], replace(SEGMENTS[1], text="a person turns :: a person walks left"), SEGMENTS[2]]
     for one, deaf in ((block, False), (block_of(prior, fresh=True), True)):
         rows = [[tasks._asked(some, i, None, 0) for i in (0, 1)] for some in (SEGMENTS, changed)]
@@ -123,7 +123,7 @@ def test_only_who_listens_hears_what_the_other_is_told(prior: Prior, block: Pair
         assert torch.allclose(first, second, atol=1e-5) == deaf
 
 
-def test_each_row_is_told_and_led_from_where_the_two_stand_when_it_begins(
+def test_each_row_is_reported_and_led_from_where_the_two_stand_when_it_begins(
     prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A network that always guesses the same: D of a later row, as shown without its noise, is what bodies made of
@@ -155,7 +155,7 @@ def test_each_row_is_told_and_led_from_where_the_two_stand_when_it_begins(
         return None
 
     monkeypatch.setattr(PairNet, "forward", constant)
-    monkeypatch.setattr(tasks._PairDenoiser, "_led", led)
+    monkeypatch.setattr(tasks._PairDenoiser, "_moved", led)
     monkeypatch.setattr(tasks, "relative_pose_guidance", guidance)
     segments = [
         Segment("a person walks", 1.0, transition=0.4),
@@ -238,7 +238,7 @@ def test_a_row_is_led_from_where_it_begins_and_shows_the_noised_state(prior: Pri
     denoiser = tasks._PairDenoiser(prior, net, [50, 1], 1.0)
     state, motion = torch.randn(2, 2, 30, 263, generator=torch.Generator().manual_seed(0))
     begin = torch.tensor([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
-    assert torch.equal(denoiser._led(row, 50, motion, begin, state=state), motion + 1)
+    assert torch.equal(denoiser._moved(row, 50, motion, begin, state=state), motion + 1)
     assert asked["level"] == 50
     assert torch.equal(asked["state"], join(block.config.places.encode(begin), state))
     assert torch.equal(asked["clean"], join(block.config.places.encode(begin), motion))
@@ -250,7 +250,7 @@ def test_a_path_for_one_of_them_holds_through_all_segments(
     """A network that always draws two real people, who look where their features say that they do."""
     encoded = two.encode(np.stack([person_at_20(motion) for motion in walkers(1.2, larger=1.0)]))
     clean = (torch.from_numpy(encoded.features[:, 8]).float() - prior.mean) / prior.std
-    places = block.config.places.encode(torch.from_numpy(encoded.stands).float())
+    places = block.config.places.encode(torch.from_numpy(encoded.poses).float())
 
     def constant(net: PairNet, x: torch.Tensor, level, bound) -> torch.Tensor:
         motion = clean.repeat(len(x) // 2, 1)[:, None].expand(-1, x.shape[1] - 1, -1)

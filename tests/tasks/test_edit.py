@@ -350,7 +350,7 @@ def test_clips_that_cannot_be_edited_are_refused(prior: Prior) -> None:
         edit(prior, Motion(chain, 30, np.zeros((60, 3)), np.tile(rot.IDENTITY, (60, 2, 1))), "walk")
 
 
-def test_a_clip_with_z_up_is_told(prior: Prior) -> None:
+def test_a_clip_with_z_up_is_reported(prior: Prior) -> None:
     """A body whose bones and world both have +Z up."""
     stand = rot.rotvec_to_quat(np.array([np.pi / 2, 0, 0]))
     clip = person(2.0)

@@ -113,7 +113,7 @@ def test_a_source_that_ends_early_lets_go_without_a_jump() -> None:
     assert np.abs(np.diff(share)).max() < 0.3
 
 
-def test_what_is_held_is_told_to_the_network_and_changes_the_free_joints() -> None:
+def test_what_is_held_is_reported_to_the_network_and_changes_the_free_joints() -> None:
     kicking = SOURCE.rotations.copy()
     kicking[:, [1, 2], 1] += 0.4
     other = Motion(SMPL22, 30.0, SOURCE.root, rot.normalize(kicking))
@@ -123,7 +123,7 @@ def test_what_is_held_is_told_to_the_network_and_changes_the_free_joints() -> No
     assert np.abs(apart).max() > 1e-3
 
 
-def test_the_network_is_told_the_source_at_its_own_moments_from_the_first_predicted_frame_on() -> None:
+def test_the_network_is_reported_the_source_at_its_own_moments_from_the_first_predicted_frame_on() -> None:
     after = person(3.0, 60.0).frames(60, 150)
     ready = given(
         PREDICTOR,
@@ -173,7 +173,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("name", sorted(MISTAKES))
-def test_what_cannot_be_held_is_told(name: str) -> None:
+def test_what_cannot_be_held_is_reported(name: str) -> None:
     hold, words = MISTAKES[name]
     with pytest.raises(MotionloomError, match=words) as error:
         future(hold)

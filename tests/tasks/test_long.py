@@ -239,7 +239,7 @@ def test_the_place_behind_features_is_where_the_next_ones_begin() -> None:
     ],
     ids=str,
 )
-def test_what_cannot_be_asked_is_told(prior: Prior, seconds: list[float], asked: dict, said: str) -> None:
+def test_what_cannot_be_asked_is_reported(prior: Prior, seconds: list[float], asked: dict, said: str) -> None:
     with pytest.raises(MotionloomError, match=said) as caught:
         list(compose(prior, [Segment(WALK, s) for s in seconds], **{"steps": 1, **asked}))
     assert "\n" not in str(caught.value)

@@ -192,6 +192,8 @@ def test_a_goal_by_its_old_keywords_says_the_new_one(prior: Prior, block: PairBl
         [old] = generate_pair(prior, block, SAID[0], goal=walk(40), person=1, steps=2)  # type: ignore[call-arg]
     [new] = generate_pair(prior, block, SAID[0], goals=(None, walk(40)), steps=2)
     assert np.array_equal(old[0].root, new[0].root)
+    with pytest.warns(FutureWarning), pytest.raises(MotionloomError, match="person 2"):
+        generate_pair(prior, block, SAID[0], goal=walk(40), person=2)  # type: ignore[call-arg]
     with pytest.raises(MotionloomError, match="both people have a goal"):
         generate_pair(prior, block, SAID[0], goals=(walk(40), walk(40)))
 
@@ -249,7 +251,7 @@ def test_a_true_future_comes_back_onto_both_bodies_in_place(
         at = count - 1 + (np.arange(frames + 1) - (seen - 1)) / 20 * whole[0].fps
         uniform = one_world([to_smpl22(motion).positions() for motion in whole], legs)
         encoded = two.encode(np.stack([positions_at(person, at) for person in uniform]))
-        return torch.from_numpy(encoded.features)[None], torch.from_numpy(encoded.stands)[None]
+        return torch.from_numpy(encoded.features)[None], torch.from_numpy(encoded.poses)[None]
 
     monkeypatch.setattr(pair, "pair_features", true)
     [duet] = complete_pair(prior, block, (past[0], past[1]), seconds=0.5)
@@ -340,8 +342,8 @@ def test_what_nothing_can_be_made_of_is_refused(prior: Prior, block: PairBlock) 
         ({"seconds": 0.0}, "cannot be made"), ({"seconds": float("nan")}, "cannot be made"),
         ({"count": 0}, "1 or more"),
         ({"count": 10_000}, "10000 duets"),
-        ({"seed": -1}, "seed"), ({"seed": (1, 2**62)}, "seed"), ({"steps": 0}, "steps"), ({"person": 2}, "person 2"),
-        ({"guidance": float("nan")}, "guidance"), ({"goal": Goal.nothing(3)}, "goal of 3"),
+        ({"seed": -1}, "seed"), ({"seed": (1, 2**62)}, "seed"), ({"steps": 0}, "steps"),
+        ({"guidance": float("nan")}, "guidance"), ({"goals": (Goal.nothing(3), None)}, "goal of 3"),
     ]  # fmt: skip
     for given, message in wrong:
         with pytest.raises(MotionloomError, match=message):

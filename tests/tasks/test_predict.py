@@ -122,17 +122,17 @@ def test_head_and_toes_stay_as_they_are_held() -> None:
     assert np.degrees(np.linalg.norm(off, axis=-1)).max() < 25
 
 
-def test_a_person_wears_what_was_seen_and_then_what_was_drawn_each_at_its_frame(
+def test_a_person_takes_what_was_seen_and_then_what_was_drawn_each_at_its_frame(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """At the predictor's own rate a frame of the grid is a frame of the result."""
-    given, wear = [], task.apply_positions
+    given, apply = [], task.continued
 
-    def apply_positions(places, old, **asked):
-        given.append((places, asked["known"]))
-        return wear(places, old, **asked)
+    def continued(tail, places, **asked):
+        given.append((places, len(tail)))
+        return apply(tail, places, **asked)
 
-    monkeypatch.setattr(task, "apply_positions", apply_positions)
+    monkeypatch.setattr(task, "continued", continued)
     predict(PREDICTOR, PAST, count=1, seconds=1.0, steps=1, temperature=1.0)
     ((places, known),) = given
     seen = Past.of(PREDICTOR, PAST).person
@@ -217,7 +217,7 @@ def test_without_a_temperature_every_seed_makes_the_same() -> None:
     close(one, other)
 
 
-def test_progress_is_told_window_by_window() -> None:
+def test_progress_is_reported_window_by_window() -> None:
     told: list[tuple[int, int]] = []
     predict(PREDICTOR, PAST, count=1, seconds=2.5, steps=1, progress=lambda done, of: told.append((done, of)))
     assert told == [(1, 3), (2, 3), (3, 3)]
@@ -267,7 +267,7 @@ def test_neither_seam_of_a_switch_jumps(seconds: float, fps: float) -> None:
     assert speed[near].max() < (2.0 if seconds >= 0.5 else 5.0) * usual
 
 
-def test_the_network_is_told_the_target_from_the_moment_on_when_it_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_network_is_reported_the_target_from_the_moment_on_when_it_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
     told, draw = [], WindowSampler.window
 
     def window(self, person, seeds, number, known, **asked):
@@ -336,7 +336,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("name", sorted(MISTAKES))
-def test_what_cannot_be_predicted_is_told_in_one_sentence(name: str) -> None:
+def test_what_cannot_be_predicted_is_reported_in_one_sentence(name: str) -> None:
     asked = {"predictor": PREDICTOR, "past": PAST, "count": 1, "seconds": 0.5} | MISTAKES[name]
     predictor, past = asked.pop("predictor"), asked.pop("past")
     with pytest.raises(MotionloomError) as error:
@@ -361,7 +361,7 @@ TARGETS = {
 
 
 @pytest.mark.parametrize("word", sorted(TARGETS))
-def test_a_target_that_cannot_be_arrived_at_is_told(word: str) -> None:
+def test_a_target_that_cannot_be_arrived_at_is_reported(word: str) -> None:
     target, asked = TARGETS[word]
     with pytest.raises(MotionloomError, match=word):
         switch(PREDICTOR, PAST, target, **asked)

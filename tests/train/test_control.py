@@ -167,7 +167,7 @@ def test_a_full_fine_tune_is_a_prior_with_other_weights(data, start, tmp_path):
     assert len(changed) > 0.9 * len(base.net.state_dict())
 
 
-def test_held_out_errors_are_told_beside_the_base_networks(data, start, tmp_path, monkeypatch):
+def test_held_out_errors_are_reported_beside_the_base_networks(data, start, tmp_path, monkeypatch):
     """With an untrained adapter (rate next to nothing) both are the same numbers."""
     monkeypatch.setattr("motionloom.train.control.HELD_WINDOW", 30)
     (tmp_path / "set" / "clips").mkdir(parents=True)

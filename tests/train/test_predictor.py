@@ -31,7 +31,7 @@ def recipe(**changes) -> Recipe:
     return Recipe(**(values | changes))
 
 
-def test_a_window_is_told_from_where_its_last_observed_pose_stands_and_faces():
+def test_a_window_is_seen_from_where_its_last_observed_pose_stands_and_faces():
     drawn = Windows(protocol().split("train"), protocol(), variant="masked").draw(1, 2, 64)
     feet = drawn.features.unflatten(-1, (22, 3))
     for row, mask in enumerate(drawn.mask):
@@ -74,7 +74,7 @@ def test_half_of_the_windows_are_mirror_images():
     assert 0.4 < higher < 0.6
 
 
-def test_a_smoothed_past_is_what_is_told_and_the_recorded_one_is_what_is_guessed():
+def test_a_smoothed_past_is_what_is_shown_and_the_recorded_one_is_what_is_guessed():
     data = protocol()
     plain = Windows(data.split("train"), data, variant="masked").draw(1, 1, 40)
     smooth = Windows(data.split("train"), data, variant="masked", smoothed=1.0).draw(1, 1, 40)

@@ -89,7 +89,7 @@ def test_unusable_recipes_are_refused(tmp_path: Path, text: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_missing_recipe_is_told(tmp_path: Path) -> None:
+def test_a_missing_recipe_is_reported(tmp_path: Path) -> None:
     with pytest.raises(MotionloomError, match="no recipe"):
         load_recipe(tmp_path / "absent.toml")
 

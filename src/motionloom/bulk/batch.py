@@ -68,7 +68,7 @@ def run(
 ) -> Iterator[Report]:
     """Make what is missing of a batch's folder; a report of each shard when it is whole, those that were at once.
 
-    moved: told how many more rows were made. rows: how many the job has, where that is known.
+    moved: called with how many more rows were made. rows: how many the job has, where that is known.
     """
     check_options(options)
     count = jobs.count() if rows is None else rows
@@ -154,13 +154,13 @@ def _here(jobs: Jobs, options: Options) -> Iterator[Result]:
         places = {id(one): place for place, one in asked.items()}
         for one, made in maker.make(list(asked.values())):
             place = places[id(one)]
-            told = {"row": place, "id": one.id, "key": one.key, "text": one.text, "seed": one.seed}
+            known = {"row": place, "id": one.id, "key": one.key, "text": one.text, "seed": one.seed}
             if not isinstance(made, Made):
-                found[place] = result({**told, "state": "failed", "error": made})
+                found[place] = result({**known, "state": "failed", "error": made})
             elif passes is None or passes.holds(made.measures):
-                found[place] = result({**told, "state": "made", **made.measures}, made.motion)
+                found[place] = result({**known, "state": "made", **made.measures}, made.motion)
             else:
-                found[place] = result({**told, "state": "dropped", **made.measures})
+                found[place] = result({**known, "state": "dropped", **made.measures})
         yield from (found[place] for place in sorted(found))
         number += len(rows)
 
@@ -179,7 +179,7 @@ def _items(jobs: Jobs, size: int, store: Store, share: tuple[int, int]) -> Itera
 
 
 def _is_done(head: Head, rows: list[bytes]) -> bool:
-    """Whether a shard holds what these rows ask, as far as the rows alone tell; failed rows are to be tried again."""
+    """Whether a shard holds what these rows ask, as far as the rows alone show; failed rows are to be tried again."""
     return not head.names_files and "failed" not in head.counts and head.digest == digest(rows)
 
 

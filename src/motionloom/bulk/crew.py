@@ -24,7 +24,7 @@ STILLBORN = 3
 """Processes in a row that may die before they are ready."""
 
 Moved = Callable[[int], None]
-"""Told how many more rows were made."""
+"""Called with how many more rows were made."""
 
 
 def cores() -> int:
@@ -43,7 +43,7 @@ class _Process:
 
     number: int
     batch: Batch
-    heard: "queue.Queue[tuple[_Process, dict[str, Any] | None]]"
+    received: "queue.Queue[tuple[_Process, dict[str, Any] | None]]"
     task: Task | None = None
     ready: bool = False
     popen: "subprocess.Popen[bytes]" = field(init=False)
@@ -79,15 +79,15 @@ class _Process:
             store.attempts(self.task.shard).unlink(missing_ok=True)
 
     def _say(self, line: str) -> None:
-        with suppress(OSError):  # it has died: that is heard on the other side
+        with suppress(OSError):  # it has died: the other side notices
             self.popen.stdin.write(line.encode() + b"\n")  # type: ignore[union-attr]
             self.popen.stdin.flush()  # type: ignore[union-attr]
 
     def _listen(self) -> None:
         with suppress(OSError, ValueError):
             for line in self.popen.stdout:  # type: ignore[union-attr]
-                self.heard.put((self, json.loads(line)))
-        self.heard.put((self, None))
+                self.received.put((self, json.loads(line)))
+        self.received.put((self, None))
 
 
 def alone(items: Iterator[Task | Report], batch: Batch, *, workers: int, moved: Moved) -> Iterator[Report]:
@@ -107,7 +107,7 @@ def alone(items: Iterator[Task | Report], batch: Batch, *, workers: int, moved: 
 class _Crew:
     def __init__(self, items: Iterator[Task | Report], batch: Batch, workers: int, moved: Moved) -> None:
         self.items, self.batch, self.workers, self.moved = items, batch, workers, moved
-        self.heard: queue.Queue[tuple[_Process, dict[str, Any] | None]] = queue.Queue()
+        self.received: queue.Queue[tuple[_Process, dict[str, Any] | None]] = queue.Queue()
         self.processes: list[_Process] = []
         self.again: deque[Task] = deque()
         self.deaths: dict[int, int] = {}
@@ -117,7 +117,7 @@ class _Crew:
     def run(self) -> Iterator[Report]:
         yield from self._fill()
         while any(process.task for process in self.processes):
-            process, message = self.heard.get()
+            process, message = self.received.get()
             if message is None:
                 self._died(process)
             elif report := self._understood(process, message):
@@ -139,7 +139,7 @@ class _Crew:
             if idle is None:
                 taken = {process.number for process in self.processes}
                 number = next(n for n in range(self.workers) if n not in taken)
-                idle = _Process(number, self.batch, self.heard)
+                idle = _Process(number, self.batch, self.received)
                 self.processes.append(idle)
             idle.give(item)
 

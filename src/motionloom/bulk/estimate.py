@@ -11,7 +11,7 @@ from motionloom.bulk.jobs import Jobs
 from motionloom.bulk.maker import Made, Maker, Options
 from motionloom.bulk.measures import Filter
 from motionloom.bulk.row import Asked, parse
-from motionloom.bulk.shard import told_of
+from motionloom.bulk.shard import entry_of
 from motionloom.bulk.writers import sizes, writer
 from motionloom.errors import MotionloomError
 
@@ -64,7 +64,7 @@ def estimate(jobs: Jobs, options: Options, *, workers: int, sample: int = 16) ->
         unique = {one.id: one for one in asked}
         for one, made in maker.make(list(unique.values())):
             if isinstance(made, Made) and (passes is None or passes.holds(made.measures)):
-                file.add(made.motion, told_of(one, made))
+                file.add(made.motion, entry_of(one, made))
                 kept += 1
         file.close()
         seconds, size = time.perf_counter() - began, sizes(Path(folder) / "data")["bytes"]

@@ -159,7 +159,7 @@ def _csv(path: Path) -> Iterator[bytes]:
 
 
 def _value(column: str, text: str) -> Any:
-    """Numbers of the columns that hold numbers; what is none is told by `row.parse`."""
+    """Numbers of the columns that hold numbers; what is none is reported by `row.parse`."""
     kinds = {"seconds": float, "seed": int}
     try:
         return kinds[column](text) if column in kinds else text

@@ -58,10 +58,10 @@ def _write_parquet(path: Path, entries: Iterator[Entry]) -> None:
 def _all(store: Store, shards: int) -> Iterator[Entry]:
     for shard in range(shards):
         for entry in store.entries(shard):
-            told = {**entry, "shard": shard}
-            if isinstance(told.get("error"), str):  # of a failed row; of a made one it is a measure
-                told["error_text"] = told.pop("error")
-            yield told
+            row = {**entry, "shard": shard}
+            if isinstance(row.get("error"), str):  # of a failed row; of a made one it is a measure
+                row["error_text"] = row.pop("error")
+            yield row
 
 
 @dataclass(frozen=True, eq=False)

@@ -88,8 +88,8 @@ class _Attempts:
 def make_shard(task: Task, batch: Batch, maker: Maker, moved: Callable[[int], None] = lambda rows: None) -> Report:
     """Make what is missing of a shard and put it into the folder.
 
-    moved: told how many more rows were made. Raises `MotionloomError` where the folder cannot be written (a full disk),
-    and then leaves the folder as it was.
+    moved: called with how many more rows were made. Raises `MotionloomError` where the folder cannot be written (a full
+    disk), and then leaves the folder as it was.
     """
     store = Store(Path(batch.out), batch.options.format)
     work, notes = store.work(task.shard), _Attempts(store.attempts(task.shard))
@@ -187,13 +187,13 @@ class _Shard:
                 if isinstance(made, str):
                     self.entries[number] = self._entry(number, "failed", one, error=made)
                     continue
-                told = told_of(one, made)
+                about = entry_of(one, made)
                 if passes is not None and not passes.holds(made.measures):
-                    self.entries[number] = self._entry(number, "dropped", one, **told)
+                    self.entries[number] = self._entry(number, "dropped", one, **about)
                     continue
                 file = file or writer(self.batch.options.format, place)
-                file.add(made.motion, told)
-                self.entries[number] = self._entry(number, "made", one, **told)
+                file.add(made.motion, about)
+                self.entries[number] = self._entry(number, "made", one, **about)
         finally:
             if file is not None:
                 file.close()
@@ -222,7 +222,7 @@ class _Shard:
         return {"row": self.task.first + number, "state": state, **known, **more}
 
 
-def told_of(one: Asked, made: Made) -> dict[str, Any]:
+def entry_of(one: Asked, made: Made) -> dict[str, Any]:
     """What goes with a motion wherever it is kept; nothing of it depends on where the row stood in the job."""
     return {
         "id": one.id, "key": one.key, "task": one.row.task, "text": one.text, "seed": one.seed,

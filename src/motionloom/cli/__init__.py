@@ -71,7 +71,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:  # from here on: a Ctrl-C while the commands are still being imported is one too
         with interruptible():
             return _told(argv)
-    except KeyboardInterrupt:  # while the end was being told
+    except KeyboardInterrupt:  # while the end was being reported
         return 130
 
 

@@ -200,7 +200,7 @@ class _Progress:
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
         self.rows, self.there, self.made, self.clock = rows, 0, 0, time.monotonic
-        self.began = self.told = self.clock()
+        self.began = self.reported = self.clock()
         self.since = 0  # rows made before the clock of the rate began: a worker first loads its weights
         screen = Console(stderr=True)
         columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn())
@@ -232,8 +232,8 @@ class _Progress:
         rate = (self.made - self.since) / max(now - self.began, 1e-9)
         done = min(self.there + self.made, self.rows)
         self.bar.update(self.task, completed=done, rate=f"{60 * rate:.0f} a minute")
-        if self.silent and now - self.told > PAUSE and rate > 0:
-            self.told = now
+        if self.silent and now - self.reported > PAUSE and rate > 0:
+            self.reported = now
             left = _time((self.rows - done) / rate)
             print(f"{done:,} of {self.rows:,} rows, {60 * rate:.0f} a minute, {left} left", file=sys.stderr)
 

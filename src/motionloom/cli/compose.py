@@ -158,8 +158,8 @@ def _pieces(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline")
     from motionloom.tasks import long
 
     start = None if timeline.start is None else load(timeline.start)
-    told = {"guidance": timeline.guidance, "seed": timeline.seed}
-    settings: dict[str, Any] = {name: value for name, value in told.items() if value is not None}
+    named = {"guidance": timeline.guidance, "seed": timeline.seed}
+    settings: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
     with bar("composing") as move:
         yield from long.compose(
             prior, timeline.segments, start=start, path=timeline.path, foot_lock=arguments.foot_lock,

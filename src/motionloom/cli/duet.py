@@ -178,8 +178,8 @@ def _composed(
     from motionloom.tasks.long import with_loaded
     from motionloom.tasks.splice import concatenated
 
-    told = {"guidance": timeline.guidance, "seed": timeline.seed}
-    shared = {name: value for name, value in told.items() if value is not None} | shared
+    named = {"guidance": timeline.guidance, "seed": timeline.seed}
+    shared = {name: value for name, value in named.items() if value is not None} | shared
     segments = with_loaded(prior, timeline.segments)
     blocks = list(
         compose_pair(
@@ -344,7 +344,7 @@ def _check_sizes(
         fail(f"{arguments.count} duets of {seconds:g} s do not fit into memory; lower --count, or use --start")
 
 
-# What is written and told
+# What is written and reported
 
 
 def _caption(arguments: argparse.Namespace, timeline: "Timeline | None") -> str:
@@ -360,7 +360,7 @@ def _write(
     caption: str,
     skin: Target | None,
 ) -> list[Path]:
-    """All files, duet by duet; a person whose motion came from a BVH file is told in its unit and orders."""
+    """All files, duet by duet; a person whose motion came from a BVH file keeps its unit and orders."""
     from motionloom.io import save, save_scene
     from motionloom.io.bvh_writer import save_bvh
 

@@ -30,7 +30,7 @@ def _physical(commands) -> None:
         help="the twenty prompts of old, those of everyday life, or both (default basic)",
     )  # fmt: skip
     obedience.add_argument("--seeds", type=int, default=10, help="seeds per prompt (default 10)")
-    obedience.add_argument("--paraphrases", action="store_true", help="also try the same wishes in other words")
+    obedience.add_argument("--paraphrases", action="store_true", help="also try the same prompts in other words")
     obedience.add_argument(
         "--only", action="append", metavar="CHECK", help="only this check, such as 'walk forward' (repeatable)"
     )

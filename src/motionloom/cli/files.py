@@ -91,7 +91,7 @@ def run_export(arguments: argparse.Namespace) -> None:
 
         chosen = arguments.out_unit or unit_that_reads_back(motion, unit or 1.0)
         if unit_that_reads_back(motion, chosen) != chosen:
-            print(f"note: give --unit {chosen:g} to read {target} at this size: bones do not tell it", file=sys.stderr)
+            print(f"note: give --unit {chosen:g} to read {target} at this size: bones do not show it", file=sys.stderr)
         save_bvh(motion, target, order=arguments.order or orders, unit=chosen)
     else:
         _only_bvh(arguments, target)

@@ -96,7 +96,7 @@ class Finished(Generic[Made]):
         return len(several) < self.total
 
     def _add(self, some: Sequence[Made]) -> None:
-        """Write what comes next, all of it, before an interruption is heard."""
+        """Write what comes next, all of it, before an interruption takes effect."""
         with held_back():
             some = self.put(some)
             first, self.count = self.count, self.count + len(some)

@@ -36,12 +36,12 @@ class Target:
 
     @property
     def files(self) -> list[Path]:
-        """All places, in the order in which they are told."""
+        """All places, in the order in which they are reported."""
         return [self.folder / name for names in (*self.futures, self.overlays) for name in names]
 
 
 @dataclass(frozen=True)
-class Manner:
+class Writing:
     """How the past's own file says its numbers, if it is a BVH; and the skeleton that futures are put on instead."""
 
     unit: float = 1.0
@@ -82,7 +82,7 @@ def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool, ow
 
 
 def write_futures(
-    wanted: Sequence[Target], motions: "Sequence[Motion]", past: int, manner: Manner, *, caption: str
+    wanted: Sequence[Target], motions: "Sequence[Motion]", past: int, writing: Writing, *, caption: str
 ) -> list[Path]:
     """Motions that begin with ``past`` given frames, into all files at once: they all appear, or none does.
 
@@ -92,16 +92,16 @@ def write_futures(
     from motionloom.io.bvh_writer import save_bvh
     from motionloom.io.folder import atomic_folder
 
-    motions = put_all(manner.skeleton, motions)
+    motions = put_all(writing.skeleton, motions)
     with ExitStack() as stack:
         for target in wanted:
             folder = stack.enter_context(atomic_folder(target.folder))
             for names in target.futures:
                 for motion, name in zip(motions, names[: len(motions)], strict=True):
-                    if manner.skeleton is not None:
-                        manner.skeleton.save(motion, folder / name, caption=Path(name).stem)
+                    if writing.skeleton is not None:
+                        writing.skeleton.save(motion, folder / name, caption=Path(name).stem)
                     elif name.lower().endswith(".bvh"):
-                        save_bvh(motion, folder / name, order=manner.orders, unit=manner.unit)
+                        save_bvh(motion, folder / name, order=writing.orders, unit=writing.unit)
                     else:
                         save(motion, folder / name, captions=[Path(name).stem])
             draw_overlays(motions, past, [folder / name for name in target.overlays], caption=caption)
@@ -133,7 +133,7 @@ class Long:
     """Futures that are written while they are made, and what became of them."""
 
     wanted: Sequence[Target]
-    manner: Manner
+    writing: Writing
     past: int
     """Frames that are given, at the beginning of each."""
     frames: int
@@ -201,13 +201,15 @@ class Long:
         found = []
         for target, folder in zip(self.wanted, folders, strict=True):
             for names in target.futures:
-                if self.manner.skeleton is not None:
-                    stream = open_target(self.manner.skeleton, folder / names[number], caption=Path(names[number]).stem)
+                if self.writing.skeleton is not None:
+                    stream = open_target(
+                        self.writing.skeleton, folder / names[number], caption=Path(names[number]).stem
+                    )
                     found.append((target.folder / names[number], stream))
                     continue
                 stream = open_stream(
                     folder / names[number], total=self.frames, fps=piece.fps, joints=len(piece.skeleton),
-                    caption=Path(names[number]).stem, order=self.manner.orders, unit=self.manner.unit,
+                    caption=Path(names[number]).stem, order=self.writing.orders, unit=self.writing.unit,
                 )  # fmt: skip
                 found.append((target.folder / names[number], stream))
         return sorted(found, key=lambda pair: pair[0].suffix.lower() == ".bvh")

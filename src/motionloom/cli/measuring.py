@@ -28,12 +28,12 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
 
 
 def words(said: str) -> tuple[str, ...]:
-    """What stands between commas."""
+    """What is between commas."""
     return tuple(word.strip() for word in said.split(",") if word.strip())
 
 
 def say(line: str) -> None:
-    """Tell how far it is, on stderr."""
+    """Report progress on stderr."""
     print(line, file=sys.stderr, flush=True)
 
 
@@ -89,7 +89,7 @@ def prepared(arguments: argparse.Namespace, command: str, folder: Path | None) -
 
 
 def show(found: "Report", arguments: argparse.Namespace) -> None:
-    """Write a report into ``--out`` and print it; published rows are wide and of other data, and stand in files."""
+    """Write a report into ``--out`` and print it; published rows are wide and of other data, and go to files."""
     import json
     from dataclasses import replace
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.finished import Finished, groups
-from motionloom.cli.futures import FORMATS, Long, Manner, targets, write_futures
+from motionloom.cli.futures import FORMATS, Long, Writing, targets, write_futures
 from motionloom.cli.futures import Target as Files
 from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import bar, check_count, fail, sampling_of
@@ -23,7 +23,7 @@ LONG = 30.0
 """Seconds from which on futures are written while they are made, one after the other."""
 DAY = 86_400.0
 LISTED = 40
-"""Files told at the end; --json lists all."""
+"""Files named at the end; --json lists all."""
 TOGETHER = 16
 """Futures that are drawn together: those of a group that is finished stay where the next one is interrupted."""
 SAME_BONE = 1e-4
@@ -129,14 +129,14 @@ def run_predict(arguments: argparse.Namespace) -> int:
     wanted = targets(outs, arguments.count, formats, pictures=not arguments.no_picture, own=own)
     check_unit(arguments, [file for one in wanted for file in one.files])
     check_overwriting(arguments, [file for one in wanted for file in one.files])
-    past, manner = _read_past(arguments, skin)
+    past, writing = _read_past(arguments, skin)
     horizon = round(arguments.seconds * past.fps)
     _check_size(arguments, past, horizon, wanted)
     hold = _hold(arguments, past, horizon)
     predictor = _predictor(arguments)
     if arguments.seconds > LONG:
         given, frames = (_frames_at(arguments, past, count) for count in (len(past), len(past) + horizon))
-        long = Long(wanted, manner, given, frames, _caption(arguments))
+        long = Long(wanted, writing, given, frames, _caption(arguments))
         return _predict_long(arguments, predictor, past, hold=hold, long=long)
     from motionloom.tasks.predict import predict
 
@@ -148,14 +148,14 @@ def run_predict(arguments: argparse.Namespace) -> int:
                     foot_lock=arguments.foot_lock, progress=moved, **sampling_of(arguments) | some,
                 )  # fmt: skip
 
-    return _written(arguments, drawn(), wanted, manner, past, note=lambda: _note_seen(predictor, past))
+    return _written(arguments, drawn(), wanted, writing, past, note=lambda: _note_seen(predictor, past))
 
 
 def _written(
     arguments: argparse.Namespace,
     drawn: "Iterator[list[Motion]]",
     wanted: list[Files],
-    manner: Manner,
+    writing: Writing,
     past: "Motion",
     *,
     note: "Callable[[], None]" = lambda: None,
@@ -165,7 +165,7 @@ def _written(
     given = _frames_at(arguments, past, len(past))
 
     def write(motions: "Sequence[Motion]", places: list[list[Path]], first: int) -> None:
-        written.extend(write_futures(wanted, motions, given, manner, caption=_caption(arguments)))
+        written.extend(write_futures(wanted, motions, given, writing, caption=_caption(arguments)))
 
     made = Finished(
         [[target.folder] for target in wanted[:1]], arguments.count, write,
@@ -191,7 +191,7 @@ def run_switch(arguments: argparse.Namespace) -> int:
     wanted = targets(outs, arguments.count, [], pictures=False, own=own)
     check_unit(arguments, [file for one in wanted for file in one.files])
     check_overwriting(arguments, [file for one in wanted for file in one.files])
-    past, manner = _read_past(arguments, skin)
+    past, writing = _read_past(arguments, skin)
     _check_size(arguments, past, round(arguments.seconds * past.fps), wanted)
     target = _like_past(arguments, arguments.target, past)
     _check_poses(arguments, (len(past) + len(target) + round(arguments.seconds * past.fps)) * len(past.skeleton))
@@ -205,7 +205,7 @@ def run_switch(arguments: argparse.Namespace) -> int:
         )
         for some, _ in groups(arguments.count, TOGETHER, lambda done, total: None)
     )  # fmt: skip
-    return _written(arguments, drawn, wanted, manner, past)
+    return _written(arguments, drawn, wanted, writing, past)
 
 
 # Futures of any length
@@ -225,8 +225,8 @@ def _predict_long(
         )
     with closing(_pieces(arguments, predictor, past, hold, frames=long.frames)) as makers:
         interrupted = long.write(makers)
-    told = [f"{file}: {s:.2f} s" if s and not arguments.json else str(file) for file, s in long.finished]
-    _report(arguments, told, arguments.count)
+    lines = [f"{file}: {s:.2f} s" if s and not arguments.json else str(file) for file, s in long.finished]
+    _report(arguments, lines, arguments.count)
     if interrupted:
         total = long.frames / (arguments.fps or past.fps)
         print(f"motionloom: interrupted; what was finished is in {long.kept()} of {total:.2f} s", file=sys.stderr)
@@ -280,13 +280,13 @@ def _caption(arguments: argparse.Namespace) -> str:
     return arguments.past.stem if target is None else f"{arguments.past.stem} to {target.stem}"
 
 
-def _read_past(arguments: argparse.Namespace, skin: Target | None) -> "tuple[Motion, Manner]":
+def _read_past(arguments: argparse.Namespace, skin: Target | None) -> "tuple[Motion, Writing]":
     whole, unit, orders = read_clip(arguments, arguments.past)
     check_size(arguments, arguments.past, whole)
     past = crop(whole, arguments)
     if len(past) < 2:
         fail(f"{arguments.past} has one frame here, and a past has at least two; only they say where the person goes")
-    return past, Manner(arguments.out_unit or unit or 1.0, orders, skin)
+    return past, Writing(arguments.out_unit or unit or 1.0, orders, skin)
 
 
 def _like_past(arguments: argparse.Namespace, path: Path, past: "Motion") -> "Motion":
@@ -407,7 +407,7 @@ def _check_poses(arguments: argparse.Namespace, each: int) -> None:
         )
 
 
-# What is told
+# What is reported
 
 
 def _note_seen(predictor: "Predictor", past: "Motion") -> None:

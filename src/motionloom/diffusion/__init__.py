@@ -3,13 +3,27 @@
 Nothing here knows about motion. Read `schedule`, `solvers`, `sampling`, then `denoisers` and `constraints`.
 """
 
+import warnings
+
 from .bases import Basis, Dct, Frames
 from .constraints import Constraint, chain, handshake, observe
 from .denoisers import Denoiser, Weight, blend, from_noise, guide, inpaint, join_rows, mix
 from .sampling import Snapshot, masked_draw, restart, row_draw, row_seed, run, sample
-from .schedule import SCHEDULES, SPACINGS, Draw, Schedule, State, cosine, from_betas, levels, linear, sigmoid, sqrt
+from .schedule import (
+    SCHEDULES,
+    SPACINGS,
+    NoiseSource,
+    Schedule,
+    State,
+    cosine,
+    from_betas,
+    levels,
+    linear,
+    sigmoid,
+    sqrt,
+)
 from .solvers import DDPM, SOLVERS, Ddim, DpmSolver2M, Solver, Step
-from .staggered import Guess, Link, staggered
+from .staggered import Link, RowsDenoiser, staggered
 
 __all__ = [
     "DDPM",
@@ -22,10 +36,10 @@ __all__ = [
     "Ddim",
     "Denoiser",
     "DpmSolver2M",
-    "Draw",
     "Frames",
-    "Guess",
     "Link",
+    "NoiseSource",
+    "RowsDenoiser",
     "Schedule",
     "Snapshot",
     "Solver",
@@ -55,3 +69,12 @@ __all__ = [
     "sqrt",
     "staggered",
 ]
+
+
+def __getattr__(name: str) -> object:
+    """Types under the names that they had, for one release."""
+    new = {"Draw": "NoiseSource", "Guess": "RowsDenoiser"}.get(name)
+    if new is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn(f"{name} is {new} now; the old name goes with the next release", FutureWarning, stacklevel=2)
+    return globals()[new]

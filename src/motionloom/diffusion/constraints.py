@@ -13,13 +13,15 @@ from torch import Tensor
 
 from .bases import Basis
 from .denoisers import mix
-from .schedule import Draw, Schedule, State
+from .schedule import NoiseSource, Schedule, State
 
 Constraint: TypeAlias = Callable[[State, int], State]
 """(state, the level it has just reached) -> edited state, of the same shape."""
 
 
-def observe(known: State, mask: Tensor, schedule: Schedule, draw: Draw, *, basis: Basis | None = None) -> Constraint:
+def observe(
+    known: State, mask: Tensor, schedule: Schedule, draw: NoiseSource, *, basis: Basis | None = None
+) -> Constraint:
     """Where `mask` is 1 (True) the state becomes signal * known + noise * draw(known), at the level it reached.
 
     With a normal draw it is the known half of RePaint (Lugmayr et al. 2022, eq. 8a). With `draw=torch.zeros_like`

@@ -1,12 +1,12 @@
-"""Guesses of the clean data, and the edits of a guess: functions from denoisers to denoisers.
+"""Denoisers, which estimate the clean data x_0, and edits of their estimates: functions from denoisers to denoisers.
 
 A denoiser answers E[x_0 | x_level]; everything it is conditioned on was bound before the sampler's loop. Here
 are the ways to bind and to edit:
 
     guide       u + s (c - u)                    classifier-free guidance (Ho & Salimans 2022), one network call
-    inpaint     (1 - m) guess + m known          hard (m is 0 or 1) and soft
+    inpaint     (1 - m) denoised + m known          hard (m is 0 or 1) and soft
     from_noise  (x - noise * e) / signal         a network that predicts the noise e
-    blend       sum of w_i guess_i               several models, e.g. DiffusionBlending
+    blend       sum of w_i denoised_i            several models, e.g. DiffusionBlending
 """
 
 from collections.abc import Callable, Sequence
@@ -18,10 +18,10 @@ from torch import Tensor
 from .schedule import Schedule, State
 
 Denoiser: TypeAlias = Callable[[State, int], State]
-"""(state, its level) -> guess of the clean data, of the same shape."""
+"""(state, its level) -> estimate of the clean data, of the same shape."""
 
 Weight: TypeAlias = float | Tensor | Callable[[int], float | Tensor]
-"""A factor of a guess: a number, a tensor that broadcasts to the state, or either as a function of the level."""
+"""A factor of an estimate: a number, a tensor that broadcasts to the state, or either as a function of the level."""
 
 C = TypeVar("C")
 
@@ -73,7 +73,7 @@ def guide(
 
 
 def inpaint(denoise: Denoiser, known: State, mask: Tensor) -> Denoiser:
-    """Holds the guess to `known` where `mask` is 1 (True), leaves it alone at 0, mixes linearly in between."""
+    """Holds the estimate to `known` where `mask` is 1 (True), leaves it alone at 0, mixes linearly in between."""
     return lambda x, level: mix(denoise(x, level), known, mask)
 
 
@@ -95,7 +95,7 @@ def from_noise(net: Callable[[State, int], Tensor], schedule: Schedule) -> Denoi
 
 
 def blend(denoisers: Sequence[Denoiser], weights: Sequence[Weight]) -> Denoiser:
-    """The weighted sum of several guesses; the weights are used as they are (usually they sum to 1)."""
+    """The weighted sum of several denoised estimates; the weights are used as they are (usually they sum to 1)."""
     if not denoisers or len(denoisers) != len(weights):
         raise ValueError(f"blending needs one weight per denoiser, got {len(weights)} for {len(denoisers)}")
 

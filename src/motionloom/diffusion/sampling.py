@@ -1,12 +1,13 @@
-"""The walk from noise to data: guess the clean data, move to a cleaner level, and again.
+"""The sampling loop from noise to data: estimate the clean data, move to a cleaner level, and again.
 
     draw = row_draw(range(seed, seed + rows))
     x = draw(torch.empty(rows, tokens, features))
     motion = run(guide(net, text, nothing, 2.5), x, levels=levels(schedule, 20), solver=DpmSolver2M(),
                  schedule=schedule, draw=draw)
 
-There are two places to interfere: the denoiser (an edit of the guess, `denoisers`) and `constrain` (an edit of the
-state after each move, `constraints`). Gradients are the caller's affair: wrap a run in `torch.inference_mode()`.
+There are two places to interfere: the denoiser (an edit of the denoised estimate, `denoisers`) and `constrain` (an
+edit of the state after each move, `constraints`). Gradients are the caller's affair: wrap a run in
+`torch.inference_mode()`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,7 +20,7 @@ from torch import Tensor
 
 from .constraints import Constraint, chain
 from .denoisers import Denoiser
-from .schedule import Draw, Schedule, State
+from .schedule import NoiseSource, Schedule, State
 from .solvers import Solver, Step
 
 
@@ -30,7 +31,7 @@ class Snapshot(NamedTuple):
     """The level that was reached."""
     state: State
     clean: State
-    """The guess that the move was made with."""
+    """The denoised estimate that the move was made with."""
 
 
 def sample(
@@ -40,7 +41,7 @@ def sample(
     levels: Sequence[int],
     solver: Solver,
     schedule: Schedule,
-    draw: Draw,
+    draw: NoiseSource,
     constrain: Constraint | None = None,
 ) -> Iterator[Snapshot]:
     """Walk `x`, a state at `levels[0]`, through strictly falling `levels`; one snapshot per move.
@@ -55,7 +56,7 @@ def sample(
 
 
 def _walk(
-    denoise: Denoiser, x: State, levels: Sequence[int], step: Step, draw: Draw, constrain: Constraint
+    denoise: Denoiser, x: State, levels: Sequence[int], step: Step, draw: NoiseSource, constrain: Constraint
 ) -> Iterator[Snapshot]:
     for t, s in pairwise(levels):
         clean = denoise(x, t)
@@ -70,7 +71,7 @@ def run(
     levels: Sequence[int],
     solver: Solver,
     schedule: Schedule,
-    draw: Draw,
+    draw: NoiseSource,
     constrain: Constraint | None = None,
 ) -> State:
     """The state at the end of `sample`; `x` itself where there is only one level."""
@@ -80,7 +81,7 @@ def run(
     return state
 
 
-def restart(clean: State, schedule: Schedule, level: int, draw: Draw) -> State:
+def restart(clean: State, schedule: Schedule, level: int, draw: NoiseSource) -> State:
     """Clean data taken to `level` with fresh noise: the start of a walk that keeps what this noise leaves of it."""
     return schedule.noised(clean, level, draw(clean))
 
@@ -90,7 +91,7 @@ def row_seed(seed: int, number: int, turn: int = 0) -> int:
     return int(np.random.SeedSequence((seed, number, turn)).generate_state(1, np.uint64)[0] >> np.uint64(1))
 
 
-def row_draw(seeds: Sequence[int], lengths: Sequence[int] | None = None) -> Draw:
+def row_draw(seeds: Sequence[int], lengths: Sequence[int] | None = None) -> NoiseSource:
     """Noise that belongs to rows: row i draws from its own generator, seeded with `seeds[i]`.
 
     So a row's noise does not depend on the other rows, on their count or order, or on the device: it is drawn
@@ -113,6 +114,6 @@ def row_draw(seeds: Sequence[int], lengths: Sequence[int] | None = None) -> Draw
     return draw
 
 
-def masked_draw(draw: Draw, mask: Tensor) -> Draw:
+def masked_draw(draw: NoiseSource, mask: Tensor) -> NoiseSource:
     """Noise scaled by (1 - mask): none where the state is to stay noise-free (noise-filtered control, soft too)."""
     return lambda like: draw(like) * (1.0 - mask.to(like.dtype))

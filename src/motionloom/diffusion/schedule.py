@@ -23,7 +23,7 @@ from torch import Tensor
 State: TypeAlias = Tensor
 """What is denoised: (rows, tokens, features). Only the first axis, the rows of a batch, has a meaning here."""
 
-Draw: TypeAlias = Callable[[Tensor], Tensor]
+NoiseSource: TypeAlias = Callable[[Tensor], Tensor]
 """Standard normal noise of the shape, type and device of its argument."""
 
 SPACINGS = ("index", "early", "quadratic", "snr")

@@ -1,12 +1,12 @@
-"""One move: from a state at level t and a guess of the clean data to a state at a cleaner level s.
+"""One move: from a state at level t and an estimate of the clean data to a state at a cleaner level s.
 
-Write a, b for signal and noise (`schedule`), D for the guess, z for fresh noise, and let
+Write a, b for signal and noise (`schedule`), D for the denoised estimate, z for fresh noise, and let
 
     r = (a_t b_s) / (a_s b_t) = exp(-h),    h = log(a_s / b_s) - log(a_t / b_t),
 
 h being the length of the step in log-SNR; r = 0 for a step to clean data.
 
-**DDIM(eta)** (Song et al. 2021, eq. 12) keeps the part of the noise that the guess implies, e = (x - a_t D) / b_t:
+**DDIM(eta)** (Song et al. 2021, eq. 12) keeps the part of the noise that the estimate implies, e = (x - a_t D) / b_t:
 
     x_s = a_s D + b_s sqrt(1 - eta² + eta² r²) e + eta b_s sqrt(1 - r²) z
 
@@ -14,7 +14,7 @@ eta = 0 is the deterministic DDIM. eta = 1 is ancestral sampling (DDPM, Ho et al
 levels it has the published posterior mean and its fixed small variance, b_s² (1 - r²) = beta_t b_s² / b_t². Over wider
 steps it is the same posterior q(x_s | x_t, x_0 = D).
 
-**DPM-Solver++(2M)** (Lu et al. 2022, algorithm 2) extrapolates the guess along log-SNR with the guess D' of the
+**DPM-Solver++(2M)** (Lu et al. 2022, algorithm 2) extrapolates the estimate along log-SNR with the estimate D' of the
 move before, of length h'; eta = 1 is its SDE variant:
 
     D2  = D + (h / 2h') (D - D')
@@ -23,7 +23,7 @@ move before, of length h'; eta = 1 is its SDE variant:
 The first move has no D' and the move to level 0 has h = inf: both use D2 = D, and are DDIM moves for eta 0 and 1.
 
 A solver is a value that may be shared; `start` opens one run and returns its step function, which alone
-remembers anything. The guess it is handed may have been edited (guidance, inpainting): it cannot tell.
+remembers anything. The estimate it is handed may have been edited (guidance, inpainting): it cannot tell.
 """
 
 import math
@@ -34,10 +34,10 @@ from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 from torch import Tensor
 
-from .schedule import Draw, Schedule, State
+from .schedule import NoiseSource, Schedule, State
 
-Step: TypeAlias = Callable[[State, State, int, int, Draw], State]
-"""(state, guess of the clean data, its level t, cleaner level s, draw) -> state at s."""
+Step: TypeAlias = Callable[[State, State, int, int, NoiseSource], State]
+"""(state, estimate of the clean data, its level t, cleaner level s, draw) -> state at s."""
 
 
 @runtime_checkable
@@ -64,9 +64,9 @@ def _check_eta(eta: float) -> None:
 
 @dataclass(frozen=True)
 class Ddim:
-    """DDIM(eta); eta = 1 is ancestral sampling. It draws once in every step if eta > 0, else never.
+    """DDIM(eta); eta = 1 is ancestral sampling. It samples noise once in every step if eta > 0, else never.
 
-    The draw of a last step to level 0 has no effect but is made, as in the published samplers, so that their
+    The noise of a last step to level 0 has no effect but is sampled, as in the published samplers, so that their
     streams of noise can be replayed.
     """
 
@@ -85,7 +85,7 @@ class Ddim:
     def start(self, schedule: Schedule) -> Step:
         """See `Solver.start`."""
 
-        def step(x: State, clean: State, t: int, s: int, draw: Draw) -> State:
+        def step(x: State, clean: State, t: int, s: int, draw: NoiseSource) -> State:
             move = self.move(schedule, t, s)
             mean = move.clean * clean + move.state * x
             return mean + move.noise * draw(x) if self.eta > 0.0 else mean
@@ -95,7 +95,7 @@ class Ddim:
 
 @dataclass(frozen=True)
 class DpmSolver2M:
-    """DPM-Solver++(2M): second order in the length of the steps, one guess per step; eta = 1 is its SDE variant."""
+    """DPM-Solver++(2M): second order in the length of the steps, one call per step; eta = 1 is its SDE variant."""
 
     eta: float = 0.0
 
@@ -104,16 +104,16 @@ class DpmSolver2M:
 
     def start(self, schedule: Schedule) -> Step:
         """See `Solver.start`."""
-        before: tuple[State, float] | None = None  # the guess and the length of the move before this one
+        before: tuple[State, float] | None = None  # the estimate and the length of the move before this one
 
-        def step(x: State, clean: State, t: int, s: int, draw: Draw) -> State:
+        def step(x: State, clean: State, t: int, s: int, draw: NoiseSource) -> State:
             nonlocal before
             h = schedule.log_snr(s) - schedule.log_snr(t)
-            guess = _extrapolate(clean, before, h)
+            ahead = _extrapolate(clean, before, h)
             before = clean, h
             b_t, (a_s, b_s) = schedule.at(t)[1], schedule.at(s)
             r = _decay(schedule, t, s)
-            mean = (b_s / b_t * r**self.eta) * x + a_s * (1.0 - r ** (1.0 + self.eta)) * guess
+            mean = (b_s / b_t * r**self.eta) * x + a_s * (1.0 - r ** (1.0 + self.eta)) * ahead
             if self.eta == 0.0:
                 return mean
             return mean + b_s * math.sqrt(1.0 - r ** (2.0 * self.eta)) * draw(x)

@@ -5,7 +5,7 @@ copies of an overlap become (1 - a) * previous + a * next with a = 0, 1/h, ... (
 2024, eq. 2). Two things differ from `constraints.handshake` over one batch of all rows:
 
 * Both copies get the *same* noise, at the start and in each move. Averaging independent noise would shrink its spread
-  to 0.7 in the middle of the overlap; equal states and equal noise make the average one of the guesses alone.
+  to 0.7 in the middle of the overlap; equal states and equal noise make the average one of the estimates alone.
 * A row may go from step k to k + 1 as soon as its two neighbours have reached step k. Nothing else ties rows together,
   so rows of a long chain walk at different levels, a bounded number of them at a time, first ones first, and each is
   handed out when it and the next one are clean. Which rows happen to share a network call changes nothing.
@@ -18,7 +18,7 @@ from itertools import pairwise
 import torch
 from torch import Tensor
 
-from .schedule import Draw, Schedule, State
+from .schedule import NoiseSource, Schedule, State
 from .solvers import Solver, Step
 
 
@@ -41,33 +41,33 @@ class _Row:
     state: State
     done: int = 0
     """Moves made."""
-    drawn: dict[int, Tensor] = field(default_factory=dict)
+    sampled: dict[int, Tensor] = field(default_factory=dict)
     """The row's own noise by the move it is for (0: the start), as long as it or the next row needs it."""
     draws: int = 0
 
     def noise(self, move: int, features: int) -> Tensor:
-        """(length, features) drawn in order, so that the noise of a move does not depend on who asks first."""
+        """(length, features) sampled in order, so that the noise of a move does not depend on who asks first."""
         while self.draws <= move:
-            self.drawn[self.draws] = torch.randn((self.link.length, features), generator=self.generator)
+            self.sampled[self.draws] = torch.randn((self.link.length, features), generator=self.generator)
             self.draws += 1
-        return self.drawn[move]
+        return self.sampled[move]
 
     def moved(self) -> None:
         """One move more; of the noise up to it the next row needs the overlap, of what lies further back nothing."""
         self.done += 1
-        for old in [move for move in self.drawn if move <= self.done]:
-            used = self.drawn.pop(old)
+        for old in [move for move in self.sampled if move <= self.done]:
+            used = self.sampled.pop(old)
             if old >= self.done - 1:
-                self.drawn[old] = used[-max(self.link.overlap, 1) :].clone()
+                self.sampled[old] = used[-max(self.link.overlap, 1) :].clone()
 
 
-Guess = Callable[[Sequence[int], Sequence[State], Sequence[int]], Sequence[State]]
-"""(numbers of rows, their states (length, features), their levels) -> guesses of the clean data."""
+RowsDenoiser = Callable[[Sequence[int], Sequence[State], Sequence[int]], Sequence[State]]
+"""(numbers of rows, their states (length, features), their levels) -> estimates of their clean data."""
 
 
 def staggered(
     links: Iterable[Link],
-    guess: Guess,
+    denoise: RowsDenoiser,
     *,
     levels: Sequence[int],
     solver: Solver,
@@ -78,21 +78,22 @@ def staggered(
 ) -> Iterator[State]:
     """Clean rows (length, features) in order, overlaps included twice; the copies of an overlap are equal.
 
-    ``links`` is read as the walk gets there. ``together``: rows per network call at most. ``moved`` is told how many
-    rows made a move. Rows live where the guesses do, on any device. Raises ValueError where the overlaps of a row do
-    not fit into it, and for levels that do not fall.
+    ``links`` is read as the walk gets there. ``together``: rows per network call at most. ``moved`` is called with how
+    many rows made a move. Rows live where the estimates do, on any device. Raises ValueError where the overlaps of a
+    row do not fit into it, and for levels that do not fall.
     """
     if len(levels) < 2 or any(s >= t for t, s in pairwise(levels)) or together < 1:
         raise ValueError(f"a walk needs falling levels and a row per call, got {list(levels)} and {together} together")
-    return _Chain(links, guess, levels, solver, schedule, features, together, moved).walk()
+    return _Chain(links, denoise, levels, solver, schedule, features, together, moved).walk()
 
 
 class _Chain:
     def __init__(
-        self, links: Iterable[Link], guess: Guess, levels: Sequence[int], solver: Solver, schedule: Schedule,
+        self, links: Iterable[Link], denoise: RowsDenoiser, levels: Sequence[int], solver: Solver, schedule: Schedule,
         features: int, together: int, moved: Callable[[int], None],
     ) -> None:  # fmt: skip
-        self.links, self.guess, self.levels, self.solver, self.schedule = iter(links), guess, levels, solver, schedule
+        self.links, self.denoise, self.levels = iter(links), denoise, levels
+        self.solver, self.schedule = solver, schedule
         self.features, self.together, self.moved = features, together, moved
         self.rows: dict[int, _Row] = {}
         self.ended = False
@@ -153,7 +154,7 @@ class _Chain:
     def _move(self, numbers: Sequence[int]) -> None:
         rows = [self.rows[number] for number in numbers]
         at = [self.levels[row.done] for row in rows]
-        cleans = self.guess(numbers, [row.state for row in rows], at)
+        cleans = self.denoise(numbers, [row.state for row in rows], at)
         for number, row, clean, level in zip(numbers, rows, cleans, at, strict=True):
             draw = self._draw(number, row.done + 1)
             row.state = row.step(row.state.to(clean), clean, level, self.levels[row.done + 1], draw)
@@ -175,7 +176,7 @@ class _Chain:
         a.state = torch.cat([a.state[:-h], shared])
         b.state = torch.cat([shared, b.state[h:]])
 
-    def _draw(self, number: int, move: int) -> Draw:
+    def _draw(self, number: int, move: int) -> NoiseSource:
         return lambda like: self._noise(number, move).to(like)
 
     def _noise(self, number: int, move: int) -> Tensor:

@@ -1,1 +1,1 @@
-"""What pulls a guess of the motion to something known."""
+"""What pulls a denoised estimate of the motion to something known."""

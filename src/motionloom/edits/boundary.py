@@ -29,17 +29,17 @@ class InpaintWindow:
     """Some frames of a motion in the world; those from ``first`` to before ``last`` are sampled anew."""
 
     positions: Array
-    """(frames + 1, 22, 3) metres at 20 fps, floor at y = 0; the last frame only tells how the one before it moves."""
+    """(frames + 1, 22, 3) metres at 20 fps, floor at y = 0; the last frame only shows how the one before it moves."""
     first: int
     last: int
     keep: NDArray[np.bool_]
     """(263,) numbers that stay inside of the stretch too."""
     strength: float = 1.0
-    """Share of the noise levels the old frames are taken to; 1 draws from noise alone."""
+    """Share of the noise levels the old frames are taken to; 1 samples from noise alone."""
     facing: bool = True
-    """Whether the drawn person must face at frame ``last`` as the known one does there."""
+    """Whether the sampled person must face at frame ``last`` as the known one does there."""
     place: bool = True
-    """Whether it must also stand there."""
+    """Whether it must also be at the same place."""
 
     def __len__(self) -> int:
         return len(self.positions) - 1
@@ -110,7 +110,7 @@ def arrival(known: Tensor, mask: Tensor, window: InpaintWindow) -> Callable[[Ten
         if window.place:
             turn, root = humanml.recover_root(bent)
             lacking = goal - root[:, last]
-            # velocities are told in the heading of the frame they lead to
+            # velocities are given in the heading of the frame they lead to
             w, y = turn[:, first + 1 : last + 1, 0], turn[:, first + 1 : last + 1, 2]
             c, s = 1 - 2 * y * y, 2 * w * y
             x, z = lacking[:, None, 0], lacking[:, None, 2]

@@ -1,4 +1,4 @@
-"""Fitting: a drawn motion is bent, as little and as smoothly as it takes, until it meets a goal.
+"""Fitting: a sampled motion is bent, as little and as smoothly as it takes, until it meets a goal.
 
 One least-squares problem over the turns of the joints and the place of the root, solved by Gauss and Newton: what is
 asked, feet that stay where they stand, small changes, small accelerations of the changes. Neighbouring frames are
@@ -28,14 +28,14 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 ROUND = 30
-"""Frames before and after a wish that may change."""
+"""Frames before and after a target that may change."""
 EXACT, STANDING, SWINGING = 0.0005, 0.001, 0.02
-"""Metres: how exactly wishes are met, standing feet stand, and other feet go where they went."""
+"""Metres: how exactly targets are met, standing feet stand, and other feet go where they went."""
 SLOW = 30.0
 """Frames squared: a change as large as allowed costs as much as one that accelerates by that share of it per frame²."""
 STEPS = 12
 _DONE = 1e-4
-"""Metres: no wish gets nearer by more in the last step."""
+"""Metres: no target gets nearer by more in the last step."""
 
 _BALLS, _HINGES = costs.by_number(costs.BALL_TURN), costs.by_number(costs.HINGE_TURN)
 """Joints that turn freely, and that bend, with the radians by which they usually may."""
@@ -52,7 +52,7 @@ _AXES = {limb.middle: np.array(limb.hinge, dtype=np.float64) for limb in LIMBS}
 _COLUMNS = 3 + 3 * len(_BALLS) + len(_HINGES)
 _SIZES = np.concatenate([np.full(3, _ROOT), np.repeat(list(_BALLS.values()), 3), list(_HINGES.values())])
 _FEET_OF = {joint: (2 * side, 2 * side + 1) for side, leg in enumerate(costs.LEGS) for joint in leg}
-"""Columns of `FEET` that a wish for a joint of the leg sets free."""
+"""Columns of `FEET` that a target for a joint of the leg sets free."""
 
 
 def fit(motion: Motion, goal: Goal) -> Motion:
@@ -60,7 +60,7 @@ def fit(motion: Motion, goal: Goal) -> Motion:
 
     ``motion`` on the 22-joint skeleton at 20 frames per second; ``goal`` of the same length, in the same world. Feet
     that stand keep their place, or all of a stance moves where the root's path does; knees and elbows never bend
-    backwards; frames further than `ROUND` from any wish stay exactly as they are. What is out of reach is pointed at.
+    backwards; frames further than `ROUND` from any target stay exactly as they are. What is out of reach is pointed at.
     Facing is not fitted. Raises MotionloomError for another skeleton or length.
     """
     if motion.skeleton != SMPL22 or motion.translations is not None:
@@ -80,8 +80,8 @@ def fit(motion: Motion, goal: Goal) -> Motion:
         part = slice(start, stop)
         pose = _Pose(motion.root[part], motion.rotations[part], np.zeros((stop - start, _COLUMNS)))
         pose.change[:, :3] = shift[part] / _ROOT
-        wishes = [_wishes(goal, part), feet.crop(part)]
-        change = _solved(pose, wishes, _stiffness(stop - start, start > 0, stop < len(motion)))
+        targets = [_targets(goal, part), feet.crop(part)]
+        change = _solved(pose, targets, _stiffness(stop - start, start > 0, stop < len(motion)))
         root[part], rotations[part] = replace(pose, change=change).posed()
     return replace(motion, root=root, rotations=rotations)
 
@@ -90,7 +90,7 @@ def fit(motion: Motion, goal: Goal) -> Motion:
 
 
 @dataclass(frozen=True, eq=False)
-class _Wishes:
+class _Targets:
     """Places of some joints, each with a weight."""
 
     joints: tuple[int, ...]
@@ -99,24 +99,24 @@ class _Wishes:
     weights: Array
     """(frames, joints, 3) 1 / standard deviation; 0 where nothing is asked."""
 
-    def crop(self, part: slice) -> "_Wishes":
-        return _Wishes(self.joints, self.places[part], self.weights[part])
+    def crop(self, part: slice) -> "_Targets":
+        return _Targets(self.joints, self.places[part], self.weights[part])
 
 
-def _wishes(goal: Goal, part: slice) -> _Wishes:
+def _targets(goal: Goal, part: slice) -> _Targets:
     joints = np.flatnonzero(goal.asked[part].any(axis=(0, 2)))
     asked = goal.asked[part][:, joints]
-    return _Wishes(tuple(joints.tolist()), np.where(asked, goal.positions[part][:, joints], 0.0), asked / EXACT)
+    return _Targets(tuple(joints.tolist()), np.where(asked, goal.positions[part][:, joints], 0.0), asked / EXACT)
 
 
 def _windows(goal: Goal) -> Iterator[tuple[int, int]]:
-    """Stretches of frames around wishes."""
+    """Stretches of frames around targets."""
     asked = goal.asked.any(axis=(1, 2)).astype(float)
     yield from true_spans(np.convolve(asked, np.ones(2 * ROUND + 1))[ROUND:-ROUND] > 0.5)
 
 
 def _in_reach(places: Array, goal: Goal) -> Array:
-    """(frames, 22, 3) the wishes, those out of reach brought as near to the body as it can follow them."""
+    """(frames, 22, 3) the targets, those out of reach brought as near to the body as it can follow them."""
     result = goal.positions.copy()
     for joint, base, length in _chains():
         base_asked = goal.asked[:, base].any(axis=-1, keepdims=True)
@@ -140,7 +140,7 @@ def _chains() -> Iterator[tuple[int, int, float]]:
 
 
 def _root_shift(places: Array, goal: Goal) -> Array:
-    """(frames, 3) metres, horizontal, smooth: what the whole body goes to be where its path, or a far wish, is."""
+    """(frames, 3) metres, horizontal, smooth: what the whole body goes to be where its path, or a far target, is."""
     need, weight = np.zeros((len(places), 3)), np.zeros((len(places), 3))
     for joint, base, length in _chains():
         line = np.where(goal.asked[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
@@ -168,7 +168,7 @@ _LARGE = 0.5
 """Metres that the whole body usually may go, feet and all."""
 
 
-def _feet(places: Array, shift: Array, goal: Goal, fps: float) -> _Wishes:
+def _feet(places: Array, shift: Array, goal: Goal, fps: float) -> _Targets:
     """Where the feet go when the body goes by ``shift``: through every stance by the mean of it."""
     planted = planted_feet(places, fps)
     wanted = places[:, list(FEET)].copy()
@@ -180,7 +180,7 @@ def _feet(places: Array, shift: Array, goal: Goal, fps: float) -> _Wishes:
         asked = np.convolve(goal.asked[:, joint].any(axis=-1), near)[6:-6] > 0.5
         for column in columns:
             weights[:, column] = np.where(asked, 1e-3 / SWINGING, weights[:, column])
-    return _Wishes(FEET, wanted, np.repeat(weights[..., None], 3, axis=-1))
+    return _Targets(FEET, wanted, np.repeat(weights[..., None], 3, axis=-1))
 
 
 # The pose and its derivatives
@@ -190,7 +190,7 @@ def _feet(places: Array, shift: Array, goal: Goal, fps: float) -> _Wishes:
 class _Pose:
     root: Array
     rotations: Array
-    """As drawn."""
+    """As sampled."""
     change: Array
     """(frames, columns), in units of `_SIZES`: root, turns of `_BALLS` in the parent's frame, bends of `_HINGES`."""
 
@@ -283,16 +283,16 @@ def _bends(places: Array, world: Array) -> Array:
 # Gauss and Newton
 
 
-def _solved(pose: _Pose, wishes: list[_Wishes], bands: Array) -> Array:
-    """(frames, columns) the change that meets the wishes best."""
-    drawn = replace(pose, change=np.zeros_like(pose.change))
-    bent = _bends(*drawn.seen())
+def _solved(pose: _Pose, targets: list[_Targets], bands: Array) -> Array:
+    """(frames, columns) the change that meets the targets best."""
+    sampled = replace(pose, change=np.zeros_like(pose.change))
+    bent = _bends(*sampled.seen())
     low, high = ((limit(bent, b) - bent) / list(_HINGES.values()) for limit, b in zip((np.minimum, np.maximum), _BEND))
     damping, best, cost = 1e-3, pose.change, np.inf
     last = np.inf
     for _ in range(STEPS):
         places, world = pose.seen()
-        now, off = _cost(pose, places, wishes, bands)
+        now, off = _cost(pose, places, targets, bands)
         if now > cost:
             damping *= 10
             pose = replace(pose, change=(pose.change + best) / 2)
@@ -305,10 +305,10 @@ def _solved(pose: _Pose, wishes: list[_Wishes], bands: Array) -> Array:
             break
         axes = pose.axes(world)
         blocks, slope = np.zeros((len(places), _COLUMNS, _COLUMNS)), np.zeros_like(pose.change)
-        for wish in wishes:
-            jacobian = pose.jacobian(wish.joints, places, axes) * wish.weights[..., None]
+        for target in targets:
+            jacobian = pose.jacobian(target.joints, places, axes) * target.weights[..., None]
             jacobian = jacobian.reshape(len(places), -1, _COLUMNS)
-            error = (wish.weights * (wish.places - places[:, list(wish.joints)])).reshape(len(places), -1, 1)
+            error = (target.weights * (target.places - places[:, list(target.joints)])).reshape(len(places), -1, 1)
             blocks += jacobian.swapaxes(-1, -2) @ jacobian
             slope += (jacobian.swapaxes(-1, -2) @ (error + jacobian @ pose.change[..., None]))[..., 0]
         blocks[:, range(_COLUMNS), range(_COLUMNS)] += damping
@@ -321,12 +321,12 @@ def _solved(pose: _Pose, wishes: list[_Wishes], bands: Array) -> Array:
     return best
 
 
-def _cost(pose: _Pose, places: Array, wishes: list[_Wishes], bands: Array) -> tuple[float, float]:
-    """What is minimised, and metres that the wishes are off on average."""
+def _cost(pose: _Pose, places: Array, targets: list[_Targets], bands: Array) -> tuple[float, float]:
+    """What is minimised, and metres that the targets are off on average."""
     total = float((pose.change * (pose.change + _stiff(bands, pose.change))).sum())
-    for wish in wishes:
-        total += float(((wish.weights * (wish.places - places[:, list(wish.joints)])) ** 2).sum())
-    first = wishes[0]
+    for target in targets:
+        total += float(((target.weights * (target.places - places[:, list(target.joints)])) ** 2).sum())
+    first = targets[0]
     off = np.abs(np.where(first.weights > 0, first.places - places[:, list(first.joints)], 0.0))
     return total, float(off.max(initial=0.0))
 

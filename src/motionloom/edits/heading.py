@@ -1,6 +1,7 @@
-"""The way somebody goes, turned to a direction of the world: steps stay as they are drawn, pace and gait too.
+"""The way somebody goes, turned to a direction of the world: steps stay as they are sampled, pace and gait too.
 
-Velocities and joints are told in the heading of the body, so that a change of the heading turns path and body together.
+Velocities and joints are given in the heading of the body, so that a change of the heading turns path and body
+together.
 """
 
 import numpy as np
@@ -26,18 +27,18 @@ _STANDING = 0.004
 
 
 def heading_for(direction: float, prior: Prior, *, first: int) -> Correction:
-    """The correction of one row's guess so that from frame ``first`` on the way goes to ``direction``.
+    """The correction of one row's estimate so that from frame ``first`` on the way goes to ``direction``.
 
     direction: radians, seen from where the person stands and faces at row frame ``first``. The turn begins there and
-    takes `SOONEST` to `LONGEST` frames. How long, and which of two ways round, the first guess decides.
+    takes `SOONEST` to `LONGEST` frames. How long, and which of two ways round, the first estimate decides.
     """
     mean = prior.mean.cpu().double().numpy()
     spread = torch.where(prior.std > 0, prior.std, 1.0).cpu().double().numpy()
-    before: list[float] = []  # the turn that was made of the guess before
+    before: list[float] = []  # the turn that was made of the estimate before
     over: list[float] = []
 
-    def correct(guess: Tensor, level: int) -> Tensor:
-        features = guess.detach().cpu().double().numpy() * spread + mean
+    def correct(denoised: Tensor, level: int) -> Tensor:
+        features = denoised.detach().cpu().double().numpy() * spread + mean
         way = _ways(features, first)
         lack = np.unwrap(np.asarray(turn_between(direction, np.angle(way))))
         middle = float(np.median(lack))
@@ -47,10 +48,10 @@ def heading_for(direction: float, prior: Prior, *, first: int) -> Correction:
         if not over:
             over.append(SOONEST + (LONGEST - SOONEST) * min(abs(before[0]) / np.pi, 1.0))
         turn = np.concatenate([np.zeros(first), lack * smoothstep(np.arange(len(lack)) / over[0])])
-        changed = guess.clone()
-        step = torch.from_numpy(-np.diff(turn) / 2 / spread[0]).to(guess)
+        changed = denoised.clone()
+        step = torch.from_numpy(-np.diff(turn) / 2 / spread[0]).to(denoised)
         changed[: len(step), 0] += step
-        return _moved_along(guess, changed, prior)
+        return _moved_along(denoised, changed, prior)
 
     return correct
 

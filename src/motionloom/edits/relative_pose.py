@@ -1,9 +1,9 @@
-"""Two people stay together: while they are drawn, where they stand to each other is asked again and again.
+"""Guidance of the relative pose of two people: while they are sampled, the block is asked for it again and again.
 
-Features tell velocities, so small errors of a guess add up, and two people who began as partners drift apart. A block
-knows better: it guesses where two people stand to each other at the first frame of whatever it is shown, and it learned
-that from crops that begin anywhere. So every guess is cut at several frames, the *knots*, the block is asked where the
-two stand there, and both are led half of the way to its answers.
+Features hold velocities, so small errors of an estimate add up, and two people who began as partners drift apart. A
+block estimates the relative pose of two people at the first frame of whatever it is shown, and it learned that from
+crops that begin anywhere. So every denoised estimate is cut at several frames, the *anchors*, the block is asked for
+the relative pose there, and both people are moved half of the way to its answers.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,17 +23,17 @@ from motionloom.nets.prior import Bound
 from motionloom.weights.prior import Prior
 
 SPACING = 40
-"""Frames from knot to knot, at most."""
+"""Frames from anchor to anchor, at most."""
 SHOWN = 60
-"""Frames behind a knot that the block is shown, at most."""
+"""Frames behind an anchor that the block is shown, at most."""
 LEAST = 20
-"""Frames behind a knot, at least."""
+"""Frames behind an anchor, at least."""
 SURE = 40
-"""Frames behind a past of both that stay as they are: their momentum tells more than the block does."""
+"""Frames behind a past of both that stay as they are: their momentum says more than the block does."""
 
 
-Lead: TypeAlias = Callable[[Tensor, Tensor, int], Tensor]
-"""(state, its guess, level) -> the guess of states (rows, 1 + frames, 263), changed."""
+PoseGuidance: TypeAlias = Callable[[Tensor, Tensor, int], Tensor]
+"""(states (rows, 1 + frames, 263), their denoised estimates, level) -> the estimates, changed."""
 
 
 def relative_pose_guidance(
@@ -45,11 +45,11 @@ def relative_pose_guidance(
     mask: Tensor,
     frozen: Sequence[bool],
     weight: float = 1.0,
-) -> Lead:
-    """What moves the guesses of pairs of one length to where the block has the two stand to each other later on.
+) -> PoseGuidance:
+    """What moves the estimates of pairs of one length to the relative poses that the block estimates later on.
 
-    Nothing does where a block never says where people stand, and for codes of the kind world, which tell where crops
-    stand in a file (published).
+    Nothing does where a block has no relative pose, and for codes of the kind world, which hold the places of crops in
+    a file (published).
 
     Args:
         bound, seeds: of each row.
@@ -59,64 +59,64 @@ def relative_pose_guidance(
     """
     silent = not any(bool(value.any()) for value in net.talk.place.parameters())
     if not weight or silent or net.talk.config.places.kind != "mutual":
-        return lambda state, guess, level: guess
+        return lambda state, denoised, level: denoised
     known = mask[:, 1:, :3].all(dim=-1)
     both = known.unflatten(0, (-1, 2)).all(dim=1)
     given = [kept or bool(row.all()) for kept, row in zip(frozen, known, strict=True)]
     past = both.cumprod(dim=1).sum(dim=1).tolist()
     places = Places.of(seeds, known.shape[1], [count + SURE if count else 0 for count in past], given)
 
-    def lead(state: Tensor, guess: Tensor, level: int) -> Tensor:
-        made = places.led(prior, net, bound, state=state, guess=guess, level=level, weight=weight)
-        return torch.where(mask, guess, made)
+    def guided(state: Tensor, denoised: Tensor, level: int) -> Tensor:
+        made = places.guided(prior, net, bound, state=state, denoised=denoised, level=level, weight=weight)
+        return torch.where(mask, denoised, made)
 
-    return lead
+    return guided
 
 
 @dataclass(frozen=True, eq=False)
 class Places:
     """Where it is asked, and who is moved; for some pairs of one length."""
 
-    knots: tuple[tuple[int, ...], ...]
+    anchors: tuple[tuple[int, ...], ...]
     """Frames of each pair."""
     spread: tuple[Tensor, ...]
-    """(frames, knots) of each pair: how much of what is done at a knot is done in a frame."""
+    """(frames, anchors) of each pair: how much of what is done at an anchor is done in a frame."""
     shares: Tensor
     """(pairs, 2) how much of the way each person goes."""
     noise: Tensor
-    """(2 * all knots, 4) of the numbers of D."""
+    """(2 * all anchors, 4) of the numbers of D."""
 
     @staticmethod
     def of(seeds: Sequence[int], frames: int, begins: Sequence[int], given: Sequence[bool]) -> "Places":
         """seeds, given: one per row, whether that person is not moved; begins: one per pair, the last frame that
         stays as it is."""
-        knots = tuple(_knots(begin, frames) for begin in begins)
-        spread = tuple(_spread([begin, *some], frames) for some, begin in zip(knots, begins, strict=True))
+        anchors = tuple(_anchors(begin, frames) for begin in begins)
+        spread = tuple(_spread([begin, *some], frames) for some, begin in zip(anchors, begins, strict=True))
         free = 1.0 - torch.tensor([float(one) for one in given]).view(-1, 2)
         shares = free / free.sum(1, keepdim=True).clamp(min=1.0)
-        most = max(len(some) for some in knots)
-        drawn = row_draw([row_seed(seed, 0, 2) for seed in seeds])(torch.zeros(len(seeds), max(most, 1), PLACE))
-        drawn = [drawn[2 * i : 2 * i + 2, : len(some)].transpose(0, 1).flatten(0, 1) for i, some in enumerate(knots)]
-        return Places(knots, spread, shares, torch.cat(drawn))
+        most = max(len(some) for some in anchors)
+        noise = row_draw([row_seed(seed, 0, 2) for seed in seeds])(torch.zeros(len(seeds), max(most, 1), PLACE))
+        noise = [noise[2 * i : 2 * i + 2, : len(some)].transpose(0, 1).flatten(0, 1) for i, some in enumerate(anchors)]
+        return Places(anchors, spread, shares, torch.cat(noise))
 
-    def led(
-        self, prior: Prior, net: PairNet, bound: Bound, *, state: Tensor, guess: Tensor, level: int | Tensor,
+    def guided(
+        self, prior: Prior, net: PairNet, bound: Bound, *, state: Tensor, denoised: Tensor, level: int | Tensor,
         weight: float,
     ) -> Tensor:  # fmt: skip
-        """A guess (rows, 1 + frames, 263) of a state at a level, changed; ``level``: one, or one per row."""
-        owner = [pair for pair, some in enumerate(self.knots) for _ in some]
+        """Estimates (rows, 1 + frames, 263) of states at a level, changed; ``level``: one, or one per row."""
+        owner = [pair for pair, some in enumerate(self.anchors) for _ in some]
         if not owner or not self.shares.any():
-            return guess
+            return denoised
         code, spread = net.talk.config.places, torch.where(prior.std > 0, prior.std, 1.0)
-        places, motion = part(guess)
+        places, motion = part(denoised)
         features = motion * spread + prior.mean
-        stands = code.decode(places.unflatten(0, (-1, 2)))
-        ways = two.compose(stands.flatten(0, 1)[:, None], two.along(features)).unflatten(0, (-1, 2))
-        at = [knot for some in self.knots for knot in some]
+        poses = code.decode(places.unflatten(0, (-1, 2)))
+        ways = two.compose(poses.flatten(0, 1)[:, None], two.along(features)).unflatten(0, (-1, 2))
+        at = [anchor for some in self.anchors for anchor in some]
         now = torch.stack([ways[pair, :, frame] for pair, frame in zip(owner, at, strict=True)])
-        rows = torch.tensor([2 * pair + person for pair in owner for person in (0, 1)], device=guess.device)
+        rows = torch.tensor([2 * pair + person for pair in owner for person in (0, 1)], device=denoised.device)
         levels = level if isinstance(level, int) else level[rows]
-        noised = prior.schedule.noised(code.encode(now).flatten(0, 1), levels, self.noise.to(guess))
+        noised = prior.schedule.noised(code.encode(now).flatten(0, 1), levels, self.noise.to(denoised))
         crops, lengths = _crops(state[:, 1:], rows.tolist(), [frame for frame in at for _ in (0, 1)])
         asked = Bound(*(one[rows] for one in bound))._replace(lengths=lengths)
         answer, _ = part(net(join(noised, crops), levels, asked))
@@ -124,9 +124,9 @@ class Places:
         return join(places, (self._moved(features, ways, lacking) - prior.mean) / spread)
 
     def _moved(self, features: Tensor, ways: Tensor, lacking: Tensor) -> Tensor:
-        """Features (rows, frames, 263) with what lacks at the knots (all knots, 3): facing, x and z."""
+        """Features (rows, frames, 263) with what lacks at the anchors (all anchors, 3): facing, x and z."""
         made, start = [], 0
-        for pair, (some, spread) in enumerate(zip(self.knots, self.spread, strict=True)):
+        for pair, (some, spread) in enumerate(zip(self.anchors, self.spread, strict=True)):
             change = spread.to(features) @ lacking[start : start + len(some)]
             start += len(some)
             for person, sign in ((0, -1.0), (1, 1.0)):
@@ -136,14 +136,14 @@ class Places:
 
 
 def _crops(motion: Tensor, rows: Sequence[int], begins: Sequence[int]) -> tuple[Tensor, Tensor]:
-    """What of a motion (some rows, frames, 263) stands in ``rows`` from frames ``begins`` on, padded; and how long."""
+    """What of a motion (some rows, frames, 263) is in ``rows`` from frames ``begins`` on, padded; and how long."""
     crops = [motion[row, begin : begin + SHOWN] for row, begin in zip(rows, begins, strict=True)]
     lengths = [len(crop) for crop in crops]
     padded = [F.pad(crop, (0, 0, 0, max(lengths) - len(crop))) for crop in crops]
     return torch.stack(padded), torch.tensor(lengths, device=motion.device)
 
 
-def _knots(begin: int, frames: int) -> tuple[int, ...]:
+def _anchors(begin: int, frames: int) -> tuple[int, ...]:
     """Even steps from ``begin`` to `LEAST` frames before the end; none where that is too near."""
     room = frames - LEAST - begin
     count = -(-room // SPACING) if room >= SPACING // 2 else 0
@@ -151,8 +151,8 @@ def _knots(begin: int, frames: int) -> tuple[int, ...]:
 
 
 def _spread(at: Sequence[int], frames: int) -> Tensor:
-    """(frames, knots), from the begin and the knots behind it: smooth curves, 1 at the own knot, 0 at the others and
-    at the begin; level behind the last."""
+    """(frames, anchors), from the begin and the anchors behind it: smooth curves, 1 at the own anchor, 0 at the others
+    and at the begin; level behind the last."""
     if len(at) == 1:
         return torch.zeros(frames, 0)
     along = np.interp(np.arange(frames), at, np.arange(len(at)))
@@ -160,7 +160,7 @@ def _spread(at: Sequence[int], frames: int) -> Tensor:
 
 
 def _lacking(now: Tensor, asked: Tensor) -> Tensor:
-    """(rows, 3): what the second person's facing, x and z lack, relative to the first; from stands (rows, 2, 4)."""
+    """(rows, 3): what the second person's facing, x and z lack, relative to the first; from poses (rows, 2, 4)."""
     first, second = now[:, 0], now[:, 1]
     there = two.seen(asked[:, 0], asked[:, 1])
     turn = two.seen(two.seen(first, second), there)
@@ -170,11 +170,11 @@ def _lacking(now: Tensor, asked: Tensor) -> Tensor:
     return torch.cat([angle[:, None], line - (second - first)[:, 2:]], dim=1)
 
 
-def _turned(stands: Tensor, angle: Tensor) -> Tensor:
-    """Stands (rows, 4) of people who turn on the spot, in radians (rows,) to their left."""
+def _turned(poses: Tensor, angle: Tensor) -> Tensor:
+    """Ground poses (rows, 4) of people who turn on the spot, in radians (rows,) to their left."""
     c, s = angle.cos(), angle.sin()
     return torch.stack(
-        [c * stands[:, 0] - s * stands[:, 1], s * stands[:, 0] + c * stands[:, 1], stands[:, 2], stands[:, 3]], dim=1
+        [c * poses[:, 0] - s * poses[:, 1], s * poses[:, 0] + c * poses[:, 1], poses[:, 2], poses[:, 3]], dim=1
     )
 
 
@@ -183,7 +183,7 @@ def _along(features: Tensor, way: Tensor, change: Tensor) -> Tensor:
     new = features.clone()
     turn, step = change[1:, 0], change[1:, 1:] - change[:-1, 1:]
     new[:-1, 0] -= (change[1:, 0] - change[:-1, 0]) / 2
-    # velocities are told in the heading of the frame they lead to
+    # velocities are given in the heading of the frame they lead to
     x, z = _back(features[:-1, 1], features[:-1, 2], turn.cos(), turn.sin())
     there = _turned(way[1:], turn)
     more = _back(step[:, 0], step[:, 1], there[:, 0], there[:, 1])

@@ -1,9 +1,9 @@
-"""Steering: how a goal bends sampling. Each guess of the clean motion is changed, as little as it takes, to meet it.
+"""Steering: how a goal bends sampling. Each denoised estimate is changed, as little as it takes, to meet it.
 
 The change is the mean of a Gaussian process given what the goal asks (Rasmussen & Williams 2006, eq. 2.23): the root's
 velocity and the joints' places may be off by smooth curves of known size, joints that hang on the same limb together.
 Given the heading, places are linear in all of these, so the change is a product with matrices that only depend on
-which joints are asked when: nothing is differentiated, and the network does not know. Its next guess does the rest.
+which joints are asked when: nothing is differentiated, and the network does not know. Its next estimate does the rest.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,18 +29,18 @@ from motionloom.weights.prior import Prior
 Array = NDArray[np.float64]
 
 Correction: TypeAlias = Callable[[Tensor, int], Tensor]
-"""(standardised clean guess (frames, features) of one row, its level) -> the same, changed."""
+"""(standardised denoised estimate (frames, features) of one row, its level) -> the same, changed."""
 
 EXACT, FEW = 0.002, 0.05
-"""Metres: how exactly wishes are met, and how exactly the root does the part that is beyond a joint's reach."""
+"""Metres: how exactly targets are met, and how exactly the root does the part that is beyond a joint's reach."""
 MOST = 4000
-"""Wishes on one coordinate that are solved for at once; of more, evenly many frames are used."""
+"""Targets on one coordinate that are solved for at once; of more, evenly many frames are used."""
 _PACE, _YAW = 0.015, 0.03
 """Standard deviations of the root's velocity (metres a frame) and of the heading's (radians a frame)."""
 _STILL, _HEIGHT = 0.003, 0.06
 """The same for the root's velocity where a limb can do it (metres a frame), and for its going up and down (metres)."""
 _LIFT, _HOPELESS = 0.3, 1.0
-"""Metres that the body goes up or down to bring a wish into reach; the need beyond which it does not try."""
+"""Metres that the body goes up or down to bring a target into reach; the need beyond which it does not try."""
 _WIDTHS = ((0.9, 12.0), (0.5, 8.0), (0.0, 5.0))
 """Frames over which a change is spread, from noises (of the schedule) above the first number of each pair."""
 _SWING, _SLACK = costs.by_number(costs.BONE_SWING), costs.by_number(costs.SLACK)
@@ -52,11 +52,11 @@ _TURN_OVER, _SLOW = 6.0, 0.01
 
 
 def toward(goal: Goal, prior: Prior, *, first: int = 0) -> Correction:
-    """The correction of one row's guess so that it meets ``goal``.
+    """The correction of one row's estimate so that it meets ``goal``.
 
     ``goal`` is in the row's own frame: the root at row frame ``first`` is the origin and faces +Z, and the goal's frame
-    k is the row's frame ``first + k``; what lies beyond the row's end is ignored. The corrected guess is within
-    `EXACT` of smooth wishes, whatever the guess was. An empty goal gives the guess itself.
+    k is the row's frame ``first + k``; what lies beyond the row's end is ignored. The corrected estimate is within
+    `EXACT` of smooth targets, whatever the estimate was. An empty goal gives the estimate itself.
     """
     if len(prior.mean) != WIDTH:
         raise MotionloomError(f"goals need weights that make HumanML3D's {WIDTH} numbers; these make {len(prior.mean)}")
@@ -65,41 +65,41 @@ def toward(goal: Goal, prior: Prior, *, first: int = 0) -> Correction:
     mean, std = prior.mean.cpu().double().numpy(), prior.std.cpu().double().numpy()
     plans: dict[tuple[int, float], _Plan] = {}
 
-    def correct(guess: Tensor, level: int) -> Tensor:
-        if goal.empty or first >= len(guess):
-            return guess
+    def correct(denoised: Tensor, level: int) -> Tensor:
+        if goal.empty or first >= len(denoised):
+            return denoised
         noise = prior.schedule.at(level)[1]
-        key = len(guess), next(width for least, width in _WIDTHS if noise >= least)
+        key = len(denoised), next(width for least, width in _WIDTHS if noise >= least)
         if key not in plans:
-            plans[key] = _plan(_in_row(goal, first, len(guess)), first, key[1])
-        features = guess.detach().cpu().double().numpy() * std + mean
+            plans[key] = _plan(_in_row(goal, first, len(denoised)), first, key[1])
+        features = denoised.detach().cpu().double().numpy() * std + mean
         changed = (_bent(features, plans[key]) - features) / std
-        return guess + torch.from_numpy(changed).to(guess)
+        return denoised + torch.from_numpy(changed).to(denoised)
 
     return correct
 
 
 def corrected(denoise: Denoiser, corrections: Sequence[Correction | None]) -> Denoiser:
-    """The denoiser whose guess of row i is changed by ``corrections[i]``; None leaves the row alone."""
+    """The denoiser whose estimate of row i is changed by ``corrections[i]``; None leaves the row alone."""
     if not any(corrections):
         return denoise
     return lambda state, level: corrected_rows(denoise(state, level), corrections, level)
 
 
-def corrected_rows(guess: Tensor, corrections: Sequence[Correction | None], level: int) -> Tensor:
-    """A guess (rows, frames, features) whose row i went through ``corrections[i]``, if there is one."""
-    if len(guess) != len(corrections):
-        raise ValueError(f"{len(corrections)} corrections for {len(guess)} rows: give one, or None, per row")
-    rows = [row if change is None else change(row, level) for row, change in zip(guess, corrections, strict=True)]
+def corrected_rows(denoised: Tensor, corrections: Sequence[Correction | None], level: int) -> Tensor:
+    """Estimates (rows, frames, features) of which row i went through ``corrections[i]``, if there is one."""
+    if len(denoised) != len(corrections):
+        raise ValueError(f"{len(corrections)} corrections for {len(denoised)} rows: give one, or None, per row")
+    rows = [row if change is None else change(row, level) for row, change in zip(denoised, corrections, strict=True)]
     return torch.stack(rows)
 
 
-# What does not depend on the guess
+# What does not depend on the estimate
 
 
 @dataclass(frozen=True, eq=False)
 class _Limbs:
-    """How wishes on one coordinate move the joints."""
+    """How targets on one coordinate move the joints."""
 
     asked: tuple[NDArray[np.intp], NDArray[np.intp]]
     """Frames and joints."""
@@ -183,7 +183,7 @@ def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Ar
 
 
 def _thinned(asked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(frames, 22) with at most `MOST` wishes, in frames spread evenly: those between follow by smoothness."""
+    """(frames, 22) with at most `MOST` targets, in frames spread evenly: those between follow by smoothness."""
     busy = np.flatnonzero(asked.any(axis=1))
     stride = 1
     while int(asked[busy[::stride]].sum()) > MOST:
@@ -217,12 +217,12 @@ _CARRIED[[*costs.numbers("ankle"), *costs.numbers("foot")]] = 0.0
 _TOGETHER = _together()
 
 
-# The change of one guess
+# The change of one estimate
 
 
 @dataclass(frozen=True, eq=False)
-class _Guess:
-    """A guess in the goal's frame."""
+class _Estimate:
+    """A denoised estimate in the goal's frame."""
 
     facing: Array
     """(frames + 1,) radians; 0 at the goal's first frame."""
@@ -240,21 +240,23 @@ class _Guess:
 
 def _bent(features: Array, plan: _Plan) -> Array:
     """Features (frames, 263), not standardised, changed to meet the goal."""
-    guess = _decoded(features, plan.first)
-    error = np.where(plan.goal.asked, plan.goal.positions - guess.world(), 0.0)
-    path = guess.path + plan.move @ _asked_of_root(guess.world(), error, plan.goal)[plan.moving]
-    facing = guess.facing + _turning_with(guess.path, path, plan.first)
-    guess = replace(guess, path=path, facing=facing)
+    denoised = _decoded(features, plan.first)
+    error = np.where(plan.goal.asked, plan.goal.positions - denoised.world(), 0.0)
+    path = denoised.path + plan.move @ _asked_of_root(denoised.world(), error, plan.goal)[plan.moving]
+    facing = denoised.facing + _turning_with(denoised.path, path, plan.first)
+    denoised = replace(denoised, path=path, facing=facing)
     if len(plan.lifting):
-        local = guess.local.copy()
-        local[..., 1] += np.outer(plan.lift @ _out_of_reach(guess.world(), plan.goal)[plan.lifting], _CARRIED)
-        guess = replace(guess, local=local)
+        local = denoised.local.copy()
+        local[..., 1] += np.outer(plan.lift @ _out_of_reach(denoised.world(), plan.goal)[plan.lifting], _CARRIED)
+        denoised = replace(denoised, local=local)
     if len(plan.turning):
-        guess = replace(guess, facing=facing + plan.turn @ _facing_error(guess.world(), plan.goal)[plan.turning])
-    error = np.where(plan.goal.asked, plan.goal.positions - guess.world(), 0.0)
+        denoised = replace(
+            denoised, facing=facing + plan.turn @ _facing_error(denoised.world(), plan.goal)[plan.turning]
+        )
+    error = np.where(plan.goal.asked, plan.goal.positions - denoised.world(), 0.0)
     far = np.linalg.norm(error[:, 1:], axis=-1, keepdims=True)
     error[:, 1:] *= np.minimum(1.0, _LONGEST / far.clip(1e-9))
-    path, change = guess.path.copy(), np.zeros_like(guess.local)
+    path, change = denoised.path.copy(), np.zeros_like(denoised.local)
     for c, limbs in enumerate(plan.limbs):
         if limbs is None:
             continue
@@ -263,15 +265,15 @@ def _bent(features: Array, plan: _Plan) -> Array:
         change[..., c] = plan.body @ pull @ limbs.together
         if c != 1:
             path[:, c // 2] += plan.still @ pull.sum(1)
-    local = guess.local + _turned(change, -guess.facing[:-1, None])
-    guess = replace(guess, path=path, local=local)
-    steps = _standing(guess.world(), features[:, LAYOUT["contacts"]], plan.goal)
-    local = local + _turned(steps, -guess.facing[:-1, None])
-    return _encoded(features, replace(guess, local=local))
+    local = denoised.local + _turned(change, -denoised.facing[:-1, None])
+    denoised = replace(denoised, path=path, local=local)
+    steps = _standing(denoised.world(), features[:, LAYOUT["contacts"]], plan.goal)
+    local = local + _turned(steps, -denoised.facing[:-1, None])
+    return _encoded(features, replace(denoised, local=local))
 
 
 def _standing(places: Array, contacts: Array, goal: Goal) -> Array:
-    """(frames, 22, 3) metres that legs go so that feet stand still where the guess says that they do.
+    """(frames, 22, 3) metres that legs go so that feet stand still where the estimate says that they do.
 
     A leg of which something is asked stays as it is around then.
     """
@@ -279,14 +281,14 @@ def _standing(places: Array, contacts: Array, goal: Goal) -> Array:
     for side, (knee, ankle, toe) in enumerate(costs.LEGS):
         asked = goal.asked[:, [knee, ankle, toe]].any(axis=(1, 2))
         free = np.convolve(asked, np.ones(4 * EASE + 1))[2 * EASE : -2 * EASE] < 0.5
-        told = (contacts[:, 2 * side : 2 * side + 2] > 0.5) & free[:, None]
-        still = stilled(places[:, ankle], places[:, toe], told)
+        planted = (contacts[:, 2 * side : 2 * side + 2] > 0.5) & free[:, None]
+        still = stilled(places[:, ankle], places[:, toe], planted)
         change[:, [ankle, toe]] = still[:, None]
         change[:, knee] = still / 2
     return change
 
 
-def _decoded(features: Array, first: int) -> _Guess:
+def _decoded(features: Array, first: int) -> _Estimate:
     facing = -2 * np.concatenate([[0.0], np.cumsum(features[:, 0])])
     facing -= facing[first]
     steps = np.zeros((len(features), 3))
@@ -295,25 +297,25 @@ def _decoded(features: Array, first: int) -> _Guess:
     local = np.zeros((len(features), len(SMPL22), 3))
     local[:, 0, 1] = features[:, 3]
     local[:, 1:] = features[:, LAYOUT["ric"]].reshape(len(features), -1, 3)
-    return _Guess(facing, path - path[first], local)
+    return _Estimate(facing, path - path[first], local)
 
 
-def _encoded(old: Array, guess: _Guess) -> Array:
-    """``old`` with the root, the places and the displacements of the joints changed to those of ``guess``."""
+def _encoded(old: Array, denoised: _Estimate) -> Array:
+    """``old`` with the root, the places and the displacements of the joints changed to those of ``denoised``."""
     new = old.copy()
     steps = np.zeros((len(old), 3))
-    steps[:, [0, 2]] = np.diff(guess.path, axis=0)
-    new[:, 0] = -np.diff(guess.facing) / 2
-    new[:, 1:3] = _turned(steps, -guess.facing[1:])[:, [0, 2]]
-    new[:, 3] = guess.local[:, 0, 1]
-    new[:, LAYOUT["ric"]] = guess.local[:, 1:].reshape(len(old), -1)
+    steps[:, [0, 2]] = np.diff(denoised.path, axis=0)
+    new[:, 0] = -np.diff(denoised.facing) / 2
+    new[:, 1:3] = _turned(steps, -denoised.facing[1:])[:, [0, 2]]
+    new[:, 3] = denoised.local[:, 0, 1]
+    new[:, LAYOUT["ric"]] = denoised.local[:, 1:].reshape(len(old), -1)
     before, after = (humanml.displacements(torch.from_numpy(part)).numpy() for part in (old, new))
     new[:-1, LAYOUT["joint_velocity"]] += (after - before).reshape(len(old) - 1, -1)
     return new
 
 
 def _asked_of_root(places: Array, error: Array, goal: Goal) -> Array:
-    """(frames, 2) metres: how far the root must go in each frame, the pelvis's own wish first.
+    """(frames, 2) metres: how far the root must go in each frame, the pelvis's own target first.
 
     A joint asks for what is beyond its slack, or beyond the reach of its limb; several joints for the mean of that.
     """

@@ -1,10 +1,10 @@
-"""Two people in one world: two canonical motions, and where each of them stands.
+"""Two people in one world: two canonical motions, and the ground pose of each.
 
-HumanML3D features tell each motion from its own first frame. What relates two people is thus lost, but for four numbers
-per person, a ground pose (cos f, sin f, x, z) of `motionloom.ground`: where somebody is at frame 0, in metres, and
-which way they face. All functions but `encode` take arrays and tensors, with any leading axes.
+HumanML3D features describe each motion relative to its own first frame. What relates two people is thus lost, but for
+four numbers per person, a ground pose (cos f, sin f, x, z) of `motionloom.ground`: where somebody is at frame 0, in
+metres, and which way they face. All functions but `encode` take arrays and tensors, with any leading axes.
 
-`PlaceCode` says how stands become the numbers D that a network of two people guesses (Shafir et al. 2024, section 3.2).
+`PlaceCode` says how ground poses become the numbers D of a network of two people (Shafir et al. 2024, section 3.2).
 """
 
 from collections.abc import Sequence
@@ -16,6 +16,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from motionloom._moved import say
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.humanml import Heading, recover_root
@@ -37,10 +38,16 @@ class Encoded(NamedTuple):
 
     features: NDArray[np.float32]
     """(2, frames, 263)"""
-    stands: Array
-    """(2, 4) in the world, at frame 0."""
+    poses: Array
+    """(2, 4) ground poses in the world, at frame 0."""
     floors: Array
     """(2,) metres: the height that each person's features call 0."""
+
+    @property
+    def stands(self) -> Array:
+        """The old name of ``poses``, for one release."""
+        say("Encoded.stands", "Encoded.poses")
+        return self.poses
 
 
 def swapped(pair: Numbers, axis: int = 0) -> Numbers:
@@ -49,51 +56,51 @@ def swapped(pair: Numbers, axis: int = 0) -> Numbers:
     return result
 
 
-# Features and stands
+# Features and ground poses
 
 
 def encode(positions: np.ndarray, *, heading: Heading = "corrected") -> Encoded:
     """Two people in one world, (2, frames, 22, 3) metres at 20 fps, +Y up, to features (2, frames - 1, 263).
 
-    Each is told from where he stands in frame 0 and from his own lowest point, as `humanml.canonical` does. The bodies
-    are taken as they are: people of the uniform size, for the shipped weights, which were trained on ``corrected``
-    headings (smoothed ones, in frame 0 too); ``compatible`` is the published way, for published weights.
+    Each is relative to the own ground pose in frame 0 and to the own lowest point, as `humanml.canonical` does. The
+    bodies are taken as they are: people of the uniform size, for the shipped weights, which were trained on
+    ``corrected`` headings (smoothed ones, in frame 0 too); ``compatible`` is the published way, for published weights.
     """
     p = _checked(positions)
     place = SMPL_LAYOUT.place(p[:, 0])
-    stands = np.stack([np.cos(place.facing), np.sin(place.facing), place.origin[:, 0], place.origin[:, 2]], axis=-1)
+    poses = np.stack([np.cos(place.facing), np.sin(place.facing), place.origin[:, 0], place.origin[:, 2]], axis=-1)
     floors = p[..., 1].min(axis=(1, 2))
-    local = from_world(p - floors[:, None, None, None] * np.array([0.0, 1.0, 0.0]), stands[:, None, None])
+    local = from_world(p - floors[:, None, None, None] * np.array([0.0, 1.0, 0.0]), poses[:, None, None])
     if heading == "corrected":
         turn = np.stack([humanml.heading_quaternions(person, heading=heading)[0] for person in local])
         w, y, zero = turn[:, 0], turn[:, 2], np.zeros(2)
-        stands = compose(stands, np.stack([1 - 2 * y * y, -2 * w * y, zero, zero], axis=-1))
-    return Encoded(np.stack([humanml.encode(person, heading=heading) for person in local]), stands, floors)
+        poses = compose(poses, np.stack([1 - 2 * y * y, -2 * w * y, zero, zero], axis=-1))
+    return Encoded(np.stack([humanml.encode(person, heading=heading) for person in local]), poses, floors)
 
 
-def decode(features: Numbers, stands: Numbers) -> Numbers:
-    """Features (..., frames, 263) of people with stands (..., 4) to places (..., frames, 22, 3) metres in the world.
+def decode(features: Numbers, poses: Numbers) -> Numbers:
+    """Features (..., frames, 263) and ground poses (..., 4) to places (..., frames, 22, 3) metres in the world.
 
     The first axis of the two, or any other, may be the one of the people. Differentiable for tensors.
     """
     places: Any = humanml.decode_positions(features)
-    return to_world(places, stands[..., None, None, :])
+    return to_world(places, poses[..., None, None, :])
 
 
 def along(features: Numbers) -> Numbers:
-    """Stands (..., frames, 4) along a motion (..., frames, 263), told from its frame 0 as the features tell it."""
+    """Ground poses (..., frames, 4) along a motion (..., frames, 263), relative to frame 0 as the features have it."""
     quaternion, place = recover_root(features)
     w, y = quaternion[..., 0], quaternion[..., 2]
     return stack(1 - 2 * y * y, -2 * w * y, place[..., 0], place[..., 2])  # it turns the world into the heading
 
 
-def later(features: Numbers, stands: Numbers, frame: int) -> Numbers:
-    """Where people with stands (..., 4) at frame 0 of (..., frames, 263) stand at another: (..., 4).
+def later(features: Numbers, poses: Numbers, frame: int) -> Numbers:
+    """Ground poses (..., 4) at another frame of (..., frames, 263), of people with ground poses (..., 4) at frame 0.
 
-    These are the stands of the crop that begins there: ``decode(features[..., frame:, :], later(...))`` is the end of
-    ``decode(features, stands)``. (The published code keeps those of the file's first frame for every crop.)
+    These are the ground poses of the crop that begins there: ``decode(features[..., frame:, :], later(...))`` is the
+    end of ``decode(features, poses)``. (The published code keeps those of the file's first frame for every crop.)
     """
-    return compose(stands, along(features[..., : frame + 1, :])[..., frame, :])
+    return compose(poses, along(features[..., : frame + 1, :])[..., frame, :])
 
 
 # Numbers for a network
@@ -101,11 +108,11 @@ def later(features: Numbers, stands: Numbers, frame: int) -> Numbers:
 
 @dataclass(frozen=True)
 class PlaceCode:
-    """How two stands become 4 numbers per person for a network, and back."""
+    """How two ground poses become 4 numbers per person for a network, and back."""
 
     kind: Literal["mutual", "world"] = "mutual"
-    """``mutual``: for each person the stand of the *other* as he sees it, so that nothing depends on the world's axes;
-    ``world``: everybody's own stand, as published."""
+    """``mutual``: for each person the ground pose of the *other* as seen from there, so that nothing depends on the
+    world's axes; ``world``: everybody's own ground pose, as published."""
     turn: float = 1.0
     """What cosine and sine are multiplied with; 0.1 as published."""
     ground: float = 1.0
@@ -117,32 +124,33 @@ class PlaceCode:
         if self.kind not in ("mutual", "world") or not numbers:
             raise MotionloomError(f"the places of two people cannot be coded by {self}; give mutual or world")
 
-    def encode(self, stands: Numbers) -> Numbers:
-        """Stands (..., 2, 4) in one world to numbers (..., 2, 4); those of exchanged people are exchanged.
+    def encode(self, poses: Numbers) -> Numbers:
+        """Ground poses (..., 2, 4) in one world to numbers (..., 2, 4); those of exchanged people are exchanged.
 
         ``world``: (cos f, -sin f, x, z), which are the entries 0, 2, 6 and 8 of the published nine: the first row of
         the rotation from the world to the person, and the ground translation.
         """
-        c, s, x, z = parts(relative(stands, swapped(stands, -2)) if self.kind == "mutual" else stands)
+        c, s, x, z = parts(relative(poses, swapped(poses, -2)) if self.kind == "mutual" else poses)
         return stack(self.turn * c, self.turn * (s if self.kind == "mutual" else -s), self.ground * x, self.ground * z)
 
     def raw(self, numbers: Numbers) -> Numbers:
-        """Numbers (..., 4) without their scales: of ``mutual`` the other's stand as a person sees it, of ``world`` the
-        person's own."""
+        """Numbers (..., 4) without their scales: of ``mutual`` the other's ground pose as a person sees it, of
+        ``world`` the person's own."""
         c, s, x, z = parts(numbers)
         s = s if self.kind == "mutual" else -s
         return stack(c / self.turn, s / self.turn, x / self.ground, z / self.ground)
 
     def decode(self, numbers: Numbers) -> Numbers:
-        """Numbers (..., 2, 4), exact or guessed, to stands (..., 2, 4).
+        """Numbers (..., 2, 4), exact or predicted, to ground poses (..., 2, 4).
 
-        ``mutual``: the first person stands at the origin facing +Z, and the two views, which may disagree a little when
-        they are guessed, are averaged; so exchanged people stand to each other as before. ``world``: in that world.
+        ``mutual``: the first person is at the origin facing +Z, and the two views, which may disagree a little when
+        they are predicted, are averaged; so the relative pose of exchanged people is as before. ``world``: in that
+        world.
         """
-        stands = self.raw(numbers)
+        poses = self.raw(numbers)
         if self.kind == "world":
-            return normalized(stands)
-        first, second = stands[..., 0, :], stands[..., 1, :]
+            return normalized(poses)
+        first, second = poses[..., 0, :], poses[..., 1, :]
         both = stack(
             first[..., 0] + second[..., 0], first[..., 1] - second[..., 1], 0 * first[..., 0], 0 * first[..., 0]
         )
@@ -157,13 +165,13 @@ PUBLISHED_CODE = PlaceCode("world", 0.1, 0.1)
 """The numbers of the published two-person checkpoints."""
 
 
-def as_published(stands: Numbers) -> Numbers:
-    """Stands (..., 2, 4) in a world to where the published tools draw them: the first person at the origin facing +Z.
+def as_published(poses: Numbers) -> Numbers:
+    """Ground poses (..., 2, 4) to where the published tools draw people: the first one at the origin facing +Z.
 
     p_1 becomes R_0 R_1' p_1 + (t_1 - t_0): the difference on the ground is not turned, which is right only where the
     first person faces +Z in the world. For comparison with published numbers; `relative` is the right one.
     """
-    first, second = stands[..., 0, :], stands[..., 1, :]
+    first, second = poses[..., 0, :], poses[..., 1, :]
     turned = relative(first, second)
     return _pile(relative(first, first), stack(turned[..., 0], turned[..., 1], *parts(second - first)[2:]))
 
@@ -189,7 +197,7 @@ SHORTEST = 20
 FARTHEST = 10.0
 """Metres: people who are never nearer than this have nothing to do with one another."""
 SAME = 1e-3
-"""Metres: two motions that differ by less everywhere, but for where they stand, are one."""
+"""Metres: two motions that differ by less everywhere, but for their ground poses, are one."""
 
 
 def together(first: Motion, second: Motion, *, name: str = "the pair") -> Array:
@@ -220,7 +228,7 @@ def together(first: Motion, second: Motion, *, name: str = "the pair") -> Array:
 def one_world(uniform: Sequence[np.ndarray], legs: Sequence[float]) -> Array:
     """(2, frames, 22, 3): each uniform person of `legs` (metres, before) moved on the ground to the common scale.
 
-    ``uniform`` are two (frames, 22, 3) whose places stand scaled by the uniform legs over each person's own.
+    ``uniform`` are two (frames, 22, 3) whose places are scaled by the uniform legs over each person's own.
     """
     mean = float(np.mean(legs))
     moved = [

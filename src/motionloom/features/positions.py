@@ -1,8 +1,8 @@
 """Joint places as prediction networks see them: from the root, in the frame of the last observed pose.
 
-A `Layout` says which joints there are and what of them is told. The published systems (Chen et al. 2023, HumanMAC) take
-the places of all joints but the root, relative to the root, and leave the root's way through the world out; here it can
-be three further numbers, and the person can be turned to face +Z in the last observed frame.
+A `Layout` says which joints there are and which numbers describe them. The published systems (Chen et al. 2023,
+HumanMAC) take the places of all joints but the root, relative to the root, and leave the root's way through the world
+out; here it can be three further numbers, and the person can be turned to face +Z in the last observed frame.
 """
 
 from dataclasses import asdict, dataclass
@@ -28,10 +28,10 @@ class Layout:
     pairs: tuple[int, ...]
     """For each joint the one on the other side, itself on the middle line."""
     across: tuple[tuple[int, int], ...] = ()
-    """(left, right) joints, such as hips and shoulders: the lines between them tell where the person faces. Empty:
+    """(left, right) joints, such as hips and shoulders: the lines between them show where the person faces. Empty:
     places keep the world's axes, as published."""
     root: bool = True
-    """Whether the root's way through the world is told as three numbers before the others."""
+    """Whether the root's path through the world is among the numbers, as three before the others."""
     z_up: bool = False
     """Whether the numbers have +Z up, as in Human3.6M files; positions handed in and out always have +Y up."""
 
@@ -52,7 +52,7 @@ class Layout:
 
     @property
     def parts(self) -> int:
-        """Joints that have numbers: the root only if its way is told."""
+        """Joints that have numbers: the root only if its path is among them."""
         return self.joints - (not self.root)
 
     @property
@@ -70,7 +70,7 @@ class Layout:
         return p.reshape(*p.shape[:-2], self.channels)
 
     def decode(self, features: np.ndarray, place: "Place") -> Array:
-        """The inverse of `encode`; a root that is not told stays in its place."""
+        """The inverse of `encode`; a root without numbers stays in its place."""
         p = np.asarray(features, dtype=np.float64).reshape(*features.shape[:-1], self.parts, 3)
         if self.z_up:
             p = np.stack([p[..., 1], p[..., 2], p[..., 0]], axis=-1)
@@ -79,7 +79,7 @@ class Layout:
         return place.out(np.concatenate([root, rest + root], axis=-2))
 
     def place(self, positions: np.ndarray) -> "Place":
-        """Where the person of poses (..., joints, 3) stands, and faces if that is told; batch shape (...)."""
+        """Ground pose of the person of poses (..., joints, 3), facing +Z if ``across`` is empty; batch shape (...)."""
         p = np.asarray(positions, dtype=np.float64)
         origin = p[..., 0, :] * (np.array([1.0, 0.0, 1.0]) if self.root else 1.0)
         if not self.across:
@@ -115,7 +115,7 @@ class Layout:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A point on the way and a facing, one per batch entry: where numbers are told from."""
+    """A point on the way and a facing, one per batch entry: what numbers are relative to."""
 
     origin: Array
     """(..., 3) metres."""
@@ -150,4 +150,4 @@ def bone_lengths(positions: np.ndarray, parents: tuple[int, ...]) -> Array:
 
 
 SMPL_LAYOUT = Layout(SMPL22.names, SMPL22.parents, SMPL22.mirror_pairs(), ((1, 2), (16, 17)))
-"""The 22 joints of the uniform person, its way through the world included, facing told."""
+"""The 22 joints of the uniform person, its path through the world and its facing included."""

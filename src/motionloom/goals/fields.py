@@ -1,4 +1,4 @@
-"""Parsed JSON or YAML from strangers, taken apart so that every mistake is told with the name of its key."""
+"""Parsed untrusted JSON or YAML, taken apart so that every mistake is reported with the name of its key."""
 
 import math
 from collections.abc import Collection, Iterator, Mapping
@@ -84,7 +84,7 @@ class Field:
         return self.value
 
     def file(self, folder: Path) -> Path:
-        """A file in ``folder`` or below it, named from there; a file from a stranger reads nothing else."""
+        """A file in ``folder`` or below it, named from there; a file from an untrusted source reads nothing else."""
         said = self.value
         if not isinstance(said, str) or not said.strip() or not said.isprintable():
             self.wrong("the name of a file")

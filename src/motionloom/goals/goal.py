@@ -1,6 +1,6 @@
 """`Goal`: what control asks of a motion, in the world: places of joints, and where the person faces.
 
-Metres, +Y up, radians about +Y (0 faces +Z, a quarter turn +X); 20 frames per second like everything that is drawn.
+Metres, +Y up, radians about +Y (0 faces +Z, a quarter turn +X); 20 frames per second like everything that is sampled.
 """
 
 from dataclasses import dataclass, replace
@@ -32,7 +32,7 @@ Placement = GroundPose
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """Wishes for each frame. What is not asked may hold any finite number."""
+    """Targets for each frame. What is not asked may hold any finite number."""
 
     positions: Array
     """(frames, 22, 3) metres in the world."""
@@ -43,7 +43,7 @@ class Goal:
     facing_asked: Flags
     """(frames,)"""
     start: GroundPose | None = None
-    """Where the person stands at frame 0, where that is known; no wish, and `placement_of` falls back on the wishes."""
+    """The ground pose at frame 0, where that is known; no target: without it `placement_of` goes by the targets."""
 
     def __post_init__(self) -> None:
         frames = len(self.positions)
@@ -69,7 +69,7 @@ class Goal:
 
     @staticmethod
     def nothing(frames: int) -> "Goal":
-        """No wishes for so many frames."""
+        """No targets for so many frames."""
         shape = (frames, len(SMPL22), 3)
         return Goal(np.zeros(shape), np.zeros(shape, bool), np.zeros(frames), np.zeros(frames, bool))
 
@@ -80,7 +80,7 @@ class Goal:
         return Goal(self.positions[part], self.asked[part], self.facing[part], self.facing_asked[part], start)
 
     def padded(self, before: int, after: int) -> "Goal":
-        """With so many frames without wishes around it."""
+        """With so many frames without targets around it."""
         ends = Goal.nothing(before + len(self) + after)
         part = slice(before, before + len(self))
         for whole, own in zip(_parts(ends), _parts(self), strict=True):
@@ -88,7 +88,7 @@ class Goal:
         return ends if before else replace(ends, start=self.start)
 
     def seen_from(self, place: GroundPose) -> "Goal":
-        """The same wishes in coordinates in which ``place`` is the origin and faces +Z.
+        """The same targets in coordinates in which ``place`` is the origin and faces +Z.
 
         Single horizontal coordinates cannot be turned: both or none of x and z must be asked unless nothing turns.
         """
@@ -102,12 +102,12 @@ class Goal:
         )
 
     def placed(self, place: GroundPose) -> "Goal":
-        """The same wishes, told in coordinates in which ``place`` is the origin facing +Z, in those of the world."""
+        """The same targets, given in coordinates in which ``place`` is the origin facing +Z, in those of the world."""
         return self.seen_from(place.inverse())
 
 
 def placement_of(goal: Goal) -> GroundPose:
-    """Where the person stands at frame 0: `Goal.start` or, without it, what the wishes say.
+    """The person's ground pose at frame 0: `Goal.start` or, without it, what the targets say.
 
     The place is the pelvis's, the direction that of the facing asked at frame 0, else of the hips and shoulders asked
     there, else the way that the pelvis's path sets out. What nobody asks is 0: the origin, facing +Z.
@@ -139,14 +139,14 @@ def body_facing(positions: np.ndarray) -> float:
 
 
 def joined(first: Goal, second: Goal) -> Goal:
-    """The wishes of one stretch of frames and of the one behind it."""
+    """The targets of one stretch of frames and of the one behind it."""
     pairs = zip(_parts(first), _parts(second), strict=True)
     positions, asked, facing, facing_asked = (np.concatenate(pair) for pair in pairs)
     return Goal(positions, asked, facing, facing_asked, first.start)
 
 
 def merged(first: Goal, second: Goal) -> Goal:
-    """The wishes of both; MotionloomError where they ask for different places (`AGREE`), naming joint and time."""
+    """The targets of both; MotionloomError where they ask for different places (`AGREE`), naming joint and time."""
     if len(first) != len(second):
         raise MotionloomError(f"goals of {len(first)} and {len(second)} frames cannot be put together")
     both = first.asked & second.asked
@@ -163,7 +163,7 @@ def merged(first: Goal, second: Goal) -> Goal:
 
 
 def overlaid(first: Goal, second: Goal) -> Goal:
-    """The wishes of both; those of the first where both ask for the same."""
+    """The targets of both; those of the first where both ask for the same."""
     return Goal(
         np.where(first.asked, first.positions, second.positions),
         first.asked | second.asked,

@@ -53,7 +53,7 @@ _TIE = 0.05
 
 
 def read_goal(source: Path | str | Mapping[str, Any], *, frames: int, fps: float = FPS, folder: Path) -> Goal:
-    """Read a goal file, or a mapping of the same keys, as the wishes of a motion of so many frames.
+    """Read a goal file, or a mapping of the same keys, as the targets of a motion of so many frames.
 
     The motion takes ``frames / fps`` seconds. Files that a goal file names lie in its own folder or below; those of a
     mapping in ``folder``. The goal's world is metres, +Y up; facing 0 is +Z, positive towards +X. Raises
@@ -121,10 +121,10 @@ class _Reader:
             top.fail(f"asks for nothing; give it one or several of {listed(KEYS)}")
         start = self.start(given["start"]) if "start" in given else _Start()
         goal, start = self.path(given["path"], start) if "path" in given else (Goal.nothing(self.frames), start)
-        told = start.position is not None or start.facing is not None
+        given = start.position is not None or start.facing is not None
         x, z = start.position or (0.0, 0.0)
         origin = GroundPose(x, z, start.facing or 0.0)
-        goal = replace(goal, start=origin if told else None)
+        goal = replace(goal, start=origin if given else None)
         for item in given["poses"].items() if "poses" in given else ():
             goal = self.joined(goal, self.pose(item, goal, origin), item)
         for item in given["joints"].items() if "joints" in given else ():

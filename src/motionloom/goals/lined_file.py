@@ -1,4 +1,4 @@
-"""A YAML file from a stranger, taken apart so that every mistake is told with the file and the line."""
+"""A YAML file from an untrusted source, taken apart so that every mistake is reported with the file and the line."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -23,7 +23,7 @@ class Segment:
     transition: float = TRANSITION
     """Seconds shared with the next segment, half before and half after the seam."""
     goal: Goal | None = None
-    """Wishes for the frames of this segment, seen from where the person stands when it begins (origin, facing +Z)."""
+    """Targets for the frames of this segment, seen from the person's ground pose when it begins (origin, facing +Z)."""
     adapters: tuple[Applied, ...] = ()
     """What was taught from clips, for this segment alone: adapters or their files, each with a factor."""
 

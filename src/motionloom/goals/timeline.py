@@ -32,7 +32,7 @@ MAX_CHARACTERS = 20_000
 MAX_GUIDANCE = 100.0
 MAX_SEED = 2**62
 MAX_GOAL_FRAMES = 1_000_000
-"""Frames with wishes in one timeline, 0.6 GB of them."""
+"""Frames with targets in one timeline, 0.6 GB of them."""
 FPS = 20.0
 
 
@@ -47,7 +47,7 @@ class Timeline:
     start: Path | None = None
     """A motion file that the motion goes on from; it is there, and not yet read."""
     path: Goal | None = None
-    """Wishes for the whole motion in the world, one row per frame."""
+    """Targets for the whole motion in the world, one row per frame."""
 
     @property
     def begins(self) -> tuple[int, ...]:
@@ -170,10 +170,10 @@ class _Reader(LinedFile):
         shared = self.number(top.get("transition"), "transition", low=SHORTEST_TRANSITION, high=LONGEST / 2)
         transitions = self.transitions(rows, shared)
         total = sum(_frames(row.seconds) for row in rows)
-        wishes = sum(_frames(row.seconds) for row in rows if row.goals) + (total if "path" in top else 0)
-        if wishes > MAX_GOAL_FRAMES:
+        targets = sum(_frames(row.seconds) for row in rows if row.goals) + (total if "path" in top else 0)
+        if targets > MAX_GOAL_FRAMES:
             self.fail(
-                document.line, f"goals for {wishes:,} frames are too many; at most {MAX_GOAL_FRAMES:,} in one file"
+                document.line, f"goals for {targets:,} frames are too many; at most {MAX_GOAL_FRAMES:,} in one file"
             )
         return Timeline(
             self.segments(rows, transitions),
@@ -299,7 +299,7 @@ class _Reader(LinedFile):
         return place
 
     def file(self, found: Lined, name: str) -> Path:
-        """A file in the timeline's folder or below it; a timeline from a stranger reads nothing else."""
+        """A file in the timeline's folder or below it; a timeline from an untrusted source reads nothing else."""
         try:
             return Field(found.value, name).file(self.path.parent)
         except MotionloomError as error:

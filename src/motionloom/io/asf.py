@@ -230,7 +230,7 @@ def _tree(lines: list[Line], names: list[str], path: Path | str) -> tuple[list[i
 
 
 def read_amc(path: Path | str, asf: Asf) -> tuple[dict[str, Array], bool]:
-    """(frames, dofs) numbers by bone name as they stand in the file, and whether angles are degrees."""
+    """(frames, dofs) numbers by bone name as they are in the file, and whether angles are degrees."""
     data = text.read_text(path)
     rows: dict[str, list[bytes]] = {}
     dofs = {b.name.encode(): len(b.dofs) for b in asf.bones if b.dofs}

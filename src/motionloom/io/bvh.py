@@ -341,7 +341,7 @@ def _rotations(joints: list[_Joint], values: Array) -> tuple[Array, dict[str, st
 def unit_that_reads_back(motion: Motion, unit: float) -> float:
     """The unit to write a motion in, so that `guess_unit` finds its size again: ``unit``, else metres or another.
 
-    Where no unit does, as for a giant, ``unit`` itself: who reads the file has to be told.
+    Where no unit does, as for a giant, ``unit`` itself: who reads the file has to be told so.
     """
     offsets, moving = moving_offsets(motion)
     lengths = np.where(np.isin(np.arange(len(offsets)), list(moving))[:, None], 0.0, offsets)

@@ -1,4 +1,4 @@
-"""Plain YAML from strangers, with the line of every value: mappings, lists, words and numbers, nothing clever.
+"""Plain YAML from untrusted sources, with the line of every value: mappings, lists, words and numbers, nothing clever.
 
 Anchors, aliases and tags are refused, so that a small file cannot become a large one or make objects; so are several
 documents, duplicate keys, NaN and infinity. Built from the parser's events in one pass and without recursion.
@@ -35,7 +35,7 @@ class Lined:
     line: int
     value: "bool | int | float | str | list[Lined] | dict[str, Lined] | None"
     key_line: int = 0
-    """Where the key stands that names it; 0 in a list."""
+    """Where the key is that names it; 0 in a list."""
 
     def plain(self) -> Any:
         """The value without lines: what `yaml.safe_load` would give."""

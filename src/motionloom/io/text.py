@@ -1,4 +1,4 @@
-"""Reading text files of numbers from strangers: size, binary junk, bad numbers, all with the line in the message."""
+"""Reading untrusted text files of numbers: size, binary junk, bad numbers, all with the line in the message."""
 
 import json
 import warnings

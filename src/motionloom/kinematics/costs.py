@@ -1,7 +1,7 @@
 """What it costs a body to move its joints, and how far its limbs reach: tables by the names of joints.
 
 A name without a side, such as ``knee``, stands for both sides. What solves for poses reads these tables by joint number
-(`by_number`); everything about one quantity stands in one table.
+(`by_number`); everything about one quantity is in one table.
 """
 
 from collections.abc import Mapping

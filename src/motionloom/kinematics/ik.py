@@ -30,7 +30,7 @@ class Limb:
     hinge: tuple[float, float, float]
     """Axis of the bend at rest: the lower bone turns by a positive angle about it."""
     tip: int | None = None
-    """The joint beyond the end (the toes), whose direction tells the turn of a straight leg."""
+    """The joint beyond the end (the toes), whose direction shows the turn of a straight leg."""
 
 
 def _limb(base: str, names: tuple[str, str, str], hinge: tuple[float, float, float], tip: str | None = None) -> Limb:
@@ -49,14 +49,14 @@ LIMBS: tuple[Limb, ...] = (
 _REST = SMPL22.offsets
 _LENGTHS = SMPL22.bone_lengths()
 _BENT = (np.sin(np.radians(6)), np.sin(np.radians(25)))
-"""Sines of the bends at which a hinge begins to tell the turn of its limb, and tells it fully."""
+"""Sines of the bends at which a hinge begins to show the turn of its limb, and shows it fully."""
 _STIFFNESS = 1.0
 """How strongly the turn of a limb is kept from frame to frame at 20 fps, against 1 for a well bent hinge."""
 _NEARLY_STRAIGHT = (0.95, 0.995)
 """Shares of full reach between which the observed bend takes over from the observed distance."""
 
 _TOLERANCE = 0.12
-"""Relative error of drawn lengths at which a rotation counts as much as its change from frame to frame."""
+"""Relative error of sampled lengths at which a rotation counts as much as its change from frame to frame."""
 
 
 def motion_from_positions(positions: np.ndarray, fps: float) -> Motion:
@@ -94,15 +94,15 @@ def local_rotations(world: np.ndarray) -> Array:
 
 def _solve_trunk(seen: Array, places: Array, world: Array) -> None:
     """Fill in places and world orientations of pelvis, spine, neck, head and collars."""
-    world[:, 0] = _smooth_by_confidence(_pelvis(seen), _misdrawn(seen[:, 1] - seen[:, 2], _REST[1] - _REST[2]))
+    world[:, 0] = _smooth_by_confidence(_pelvis(seen), _length_error(seen[:, 1] - seen[:, 2], _REST[1] - _REST[2]))
     chest = [12, 13, 14]
     spare = (_REST[13] - _REST[14], seen[:, 13] - seen[:, 14])
     turned = fit_rotation(_REST[chest], seen[:, chest] - seen[:, 9:10], spare=spare)
-    world[:, 9] = _smooth_by_confidence(turned, _misdrawn(spare[1], spare[0]))
+    world[:, 9] = _smooth_by_confidence(turned, _length_error(spare[1], spare[0]))
     for joint, share in ((3, 1 / 3), (6, 2 / 3)):
         child = SMPL22.children(joint)[0]
-        guess = rot.slerp(world[:, 0], world[:, 9], np.full(len(seen), share))
-        world[:, joint] = aim(guess, _REST[child], _smooth_bones(seen[:, child] - seen[:, joint], guess, child))
+        expected = rot.slerp(world[:, 0], world[:, 9], np.full(len(seen), share))
+        world[:, joint] = aim(expected, _REST[child], _smooth_bones(seen[:, child] - seen[:, joint], expected, child))
     trunk = (3, 6, 9, 12, 13, 14, 1, 2)
     for joint in trunk:
         places[:, joint] = _end_of(joint, places, world)
@@ -112,10 +112,10 @@ def _solve_trunk(seen: Array, places: Array, world: Array) -> None:
     shift = np.einsum("j,fjk->fk", weights / weights.sum(), (seen - places)[:, (0, *trunk)])
     places[:, (0, *trunk)] += shift[:, None]
     for joint, child in ((12, 15), (13, 16), (14, 17)):
-        drawn = seen[:, child] - places[:, joint]
-        error = _misdrawn(drawn, _REST[child])
-        usual = rot.rotate(world[:, 9], np.broadcast_to(_REST[child], drawn.shape))
-        turned = aim(world[:, 9], _REST[child], drawn + 2 * error[:, None] * usual)
+        sampled = seen[:, child] - places[:, joint]
+        error = _length_error(sampled, _REST[child])
+        usual = rot.rotate(world[:, 9], np.broadcast_to(_REST[child], sampled.shape))
+        turned = aim(world[:, 9], _REST[child], sampled + 2 * error[:, None] * usual)
         local = _smooth_by_confidence(rot.multiply(rot.inverse(world[:, 9]), turned), error)
         world[:, joint] = rot.multiply(world[:, 9], local)
         places[:, child] = _end_of(child, places, world)
@@ -133,24 +133,25 @@ def _level_head(chest: Array, neck: Array) -> Array:
     return rot.rotvec_to_quat(np.array([-lean, 0, 0]))
 
 
-def _smooth_bones(bone: Array, guess: Array, child: int) -> Array:
-    """The seen bone (frames, 3), mixed with the guessed one as far as its breathing length shows noise."""
+def _smooth_bones(bone: Array, expected: Array, child: int) -> Array:
+    """The seen bone (frames, 3), mixed with the expected one as far as its breathing length shows noise."""
     length = np.linalg.norm(bone, axis=-1)
     noise = float(np.std(length) / _LENGTHS[child])
-    return bone + min(2.0, 6.0 * noise) * rot.rotate(guess, np.broadcast_to(_REST[child], bone.shape))
+    return bone + min(2.0, 6.0 * noise) * rot.rotate(expected, np.broadcast_to(_REST[child], bone.shape))
 
 
-def _misdrawn(bone: Array, rest: Array) -> Array:
-    """(frames,): how far the length of a drawn bone (frames, 3) is from its own, in units of that."""
+def _length_error(bone: Array, rest: Array) -> Array:
+    """(frames,): how far the length of a sampled bone (frames, 3) is from its own, in units of that."""
     return np.abs(1 - np.linalg.norm(bone, axis=-1) / np.linalg.norm(rest))
 
 
 def _smooth_by_confidence(turns: Array, error: Array) -> Array:
-    """Rotations (frames, ..., 4), steadied in time as far as what they were read off was drawn wrongly (frames, ...).
+    """Rotations (frames, ..., 4), smoothed in time as far as what they were read off has the wrong length (frames,
+    ...).
 
-    Where a network is not sure it draws in between: somebody who spins has both hips, or a limb its two ends, in one
+    Where a network is not sure it samples in between: somebody who spins has both hips, or a limb its two ends, in one
     place, and what is read off that turns by half a circle within a frame. Minimises the squared distance to each
-    rotation, weighted by the inverse square of the relative error, plus the squared change per frame: what is drawn
+    rotation, weighted by the inverse square of the relative error, plus the squared change per frame: what is sampled
     with the right lengths stays exactly as it is.
     """
     weight = (_TOLERANCE / error.clip(1e-6))[..., None] ** 2
@@ -172,7 +173,7 @@ def fit_rotation(rest: np.ndarray, seen: np.ndarray, *, spare: tuple[np.ndarray,
     """World quaternions (frames, 4) that best turn ``rest`` (points, 3) into ``seen`` (frames, points, 3).
 
     Kabsch, *Acta Cryst.* A32 (1976). Where the points lie on a line (left and right hip coincide), the ``spare`` pair
-    of vectors, rest (3,) and seen (frames, 3), tells the rest; elsewhere it has no say.
+    of vectors, rest (3,) and seen (frames, 3), gives the rest; elsewhere it has no say.
     """
     full = np.linalg.svd(rest.T @ rest)[1][1]
     correlation = seen.swapaxes(-1, -2) @ rest
@@ -210,17 +211,17 @@ def solve_limbs(seen: np.ndarray, places: np.ndarray, world: np.ndarray, fps: fl
         world[:, c] = world[:, b]
         if limb.tip is not None:
             world[:, c] = aim(world[:, b], _REST[limb.tip], seen[:, limb.tip] - seen[:, c])
-            world[:, limb.tip] = world[:, c]  # places do not tell how toes are bent: they go with the foot
+            world[:, limb.tip] = world[:, c]  # places do not show how toes are bent: they go with the foot
 
 
 def _smooth_limbs(seen: Array, local: Array) -> Array:
-    """Local rotations (frames, 22, 4), smooth at hips, knees, shoulders and elbows: a limb drawn short would have
+    """Local rotations (frames, 22, 4), smooth at hips, knees, shoulders and elbows: a limb sampled too short would have
     to fold up, or open, within a frame to reach its end."""
     ends = [[limb.start, limb.middle, limb.end] for limb in LIMBS]
     joints = [[limb.start, limb.middle] for limb in LIMBS]
     lengths = _LENGTHS[[[limb.middle, limb.end] for limb in LIMBS]]
-    drawn = np.linalg.norm(np.diff(seen[:, ends], axis=2), axis=-1)
-    error = np.abs(1 - drawn / lengths).mean(-1)
+    sampled = np.linalg.norm(np.diff(seen[:, ends], axis=2), axis=-1)
+    error = np.abs(1 - sampled / lengths).mean(-1)
     result = local.copy()
     result[:, joints] = _smooth_by_confidence(
         local[:, joints], error[..., None]

@@ -1,7 +1,7 @@
 """Places of joints to a body whose first frames were shown: those stay, the rest follows from them.
 
-The pose and its change that were shown last lead over into the new ones as at the borders of a drawn stretch
-(`edits.boundary`), here on a body with constant bones; feet that stand go on standing where they were shown.
+The pose and its change that were shown last pass into the new ones as at the borders of an inpainted stretch
+(`edits.boundary`), here on a body with constant bones; planted feet stay planted where they were shown.
 """
 
 from dataclasses import replace
@@ -25,18 +25,18 @@ def body(positions: Array, contacts: Array, fps: float, shown: Motion | None) ->
 
     The first ``len(shown)`` places are those that ``shown`` was made of; contacts: (frames, 4) as in the features.
     """
-    drawn = motion_from_positions(positions, fps)
+    sampled = motion_from_positions(positions, fps)
     if shown is None:
-        return clean_feet(drawn, contacts=contacts)
-    return _begun(shown, clean_feet(_led(drawn, shown), contacts=contacts, shown=len(shown)))
+        return clean_feet(sampled, contacts=contacts)
+    return _begun(shown, clean_feet(_continuing(sampled, shown), contacts=contacts, shown=len(shown)))
 
 
 def put(motion: Motion, skeleton: Skeleton, shown: Motion | None) -> Motion:
     """A motion of the 22-joint person on another skeleton, begun with the frames that were shown on that."""
     if skeleton == SMPL22:
         return motion
-    worn = retarget(motion, skeleton)
-    return worn if shown is None else _begun(shown, _led(worn, shown))
+    retargeted = retarget(motion, skeleton)
+    return retargeted if shown is None else _begun(shown, _continuing(retargeted, shown))
 
 
 def _begun(shown: Motion, made: Motion) -> Motion:
@@ -50,14 +50,14 @@ def _begun(shown: Motion, made: Motion) -> Motion:
     )
 
 
-def _led(drawn: Motion, shown: Motion) -> Motion:
-    """The shown frames, and the drawn ones behind them, led over from what was shown."""
-    count, behind = len(shown), len(drawn) - len(shown)
+def _continuing(sampled: Motion, shown: Motion) -> Motion:
+    """The shown frames, and the sampled ones behind them, which take up pose and velocity of what was shown."""
+    count, behind = len(shown), len(sampled) - len(shown)
     reach = min(JOIN, behind)
-    off = shown.root - drawn.root[:count]
-    root = drawn.root.copy()
+    off = shown.root - sampled.root[:count]
+    root = sampled.root.copy()
     root[:count] = shown.root
     root[count : count + reach] += match_boundary(off[-1], off[-1] - off[-2], reach)
-    turns = match_rotations(drawn.rotations, shown.rotations, count - 1, 1, reach)
+    turns = match_rotations(sampled.rotations, shown.rotations, count - 1, 1, reach)
     turns[:count] = shown.rotations
-    return replace(drawn, root=root, rotations=rot.unroll(rot.normalize(turns)))
+    return replace(sampled, root=root, rotations=rot.unroll(rot.normalize(turns)))

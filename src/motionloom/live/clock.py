@@ -1,6 +1,6 @@
-"""A `Live` against the time: a thread that draws ahead, a bounded buffer, and frames that are handed out on time.
+"""A `Live` against the time: a thread that samples ahead, a bounded buffer, and frames that are handed out on time.
 
-The buffer is as long as the longest window took to draw lately, and half as much again, so that a command waits no
+The buffer is as long as the longest window took lately, and half as much again, so that a command waits no
 longer than it must; on a machine that is too slow it grows, windows follow each other less often, and `Health` says so.
 When frames are late all the same the clock waits: what is shown never jumps.
 """
@@ -85,7 +85,7 @@ class Player:
         self._thread = threading.Thread(target=self._plan, name="motionloom-live", daemon=True)
 
     def start(self) -> "Player":
-        """Begin to draw ahead, in a thread of its own."""
+        """Begin to sample ahead, in a thread of its own."""
         self._thread.start()
         return self
 
@@ -185,7 +185,7 @@ class Player:
         return max(2, round(self._ahead * self._live.fps))
 
     def _fit(self, took: float) -> None:
-        """The buffer for how long windows take to draw, and how often they are drawn."""
+        """The buffer for how long windows take, and how often they are sampled."""
         self._took.append(took)
         longest = max(self._took)
         self._ahead = min(max(1.5 * longest, SHORTEST), LONGEST)

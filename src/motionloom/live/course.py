@@ -1,7 +1,7 @@
 """Where somebody is to go in the frames of the next window: steering and paths as a few places of the pelvis.
 
-Places are asked every `EVERY` frames only, so that between them the body sways as it is drawn. Nobody changes pace or
-way within a frame: what is asked leads over from how the person moves.
+Places are asked every `EVERY` frames only, so that between them the body sways as it is sampled. Nobody changes pace or
+way within a frame: what is asked begins with how the person moves.
 """
 
 import math

@@ -1,9 +1,9 @@
 """`Live`: one pose after the other, without end, and what is asked in between changes what comes.
 
-There is one plan: the frames that were drawn and not yet shown. When something is asked, or when the plan runs short,
-a window is drawn from the next frame on (`window`), knowing the last half second; its body follows from the poses that
-were shown (`body`). Everything is counted in frames, no clock is looked at: the same seed and the same commands at the
-same frames make the same motion. `clock` runs one of these against the time; `pair` has two people.
+There is one plan: the frames that were sampled and not yet shown. When something is asked, or when the plan runs short,
+a window is sampled from the next frame on (`window`), knowing the last half second; its body follows from the poses
+that were shown (`body`). Everything is counted in frames, no clock is looked at: the same seed and the same commands at
+the same frames make the same motion. `clock` runs one of these against the time; `pair` has two people.
 """
 
 from abc import ABC, abstractmethod
@@ -56,14 +56,14 @@ def motion_of(frames: Sequence[Frame], fps: float) -> Motion:
 
 
 class Stage(ABC):
-    """One person or two who move without end: frames are counted, windows are drawn when they must be."""
+    """One person or two who move without end: frames are counted, windows are sampled when they must be."""
 
     def __init__(self, people: Sequence[Person], settings: Settings, fps: float) -> None:
         if not (np.isfinite(fps) and 1 <= fps <= 240):
             raise MotionloomError(f"live motion of {fps:g} frames per second cannot be shown; give 1 to 240")
         self.people, self.settings, self.fps = tuple(people), settings, float(fps)
         self._frame = 0  # the next one to be shown, at the rate of what is shown
-        self._next = self._again = 0  # the next frame at 20 per second, and when to draw anew
+        self._next = self._again = 0  # the next frame at 20 per second, and when to sample anew
         self._drawn = -settings.used  # where the last window began
         self._rest, self._open = settings.rest, True  # frames between windows; whether commands may be taken up
         self._two: list[list[tuple[Array, Array, str]]] = []  # the last two frames at 20 per second, of everybody
@@ -145,7 +145,7 @@ class Live(Stage, Asked):
         settings: Settings | None = None,
     ) -> None:
         """prior: weights that make HumanML3D's 263 numbers. fps: rate of the frames that are shown, 1 to 240; motion is
-        drawn at 20 per second and interpolated. start: a motion of anybody that this goes on from, in its place;
+        sampled at 20 per second and interpolated. start: a motion of anybody that this goes on from, in its place;
         without one the person begins at the origin facing +Z. skeleton: a humanoid that frames are shown on (None: the
         22-joint person). Raises `MotionloomError` for what cannot be.
         """
@@ -190,7 +190,7 @@ class Live(Stage, Asked):
 
 
 def check(prior: Prior, seed: int) -> None:
-    """`MotionloomError` for weights and seeds that no live motion is drawn with."""
+    """`MotionloomError` for weights and seeds that no live motion is sampled with."""
     if len(prior.mean) != WIDTH or prior.fps != FPS:
         raise MotionloomError(
             f"these weights make {len(prior.mean)} numbers a frame; live motion needs {WIDTH} at {FPS:g} fps"

@@ -1,7 +1,7 @@
 """`LivePair`: two people who move without end in one world, and what is asked of either changes what comes.
 
-Both are drawn together by one frozen prior and the block that makes two people of it (`tasks.pair`): each window knows
-the last half second of both and where they stand to each other. Their bodies follow as one person's does.
+Both are sampled together by one frozen prior and the block that makes two people of it (`tasks.pair`): each window
+knows the last half second of both and their relative pose. Their bodies follow as one person's does.
 """
 
 from collections.abc import Iterator, Sequence
@@ -48,7 +48,7 @@ class LivePair(Stage):
         settings: Settings | None = None,
     ) -> None:
         """block: weights that make two people of this prior. start: what both did before, in one world; without it
-        the first person begins at the origin facing +Z and the words say where the second stands. Otherwise as `Live`.
+        the first person begins at the origin facing +Z and the words decide where the second is. Otherwise as `Live`.
         The solver and how the levels are spread are those of every duet. Raises `MotionloomError` for what cannot be.
         """
         check(prior, seed)
@@ -81,13 +81,13 @@ class LivePair(Stage):
         changes: list[Correction | None] = [None, None]
         observed = None
         if count:
-            stands = two.seen(_stand(requests[0].begin), np.stack([_stand(request.begin) for request in requests]))
-            observed = known_state(prior, self._net, known, torch.from_numpy(stands).float(), count + frames)
+            poses = two.seen(_pose(requests[0].begin), np.stack([_pose(request.begin) for request in requests]))
+            observed = known_state(prior, self._net, known, torch.from_numpy(poses).float(), count + frames)
         for i, request in enumerate(requests):
             if count or request.edits or request.turns:
                 changes[i] = leaving(prior, known[i], frames, edits=request.edits, turns=request.turns)
         frozen = [bool(request.edits or request.turns) for request in requests]
-        features, drawn = pair_features(
+        features, sampled = pair_features(
             prior, self._net, [request.words for request in requests], count + frames,
             seeds=[row_seed(self._seed, i, self._next) for i in (0, 1)],
             edits=PairEdits(observed, changes, frozen=frozen),
@@ -95,12 +95,12 @@ class LivePair(Stage):
         )  # fmt: skip
         self._calls += self.settings.steps
         made = features[0].double().numpy()
-        begins: list[Placement | None] = [None, None] if count else [placement(stand) for stand in drawn[0].numpy()]
+        begins: list[Placement | None] = [None, None] if count else [placement(pose) for pose in sampled[0].numpy()]
         for i, (person, request) in enumerate(zip(self.people, requests, strict=True)):
             window = np.concatenate([request.known, made[i, count:]])
             person.accept(request, window, self._next, begins[i])
 
 
-def _stand(place: Placement) -> np.ndarray:
+def _pose(place: Placement) -> np.ndarray:
     """(4,) as of `features.pair`."""
     return np.array([np.cos(place.facing), np.sin(place.facing), place.x, place.z])

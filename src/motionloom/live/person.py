@@ -1,4 +1,4 @@
-"""One person of a live motion: what is asked of him, the frames drawn for him, and the body that was shown."""
+"""One person of a live motion: what is asked of him, the frames sampled for him, and the body that was shown."""
 
 from abc import ABC, abstractmethod
 from collections import deque
@@ -83,12 +83,12 @@ class Request:
     turns: list[Correction]
     """As of `window.Drawer`."""
     again: int
-    """Frames after which to draw again."""
+    """Frames after which to sample again."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """Frames from ``first`` on: some of the past, which were shown, and what was drawn."""
+    """Frames from ``first`` on: some of the past, which were shown, and what was sampled."""
 
     first: int
     features: Array
@@ -180,7 +180,7 @@ class Person(Asked):
         return Request(known, begin, words, edits, turns, again)
 
     def accept(self, request: Request, features: Array, frame: int, begin: Placement | None = None) -> None:
-        """Take a window (known and drawn frames, 263) for the plan; ``begin`` where nothing was known."""
+        """Take a window (known and sampled frames, 263) for the plan; ``begin`` where nothing was known."""
         count = len(request.known)
         positions, contacts, places = decoded(features, begin or request.begin)
         old = self._plan
@@ -219,7 +219,7 @@ class Person(Asked):
         return goal
 
     def _wanted(self, frame: int, course: Course) -> tuple[Goal, str, int]:
-        """What is asked of the next frames, in the world; the words; and after how many frames to draw again."""
+        """What is asked of the next frames, in the world; the words; and after how many frames to sample again."""
         frames, again = self._settings.ahead, self._settings.used
         words, steer = self._words, self._steer
         if self._trail is not None and self._trail.left(course, frame) <= ARRIVED:

@@ -21,7 +21,7 @@ KEPT = 120.0
 
 @dataclass(eq=False)
 class Session:
-    """Somebody who moves for one client. Without a client he waits: his buffer is full, and nothing is drawn."""
+    """Somebody who moves for one client. Without a client he waits: his buffer is full, and nothing is sampled."""
 
     key: str
     begun: Hello

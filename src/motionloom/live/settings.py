@@ -1,4 +1,4 @@
-"""How a live motion is drawn: lengths in frames of the prior (20 per second), steps and solver."""
+"""How a live motion is sampled: lengths in frames of the prior (20 per second), steps and solver."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from motionloom.errors import MotionloomError
 
 @dataclass(frozen=True)
 class Settings:
-    """What a `Live` is drawn with; the defaults are those that docs/live.md measures."""
+    """What a `Live` is sampled with; the defaults are those that docs/live.md measures."""
 
     steps: int = 8
     """Guided network calls for one window."""
@@ -21,9 +21,9 @@ class Settings:
     known: int = 10
     """Frames of the past that a window begins with."""
     ahead: int = 60
-    """Frames that a window draws."""
+    """Frames that a window samples."""
     used: int = 40
-    """Frames of a window that are shown before the next one is drawn, when nothing is asked."""
+    """Frames of a window that are shown before the next one is sampled, when nothing is asked."""
     rest: int = 4
     """Frames between two windows at least: what is asked more often is put together."""
 
@@ -35,11 +35,11 @@ class Settings:
             )
         if not 1 <= self.steps <= 200 or not abs(self.guidance) <= 100:
             raise MotionloomError(
-                f"{self.steps} steps with a guidance of {self.guidance:g} cannot be drawn; give 1 to 200 steps, usual "
-                "guidance is 1 to 7"
+                f"{self.steps} steps with a guidance of {self.guidance:g} cannot be sampled; give 1 to 200 steps, "
+                "usual guidance is 1 to 7"
             )
         if not (4 <= self.known <= 40 and 1 <= self.rest <= self.used <= self.ahead - 10 and self.ahead <= 180):
             raise MotionloomError(
-                f"windows of {self.known} known and {self.ahead} drawn frames, {self.used} of them used, do not fit; "
-                "give 4 to 40 known frames and at most 180 drawn ones, 10 more than are used"
+                f"windows of {self.known} known and {self.ahead} sampled frames, {self.used} of them used, do not fit; "
+                "give 4 to 40 known frames and at most 180 sampled ones, 10 more than are used"
             )

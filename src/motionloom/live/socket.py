@@ -120,7 +120,7 @@ async def _heard(websocket: Socket, session: Session, said: Mapping[str, Any]) -
 
 async def _play(websocket: Socket, session: Session) -> None:
     """Send poses at their times."""
-    pace, told = Pace(time.monotonic), time.monotonic()
+    pace, reported = Pace(time.monotonic), time.monotonic()
     player = session.player
     while True:
         while (frame := session.pending or player.take(timeout=0.0)) is None:
@@ -133,8 +133,8 @@ async def _play(websocket: Socket, session: Session) -> None:
         player.shown(late)
         await _send(websocket, messages.frame(frame, late))
         session.number, session.pending = frame.number + 1, None
-        if time.monotonic() - told > EVERY:
-            told = time.monotonic()
+        if time.monotonic() - reported > EVERY:
+            reported = time.monotonic()
             await _send(websocket, messages.health(player.health))
 
 

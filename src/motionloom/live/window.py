@@ -1,7 +1,7 @@
-"""One window of a live motion: its first frames are known, the rest is drawn in a few steps.
+"""One window of a live motion: its first frames are known, the rest is sampled in a few steps.
 
 The walk is that of every other motion (`diffusion.sampling`), what is known is held as in `tasks.redraw`, and the
-noise belongs to the numbers of frames: a frame that is drawn again, because something was asked, has the same noise.
+noise belongs to the numbers of frames: a frame that is sampled again, because something was asked, has the same noise.
 """
 
 from collections import OrderedDict
@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom.diffusion import SOLVERS, Denoiser, Draw, guide, inpaint, levels, observe, row_seed, sample
+from motionloom.diffusion import SOLVERS, Denoiser, NoiseSource, guide, inpaint, levels, observe, row_seed, sample
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction
 from motionloom.live.settings import Settings
@@ -28,10 +28,10 @@ class Noise:
 
     def __init__(self, seed: int, moves: int, features: int) -> None:
         self._seed = seed
-        self._shape = 2 * moves + 2, features  # the walk draws, and what is known is shown at noise of its own
+        self._shape = 2 * moves + 2, features  # each move takes noise, and what is known is shown at noise of its own
         self._kept: dict[int, Tensor] = {}
 
-    def draw(self, first: int, frames: int, device: torch.device) -> Draw:
+    def draw(self, first: int, frames: int, device: torch.device) -> NoiseSource:
         """The noise of the frames from ``first`` on, for one walk: call number k gets that of its k-th draw."""
         self._kept = {number: kept for number, kept in self._kept.items() if number >= first}
         for number in range(first, first + frames):
@@ -59,16 +59,17 @@ class Drawer:
         text: str,
         known: Tensor,
         frames: int,
-        draw: Draw,
+        draw: NoiseSource,
         *,
         edits: Sequence[Correction] = (),
         turns: Sequence[Correction] = (),
     ) -> np.ndarray:
         """(known + frames, 263) float64 features, not standardised, the known ones as they were.
 
-        text: what is done; known: (n, 263) features of the last frames, n may be 0; frames: how many to draw; draw: of
-        `Noise.draw`, for all frames of the window; edits: what every guess goes through, one after the other, before it
-        is made to leave the known frames without a jump; turns: the same behind that, for edits that jump nowhere.
+        text: what is done; known: (n, 263) features of the last frames, n may be 0; frames: how many to sample; draw:
+        of `Noise.draw`, for all frames of the window; edits: what every estimate goes through, one after the other,
+        before it is made to leave the known frames without a jump; turns: the same behind that, for edits that jump
+        nowhere.
         """
         prior, count = self.prior, len(known)
         spread = torch.where(prior.std > 0, prior.std, 1.0)
@@ -94,9 +95,9 @@ class Drawer:
         return torch.where(mask, given, state * spread + prior.mean)[0].cpu().double().numpy()
 
     def _guided(self, text: str, frames: int) -> Denoiser:
-        """The prior's guess under a text; an empty one asks for nothing in particular.
+        """The prior's denoised estimate under a text; an empty one asks for nothing in particular.
 
-        A token of the network holds several frames, and between tokens it leaves small steps: the last guess is the
+        A token of the network holds several frames, and between tokens it leaves small steps: the last estimate is the
         average over all ways to divide the frames into tokens (as in `tasks.long`), which are rows of one call.
         """
         if text not in self._bound:
@@ -113,7 +114,7 @@ class Drawer:
         )
         shifted = guide(net, own, null, scale)
 
-        def guess(state: Tensor, level: int) -> Tensor:
+        def denoise(state: Tensor, level: int) -> Tensor:
             if level != self._levels[-2] or ways == 1:
                 return once(state, level)
             rows = shifted(torch.cat([F.pad(state[:, k:], (0, 0, 0, k)) for k in range(ways)]), level)
@@ -123,13 +124,14 @@ class Drawer:
             count = torch.arange(1, frames + 1, device=state.device).clamp(max=ways)
             return total / count[:, None]
 
-        return guess
+        return denoise
 
 
 def leaving(
     prior: Prior, known: Tensor, frames: int, *, edits: Sequence[Correction], turns: Sequence[Correction]
 ) -> Correction:
-    """What every guess of a window goes through: ``edits``, no jump behind what is known, ``edits`` again, ``turns``.
+    """What every estimate of a window goes through: ``edits``, no jump behind what is known, ``edits`` again,
+    ``turns``.
 
     known: (n, 263) features, not standardised, of which ``frames`` are behind; the known ones stay as they are.
     """
@@ -140,12 +142,12 @@ def leaving(
     meet = joining(given, mask, len(known), len(known) + frames)
     data = (given - prior.mean) / spread
 
-    def changed(guess: Tensor, level: int) -> Tensor:
+    def changed(denoised: Tensor, level: int) -> Tensor:
         for edit in edits:
-            guess = edit(guess, level)
-        guess = ((meet(guess[None] * spread + prior.mean) - prior.mean) / spread)[0]
+            denoised = edit(denoised, level)
+        denoised = ((meet(denoised[None] * spread + prior.mean) - prior.mean) / spread)[0]
         for turn in (*edits, *turns):  # edits again: a heading bent at the border turns all that is behind it
-            guess = turn(guess, level)
-        return torch.where(mask[0], data[0], guess)
+            denoised = turn(denoised, level)
+        return torch.where(mask[0], data[0], denoised)
 
     return changed

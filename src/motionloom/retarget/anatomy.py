@@ -249,7 +249,7 @@ def _hangs_on(skeleton: Skeleton, found: JointMap, joint: int, part: int) -> boo
 
 
 def _odd_frames(rest: Array) -> Array:
-    """What the offsets alone tell: bones, hip line and shoulder line; the twist of limbs is arbitrary."""
+    """What the offsets alone show: bones, hip line and shoulder line; the twist of limbs is arbitrary."""
     hips, shoulders = rest[1] - rest[2], rest[16] - rest[17]
     frames = np.tile(rot.IDENTITY, (22, 1))
     for j, child in enumerate(CHILD):

@@ -75,7 +75,7 @@ def read_word(name: str) -> str:
 
 
 def parts_by_name(skeleton: Skeleton) -> Parts:
-    """The parts whose joints the names tell, sided ones as ``left_knee``; what is not named is left out."""
+    """The parts whose joints the names give, sided ones as ``left_knee``; what is not named is left out."""
     found: dict[tuple[str, str], int] = {}
     for j in range(len(skeleton)):
         if j not in skeleton.ends:

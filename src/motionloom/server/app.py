@@ -1,4 +1,4 @@
-"""The HTTP application: routes, bodies and answers. What they mean stands in `docs/server.md`."""
+"""The HTTP application: routes, bodies and answers. What they mean is in `docs/server.md`."""
 
 import asyncio
 import base64

@@ -1,4 +1,4 @@
-"""What a client asks of a job: JSON from a stranger to a `Request`, or a sentence that says what is wrong with it.
+"""What a client asks of a job: untrusted JSON to a `Request`, or a sentence that says what is wrong with it.
 
 Numbers are bounded by `Limits`; timelines and goals go through the readers of the command line, so that the same words
 are refused with the same sentences.

@@ -103,9 +103,9 @@ def _composed(models: Models, request: Request, progress: Progress) -> Iterator[
     start = None if timeline.start is None else _loaded(timeline.start)
     for number in range(request.count):
         seed = request.seed + number
-        told = _moves(progress, request, len(timeline.segments), number)
+        moves = _moves(progress, request, len(timeline.segments), number)
         blocks = long.compose(
-            models.prior, timeline.segments, seed=seed, start=start, path=timeline.path, progress=told,
+            models.prior, timeline.segments, seed=seed, start=start, path=timeline.path, progress=moves,
             **shared(request),
         )  # fmt: skip
         motion = concatenated(*blocks)
@@ -197,11 +197,11 @@ def _composed_pair(models: Models, request: Request, progress: Progress) -> Iter
         raise MotionloomError("two people do not go on from one 'start'; leave it out, or give 'past'")
     given = {} if request.options["together"] is None else {"pair_guidance": request.options["together"]}
     for number in range(request.count):
-        told = _moves(progress, request, len(timeline.segments), number)
+        moves = _moves(progress, request, len(timeline.segments), number)
         blocks = list(
             duet.compose_pair(
                 models.prior, models.block, timeline.segments, seed=request.seed + number, path=timeline.path,
-                person=person, progress=told, **given, **shared(request),
+                person=person, progress=moves, **given, **shared(request),
             )
         )  # fmt: skip
         two = (concatenated(*[one for one, _ in blocks]), concatenated(*[other for _, other in blocks]))
@@ -214,16 +214,16 @@ _TASKS: dict[str, Callable[[Models, Request, Progress], Iterator[Result]]] = {
 
 
 def _moves(progress: Progress, request: Request, segments: int, number: int) -> Callable[[int], None]:
-    """The progress of a long motion, which is told in moves of rows."""
+    """The progress of a long motion, which is counted in moves of rows."""
     steps = request.steps or text.STEPS
     done = number * segments * steps
 
-    def told(more: int) -> None:
+    def moved(more: int) -> None:
         nonlocal done
         done += more
         progress(done, request.count * segments * steps)
 
-    return told
+    return moved
 
 
 def _loaded(path: Any) -> Motion:

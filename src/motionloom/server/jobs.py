@@ -67,7 +67,7 @@ class Job:
                 "error": self.error, "results": list(self.results),
             }  # fmt: skip
 
-    # -- what the worker tells
+    # -- what the worker reports
 
     def started(self) -> bool:
         """Take the job up; False if it was cancelled before."""

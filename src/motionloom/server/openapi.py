@@ -133,7 +133,7 @@ def _paths() -> dict[str, Any]:
         "/characters": {"post": ("Send a GLB, VRM, glTF or BVH character",
                                  {"parameters": [name]} | upload | _answered("id, joints", _OBJECT, status=201))},
         "/characters/{id}": {"get": ("The character's file", _answered("the file", _FILE, kind="*/*"))},
-        "/generate": {"post": ("What an MMCP request asks, with the extra mmcp; /mmcp/docs tells of it",
+        "/generate": {"post": ("What an MMCP request asks, with the extra mmcp; /mmcp/docs describes it",
                                _asked(_OBJECT) | _answered("glTF", _OBJECT, kind="model/gltf+json"))},
         "/project": {
             "get": ("The project as it was saved last", _answered("any JSON; null before the first", {})),

@@ -197,7 +197,7 @@ class Worker:
             nonlocal walks
             self._check(jobs)
             walks += denoised.done == 1
-            if jobs[0].request.task == "switch":  # which tells of no progress itself
+            if jobs[0].request.task == "switch":  # which reports no progress itself
                 count = jobs[0].request.count
                 jobs[0].progress(min(walks - 1, count - 1) * denoised.of + denoised.done, count * denoised.of)
             if not any(job.request.levels and not job.finished for job in jobs):

@@ -31,7 +31,7 @@ FADE = 20
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Some frames of a motion, as a network drew them."""
+    """Some frames of a motion, as a network predicted them."""
 
     positions: Array
     """(frames, 22, 3) metres in the world; bones may breathe."""

@@ -1,8 +1,8 @@
 """Completing windows of motion of which something is known: the past, an end, some joints (`Predictor`).
 
 The published way (`lab.papers.humanmac`) mixes the known frames into the noisy state and stops one level short of
-clean. Here the network is told what is known, the walk ends clean, and what is known is written back exactly; the rest
-is led to it so that neither place nor velocity jumps, and bones keep the lengths of the past.
+clean. Here what is known is a condition of the network, sampling ends clean, and what is known is written back exactly;
+the rest meets it so that neither place nor velocity jumps, and bones keep the lengths of the past.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,7 +31,7 @@ TEMPERATURE = PredictionSampling.temperature
 FUTURES = 10
 """Futures that are made unless asked otherwise."""
 EASE = 0.4
-"""Seconds over which unknown frames are led from what is known to the network's own course."""
+"""Seconds over which unknown frames go over from what is known to the network's own course."""
 BATCH = 512
 """Rows in one network call."""
 
@@ -58,7 +58,7 @@ def complete(
     poses: Callable[[Tensor], Array] | None = None,
     **settings: Unpack[PredictionSettings],
 ) -> Tensor:
-    """Windows (rows, frames, channels) with what is not known drawn; row i from ``seeds[i]``, alone or in a batch.
+    """Windows (rows, frames, channels) with what is not known sampled; row i from ``seeds[i]``, alone or in a batch.
 
     ``features`` are read where ``mask`` (rows, frames, parts) is above 0; ``pose`` (rows, channels) is the last
     observed one. Known numbers are those that are given, and the others leave them without a jump. ``sampling``, or
@@ -89,7 +89,8 @@ def complete(
 
 
 def joined(made: Tensor, known: Tensor, mask: Tensor, *, ease: int) -> Tensor:
-    """``known`` where ``mask`` is 1, around it ``made``, led there: (rows, frames, channels), mask one per 3 of them.
+    """``known`` where ``mask`` is 1, ``made`` matched to it elsewhere: (rows, frames, channels), mask one per 3 of
+    them.
 
     What made frames lack at a border, in value and in change per frame, fades over ``ease`` frames as the quintic that
     leaves their second derivative alone, or over the whole gap between two borders where that is shorter. Rows whose
@@ -101,11 +102,11 @@ def joined(made: Tensor, known: Tensor, mask: Tensor, *, ease: int) -> Tensor:
     patterns, rows = np.unique(sure.reshape(len(sure), -1), axis=0, return_inverse=True)
     for number, pattern in enumerate(patterns.reshape(-1, *sure.shape[1:])):
         chosen = torch.from_numpy(np.flatnonzero(rows.reshape(-1) == number)).to(made.device)
-        result[chosen] += _lead(made[chosen], known[chosen], pattern, ease) * (1 - each[chosen])
+        result[chosen] += _matching(made[chosen], known[chosen], pattern, ease) * (1 - each[chosen])
     return result
 
 
-def _lead(made: Tensor, known: Tensor, sure: NDArray[np.bool_], ease: int) -> Tensor:
+def _matching(made: Tensor, known: Tensor, sure: NDArray[np.bool_], ease: int) -> Tensor:
     """What to add to ``made`` (rows, frames, channels) for one mask (frames, parts)."""
     added, lack = torch.zeros_like(made), known - made
     courses, parts = np.unique(sure.T, axis=0, return_inverse=True)
@@ -123,7 +124,7 @@ def _lead(made: Tensor, known: Tensor, sure: NDArray[np.bool_], ease: int) -> Te
 
 
 def _borders(course: NDArray[np.bool_], ease: int) -> list[tuple[int, int, int]]:
-    """Last known frame, direction of the unknown ones, and how many of them have room to be led."""
+    """Last known frame, direction of the unknown ones, and how many of them have room to be changed."""
     edges = np.flatnonzero(np.diff(course.astype(int))).tolist()
     ends = [-1, *edges, len(course) - 1]
     return [
@@ -146,7 +147,7 @@ def next_frames(
     """(rows, frames, joints, 3) metres: what comes behind pasts (rows, h, joints, 3) in the world, +Y up.
 
     h is 2 to ``predictor.observed``. ``frames``: how many, at most (and by default) as many as the window has left
-    behind the frames it usually sees. ``exact``: bones as long as the past's; else what the network drew.
+    behind the frames it usually sees. ``exact``: bones as long as the past's; else what the network predicts.
     """
     past = np.asarray(past, dtype=np.float64)
     frames = predictor.frames - predictor.observed if frames is None else frames
@@ -183,8 +184,8 @@ def _check(predictor: Predictor, past: Array, frames: int, known: Known | None) 
     h = past.shape[1]
     if not 2 <= h <= predictor.observed or not 1 <= frames <= predictor.frames - h:
         raise MotionloomError(
-            f"this predictor sees 2 to {predictor.observed} frames and draws, with them, at most {predictor.frames}; "
-            f"got a past of {h} and {frames} frames to draw"
+            f"this predictor sees 2 to {predictor.observed} frames and samples, with them, at most {predictor.frames}; "
+            f"got a past of {h} and {frames} frames to sample"
         )
     if known is None:
         return

@@ -1,7 +1,7 @@
 """Control: motions that meet a goal in the world, from a prompt.
 
-The goal is seen from where the person stands at frame 0; there it steers every guess of the sampler (`steering`); the
-drawn motion is put into the world and fitted to what is left of the wishes (`fitting`).
+The goal is seen from the person's ground pose at frame 0; there it steers every denoised estimate of the sampler
+(`steering`); the sampled motion is put into the world and fitted to what is left of the targets (`fitting`).
 """
 
 from collections.abc import Callable, Sequence
@@ -38,9 +38,9 @@ Weighted = tuple[Adapter, Weight]
 Adapters = Literal["none", "fitting"] | Sequence[Adapter | Weighted]
 
 MISSED = 0.05
-"""Metres off beyond which a wish counts as missed."""
-TOLD = 10
-"""Missed wishes that are put into words."""
+"""Metres off beyond which a target counts as missed."""
+SENTENCES = 10
+"""Missed targets that are put into words."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,14 +49,20 @@ class Controlled:
 
     motion: Motion
     """In the world of the goal."""
-    drawn: Motion
+    sampled: Motion
     """The same before it was fitted."""
     error: float
     """Metres: mean over the joints and frames that are asked for a place."""
     worst: float
     """Metres: the largest of them."""
     missed: tuple[str, ...]
-    """A sentence for each of the wishes that are more than `MISSED` off, at most `TOLD`, the worst first."""
+    """A sentence for each of the targets that are more than `MISSED` off, at most `SENTENCES`, the worst first."""
+
+    @property
+    def drawn(self) -> Motion:
+        """The old name of ``sampled``, for one release."""
+        say("Controlled.drawn", "Controlled.sampled")
+        return self.sampled
 
 
 @renamed({"clean": "foot_lock", "exact": "fit"})
@@ -126,10 +132,10 @@ def steered_features(
     progress: Progress | None = None,
     **settings: Unpack[Settings],
 ) -> list[Tensor]:
-    """`motionloom.tasks.text.sample_features` for rows of the goal's length, each guess steered towards ``goal``.
+    """`motionloom.tasks.text.sample_features` for rows of the goal's length, each estimate steered towards ``goal``.
 
-    ``goal`` as of `steering.toward`. With ``adapters`` their blended guesses are steered, and the numbers that are
-    asked stand in the state without noise, as the last steered guess has them (as in Shafir et al. 2024, algorithm 2,
+    ``goal`` as of `steering.toward`. With ``adapters`` their blended estimates are steered, and the numbers that are
+    asked are in the state without noise, as the last steered estimate has them (as in Shafir et al. 2024, algorithm 2,
     whose numbers are known beforehand; here they depend on where the rest of the body goes).
     """
     check_prompts(prompts)
@@ -188,7 +194,7 @@ def fitting_adapters(prior: Prior, goal: Goal) -> list[Adapter]:
 
 
 def _seeing(net: Callable[[Tensor, Tensor], Denoiser], change: Correction, prior: Prior, mask: Tensor) -> Denoiser:
-    """The steered denoiser that shows its networks the last steered guess, free of noise, where ``mask`` is True.
+    """The steered denoiser that shows its networks the last steered estimate, free of noise, where ``mask`` is True.
 
     ``net`` (given, mask) is the denoiser of the networks that are shown what is given. At the first level nothing is.
     """
@@ -197,11 +203,11 @@ def _seeing(net: Callable[[Tensor, Tensor], Denoiser], change: Correction, prior
     def seen(state: Tensor, level: int) -> Tensor:
         nonlocal last
         if last is None:
-            guess = net(torch.zeros_like(state), torch.zeros_like(state, dtype=torch.bool))(state, level)
+            denoised = net(torch.zeros_like(state), torch.zeros_like(state, dtype=torch.bool))(state, level)
         else:
             shown = mix(state, prior.schedule.at(level)[0] * last, mask)
-            guess = net(last, mask.expand(len(state), -1, -1))(shown, level)
-        last = torch.stack([change(row, level) for row in guess])
+            denoised = net(last, mask.expand(len(state), -1, -1))(shown, level)
+        last = torch.stack([change(row, level) for row in denoised])
         return last
 
     return seen
@@ -215,18 +221,18 @@ def moved(motion: Motion, place: GroundPose) -> Motion:
     return replace(motion, root=place.to_world(motion.root), rotations=rot.unroll(rotations))
 
 
-def judged(motion: Motion, drawn: Motion, goal: Goal) -> Controlled:
+def judged(motion: Motion, sampled: Motion, goal: Goal) -> Controlled:
     """How far ``motion`` is from what ``goal`` asks, joint by joint and frame by frame."""
     off = np.where(goal.asked, motion.positions() - goal.positions, 0.0)
     asked = goal.asked.any(axis=-1)
     distance = np.linalg.norm(off, axis=-1)
     if not asked.any():
-        return Controlled(motion, drawn, 0.0, 0.0, ())
-    order = np.argsort(-distance, axis=None)[:TOLD]
+        return Controlled(motion, sampled, 0.0, 0.0, ())
+    order = np.argsort(-distance, axis=None)[:SENTENCES]
     worst = [np.unravel_index(k, distance.shape) for k in order]
     missed = tuple(
         f"{SMPL22.names[joint]} at {frame / motion.fps:.2f} s is {distance[frame, joint]:.2f} m away from its goal"
         for frame, joint in worst
         if distance[frame, joint] > MISSED
     )
-    return Controlled(motion, drawn, float(distance[asked].mean()), float(distance.max()), missed)
+    return Controlled(motion, sampled, float(distance[asked].mean()), float(distance.max()), missed)

@@ -1,8 +1,8 @@
 """Two people and what else there is: an answer to somebody's motion, and long duets of several prompts.
 
 A long duet is a chain of rows as in `tasks.long`, each holding both people. Neighbouring rows agree on what each person
-does where they overlap; where the two stand to each other is drawn for the first row, and carried along by everybody's
-own way into every further one, at each guess.
+does where they overlap; the relative pose of the two is sampled for the first row, and carried along by everybody's
+own way into every further one, at each step.
 """
 
 from collections import deque
@@ -18,7 +18,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from motionloom._moved import renamed
-from motionloom.edits.relative_pose import Lead, relative_pose_guidance
+from motionloom.edits.relative_pose import PoseGuidance, relative_pose_guidance
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.layout import FPS, WIDTH
@@ -44,9 +44,9 @@ from motionloom.tasks.pair import (
     pair_seeds,
     person_seeds,
     placement,
+    poses_at,
     prompts_of,
     stacked,
-    standing_at,
 )
 from motionloom.tasks.sampling import Moves, PairSampling, PairSettings, Progress, sample_chain, smooth
 from motionloom.tasks.splice import apply_positions, person_at_20
@@ -100,19 +100,19 @@ def react(
     ratio = float(np.mean(legs)) / legs[1]
     alone = person_at_20(given)
     places = one_world([alone, alone], legs)[0]
-    known, stands, _ = two.encode(np.stack([places, places]))
+    known, poses, _ = two.encode(np.stack([places, places]))
     net = block.net(prior)
-    observed = known_state(prior, net, torch.from_numpy(known), torch.from_numpy(stands), known.shape[1])
+    observed = known_state(prior, net, torch.from_numpy(known), torch.from_numpy(poses), known.shape[1])
     observed.mask[:, 0] = observed.mask[1] = False
-    features, drawn = pair_features(
+    features, sampled = pair_features(
         prior, net, said * chosen.number(), known.shape[1], seeds=pair_seeds(chosen),
         edits=PairEdits(stacked([observed] * chosen.number())), sampling=chosen, progress=progress,
     )  # fmt: skip
     floor, made = _floor(given), []
     at = np.arange(len(given)) / given.fps * FPS
-    for numbers, standing in zip(features, drawn.double().numpy(), strict=True):
-        stand = standing_at(standing, placement(stands[0]), 0)[1]
-        other = moved(finish(prior, numbers[1], foot_lock=foot_lock), placement(stand)).at(at, given.fps)
+    for numbers, standing in zip(features, sampled.double().numpy(), strict=True):
+        other_pose = poses_at(standing, placement(poses[0]), 0)[1]
+        other = moved(finish(prior, numbers[1], foot_lock=foot_lock), placement(other_pose)).at(at, given.fps)
         height = np.array([0.0, floor, 0.0])
         made.append((given, replace(other, root=other.root * [ratio, 1.0, ratio] + height)))
     return made
@@ -167,15 +167,15 @@ def compose_pair(
         raise MotionloomError("there is no segment; say what the two people do, one after the other")
     track = None if path is None else Track.along(path, prior.fps)
     asked = [_asked(segments, i, track if i == person else None, person) for i in (0, 1)]
-    drawn = duet_features(prior, block.net(prior), asked, sampling=chosen, progress=progress)
-    features, stands = next(drawn)
+    sampled = duet_features(prior, block.net(prior), asked, sampling=chosen, progress=progress)
+    features, poses = next(sampled)
     if track:
-        stands = standing_at(stands, track.stands(0), person)
-    pieces = tee(chain([features], (piece for piece, _ in drawn)))
+        poses = poses_at(poses, track.place(0), person)
+    pieces = tee(chain([features], (piece for piece, _ in sampled)))
     people = [
         bodies(
             in_world(
-                prior, _of(pieces[i], i), deque(segment.goal for segment in asked[i]), placement(stands[i]),
+                prior, _of(pieces[i], i), deque(segment.goal for segment in asked[i]), placement(poses[i]),
                 track if i == person else None,
             ),
             prior.fps, foot_lock=foot_lock,
@@ -186,12 +186,12 @@ def compose_pair(
 
 
 def _asked(segments: Sequence[Segment], person: int, track: Track | None, goals_of: int) -> list[Segment]:
-    """The segments of one person; on a path each has its part among its wishes."""
+    """The segments of one person; on a path each has its part among its targets."""
     result, first = [], 0
     for segment in segments:
         own = replace(segment, text=prompts_of(segment.text)[person], goal=segment.goal if person == goals_of else None)
         frames = round(own.seconds * FPS)
-        result.append(track.led(own, first, frames) if track else own)
+        result.append(track.asked(own, first, frames) if track else own)
         first += frames
     return result
 
@@ -210,7 +210,7 @@ def duet_features(
     progress: Moves | None = None,
     **settings: Unpack[PairSettings],
 ) -> Iterator[tuple[Tensor, Array]]:
-    """Pieces (2, frames, 263), not standardised, one per segment, and stands (2, 4) at the first frame of the first.
+    """Pieces (2, frames, 263), not standardised, one per segment, and the ground poses (2, 4) at the very first frame.
 
     segments: those of each person, of equal lengths and transitions. Strung together the pieces are the two motions.
     Row i is sampled from ``seed + i``. ``batch_size``: rows per network call; it changes speed and memory, not the
@@ -240,7 +240,7 @@ def _parted(state: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def _strung(motion: Tensor, places: Tensor) -> Tensor:
-    """The inverse of `_parted`: D stands in the first frame, and zeros behind it."""
+    """The inverse of `_parted`: D is in the first frame, and zeros behind it."""
     row = motion.transpose(0, 1).flatten(1)
     return torch.cat([row, F.pad(places.reshape(1, -1), (0, 0, 0, len(row) - 1))], dim=1)
 
@@ -252,13 +252,13 @@ class _PairRow:
     people: tuple[Row, ...]
     net: PairNet
     """With the segment's adapters."""
-    lead: Lead
+    guidance: PoseGuidance
     before: "_PairRow | None"
     """The row before, as long as this one is under way."""
     noise: Tensor | None = None
     """(2, 4) that this row's D began as."""
     ends: dict[int, Tensor] = field(default_factory=dict)
-    """Relative poses (2, 4) at the frame with which the next row begins, by level of the guess."""
+    """Relative poses (2, 4) at the frame with which the next row begins, by level of the estimate."""
 
     @property
     def length(self) -> int:
@@ -273,7 +273,7 @@ class _PairRow:
 
 @dataclass(frozen=True, eq=False)
 class _PairDenoiser:
-    """The guided guess of rows of a chain; each row remembers its last one, which says where the next row begins."""
+    """Guided estimates of rows of a chain; each row remembers its last one, which says where the next row begins."""
 
     prior: Prior
     net: PairNet
@@ -289,11 +289,11 @@ class _PairDenoiser:
             goals = [one[number].goal for one in segments]
             net = self._net(people[0].net, before)
             mask = torch.zeros(2, 1 + people[0].length, WIDTH, dtype=torch.bool, device=self.prior.mean.device)
-            lead = relative_pose_guidance(
+            guidance = relative_pose_guidance(
                 self.prior, net, bound_together([one.cond for one in people]), seeds=person_seeds(seed + number, 0),
                 mask=mask, frozen=[goal is not None and not goal.empty for goal in goals], weight=self.pair_guidance,
             )  # fmt: skip
-            before = _PairRow(people, net, lead, before)
+            before = _PairRow(people, net, guidance, before)
             yield before
 
     def __call__(self, rows: Sequence[_PairRow], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
@@ -306,14 +306,14 @@ class _PairDenoiser:
                 for places, (motion, _) in zip(shown, parts, strict=True)
             ]
         )
-        denoised = self._guesses(rows, x.unflatten(0, (-1, 2)), frames, at)
+        denoised = self._estimates(rows, x.unflatten(0, (-1, 2)), frames, at)
         made = []
         for row, count, level, one, (state, _) in zip(rows, frames, at, denoised, parts, strict=True):
             places, motion = part(one)
             people = zip(motion[:, :count], row.people, strict=True)
-            motion = torch.stack([person.correct(guess, level) for guess, person in people])
+            motion = torch.stack([person.correct(one, level) for one, person in people])
             begin = self._begin_or(places, row, level)
-            motion = self._led(row, level, motion, begin, state=state)
+            motion = self._moved(row, level, motion, begin, state=state)
             made.append(_strung(motion, places))
             features = motion * self.prior.std + self.prior.mean
             row.ends[level] = two.later(features, begin, row.length - max(row.overlap, 1))
@@ -327,7 +327,7 @@ class _PairDenoiser:
         return self.prior.schedule.noised(self.net.talk.config.places.encode(end), level, row.noise)
 
     def _begin(self, row: _PairRow, level: int) -> Tensor | None:
-        """Where the two stand when a row begins, by what the row before guessed one level earlier: which of the two
+        """The ground poses when a row begins, by what the row before estimated one level earlier: which of the two
         moves first must not matter."""
         step = self.levels.index(level)
         return row.before.ends.get(self.levels[step - 1]) if step and row.before else None
@@ -338,7 +338,7 @@ class _PairDenoiser:
         return self.net.talk.config.places.decode(places) if begin is None else begin
 
     def kept(self, row: _PairRow, state: Tensor, level: int) -> tuple[Tensor, Tensor]:
-        """Features (2, frames, 263) of a denoised row between its seams, and where the two stand in the first one."""
+        """Features (2, frames, 263) of a denoised row between its seams, and the ground poses in the first one."""
         motion, places = _parted(state)
         features, one = motion * self.prior.std + self.prior.mean, row.people[0]
         own = features[:, one.before : one.before + one.frames]
@@ -346,12 +346,12 @@ class _PairDenoiser:
 
     def poses(self, kept: list[tuple[Tensor, Tensor]]) -> Array:
         """(2, frames, 22, 3) of what was `kept` of rows."""
-        return torch.cat([two.decode(own, stands) for own, stands in kept], dim=1).cpu().numpy()
+        return torch.cat([two.decode(own, poses) for own, poses in kept], dim=1).cpu().numpy()
 
-    def _led(self, row: _PairRow, level: int, motion: Tensor, begin: Tensor, *, state: Tensor) -> Tensor:
-        """The guess of a row, its people moved to each other from where they begin."""
+    def _moved(self, row: _PairRow, level: int, motion: Tensor, begin: Tensor, *, state: Tensor) -> Tensor:
+        """The estimate of a row, its people moved to each other from where they begin."""
         places = self.net.talk.config.places.encode(begin)
-        return part(row.lead(join(places, state), join(places, motion), level))[1]
+        return part(row.guidance(join(places, state), join(places, motion), level))[1]
 
     def _net(self, base: PriorNet, before: _PairRow | None) -> PairNet:
         """The block over the prior's network, or over that network with a segment's adapters in it."""
@@ -359,8 +359,8 @@ class _PairDenoiser:
             return self.net
         return before.net if before and before.people[0].net is base else self.net.over(base)
 
-    def _guesses(self, rows: Sequence[_PairRow], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> list[Tensor]:
-        """Guided guesses (2, 1 + frames, numbers) of rows x, one network call for each set of adapters."""
+    def _estimates(self, rows: Sequence[_PairRow], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> list[Tensor]:
+        """Guided estimates (2, 1 + frames, numbers) of rows x, one network call for each set of adapters."""
         denoised: dict[int, Tensor] = {}
         for places in same_net([row.people[0] for row in rows]):
             people = [person for i in places for person in rows[i].people]

@@ -1,7 +1,7 @@
-"""Changing a clip by words: some parts or some time of it drawn anew, its end tied to its beginning, or more behind it.
+"""Changing a clip by words: parts or some time of it sampled anew, its end tied to its beginning, or more behind it.
 
 Everything that is kept comes back exactly, on the clip's own skeleton and at its own rate. Only a window around what is
-drawn goes through the network, so that the time does not grow with the length of the clip.
+sampled goes through the network, so that the time does not grow with the length of the clip.
 """
 
 from collections.abc import Callable, Sequence
@@ -85,7 +85,7 @@ class Redraw:
                 )
         longest = max((stop - start for start, stop in self.spans), default=length)
         if longest > LONGEST:
-            raise MotionloomError(f"{longest:.0f} s cannot be drawn at once; name stretches of at most {LONGEST:g} s")
+            raise MotionloomError(f"{longest:.0f} s cannot be sampled at once; name stretches of at most {LONGEST:g} s")
         return length
 
     def frames(self, clip: Motion) -> list[tuple[int, int]]:
@@ -227,7 +227,7 @@ def changes_asked(
     asked += [Extend(extend)] if extend else []
     asked += [Loop(blend)] if loop else []
     if not asked:
-        raise MotionloomError("nothing to change: say in words what to draw, name a stretch, loop or extend")
+        raise MotionloomError("nothing to change: say in words what to make, name a stretch, loop or extend")
     return asked
 
 
@@ -261,7 +261,7 @@ class _Sampler:
 
 
 def kept_numbers(keep: Sequence[str]) -> NDArray[np.bool_]:
-    """(263,) True at the features that tell about the kept parts."""
+    """(263,) True at the features of the kept parts."""
     chosen = layout.mask([name for name in keep if name.startswith("root")])
     joints = _joints(keep)
     if 0 in joints:
@@ -317,8 +317,8 @@ def _looped(sampler: _Sampler, motion: Motion, blend: float, seed: int) -> Motio
     stretch = _window(window, first, last)
     made = sampler.sample(window, replace(stretch, facing=straight, place=here), seed)
     if not here:
-        (to, drawn), (begin, faced) = standing(made, last), standing(window, last)
-        turn = rot.IDENTITY if straight else rot.multiply(drawn, rot.inverse(faced))
+        (to, sampled), (begin, faced) = standing(made, last), standing(window, last)
+        turn = rot.IDENTITY if straight else rot.multiply(sampled, rot.inverse(faced))
         window = concatenated(tail, gap, carried_level(head, turn, begin, to))
     spliced = splice(window, made, first, last=last)
     return concatenated(motion.frames(0, rest), spliced.frames(first, last))

@@ -22,7 +22,7 @@ from motionloom.weights.predictor import Predictor
 Array = NDArray[np.float64]
 
 RAMP = 0.2
-"""Seconds in which a part that is held for a while is led there and back."""
+"""Seconds over which a part that is held for a while fades in and out."""
 NEAR = (0.3, np.radians(20))
 """Metres and radians within which a source already goes on from the clip and is not moved there."""
 
@@ -42,7 +42,7 @@ class Given:
     """(frames,) weight of the place."""
 
     def known(self, first: int, last: int) -> Known | None:
-        """What the network is told of the frames ``first`` to before ``last`` behind the past (1 is the first)."""
+        """What the network knows of the frames ``first`` to before ``last`` behind the past (1 is the first)."""
         frames = slice(first - 1, min(last - 1, len(self.places)))
         if first - 1 >= len(self.places) or not self.mask[frames].any():
             return None
@@ -89,7 +89,7 @@ def given(predictor: Predictor, seen: Past, hold: FixedJoints, seconds: float) -
 
 
 def _own_joints(past: Motion, chosen: frozenset[int] | set[int]) -> Array:
-    """(joints,) 1 for the joints of the past's skeleton that some of the 22 stand for, and for what hangs on them."""
+    """(joints,) 1 for the past's joints that correspond to some of the 22, and for what hangs on them."""
     always = kept_parts(past.skeleton).joints
     flags = kept_parts(past.skeleton, frozenset(chosen)).joints & ~always
     for joint, parent in enumerate(past.skeleton.parents):
@@ -123,7 +123,7 @@ def _placed(past: Motion, source: Motion) -> Motion:
 
 
 def check_like(past: Motion, other: Motion, what: str) -> None:
-    """Raise MotionloomError unless both are of one skeleton, manner and rate."""
+    """Raise MotionloomError unless both are of one skeleton and rate, and both with or without moving bones."""
     if other.skeleton != past.skeleton:
         raise MotionloomError(
             f"the {what} has another skeleton ({len(other.skeleton)} joints, the past {len(past.skeleton)}); "

@@ -1,7 +1,8 @@
 """Inpainting on the 263 features: a stretch of a person's motion sampled anew between frames that are known.
 
 The known numbers stay (Lugmayr et al., "RePaint", CVPR 2022, without its repetitions), and where the motion goes on
-behind the stretch, every guess is made to arrive there: the features tell velocities of the root, nothing else would.
+behind the stretch, every denoised estimate is made to arrive there: features hold velocities of the root, nothing else
+would.
 """
 
 from dataclasses import dataclass

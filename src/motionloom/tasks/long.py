@@ -1,7 +1,7 @@
 """Long motion: a list of prompts to one motion without seams, of any length, in constant memory (DoubleTake).
 
 Each segment is a row of the sampler. A row reaches over its seams into the neighbours, half a transition on either
-side, and neighbours agree on what they share at every level (`diffusion.staggered`), so that a transition is drawn
+side, and neighbours agree on what they share at every level (`diffusion.staggered`), so that a transition is sampled
 knowing what comes before and after it. Rows come out one by one; their features are cut at the seams and strung
 together, and a moving window of frames becomes positions and a body.
 
@@ -86,7 +86,7 @@ def compose(
     Args:
         prior: weights that make HumanML3D's 263 numbers at 20 frames per second.
         segments: what happens, one after the other, in all the sum of ``round(seconds * 20)`` frames; their goals are
-            seen from where the person stands when they begin. They may be endless if there is no path; memory does not
+            seen from the person's ground pose when they begin. They may be endless if there is no path; memory does not
             grow with them.
         start: a motion of anybody that this one goes on from, in its place; it is not repeated.
         path: where the pelvis is on the ground in each frame of the whole (`Goal` of that length, in the world).
@@ -107,19 +107,19 @@ def compose(
     chosen.levels(prior.schedule)
     past = None if start is None else Past.of(start)
     track = None if path is None else Track.along(path, prior.fps)
-    wishes: deque[Goal | None] = deque()
+    goals: deque[Goal | None] = deque()
 
     def asked() -> Iterator[Segment]:
         first = 0
         for segment in segments:
-            wishes.append(segment.goal)
+            goals.append(segment.goal)
             frames = round(segment.seconds * prior.fps)
-            yield track.led(segment, first, frames) if track else segment
+            yield track.asked(segment, first, frames) if track else segment
             first += frames
 
     pieces = long_features(prior, asked(), past=past, sampling=chosen, progress=progress)
-    place = past.end if past else track.stands(0) if track else GroundPose()
-    return bodies(in_world(prior, pieces, wishes, place, track), prior.fps, foot_lock=foot_lock)
+    place = past.end if past else track.place(0) if track else GroundPose()
+    return bodies(in_world(prior, pieces, goals, place, track), prior.fps, foot_lock=foot_lock)
 
 
 @renamed({"together": "batch_size"})
@@ -209,12 +209,12 @@ def _one_after_the_other(edits: Sequence[Correction]) -> Correction:
 
 
 def _averaged(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int], *, last: int) -> list[Tensor]:
-    """Guesses; those of the last move are averages over all ways to divide the frames into the network's tokens.
+    """Estimates; those of the last move are averages over all ways to divide the frames into the network's tokens.
 
     A token holds several frames, and between tokens the network leaves small steps. (Averaging over shifts is the
     cycle spinning of Coifman & Donoho 1995; `smooth` is the cheaper remedy of single motions.)
     """
-    cleans = _guess(prior, rows, states, at)
+    cleans = _estimates(prior, rows, states, at)
     ending = [i for i, level in enumerate(at) if level == last]
     shifts = range(1, prior.net.config.patch)
     sums = {i: cleans[i].clone() for i in ending}
@@ -222,7 +222,9 @@ def _averaged(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Seque
         longer = [i for i in ending if len(states[i]) > shift]
         if not longer:
             break
-        shifted = _guess(prior, [rows[i] for i in longer], [states[i][shift:] for i in longer], [last] * len(longer))
+        shifted = _estimates(
+            prior, [rows[i] for i in longer], [states[i][shift:] for i in longer], [last] * len(longer)
+        )
         for i, clean in zip(longer, shifted, strict=True):
             sums[i][shift:] += clean
     for i, total in sums.items():
@@ -231,12 +233,12 @@ def _averaged(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Seque
     return cleans
 
 
-def _guess(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
-    """Guided guesses of rows of different lengths and levels, as one network call for each set of adapters."""
+def _estimates(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
+    """Guided estimates of rows of different lengths and levels, as one network call for each set of adapters."""
     cleans: dict[int, Tensor] = {}
     for numbers in same_net(rows):
         some = [rows[i] for i in numbers]
-        made = _guess_of_one_net(prior, some, [states[i] for i in numbers], [at[i] for i in numbers])
+        made = _estimates_of_one_net(prior, some, [states[i] for i in numbers], [at[i] for i in numbers])
         cleans.update(zip(numbers, made, strict=True))
     return [cleans[i] for i in range(len(rows))]
 
@@ -249,7 +251,7 @@ def same_net(rows: Sequence[Row]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _guess_of_one_net(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
+def _estimates_of_one_net(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
     frames = [len(state) for state in states]
     x = torch.stack([F.pad(state, (0, 0, 0, max(frames) - len(state))) for state in states]).to(prior.mean)
     lengths = torch.tensor([*frames, *frames], device=x.device)
@@ -305,7 +307,7 @@ class Past:
         return Past(torch.from_numpy(known).float(), decoded(known, begin)[1])
 
     def holder(self, prior: Prior, length: int) -> Correction:
-        """Makes the first frames of a row's guess the known ones, and the next ones leave them without a jump."""
+        """Makes the first frames of a row's estimate the known ones, and the next ones leave them without a jump."""
         count, width = self.known.shape
         known = torch.cat([self.known, self.known.new_zeros(length - count, width)]).to(prior.mean)[None]
         mask = torch.zeros_like(known, dtype=torch.bool)
@@ -334,32 +336,32 @@ class Track:
             raise MotionloomError("the path of a long motion must say where to be in every frame; give points for all")
         return Track(path, np.where(path.facing_asked, path.facing, along(path.positions[:, 0, [0, 2]], fps)))
 
-    def stands(self, frame: int) -> GroundPose:
+    def place(self, frame: int) -> GroundPose:
         """Where the person is at that frame."""
         if frame == 0:
             return placement_of(self.path)
         x, _, z = self.path.positions[frame, 0]
         return GroundPose(float(x), float(z), float(self.ways[frame]))
 
-    def led(self, segment: Segment, first: int, frames: int) -> Segment:
-        """The segment that begins with frame ``first``, with its part of the path among its wishes."""
+    def asked(self, segment: Segment, first: int, frames: int) -> Segment:
+        """The segment that begins with frame ``first``, with its part of the path among its targets."""
         if first + frames > len(self.path):
             raise MotionloomError(
                 f"the path has {len(self.path)} frames and the segments have more; make them equally long"
             )
-        part = self.path.crop(first, first + frames).seen_from(self.stands(first))
+        part = self.path.crop(first, first + frames).seen_from(self.place(first))
         return replace(segment, goal=part if segment.goal is None else merged(part, segment.goal))
 
 
 def in_world(
-    prior: Prior, pieces: Iterable[Tensor], wishes: deque[Goal | None], place: GroundPose, track: Track | None
+    prior: Prior, pieces: Iterable[Tensor], goals: deque[Goal | None], place: GroundPose, track: Track | None
 ) -> Iterator[Places]:
     """Each piece where the one before it ends; on a path bent once more, so that errors do not add up."""
     mean, first = prior.mean.cpu(), 0
     spread = torch.where(prior.std > 0, prior.std, 1.0).cpu()
     for piece in pieces:
-        wish = wishes.popleft()
-        goal = Goal.nothing(len(piece)) if wish is None else wish.placed(place)
+        asked = goals.popleft()
+        goal = Goal.nothing(len(piece)) if asked is None else asked.placed(place)
         if track:
             part = track.path.crop(first, first + len(piece))
             piece = toward(part.seen_from(place), prior)((piece - mean) / spread, 0) * spread + mean

@@ -1,7 +1,7 @@
 """Two people at once: from words, one of them on a path, or going on from what both did (Shafir et al. 2024, ComMDM).
 
-Both are drawn by one frozen prior that a communication block makes listen to itself (`nets.pair`). Their features tell
-each from his own first frame; where the two stand to each other is drawn with them and puts both into one world.
+Both are sampled by one frozen prior that a communication block makes listen to itself (`nets.pair`). Their features are
+each relative to the own first frame; the relative pose of the two is sampled with them and puts both into one world.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from motionloom._moved import renamed, say
-from motionloom.diffusion import Denoiser, Draw, row_draw, row_seed
+from motionloom.diffusion import Denoiser, NoiseSource, row_draw, row_seed
 from motionloom.edits.fitting import fit
 from motionloom.edits.relative_pose import relative_pose_guidance
 from motionloom.edits.steering import Correction, corrected_rows, toward
@@ -70,7 +70,7 @@ MOST = 10_000.0
 
 @dataclass(frozen=True, eq=False)
 class PairEdits:
-    """What is known of rows, and how their guesses are changed; a row is a person: a0, b0, a1, b1, ..."""
+    """What is known of rows, and how their denoised estimates are changed; a row is a person: a0, b0, a1, b1, ..."""
 
     observed: Observed | None = None
     """(rows, 1 + frames, 263) of `nets.pair`: the slot of D, then the motion."""
@@ -100,7 +100,7 @@ def pair_features(
         prompts: one per row; rows are people, a0, b0, a1, b1, ...; an empty prompt asks for nothing.
         frames: of each motion.
         seeds: one per row. With a block that says nothing a row is what `text.sample_features` makes of its seed.
-        edits: what is known, and what changes the guesses.
+        edits: what is known, and what changes the estimates.
         sampling: or single settings of it as keywords; ``batch_size`` counts pairs.
 
     Raises:
@@ -123,11 +123,11 @@ def pair_features(
         return torch.cat([state[:, :1], corrected_rows(state[:, 1:], some, level)], dim=1) if any(some) else state
 
     def edit(denoise: Denoiser, batch: Batch) -> Denoiser:
-        lead = relative_pose_guidance(
+        guided = relative_pose_guidance(
             prior, net, net.bind(batch.cond), seeds=batch.seeds, mask=mask[batch.rows],
             frozen=[frozen[i] for i in batch.rows], weight=chosen.pair_guidance,
         )  # fmt: skip
-        return lambda state, level: lead(state, corrected(denoise(state, level), batch.rows, level), level)
+        return lambda state, level: guided(state, corrected(denoise(state, level), batch.rows, level), level)
 
     silent = not any(prompt.strip() for prompt in prompts)
     how = replace(chosen, batch_size=2 * chosen.batch(PAIRS), guidance=1.0 if silent else chosen.guidance)
@@ -152,13 +152,13 @@ def _view(prior: Prior, net: PairNet) -> View:
 
     def poses(states: Tensor) -> Array:
         places, motion = part(states)
-        stands = net.talk.config.places.decode(places.unflatten(0, (-1, 2)))
-        return two.decode((motion * prior.std + prior.mean).unflatten(0, (-1, 2)), stands).cpu().double().numpy()
+        ground = net.talk.config.places.decode(places.unflatten(0, (-1, 2)))
+        return two.decode((motion * prior.std + prior.mean).unflatten(0, (-1, 2)), ground).cpu().double().numpy()
 
     return View(poses, people=2)
 
 
-def pair_draw(seeds: Sequence[int]) -> Draw:
+def pair_draw(seeds: Sequence[int]) -> NoiseSource:
     """Noise of rows' own seeds; a motion gets the noise it has where nobody else is there, the slot before it other."""
     places, motion = row_draw([row_seed(seed, 0, 1) for seed in seeds]), row_draw(seeds)
     return lambda like: torch.cat([places(like[:, :1]), motion(like[:, 1:])], dim=1)
@@ -177,7 +177,7 @@ def pair_seeds(sampling: PairSampling) -> list[int]:
 
 
 def prompts_of(prompt: Prompt) -> tuple[str, str]:
-    """What the first and what the second person is told: a text with `MARK` parts them, one without is for both."""
+    """The prompts of the first and of the second person: a text with `MARK` parts them, one without is for both."""
     if isinstance(prompt, tuple):
         return prompt
     said = [words.strip() for words in prompt.split(MARK)]
@@ -188,14 +188,14 @@ def prompts_of(prompt: Prompt) -> tuple[str, str]:
     return said[0], said[1]
 
 
-def known_state(prior: Prior, net: PairNet, features: Tensor, stands: Tensor, frames: int) -> Observed:
-    """A state (2, 1 + frames, 263) in which the first frames of two people are known, and where they stand.
+def known_state(prior: Prior, net: PairNet, features: Tensor, poses: Tensor, frames: int) -> Observed:
+    """A state (2, 1 + frames, 263) in which the first frames of two people are known, and their ground poses.
 
-    features: (2, known frames, 263), not standardised; stands: (2, 4). The network sees them without noise.
+    features: (2, known frames, 263), not standardised; poses: (2, 4). The network sees them without noise.
     """
     spread = torch.where(prior.std > 0, prior.std, 1.0)
     motion = (features.to(prior.mean) - prior.mean) / spread
-    places = net.talk.config.places.encode(stands.to(prior.mean))
+    places = net.talk.config.places.encode(poses.to(prior.mean))
     state = join(places, F.pad(motion, (0, 0, 0, frames - motion.shape[1])))
     mask = torch.zeros_like(state, dtype=torch.bool)
     mask[:, : 1 + motion.shape[1]] = True
@@ -258,7 +258,7 @@ def generate_pair(
     made = []
     for numbers, beside in zip(features, poses.double().numpy(), strict=True):
         if goal:
-            beside = standing_at(beside, place, person)
+            beside = poses_at(beside, place, person)
         people = [finish(prior, one, foot_lock=foot_lock) for one in numbers]
         duet = [moved(one, placement(pose)) for one, pose in zip(people, beside, strict=True)]
         if goal:
@@ -278,16 +278,16 @@ def _goal_of(goals: tuple[Goal | None, Goal | None], settings: Any) -> tuple[Goa
     return next((goal for goal in goals if goal), None), int(goals[0] is None and goals[1] is not None)
 
 
-def placement(stand: np.ndarray) -> GroundPose:
-    """A stand (4,) of `features.pair` as a `GroundPose`."""
-    c, s, x, z = (float(number) for number in stand)
+def placement(pose: np.ndarray) -> GroundPose:
+    """A ground pose (4,) of `features.pair` as a `GroundPose`."""
+    c, s, x, z = (float(number) for number in pose)
     return GroundPose(x, z, float(np.arctan2(s, c)))
 
 
-def standing_at(stands: Array, place: GroundPose, person: int) -> Array:
-    """Stands (2, 4) moved rigidly on the ground so that ``person`` stands at a place."""
+def poses_at(poses: Array, place: GroundPose, person: int) -> Array:
+    """Ground poses (2, 4) moved rigidly on the ground so that that of ``person`` is ``place``."""
     there = np.array([np.cos(place.facing), np.sin(place.facing), place.x, place.z])
-    return two.compose(there, two.seen(stands[person], stands))
+    return two.compose(there, two.seen(poses[person], poses))
 
 
 def _goal_frames(goal: Goal) -> int:
@@ -350,11 +350,11 @@ def complete_pair(
     if not 0 < seconds <= LONGEST:
         raise MotionloomError(f"two people cannot go on for {seconds:g} s; ask for more than 0 and at most {LONGEST:g}")
     ground, added = Ground.of(past), max(round(seconds * past[0].fps), 1)
-    known, stands, floors = ground.encoded()
+    known, poses, floors = ground.encoded()
     seen = known.shape[1]
     frames = seen + int(np.ceil(added / past[0].fps * FPS - 1e-6)) + 1
     net, count = block.net(prior), chosen.number()
-    observed = known_state(prior, net, torch.from_numpy(known), torch.from_numpy(stands), frames)
+    observed = known_state(prior, net, torch.from_numpy(known), torch.from_numpy(poses), frames)
     leaving = [Past(torch.from_numpy(one).float(), GroundPose()).holder(prior, frames) for one in known]
     edits = PairEdits(stacked([observed] * count), leaving * count, frozen=[False] * (2 * count))
     features, _ = pair_features(
@@ -362,7 +362,7 @@ def complete_pair(
     )
     made = []
     for numbers in features.double().numpy():
-        places = two.decode(numbers, stands) + floors[:, None, None, None] * np.array([0.0, 1.0, 0.0])
+        places = two.decode(numbers, poses) + floors[:, None, None, None] * np.array([0.0, 1.0, 0.0])
         contacts = numbers[..., LAYOUT["contacts"]]
         duet = [ground.behind(i, places[i], contacts[i], seen, added, foot_lock=foot_lock) for i in (0, 1)]
         made.append((duet[0], duet[1]))
@@ -413,6 +413,6 @@ class Ground:
         tail = motion.frames(len(motion) - shown, len(motion))
         at = (np.arange(shown + max(added, LEAST)) - (shown - 1)) / motion.fps * FPS + seen - 1
         nearest = np.clip(at.round().astype(int), 0, len(contacts) - 1)
-        drawn = positions_at(self.own(person, places), at)
-        new = continued(tail, drawn, contacts=contacts[nearest], foot_lock=foot_lock)
+        sampled = positions_at(self.own(person, places), at)
+        new = continued(tail, sampled, contacts=contacts[nearest], foot_lock=foot_lock)
         return concatenated(motion, new.frames(0, added))

@@ -43,7 +43,7 @@ MANY = 1000
 CHUNK = 8.0
 """Seconds that become a body at once."""
 ARRIVAL = 0.75
-"""Share of a window that is drawn with the target of a switch in view; a longer one begins as a free future."""
+"""Share of a window that is sampled with the target of a switch in view; a longer one begins as a free future."""
 TARGET = 1.0
 """Seconds of the target that are shown to the network, at most."""
 
@@ -185,7 +185,7 @@ def _arriving(
     predictor, past, person, rate, tail = sampler.predictor, seen.motion, seen.person, seen.rate, seen.tail
     arrival = (gap + 1) * rate
     room = predictor.frames - len(person)
-    shown = max(min(TARGET * predictor.fps, (len(target) - 1) * rate), 2.0)  # two places of the grid tell a velocity
+    shown = max(min(TARGET * predictor.fps, (len(target) - 1) * rate), 2.0)  # two places of the grid give a velocity
     last = min(room, int(arrival + shown))
     at = np.arange(1, last + 1)
     goal = to_smpl22(target.frames(0, min(len(target), round(CONTEXT * past.fps) + 2))).positions()

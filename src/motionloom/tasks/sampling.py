@@ -17,8 +17,8 @@ from motionloom.diffusion import (
     SOLVERS,
     SPACINGS,
     Denoiser,
-    Draw,
     Link,
+    NoiseSource,
     Schedule,
     State,
     guide,
@@ -191,8 +191,8 @@ class PairSampling(Sampling):
     """How two people are sampled."""
 
     pair_guidance: float = 1.0
-    """How far every guess of the two is moved to where the block has them stand to each other, 0 (not at all; as
-    published) to 1."""
+    """How far every denoised estimate of the two is moved to the relative pose that the block estimates, 0 (not at all;
+    as published) to 1."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -216,7 +216,7 @@ class Rows:
     lengths: Sequence[int]
     """Tokens: frames, and one more for two people."""
     seeds: Sequence[int]
-    noise: Callable[[Sequence[int]], Draw] = row_draw
+    noise: Callable[[Sequence[int]], NoiseSource] = row_draw
     """From seeds to the noise of their rows."""
 
     def batches(self, size: int) -> list[list[int]]:
@@ -312,7 +312,7 @@ def sample(
 def smooth(features: Tensor) -> Tensor:
     """(..., frames, numbers) weighted 1/6, 2/3, 1/6 along time, ends repeated.
 
-    A network whose tokens hold several frames draws each token smoothly and leaves small steps between them.
+    A network whose tokens hold several frames makes each token smooth and leaves small steps between them.
     """
     before = torch.cat([features[..., :1, :], features[..., :-1, :]], dim=-2)
     after = torch.cat([features[..., 1:, :], features[..., -1:, :]], dim=-2)
@@ -374,7 +374,7 @@ def sample_chain(
             waiting[number] = row
             yield Link(row.length, row.overlap, first + number)
 
-    def guess(numbers: Sequence[int], states: Sequence[State], at: Sequence[int]) -> Sequence[State]:
+    def denoise(numbers: Sequence[int], states: Sequence[State], at: Sequence[int]) -> Sequence[State]:
         here = [state.to(prior.mean) for state in states]  # the noise that rows begin with is the CPU's
         some = [waiting[number] for number in numbers]
         denoised = denoise(some, here, at)
@@ -383,7 +383,7 @@ def sample_chain(
         return denoised
 
     made = staggered(
-        links(), guess, levels=way, solver=SOLVERS[sampling.solver], schedule=prior.schedule, features=features,
+        links(), denoise, levels=way, solver=SOLVERS[sampling.solver], schedule=prior.schedule, features=features,
         together=sampling.batch(batch_size), moved=progress or (lambda count: None),
     )  # fmt: skip
     for number, state in enumerate(made):

@@ -1,7 +1,7 @@
-"""Putting a drawn stretch into a user's own motion: their skeleton, their frame rate, no jump at the borders.
+"""Putting a sampled stretch into a user's own motion: their skeleton, their frame rate, no jump at the borders.
 
-What lies outside of the stretch is never touched. Inside, the drawn motion is moved by what it lacks at the borders, in
-place and in velocity; that fades over a few frames ("inertialization", Bollo, GDC 2018, with a cubic).
+What lies outside of the stretch is never touched. Inside, the sampled motion is moved by what it lacks at the borders,
+in place and in velocity; that fades over a few frames ("inertialization", Bollo, GDC 2018, with a cubic).
 """
 
 from dataclasses import dataclass, replace
@@ -74,7 +74,7 @@ def person_at_20(motion: Motion) -> Array:
 
 
 def apply_sample(sample: Inpainted, old: Motion, *, foot_lock: bool) -> Motion:
-    """What was drawn, on the old motion's skeleton, at its rate and length, over its floor; feet cleaned."""
+    """What was sampled, on the old motion's skeleton, at its rate and length, over its floor; feet cleaned."""
     places = resample_positions(sample.positions, FPS, target=old.fps)[: len(old)]
     nearest = np.minimum((np.arange(len(old)) * FPS / old.fps).round().astype(int), len(sample.contacts) - 1)
     return apply_positions(places, old, contacts=sample.contacts[nearest], foot_lock=foot_lock)
@@ -86,7 +86,7 @@ def apply_positions(
     """Places (frames of ``old``, 22, 3) metres of the uniform person that the old motion is, on its skeleton, over its
     floor; feet cleaned, by contacts (frames, 4) or by what the feet do.
 
-    known: how many of the first places are the old motion's own, if what follows them is not: they tell where it is.
+    known: how many of the first places are the old motion's own, if what follows them is not: they show where it is.
     """
     person = motion_from_positions(places, old.fps)
     if foot_lock:
@@ -108,7 +108,7 @@ def apply_positions(
 def _held_alike(made: Motion, old: Motion, known: int) -> Motion:
     """``made`` with hands, head and toes held as they usually are in the first ``known`` frames of ``old``.
 
-    Places do not tell how; without it they would turn to how the uniform person holds them, in a blink.
+    Places do not say how; without it they would turn to how the uniform person holds them, in a blink.
     """
     drivers, rotations = read_body(made.skeleton).drivers, made.rotations.copy()
     now, was = made.frames(0, known).world_rotations(), old.frames(0, known).world_rotations()
@@ -120,7 +120,7 @@ def _held_alike(made: Motion, old: Motion, known: int) -> Motion:
 
 
 def match_root(old: Motion, made: Motion) -> Motion:
-    """The same poses told as in the old motion, of as many frames: which joint carries the way through the world.
+    """The same poses as the old motion's files hold them, of as many frames: which joint carries the path.
 
     Files may hold the root still and move the hips in it; then the bones' changing lengths stay the old ones.
     """
@@ -202,7 +202,7 @@ def carried(motion: Motion, turn: Array, about: Array, to: Array) -> Motion:
 
 
 def carried_level(motion: Motion, turn: Array, about: Array, to: Array) -> Motion:
-    """The same along the floor, told in the motion's own manner."""
+    """The same along the floor, the path carried by the same joint as before (`match_root`)."""
     return match_root(motion, carried(motion, turn, about, to * [1, 0, 1] + about * [0, 1, 0]))
 
 

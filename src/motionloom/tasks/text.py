@@ -1,6 +1,6 @@
 """Text to motion: prompts in, motions out.
 
-A prompt becomes word vectors once; noise is drawn per motion from its own seed; the solver walks the noise to clean
+A prompt becomes word vectors once; noise is sampled per motion from its own seed; the solver walks the noise to clean
 features with the guided network as its denoiser; features become positions, positions a person with constant bones.
 """
 
@@ -141,7 +141,7 @@ def generate_each(
 
 
 def alone(prior: Prior) -> View:
-    """One person to a row, as the network drew them."""
+    """One person to a row, as the network predicted them."""
     return View(lambda states: places_of(prior, states)[:, None])
 
 

@@ -6,7 +6,7 @@
     with watching(show):
         generate(prior, ["a person jumps"])
 
-Whatever draws (every function of `motionloom.tasks`) reports to the callback of the `watching` block that it runs in.
+Whatever samples (every function of `motionloom.tasks`) reports to the callback of the `watching` block that it runs in.
 The poses are decoded only where `Denoised.positions` is called, so watching costs nothing unless one looks. An
 exception that the callback raises ends the drawing: that is how a motion is cancelled between two network calls.
 """
@@ -36,7 +36,7 @@ class Denoised:
     of: int
     """Moves of the walk; an edit of several stretches, or a batch of several lengths, takes several walks."""
     rows: tuple[int, ...]
-    """Numbers of the motions that are drawn together in this walk; else 0."""
+    """Numbers of the motions that are sampled together in this walk; else 0."""
     decode: Callable[[], np.ndarray]
     """Gives what `positions` gives; any float type."""
 
@@ -51,15 +51,15 @@ class Denoised:
 
 OnDenoised = Callable[[Denoised], None]
 SHOWN = 64
-"""Segments of a long motion that are shown while it is drawn."""
+"""Segments of a long motion that are shown while it is sampled."""
 _callback: ContextVar[OnDenoised | None] = ContextVar("motionloom_on_denoised", default=None)
 
 
 @contextmanager
 def watching(on_denoised: OnDenoised) -> Iterator[None]:
-    """Call ``on_denoised`` after each network call of whatever is drawn inside the block, in the same thread.
+    """Call ``on_denoised`` after each network call of whatever is sampled inside the block, in the same thread.
 
-    Generators (`compose`, `compose_pair`) draw while they are read: read them inside the block.
+    Generators (`compose`, `compose_pair`) sample while they are read: read them inside the block.
     """
     token = _callback.set(on_denoised)
     try:
@@ -86,7 +86,7 @@ class View:
 
 
 def report(done: int, of: int, rows: Sequence[int], decode: Callable[[], np.ndarray]) -> None:
-    """Tell whoever watches of one network call; nothing happens where nobody does."""
+    """Report one network call to whoever watches; nothing happens where nobody does."""
     callback = _callback.get()
     if callback is not None:
         callback(Denoised(done, of, tuple(rows), decode))
@@ -117,7 +117,7 @@ class Latest(Generic[R]):
         self.calls: Counter[int] = Counter()
 
     def report(self, numbers: Sequence[int], rows: Sequence[R], states: Sequence[Tensor], at: Sequence[int]) -> None:
-        """Take in what was predicted for some rows, and tell of what is there if that begins with the first one."""
+        """Take in what was predicted for some rows, and report what is there if that begins with the first one."""
         if _callback.get() is None:
             return
         for number, row, state, level in zip(numbers, rows, states, at, strict=True):

@@ -1,4 +1,4 @@
-"""The windows that predictions are made of: the uniform person at a predictor's rate, and what draws behind it."""
+"""The windows that predictions are made of: the uniform person at a predictor's rate, and what samples its future."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -96,7 +96,7 @@ class WindowSampler:
 
 
 def _lift(person: Array, made: Array, fps: float) -> Array:
-    """(rows, frames) metres that keep what is drawn behind a person from sinking under the floor at y = 0."""
+    """(rows, frames) metres that keep what is sampled behind a person from sinking under the floor at y = 0."""
     lowest = np.minimum(person[:, -1, :, 1].min(axis=-1), -SUNK)  # who is lower already stays there
     under = (lowest[:, None] - made[..., 1].min(axis=-1)).clip(0)
     ease = max(round(EASE * fps), 1)

@@ -188,7 +188,7 @@ def merged(net: PriorNet, adapters: Sequence[tuple[Adapter, float]]) -> PriorNet
         if not adapter.taught:
             raise MotionloomError(
                 f"the adapter {adapter.name!r} is one for control ({adapter.control}); only adapters made by "
-                "'motionloom teach' change what is drawn by words"
+                "'motionloom teach' change what is sampled by words"
             )
         if not math.isfinite(factor):
             raise MotionloomError(f"the adapter {adapter.name!r} has the factor {factor}; give a number such as 0.8")
@@ -218,7 +218,7 @@ class AdaptedNet(nn.Module):
         return self.net.bind(cond)
 
     def forward(self, x: Tensor, level: int | Tensor, bound: Bound | Controlled) -> Tensor:
-        """(rows, frames, features) standardised at ``level`` to the clean guess."""
+        """(rows, frames, features) standardised at ``level`` to the denoised estimate."""
         if isinstance(bound, Controlled):
             plain, shown = bound.bound, [torch.where(bound.mask, bound.given.to(x), 0.0), bound.mask.to(x)]
         else:
@@ -227,7 +227,7 @@ class AdaptedNet(nn.Module):
 
 
 def show(net: nn.Module, bound: Bound, given: Tensor, mask: Tensor) -> Bound | Controlled:
-    """The condition under which a network is told what is given, if it can be told; see `Controlled`."""
+    """The condition that shows a network what is given, if it takes one; see `Controlled`."""
     return Controlled(bound, given, mask) if isinstance(net, AdaptedNet | AdapterNet) else bound
 
 

@@ -61,7 +61,7 @@ def test_formats_are_chosen_by_name_or_by_the_files_ending(weights, asked, drawn
     assert len(io.load("a_1.glb")) == 90
 
 
-def test_a_thousand_futures_are_told_in_few_lines(weights, asked, capsys, monkeypatch):
+def test_a_thousand_futures_are_reported_in_few_lines(weights, asked, capsys, monkeypatch):
     monkeypatch.setattr(futures, "write_futures", lambda *a, **k: [])
     monkeypatch.setattr(command, "write_futures", lambda wanted, *a, **k: wanted[0].files)
     assert run(weights, "predict", "past.bvh", "--count", "1000", "--no-picture", "--out", "f") == 0

@@ -66,7 +66,7 @@ def test_a_target_on_another_skeleton_is_retargeted_where_that_is_asked(weights,
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_mistakes_of_a_switch_are_told_too(weights, asked, words, message, capsys):
+def test_mistakes_of_a_switch_are_reported_too(weights, asked, words, message, capsys):
     Path("folder").mkdir()
     assert run(weights, "switch", "past.bvh", "kick.bvh", *words) == 2
     assert message in capsys.readouterr().err

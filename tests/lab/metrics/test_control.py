@@ -99,7 +99,7 @@ def test_root_and_joints_are_told_apart() -> None:
     assert control.of_root([control.distances(made, goal, asked)]) is None
 
 
-def test_motions_without_wishes_are_not_counted_as_good_ones() -> None:
+def test_motions_without_targets_are_not_counted_as_good_ones() -> None:
     goal = standing(1.0)
     nothing, everything = np.zeros(goal.shape, bool), np.ones(goal.shape, bool)
     apart = [control.distances(goal + 1, goal, everything), control.distances(goal, goal, nothing)]

@@ -76,7 +76,7 @@ def test_places_made_with_the_body_model_are_preferred(tmp_path: Path) -> None:
     assert np.allclose(read.recordings[1].positions, z_up(400)[::2][..., [1, 2, 0]])
 
 
-def test_broken_recordings_are_told_and_left_out(tmp_path: Path) -> None:
+def test_broken_recordings_are_reported_and_left_out(tmp_path: Path) -> None:
     """NaN, another number of joints, no archive, a pickle: each is named, and the good one is read."""
     place = amass_folder(tmp_path) / "SOMA" / "a"
     place.mkdir(parents=True)

@@ -97,7 +97,7 @@ def test_a_tenth_of_each_persons_actions_is_held_out() -> None:
                for n in range(2, 60) for s in range(6))  # fmt: skip
 
 
-def test_missing_subjects_are_told(tmp_path: Path) -> None:
+def test_missing_subjects_are_reported(tmp_path: Path) -> None:
     """A file with one subject is read and the others are named; one with none is refused."""
     told: list[str] = []
     read_h36m(write(tmp_path / "a.npz", {"S9": {"Waiting": person(130)}}), say=told.append)

@@ -166,12 +166,12 @@ def test_what_is_missing_is_named(guo: GuoEvaluator) -> None:
     ],
     ids=["short", "narrow", "batched", "nan", "infinite", "integers"],
 )
-def test_motions_that_cannot_be_judged_are_told(guo: GuoEvaluator, features: np.ndarray, reason: str) -> None:
+def test_motions_that_cannot_be_judged_are_reported(guo: GuoEvaluator, features: np.ndarray, reason: str) -> None:
     with pytest.raises(MotionloomError, match=reason):
         guo.motions([motion(40), features])
 
 
-def test_parts_that_do_not_fit_are_told(guo: GuoEvaluator) -> None:
+def test_parts_that_do_not_fit_are_reported(guo: GuoEvaluator) -> None:
     mean, std = statistics()
     wrong = Words(("sos", "eos", "unk"), np.ones((3, 5), dtype=np.float32))
     for change, reason in (
@@ -287,7 +287,7 @@ def change_tensors(folder: Path, **new: torch.Tensor) -> None:
         lambda f: (f / "guo.safetensors").unlink(),
     ],
 )
-def test_a_damaged_or_foreign_file_is_told(tmp_path: Path, damage) -> None:
+def test_a_damaged_or_foreign_file_is_reported(tmp_path: Path, damage) -> None:
     save_guo(read_published(files(tmp_path)), tmp_path / "guo.safetensors")
     damage(tmp_path)
     with pytest.raises(MotionloomError):

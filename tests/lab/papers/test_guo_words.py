@@ -86,7 +86,7 @@ def test_without_lists_the_tag_stays(tmp_path: Path) -> None:
     assert TAGS[read_words(published(tmp_path)).look_up("left/ADJ")[1]] == "ADJ"
 
 
-def test_a_token_without_its_part_of_speech_is_told(words: Words) -> None:
+def test_a_token_without_its_part_of_speech_is_reported(words: Words) -> None:
     with pytest.raises(MotionloomError, match="part of speech"):
         words.look_up("walk")
 
@@ -236,7 +236,7 @@ def test_anything_that_is_not_plain_is_refused_and_not_run(
         (lambda f: np.save(f / "our_vab_data.npy", np.array([Bomb(f / "was run")]), allow_pickle=True), "npy"),
     ],
 )
-def test_published_files_that_do_not_fit_are_told(tmp_path: Path, change, reason: str) -> None:
+def test_published_files_that_do_not_fit_are_reported(tmp_path: Path, change, reason: str) -> None:
     change(published(tmp_path))
     with pytest.raises(MotionloomError, match=reason):
         read_words(tmp_path)

@@ -128,7 +128,7 @@ def test_training_learns_and_the_file_comes_back(tmp_path: Path) -> None:
     assert "2 pairs and their mirror images" in said[0]
 
 
-def test_what_is_no_such_file_is_told(tmp_path: Path) -> None:
+def test_what_is_no_such_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(MotionloomError, match="--train-mrt"):
         MrtFile.load(tmp_path / "none.safetensors")
     (tmp_path / "bad.safetensors").write_bytes(b"not weights")

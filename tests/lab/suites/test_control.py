@@ -244,7 +244,7 @@ def test_a_stopped_run_goes_on_and_gives_the_same(tmp_path: Path) -> None:
         control.measure(trial(Fakes()), kinds, parts=Parts(tmp_path, "other"))
 
 
-def test_a_way_that_these_weights_cannot_go_is_told_and_stops_nothing() -> None:
+def test_a_way_that_these_weights_cannot_go_is_reported_and_stops_nothing() -> None:
     found = control.measure(trial(Fakes(refuses="fine-tuned")), control_kinds.kinds(["trajectory"]))
     assert any("fine-tuned: not measured (there is no such adapter)" in note for note in found.notes)
     assert found.row("trajectory, ours")

@@ -133,7 +133,7 @@ def test_a_sampler_that_knows_what_came_has_no_error(given: str, slots: int) -> 
     known, mask = asked["edits"].observed.values, asked["edits"].observed.mask
     assert known.shape == (6, 1 + FRAMES, 263)
     assert mask[:, :, 0].sum(1).tolist() == [slots] * 6
-    place = net.talk.config.places.encode(two.encode(crops.positions[1]).stands)
+    place = net.talk.config.places.encode(two.encode(crops.positions[1]).poses)
     np.testing.assert_allclose(known[2:4, 0, :4], place, atol=1e-5)
     held = ((known[:2, 1:slots] * prior.std) + prior.mean).numpy()
     local = oracle.features[0, :, : slots - 1].numpy()
@@ -246,7 +246,7 @@ def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
         duet.measure(crops, {"ours": counted}, replace(how, seed=1), kinds=("ours",), run=Run(folder=tmp_path))
 
 
-def test_wishes_that_cannot_be_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_targets_that_cannot_be_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(duet, "blocks", dict)
     impossible: list[dict[str, Any]] = [{"crops": 0}, {"samples": 0}, {"given": "all"}, {"seed": -1}]
     for wrong in impossible:
@@ -299,7 +299,7 @@ def test_other_blocks_are_rows_by_their_names_and_sizes(tmp_path: Path) -> None:
     np.testing.assert_allclose(made, alone, atol=1e-4)  # a fresh block says nothing
 
 
-def test_two_blocks_of_one_name_and_blocks_of_another_prior_are_told(tmp_path: Path) -> None:
+def test_two_blocks_of_one_name_and_blocks_of_another_prior_are_reported(tmp_path: Path) -> None:
     prior = tiny.prior()
     one = saved(prior, tmp_path / "one.safetensors", "same")
     two_of = saved(prior, tmp_path / "two.safetensors", "same", layers=2)

@@ -142,7 +142,7 @@ def test_beginnings_are_of_random_train_windows() -> None:
     assert apart(TEXT_HOW, 0) != apart(TEXT_HOW, 1) != apart(replace(TEXT_HOW, seed=1), 1)
 
 
-def test_duets_that_cannot_be_compared_are_told() -> None:
+def test_duets_that_cannot_be_compared_are_reported() -> None:
     with pytest.raises(MotionloomError, match="no captions"):
         duet_text.text_table([replace(pair, captions=()) for pair in RECORDED])
     with pytest.raises(MotionloomError, match="fewer than two pairs"):

@@ -231,7 +231,7 @@ def test_a_quick_run_is_marked_and_never_replaces_a_full_one_unless_asked(job: J
     assert run_all(quick, out, [one.suite()], again=True)[0].said == "measured"
 
 
-def test_missing_weights_are_told_before_anything_runs(job: Job, tmp_path: Path) -> None:
+def test_missing_weights_are_reported_before_anything_runs(job: Job, tmp_path: Path) -> None:
     one = Counted("one")
     with pytest.raises(MotionloomError, match="nowhere"):
         run_all(replace(job, weights="nowhere.safetensors"), tmp_path / "out", [one.suite()])

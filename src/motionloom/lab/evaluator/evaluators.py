@@ -29,7 +29,7 @@ class Evaluator(Protocol):
 
     @property
     def name(self) -> str:
-        """Short; stands in every report."""
+        """Short; is in every report."""
         ...
 
     @property

@@ -24,7 +24,7 @@ from motionloom.weights.container import Container, check, halved, shapes
 
 EVALUATORS = Container("evaluator", "motionloom_evaluator", max_bytes=100 << 20)
 KEY = EVALUATORS.key
-"""Metadata entry that tells the file's kind."""
+"""Metadata entry that says the file's kind."""
 INPUTS = 4 + 63 + 66 + 4
 """Numbers per frame that the motion encoder reads, see `inputs`."""
 STRIDE = 4

@@ -46,7 +46,7 @@ def distances(positions: ArrayLike, wanted: ArrayLike, asked: ArrayLike) -> Arra
     made, goal, flags = np.asarray(positions, float), np.asarray(wanted, float), np.asarray(asked, bool)
     if made.ndim != 3 or made.shape[-1] != 3 or not made.shape == goal.shape == flags.shape:
         raise MotionloomError(
-            f"places, wishes and flags must be (frames, joints, 3) alike; got {made.shape}, {goal.shape}, {flags.shape}"
+            f"places, targets and flags are (frames, joints, 3) alike; got {made.shape}, {goal.shape}, {flags.shape}"
         )
     apart = np.subtract(made, goal, out=np.zeros(made.shape), where=flags)
     if not np.isfinite(apart).all():

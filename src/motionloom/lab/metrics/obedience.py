@@ -48,7 +48,7 @@ class Check:
     seconds: float
     """Length to generate."""
     paraphrases: tuple[str, ...]
-    """The same wish in other words."""
+    """The same prompt in other words."""
     bounds: tuple[Bound, ...]
     words: str
     """Pattern of captions of real clips that show the action."""

@@ -32,7 +32,7 @@ SERIES: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
 }
 """What is compared, by name: (2, frames, 22, 3) to a number for each frame (of each person), all of `pair`."""
 JUDGED = ("distance", "looking_away", "hand_contact")
-"""Distance, facing and hand contact: what tells partners from strangers."""
+"""Distance, facing and hand contact: what separates partners from shuffled people."""
 _LEVELS = 400
 
 

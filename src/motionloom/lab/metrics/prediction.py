@@ -1,10 +1,10 @@
 """How good the futures of stochastic motion prediction are: APD, ADE, FDE, MMADE, MMFDE, APDE, CMD and body realism.
 
-Everything is told per window: ``samples`` (S, F, J, 3) are the futures a system drew, ``truth`` (F, J, 3) is what came,
-``futures`` (K, F, J, 3) is what came after similar poses, the truth among it. Places are metres from the root, without
-the root itself (16 joints in Human3.6M, 14 in HumanEva-I, 21 in AMASS). The norm of APD, ADE, FDE and their kin is that
-of the *whole* flattened pose, not a mean over joints: numbers by the other convention are about fifteen times smaller,
-so `zero_velocity` belongs beside every result. What cannot be measured raises `MotionloomError`.
+Everything is measured per window: ``samples`` (S, F, J, 3) are the futures a system sampled, ``truth`` (F, J, 3) is
+what came, ``futures`` (K, F, J, 3) is what came after similar poses, the truth among it. Places are metres from the
+root, without the root itself (16 joints in Human3.6M, 14 in HumanEva-I, 21 in AMASS). The norm of APD, ADE, FDE and
+their kin is that of the *whole* flattened pose, not a mean over joints: numbers by the other convention are about
+fifteen times smaller, so `zero_velocity` belongs beside every result. What cannot be measured raises `MotionloomError`.
 
 Sources: Yuan and Kitani, DLow, ECCV 2020 (APD to MMFDE); Barquero et al., BeLFusion, ICCV 2023 (APDE, CMD);
 Tian et al., TransFusion, 2024 (median and worst ADE). Limbs, jerk and seams: `motionloom.lab.metrics.prediction_body`.
@@ -260,14 +260,14 @@ METRICS: tuple[Metric, ...] = (
     Metric("seam_acceleration", "jump of acceleration at the seam", "m/s^2", "real"),
     Metric("seam_acceleration_worst", "of the worst joint", "m/s^2", "real"),
 )
-"""In the order of tables; CMD stands apart, for it is not a mean of windows (`Tally.cmd`)."""
+"""In the order of tables; CMD is apart, for it is not a mean of windows (`Tally.cmd`)."""
 MULTIMODAL = ("mmade", "mmfde", "apde")
 """Metrics that ``skip_multimodal`` leaves out for windows with a single future."""
 
 
 @dataclass(frozen=True, eq=False)
 class WindowScores:
-    """Everything told about one window; None where it cannot be told (see `score_window`)."""
+    """Everything measured of one window; None where it cannot be measured (see `score_window`)."""
 
     futures: int
     """How many real futures the window has, the truth counted."""
@@ -314,17 +314,17 @@ def score_window(
     errors = _errors(s, t)
     mean = errors.mean(axis=1)
     mm, jolt = _multimodal(s, y), jerk(s, fps)
-    told: dict[str, float] = {}
+    measured: dict[str, float] = {}
     if limbs is not None:
-        told |= stretch(s, t, limbs)._asdict()
-        told |= {"mae": angle_error(s, t, limbs)} if limbs.chains else {}
+        measured |= stretch(s, t, limbs)._asdict()
+        measured |= {"mae": angle_error(s, t, limbs)} if limbs.chains else {}
     if past is not None:
-        told |= {f"seam_{name}": value for name, value in seam(past, s, fps)._asdict().items()}
+        measured |= {f"seam_{name}": value for name, value in seam(past, s, fps)._asdict().items()}
     variety = apd(s)
     return WindowScores(
         len(y), speeds(s), variety, float(mean.min()), float(errors[:, -1].min()), *mm,
         abs(variety - apd(y)) if len(y) > 1 else None, float(np.median(mean)), float(mean.max()),
-        jolt.mean, jolt.peak, **told,
+        jolt.mean, jolt.peak, **measured,
     )  # fmt: skip
 
 
@@ -333,7 +333,7 @@ class Average(NamedTuple):
 
     value: float
     n: int
-    """Windows it was told for."""
+    """Windows it was measured on."""
 
 
 class Tally:
@@ -367,7 +367,7 @@ class Tally:
             self._counts[metric.name] = self._counts.get(metric.name, 0) + 1
 
     def averages(self) -> dict[str, Average]:
-        """By name of `METRICS`, in that order; metrics that were told for no window are absent."""
+        """By name of `METRICS`, in that order; metrics that were measured on no window are absent."""
         return {
             m.name: Average(self._sums[m.name] / self._counts[m.name], self._counts[m.name])
             for m in METRICS

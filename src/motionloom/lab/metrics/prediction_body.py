@@ -105,7 +105,7 @@ def stretch(samples: np.ndarray, truth: np.ndarray, limbs: Limbs) -> Stretch:
     s, t = as_window(samples, truth, frames=2)
     real = _lengths(t, limbs).mean(axis=0)
     if not (real > 0).all():
-        raise MotionloomError("a limb of the real motion has no length, so nothing can be told in percent of it.")
+        raise MotionloomError("a limb of the real motion has no length, so nothing can be given in percent of it.")
     length = _lengths(s, limbs)
     change = np.diff(length, axis=1)
     found = (

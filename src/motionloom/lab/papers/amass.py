@@ -80,11 +80,11 @@ def read_amass(
     Tests predict from frame 180 on and then every 120 frames (windows begin at 150, 270 ...), a window that would end
     with the last frame left out. ``segments`` names the windows instead: a .csv as published (``dataset``, ``file``,
     ``file_idx``, ``pred_init``, ``pred_end``), a .csv with ``file`` and ``first`` (first observed frame), or a .json
-    list of such pairs; windows that are not there are told and left out. Recordings of the same name in one data set
-    (GRAB) take the list's rows in the order of their paths.
+    list of such pairs; windows that are not there are reported and left out. Recordings of the same name in one data
+    set (GRAB) take the list's rows in the order of their paths.
 
     Raises MotionloomError for a folder without data sets and for a list that cannot be used; single recordings that
-    cannot be read are left out and told.
+    cannot be read are left out and reported.
     """
     folder = Path(folder)
     sets = [(name, place) for name, place in _set_folders(folder) if _SPLITS[name] in splits]

@@ -330,8 +330,8 @@ def load_items(
 ) -> list[Item]:  # fmt: skip
     """All examples of one split of a BABEL folder. ``crop``: cut longer ones at random, by ``seed`` (see `items`).
 
-    ``dropped`` is told in a sentence of each recording that is missing, broken or under half a second; without it the
-    first such raises MotionloomError.
+    ``dropped`` is called with a sentence for each recording that is missing, broken or under half a second; without it
+    the first such raises MotionloomError.
     """
     rng, result = np.random.default_rng(seed), []
     for recording in find_recordings(folder, splits=(split,)):

@@ -13,7 +13,7 @@ H36M_LAYOUT = Layout(
     root=False,
     z_up=True,
 )  # fmt: skip
-"""Human3.6M, 17 of its 32 joints (Martinez et al. 2017); 16 of them are told."""
+"""Human3.6M, 17 of its 32 joints (Martinez et al. 2017); 16 of them have numbers."""
 
 HUMANEVA_LAYOUT = Layout(
     names=(
@@ -25,4 +25,4 @@ HUMANEVA_LAYOUT = Layout(
     root=False,
     z_up=True,
 )  # fmt: skip
-"""HumanEva-I, 15 joints; 14 of them are told."""
+"""HumanEva-I, 15 joints; 14 of them have numbers."""

@@ -3,11 +3,11 @@
 Given numbers M stay free of noise all the way, as in training (algorithm 1): at every level they are signal * known.
 
     x_T = signal_T * known * M + noise_T * draw * (1 - M)
-    guess = sum of w_i (u_i + s (c_i - u_i))         each network guided by itself, then blended
-    guess = known on M;  x_s from x_t and guess;  x_s = signal_s * known on M
+    denoised = sum of w_i (u_i + s (c_i - u_i))         each network guided by itself, then blended
+    denoised = known on M;  x_s from x_t and denoised;  x_s = signal_s * known on M
 
-As published, but for one thing: nothing of the motion that the given numbers come from is in the start beside them
-(the published code starts from all of it, noised). MDM's inpainting overwrites the guess alone and noises everything.
+As published, but for one thing: nothing of the motion that the given numbers come from is in the start beside them (the
+published code starts from all of it, noised). MDM's inpainting overwrites the estimate alone and noises everything.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from torch import Tensor
 from motionloom.diffusion import (
     SOLVERS,
     Denoiser,
-    Draw,
+    NoiseSource,
     Schedule,
     Solver,
     Weight,
@@ -60,7 +60,7 @@ def control_features(
         seeds: one per row; a row's motion depends on no other row.
         weights: one per network, a number or what broadcasts to the motions, or either by level (`diffusion.blend`);
             the mean by default. They are used as they are.
-        corrections: change each row's blended guess before the given numbers are put in.
+        corrections: change each row's blended estimate before the given numbers are put in.
         sampling: or single settings of it as keywords.
 
     Raises:
@@ -96,7 +96,7 @@ def controlled(
     levels: Sequence[int],
     solver: Solver,
     schedule: Schedule,
-    draw: Draw,
+    draw: NoiseSource,
     start: Tensor | None = None,
 ) -> Tensor:
     """The walk of algorithm 2 on any denoiser; (rows, frames, features).

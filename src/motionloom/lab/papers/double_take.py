@@ -26,7 +26,7 @@ from motionloom.diffusion import (
     SOLVERS,
     Constraint,
     Denoiser,
-    Draw,
+    NoiseSource,
     Schedule,
     Solver,
     State,
@@ -197,7 +197,7 @@ class Takes:
 
 
 def flags(plan: Plan) -> Tensor:
-    """(rows, longest) integers: 1 on frames that a row shares with another, for networks that are told so."""
+    """(rows, longest) integers: 1 on frames that a row shares with another, for networks conditioned on it."""
     marks = torch.zeros(len(plan.lengths), max(plan.lengths), dtype=torch.long)
     for i, h in enumerate(plan.handshakes):
         marks[i, plan.lengths[i] - h : plan.lengths[i]] = 1
@@ -226,7 +226,7 @@ def first_take(
     *,
     way: Sequence[int],
     schedule: Schedule,
-    draw: Draw,
+    draw: NoiseSource,
     solver: Solver = DDPM,
     join: bool = True,
 ) -> State:
@@ -265,10 +265,10 @@ def second_take(
     *,
     way: Sequence[int],
     schedule: Schedule,
-    draw: Draw,
+    draw: NoiseSource,
     solver: Solver = DDPM,
 ) -> State:
-    """Sandwiches noised to ``way[0]`` and refined, the guess held to them by ``weights`` (transitions, frames)."""
+    """Sandwiches noised to ``way[0]`` and refined, the estimate held to them by ``weights`` (transitions, frames)."""
     repetitions = len(sandwich) // len(weights)
     mask = weights.to(sandwich).repeat(repetitions, 1)[..., None]
     x = restart(sandwich, schedule, way[0], draw)
@@ -319,7 +319,7 @@ def double_take(
     mode: Mode,
     way: Sequence[int],
     schedule: Schedule,
-    draws: tuple[Draw, Draw],
+    draws: tuple[NoiseSource, NoiseSource],
     **options: Unpack[TakeOptions],
 ) -> Takes:
     """Both takes; one interval is sampled as ever and has no second take.

@@ -19,7 +19,19 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motionloom.diffusion import Basis, Constraint, Ddim, Denoiser, Draw, Schedule, State, mix, row_draw, row_seed, run
+from motionloom.diffusion import (
+    Basis,
+    Constraint,
+    Ddim,
+    Denoiser,
+    NoiseSource,
+    Schedule,
+    State,
+    mix,
+    row_draw,
+    row_seed,
+    run,
+)
 from motionloom.errors import MotionloomError
 from motionloom.weights.predictor import Predictor
 
@@ -92,7 +104,7 @@ class Options(TypedDict, total=False):
 
 
 def published_completion(
-    denoise: Denoiser, observed: Tensor, rows: int, *, basis: Basis, schedule: Schedule, draw: Draw,
+    denoise: Denoiser, observed: Tensor, rows: int, *, basis: Basis, schedule: Schedule, draw: NoiseSource,
     **options: Unpack[Options],
 ) -> tuple[State, Tensor]:  # fmt: skip
     """DCT-Completion.
@@ -138,7 +150,9 @@ class Held:
     last: float = 0
 
 
-def mixed_in_time(held: Sequence[Held], to_time: Way, to_state: Way, schedule: Schedule, draw: Draw) -> Constraint:
+def mixed_in_time(
+    held: Sequence[Held], to_time: Way, to_state: Way, schedule: Schedule, draw: NoiseSource
+) -> Constraint:
     """Everything known, noised, mixed into the state in time one after the other; then back into coefficients, once.
 
     With one thing known it is `observe(..., basis=)`. Two of those would drop frequencies in between, which the
@@ -216,7 +230,7 @@ def published_futures(
 
 
 @torch.inference_mode()
-def _complete(predictor: Predictor, observed: Tensor, keep: Tensor, *, draw: Draw, steps: int) -> Tensor:
+def _complete(predictor: Predictor, observed: Tensor, keep: Tensor, *, draw: NoiseSource, steps: int) -> Tensor:
     """Windows (rows, frames, channels) after observed ones (rows, h, channels); ``keep`` (rows,): which are told."""
     rows, h, channels = observed.shape
     pose, schedule = observed[:, -1], predictor.schedule

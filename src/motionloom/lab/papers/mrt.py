@@ -2,11 +2,11 @@
 Prediction with Multi-Range Transformers"), a baseline of prefix completion.
 
 For each person: a local encoder sees the cosine spectrum of the own last second, as differences of neighbouring rows; a
-global encoder sees every frame of everybody, told who is near; a decoder with one query, the person's last pose, asks
-both and says the displacements of the next second as a spectrum. Longer futures are said second by second.
+global encoder sees every frame of everybody, with how near they are; a decoder with one query, the person's last pose,
+asks both and says the displacements of the next second as a spectrum. Longer futures are said second by second.
 
-Written from the paper's description. Here: 22 joints at 20 frames a second (there: 15 joints at 15), the places told
-from the middle of all people's last roots (there: absolute in a centred scene), and no discriminator.
+Written from the paper's description. Here: 22 joints at 20 frames a second (there: 15 joints at 15), the places
+relative to the middle of all people's last roots (there: absolute in a centred scene), and no discriminator.
 """
 
 from collections.abc import Mapping
@@ -61,8 +61,8 @@ class MrtConfig:
 class Mrt(nn.Module):
     """``net(past)``: the next ``frames`` of everybody, (rows, people, frames, 22, 3), from as many before.
 
-    Metres in any world whose axes stay: what is told moves with the people, but does not turn with them. People who are
-    exchanged give exchanged results.
+    Metres in any world whose axes stay: what is given moves with the people, but does not turn with them. People who
+    are exchanged give exchanged results.
     """
 
     def __init__(self, config: MrtConfig) -> None:
@@ -85,28 +85,28 @@ class Mrt(nn.Module):
         rows, people, frames = past.shape[:3]
         if frames != self.config.frames or past.shape[3:] != (JOINTS, 3):
             raise MotionloomError(f"the multi-range transformer sees {self.config.frames} frames; got {past.shape}")
-        told = past - middle(past)
-        near = _nearness(told)
-        own = self._own(told.flatten(0, 1).flatten(2))
-        others = self._all(told.flatten(3))
+        places = past - middle(past)
+        near = _nearness(places)
+        own = self._own(places.flatten(0, 1).flatten(2))
+        others = self._all(places.flatten(3))
         memory = torch.cat([own, (others[:, None] + near[..., None]).flatten(0, 1)], dim=1)
-        query = self.ask(told[:, :, -1].flatten(0, 1).flatten(1))[:, None]
+        query = self.ask(places[:, :, -1].flatten(0, 1).flatten(1))[:, None]
         for layer in self.decoder:
             query = layer(query, memory)
         spectrum = self.out(F.gelu(self.expand(query)).view(len(query), frames, -1))
         return self.basis.to_time(spectrum).view(rows, people, frames, JOINTS, 3)
 
-    def _own(self, told: Tensor) -> Tensor:
+    def _own(self, places: Tensor) -> Tensor:
         """(rows * people, frames, 66) to (rows * people, frames - 1, width)."""
-        x = self.local_in(self.basis.to_spectrum(told).diff(dim=1))
+        x = self.local_in(self.basis.to_spectrum(places).diff(dim=1))
         x = x + _times(x.shape[1], x)
         for layer in self.local:
             x = layer(x, x)
         return x
 
-    def _all(self, told: Tensor) -> Tensor:
+    def _all(self, places: Tensor) -> Tensor:
         """(rows, people, frames, 66) to (rows, people * frames, width); who is who is not said, only when."""
-        x = self.global_in(told)
+        x = self.global_in(places)
         x = (x + _times(x.shape[2], x)).flatten(1, 2)
         for layer in self.everybody:
             x = layer(x, x)
@@ -119,9 +119,9 @@ def middle(past: Tensor) -> Tensor:
     return (roots * roots.new_tensor([1.0, 0.0, 1.0]))[:, None, None, None]
 
 
-def _nearness(told: Tensor) -> Tensor:
+def _nearness(places: Tensor) -> Tensor:
     """(rows, people, people * frames): exp of minus the mean squared distance of each pose to each one's last pose."""
-    apart = told[:, :, -1][:, :, None, None] - told[:, None]
+    apart = places[:, :, -1][:, :, None, None] - places[:, None]
     return torch.exp(-(apart**2).sum(-1).mean(-1)).flatten(2)
 
 
@@ -202,6 +202,6 @@ class MrtFile:
             check(tensors, shapes(net), str(path))
             net = net.to_empty(device="cpu")
             net.load_state_dict(tensors)
-            told = MrtFile(net, str(about["licence"]), str(about["data"]), dict(about["notes"]))
-        told.net.to(device).eval().requires_grad_(False)
-        return told
+            file = MrtFile(net, str(about["licence"]), str(about["data"]), dict(about["notes"]))
+        file.net.to(device).eval().requires_grad_(False)
+        return file

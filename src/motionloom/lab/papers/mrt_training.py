@@ -90,7 +90,7 @@ def train_mrt(
         config: sizes; None: the usual ones.
         device: cpu, cuda, or None for what there is.
         stop: make a break after so many steps.
-        say: told a line now and then.
+        say: called with a line of progress now and then.
         settings: see `Settings`.
 
     Returns:

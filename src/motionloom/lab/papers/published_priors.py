@@ -24,7 +24,7 @@ def import_published(
     """A published MDM or PriorMDM checkpoint (``model*.pt``, with ``args.json`` beside it) as a `Prior`.
 
     Of a checkpoint of two people (ComMDM) it is the network of each; `import_block` reads the rest.
-    mean, std: (features,) statistics published with the data set. warn: told what was missing and is assumed.
+    mean, std: (features,) statistics published with the data set. warn: called with what was missing and is assumed.
     Raises MotionloomError for anything but plain weights of MDM's ``trans_enc``.
     """
     path = Path(path)

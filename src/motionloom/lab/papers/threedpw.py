@@ -58,7 +58,7 @@ def read_3dpw(
         texts: The folder ``text`` of ComMDM's published data, with ``train/NAME.txt`` (or ``NAME_p0.txt``), a caption
             on each line, words after a # ignored; None: ``folder/text`` where it is there. No text, no captions.
         splits: Of train, validation and test. The published work leaves test out as noisy and without interaction.
-        say: Told what is left out and why.
+        say: Called with what is left out and why.
 
     Raises:
         MotionloomError: No such files, a damaged or foreign one (named), or none with two people.

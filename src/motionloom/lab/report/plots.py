@@ -116,8 +116,8 @@ def _points(report: Report, columns: Sequence[Column], rows: Sequence[Row], path
         axis.margins(x=0.08)
         axis.locator_params(axis="x", nbins=4)
     if sources:
-        told = [f"[{k}] {_plain(source, 120)}" for k, source in enumerate(sources, start=1)]
-        figure.supxlabel("\n".join(["hatched: published", *told]), fontsize=8, color="#5a6270")
+        listed = [f"[{k}] {_plain(source, 120)}" for k, source in enumerate(sources, start=1)]
+        figure.supxlabel("\n".join(["hatched: published", *listed]), fontsize=8, color="#5a6270")
     return _save(figure, report, path)
 
 

@@ -170,7 +170,7 @@ def decode(found: Any) -> Report:
     names = {c.name for c in columns}
     rows = tuple(_row(r, names) for r in _list(found["rows"], MOST_ROWS))
     if len(names) != len(columns) or len({(r.name, r.measured_on) for r in rows}) != len(rows):
-        raise MotionloomError("a column or a row stands there twice")
+        raise MotionloomError("a column or a row is there twice")
     notes = tuple(_text(note) for note in _list(found["notes"], MOST_ROWS))
     protocol = _plain(found["protocol"])
     return Report(suite, _text(found["title"]), _text(found["command"]), protocol, columns, rows, notes)

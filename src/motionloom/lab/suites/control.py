@@ -41,7 +41,7 @@ from motionloom.weights.adapter import adapters
 COUNT, REPLICATIONS = 32, 3
 RATIOS = {"share_ratio": "skate_share", "speed_ratio": "skate_speed", "slide_ratio": "skate_slide",
           "jerk_ratio": "jerk"}  # fmt: skip
-"""Columns that hold a number against that of the uncontrolled row of the same kind and manner (`BASE`)."""
+"""Columns that hold a number against that of the uncontrolled row of the same kind and finish (`BASE`)."""
 SEEN = {"skate_share": 0.1, "skate_speed": 0.1, "skate_slide": 0.01, "jerk": 0.1}
 """Of uncontrolled motions: what is smaller is nothing, and nothing is held against it."""
 
@@ -65,10 +65,10 @@ COLUMNS: tuple[Column, ...] = (
     Column("skate_slide", "skate mm/frame", "down", "step of a toe at contact (Motius)", 2),
     Column("jerk", "jerk m/s³", "real", "third derivative of the joints' places, mean", 1),
     Column("penetration", "penetration cm", "down", "the lowest joint under the floor, mean over frames", 2),
-    Column("share_ratio", "skate % ×", "down", "against the uncontrolled row of the same manner", 2),
-    Column("speed_ratio", "skate cm/s ×", "down", "against the uncontrolled row of the same manner", 2),
-    Column("slide_ratio", "skate mm/frame ×", "down", "against the uncontrolled row of the same manner", 2),
-    Column("jerk_ratio", "jerk ×", "down", "against the uncontrolled row of the same manner", 2),
+    Column("share_ratio", "skate % ×", "down", "against the uncontrolled row of the same finish", 2),
+    Column("speed_ratio", "skate cm/s ×", "down", "against the uncontrolled row of the same finish", 2),
+    Column("slide_ratio", "skate mm/frame ×", "down", "against the uncontrolled row of the same finish", 2),
+    Column("jerk_ratio", "jerk ×", "down", "against the uncontrolled row of the same finish", 2),
     Column("seconds", "s per motion", "", "wall time from the goal to the motion, on the machine that measured", 2),
 )  # fmt: skip
 
@@ -223,8 +223,8 @@ def measure(
 ) -> Report:
     """All rows: the real motions, then each way of control for each kind of goal.
 
-    A way that these weights cannot go (no adapter of that name) is told in a note and stops nothing. The uncontrolled
-    rows are made wherever something is held against them.
+    A way that these weights cannot go (no adapter of that name) is reported in a note and stops nothing. The
+    uncontrolled rows are made wherever something is held against them.
     """
     parts, count = parts or Parts(None, ""), range(trial.protocol.replications)
     wanted = {*methods, *(BASE[name] for name in methods)}

@@ -1,8 +1,8 @@
 """What control is asked for in the suite `control`: kinds of goals, each taken out of a real motion.
 
 A kind is known by its parts: ``trajectory``, a joint, or several with ``+`` between them, in every frame; ``keyframes``
-and ``in_between`` are sparse. Each is told twice: as a goal in the world, and as the numbers of the representation that
-the published way of control fixes (Shafir et al. 2024, section 3.3).
+and ``in_between`` are sparse. Each is given twice: as a goal in the world, and as the numbers of the representation
+that the published way of control fixes (Shafir et al. 2024, section 3.3).
 """
 
 from collections.abc import Sequence
@@ -61,7 +61,7 @@ class Kind:
         """(count,) flags of the frames that are asked."""
         at = np.arange(count)
         if self.when == "each second":
-            return (at % SECOND == 0) & (at > 0)  # frame 0 would say where the body stands, which nobody asked
+            return (at % SECOND == 0) & (at > 0)  # frame 0 would say where the body is, which nobody asked
         if self.when == "ends":
             given = min(SECOND, count // 4)  # of a short motion half is left open
             return (at < given) | (at >= count - given)
@@ -100,7 +100,7 @@ def kind(name: str) -> Kind:
 
 
 def kinds(names: Sequence[str]) -> tuple[Kind, ...]:
-    """The kinds of those names; MotionloomError for an unknown one, one that stands there twice, and none at all."""
+    """The kinds of those names; MotionloomError for an unknown one, one that is there twice, and none at all."""
     found = tuple(kind(name) for name in names)
     titles = [one.title for one in found]
     if not 1 <= len(found) <= MOST_KINDS or len(set(titles)) != len(titles):

@@ -102,7 +102,7 @@ def uncontrolled(prior: Prior, how: Sampling, *, exported: bool) -> Method:
 
 
 def published(prior: Prior, how: Sampling, nets: Sequence[Net], *, noise_free: bool) -> Method:
-    """Control in the representation: the fixed numbers are written into every guess (`diffusion_blending`)."""
+    """Control in the representation: the fixed numbers are written into every estimate (`diffusion_blending`)."""
 
     def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
         result: dict[int, Made] = {}
@@ -157,7 +157,7 @@ def of_features(features: np.ndarray) -> Made:
 
 
 def of_motion(motion: Motion) -> Made:
-    """A motion as it is exported, on 22 joints at 20 frames per second; the last frame's numbers stand there twice."""
+    """A motion as it is exported, on 22 joints at 20 frames per second; the last frame's numbers are there twice."""
     positions = motion.positions()
     features = humanml.positions_to_features(positions, motion.fps).astype(np.float64)
     return Made(positions, np.concatenate([features, features[-1:]]))  # a frame has a step only to the next one

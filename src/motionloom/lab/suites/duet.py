@@ -64,7 +64,7 @@ class How:
     steps: int = STEPS
     guidance: float = 1.0
     prompt: str = ""
-    """What the networks are told in words; published: nothing."""
+    """The prompt of the networks; published: none."""
     given: str = "past"
     """What of the first second is known, see `duet_ways.GIVEN`."""
     seed: int = 0
@@ -297,20 +297,20 @@ def verdicts(errors: Mapping[str, tuple[str, Mapping[str, Array]]]) -> tuple[str
     """Ours against each other way, crop by crop."""
     if "ours" not in errors:
         return ()
-    told = []
+    notes = []
     for kind, (name, numbers) in errors.items():
         if kind == "ours":
             continue
         apart = [Value.of((errors["ours"][1][f"root_{k}"] - numbers[f"root_{k}"]).tolist()) for k in mp.HORIZONS]
         said = ", ".join(f"{value.text()} m at {k} s" for k, value in zip(mp.HORIZONS, apart, strict=True))
-        told.append(
+        notes.append(
             f"Root error of ours, one sample, less that of {name}, crop by crop (below 0: ours is better): {said}."
         )
-    return tuple(told)
+    return tuple(notes)
 
 
 def protocol_of(crops: Crops, how: How) -> dict[str, Any]:
-    """What stands with the table."""
+    """The notes under the table."""
     known, true = GIVEN[how.given]
     last = "of the real next frame" if true else "as between the last two given ones"
     return {

@@ -127,7 +127,7 @@ def alone(prior: Prior, given: Windows, how: How) -> Make:
                 prior, caption, seconds=how.seconds, seed=own_seed(seed, number), guidance=how.guidance,
                 steps=how.steps, foot_lock=how.clean,
             )  # fmt: skip
-            begins = placement(two.encode(window).stands[1])
+            begins = placement(two.encode(window).poses[1])
             made.append((motion_from_positions(window[0], mp.FPS), moved(partner, begins)))
         return made
 

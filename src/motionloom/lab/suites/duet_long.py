@@ -100,9 +100,9 @@ def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: How
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
         made = []
-        for number, stands in enumerate(begun(count, seed)):
+        for number, poses in enumerate(begun(count, seed)):
             first, second = (
-                moved(one(caption, own_seed(seed, 2 * number + i)), placement(stand)) for i, stand in enumerate(stands)
+                moved(one(caption, own_seed(seed, 2 * number + i)), placement(pose)) for i, pose in enumerate(poses)
             )
             made.append((first, second))
         return made

@@ -1,8 +1,8 @@
 """Duets from words beside real pairs: where the two are to each other, what they touch, whether they move together.
 
-Each quantity that tells partners from strangers is held against how much real recordings differ from one another
-(`lab.metrics.pair_groups`); strangers, real and made, are rows of their own, and so is the prior without communication
-whose people at least begin where real partners do.
+Each quantity that separates partners from shuffled people is held against how much real recordings differ from one
+another (`lab.metrics.pair_groups`); strangers, real and made, are rows of their own, and so is the prior without
+communication whose people at least begin where real partners do.
 """
 
 import time
@@ -172,14 +172,14 @@ def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
         nothing = torch.zeros(2, 0, len(prior.mean))
-        told = [known_state(prior, net, nothing, torch.from_numpy(stands), frames) for stands in begun(count, seed)]
-        features, stands = pair_features(
+        known = [known_state(prior, net, nothing, torch.from_numpy(poses), frames) for poses in begun(count, seed)]
+        features, poses = pair_features(
             prior, net, [caption] * (2 * count), frames,
             seeds=[s for number in range(count) for s in person_seeds(seed, number)],
-            edits=PairEdits(stacked(told)), guidance=how.guidance, steps=how.steps,
+            edits=PairEdits(stacked(known)), guidance=how.guidance, steps=how.steps,
         )  # fmt: skip
         made = []
-        for numbers, standing in zip(features, stands.double().numpy(), strict=True):
+        for numbers, standing in zip(features, poses.double().numpy(), strict=True):
             first, second = (
                 moved(finish(prior, f, foot_lock=how.clean), placement(s))
                 for f, s in zip(numbers, standing, strict=True)
@@ -191,13 +191,13 @@ def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
 
 
 def beginnings(pairs: Sequence[Pair], how: How) -> Callable[[int, int], list[Array]]:
-    """(count, seed) to stands (2, 4) of partners at the beginning of random train windows."""
+    """(count, seed) to ground poses (2, 4) of partners at the beginning of random train windows."""
     frames = frames_in(how.seconds, mp.FPS)
     real = [window for pair in pairs if pair.split == "train" for window in windows(pair, frames, frames // 2)]
 
     def begun(count: int, seed: int) -> list[Array]:
         rng = np.random.default_rng((how.seed, seed))
-        return [two.encode(real[int(rng.integers(len(real)))].positions).stands for _ in range(count)]
+        return [two.encode(real[int(rng.integers(len(real)))].positions).poses for _ in range(count)]
 
     return begun
 
@@ -317,24 +317,24 @@ def _row(
 
 def verdicts(rows: Sequence[Row]) -> tuple[str, ...]:
     """What holds, in words."""
-    told = []
+    notes = []
     for row in rows:
         if not row.name.startswith("ours"):
             continue
         ratios = [(name, row.values[f"ratio_{name}"].mean) for name in groups.JUDGED]
         said = ", ".join(f"{name.replace('_', ' ')} {ratio:.2f}" for name, ratio in ratios)
         inside = "within" if all(ratio <= groups.LIMIT for _, ratio in ratios) else "not within"
-        told.append(f"{row.name}: {inside} {groups.LIMIT:g} times of the real pairs' spread ({said}).")
+        notes.append(f"{row.name}: {inside} {groups.LIMIT:g} times of the real pairs' spread ({said}).")
         depth = row.values["penetration"].mean
         if "shuffled" not in row.name:
-            told.append(
+            notes.append(
                 f"{row.name}: mean penetration {depth:.2f} cm, {'under' if depth < DEEP else 'not under'} {DEEP:g} cm."
             )
-    return tuple(told)
+    return tuple(notes)
 
 
 def protocol_of(recorded: dict[str, list[Array]], captions: Sequence[str], how: How) -> dict[str, Any]:
-    """What stands with the table."""
+    """The notes under the table."""
     return {
         "recordings": len(recorded), "real windows": sum(map(len, recorded.values())),
         "frames per second": mp.FPS, "seconds": how.seconds, "duets": how.duets, "captions": list(captions),

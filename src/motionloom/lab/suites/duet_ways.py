@@ -43,7 +43,7 @@ class Crops:
 
 Way = Callable[[Crops, int], Array]
 Features = Callable[..., tuple[Tensor, Tensor]]
-"""`tasks.pair.pair_features`, or what stands in for it."""
+"""`tasks.pair.pair_features`, or what takes its place."""
 Given = Literal["past", "tool", "published"]
 FRAMES = 80
 """Frames of a completion, the given ones included."""
@@ -112,8 +112,8 @@ def drawn(
 
     def way(crops: Crops, sample: int) -> Array:
         known = [two.encode(seen(crop, given)) for crop in crops.positions]
-        told = [
-            known_state(prior, net, torch.from_numpy(one.features), torch.from_numpy(one.stands), FRAMES)
+        states = [
+            known_state(prior, net, torch.from_numpy(one.features), torch.from_numpy(one.poses), FRAMES)
             for one in known
         ]
         people = [torch.from_numpy(person) for one in known for person in one.features]
@@ -121,11 +121,11 @@ def drawn(
         features, _ = make(
             prior, net, [prompt] * len(people), FRAMES,
             seeds=[s for number in crops.numbers for s in person_seeds(row_seed(seed, sample), number)],
-            edits=PairEdits(stacked(told), leaving if given == "past" else None, frozen=[False] * len(people)),
+            edits=PairEdits(stacked(states), leaving if given == "past" else None, frozen=[False] * len(people)),
             guidance=guidance, steps=steps,
         )  # fmt: skip
-        stands, floors = np.stack([one.stands for one in known]), np.stack([one.floors for one in known])
-        return two.decode(features.double().numpy(), stands) + floors[..., None, None, None] * _UP
+        poses, floors = np.stack([one.poses for one in known]), np.stack([one.floors for one in known])
+        return two.decode(features.double().numpy(), poses) + floors[..., None, None, None] * _UP
 
     return way
 

@@ -49,8 +49,8 @@ def run_all(
 ) -> list[Outcome]:
     """Run every suite into ``out/NAME``; one that was finished there with the same settings is not run again.
 
-    ``keep``: also write each report as ``keep/NAME.json``, the form of a release. ``again``: forget what stands there.
-    A suite whose kind of data is not there is skipped, and one that cannot run has failed; both are told in their
+    ``keep``: also write each report as ``keep/NAME.json``, the form of a release. ``again``: forget what is there.
+    A suite whose kind of data is not there is skipped, and one that cannot run has failed; both are reported in their
     outcomes and stop no other. Raises `MotionloomError` if a quick run would
     replace a full one.
     """
@@ -132,7 +132,7 @@ def _finished(folder: Path, mark: str) -> Report | None:
 
 
 def _is_full(path: Path) -> bool:
-    """Whether a report of a run that was not quick stands there."""
+    """Whether a report of a run that was not quick is there."""
     try:
         return path.is_file() and not reports.read(path).protocol.get("quick", False)
     except MotionloomError:

@@ -22,7 +22,7 @@ from motionloom.lab.suites.parts import Parts, fingerprint
 from motionloom.weights.prior import Prior, find_weights
 
 Say = Callable[[str], None]
-"""Told a line now and then."""
+"""Called with a line of progress now and then."""
 CHUNK = 64
 """Motions embedded at once."""
 DIVERSITY_PAIRS = 300

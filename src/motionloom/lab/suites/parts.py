@@ -67,14 +67,14 @@ class Parts:
         self,
         name: str,
         make: Callable[[], Mapping[str, float]],
-        told: Callable[[Mapping[str, float]], str] | None = None,
+        line: Callable[[Mapping[str, float]], str] | None = None,
         progress: Callable[[str], None] = lambda line: None,
     ) -> dict[str, float]:
-        """The numbers of a piece: kept ones, or made and kept now, which ``told`` says in a line for ``progress``."""
+        """The numbers of a piece: kept ones, or made and kept now, which ``line`` says in a line for ``progress``."""
         found = self.find(name)
         if found is None:
             found = dict(make())
             self.keep(name, found)
-            if told is not None:
-                progress(told(found))
+            if line is not None:
+                progress(line(found))
         return found

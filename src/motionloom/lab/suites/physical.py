@@ -40,7 +40,7 @@ def obedience_report(
     note = f"{found['prompts_obeyed']} of {found['prompts']} prompts are obeyed on {obey.ENOUGH:.0%} of their seeds."
     columns = (
         Column("obeyed", "obeyed", "up", "share of seeds on which every bound of the check holds", 2, True),
-        Column("reworded", "in other words", "up", "the same for the same wish in other words", 2, True),
+        Column("reworded", "in other words", "up", "the same for the same prompt in other words", 2, True),
         Column("real", "real clips", "", "share of real clips of that action which pass the same check", 2, True),
     )
     protocol = {"checks": obey.fingerprint(checks), **settings}

@@ -171,11 +171,11 @@ def _trained(name: str, lab: Lab) -> tuple[list[Column], list[Row], dict[str, An
         predictor = network(lab, setting, value)
         size = sum(p.numel() for p in predictor.net.parameters())
         for steps in (10, 50) if name == "noising" else (STEPS,):
-            told = f"{setting} {value}" if name != "noising" else f"{value} levels, {steps} steps"
-            lab.progress(f"{told}: {len(trial.windows)} windows")
+            label = f"{setting} {value}" if name != "noising" else f"{value} levels, {steps} steps"
+            lab.progress(f"{label}: {len(trial.windows)} windows")
             way = prediction.drawn(predictor, lab.budget.seed, samples=lab.budget.samples, steps=steps)
             scored = trials.score(trial, way, samples=lab.budget.samples, say=lab.progress)
-            rows.append(_row(trial, told, scored | {"parameters": size / 1e6}))
+            rows.append(_row(trial, label, scored | {"parameters": size / 1e6}))
     size = Column("parameters", "M parameters", "", "millions", 2)
     about = {"networks": f"width {BASE['width']}, {BASE['layers']} layers, {BASE['kept']} coefficients unless said",
              "training": f"{lab.budget.train_steps} steps of 64 windows, seed {lab.budget.seed}",

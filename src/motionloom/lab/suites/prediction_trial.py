@@ -1,7 +1,7 @@
 """The windows that predictors are tried on, and one way of predicting scored on all of them in little memory.
 
 A way takes pasts (windows, observed, joints, 3) to futures (windows, samples, frames, joints, 3), metres in the world,
-+Y up. Scores are on places from the root, as in the literature; how the root goes through the world is told apart.
++Y up. Scores are on places from the root, as in the literature; how the root goes through the world is measured apart.
 """
 
 import time
@@ -135,10 +135,10 @@ def check_fit(predictor: Predictor, protocol: Protocol) -> None:
     mine = predictor.layout.joints, predictor.fps, predictor.observed, predictor.frames
     its = protocol.layout.joints, protocol.fps, protocol.observed, protocol.frames
     if mine != its or predictor.layout.names != protocol.layout.names:
-        told = [f"{joints} joints at {fps:g} fps, {seen} of {frames} frames seen" for joints, fps, seen, frames in
+        sizes = [f"{joints} joints at {fps:g} fps, {seen} of {frames} frames seen" for joints, fps, seen, frames in
                 (mine, its)]  # fmt: skip
         raise MotionloomError(
-            f"these weights are for {told[0]}, and {protocol.name} has {told[1]}; name weights trained on such data"
+            f"these weights are for {sizes[0]}, and {protocol.name} has {sizes[1]}; name weights trained on such data"
         )
 
 
@@ -179,7 +179,7 @@ def score(
 
 def _made(trial: Trial, way: Way | None, chunk: int, say: Callable[[str], None]) -> Iterator[tuple[int, Array, float]]:
     """Number of each window, its futures (samples, frames, joints, 3), and the seconds that they took."""
-    told = time.perf_counter()
+    reported = time.perf_counter()
     for first in range(0, len(trial.windows), chunk):
         last = min(first + chunk, len(trial.windows))
         if way is None:
@@ -191,8 +191,8 @@ def _made(trial: Trial, way: Way | None, chunk: int, say: Callable[[str], None])
         took = (time.perf_counter() - began) / (last - first)
         for number in range(first, last):
             yield number, made[number - first], took
-        if time.perf_counter() - told > EVERY:
-            told = time.perf_counter()
+        if time.perf_counter() - reported > EVERY:
+            reported = time.perf_counter()
             say(f"window {last} of {len(trial.windows)}")
 
 

@@ -223,7 +223,7 @@ class Protocol:
         captions, samples = self.multimodality
         several = f"{captions} captions x {samples} motions, in the first {self.multimodal_replications} replications"
         exact = "exact, from the ground truth" if self.lengths == "exact" else "196 frames, cut to the ground truth's"
-        told = "true" if self.caption_length == "true" else f"{PUBLISHED_CAPTION} for generated motions, as published"
+        length = "true" if self.caption_length == "true" else f"{PUBLISHED_CAPTION} for generated motions, as published"
         return {
             "data": data,
             **selection.described(),
@@ -233,7 +233,7 @@ class Protocol:
             "statistics": "those of the evaluator",
             "evaluator": evaluator,
             "generated lengths": exact,
-            "caption length": told,
+            "caption length": length,
             "captions": "one per item and replication, drawn by seed",
             "batch": self.batch or "the whole set",
             "last partial batch": "dropped" if self.batch else "none",

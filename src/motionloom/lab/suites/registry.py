@@ -62,7 +62,7 @@ class Suite:
     name: str
     measures: str
     run: Callable[[Job, Mapping[str, Any]], Report]
-    """Called with the job and the settings of its kind of run; resumes from what stands in ``job.folder``."""
+    """Called with the job and the settings of its kind of run; resumes from what is in ``job.folder``."""
     full: Mapping[str, Any]
     """Settings of a run whose numbers are kept."""
     quick: Mapping[str, Any]

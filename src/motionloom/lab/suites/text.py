@@ -227,7 +227,7 @@ def measure(
     command: str = "",
     progress: Callable[[str], None] = lambda line: None,
 ) -> Report:
-    """All rows. ``memory`` tells the peak in MB of generating with so many steps; ``label`` names the weights."""
+    """All rows. ``memory`` gives the peak in MB of generating with so many steps; ``label`` names the weights."""
     parts = parts or Parts(None, "")
     protocol, count = trial.protocol, range(trial.protocol.replications)
     rows = [

@@ -41,7 +41,7 @@ NEAR = 0.6
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The samples of a request: rotations as MMCP tells them."""
+    """The samples of a request: rotations as MMCP has them."""
 
     rotations: Array
     """(samples, frames, joints, 4) x, y, z, w."""
@@ -68,7 +68,7 @@ def answer(models: Models, request: Any, progress: Progress) -> Iterator[Answer]
     places = [rig.told_places(motion) for motion in motions]
     free = [one for one in places if one is not None]
     yield Answer(
-        np.stack([rig.told(motion) for motion in motions]), np.stack([motion.root for motion in motions]),
+        np.stack([rig.rotations_of(motion) for motion in motions]), np.stack([motion.root for motion in motions]),
         np.stack(free) if len(free) == count else None,
         [_boundaries(request)] * count, {} if rig.uniform else rig.joints(), list(asked.notes),
     )  # fmt: skip
@@ -141,7 +141,7 @@ def _ends(request: Any, clock: Clock) -> list[int]:
 
 
 def _drawn(models: Models, segments: list[Segment], asked: Asked, seed: int, options: dict[str, Any]) -> Motion:
-    """The segments, steered to what is asked of them; poses without a place are asked where a first draw stands."""
+    """The segments, steered to what is asked of them; poses without a place are asked where a first sample is."""
     goal = asked.goal
     if asked.floating:
         first = _steered(models, segments, goal, seed, options).positions()

@@ -1,6 +1,6 @@
-"""Skeletons and poses as MMCP tells them, and as the library does.
+"""Skeletons and poses as MMCP has them, and as the library does.
 
-MMCP tells each joint's rotation in its parent's frame, the rest rotation included, with quaternions ``(x, y, z, w)``;
+MMCP gives each joint's rotation in its parent's frame, the rest rotation included, with quaternions ``(x, y, z, w)``;
 here a skeleton at rest has no rotations at all. With W the world rotations at rest, of a joint and of its parent p:
 ``theirs = inverse(W_p) * ours * W`` and ``ours = W_p * theirs * inverse(W)``.
 """
@@ -52,7 +52,7 @@ class Rig:
         return {name: max(point, key=lambda joint: point[joint]) for name, point in points.items()}
 
     def motion(self, names: Sequence[str], turns: Array, root: Array, fps: float) -> Motion:
-        """Poses (frames, joints, 4) as MMCP tells them of some joints, the others at rest; root (frames, 3)."""
+        """Poses (frames, joints, 4) as MMCP has them of some joints, the others at rest; root (frames, 3)."""
         local = np.tile(self._local_rest(), (len(turns), 1, 1))
         for number, name in enumerate(names):
             local[:, self.skeleton.index(name)] = rot.normalize(np.roll(turns[:, number], 1, axis=-1))
@@ -68,8 +68,8 @@ class Rig:
         """The uniform person's motion on this skeleton."""
         return motion if self.uniform else retarget(motion, self.skeleton)
 
-    def told(self, motion: Motion) -> Array:
-        """(frames, joints, 4) rotations of a motion on this skeleton as MMCP tells them."""
+    def rotations_of(self, motion: Motion) -> Array:
+        """(frames, joints, 4) rotations of a motion on this skeleton as MMCP has them."""
         parents = [self.rest[p] if p >= 0 else rot.IDENTITY for p in self.skeleton.parents]
         turned = rot.multiply(rot.inverse(np.array(parents))[None], rot.multiply(motion.rotations, self.rest[None]))
         return np.roll(rot.normalize(turned), -1, axis=-1)

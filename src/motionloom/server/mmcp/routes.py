@@ -43,7 +43,7 @@ def application_of(app: Starlette) -> Any:
 
 
 async def capabilities_of(app: Starlette) -> dict[str, Any]:
-    """What MMCP tells at ``/capabilities``; nothing where it is not installed."""
+    """What MMCP answers at ``/capabilities``; nothing where it is not installed."""
     inner = application_of(app)
     if inner is None:
         return {}

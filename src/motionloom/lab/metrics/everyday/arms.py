@@ -4,7 +4,7 @@ import numpy as np
 
 from motionloom.kinematics import gestures as g
 from motionloom.kinematics import physics as ph
-from motionloom.lab.metrics.everyday.body import ANKLES, ELBOWS, HIPS, SHOULDERS, WRISTS, Body, times
+from motionloom.lab.metrics.everyday.body import ELBOWS, HIPS, SHOULDERS, WRISTS, Body, times
 from motionloom.lab.metrics.everyday.check import Everyday, at_least, at_most, between
 from motionloom.lab.metrics.obedience import Measures
 
@@ -95,11 +95,10 @@ def swings_arms(body: Body) -> Measures:
     """``swings``: to and fro of 20 cm or more of the hands along the way the chest faces, both sides together.
     ``feet``: metres the middle of the feet goes. ``upright``: degrees the trunk leans, 90th percentile. ``pelvis``:
     leg lengths over the floor, 5th percentile."""
-    feet = body.p[:, ANKLES].mean(axis=1)
     forward = body.hands[..., 2]
     return {
         "swings": min(g.oscillations(forward[:, 0], 0.2), g.oscillations(forward[:, 1], 0.2)),
-        "feet": float(np.linalg.norm((feet - feet[0])[:, [0, 2]], axis=-1).max()),
+        "feet": body.feet_travel,
         "upright": float(np.percentile(body.lean, 90)),
         "pelvis": float(np.percentile(body.height, 5)),
     }

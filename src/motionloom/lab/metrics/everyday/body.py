@@ -109,6 +109,16 @@ class Body:
         """Metres: the farthest the pelvis gets from where it began, over the ground."""
         return float(np.linalg.norm((self.p[:, 0] - self.p[0, 0])[:, [0, 2]], axis=-1).max())
 
+    @cached_property
+    def feet(self) -> Array:
+        """(frames, 3) metres: the middle of the ankles."""
+        return self.p[:, ANKLES].mean(axis=1)
+
+    @property
+    def feet_travel(self) -> float:
+        """Metres: the farthest the middle of the ankles gets from where it began, over the ground."""
+        return float(np.linalg.norm((self.feet - self.feet[0])[:, [0, 2]], axis=-1).max())
+
     # ---- posture ---------------------------------------------------------------------------------------------------
 
     @cached_property
@@ -137,10 +147,19 @@ class Body:
         return np.degrees(g.knee_bend(self.p))
 
     @cached_property
+    def across(self) -> Array:
+        """(frames, 3) metres: from the right hip and shoulder to the left ones."""
+        return self.p[:, HIPS[0]] - self.p[:, HIPS[1]] + self.p[:, SHOULDERS[0]] - self.p[:, SHOULDERS[1]]
+
+    @property
+    def axis_across(self) -> Array:
+        """(frames, 3): the direction of `across`, about which the trunk turns forwards."""
+        return self.across / np.maximum(np.linalg.norm(self.across, axis=-1, keepdims=True), 1e-9)
+
+    @cached_property
     def front(self) -> Array:
         """(frames, 3): the direction the chest faces; y is 1 on the back, -1 face down, 0 upright."""
-        across = self.p[:, HIPS[0]] - self.p[:, HIPS[1]] + self.p[:, SHOULDERS[0]] - self.p[:, SHOULDERS[1]]
-        front = np.cross(across, self.p[:, J["neck"]] - self.p[:, 0])
+        front = np.cross(self.across, self.p[:, J["neck"]] - self.p[:, 0])
         return front / np.maximum(np.linalg.norm(front, axis=-1, keepdims=True), 1e-9)
 
     @cached_property

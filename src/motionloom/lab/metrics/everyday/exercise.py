@@ -63,11 +63,10 @@ def side_lunge(body: Body, side: int) -> Measures:
     ``trunk``: degrees the trunk leans, median."""
     wide = np.abs(body.own[:, ANKLES[0], 0] - body.own[:, ANKLES[1], 0]) > 0.6 * body.leg
     lunges = [wide & (body.knees[:, s] > 50) & (body.knees[:, 1 - s] < body.knees[:, s] - 30) for s in (side, 1 - side)]
-    feet = body.p[:, ANKLES].mean(axis=1)
     return {
         "held": body.held(lunges[0]),
         "other": body.held(lunges[1]),
-        "feet": float(np.linalg.norm((feet - feet[0])[:, [0, 2]], axis=-1).max()),
+        "feet": body.feet_travel,
         "trunk": float(np.median(body.lean)),
     }
 

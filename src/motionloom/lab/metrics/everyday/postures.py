@@ -159,10 +159,8 @@ def crawls(body: Body) -> Measures:
 def rolls(body: Body) -> Measures:
     """``rolled``: degrees the trunk turns over forwards. ``low``: metres of the head over the floor at its lowest.
     ``flown``: metres the lowest joint is over the floor at the most."""
-    across = body.p[:, 1] - body.p[:, 2] + body.p[:, 16] - body.p[:, 17]
-    across = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
     return {
-        "rolled": float(body.spin(across).max()),
+        "rolled": float(body.spin(body.axis_across).max()),
         "head": float(body.p[:, 15, 1].min()),
         "pelvis": float(body.p[:, 0, 1].min()),
     }

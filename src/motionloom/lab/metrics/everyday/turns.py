@@ -74,9 +74,7 @@ def somersaults(body: Body) -> Measures:
     leans from the vertical at the most. ``hands``: metres of the lower wrist over the floor at its lowest.
     ``tumbled``: degrees the trunk turns over to a side (about the direction it faces), either way. ``flown``:
     metres the lowest joint is over the floor at the most."""
-    across = body.p[:, 1] - body.p[:, 2] + body.p[:, 16] - body.p[:, 17]
-    across = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
-    rolled, tumbled = body.spin(across), body.spin(body.front)
+    rolled, tumbled = body.spin(body.axis_across), body.spin(body.front)
     return {
         "rolled": float(rolled[np.argmax(np.abs(rolled))]),
         "tumbled": float(np.abs(tumbled).max()),
@@ -111,11 +109,10 @@ def sways(body: Body) -> Measures:
     metres the middle of the feet goes. ``turned``: degrees of heading between the farthest ways. ``ahead``: degrees
     the trunk leans to front or back, 90th percentile. ``lifted``: metres an ankle is lifted, 95th percentile.
     ``hands``: m/s of the wrists against the body, mean."""
-    feet = body.p[:, ANKLES].mean(axis=1)
-    side = (body.p[:, 9] - feet) @ _left_at_start(body)
+    side = (body.p[:, 9] - body.feet) @ _left_at_start(body)
     return {
         "swings": g.oscillations(side, 0.06),
-        "feet": float(np.linalg.norm((feet - feet[0])[:, [0, 2]], axis=-1).max()),
+        "feet": body.feet_travel,
         "turned": float(np.ptp(body.heading)),
         "ahead": float(np.percentile(np.abs(body.bend), 90)),
         "lifted": float(np.percentile(body.ankles - np.percentile(body.ankles, 5, axis=0), 95)),
@@ -124,7 +121,7 @@ def sways(body: Body) -> Measures:
 
 
 def _left_at_start(body: Body) -> np.ndarray:
-    across = np.median(body.p[:, 1] - body.p[:, 2] + body.p[:, 16] - body.p[:, 17], axis=0) * [1.0, 0.0, 1.0]
+    across = np.median(body.across, axis=0) * [1.0, 0.0, 1.0]
     return across / max(float(np.linalg.norm(across)), 1e-9)
 
 
