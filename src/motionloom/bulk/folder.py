@@ -47,6 +47,8 @@ class Head:
     """Files and bytes of the shard's data; no files where no row was kept."""
     counts: dict[str, int]
     """Rows by what became of them, one of `STATES`."""
+    refused: int = 0
+    """How many of the failed ones cannot be made as they are written, whoever tries."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +132,7 @@ def about(options: Options, *, rows: int, shard_rows: int) -> dict[str, Any]:
         "version": version("motionloom"),
         "weights": {"name": card.name, "sha256": weights, "licence": card.licence},
         "motions": options.of_motions(weights),
+        "duets": options.of_duets(),
         "defaults": {"seconds": options.seconds, "seed": options.seed, "skeleton": _skeleton(options)},
         "files": options.format,
         "filter": options.filter,
@@ -175,7 +178,7 @@ def open_folder(out: Path, options: Options, *, rows: int, shard_rows: int) -> d
     found = read_manifest(check_folder(out))
     wanted = about(options, rows=rows, shard_rows=shard_rows if found is None else int(found["shard_rows"]))
     if found is not None:
-        for part in ("weights", "motions", "defaults", "files", "filter", "judge"):
+        for part in ("weights", "motions", "duets", "defaults", "files", "filter", "judge"):
             if found.get(part) != wanted[part]:
                 was, now = _difference(found.get(part), wanted[part])
                 raise MotionloomError(

@@ -146,12 +146,18 @@ def _csv(path: Path) -> Iterator[bytes]:
     csv.field_size_limit(MAX_LINE)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            table = csv.DictReader(file, strict=True)
+            head = file.readline(MAX_LINE)
+            file.seek(0)
+            between = max(",;\t", key=head.count)  # a table of a country with decimal commas has semicolons
+            table = csv.DictReader(file, strict=True, delimiter=between)
+            names = [name.strip() for name in table.fieldnames or ()]
+            if twice := [name for name in names if names.count(name) > 1]:
+                raise MotionloomError(f"{path} has the column {twice[0]!r} twice; name each once")
             for row in table:
                 if None in row or None in row.values():
                     raise MotionloomError(
                         f"{path}, line {table.line_num}: {len(table.fieldnames or ())} fields are needed, as in the "
-                        "first line; put quotes around a prompt with a comma"
+                        f"first line; put quotes around a prompt with a {between!r}"
                     )
                 yield _json({key.strip(): _value(key.strip(), text) for key, text in row.items() if text.strip()})
     except (csv.Error, UnicodeDecodeError) as error:
@@ -160,7 +166,7 @@ def _csv(path: Path) -> Iterator[bytes]:
 
 def _value(column: str, text: str) -> Any:
     """Numbers of the columns that hold numbers; what is none is told by `row.parse`."""
-    kinds = {"seconds": float, "seed": int}
+    kinds = {"seconds": float, "seed": int, "person": int}
     try:
         return kinds[column](text) if column in kinds else text
     except ValueError:
