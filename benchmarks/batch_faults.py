@@ -17,6 +17,7 @@ import os
 import random
 import secrets
 import signal
+import socket
 import subprocess
 import sys
 import tarfile
@@ -82,9 +83,25 @@ class Cluster:
         self.folder = folder
         self.raylets: list[subprocess.Popen[bytes]] = []
         self.head = self._start("--head", f"--port={PORT}", "--num-cpus=0", "--include-dashboard=false")
+        self._wait()
+        self.add()
+        self.add()
+
+    def _wait(self) -> None:
+        """Until the head takes calls."""
+        while True:
+            self.check()
+            with suppress(OSError), socket.create_connection(("127.0.0.1", PORT), timeout=1):
+                break
+            time.sleep(0.5)
         time.sleep(8)
-        self.add()
-        self.add()
+        self.check()
+
+    def check(self) -> None:
+        """End it all where the head has died, which nobody killed: on a machine that is too busy Ray gives up."""
+        if self.head.poll() is not None:
+            self.end()
+            sys.exit(f"the head ended by itself: {(self.folder / 'ray.log').read_text()[-500:]}")
 
     def add(self) -> None:
         """Another raylet."""
@@ -197,6 +214,7 @@ def beat(cluster: Cluster, one: Driver, disk: Disk, *, blows: int, pause: float,
     struck, full = Counter[str](), [round(blows * share) for share in FULL_AT] if disk.mounted else []
     while struck.total() - struck["full disk"] < blows and one.report() is None:
         time.sleep(pause * dice.random())
+        cluster.check()
         if one.popen.poll() is not None:
             if one.report() is not None:
                 break
@@ -204,7 +222,7 @@ def beat(cluster: Cluster, one: Driver, disk: Disk, *, blows: int, pause: float,
             one.start()
         if full and struck.total() - struck["full disk"] >= full[0]:
             full.pop(0)
-            fill(one, disk)
+            fill(one, disk, cluster)
             struck["full disk"] += 1
             continue
         kind = dice.choice(KINDS)
@@ -224,15 +242,16 @@ def beat(cluster: Cluster, one: Driver, disk: Disk, *, blows: int, pause: float,
     return struck
 
 
-def fill(one: Driver, disk: Disk) -> None:
+def fill(one: Driver, disk: Disk, cluster: Cluster) -> None:
     """The disk is full until the driver has ended over it."""
     disk.fill()
     print(f"{time.strftime('%X')} full disk", flush=True)
     while True:
-        with suppress(subprocess.TimeoutExpired):
-            one.popen.wait(timeout=600)
+        while one.popen.poll() is None:
+            cluster.check()
+            time.sleep(0.5)
         print(f"{time.strftime('%X')}   the driver ended ({one.popen.poll()}): {said(one)}", flush=True)
-        if one.popen.poll() == 2:
+        if one.popen.poll() == 2 and "No space left" in said(one):
             break
         one.start()
     disk.resize(ROOM)

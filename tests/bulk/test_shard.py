@@ -2,6 +2,7 @@
 
 import errno
 import json
+import shutil
 import tarfile
 from collections import Counter
 from dataclasses import replace
@@ -196,6 +197,28 @@ def test_a_filter_drops_what_does_not_pass_and_says_what_it_measured(ready: Make
     for one in results():
         assert (one.about["travel"] > travel[2]) == (one.state == "made") == (one.motion is not None)
     assert make(ready, rows(6), replace(ready.options, filter=condition)).made == 0
+
+
+@pytest.mark.parametrize("kind", ["npz", "webdataset"])
+def test_two_who_make_the_same_shard_keep_apart(ready: Maker, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An actor whose driver died may go on for a while beside the one that took its place."""
+    asked = replace(ready.options, format=kind)
+    make(ready, rows(3), asked)
+    exact = everything()
+    shutil.rmtree(OUT)
+    commit, others = shard_module._Shard._commit, []
+
+    def late(self: Any, data: Path | None, **more: Any) -> Report:
+        if not others:
+            others.append("begun")
+            others.append(make(ready, rows(3), asked))
+        return commit(self, data, **more)
+
+    monkeypatch.setattr(shard_module._Shard, "_commit", late)
+    with pytest.raises(MotionloomError, match="cannot write to out"):
+        make(ready, rows(3), asked)
+    assert others[1] == Report(0, 3, {"made": 3}, 3)
+    assert everything() == exact
 
 
 def test_a_full_disk_leaves_the_folder_as_it_was(ready: Maker, monkeypatch: pytest.MonkeyPatch) -> None:

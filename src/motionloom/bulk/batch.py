@@ -226,6 +226,5 @@ def _finish(store: Store, shards: int, *, changed: bool) -> None:
         return
     if changed or not any((store.out / f"metadata.{kind}").exists() for kind in ("parquet", "jsonl")):
         write_table(store, shards)
-    work = store.work(0).parent
-    if work.is_dir() and not any(work.iterdir()):
-        work.rmdir()
+    if store.work.is_dir() and not any(store.work.iterdir()):
+        store.work.rmdir()

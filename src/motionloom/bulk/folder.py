@@ -12,6 +12,7 @@ in one step too, which says how large the data are. So a shard is whole or it is
 import hashlib
 import json
 import os
+import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -67,13 +68,25 @@ class Store:
         """Where it is written what became of a shard's rows."""
         return self.out / RECORDS / f"{shard:06d}.jsonl"
 
-    def work(self, shard: int) -> Path:
-        """Where a shard is made; nobody reads there."""
-        return self.out / WORK / f"{shard:06d}"
+    @property
+    def work(self) -> Path:
+        """Where shards are made; nobody reads there."""
+        return self.out / WORK
+
+    def new_work(self, shard: int) -> Path:
+        """A folder to make a shard in, of its own for whoever calls: two who make the same shard keep apart."""
+        place = self.work / f"{shard:06d}.{os.urandom(4).hex()}"
+        place.mkdir(parents=True)
+        return place
+
+    def clear_work(self, shard: int) -> None:
+        """Remove what others made of a shard, who were killed. One who lives after all fails, and harms nobody."""
+        for place in self.work.glob(f"{shard:06d}.*/"):
+            shutil.rmtree(place, ignore_errors=True)
 
     def attempts(self, shard: int) -> Path:
         """Where it is noted what was begun and not ended: of a shard that was made, nothing."""
-        return self.out / WORK / f"{shard:06d}.attempts"
+        return self.work / f"{shard:06d}.attempts"
 
     def head(self, shard: int) -> Head | None:
         """What the record says of its shard, if both are whole."""
@@ -92,13 +105,16 @@ class Store:
             for line in file:
                 yield json.loads(line)
 
-    def commit(self, shard: int, data: Path | None, entries: Sequence[Entry], head: Head) -> None:
-        """Put a shard into the folder: ``data`` (None: nothing was kept) and the record of all of its rows."""
+    def commit(self, shard: int, data: Path | None, entries: Sequence[Entry], head: Head, *, old: Path) -> None:
+        """Put a shard into the folder: ``data`` (None: nothing was kept) and the record of all of its rows.
+
+        old: where to put a folder that was there before.
+        """
         target = self.data(shard)
         if data is not None:
             sync(data)
         if target.is_dir():
-            target.rename(self.work(shard) / "old")
+            target.rename(old)
         elif data is None:
             target.unlink(missing_ok=True)
         if data is not None:

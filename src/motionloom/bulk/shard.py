@@ -95,13 +95,12 @@ def make_shard(task: Task, batch: Batch, maker: Maker, moved: Callable[[int], No
     and then leaves the folder as it was.
     """
     store = Store(Path(batch.out), batch.options.format)
-    work, notes = store.work(task.shard), _Attempts(store.attempts(task.shard))
     try:
-        shutil.rmtree(work, ignore_errors=True)  # of somebody who was killed
-        work.mkdir(parents=True)
+        store.clear_work(task.shard)
+        work, notes = store.new_work(task.shard), _Attempts(store.attempts(task.shard))
         notes.note("begin")
         try:
-            return _Shard(task, batch, maker, store, notes, moved).make()
+            return _Shard(task, batch, maker, store, work, notes, moved).make()
         except (Exception, KeyboardInterrupt):
             notes.place.unlink(missing_ok=True)  # it ended, if not well
             raise
@@ -117,6 +116,8 @@ class _Shard:
     batch: Batch
     maker: Maker
     store: Store
+    work: Path
+    """A folder of its own."""
     notes: _Attempts
     moved: Callable[[int], None]
     entries: dict[int, Entry] = field(default_factory=dict)
@@ -181,7 +182,7 @@ class _Shard:
     def _write(self, todo: dict[int, Asked], carried: Sequence[str]) -> Path | None:
         numbers = {id(one): number for number, one in todo.items()}
         passes = Filter(self.batch.options.filter) if self.batch.options.filter else None
-        place = self.store.work(self.task.shard) / "data"
+        place = self.work / "data"
         file: Writer | None = None
         try:
             if carried:
@@ -217,7 +218,7 @@ class _Shard:
         size = sizes(data) if data is not None else {"files": 0, "bytes": 0}
         head = Head(digest(rows), self.names_files, size, counts, self.refused)
         if not same:
-            self.store.commit(shard, data, entries, head)
+            self.store.commit(shard, data, entries, head, old=self.work / "old")
         elif self.store.head(shard) != head or list(self.store.entries(shard)) != entries:
             self.store.write_record(shard, entries, head)
         self.notes.place.unlink(missing_ok=True)
