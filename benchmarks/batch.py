@@ -1,12 +1,13 @@
 """What a motion costs in a batch: alone, two shares beside each other, Ray on this machine; and for jobs of many sizes.
 
     python benchmarks/batch.py > benchmarks/batch.txt            # all of it, at most 20 minutes on two idle cores
-    python benchmarks/batch.py --bits                            # only: does every way make the same motions?
+    python benchmarks/batch.py --parts bits                      # only: does every way make the same motions?
 
 1. Sampling and body solving alone, in one process and in two beside each other: the most that any way can reach.
 2. Every way as its command does it, in processes of their own: motions of 4 s.
 3. Cost and memory for jobs of 10 to 10,000 rows: short motions of few steps, so that what is not sampling shows.
-4. The same bits: one row after the other, in shares, on Ray, in another order, with other rows beside them.
+4. Where the processor's time of one process goes.
+5. The same bits: one row after the other, in shares, on Ray, in another order, with other rows beside them.
 
 The clock of a way begins with its first shard (loading takes the same few seconds however many rows there are, and is
 given beside it) and ends when the last one is in the folder. Run it on a machine that does nothing else; figures from
@@ -40,6 +41,7 @@ WAYS = {
     "two shares": [["--workers", "1", "--shard", "0/2"], ["--workers", "1", "--shard", "1/2"]],
     "ray": [["--ray", "--workers", "2"]],
 }
+PARTS = ("ways", "sizes", "profile", "bits")
 CALL = 8
 """Rows of a network call."""
 SHORT = 0.5, 8
@@ -297,7 +299,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=24)
     parser.add_argument("--weights", default="default")
     parser.add_argument("--profile", type=int, default=100, metavar="ROWS", help="motions that are profiled")
-    parser.add_argument("--bits", action="store_true", help="only the last part")
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS, help="default: all of them")
     parser.add_argument("--pure", type=int, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.pure:
@@ -307,11 +309,13 @@ def main() -> None:
     options = ["--weights", arguments.weights, "--steps", str(arguments.steps)]
     began = time.monotonic()
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} at the start", flush=True)
-    if not arguments.bits:
+    if "ways" in arguments.parts:
         by_way(ways, arguments.rows, options, arguments)
+    if "sizes" in arguments.parts:
         by_size(arguments.sizes, arguments.weights, arguments.limit)
+    if "profile" in arguments.parts:
         profile(arguments.profile, arguments.steps, arguments.weights)
-    good = bits(32, ways, options)
+    good = "bits" not in arguments.parts or bits(32, ways, options)
     print(f"\n{(time.monotonic() - began) / 60:.1f} minutes in all")
     sys.exit(0 if good else "motions differ between the ways of making them")
 
