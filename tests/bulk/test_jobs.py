@@ -42,7 +42,8 @@ def test_a_csv_file_gives_the_rows_that_were_written(
 def test_a_csv_file_of_a_spreadsheet_may_have_a_mark_at_its_beginning_and_semicolons(
     folder: Path, between: str
 ) -> None:
-    lines = ["prompt;seconds;seed", '"walks; then sits, slowly";2.5;7', ";;"]
+    half = "2,5" if between == ";" else "2.5"
+    lines = ["prompt;seconds;seed", f'"walks; then sits, slowly";{half};7', ";;"]
     (folder / "a.csv").write_bytes(("\r\n".join(lines) + "\r\n").replace(";", between).encode("utf-8-sig"))
     prompt = f"walks{between} then sits, slowly"
     assert read(Jobs.of("a.csv")) == [{"prompt": prompt, "seconds": 2.5, "seed": 7}, {}]

@@ -8,7 +8,7 @@ from typing import Any
 
 from motionloom.bulk.crew import alone, cores
 from motionloom.bulk.folder import Head, Store, digest, open_folder
-from motionloom.bulk.jobs import Jobs, parquet, shard_size
+from motionloom.bulk.jobs import MOST, Jobs, parquet, shard_size
 from motionloom.bulk.maker import FORMATS, Made, Maker, Options
 from motionloom.bulk.measures import Filter
 from motionloom.bulk.metadata import Result, read_batch, result, write_table
@@ -73,7 +73,7 @@ def run(
     check_options(options)
     count = jobs.count() if rows is None else rows
     check_jobs(jobs, count)
-    manifest = open_folder(out, options, rows=count, shard_rows=shard_size(count))
+    manifest = open_folder(out, options, rows=count, shard_rows=options.shard_rows or shard_size(count))
     size = int(manifest["shard_rows"])
     store, shards = Store(out, options.format), -(-count // size)
     _check_left_over(store, shards)
@@ -113,6 +113,8 @@ def check_options(options: Options) -> None:
             )
     if not 0 <= options.pair_guidance <= 1:
         raise MotionloomError(f"the pair guidance must be 0 to 1; got {options.pair_guidance:g}")
+    if options.shard_rows is not None and not 1 <= options.shard_rows <= MOST:
+        raise MotionloomError(f"a shard has 1 to {MOST:,} rows; got {options.shard_rows:,}")
     if options.fps is not None and not 1 <= options.fps <= 1000:
         raise MotionloomError(f"the frame rate must be 1 to 1000; got {options.fps:g}")
     if options.skeleton is not None and options.skeleton != "smpl22" and not Path(options.skeleton).is_file():

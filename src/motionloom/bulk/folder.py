@@ -200,6 +200,10 @@ def open_folder(out: Path, options: Options, *, rows: int, shard_rows: int) -> d
                 raise MotionloomError(
                     f"{out} was made with other settings: {part} {was}, not {now}; name another folder"
                 )
+        if options.shard_rows not in (None, wanted["shard_rows"]):
+            raise MotionloomError(
+                f"{out} has shards of {wanted['shard_rows']:,} rows, not {options.shard_rows:,}; name another folder"
+            )
     try:
         for place in (out, out / RECORDS, out / WORK):
             place.mkdir(exist_ok=True)

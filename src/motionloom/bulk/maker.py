@@ -64,6 +64,8 @@ class Options:
     """A file with the skeleton of rows that name none; None: the 22-joint person."""
     format: str = "npz"
     """One of `FORMATS`."""
+    shard_rows: int | None = None
+    """Rows of a shard, up to `motionloom.bulk.jobs.MOST`; None: as suits the job's size."""
     filter: str | None = None
     """See `motionloom.bulk.measures.Filter`; motions that do not pass are dropped."""
     judge: str | None = None

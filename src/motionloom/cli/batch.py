@@ -40,6 +40,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "--format", default="npz", choices=("npz", "bvh", "glb", "webdataset", "parquet"),
         help="single files, or shards that hold many (default npz)",
     )  # fmt: skip
+    parser.add_argument("--shard-rows", type=int, metavar="N", help="rows of a shard (default: by the job, up to 1000)")
     parser.add_argument("--filter", metavar="CONDITION", help="keep what passes, such as 'skate < 0.2 and obeys'")
     parser.add_argument("--seconds", type=float, default=5.0, help="length of rows that do not say (default 5)")
     parser.add_argument(
@@ -119,7 +120,7 @@ def _options(arguments: argparse.Namespace) -> "Options":
     return Options(
         weights=arguments.weights, adapters=arguments.adapter, device=arguments.device, bf16=arguments.bf16,
         raw=arguments.raw, fps=arguments.fps, pair_weights=arguments.pair_weights,
-        pair_guidance=arguments.pair_guidance,
+        pair_guidance=arguments.pair_guidance, shard_rows=arguments.shard_rows,
         seconds=arguments.seconds, seed=arguments.seed, skeleton=arguments.skeleton, format=arguments.format,
         filter=arguments.filter, judge=JUDGE if obeys else None,
         **{name: value for name, value in given.items() if value is not None},
@@ -199,7 +200,7 @@ def _say(out: Path, counts: "dict[str, int]", made: int) -> None:
         if counts["failed"]
         else []
     )
-    print(("nothing was left to make: " if not made else "") + ", ".join(said))
+    print(("nothing was left to make: " if counts["made"] and not made else "") + ", ".join(said))
 
 
 class _Progress:
