@@ -1,11 +1,14 @@
-"""Twenty random blows to a batch on a local Ray cluster of several processes: is every row there exactly once?
+"""Random blows to a batch on a local Ray cluster of several processes: is every row there exactly once?
 
     python benchmarks/batch_faults.py --blows 20 --seed 0
 
-A head and two more raylets are started on this machine, and `motionloom batch --ray auto` on them. Then, at random
-times, a worker, a raylet or the driver is killed (SIGKILL); raylets and drivers are started again, as a cluster manager
-and a user would. Among the rows is one that cannot be made. At the end the same command is run until it says that
-nothing is left, and every row is looked at.
+A head and two more raylets are started on this machine, and `motionloom batch --ray` on them. Then, at random times, a
+worker, a raylet or the driver is killed (SIGKILL); raylets and drivers are started again, as a cluster manager and a
+user would. Twice the disk is full: the folder lies on a tmpfs of its own, which is made so small that nothing more
+fits into it, until the driver has ended over it (only for root on Linux; else it is said and left out). Among the rows
+is one that cannot be made, and one that ends every process that makes it. In the end the same command is run until it
+comes to its end, and every row is looked at; then both rows are mended, and the command is run twice more: once to make
+them, once when nothing is left.
 """
 
 import argparse
@@ -14,34 +17,47 @@ import os
 import random
 import secrets
 import signal
+import socket
 import subprocess
 import sys
+import tarfile
 import tempfile
 import time
 from collections import Counter
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
+from motionloom.bulk.folder import Store
 from motionloom.bulk.metadata import read_batch
 
 PORT = 26379
 RAY = [sys.executable, "-m", "ray.scripts.scripts", "start", "--block", "--disable-usage-stats"]
+POISON = "a person swallows poison"
+KINDS = ("worker", "worker", "raylet", "driver")
+ROOM = "256m"
+FULL_AT = (0.3, 0.7)
+"""After these shares of the blows the disk is full."""
 
 
-def processes(word: str) -> list[int]:
-    """Processes of this machine whose command line has this word, but not this one."""
-    found = []
-    for place in Path("/proc").glob("[0-9]*"):
-        try:
-            if word.encode() in (place / "cmdline").read_bytes() and int(place.name) != os.getpid():
-                found.append(int(place.name))
-        except OSError:
-            continue
-    return found
+def deadly(prompt: str, _positions: Any, _fps: float) -> bool | None:
+    """A judge that ends its process over one prompt, and knows nothing of the others."""
+    if prompt == POISON:
+        os._exit(9)
+    return None
 
 
-def kill_all(process: "subprocess.Popen[bytes]") -> None:
-    """End a process that was started here and everything below it."""
+def driver(words: list[str]) -> int:
+    """`motionloom batch` with that judge."""
+    import motionloom.cli.batch
+    from motionloom.cli import main as motionloom_main
+
+    motionloom.cli.batch.JUDGE = "batch_faults:deadly"
+    return motionloom_main(["batch", *words])
+
+
+def family(process: "subprocess.Popen[bytes]") -> list[int]:
+    """A process that was started here and everything below it."""
     above = {}
     for place in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
@@ -49,24 +65,55 @@ def kill_all(process: "subprocess.Popen[bytes]") -> None:
     below = [process.pid]
     for pid in below:
         below += [other for other, parent in above.items() if parent == pid]
-    for pid in below:
+    return below
+
+
+def kill_all(process: "subprocess.Popen[bytes]") -> None:
+    """End a process that was started here and everything below it."""
+    for pid in family(process):
         with suppress(OSError):
             os.kill(pid, signal.SIGKILL)
     process.wait()
 
 
 class Cluster:
-    """A head without processors, and raylets with one each."""
+    """A head without processors, and two raylets with one each."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.raylets: list[subprocess.Popen[bytes]] = []
         self.head = self._start("--head", f"--port={PORT}", "--num-cpus=0", "--include-dashboard=false")
+        self._wait()
+        self.add()
+        self.add()
+
+    def _wait(self) -> None:
+        """Until the head takes calls."""
+        while True:
+            self.check()
+            with suppress(OSError), socket.create_connection(("127.0.0.1", PORT), timeout=1):
+                break
+            time.sleep(0.5)
         time.sleep(8)
+        self.check()
+
+    def check(self) -> None:
+        """End it all where the head has died, which nobody killed: on a machine that is too busy Ray gives up."""
+        if self.head.poll() is not None:
+            self.end()
+            sys.exit(f"the head ended by itself: {(self.folder / 'ray.log').read_text()[-500:]}")
 
     def add(self) -> None:
         """Another raylet."""
         self.raylets.append(self._start(f"--address=127.0.0.1:{PORT}", "--num-cpus=1"))
+
+    def workers(self) -> list[int]:
+        """Processes that hold a prior."""
+        found = []
+        for pid in (pid for raylet in self.raylets for pid in family(raylet)):
+            with suppress(OSError):
+                found += [pid] if b"ray::Hand" in Path(f"/proc/{pid}/cmdline").read_bytes() else []
+        return found
 
     def kill_raylet(self, dice: random.Random) -> None:
         """One raylet and what it runs, gone at once; a new one takes its place."""
@@ -80,9 +127,160 @@ class Cluster:
             kill_all(one)
 
     def _start(self, *words: str) -> "subprocess.Popen[bytes]":
-        log = (self.folder / "ray.log").open("ab")
         command = [*RAY, "--object-store-memory=100000000", *words]
-        return subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
+        with (self.folder / "ray.log").open("ab") as log:
+            return subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
+
+
+class Disk:
+    """A folder on a file system of its own, whose size can be changed."""
+
+    def __init__(self, place: Path) -> None:
+        self.place = place
+        place.mkdir()
+        self.mounted = subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", f"size={ROOM}", "tmpfs", str(place)], check=False, capture_output=True
+        ).returncode == 0  # fmt: skip
+
+    def resize(self, size: str) -> None:
+        """Make it larger, or smaller than it is but not than what it holds."""
+        subprocess.run(["mount", "-o", f"remount,size={size}", str(self.place)], check=True)
+
+    def fill(self) -> None:
+        """No room for anything more."""
+        about = os.statvfs(self.place)
+        self.resize(str((about.f_blocks - about.f_bfree) * about.f_frsize))
+
+    def end(self) -> None:
+        """As it was before."""
+        if self.mounted:
+            subprocess.run(["umount", str(self.place)], check=True)
+
+
+class Driver:
+    """The command, started again whenever it ended."""
+
+    def __init__(self, command: list[str], folder: Path) -> None:
+        self.command, self.folder, self.starts = command, folder, 0
+        self.start()
+
+    def start(self) -> None:
+        """Once more."""
+        self.starts += 1
+        with self.output.open("wb") as out, self.errors.open("wb") as errors:
+            self.popen = subprocess.Popen(self.command, stdout=out, stderr=errors)
+
+    @property
+    def output(self) -> Path:
+        """Of the last start."""
+        return self.folder / "driver.json"
+
+    @property
+    def errors(self) -> Path:
+        """Of the last start."""
+        return self.folder / "driver.txt"
+
+    def report(self) -> dict[str, Any] | None:
+        """What it said at its end; None while it runs, and where it came to none."""
+        if self.popen.poll() not in (0, 1):
+            return None
+        try:
+            return json.loads(self.output.read_text())
+        except ValueError:
+            return None
+
+    def finish(self, most: int) -> tuple[dict[str, Any], float]:
+        """Start it until it comes to its end; what it said, and the seconds of the last start."""
+        for _ in range(most):
+            self.start()
+            began = time.monotonic()
+            self.popen.wait()
+            if found := self.report():
+                return found, time.monotonic() - began
+        sys.exit(f"{most} drivers came to no end: {self.errors.read_text()[-500:]}")
+
+
+def job(path: Path, count: int, *, poisoned: bool) -> None:
+    """Rows of 1 to 3 s."""
+    rows = [{"prompt": "a person walks", "seconds": 1 + i % 3, "seed": i} for i in range(count)]
+    if poisoned:
+        rows[count // 2]["seconds"] = 1000
+        rows[count // 3]["prompt"] = POISON
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows))
+
+
+def beat(cluster: Cluster, one: Driver, disk: Disk, *, blows: int, pause: float, dice: random.Random) -> Counter[str]:
+    """All the blows, unless the batch is ready before; how many of which kind."""
+    struck, full = Counter[str](), [round(blows * share) for share in FULL_AT] if disk.mounted else []
+    while struck.total() - struck["full disk"] < blows and one.report() is None:
+        time.sleep(pause * dice.random())
+        cluster.check()
+        if one.popen.poll() is not None:
+            if one.report() is not None:
+                break
+            print(f"{time.strftime('%X')}   the driver ended ({one.popen.poll()}): {said(one)}", flush=True)
+            one.start()
+        if full and struck.total() - struck["full disk"] >= full[0]:
+            full.pop(0)
+            fill(one, disk, cluster)
+            struck["full disk"] += 1
+            continue
+        kind = dice.choice(KINDS)
+        victims = cluster.workers()
+        if kind == "worker" and not victims:
+            continue
+        if kind == "worker":
+            with suppress(ProcessLookupError):
+                os.kill(dice.choice(victims), signal.SIGKILL)
+        elif kind == "raylet":
+            cluster.kill_raylet(dice)
+        else:
+            one.popen.kill()
+            one.popen.wait()
+        struck[kind] += 1
+        print(f"{time.strftime('%X')} {kind}", flush=True)
+    return struck
+
+
+def fill(one: Driver, disk: Disk, cluster: Cluster) -> None:
+    """The disk is full until the driver has ended over it."""
+    disk.fill()
+    print(f"{time.strftime('%X')} full disk", flush=True)
+    while True:
+        while one.popen.poll() is None:
+            cluster.check()
+            time.sleep(0.5)
+        print(f"{time.strftime('%X')}   the driver ended ({one.popen.poll()}): {said(one)}", flush=True)
+        if one.popen.poll() == 2 and "No space left" in said(one):
+            break
+        one.start()
+    disk.resize(ROOM)
+
+
+def said(one: Driver) -> str:
+    """The last line of its complaints."""
+    return (one.errors.read_text(errors="replace").strip().splitlines() or [""])[-1][:150]
+
+
+def look(out: Path, rows: int) -> tuple[Counter[str], list[str]]:
+    """Rows by what became of them, and everything that should not be."""
+    found = list(read_batch(out))
+    wrong = [] if [one.row for one in found] == list(range(rows)) else ["rows are missing or there twice"]
+    made = [one.id for one in found if one.state == "made"]
+    if len(set(made)) != len(made) or sum(one.motion is not None for one in found) != len(made):
+        wrong.append("motions are missing or there twice")
+    in_tars: list[str] = []
+    for shard in out.glob("shard-*.tar"):
+        with tarfile.open(shard) as tar:
+            in_tars += tar.getnames()
+    if sorted(in_tars) != sorted(f"{name}.{kind}" for name in made for kind in ("npz", "json")):
+        wrong.append("tars hold other things than the records say")
+    store = Store(out, "webdataset")
+    known = {f"shard-{number:06d}.tar" for number in range(len(list(store.record(0).parent.glob("*.jsonl"))))}
+    left = {path.name for path in out.iterdir()} - known - {"manifest.json", "records", "metadata.parquet"}
+    left |= {path.name for path in (out / "records").iterdir()} - {name[6:12] + ".jsonl" for name in known}
+    wrong += [f"left over: {name}" for name in sorted(left)]
+    return Counter(one.state for one in found), wrong
 
 
 def main() -> None:
@@ -95,55 +293,62 @@ def main() -> None:
     parser.add_argument("--weights", default="default")
     parser.add_argument("--steps", type=int, default=24)
     arguments = parser.parse_args()
+    here = str(Path(__file__).resolve().parent)
+    os.environ["PYTHONPATH"] = os.pathsep.join([here, *filter(None, [os.environ.get("PYTHONPATH")])])
     os.environ |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(16)}  # this cluster's own
-    dice, blows, drivers = random.Random(arguments.seed), Counter[str](), 1
     with tempfile.TemporaryDirectory(prefix="motionloom-") as name:
         folder = Path(name)
-        rows = [{"prompt": "a person walks", "seconds": 1 + i % 3, "seed": i} for i in range(arguments.rows)]
-        rows[arguments.rows // 2]["seconds"] = 1000  # the poisoned one
-        (folder / "jobs.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-        command = [
-            sys.executable, "-m", "motionloom", "batch", str(folder / "jobs.jsonl"), "--out", str(folder / "out"),
-            "--format", "webdataset", "--ray", f"127.0.0.1:{PORT}", "--workers", "2", "--weights", arguments.weights,
-            "--steps", str(arguments.steps),
-        ]  # fmt: skip
-        cluster = Cluster(folder)
+        disk = Disk(folder / "disk")
+        if not disk.mounted:
+            print("no file system of its own can be mounted here: the disk will not be full")
         try:
-            cluster.add()
-            cluster.add()
-            driver = subprocess.Popen(command)
-            while blows.total() < arguments.blows and driver.poll() in (None, -9, 2):
-                time.sleep(arguments.pause * dice.random())
-                if driver.poll() is not None:
-                    driver, drivers = subprocess.Popen(command), drivers + 1
-                kind = dice.choice(["worker", "worker", "raylet", "driver"])
-                victims = processes("ray::Hand")
-                if kind == "worker" and not victims:
-                    continue
-                if kind == "worker":
-                    os.kill(dice.choice(victims), signal.SIGKILL)
-                elif kind == "raylet":
-                    cluster.kill_raylet(dice)
-                else:
-                    driver.kill()
-                    driver.wait()
-                blows[kind] += 1
-                print(f"{time.strftime('%X')} {kind}", flush=True)
-            code = driver.wait() if driver.poll() is None else driver.poll()
-            while code not in (0, 1) and drivers < 2 * arguments.blows + 10:
-                code, drivers = subprocess.run(command, check=False).returncode, drivers + 1
-            again = subprocess.run(command, capture_output=True, text=True, check=False)
+            sys.exit(1 if strike(folder, disk, arguments) else 0)
         finally:
-            cluster.end()
-        found = list(read_batch(folder / "out"))
-        states = Counter(one.state for one in found)
-        whole = [one.row for one in found] == list(range(arguments.rows)) and states["failed"] == 1
-        motions = sum(one.motion is not None for one in found)
-        left = [str(path) for path in (folder / "out").rglob("*") if ".part" in path.name or ".work" in path.parts]
-        print(f"{dict(blows)}, {drivers} drivers; {dict(states)}, {motions} motions read; left over: {left}")
-        print(again.stdout.strip(), again.stderr.strip())
-        sys.exit(0 if whole and motions == states["made"] == arguments.rows - 1 and not left else 1)
+            disk.end()
+
+
+def strike(folder: Path, disk: Disk, arguments: argparse.Namespace) -> list[str]:
+    """The whole story; what went wrong in it."""
+    out = disk.place / "out"
+    job(folder / "jobs.jsonl", arguments.rows, poisoned=True)
+    command = [
+        sys.executable, __file__, "--driver", str(folder / "jobs.jsonl"), "--out", str(out), "--format", "webdataset",
+        "--ray", f"127.0.0.1:{PORT}", "--workers", "2", "--weights", arguments.weights, "--steps",
+        str(arguments.steps), "--filter", "obeys", "--json",
+    ]  # fmt: skip
+    cluster = Cluster(folder)
+    try:
+        one = Driver(command, folder)
+        dice = random.Random(arguments.seed)
+        struck = beat(cluster, one, disk, blows=arguments.blows, pause=arguments.pause, dice=dice)
+        if one.popen.poll() is None:
+            one.popen.wait()
+        if one.report() is None:
+            one.finish(10)
+        counts, wrong = look(out, arguments.rows)
+        print(f"{dict(struck)}, {one.starts} drivers; {dict(counts)}")
+        reasons = [f"row {row.row}: {row.why}" for row in read_batch(out, motions=False) if row.state == "failed"]
+        print("\n".join(reasons))
+        if struck.total() - struck["full disk"] < arguments.blows:
+            wrong.append("the batch was ready before the last blow; ask for more rows")
+        if counts != {"made": arguments.rows - 2, "failed": 2}:
+            wrong.append("not exactly the two poisoned rows failed")
+        job(folder / "jobs.jsonl", arguments.rows, poisoned=False)
+        mended, seconds = one.finish(5)
+        print(f"both rows mended: {mended}, {seconds:.0f} s")
+        again, seconds = one.finish(1)
+        print(f"once more: {again}, {seconds:.1f} s")
+        counts, more = look(out, arguments.rows)
+        wrong += more
+        if counts != {"made": arguments.rows} or mended["tried"] != 2 or again["tried"]:
+            wrong.append("the mended rows were not made exactly once")
+        print("\n".join(wrong) or "every row is there exactly once")
+        return wrong
+    finally:
+        cluster.end()
 
 
 if __name__ == "__main__":
+    if sys.argv[1:2] == ["--driver"]:
+        sys.exit(driver(sys.argv[2:]))
     main()

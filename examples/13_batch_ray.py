@@ -6,12 +6,14 @@ This is for pipelines that go on behind the motions: filter, tokenise, train. Ne
 
 import json
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
 from motionloom.bulk.maker import Made, Maker, Options
 from motionloom.bulk.row import parse
+from motionloom.errors import MotionloomError
 
 
 class Motions:
@@ -23,7 +25,10 @@ class Motions:
     def __call__(self, rows: dict[str, np.ndarray]) -> dict[str, list]:
         """Rows that cannot be made are left out."""
         asked = [dict(zip(rows, values)) for values in zip(*(column.tolist() for column in rows.values()))]
-        ready = [self.maker.sources.ask(parse(json.dumps(row).encode())) for row in asked]
+        ready = []
+        for row in asked:
+            with suppress(MotionloomError):
+                ready.append(self.maker.sources.ask(parse(json.dumps(row).encode())))
         made = [(one, found) for one, found in self.maker.make(ready) if isinstance(found, Made)]
         return {
             "id": [one.key for one, _ in made],

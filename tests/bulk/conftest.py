@@ -4,14 +4,21 @@ from pathlib import Path
 
 import pytest
 
-from motionloom.weights.prior import save_prior
+from motionloom.weights.prior import Prior, save_prior
 from tests.nets import tiny
+from tests.tasks.two_people import block
 
 
 @pytest.fixture(scope="session")
 def weights(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The file of a tiny prior with random weights."""
     return str(save_prior(tiny.prior(), tmp_path_factory.mktemp("weights") / "tiny.safetensors"))
+
+
+@pytest.fixture(scope="session")
+def pair_weights(weights: str, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The file of a block that makes two people of that prior."""
+    return str(block(Prior.load(weights)).save(tmp_path_factory.mktemp("pair") / "pair.safetensors", half=False))
 
 
 @pytest.fixture(autouse=True)

@@ -38,7 +38,21 @@ def test_a_csv_file_gives_the_rows_that_were_written(
     assert read(Jobs.of(path)) == [{"prompt": prompt, "seconds": 2.5, "seed": seed} for prompt in prompts]
 
 
-@pytest.mark.parametrize("text", ["prompt,seed\na,1,2\n", "prompt,seed\na\n", 'prompt\n"a\n', "prompt\n\udcff\n"])
+@pytest.mark.parametrize("between", [";", "\t"])
+def test_a_csv_file_of_a_spreadsheet_may_have_a_mark_at_its_beginning_and_semicolons(
+    folder: Path, between: str
+) -> None:
+    half = "2,5" if between == ";" else "2.5"
+    lines = ["prompt;seconds;seed", f'"walks; then sits, slowly";{half};7', ";;"]
+    (folder / "a.csv").write_bytes(("\r\n".join(lines) + "\r\n").replace(";", between).encode("utf-8-sig"))
+    prompt = f"walks{between} then sits, slowly"
+    assert read(Jobs.of("a.csv")) == [{"prompt": prompt, "seconds": 2.5, "seed": 7}, {}]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["prompt,seed,prompt\na,1,b\n", "prompt,seed\na,1,2\n", "prompt,seed\na\n", 'prompt\n"a\n', "prompt\n\udcff\n"],
+)
 def test_a_csv_file_with_rows_of_other_lengths_or_of_no_text_is_refused(folder: Path, text: str) -> None:
     (folder / "a.csv").write_bytes(text.encode("utf-8", "surrogateescape"))
     with pytest.raises(MotionloomError, match=r"a\.csv"):

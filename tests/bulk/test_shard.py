@@ -2,6 +2,7 @@
 
 import errno
 import json
+import shutil
 import tarfile
 from collections import Counter
 from dataclasses import replace
@@ -12,13 +13,15 @@ import numpy as np
 import pytest
 
 from motionloom.bulk import shard as shard_module
+from motionloom.bulk.batch import _items
 from motionloom.bulk.folder import Store, open_folder
+from motionloom.bulk.jobs import Jobs
 from motionloom.bulk.maker import Maker, Options
 from motionloom.bulk.metadata import Result, read_batch
 from motionloom.bulk.shard import CAREFUL, FATAL, Batch, Report, Task, make_shard
 from motionloom.errors import MotionloomError
 from motionloom.io import load
-from tests.bulk.rows import apart, options, positions, rows
+from tests.bulk.rows import apart, options, positions, rows, written
 
 OUT = Path("out")
 TIMELINE = "segments: [{text: a person walks, seconds: 1}, {text: a person sits, seconds: 1}]\n"
@@ -35,7 +38,7 @@ def make(maker: Maker, found: list[dict[str, Any]], asked: Options | None = None
     asked = asked or maker.options
     maker.sources._cache.clear()
     manifest = open_folder(OUT, asked, rows=len(found), shard_rows=max(len(found), 1))
-    batch = Batch(str(OUT), ".", manifest["weights"]["sha256"], asked)
+    batch = Batch(str(OUT), ".", manifest["weights"]["sha256"], manifest["duets"], asked)
     return make_shard(Task(0, first, [json.dumps(row).encode() for row in found]), batch, maker)
 
 
@@ -108,14 +111,33 @@ def test_rows_that_cannot_be_are_listed_with_a_sentence_and_the_others_made(read
     assert len(report.problems) == 3
 
 
+def test_rows_that_nobody_can_make_as_they_are_written_are_not_tried_again(ready: Maker, folder: Path) -> None:
+    """But those are that name files, which may come, and those that may go well another time."""
+    for number, (row, again) in enumerate(
+        [
+            ({"prompt": ""}, False),
+            ({"prompt": "a", "seconds": 99}, False),
+            ({"prompt": "a", "goal": "absent.json"}, True),
+        ]
+    ):
+        found = [*rows(2), row]
+        make(ready, found)
+        OUT.rename(f"out{number}")
+        jobs = Jobs.of(written(folder / "jobs.jsonl", found))
+        (item,) = _items(jobs, 3, Store(folder / f"out{number}", "npz"), (0, 1))
+        assert isinstance(item, Task) == again
+        if isinstance(item, Report):
+            assert (item.counts, item.made, len(item.problems)) == ({"made": 2, "failed": 1}, 0, 1)
+
+
 def test_a_row_that_breaks_the_program_breaks_itself_alone(ready: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
     """And is tried again, when it may go well; what is there already stays as it is."""
     finished = Maker._finished
 
-    def poisoned(self: Maker, asked: Any, motion: Any, **more: Any) -> Any:
+    def poisoned(self: Maker, asked: Any, *more: Any) -> Any:
         if asked.seed == 2:
             raise ZeroDivisionError("poison")
-        return finished(self, asked, motion, **more)
+        return finished(self, asked, *more)
 
     with monkeypatch.context() as patch:
         patch.setattr(Maker, "_finished", poisoned)
@@ -138,11 +160,11 @@ def test_a_row_that_ends_its_process_every_time_is_found_out(ready: Maker, monke
     finished = Maker._finished
     tried: Counter[int] = Counter()
 
-    def deadly(self: Maker, asked: Any, motion: Any, **more: Any) -> Any:
+    def deadly(self: Maker, asked: Any, *more: Any) -> Any:
         tried[asked.seed] += 1
         if asked.seed == 1:
             raise Killed
-        return finished(self, asked, motion, **more)
+        return finished(self, asked, *more)
 
     with monkeypatch.context() as patch:
         patch.setattr(Maker, "_finished", deadly)
@@ -175,6 +197,28 @@ def test_a_filter_drops_what_does_not_pass_and_says_what_it_measured(ready: Make
     for one in results():
         assert (one.about["travel"] > travel[2]) == (one.state == "made") == (one.motion is not None)
     assert make(ready, rows(6), replace(ready.options, filter=condition)).made == 0
+
+
+@pytest.mark.parametrize("kind", ["npz", "webdataset"])
+def test_two_who_make_the_same_shard_keep_apart(ready: Maker, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An actor whose driver died may go on for a while beside the one that took its place."""
+    asked = replace(ready.options, format=kind)
+    make(ready, rows(3), asked)
+    exact = everything()
+    shutil.rmtree(OUT)
+    commit, others = shard_module._Shard._commit, []
+
+    def late(self: Any, data: Path | None, **more: Any) -> Report:
+        if not others:
+            others.append("begun")
+            others.append(make(ready, rows(3), asked))
+        return commit(self, data, **more)
+
+    monkeypatch.setattr(shard_module._Shard, "_commit", late)
+    with pytest.raises(MotionloomError, match="cannot write to out"):
+        make(ready, rows(3), asked)
+    assert others[1] == Report(0, 3, {"made": 3}, 3)
+    assert everything() == exact
 
 
 def test_a_full_disk_leaves_the_folder_as_it_was(ready: Maker, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -60,6 +60,14 @@ def test_what_was_taught_is_in_the_motions_and_in_their_names(weights: str, caps
     assert "there is no adapter none.safetensors" in capsys.readouterr().err
 
 
+def test_rows_of_a_shard_can_be_chosen_once(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command(weights, "jobs.jsonl", "--shard-rows", "3") == 0
+    assert sorted(len(list(place.iterdir())) for place in Path("out").glob("shard-*")) == [1, 3]
+    capsys.readouterr()
+    assert command(weights, "jobs.jsonl", "--shard-rows", "2") == 2
+    assert "shards of 3 rows, not 2" in complaint(capsys)
+
+
 def test_failed_rows_are_reported_and_the_exit_code_says_so(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
     written(Path("jobs.jsonl"), [*rows(2), {"prompt": "a", "seconds": 99}])
     assert command(weights, "jobs.jsonl", "--filter", "travel < 0") == 1
@@ -85,7 +93,8 @@ def test_a_dry_run_says_how_much_and_writes_nothing(weights: str, capsys: pytest
         [], ["jobs.jsonl", "--prompts", "prompts.txt"], ["absent.jsonl"], ["prompts.txt"], ["--prompts", "absent.txt"],
         ["jobs.jsonl", "--variants", "2"], ["--prompts", "prompts.txt", "--variants", "0"],
         ["jobs.jsonl", "--filter", "speedy < 2"], ["jobs.jsonl", "--filter", "open('x')"],
-        ["jobs.jsonl", "--shard", "2/2"],
+        ["jobs.jsonl", "--shard", "2/2"], ["jobs.jsonl", "--shard-rows", "0"],
+        ["jobs.jsonl", "--pair-guidance", "2"], ["jobs.jsonl", "--pair-weights", "absent"],
         ["jobs.jsonl", "--shard", "x"], ["jobs.jsonl", "--shard", "0/2", "--ray"], ["jobs.jsonl", "--workers", "0"],
         ["jobs.jsonl", "--seed", "-1"], ["jobs.jsonl", "--bf16"], ["jobs.jsonl", "--fps", "0"],
         ["jobs.jsonl", "--skeleton", "absent.bvh"], ["jobs.jsonl", "--weights", "absent"],

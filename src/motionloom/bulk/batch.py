@@ -8,12 +8,12 @@ from typing import Any
 
 from motionloom.bulk.crew import alone, cores
 from motionloom.bulk.folder import Head, Store, digest, open_folder
-from motionloom.bulk.jobs import Jobs, parquet, shard_size
+from motionloom.bulk.jobs import MOST, Jobs, parquet, shard_size
 from motionloom.bulk.maker import FORMATS, Made, Maker, Options
 from motionloom.bulk.measures import Filter
 from motionloom.bulk.metadata import Result, read_batch, result, write_table
 from motionloom.bulk.row import parse
-from motionloom.bulk.shard import Batch, Report, Task
+from motionloom.bulk.shard import Batch, Report, Task, problems
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import parse_adapter
 
@@ -73,11 +73,17 @@ def run(
     check_options(options)
     count = jobs.count() if rows is None else rows
     check_jobs(jobs, count)
-    manifest = open_folder(out, options, rows=count, shard_rows=shard_size(count))
+    manifest = open_folder(out, options, rows=count, shard_rows=options.shard_rows or shard_size(count))
     size = int(manifest["shard_rows"])
     store, shards = Store(out, options.format), -(-count // size)
     _check_left_over(store, shards)
-    work = Batch(str(out.resolve()), str(jobs.folder.resolve()), manifest["weights"]["sha256"], _found(options))
+    work = Batch(
+        str(out.resolve()),
+        str(jobs.folder.resolve()),
+        manifest["weights"]["sha256"],
+        manifest["duets"],
+        _found(options),
+    )
     items = _items(jobs, size, store, where.shard or (0, 1))
     if where.ray is not None:
         from motionloom.bulk.on_ray import on_ray
@@ -105,6 +111,10 @@ def check_options(options: Options) -> None:
             raise MotionloomError(
                 "the filter asks whether motions obey, and there is no judge; name one in the options"
             )
+    if not 0 <= options.pair_guidance <= 1:
+        raise MotionloomError(f"the pair guidance must be 0 to 1; got {options.pair_guidance:g}")
+    if options.shard_rows is not None and not 1 <= options.shard_rows <= MOST:
+        raise MotionloomError(f"a shard has 1 to {MOST:,} rows; got {options.shard_rows:,}")
     if options.fps is not None and not 1 <= options.fps <= 1000:
         raise MotionloomError(f"the frame rate must be 1 to 1000; got {options.fps:g}")
     if options.skeleton is not None and options.skeleton != "smpl22" and not Path(options.skeleton).is_file():
@@ -157,8 +167,8 @@ def _here(jobs: Jobs, options: Options) -> Iterator[Result]:
             known = {"row": place, "id": one.id, "key": one.key, "text": one.text, "seed": one.seed}
             if not isinstance(made, Made):
                 found[place] = result({**known, "state": "failed", "error": made})
-            elif passes is None or passes.holds(made.measures):
-                found[place] = result({**known, "state": "made", **made.measures}, made.motion)
+            elif made.passes(passes):
+                found[place] = result({**known, "state": "made", **made.measures}, made.people)
             else:
                 found[place] = result({**known, "state": "dropped", **made.measures})
         yield from (found[place] for place in sorted(found))
@@ -173,14 +183,15 @@ def _items(jobs: Jobs, size: int, store: Store, share: tuple[int, int]) -> Itera
             continue
         head = store.head(shard)
         if head is not None and _is_done(head, rows):
-            yield Report(shard, len(rows), head.counts, 0)
+            listed = problems(store.entries(shard)) if "failed" in head.counts else []
+            yield Report(shard, len(rows), head.counts, 0, listed)
         else:
             yield Task(shard, shard * size, rows)
 
 
 def _is_done(head: Head, rows: list[bytes]) -> bool:
-    """Whether a shard holds what these rows ask, as far as the rows alone show; failed rows are to be tried again."""
-    return not head.names_files and "failed" not in head.counts and head.digest == digest(rows)
+    """Whether a shard holds what these rows ask, as far as the rows alone show; what failed is to be tried again."""
+    return not head.names_files and head.counts.get("failed", 0) == head.refused and head.digest == digest(rows)
 
 
 def _found(options: Options) -> Options:
@@ -192,7 +203,8 @@ def _found(options: Options) -> Options:
 
     adapters = [f"{path.resolve()}:{factor!r}" for path, factor in map(parse_adapter, options.adapters)]
     weights = whole(options.weights) or "default"
-    return replace(options, weights=weights, adapters=adapters, skeleton=whole(options.skeleton))
+    pair = whole(options.pair_weights) or "duet"
+    return replace(options, weights=weights, pair_weights=pair, adapters=adapters, skeleton=whole(options.skeleton))
 
 
 def _workers(options: Options) -> int:
@@ -216,6 +228,5 @@ def _finish(store: Store, shards: int, *, changed: bool) -> None:
         return
     if changed or not any((store.out / f"metadata.{kind}").exists() for kind in ("parquet", "jsonl")):
         write_table(store, shards)
-    work = store.work(0).parent
-    if work.is_dir() and not any(work.iterdir()):
-        work.rmdir()
+    if store.work.is_dir() and not any(store.work.iterdir()):
+        store.work.rmdir()

@@ -3,7 +3,6 @@
 import json
 import os
 import queue
-import shutil
 import subprocess
 import sys
 import threading
@@ -75,7 +74,7 @@ class _Process:
                 stream.close()  # type: ignore[union-attr]
         if self.task is not None:
             store = Store(Path(self.batch.out), self.batch.options.format)
-            shutil.rmtree(store.work(self.task.shard), ignore_errors=True)
+            store.clear_work(self.task.shard)
             store.attempts(self.task.shard).unlink(missing_ok=True)
 
     def _say(self, line: str) -> None:

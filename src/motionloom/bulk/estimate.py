@@ -63,8 +63,8 @@ def estimate(jobs: Jobs, options: Options, *, workers: int, sample: int = 16) ->
         file = writer(options.format, Path(folder) / "data")
         unique = {one.id: one for one in asked}
         for one, made in maker.make(list(unique.values())):
-            if isinstance(made, Made) and (passes is None or passes.holds(made.measures)):
-                file.add(made.motion, entry_of(one, made))
+            if isinstance(made, Made) and made.passes(passes):
+                file.add(made.people, entry_of(one, made))
                 kept += 1
         file.close()
         seconds, size = time.perf_counter() - began, sizes(Path(folder) / "data")["bytes"]

@@ -12,6 +12,7 @@ in one step too, which says how large the data are. So a shard is whole or it is
 import hashlib
 import json
 import os
+import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -47,6 +48,8 @@ class Head:
     """Files and bytes of the shard's data; no files where no row was kept."""
     counts: dict[str, int]
     """Rows by what became of them, one of `STATES`."""
+    refused: int = 0
+    """How many of the failed ones cannot be made as they are written, whoever tries."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +68,25 @@ class Store:
         """Where it is written what became of a shard's rows."""
         return self.out / RECORDS / f"{shard:06d}.jsonl"
 
-    def work(self, shard: int) -> Path:
-        """Where a shard is made; nobody reads there."""
-        return self.out / WORK / f"{shard:06d}"
+    @property
+    def work(self) -> Path:
+        """Where shards are made; nobody reads there."""
+        return self.out / WORK
+
+    def new_work(self, shard: int) -> Path:
+        """A folder to make a shard in, of its own for whoever calls: two who make the same shard keep apart."""
+        place = self.work / f"{shard:06d}.{os.urandom(4).hex()}"
+        place.mkdir(parents=True)
+        return place
+
+    def clear_work(self, shard: int) -> None:
+        """Remove what others made of a shard, who were killed. One who lives after all fails, and harms nobody."""
+        for place in self.work.glob(f"{shard:06d}.*/"):
+            shutil.rmtree(place, ignore_errors=True)
 
     def attempts(self, shard: int) -> Path:
         """Where it is noted what was begun and not ended: of a shard that was made, nothing."""
-        return self.out / WORK / f"{shard:06d}.attempts"
+        return self.work / f"{shard:06d}.attempts"
 
     def head(self, shard: int) -> Head | None:
         """What the record says of its shard, if both are whole."""
@@ -90,13 +105,16 @@ class Store:
             for line in file:
                 yield json.loads(line)
 
-    def commit(self, shard: int, data: Path | None, entries: Sequence[Entry], head: Head) -> None:
-        """Put a shard into the folder: ``data`` (None: nothing was kept) and the record of all of its rows."""
+    def commit(self, shard: int, data: Path | None, entries: Sequence[Entry], head: Head, *, old: Path) -> None:
+        """Put a shard into the folder: ``data`` (None: nothing was kept) and the record of all of its rows.
+
+        old: where to put a folder that was there before.
+        """
         target = self.data(shard)
         if data is not None:
             sync(data)
         if target.is_dir():
-            target.rename(self.work(shard) / "old")
+            target.rename(old)
         elif data is None:
             target.unlink(missing_ok=True)
         if data is not None:
@@ -130,6 +148,7 @@ def about(options: Options, *, rows: int, shard_rows: int) -> dict[str, Any]:
         "version": version("motionloom"),
         "weights": {"name": card.name, "sha256": weights, "licence": card.licence},
         "motions": options.of_motions(weights),
+        "duets": options.of_duets(),
         "defaults": {"seconds": options.seconds, "seed": options.seed, "skeleton": _skeleton(options)},
         "files": options.format,
         "filter": options.filter,
@@ -175,12 +194,16 @@ def open_folder(out: Path, options: Options, *, rows: int, shard_rows: int) -> d
     found = read_manifest(check_folder(out))
     wanted = about(options, rows=rows, shard_rows=shard_rows if found is None else int(found["shard_rows"]))
     if found is not None:
-        for part in ("weights", "motions", "defaults", "files", "filter", "judge"):
+        for part in ("weights", "motions", "duets", "defaults", "files", "filter", "judge"):
             if found.get(part) != wanted[part]:
                 was, now = _difference(found.get(part), wanted[part])
                 raise MotionloomError(
                     f"{out} was made with other settings: {part} {was}, not {now}; name another folder"
                 )
+        if options.shard_rows not in (None, wanted["shard_rows"]):
+            raise MotionloomError(
+                f"{out} has shards of {wanted['shard_rows']:,} rows, not {options.shard_rows:,}; name another folder"
+            )
     try:
         for place in (out, out / RECORDS, out / WORK):
             place.mkdir(exist_ok=True)

@@ -19,7 +19,9 @@ READS = (".jsonl", ".ndjson", ".csv", ".parquet")
 MAX_LINE = 4_000_000
 """Bytes of one row."""
 LARGEST = 1000
-"""Rows of a shard."""
+"""Rows of a shard, unless asked otherwise."""
+MOST = 10_000
+"""Rows of a shard that may be asked for: a process has all of them in memory."""
 SMALLEST, SHARDS = 8, 64
 """A small job is cut into about so many shards, so that every core has something to do until the end."""
 
@@ -146,23 +148,32 @@ def _csv(path: Path) -> Iterator[bytes]:
     csv.field_size_limit(MAX_LINE)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            table = csv.DictReader(file, strict=True)
+            head = file.readline(MAX_LINE)
+            file.seek(0)
+            between = max(",;\t", key=head.count)  # a table of a country with decimal commas has semicolons
+            table = csv.DictReader(file, strict=True, delimiter=between)
+            names = [name.strip() for name in table.fieldnames or ()]
+            if twice := [name for name in names if names.count(name) > 1]:
+                raise MotionloomError(f"{path} has the column {twice[0]!r} twice; name each once")
             for row in table:
                 if None in row or None in row.values():
                     raise MotionloomError(
                         f"{path}, line {table.line_num}: {len(table.fieldnames or ())} fields are needed, as in the "
-                        "first line; put quotes around a prompt with a comma"
+                        f"first line; put quotes around a prompt with a {between!r}"
                     )
-                yield _json({key.strip(): _value(key.strip(), text) for key, text in row.items() if text.strip()})
+                point = "," if between == ";" else "."
+                yield _json(
+                    {key.strip(): _value(key.strip(), text, point) for key, text in row.items() if text.strip()}
+                )
     except (csv.Error, UnicodeDecodeError) as error:
         raise MotionloomError(f"{path} is not a CSV file in UTF-8 ({error})") from None
 
 
-def _value(column: str, text: str) -> Any:
-    """Numbers of the columns that hold numbers; what is none is reported by `row.parse`."""
-    kinds = {"seconds": float, "seed": int}
+def _value(column: str, text: str, point: str) -> Any:
+    """Numbers of the columns that hold numbers; what is none is reported by `row.parse`. point: the decimal one."""
+    kinds = {"seconds": float, "seed": int, "person": int}
     try:
-        return kinds[column](text) if column in kinds else text
+        return kinds[column](text.replace(point, ".")) if column in kinds else text
     except ValueError:
         return text
 

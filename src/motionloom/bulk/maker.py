@@ -3,12 +3,13 @@
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from motionloom.bulk.measures import Judge, find_judge, measure
+from motionloom.bulk.measures import Filter, Judge, Values, find_judge, in_one, measure, measure_two
 from motionloom.bulk.row import Asked, Sources, hash_adapters, hash_file
 from motionloom.bulk.sampling import LEAST, draw_group, groups
 from motionloom.edits.fitting import fit
@@ -20,8 +21,12 @@ from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22
 from motionloom.tasks.adapting import adapt
 from motionloom.tasks.control import Controlled, judged, moved, steered_features
-from motionloom.tasks.long import compose
+from motionloom.tasks.duet import compose_pair
+from motionloom.tasks.long import compose, with_loaded
+from motionloom.tasks.pair import Duet, generate_pair, prompts_of
 from motionloom.tasks.text import GUIDANCE, SOLVER, STEPS, check, check_features, finish, to_motion
+from motionloom.weights.container import PAIRS
+from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior, find_weights
 
 TOGETHER = {"cpu": 8, "cuda": 128}
@@ -37,6 +42,10 @@ class Options:
     """A shipped name or a file."""
     adapters: Sequence[str] = ()
     """What was taught from clips: ``FILE`` or ``FILE:FACTOR``, see `motionloom.goals.adapters.parse_adapter`."""
+    pair_weights: str = "duet"
+    """What makes two people of one: a shipped name or a file."""
+    pair_guidance: float = 1.0
+    """How firmly two people keep to where that wants them, 0 to 1."""
     device: str = "cpu"
     bf16: bool = False
     """Let the network compute in bfloat16."""
@@ -55,6 +64,8 @@ class Options:
     """A file with the skeleton of rows that name none; None: the 22-joint person."""
     format: str = "npz"
     """One of `FORMATS`."""
+    shard_rows: int | None = None
+    """Rows of a shard, up to `motionloom.bulk.jobs.MOST`; None: as suits the job's size."""
     filter: str | None = None
     """See `motionloom.bulk.measures.Filter`; motions that do not pass are dropped."""
     judge: str | None = None
@@ -67,14 +78,33 @@ class Options:
             "raw": self.raw, "fps": self.fps, "bf16": self.bf16,
         }  # fmt: skip
 
+    def of_duets(self) -> dict[str, Any]:
+        """What else determines motions of two people; raises `MotionloomError` for a file that is not there."""
+        return {"weights": hash_file(PAIRS.find(self.pair_weights)), "guidance": self.pair_guidance}
+
 
 @dataclass(frozen=True, eq=False)
 class Made:
     """A motion that was made of a row."""
 
-    motion: Motion
-    measures: dict[str, float | bool | None]
-    """`motionloom.bulk.measures.MEANING` of the 22-joint person, before it came onto another skeleton."""
+    people: tuple[Motion, ...]
+    """One person, or two in one world."""
+    measured: tuple[Values, ...]
+    """`motionloom.bulk.measures.MEANING` of each 22-joint person, before it came onto another skeleton."""
+
+    @property
+    def motion(self) -> Motion:
+        """The first person's."""
+        return self.people[0]
+
+    @property
+    def measures(self) -> dict[str, float | bool | None]:
+        """Of everybody, as `motionloom.bulk.measures.in_one` calls them."""
+        return in_one(self.measured)
+
+    def passes(self, condition: Filter | None) -> bool:
+        """Whether everybody in it meets the condition."""
+        return condition is None or all(condition.holds(one) for one in self.measured)
 
 
 def hash_weights(options: Options) -> str:
@@ -92,22 +122,27 @@ def hash_weights(options: Options) -> str:
 class Maker:
     """A prior that is ready to make rows, and what it makes them with.
 
-    ``weights``: what `hash_weights` must give, where that is known beforehand.
+    ``weights``, ``pair``: what `hash_weights` and `Options.of_duets` must give, where that is known beforehand.
     Raises `MotionloomError` for options that no motion can be made with.
     """
 
-    def __init__(self, options: Options, *, folder: Path, weights: str | None = None) -> None:
-        path, found = find_weights(options.weights), hash_weights(options)
+    def __init__(
+        self, options: Options, *, folder: Path, weights: str | None = None, pair: dict[str, Any] | None = None
+    ) -> None:
+        path, found, duets = find_weights(options.weights), hash_weights(options), options.of_duets()
         if weights is not None and found != weights:
             which = f"{path} or an adapter" if options.adapters else str(path)
             raise MotionloomError(f"{which} differs from what this batch is made with; use the same files")
+        if pair is not None and duets != pair:
+            which = PAIRS.find(options.pair_weights)
+            raise MotionloomError(f"{which} differs from what this batch is made with; use the same file")
         self.options = options
         self.prior = adapt(Prior.load(path, device=options.device), [parse_adapter(one) for one in options.adapters])
         check(self.prior, [], steps=options.steps, guidance=options.guidance, solver=options.solver)
         check_features(self.prior)
         self.sources = Sources(
-            folder, options.of_motions(found), fps=self.prior.fps, seconds=options.seconds, seed=options.seed,
-            skeleton=options.skeleton,
+            folder, options.of_motions(found), pair=duets, fps=self.prior.fps, seconds=options.seconds,
+            seed=options.seed, skeleton=options.skeleton,
         )  # fmt: skip
         self.judge: Judge | None = find_judge(options.judge) if options.judge else None
         self.together = TOGETHER.get(self.prior.mean.device.type, TOGETHER["cpu"])
@@ -136,7 +171,7 @@ class Maker:
                 same.setdefault(id(one.goal), []).append(one)
         for rows in same.values():
             yield from (rows[at : at + together] for at in range(0, len(rows), together))
-        yield from ([one] for one in asked if one.row.task == "compose")
+        yield from ([one] for one in asked if one.row.task in ("compose", "duet"))
 
     def _try(self, rows: list[Asked]) -> Iterator[tuple[Asked, Made | str]]:
         try:
@@ -152,11 +187,13 @@ class Maker:
             yield from self._try([row])
 
     def _made(self, rows: list[Asked]) -> list[Made]:
+        if rows[0].row.task == "duet":
+            return [self._duet(rows[0])]
         if rows[0].row.task == "compose":
             return [self._compose(rows[0])]
         if rows[0].row.task == "control":
             return [
-                self._finished(one, made.motion, error=round(made.error, 4), worst=round(made.worst, 4))
+                self._alone(one, made.motion, error=round(made.error, 4), worst=round(made.worst, 4))
                 for one, made in zip(rows, self._control(rows), strict=True)
             ]
         options = self.options
@@ -166,7 +203,7 @@ class Maker:
             bf16=options.bf16,
         )  # fmt: skip
         return [
-            self._finished(one, finish(self.prior, features, foot_lock=not options.raw))
+            self._alone(one, finish(self.prior, features, foot_lock=not options.raw))
             for one, features in zip(rows, drawn, strict=True)
         ]
 
@@ -196,14 +233,57 @@ class Maker:
             self.prior, timeline.segments, seed=asked.seed, guidance=guidance, steps=self.options.steps,
             start=asked.start, path=timeline.path, foot_lock=not self.options.raw,
         )  # fmt: skip
-        return self._finished(asked, joined(list(pieces)))
+        return self._alone(asked, joined(list(pieces)))
+
+    @cached_property
+    def _block(self) -> PairBlock:
+        return PairBlock.load(self.options.pair_weights, self.prior)
+
+    def _duet(self, asked: Asked) -> Made:
+        """Two people, one pair at a time: what is drawn beside it would change the last bits."""
+        if self.options.bf16:
+            raise MotionloomError("the task duet is made in float32")
+        duet, texts = self._two(asked), (asked.text, asked.text) if asked.timeline else prompts_of(asked.row.prompt)
+        measured = measure_two(duet, texts, self.judge)
+        if asked.goal is not None:
+            person = asked.row.person - 1
+            missed = judged(duet[person], duet[person], asked.goal)
+            measured[person] |= {"error": round(missed.error, 4), "worst": round(missed.worst, 4)}
+        return self._finished(asked, duet, measured)
+
+    def _two(self, asked: Asked) -> Duet:
+        options, person = self.options, asked.row.person - 1
+        how = {
+            "guidance": options.guidance, "steps": options.steps, "solver": options.solver, "seed": asked.seed,
+            "pair_guidance": options.pair_guidance,
+        }  # fmt: skip
+        if (timeline := asked.timeline) is not None:
+            how |= {} if timeline.guidance is None else {"guidance": timeline.guidance}
+            segments = with_loaded(self.prior, timeline.segments)
+            blocks = list(
+                compose_pair(
+                    self.prior, self._block, segments, path=timeline.path, person=person,
+                    foot_lock=not options.raw, **how,
+                )
+            )  # fmt: skip
+            return joined([block[0] for block in blocks]), joined([block[1] for block in blocks])
+        goals = (None, asked.goal) if person else (asked.goal, None)
+        (duet,) = generate_pair(
+            self.prior, self._block, asked.row.prompt, seconds=asked.frames / self.prior.fps, goals=goals,
+            foot_lock=not options.raw, **how,
+        )  # fmt: skip
+        return duet
 
     def _only_fp32_ddpm(self, asked: Asked) -> None:
         if self.options.bf16 or self.options.solver != SOLVER:
             raise MotionloomError(f"the task {asked.row.task} is made in float32 with the solver {SOLVER}")
 
-    def _finished(self, asked: Asked, motion: Motion, **measured: float) -> Made:
-        measures = {**measure(motion, asked.text, self.judge), **measured}
+    def _alone(self, asked: Asked, motion: Motion, **measured: float) -> Made:
+        return self._finished(asked, [motion], [{**measure(motion, asked.text, self.judge), **measured}])
+
+    def _finished(self, asked: Asked, people: Sequence[Motion], measured: Sequence[Values]) -> Made:
         if asked.target is not None:
-            motion = from_smpl22(motion, asked.target)
-        return Made(motion if self.options.fps is None else motion.resample(self.options.fps), measures)
+            people = [from_smpl22(motion, asked.target) for motion in people]
+        if self.options.fps is not None:
+            people = [motion.resample(self.options.fps) for motion in people]
+        return Made(tuple(people), tuple(measured))

@@ -30,8 +30,14 @@ MEANING: dict[str, str] = {
     "error": "metres from the goal on average (rows with a goal)",
     "worst": "metres from the goal at the most (rows with a goal)",
     "obeys": "whether it does what its prompt says (prompts that a physical check knows)",
+    "apart": "metres between the hips of two people, on average (rows of the task duet)",
+    "nearest": "metres between the nearest joints of two people, where they are nearest (rows of the task duet)",
 }
 """What each measure is."""
+SHARED = ("apart", "nearest")
+"""Measures of two people together."""
+SECOND = "second_"
+"""What the measures of the second of two people are called beside those of the first."""
 
 
 def measure(motion: Motion, prompt: str, judge: Judge | None = None) -> dict[str, float | bool | None]:
@@ -52,7 +58,23 @@ def measure(motion: Motion, prompt: str, judge: Judge | None = None) -> dict[str
         "turn": float(np.degrees(physics.turn(positions))),
     }
     found: dict[str, float | bool | None] = {name: round(float(value), 4) for name, value in numbers.items()}
-    return {**found, "error": None, "worst": None, "obeys": judge(prompt, positions, fps) if judge else None}
+    unknown = dict.fromkeys(("error", "worst", *SHARED))
+    return {**found, **unknown, "obeys": judge(prompt, positions, fps) if judge else None}
+
+
+def measure_two(people: Sequence[Motion], prompts: Sequence[str], judge: Judge | None = None) -> list[dict[str, Any]]:
+    """Measures of each of two people in one world, as of `measure`, and with them those of both together."""
+    first, second = (person.positions() for person in people)
+    hips = np.linalg.norm(first[:, 0] - second[:, 0], axis=-1)
+    nearest = min(float(np.linalg.norm(a[:, None] - b[None], axis=-1).min()) for a, b in zip(first, second))
+    together = {"apart": round(float(hips.mean()), 4), "nearest": round(nearest, 4)}
+    return [{**measure(person, prompt, judge), **together} for person, prompt in zip(people, prompts, strict=True)]
+
+
+def in_one(people: Sequence[Values]) -> dict[str, float | bool | None]:
+    """The measures of everybody in a motion as one mapping: the first person's by their names, the second's as well."""
+    second = {f"{SECOND}{name}": value for name, value in people[1].items() if name not in SHARED} if people[1:] else {}
+    return {**people[0], **second}
 
 
 def find_judge(name: str) -> Judge:

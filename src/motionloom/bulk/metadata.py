@@ -3,7 +3,7 @@
 import json
 import tarfile
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -13,9 +13,9 @@ import numpy as np
 
 from motionloom.bulk.folder import Entry, Store, read_manifest
 from motionloom.bulk.jobs import arrow, parquet
-from motionloom.bulk.writers import parquet_schema
+from motionloom.bulk.writers import file_names, parquet_schema
 from motionloom.errors import MotionloomError
-from motionloom.io import load
+from motionloom.io import load, load_scene
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
 
@@ -78,16 +78,21 @@ class Result:
     """Of a failed or repeated row, in a sentence; else empty."""
     about: dict[str, Any]
     """Words, seed, frames, measures."""
-    motion: Motion | None = None
-    """Of a row that was made, where motions are read."""
+    people: tuple[Motion, ...] = ()
+    """Everybody in a row that was made, where motions are read: one person, or two in one world."""
+
+    @property
+    def motion(self) -> Motion | None:
+        """Of the first person; None where there is none."""
+        return self.people[0] if self.people else None
 
 
-def result(entry: Entry, motion: Motion | None = None) -> Result:
+def result(entry: Entry, people: tuple[Motion, ...] = ()) -> Result:
     """What a record says of a row."""
     own = ("row", "state", "id")
     failed = entry["state"] in ("failed", "repeated")
     about = {key: value for key, value in entry.items() if key not in own and not (failed and key == "error")}
-    return Result(entry["row"], entry["state"], entry.get("id"), entry["error"] if failed else "", about, motion)
+    return Result(entry["row"], entry["state"], entry.get("id"), entry["error"] if failed else "", about, people)
 
 
 def read_batch(out: Path | str, *, motions: bool = True) -> Iterator[Result]:
@@ -104,40 +109,51 @@ def read_batch(out: Path | str, *, motions: bool = True) -> Iterator[Result]:
     for shard in range(shards):
         if store.head(shard) is not None:
             entries = list(store.entries(shard))
-            made = (entry["id"] for entry in entries if entry["state"] == "made")
+            made = {entry["id"]: entry.get("people", 1) for entry in entries if entry["state"] == "made"}
             read = _motions(store, shard, made) if motions else {}
-            yield from (result(entry, read.get(entry.get("id"))) for entry in entries)
+            yield from (result(entry, read.get(entry.get("id"), ())) for entry in entries)
 
 
-def _motions(store: Store, shard: int, ids: Iterable[str]) -> dict[Any, Motion]:
+People = tuple[Motion, ...]
+
+
+def _motions(store: Store, shard: int, made: dict[str, int]) -> dict[Any, People]:
+    """The motions of these ids, of which each has so many people."""
     place = store.data(shard)
     if store.kind == "webdataset":
         return _from_tar(place) if place.exists() else {}
     if store.kind == "parquet":
         return _from_parquet(place) if place.exists() else {}
-    return {name: load(place / f"{name}.{store.kind}") for name in ids}
+    if store.kind == "glb":
+        return {name: tuple(load_scene(place / f"{name}.glb")) for name in made}
+    return {
+        name: tuple(load(place / file) for file in file_names(name, f".{store.kind}", people))
+        for name, people in made.items()
+    }
 
 
-def _from_tar(place: Path) -> dict[Any, Motion]:
-    found = {}
+def _from_tar(place: Path) -> dict[Any, People]:
+    found: dict[str, People] = {}
     with tarfile.open(place) as tar, tempfile.TemporaryDirectory(prefix="motionloom-") as folder:
         for member in tar:
             data = tar.extractfile(member)
             if member.name.endswith(".npz") and data is not None:
                 part = Path(folder) / "motion.npz"
                 part.write_bytes(data.read())
-                found[member.name.removesuffix(".npz")] = load(part)
+                name = member.name.partition(".")[0]
+                found[name] = (*found.get(name, ()), load(part))
     return found
 
 
-def _from_parquet(place: Path) -> dict[Any, Motion]:
+def _from_parquet(place: Path) -> dict[Any, People]:
     with parquet().ParquetFile(place) as file:
-        return {row["id"]: _motion(row) for part in file.iter_batches(batch_size=64) for row in part.to_pylist()}
+        return {row["id"]: _people(row) for part in file.iter_batches(batch_size=64) for row in part.to_pylist()}
 
 
-def _motion(row: dict[str, Any]) -> Motion:
-    frames, joints = row["frames"], row["joints"]
+def _people(row: dict[str, Any]) -> People:
+    people, frames, joints = row["people"], row["frames"], row["joints"]
     offsets = np.array(row["offsets"], dtype=np.float64).reshape(joints, 3)
     skeleton = Skeleton(tuple(row["names"]), tuple(row["parents"]), offsets)
-    turns = np.array(row["rotations"], dtype=np.float64).reshape(frames, joints, 4)
-    return Motion(skeleton, row["fps"], np.array(row["root"]).reshape(frames, 3), turns)
+    turns = np.array(row["rotations"], dtype=np.float64).reshape(people, frames, joints, 4)
+    roots = np.array(row["root"]).reshape(people, frames, 3)
+    return tuple(Motion(skeleton, row["fps"], root, turn) for root, turn in zip(roots, turns, strict=True))

@@ -10,6 +10,7 @@ import os
 from collections import deque
 from collections.abc import Generator, Iterator
 from dataclasses import asdict
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,9 @@ class Hand:
         torch.set_num_threads(1)
         self.batch, self.problem = Batch.from_json(line), ""
         try:
-            self.maker = Maker(self.batch.options, folder=Path(self.batch.folder), weights=self.batch.weights)
+            self.maker = Maker(
+                self.batch.options, folder=Path(self.batch.folder), weights=self.batch.weights, pair=self.batch.pair
+            )
         except MotionloomError as error:
             self.problem = str(error)
 
@@ -58,6 +61,13 @@ def on_ray(
     workers: actors; None: one per processor of the cluster, with CUDA one per GPU.
     Raises `MotionloomError` where Ray is not installed or not there.
     """
+    for item in items:
+        if isinstance(item, Task):
+            items = chain([item], items)
+            break
+        yield item
+    else:
+        return  # nothing is left to make, and no cluster needed
     ray = _start(address)
     try:
         yield from _Crew(ray, items, batch, workers, moved).run()

@@ -19,13 +19,18 @@ from motionloom.goals.timeline import Timeline, read_timeline
 from motionloom.io import load
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.tasks.pair import MARK, prompts_of
 from motionloom.tasks.text import LARGEST_SEED, frames_in
 
-FORMAT = 1
-"""Version of what an id means."""
-COLUMNS = ("task", "prompt", "seconds", "seed", "timeline", "goal", "skeleton", "id")
-TASKS = ("generate", "control", "compose")
+FORMAT = 2
+"""Version of what an id means, and of how shards are laid out."""
+COLUMNS = ("task", "prompt", "seconds", "seed", "timeline", "goal", "person", "skeleton", "id")
+TASKS = ("generate", "control", "compose", "duet")
+_ELSEWHERE = ("edit", "predict", "switch")
+"""Tasks that begin with a clip: a batch does none of them."""
 MAX_CHARACTERS = 20_000
+MAX_DUET = 3600.0
+"""Seconds of a timeline of two people."""
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 _KEPT = 64
 """Files named by rows that are kept in memory."""
@@ -37,11 +42,13 @@ class Row:
 
     task: str
     prompt: str
-    """Empty for ``compose``: its timeline says what happens."""
+    """Empty where there is a timeline, which says what happens."""
     seconds: float | None
     seed: int | None
     timeline: str | None = None
     goal: str | dict[str, Any] | None = None
+    person: int = 1
+    """Whose the goal is, or a timeline's path and goals: of two people the first (1) or the second (2)."""
     skeleton: str | None = None
     name: str | None = None
     """The user's own ``id``: the name of the motion's files."""
@@ -87,13 +94,15 @@ def parse(raw: bytes) -> Row:
     prompt, timeline, skeleton, name = (_text(row, key) for key in ("prompt", "timeline", "skeleton", "id"))
     goal = _goal(row.get("goal"))
     task = _task(_text(row, "task"), goal is not None, timeline is not None)
-    if task != "compose" and not (prompt or "").strip():
+    if timeline is None and not (prompt or "").strip():
         raise MotionloomError("the row has no prompt; say in words what the person does")
-    if task == "compose" and (prompt is not None or "seconds" in row):
+    if timeline is not None and (prompt is not None or "seconds" in row):
         raise MotionloomError("a row with a timeline has no prompt and no seconds; write them into the timeline")
+    _check_words(task, prompt or "")
     if name is not None and not _NAME.fullmatch(name):
         raise MotionloomError(f"the id {name[:40]!r} cannot name a file; use at most 100 letters, digits, '_' and '-'")
-    return Row(task, prompt or "", _seconds(row), _seed(row), timeline, goal, skeleton, name)
+    person = _person(row, task, alone=goal is None and timeline is None)
+    return Row(task, prompt or "", _seconds(row), _seed(row), timeline, goal, person, skeleton, name)
 
 
 def _columns(raw: bytes) -> dict[str, Any]:
@@ -120,15 +129,38 @@ def _goal(goal: Any) -> str | dict[str, Any] | None:
 
 
 def _task(given: str | None, goal: bool, timeline: bool) -> str:
-    meant = "compose" if timeline else "control" if goal else "generate"
+    meant = "duet" if given == "duet" else "compose" if timeline else "control" if goal else "generate"
     if goal and timeline:
         raise MotionloomError("the row has a goal and a timeline; write the goal into the timeline")
+    if given in _ELSEWHERE:
+        raise MotionloomError(
+            f"a batch does not {given}, since that begins with a clip: 'motionloom {given} --count' makes many of one"
+        )
     if given is not None and given not in TASKS:
         raise MotionloomError(f"no task {given[:40]!r}; there are {', '.join(TASKS)}")
     if given is not None and given != meant:
         needs = {"compose": "a timeline", "control": "a goal", "generate": "neither goal nor timeline"}
         raise MotionloomError(f"the task {given} needs {needs[given]}, and the row asks for {meant}")
     return meant
+
+
+def _check_words(task: str, words: str) -> None:
+    """Refuse words for two people that one would get, and those that are not for both."""
+    if task == "duet":
+        prompts_of(words)
+    elif MARK in words:
+        raise MotionloomError(f"the prompt {words[:60]!r} has words for two people; give the row the task duet")
+
+
+def _person(row: dict[str, Any], task: str, *, alone: bool) -> int:
+    value = row.get("person")
+    if value is None:
+        return 1
+    if isinstance(value, bool) or value not in (1, 2):
+        raise MotionloomError(f"'person' must be 1 or 2; got {str(value)[:40]!r}")
+    if task != "duet" or alone:
+        raise MotionloomError("'person' says whose a goal or a timeline's path is, in rows of the task duet")
+    return int(value)
 
 
 def _text(row: dict[str, Any], key: str) -> str | None:
@@ -177,6 +209,7 @@ class Sources:
         folder: Path,
         common: Mapping[str, Any],
         *,
+        pair: Mapping[str, Any] | None = None,
         fps: float = FPS,
         seconds: float = 5.0,
         seed: int = 0,
@@ -184,9 +217,11 @@ class Sources:
     ) -> None:
         """``folder``: where these files lie, or below. ``common``: what determines every motion (weights, settings).
 
-        fps: of the weights. seconds, seed, skeleton: of rows that do not say; a skeleton may lie anywhere.
+        pair: what else determines motions of two people. fps: of the weights. seconds, seed, skeleton: of rows that do
+        not say; a skeleton may lie anywhere.
         """
         self.folder, self.fps, self.seconds, self.seed, self.skeleton = folder, fps, seconds, seed, skeleton
+        self._pair = dict(pair or {})
         self._common = json.dumps({**common, "format": FORMAT}, sort_keys=True)
         self._cache: OrderedDict[Any, Any] = OrderedDict()
 
@@ -197,6 +232,7 @@ class Sources:
         if row.timeline is not None:
             timeline = self._read("timeline", row.timeline, read_timeline)
             start = None if timeline.start is None else self._kept("start", timeline.start, load)
+            _check_timeline(row.task, timeline)
             seed = next(s for s in (row.seed, timeline.seed, self.seed) if s is not None)
             frames = timeline.frames
         else:
@@ -213,6 +249,8 @@ class Sources:
             "goal": goal and digest_goal(goal), "timeline": timeline and digest_timeline(timeline, start),
             "skeleton": target and digest_skeleton(target),
         }  # fmt: skip
+        if row.task == "duet":
+            said |= {"pair": self._pair, "person": row.person}
         key = hashlib.sha256(json.dumps(said, sort_keys=True).encode("utf-8", "surrogatepass")).hexdigest()[:32]
         return Asked(row, key, frames, seed, goal, timeline, start, target)
 
@@ -233,6 +271,18 @@ class Sources:
             if len(self._cache) > _KEPT:
                 self._cache.popitem(last=False)
         return self._cache[key]
+
+
+def _check_timeline(task: str, timeline: Timeline) -> None:
+    """Refuse before anything is drawn what two people, or one, cannot do."""
+    for segment in timeline.segments:
+        _check_words(task, segment.text)
+    if task != "duet":
+        return
+    if timeline.start is not None:
+        raise MotionloomError("two people do not go on from one 'start'; leave it out of the timeline")
+    if timeline.seconds > MAX_DUET:
+        raise MotionloomError(f"two people do at most {MAX_DUET:g} s of a timeline; got {timeline.seconds:g}")
 
 
 def _read_skeleton(path: Path) -> Skeleton:

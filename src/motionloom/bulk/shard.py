@@ -3,8 +3,9 @@
 import json
 import shutil
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,8 @@ class Batch:
     """Where the files that rows name lie."""
     weights: str
     """Hash of the weights' file."""
+    pair: dict[str, Any]
+    """`Options.of_duets`."""
     options: Options
 
     def to_json(self) -> str:
@@ -92,13 +95,12 @@ def make_shard(task: Task, batch: Batch, maker: Maker, moved: Callable[[int], No
     disk), and then leaves the folder as it was.
     """
     store = Store(Path(batch.out), batch.options.format)
-    work, notes = store.work(task.shard), _Attempts(store.attempts(task.shard))
     try:
-        shutil.rmtree(work, ignore_errors=True)  # of somebody who was killed
-        work.mkdir(parents=True)
+        store.clear_work(task.shard)
+        work, notes = store.new_work(task.shard), _Attempts(store.attempts(task.shard))
         notes.note("begin")
         try:
-            return _Shard(task, batch, maker, store, notes, moved).make()
+            return _Shard(task, batch, maker, store, work, notes, moved).make()
         except (Exception, KeyboardInterrupt):
             notes.place.unlink(missing_ok=True)  # it ended, if not well
             raise
@@ -114,11 +116,14 @@ class _Shard:
     batch: Batch
     maker: Maker
     store: Store
+    work: Path
+    """A folder of its own."""
     notes: _Attempts
     moved: Callable[[int], None]
     entries: dict[int, Entry] = field(default_factory=dict)
     """By the row's number within the shard."""
     names_files: bool = False
+    refused: int = 0
 
     def make(self) -> Report:
         old = self._old()
@@ -148,11 +153,13 @@ class _Shard:
         """The rows that can be made; for the others an entry that says why not."""
         seen: dict[str, int] = {}
         for number, raw in enumerate(self.task.rows):
+            row = None
             try:
                 row = parse(raw)
                 self.names_files |= row.names_files
                 one = self.maker.sources.ask(row)
             except MotionloomError as error:
+                self.refused += row is None or not row.names_files
                 self.entries[number] = self._entry(number, "failed", id=None, error=str(error))
                 continue
             except (OSError, RecursionError, MemoryError) as error:
@@ -162,6 +169,7 @@ class _Shard:
                 before = self.task.first + seen[one.id]
                 why = f"row {before} of the job is the same" if one.row.name is None else f"row {before} has this id"
                 state = "repeated" if one.row.name is None else "failed"
+                self.refused += state == "failed"
                 self.entries[number] = self._entry(number, state, one, error=why)
                 continue
             seen[one.id] = number
@@ -174,7 +182,7 @@ class _Shard:
     def _write(self, todo: dict[int, Asked], carried: Sequence[str]) -> Path | None:
         numbers = {id(one): number for number, one in todo.items()}
         passes = Filter(self.batch.options.filter) if self.batch.options.filter else None
-        place = self.store.work(self.task.shard) / "data"
+        place = self.work / "data"
         file: Writer | None = None
         try:
             if carried:
@@ -188,11 +196,11 @@ class _Shard:
                     self.entries[number] = self._entry(number, "failed", one, error=made)
                     continue
                 about = entry_of(one, made)
-                if passes is not None and not passes.holds(made.measures):
+                if not made.passes(passes):
                     self.entries[number] = self._entry(number, "dropped", one, **about)
                     continue
                 file = file or writer(self.batch.options.format, place)
-                file.add(made.motion, about)
+                file.add(made.people, about)
                 self.entries[number] = self._entry(number, "made", one, **about)
         finally:
             if file is not None:
@@ -208,23 +216,28 @@ class _Shard:
         found = Counter(entry["state"] for entry in entries)
         counts = {state: found[state] for state in STATES if found[state]}
         size = sizes(data) if data is not None else {"files": 0, "bytes": 0}
-        head = Head(digest(rows), self.names_files, size, counts)
+        head = Head(digest(rows), self.names_files, size, counts, self.refused)
         if not same:
-            self.store.commit(shard, data, entries, head)
+            self.store.commit(shard, data, entries, head, old=self.work / "old")
         elif self.store.head(shard) != head or list(self.store.entries(shard)) != entries:
             self.store.write_record(shard, entries, head)
         self.notes.place.unlink(missing_ok=True)
-        problems = [f"row {e['row']}: {e['error']}" for e in entries if e["state"] == "failed"]
-        return Report(shard, len(rows), counts, made, problems[:5])
+        return Report(shard, len(rows), counts, made, problems(entries))
 
     def _entry(self, number: int, state: str, one: Asked | None = None, **more: Any) -> Entry:
         known = {} if one is None else {"id": one.id, "key": one.key, "task": one.row.task, "text": one.text}
         return {"row": self.task.first + number, "state": state, **known, **more}
 
 
+def problems(entries: Iterable[Entry]) -> list[str]:
+    """A few of the failed rows, with their reasons."""
+    failed = (entry for entry in entries if entry["state"] == "failed")
+    return [f"row {entry['row']}: {entry['error']}" for entry in islice(failed, 5)]
+
+
 def entry_of(one: Asked, made: Made) -> dict[str, Any]:
     """What goes with a motion wherever it is kept; nothing of it depends on where the row stood in the job."""
     return {
         "id": one.id, "key": one.key, "task": one.row.task, "text": one.text, "seed": one.seed,
-        "frames": len(made.motion), "fps": made.motion.fps, **made.measures,
+        "people": len(made.people), "frames": len(made.motion), "fps": made.motion.fps, **made.measures,
     }  # fmt: skip

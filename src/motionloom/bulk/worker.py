@@ -51,7 +51,7 @@ def _work(lines: "queue.Queue[str]", say: Any) -> None:
 
     torch.set_num_threads(1)  # there is a process for each core
     batch = Batch.from_json(lines.get())
-    maker = Maker(batch.options, folder=Path(batch.folder), weights=batch.weights)
+    maker = Maker(batch.options, folder=Path(batch.folder), weights=batch.weights, pair=batch.pair)
     say({"ready": True})
     while True:
         asked = json.loads(lines.get())

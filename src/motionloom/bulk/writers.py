@@ -9,21 +9,22 @@ import os
 import shutil
 import tarfile
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from motionloom.bulk.jobs import arrow, parquet
-from motionloom.io import save
+from motionloom.bulk.measures import MEANING, SECOND, SHARED
+from motionloom.io import save, save_scene
 from motionloom.io.npz import save_npz
 from motionloom.motion import Motion
 
 ROWS = 64
 """Motions of a row group of a Parquet file: how many are in memory at once."""
-NUMBERS = ("error", "worst", "seconds", "skate", "skate_speed", "penetration", "floating", "jerk", "peak_jerk",
-           "travel", "speed", "turn")  # fmt: skip
+PEOPLE = ("first", "second")
+"""Files of two people, where a file holds one: ``ID.first.npz``, ``ID.second.npz``."""
 
 
 class Writer(ABC):
@@ -35,8 +36,8 @@ class Writer(ABC):
         self.path = path
 
     @abstractmethod
-    def add(self, motion: Motion, about: dict[str, Any]) -> None:
-        """One motion; ``about`` has its ``id`` and what is to be known of it."""
+    def add(self, people: Sequence[Motion], about: dict[str, Any]) -> None:
+        """One motion, of one person or two; ``about`` has its ``id`` and what is to be known of it."""
 
     @abstractmethod
     def carry(self, old: Path, ids: Collection[str]) -> None:
@@ -55,19 +56,26 @@ class Files(Writer):
         self.kind = suffix
         path.mkdir()
 
-    def add(self, motion: Motion, about: dict[str, Any]) -> None:
-        save(motion, self.path / f"{about['id']}{self.kind}")
+    def add(self, people: Sequence[Motion], about: dict[str, Any]) -> None:
+        names = file_names(about["id"], self.kind, len(people))
+        if len(names) < len(people):
+            save_scene(people, self.path / names[0], names=PEOPLE)
+            return
+        for motion, name in zip(people, names, strict=True):
+            save(motion, self.path / name)
 
     def carry(self, old: Path, ids: Collection[str]) -> None:
-        for name in ids:
-            shutil.copyfile(old / f"{name}{self.kind}", self.path / f"{name}{self.kind}")
+        for place in old.iterdir():
+            if place.name.partition(".")[0] in ids:
+                shutil.copyfile(place, self.path / place.name)
 
     def close(self) -> None:
         """Nothing is left to do: each file is whole."""
 
 
 class Tar(Writer):
-    """``id.npz`` and ``id.json``, one after the other: webdataset's layout. The same motions make the same bytes."""
+    """``id.npz`` (of two people ``id.first.npz``, ``id.second.npz``) and ``id.json``, one after the other: webdataset's
+    layout. The same motions make the same bytes."""
 
     suffix = ".tar"
 
@@ -76,9 +84,10 @@ class Tar(Writer):
         self._tar = tarfile.open(path, "w", format=tarfile.USTAR_FORMAT)  # noqa: SIM115
         self._part = path.with_name(f"{path.name}.npz")
 
-    def add(self, motion: Motion, about: dict[str, Any]) -> None:
-        save_npz(motion, self._part)
-        self._put(f"{about['id']}.npz", self._part.read_bytes())
+    def add(self, people: Sequence[Motion], about: dict[str, Any]) -> None:
+        for motion, name in zip(people, file_names(about["id"], ".npz", len(people)), strict=True):
+            save_npz(motion, self._part)
+            self._put(name, self._part.read_bytes())
         self._put(f"{about['id']}.json", json.dumps(about, ensure_ascii=False, sort_keys=True).encode())
 
     def carry(self, old: Path, ids: Collection[str]) -> None:
@@ -108,8 +117,8 @@ class Parquet(Writer):
         self._rows: list[dict[str, Any]] = []
         self._file = parquet().ParquetWriter(path, parquet_schema(), compression="zstd")
 
-    def add(self, motion: Motion, about: dict[str, Any]) -> None:
-        self._rows.append(parquet_row(motion, about))
+    def add(self, people: Sequence[Motion], about: dict[str, Any]) -> None:
+        self._rows.append(parquet_row(people, about))
         if len(self._rows) == ROWS:
             self._flush()
 
@@ -133,32 +142,43 @@ class Parquet(Writer):
 
 
 def parquet_schema() -> Any:
-    """Columns of a Parquet shard; positions (frames, joints, 3), rotations (frames, joints, 4) and root flat."""
+    """Columns of a Parquet shard, arrays flat: positions (people, frames, joints, 3), rotations (people, frames,
+    joints, 4), root (people, frames, 3)."""
     pa = arrow()
     floats = pa.list_(pa.float32())
+    measures = [*MEANING, *(f"{SECOND}{name}" for name in MEANING if name not in SHARED)]
     return pa.schema(
         [
             *((name, pa.string()) for name in ("id", "key", "task", "text")),
-            ("seed", pa.int64()), ("fps", pa.float64()), ("frames", pa.int32()), ("joints", pa.int32()),
+            ("seed", pa.int64()), ("fps", pa.float64()), ("people", pa.int32()), ("frames", pa.int32()),
+            ("joints", pa.int32()),
             ("positions", floats), ("rotations", floats), ("root", floats),
             ("names", pa.list_(pa.string())), ("parents", pa.list_(pa.int32())), ("offsets", floats),
-            ("obeys", pa.bool_()), *((name, pa.float64()) for name in NUMBERS),
+            *((name, pa.bool_() if name.endswith("obeys") else pa.float64()) for name in measures),
         ]
     )  # fmt: skip
 
 
-def parquet_row(motion: Motion, about: dict[str, Any]) -> dict[str, Any]:
+def parquet_row(people: Sequence[Motion], about: dict[str, Any]) -> dict[str, Any]:
     """A motion as a row of `parquet_schema`."""
 
-    def flat(values: np.ndarray) -> np.ndarray:
-        return np.asarray(values, dtype=np.float32).reshape(-1)
+    def flat(*values: np.ndarray) -> np.ndarray:
+        return np.concatenate([np.asarray(one, dtype=np.float32).reshape(-1) for one in values])
 
+    skeleton = people[0].skeleton  # both are on the same one
     return {
         **about,
-        "joints": len(motion.skeleton), "positions": flat(motion.positions()), "rotations": flat(motion.rotations),
-        "root": flat(motion.root), "names": list(motion.skeleton.names), "parents": list(motion.skeleton.parents),
-        "offsets": flat(motion.skeleton.offsets),
+        "joints": len(skeleton), "positions": flat(*(motion.positions() for motion in people)),
+        "rotations": flat(*(motion.rotations for motion in people)), "root": flat(*(motion.root for motion in people)),
+        "names": list(skeleton.names), "parents": list(skeleton.parents), "offsets": flat(skeleton.offsets),
     }  # fmt: skip
+
+
+def file_names(name: str, kind: str, people: int) -> list[str]:
+    """The files of a motion: one, or one for each of two people where a file of that kind holds one person."""
+    if people == 1 or kind == ".glb":
+        return [f"{name}{kind}"]
+    return [f"{name}.{person}{kind}" for person in PEOPLE]
 
 
 def writer(kind: str, path: Path) -> Writer:

@@ -40,6 +40,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "--format", default="npz", choices=("npz", "bvh", "glb", "webdataset", "parquet"),
         help="single files, or shards that hold many (default npz)",
     )  # fmt: skip
+    parser.add_argument("--shard-rows", type=int, metavar="N", help="rows of a shard (default: by the job, up to 1000)")
     parser.add_argument("--filter", metavar="CONDITION", help="keep what passes, such as 'skate < 0.2 and obeys'")
     parser.add_argument("--seconds", type=float, default=5.0, help="length of rows that do not say (default 5)")
     parser.add_argument(
@@ -56,6 +57,13 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument(
         "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
     )
+    parser.add_argument(
+        "--pair-weights", default="duet", metavar="NAME|PATH", help="what makes two people of one (default duet)"
+    )
+    parser.add_argument(
+        "--pair-guidance", type=float, default=1.0, metavar="SHARE",
+        help="how firmly two people keep to where that wants them, 0 to 1 (default)",
+    )  # fmt: skip
     add_adapters(parser)
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--bf16", action="store_true", help="let the network compute in bfloat16")
@@ -111,7 +119,8 @@ def _options(arguments: argparse.Namespace) -> "Options":
     obeys = arguments.filter is not None and "obeys" in Filter(arguments.filter).names
     return Options(
         weights=arguments.weights, adapters=arguments.adapter, device=arguments.device, bf16=arguments.bf16,
-        raw=arguments.raw, fps=arguments.fps,
+        raw=arguments.raw, fps=arguments.fps, pair_weights=arguments.pair_weights,
+        pair_guidance=arguments.pair_guidance, shard_rows=arguments.shard_rows,
         seconds=arguments.seconds, seed=arguments.seed, skeleton=arguments.skeleton, format=arguments.format,
         filter=arguments.filter, judge=JUDGE if obeys else None,
         **{name: value for name, value in given.items() if value is not None},
@@ -186,8 +195,12 @@ def _say(out: Path, counts: "dict[str, int]", made: int) -> None:
     said = [f"{counts['made']:,} motions are in {out}"]
     said += [f"{counts['dropped']:,} were dropped by the filter"] if counts["dropped"] else []
     said += [f"{counts['repeated']:,} rows repeat others"] if counts["repeated"] else []
-    said += [f"{counts['failed']:,} failed (the same command tries them again)"] if counts["failed"] else []
-    print(("nothing was left to make: " if not made else "") + ", ".join(said))
+    said += (
+        [f"{counts['failed']:,} failed (mend their rows; the same command tries again what may go well)"]
+        if counts["failed"]
+        else []
+    )
+    print(("nothing was left to make: " if counts["made"] and not made else "") + ", ".join(said))
 
 
 class _Progress:
