@@ -1,6 +1,7 @@
 """The way somebody goes, turned to a direction of the world: steps stay as they are drawn, pace and gait too.
 
 Velocities and joints are told in the heading of the body, so that a change of the heading turns path and body together.
+A foot that stands does not turn with them: legs are moved so that it stays in its place.
 """
 
 import numpy as np
@@ -8,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motionloom.edits.steering import Correction
+from motionloom.edits.steering import Correction, standing
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT
 from motionloom.goals.goal import turn_between
@@ -50,7 +51,9 @@ def heading_for(direction: float, prior: Prior, *, first: int) -> Correction:
         changed = guess.clone()
         step = torch.from_numpy(-np.diff(turn) / 2 / spread[0]).to(guess)
         changed[: len(step), 0] += step
-        return _moved_along(guess, changed, prior)
+        turned = _moved_along(guess, changed, prior)
+        features = standing(turned.detach().cpu().double().numpy() * spread + mean, first)
+        return torch.from_numpy((features - mean) / spread).to(guess)
 
     return correct
 

@@ -51,12 +51,13 @@ _TURN_OVER, _SLOW = 6.0, 0.01
 """Frames over which the body turns with its path; metres a frame below which a path has no direction."""
 
 
-def toward(goal: Goal, prior: Prior, *, first: int = 0) -> Correction:
+def toward(goal: Goal, prior: Prior, *, first: int = 0, known: bool = False) -> Correction:
     """The correction of one row's guess so that it meets ``goal``.
 
     ``goal`` is in the row's own frame: the root at row frame ``first`` is the origin and faces +Z, and the goal's frame
     k is the row's frame ``first + k``; what lies beyond the row's end is ignored. The corrected guess is within
-    `EXACT` of smooth wishes, whatever the guess was. An empty goal gives the guess itself.
+    `EXACT` of smooth wishes, whatever the guess was. An empty goal gives the guess itself. known: the frames before
+    ``first`` stay what they are, and a foot that stands at the last of them stands on there.
     """
     if len(prior.mean) != WIDTH:
         raise MotionloomError(f"goals need weights that make HumanML3D's {WIDTH} numbers; these make {len(prior.mean)}")
@@ -73,7 +74,7 @@ def toward(goal: Goal, prior: Prior, *, first: int = 0) -> Correction:
         if key not in plans:
             plans[key] = _plan(_in_row(goal, first, len(guess)), first, key[1])
         features = guess.detach().cpu().double().numpy() * std + mean
-        changed = (_bent(features, plans[key]) - features) / std
+        changed = (_bent(features, plans[key], first if known else 0) - features) / std
         return guess + torch.from_numpy(changed).to(guess)
 
     return correct
@@ -238,8 +239,8 @@ class _Guess:
         return places
 
 
-def _bent(features: Array, plan: _Plan) -> Array:
-    """Features (frames, 263), not standardised, changed to meet the goal."""
+def _bent(features: Array, plan: _Plan, known: int) -> Array:
+    """Features (frames, 263), not standardised, changed to meet the goal; of which some are ``known``."""
     guess = _decoded(features, plan.first)
     error = np.where(plan.goal.asked, plan.goal.positions - guess.world(), 0.0)
     path = guess.path + plan.move @ _asked_of_root(guess.world(), error, plan.goal)[plan.moving]
@@ -265,22 +266,31 @@ def _bent(features: Array, plan: _Plan) -> Array:
             path[:, c // 2] += plan.still @ pull.sum(1)
     local = guess.local + _turned(change, -guess.facing[:-1, None])
     guess = replace(guess, path=path, local=local)
-    steps = _standing(guess.world(), features[:, LAYOUT["contacts"]], plan.goal)
+    steps = _standing(guess.world(), features[:, LAYOUT["contacts"]], plan.goal, known)
     local = local + _turned(steps, -guess.facing[:-1, None])
     return _encoded(features, replace(guess, local=local))
 
 
-def _standing(places: Array, contacts: Array, goal: Goal) -> Array:
+def standing(features: Array, first: int) -> Array:
+    """Features (frames, 263), not standardised, with legs that go so that feet stand still where the contacts say that
+    they stand; a foot that stands before frame ``first`` stays in its place."""
+    guess = _decoded(features, first)
+    steps = _standing(guess.world(), features[:, LAYOUT["contacts"]], Goal.nothing(len(features)), first)
+    return _encoded(features, replace(guess, local=guess.local + _turned(steps, -guess.facing[:-1, None])))
+
+
+def _standing(places: Array, contacts: Array, goal: Goal, known: int) -> Array:
     """(frames, 22, 3) metres that legs go so that feet stand still where the guess says that they do.
 
-    A leg of which something is asked stays as it is around then.
+    A leg of which something is asked stays as it is around then. Feet that stand in the last of the ``known`` frames
+    keep the place that they have there.
     """
     change = np.zeros_like(places)
     for side, (knee, ankle, toe) in enumerate(costs.LEGS):
         asked = goal.asked[:, [knee, ankle, toe]].any(axis=(1, 2))
         free = np.convolve(asked, np.ones(4 * EASE + 1))[2 * EASE : -2 * EASE] < 0.5
         told = (contacts[:, 2 * side : 2 * side + 2] > 0.5) & free[:, None]
-        still = stilled(places[:, ankle], places[:, toe], told)
+        still = stilled(places[:, ankle], places[:, toe], told, known=known)
         change[:, [ankle, toe]] = still[:, None]
         change[:, knee] = still / 2
     return change
