@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from motionloom import load, save_prior
+from motionloom import Prior, load, save_prior
 from motionloom.cli import main
 from tests.live import people
+from tests.tasks.two_people import block
 
 SCRIPT = "seconds: 1.2\nseed: 2\ncommands:\n- {at: 0, say: a person walks}\n- {at: 0.6, steer: {direction: 90}}\n"
 
@@ -26,6 +27,20 @@ def test_a_script_becomes_a_motion_and_a_picture(weights: str, tmp_path: Path, c
     said = json.loads(capsys.readouterr().out)
     assert (said["frames"], said["files"], said["calls"]) == (36, outs, 4)
     assert (load(outs[0]).fps, len(load(outs[1]))) == (pytest.approx(30, abs=1e-3), 36)
+
+
+def test_two_people_become_a_file_each_and_one_picture(weights: str, tmp_path: Path, capsys) -> None:
+    script = tmp_path / "a.yaml"
+    script.write_text("people: 2\n" + SCRIPT + "- {at: 0.3, person: 2, say: a person waves}\n")
+    prior = Prior.load(weights)
+    made = block(prior).save(tmp_path / "block.safetensors")
+    common = ["live", str(script), "--weights", weights, "--pair-weights", str(made), "--steps", "2"]
+    outs = [str(tmp_path / name) for name in ("a.bvh", "b.bvh", "c.png")]
+    assert main([*common, "--json", *(word for out in outs for word in ("--out", out))]) == 0
+    assert json.loads(capsys.readouterr().out)["files"] == outs
+    assert [len(load(out)) for out in outs[:2]] == [24, 24]
+    assert main([*common, "--out", str(tmp_path / "alone.bvh")]) == 2
+    assert "holds one person" in capsys.readouterr().err
 
 
 def test_a_check_makes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:

@@ -44,12 +44,12 @@ def test_a_player_gives_the_frames_of_its_live_and_says_how_to_make_them_again()
         player.ask(Steer(1.0, 1.0))
         made += [taken(player) for _ in range(60)]
         asked = player.taken
-    assert [command for _, command in asked] == [Say("a person walks"), Steer(1.0, 1.0)]
+    assert [one.command for one in asked] == [Say("a person walks"), Steer(1.0, 1.0)]
     again = Live(prior, seed=2, settings=QUICK)
     for old in made:
-        for at, command in asked:
-            if at == old.number:
-                again.ask(command)
+        for one in asked:
+            if one.frame == old.number:
+                again.ask(one.command, one.person)
         new = next(again)
         assert np.array_equal(old.root, new.root)
         assert np.array_equal(old.rotations, new.rotations)
@@ -65,7 +65,7 @@ def test_queues_are_bounded_and_what_is_dropped_is_counted() -> None:
         first = taken(player)
         assert first.number == 0
     assert live.number <= 1 + player._room() + 1, "nobody took frames, so none were drawn ahead of the buffer"
-    assert player.taken[-1][1] == Steer(0.999, 1.0), "the newest is what counts"
+    assert player.taken[-1].command == Steer(0.999, 1.0), "the newest is what counts"
 
 
 def test_a_slow_machine_says_so_and_a_command_waits_longer() -> None:

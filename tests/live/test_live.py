@@ -90,7 +90,7 @@ def test_what_was_taken_up_replays_the_session_at_any_rate_and_spacing(prior: Pr
         live.stretch(0.6)
         made = played(live, SCRIPT, 80)
         asked: dict[int, list[Command]] = {}
-        for frame, command in live.taken:
+        for frame, command, _ in live.taken:
             asked.setdefault(frame, []).append(command)
         assert same(made, played(Live(prior, seed=5, fps=fps, settings=QUICK), asked, 80)), fps
 

@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 
 from motionloom.errors import MotionloomError
 from motionloom.live import clock, messages, socket
-from motionloom.live.commands import LONGEST_TEXT, Path, Pose, Reach, Say, Steer, from_json, to_json
+from motionloom.live.commands import LONGEST_TEXT, Path, Pose, Reach, Say, Steer, from_json, person_of, to_json
 from motionloom.live.sessions import Sessions
 from motionloom.live.socket import live_session
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22, Skeleton
 from tests.live import people
 from tests.live.people import QUICK
+from tests.tasks.two_people import block
 
 PATIENCE = 60.0
 """Seconds that a test waits on a machine that is very busy before it says that nothing comes."""
@@ -63,7 +64,7 @@ class Client:
 @pytest.fixture
 def sessions() -> Iterator[Sessions]:
     made = people.prior()
-    found = Sessions(lambda: made, most=2, settings=QUICK)
+    found = Sessions(lambda: made, block=block, most=2, settings=QUICK)
     yield found
     found.close()
 
@@ -119,6 +120,43 @@ def test_what_is_recorded_is_what_was_taken_up(sessions: Sessions) -> None:
         (command,) = found["commands"]
         assert (command["type"], command["direction"], command["speed"]) == ("steer", 90.0, 1.5)
         assert found["seed"] == 7
+
+    talk(sessions, lead)
+
+
+def test_two_people_come_in_one_frame_and_each_is_asked_by_number(sessions: Sessions) -> None:
+    async def lead(client: Client) -> None:
+        client.say(type="hello", people=2, fps=60, seed=3)
+        assert (await client.next("welcome"))["people"] == 2
+        client.say(type="say", text="a person walks :: a person stands still")
+        client.say(type="steer", direction=90, person=2)
+        client.say(type="steer", speed=1.0, person=3)
+        assert "1 or 2" in (await client.next("error"))["message"]
+        client.say(type="say", text="a :: b :: c")
+        assert "words for each person" in (await client.next("error"))["message"]
+        while True:
+            (frame,) = await client.frames(1)
+            assert [len(one["rotations"]) for one in frame["people"]] == [22, 22]
+            client.say(type="record")
+            found = await client.next("recorded")
+            if len(found["commands"]) == 3:
+                break
+        said = {(one["person"], one["type"]): one for one in found["commands"]}
+        assert said[1, "say"]["text"] == "a person walks"
+        assert said[2, "say"]["text"] == "a person stands still"
+        assert said[2, "steer"]["direction"] == 90.0
+        assert found["people"] == 2
+
+    talk(sessions, lead)
+
+
+def test_who_is_alone_has_no_second_person(sessions: Sessions) -> None:
+    async def lead(client: Client) -> None:
+        client.say(type="hello")
+        await client.next("welcome")
+        client.say(type="steer", speed=1.0, person=2)
+        assert "no person 2" in (await client.next("error"))["message"]
+        await client.frames(3)
 
     talk(sessions, lead)
 
@@ -262,7 +300,21 @@ JUNK = st.recursive(
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
     max_leaves=12,
 )
-FIELDS = ["text", "direction", "speed", "facing", "points", "joint", "position", "within", "places", "seed", "skeleton"]
+FIELDS = [
+    "person",
+    "people",
+    "text",
+    "direction",
+    "speed",
+    "facing",
+    "points",
+    "joint",
+    "position",
+    "within",
+    "places",
+    "seed",
+    "skeleton",
+]
 
 
 @settings(max_examples=150)
@@ -274,7 +326,7 @@ def test_whatever_a_client_says_is_a_command_or_one_sentence(kind: str, fields: 
     said = {**fields, "type": kind}
     sentence = ""
     try:
-        messages.hello(said) if kind == "hello" else from_json(said)
+        messages.hello(said) if kind == "hello" else (from_json(said), person_of(said))
     except MotionloomError as error:
         sentence = str(error)
     assert len(sentence) < 500

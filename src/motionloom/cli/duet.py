@@ -99,7 +99,7 @@ def _add_sampling(parser: argparse.ArgumentParser) -> None:
 def run_duet(arguments: argparse.Namespace) -> int:
     """``motionloom duet``."""
     _check(arguments)
-    outs, skin = _check_outs(arguments)
+    outs, skin = check_pair_outs(arguments)
     files = places(outs, arguments.count, sheets=False, target=skin)
     check_overwriting(arguments, [file for several in files for file in several])
     timeline = _timeline(arguments) if arguments.timeline else None
@@ -110,7 +110,7 @@ def run_duet(arguments: argparse.Namespace) -> int:
     caption = _caption(arguments, timeline)
 
     def write(duets: "Sequence[list[Motion]]", places: list[list[Path]], first: int) -> None:
-        _write(duets, places, manners, caption, skin)
+        write_pairs(duets, places, manners, caption, skin)
 
     def put(duets: "Sequence[list[Motion]]") -> "list[list[Motion]]":
         return [put_all(skin, at_rate(duet, arguments.fps)) for duet in duets]
@@ -306,7 +306,7 @@ def _check_numbers(arguments: argparse.Namespace) -> None:
     check_rate(arguments)
 
 
-def _check_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target | None]:
+def check_pair_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target | None]:
     """The files to write, those of one person in twos of a kind, first that of the first person; and the skeleton."""
     outs = arguments.out or [Path("duet.glb")]
     skin = read_target(arguments, outs)
@@ -353,7 +353,7 @@ def _caption(arguments: argparse.Namespace, timeline: "Timeline | None") -> str:
     return arguments.text or " and ".join(path.stem for path in _inputs(arguments))
 
 
-def _write(
+def write_pairs(
     duets: "Sequence[list[Motion]]",
     files: list[list[Path]],
     manners: "list[tuple[float, dict[str, str]]]",

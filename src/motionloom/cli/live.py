@@ -1,10 +1,11 @@
-"""`motionloom live`: a scripted session with somebody who is steered while he moves, to files or against the clock."""
+"""`motionloom live`: a scripted session with one or two people who are steered, to files or against the clock."""
 
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from motionloom.cli.duet import check_pair_outs, write_pairs
 from motionloom.cli.sampling import add_adapters, check_outs, fail, load_prior
 from motionloom.cli.sampling import write as write_files
 from motionloom.cli.skeletons import Target, add_skeleton
@@ -12,7 +13,7 @@ from motionloom.cli.writing import add_writing, check_overwriting, check_unit
 
 if TYPE_CHECKING:
     from motionloom.live.clock import Health
-    from motionloom.live.live import Frame, Live
+    from motionloom.live.live import Frame, Stage
     from motionloom.live.script import Script
 
 
@@ -26,15 +27,22 @@ def add(subparsers) -> None:
     parser.add_argument("script", type=Path, metavar="SCRIPT", help="a .yaml file: seconds, seed, commands")
     parser.add_argument(
         "--out", type=Path, action="append", metavar="NAME",
-        help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default motion.bvh)",
+        help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default motion.bvh); of two people a .bvh or "
+        ".npz holds one each: give two (default duet.glb)",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, help="the same seed makes the same motion (default: the script's, else 0)")
     parser.add_argument("--fps", type=float, help="frames per second that are shown (default: the model's 20)")
-    parser.add_argument("--start", type=Path, metavar="FILE", help="a motion to go on from, in its place")
+    parser.add_argument(
+        "--start", type=Path, action="append", metavar="FILE",
+        help="a motion to go on from, in its place; with two people one for each",
+    )  # fmt: skip
     parser.add_argument("--steps", type=int, default=8, help="network calls per window (default 8)")
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the words (default 2.5)")
     parser.add_argument(
         "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
+    )
+    parser.add_argument(
+        "--pair-weights", default="duet", metavar="NAME|PATH", help="what makes two of one (default duet)"
     )
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--clock", action="store_true", help="play it against the time and say how that went")
@@ -53,40 +61,54 @@ def _live(arguments: argparse.Namespace) -> int:
     if arguments.check:
         _report(arguments, script, [], None, {})
         return 0
-    outs, target = check_outs(arguments)
+    outs, target = check_outs(arguments) if script.people == 1 else check_pair_outs(arguments)
     if arguments.fps is not None and not 1 <= arguments.fps <= 240:
         fail(f"--fps must be 1 to 240; got {arguments.fps:g}")
     check_unit(arguments, outs)
     check_overwriting(arguments, outs)
+    if len(arguments.start or ()) not in (0, script.people):
+        fail(f"--start is given {len(arguments.start)} times; the script has {script.people} people: give one for each")
     live = _made(arguments, script)
     frames, health = _against_time(script, live) if arguments.clock else (list(script.run(live)), None)
-    written = _written(frames, live.fps, outs, target, arguments.out_unit)
+    if script.people == 1:
+        written = _written([one for (one,) in frames], live.fps, outs, target, arguments.out_unit)
+    else:
+        written = _written_pair(frames, live.fps, outs, target, arguments.out_unit)
     _report(arguments, script, written, health, {"calls": live.calls, "frames": len(frames)})
     return 0
 
 
-def _made(arguments: argparse.Namespace, script: "Script") -> "Live":
+def _made(arguments: argparse.Namespace, script: "Script") -> "Stage":
     from motionloom.io import load
     from motionloom.live.live import Live
+    from motionloom.live.pair import LivePair
     from motionloom.live.settings import Settings
+    from motionloom.weights.pair import PairBlock
 
     settings = Settings(steps=arguments.steps, guidance=arguments.guidance)
-    start = None if arguments.start is None else load(arguments.start)
+    starts = [load(path) for path in arguments.start or ()]
     seed = script.seed if arguments.seed is None else arguments.seed
-    return Live(load_prior(arguments), seed=seed, fps=arguments.fps or 20.0, start=start, settings=settings)
+    shared: dict[str, Any] = {"seed": seed, "fps": arguments.fps or 20.0, "settings": settings}
+    prior = load_prior(arguments)
+    if script.people == 1:
+        return Live(prior, start=starts[0] if starts else None, **shared)
+    block = PairBlock.load(arguments.pair_weights, prior)
+    return LivePair(prior, block, start=(starts[0], starts[1]) if starts else None, **shared)
 
 
-def _against_time(script: "Script", live: "Live") -> tuple[list["Frame"], "Health"]:
+def _against_time(script: "Script", live: "Stage") -> tuple[list[tuple["Frame", ...]], "Health"]:
     """The session as somebody would see it who asks at the script's times."""
     from motionloom.live.clock import Player
+    from motionloom.live.live import Frame
 
     waiting = list(script.commands)[::-1]
-    frames: list[Frame] = []
+    frames: list[tuple[Frame, ...]] = []
     with Player(live) as player:
-        for frame in player.frames():
-            frames.append(frame)
-            while waiting and waiting[-1][0] <= frame.time + 1e-6:
-                player.ask(waiting.pop()[1])
+        for shown in player.frames():
+            frames.append((shown,) if isinstance(shown, Frame) else shown)
+            while waiting and waiting[-1].at <= frames[-1][0].time + 1e-6:
+                _, command, person = waiting.pop()
+                player.ask(command, person)
             if len(frames) >= script.seconds * live.fps - 1e-6:
                 break
         return frames, player.health
@@ -109,6 +131,18 @@ def _written(
         motions = [motion if target is None else target.put(motion) for _, motion in pieces]
         files += write_files(motions, [out], [words for words, _ in pieces], target, unit=unit)
     return files
+
+
+def _written_pair(
+    frames: Sequence[tuple["Frame", ...]], fps: float, outs: Sequence[Path], target: Target | None, unit: float | None
+) -> list[Path]:
+    """The files of two people; those that hold one person each come in twos."""
+    from motionloom.live.live import motion_of
+
+    people = [motion_of([both[i] for both in frames], fps) for i in (0, 1)]
+    duet = people if target is None else [target.put(motion) for motion in people]
+    said = dict.fromkeys(" :: ".join(one.words for one in both) for both in frames)
+    return write_pairs([duet], [[out] for out in outs], [(unit or 1.0, {})] * 2, "; ".join([*said][:20]), target)
 
 
 def _report(

@@ -1,7 +1,7 @@
 """The way somebody goes, turned to a direction of the world: steps stay as they are sampled, pace and gait too.
 
 Velocities and joints are given in the heading of the body, so that a change of the heading turns path and body
-together.
+together. A foot that stands does not turn with them: legs are moved so that it stays in its place.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from motionloom.blending import smoothstep
-from motionloom.edits.steering import Correction
+from motionloom.edits.steering import Correction, standing
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT
 from motionloom.goals.goal import turn_between
@@ -51,7 +51,9 @@ def heading_for(direction: float, prior: Prior, *, first: int) -> Correction:
         changed = denoised.clone()
         step = torch.from_numpy(-np.diff(turn) / 2 / spread[0]).to(denoised)
         changed[: len(step), 0] += step
-        return _moved_along(denoised, changed, prior)
+        turned = _moved_along(denoised, changed, prior)
+        features = standing(turned.detach().cpu().double().numpy() * spread + mean, first)
+        return torch.from_numpy((features - mean) / spread).to(denoised)
 
     return correct
 

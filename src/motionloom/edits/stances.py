@@ -27,10 +27,11 @@ def carried(shift: Array, standing: Flags) -> Array:
     return shift + _between(len(shift), stances, extra, BEYOND)
 
 
-def stilled(ankle: Array, toe: Array, planted: Flags) -> Array:
+def stilled(ankle: Array, toe: Array, planted: Flags, *, known: int = 0) -> Array:
     """(frames, 3) metres, horizontal, to add to a foot so that what is planted of it stands in one place.
 
-    ankle, toe: (frames, 3) metres in the world; planted: (frames, 2) flags for the two. A stance keeps its mean place.
+    ankle, toe: (frames, 3) metres in the world; planted: (frames, 2) flags for the two. A stance keeps its mean place;
+    one that begins in the first ``known`` frames keeps the place that it has in the last of them.
     """
     steps = np.zeros((len(ankle) - 1, 3))
     for place, flags in ((ankle, planted[:, 0]), (toe, planted[:, 1])):
@@ -40,7 +41,7 @@ def stilled(ankle: Array, toe: Array, planted: Flags) -> Array:
     stances, paths = true_spans(planted[:, 0] | planted[:, 1]), []
     for start, stop in stances:
         path = np.concatenate([np.zeros((1, 3)), np.cumsum(steps[start : stop - 1], axis=0)])
-        path -= path.mean(0)
+        path -= path[known - 1 - start] if start < known < stop else path.mean(0)
         paths.append(path * min(1.0, FAR / max(float(np.linalg.norm(path, axis=-1).max()), 1e-9)))
     return _between(len(ankle), stances, paths, EASE)
 

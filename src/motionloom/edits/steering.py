@@ -51,12 +51,13 @@ _TURN_OVER, _SLOW = 6.0, 0.01
 """Frames over which the body turns with its path; metres a frame below which a path has no direction."""
 
 
-def toward(goal: Goal, prior: Prior, *, first: int = 0) -> Correction:
+def toward(goal: Goal, prior: Prior, *, first: int = 0, known: bool = False) -> Correction:
     """The correction of one row's estimate so that it meets ``goal``.
 
     ``goal`` is in the row's own frame: the root at row frame ``first`` is the origin and faces +Z, and the goal's frame
     k is the row's frame ``first + k``; what lies beyond the row's end is ignored. The corrected estimate is within
-    `EXACT` of smooth targets, whatever the estimate was. An empty goal gives the estimate itself.
+    `EXACT` of smooth targets, whatever the estimate was. An empty goal gives the estimate itself. known: the
+    frames before ``first`` stay what they are, and a foot that is planted at the last of them stays there.
     """
     if len(prior.mean) != WIDTH:
         raise MotionloomError(f"goals need weights that make HumanML3D's {WIDTH} numbers; these make {len(prior.mean)}")
@@ -73,7 +74,7 @@ def toward(goal: Goal, prior: Prior, *, first: int = 0) -> Correction:
         if key not in plans:
             plans[key] = _plan(_in_row(goal, first, len(denoised)), first, key[1])
         features = denoised.detach().cpu().double().numpy() * std + mean
-        changed = (_bent(features, plans[key]) - features) / std
+        changed = (_bent(features, plans[key], first if known else 0) - features) / std
         return denoised + torch.from_numpy(changed).to(denoised)
 
     return correct
@@ -238,8 +239,8 @@ class _Estimate:
         return places
 
 
-def _bent(features: Array, plan: _Plan) -> Array:
-    """Features (frames, 263), not standardised, changed to meet the goal."""
+def _bent(features: Array, plan: _Plan, known: int) -> Array:
+    """Features (frames, 263), not standardised, changed to meet the goal; of which some are ``known``."""
     denoised = _decoded(features, plan.first)
     error = np.where(plan.goal.asked, plan.goal.positions - denoised.world(), 0.0)
     path = denoised.path + plan.move @ _asked_of_root(denoised.world(), error, plan.goal)[plan.moving]
@@ -267,22 +268,31 @@ def _bent(features: Array, plan: _Plan) -> Array:
             path[:, c // 2] += plan.still @ pull.sum(1)
     local = denoised.local + _turned(change, -denoised.facing[:-1, None])
     denoised = replace(denoised, path=path, local=local)
-    steps = _standing(denoised.world(), features[:, LAYOUT["contacts"]], plan.goal)
+    steps = _standing(denoised.world(), features[:, LAYOUT["contacts"]], plan.goal, known)
     local = local + _turned(steps, -denoised.facing[:-1, None])
     return _encoded(features, replace(denoised, local=local))
 
 
-def _standing(places: Array, contacts: Array, goal: Goal) -> Array:
+def standing(features: Array, first: int) -> Array:
+    """Features (frames, 263), not standardised, with legs that go so that feet stand still where the contacts say that
+    they stand; a foot that stands before frame ``first`` stays in its place."""
+    denoised = _decoded(features, first)
+    steps = _standing(denoised.world(), features[:, LAYOUT["contacts"]], Goal.nothing(len(features)), first)
+    return _encoded(features, replace(denoised, local=denoised.local + _turned(steps, -denoised.facing[:-1, None])))
+
+
+def _standing(places: Array, contacts: Array, goal: Goal, known: int) -> Array:
     """(frames, 22, 3) metres that legs go so that feet stand still where the estimate says that they do.
 
-    A leg of which something is asked stays as it is around then.
+    A leg of which something is asked stays as it is around then. Feet that stand in the last of the ``known`` frames
+    keep the place that they have there.
     """
     change = np.zeros_like(places)
     for side, (knee, ankle, toe) in enumerate(costs.LEGS):
         asked = goal.asked[:, [knee, ankle, toe]].any(axis=(1, 2))
         free = np.convolve(asked, np.ones(4 * EASE + 1))[2 * EASE : -2 * EASE] < 0.5
         planted = (contacts[:, 2 * side : 2 * side + 2] > 0.5) & free[:, None]
-        still = stilled(places[:, ankle], places[:, toe], planted)
+        still = stilled(places[:, ankle], places[:, toe], planted, known=known)
         change[:, [ankle, toe]] = still[:, None]
         change[:, knee] = still / 2
     return change

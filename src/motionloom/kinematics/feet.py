@@ -190,6 +190,8 @@ def _bridge(values: Array, pieces: list[tuple[int, int]], ease: int) -> None:
     frames = len(values)
     ends = [(-ease, -ease), *pieces, (frames + ease, frames + ease)]
     for (first, stop), (start, last) in pairwise(ends):
+        if stop == start:
+            continue  # one begins where the other ends
         if 0 < stop < start < frames and start - stop < 2 * ease:
             left, right = values[stop - 1], values[start]
             into, out = _slope(values, stop - 1, first), _slope(values, start, last - 1)

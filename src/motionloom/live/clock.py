@@ -10,9 +10,10 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Generic
 
-from motionloom.live.commands import Command
-from motionloom.live.live import Frame, Live
+from motionloom.live.commands import Command, Taken
+from motionloom.live.live import Frame, Shown, Stage
 
 SHORTEST, LONGEST = 0.1, 2.0
 """Seconds of frames that wait in the buffer, at least and at most."""
@@ -46,6 +47,11 @@ class Health:
     """In words, where the machine is too slow."""
 
 
+def first_of(shown: Frame | tuple[Frame, Frame]) -> Frame:
+    """The frame of the only person, or of the first of two: both have one number and one time."""
+    return shown if isinstance(shown, Frame) else shown[0]
+
+
 class Pace:
     """When frames are due: the first at once, the others at their times from there; a late one delays all behind it."""
 
@@ -68,13 +74,13 @@ class Pace:
         return late
 
 
-class Player:
-    """Plays one `Live` against the time. Commands come from any thread; frames are taken by one."""
+class Player(Generic[Shown]):
+    """Plays one `Live` or `LivePair` against the time. Commands come from any thread; frames are taken by one."""
 
-    def __init__(self, live: Live, *, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, live: Stage[Shown], *, now: Callable[[], float] = time.monotonic) -> None:
         self._live, self._now = live, now
-        self._inbox: deque[Command] = deque()
-        self._buffer: deque[Frame] = deque()
+        self._inbox: deque[tuple[Command, int]] = deque()
+        self._buffer: deque[Shown] = deque()
         self._changed = threading.Condition()
         self._stopped, self._error = False, None
         self._ahead = 0.25
@@ -84,12 +90,12 @@ class Player:
         self._health = Health(0, 0, 0.0, self._ahead, 0, 0.0)
         self._thread = threading.Thread(target=self._plan, name="motionloom-live", daemon=True)
 
-    def start(self) -> "Player":
+    def start(self) -> "Player[Shown]":
         """Begin to sample ahead, in a thread of its own."""
         self._thread.start()
         return self
 
-    def __enter__(self) -> "Player":
+    def __enter__(self) -> "Player[Shown]":
         return self.start()
 
     def __exit__(self, *_: object) -> None:
@@ -108,13 +114,15 @@ class Player:
         """Whether no more frames are made."""
         return self._stopped
 
-    def ask(self, command: Command) -> None:
-        """Ask for something as soon as possible."""
+    def ask(self, command: Command, person: int | None = None) -> None:
+        """Ask for something as soon as possible, as of `Stage.ask`."""
+        parts = self._live.addressed(command, person)
         with self._changed:
-            if len(self._inbox) >= WAITING:
-                self._inbox.popleft()
-                self._health = replace(self._health, dropped=self._health.dropped + 1)
-            self._inbox.append(command)
+            for part in parts:
+                if len(self._inbox) >= WAITING:
+                    self._inbox.popleft()
+                    self._health = replace(self._health, dropped=self._health.dropped + 1)
+                self._inbox.append(part)
 
     @property
     def health(self) -> Health:
@@ -123,19 +131,20 @@ class Player:
             return self._health
 
     @property
-    def taken(self) -> list[tuple[int, Command]]:
-        """What was asked, with the frames that it first changed (`Live.taken`)."""
+    def taken(self) -> list[Taken]:
+        """What was asked, with the frames that it first changed (`Stage.taken`)."""
         return self._live.taken
 
-    def frames(self) -> Iterator[Frame]:
+    def frames(self) -> Iterator[Shown]:
         """Frames, each at its time; without end, or until `stop`."""
         pace = Pace(self._now)
-        while (frame := self.take()) is not None:
+        while (found := self.take()) is not None:
+            frame = first_of(found)
             time.sleep(pace.until(frame))
             self.shown(pace.late(frame))
-            yield frame
+            yield found
 
-    def take(self, timeout: float | None = None) -> Frame | None:
+    def take(self, timeout: float | None = None) -> Shown | None:
         """The next frame as soon as it is there, whatever the time; None after ``timeout`` seconds or at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._buffer or self._stopped or self._error, timeout)
@@ -168,7 +177,7 @@ class Player:
             if self._stopped:
                 return False
             while self._inbox:
-                self._live.ask(self._inbox.popleft())
+                self._live.ask(*self._inbox.popleft())
         begun, calls = self._now(), self._live.calls
         frame = next(self._live)
         took = self._now() - begun

@@ -7,7 +7,7 @@ goal files. Everything is checked here, so that nothing that comes from outside 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -132,6 +132,16 @@ class Pose:
 Command: TypeAlias = Say | Steer | Path | Reach | Pose
 
 
+class Taken(NamedTuple):
+    """Something that was asked, with the frame that it first changed."""
+
+    frame: int
+    """Number of the frame, at the rate that is shown."""
+    command: Command
+    person: int
+    """0, or 1 for the second of two people."""
+
+
 def _number(value: Any, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
         raise MotionloomError(f"{name} must be a number")
@@ -181,7 +191,7 @@ _KINDS: Mapping[str, tuple[set[str], set[str], Callable[[Mapping[str, Any]], Com
 
 
 def from_json(said: Any) -> Command:
-    """The command that a JSON object says; `MotionloomError` for anything else."""
+    """The command that a JSON object says; `MotionloomError` for anything else. Whom it is for says `person_of`."""
     if not isinstance(said, Mapping) or not isinstance(said.get("type"), str):
         raise MotionloomError('a command is a JSON object with a "type"')
     kind = said["type"]
@@ -190,10 +200,20 @@ def from_json(said: Any) -> Command:
     needed, allowed, make = _KINDS[kind]
     if lacking := needed - set(said):
         raise MotionloomError(f"the command {kind} lacks {', '.join(sorted(lacking))}")
-    if extra := set(said) - needed - allowed - {"type"}:
+    if extra := set(said) - needed - allowed - {"type", "person"}:
         name = min(map(str, extra))[:40]
         raise MotionloomError(f"the command {kind} has no {name!r}; it has {', '.join(sorted(needed | allowed))}")
     return make(said)
+
+
+def person_of(said: Mapping[str, Any]) -> int | None:
+    """Which person a JSON object is for, 0 or 1; None where it names nobody, which is everybody."""
+    number = said.get("person")
+    if number is None:
+        return None
+    if isinstance(number, bool) or number not in (1, 2):
+        raise MotionloomError("person is 1 or 2; without it what is asked is for everybody")
+    return int(number) - 1
 
 
 def to_json(command: Command) -> dict[str, Any]:

@@ -20,7 +20,9 @@ Array = NDArray[np.float64]
 EVERY = 8
 """Frames between two places that are asked."""
 PICK_UP, TURN = 12.0, 20.0
-"""Frames in which a pace is taken up, and in which half a turn is made."""
+"""Frames in which a pace is taken up at least, and in which half a turn is made."""
+CHANGE = 0.0075
+"""Metres a frame by which a pace changes in a frame (3 m/s²): nobody who runs stands half a second later."""
 ARRIVED = 0.3
 """Metres from the end of a path at which it is over."""
 AHEAD = 0.6
@@ -56,6 +58,16 @@ def steered(course: Course, steer: Steer, frames: int, fps: float) -> Goal:
     return goal
 
 
+def braking(course: Course, frames: int) -> Goal:
+    """Places for somebody who comes to a stand where he goes; none are asked when he stands."""
+    goal = Goal.nothing(frames)
+    over = math.hypot(*course.velocity) / CHANGE
+    at = np.arange(EVERY, frames, EVERY)
+    angle = math.atan2(*course.velocity)
+    _ask(goal, at[at < over + EVERY], _walked(course, angle, 0.0, frames))
+    return goal
+
+
 def _ask(goal: Goal, at: NDArray[np.int_], way: Array) -> None:
     """Ask for the pelvis in some frames of a way (frames, 2)."""
     goal.positions[at, 0, ::2] = way[at]
@@ -70,7 +82,7 @@ def _walked(course: Course, direction: float, step: float, frames: int) -> Array
     turn = float(turn_between(direction, start))
     count = np.arange(frames)
     angle = start + turn * smoothstep(count / _turning(turn))
-    size = pace + (step - pace) * smoothstep(count / PICK_UP)
+    size = pace + (step - pace) * smoothstep(count / max(PICK_UP, abs(step - pace) / CHANGE))
     steps = np.stack([size * np.sin(angle), size * np.cos(angle)], axis=-1)
     return np.array([course.place.x, course.place.z]) + np.concatenate([np.zeros((1, 2)), steps[:-1].cumsum(0)])
 

@@ -9,6 +9,7 @@ the same frames make the same motion. `clock` runs one of these against the time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import numpy as np
 import torch
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
-from motionloom.live.commands import Command
+from motionloom.live.commands import Command, Taken
 from motionloom.live.person import Asked, Person, Request
 from motionloom.live.settings import Settings
 from motionloom.live.window import Drawer, Noise
@@ -55,7 +56,11 @@ def motion_of(frames: Sequence[Frame], fps: float) -> Motion:
     return Motion(frames[0].skeleton, fps, root, turns)
 
 
-class Stage(ABC):
+Shown = TypeVar("Shown", Frame, tuple[Frame, Frame])
+"""What is shown at once: the frame of one person, or of both."""
+
+
+class Stage(ABC, Generic[Shown]):
     """One person or two who move without end: frames are counted, windows are sampled when they must be."""
 
     def __init__(self, people: Sequence[Person], settings: Settings, fps: float) -> None:
@@ -77,6 +82,34 @@ class Stage(ABC):
     @abstractmethod
     def calls(self) -> int:
         """Guided calls of the network so far."""
+
+    @abstractmethod
+    def __next__(self) -> Shown: ...
+
+    def __iter__(self) -> Iterator[Shown]:
+        return self
+
+    def ask(self, command: Command, person: int | None = None) -> None:
+        """Ask for something from the next frame on: 0 or 1 of two people, or everybody (None)."""
+        for part, whom in self.addressed(command, person):
+            self.people[whom].ask(part)
+
+    def addressed(self, command: Command, person: int | None = None) -> list[tuple[Command, int]]:
+        """What each person is asked by a command that is for one of them or for everybody; changes nothing.
+
+        Raises `MotionloomError` where there is no such person.
+        """
+        if person is not None and not 0 <= person < len(self.people):
+            count = "one person" if len(self.people) == 1 else f"{len(self.people)} people"
+            raise MotionloomError(f"there is no person {person + 1} in this session; it has {count}")
+        return [(command, whom) for whom in range(len(self.people)) if person in (None, whom)]
+
+    @property
+    def taken(self) -> list[Taken]:
+        """What was asked, with the frames that it first changed: asked before these frames of one of the same seed and
+        start, it makes the same motion again."""
+        found = [Taken(at, asked, i) for i, person in enumerate(self.people) for at, asked in person.taken]
+        return sorted(found, key=lambda one: one.frame)
 
     def stretch(self, seconds: float) -> int:
         """Draw windows at least so many seconds apart, for machines that are slow; gives the frames back (at 20 per
@@ -123,7 +156,7 @@ class Stage(ABC):
         return made
 
 
-class Live(Stage, Asked):
+class Live(Stage[Frame], Asked):
     """Somebody who moves without end and does what is asked.
 
     live = Live(Prior.load(), seed=1)
@@ -155,23 +188,10 @@ class Live(Stage, Asked):
         self._draw = Drawer(prior, chosen)
         self._noise = Noise(seed, chosen.steps, len(prior.mean))
 
-    def ask(self, command: Command) -> None:
-        """Ask for something from the next frame on."""
-        self.people[0].ask(command)
-
     @property
     def calls(self) -> int:
         """Guided calls of the network so far."""
         return self._draw.calls
-
-    @property
-    def taken(self) -> list[tuple[int, Command]]:
-        """What was asked, with the frames that it first changed: asked before these frames of a `Live` of the same seed
-        and start, it makes the same motion again."""
-        return self.people[0].taken
-
-    def __iter__(self) -> Iterator[Frame]:
-        return self
 
     def __next__(self) -> Frame:
         return self.frames()[0]

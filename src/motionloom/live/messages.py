@@ -8,8 +8,8 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.io.text import parse_json
-from motionloom.live.clock import Health
-from motionloom.live.commands import Command, to_json
+from motionloom.live.clock import Health, first_of
+from motionloom.live.commands import Taken, to_json
 from motionloom.live.live import Frame
 from motionloom.retarget.named import named_skeleton
 from motionloom.skeleton import SMPL22, Skeleton
@@ -18,7 +18,7 @@ VERSION = 1
 LARGEST = 256 * 1024
 """Bytes of one message."""
 MOST_JOINTS = 300
-_HELLO = ("type", "seed", "fps", "skeleton", "session")
+_HELLO = ("type", "seed", "fps", "people", "skeleton", "session")
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class Hello:
 
     seed: int = 0
     fps: float = 20.0
+    people: int = 1
+    """1 or 2."""
     skeleton: Skeleton = field(default_factory=lambda: SMPL22)
     session: str = ""
     """The key of a session to go on with."""
@@ -53,9 +55,12 @@ def hello(said: Mapping[str, Any]) -> Hello:
         raise MotionloomError("a seed is a whole number from 0 to below 2**62")
     if isinstance(fps, bool) or not isinstance(fps, int | float) or not 1 <= fps <= 120:
         raise MotionloomError("fps is a number from 1 to 120")
+    people = said.get("people", 1)
+    if isinstance(people, bool) or people not in (1, 2):
+        raise MotionloomError("people is 1 or 2")
     if not isinstance(session, str) or len(session) > 100:
         raise MotionloomError("a session is named by the key that its welcome gave")
-    return Hello(seed, float(fps), skeleton(said.get("skeleton", "smpl22")), session)
+    return Hello(seed, float(fps), int(people), skeleton(said.get("skeleton", "smpl22")), session)
 
 
 def skeleton(said: Any) -> Skeleton:
@@ -82,17 +87,22 @@ def welcome(begun: Hello, key: str, number: int) -> dict[str, Any]:
     """The answer to hello; ``number``: of the frame that comes first."""
     bones = begun.skeleton
     return {
-        "type": "welcome", "version": VERSION, "session": key, "fps": begun.fps, "seed": begun.seed, "frame": number,
+        "type": "welcome", "version": VERSION, "session": key, "fps": begun.fps, "seed": begun.seed,
+        "people": begun.people, "frame": number,
         "joints": list(bones.names), "parents": list(bones.parents), "offsets": bones.offsets.round(6).tolist(),
     }  # fmt: skip
 
 
-def frame(shown: Frame, late: float) -> dict[str, Any]:
-    """One pose: root in metres, rotations (w, x, y, z) in the parent's frame; late: seconds behind its time."""
-    return {
-        "type": "frame", "frame": shown.number, "time": round(shown.time, 6), "late": round(late, 4),
-        "root": shown.root.round(5).tolist(), "rotations": shown.rotations.round(6).tolist(), "words": shown.words,
-    }  # fmt: skip
+def frame(shown: Frame | tuple[Frame, Frame], late: float) -> dict[str, Any]:
+    """One pose, or those of two people: root in metres, rotations (w, x, y, z) in the parent's frame; late: seconds
+    behind its time."""
+    first = first_of(shown)
+    poses = [
+        {"root": one.root.round(5).tolist(), "rotations": one.rotations.round(6).tolist(), "words": one.words}
+        for one in ((shown,) if isinstance(shown, Frame) else shown)
+    ]
+    about = {"type": "frame", "frame": first.number, "time": round(first.time, 6), "late": round(late, 4)}
+    return {**about, **poses[0]} if len(poses) == 1 else {**about, "people": poses}
 
 
 def health(state: Health) -> dict[str, Any]:
@@ -103,7 +113,13 @@ def health(state: Health) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def recorded(begun: Hello, taken: list[tuple[int, Command]], number: int) -> dict[str, Any]:
+def recorded(begun: Hello, taken: list[Taken], number: int) -> dict[str, Any]:
     """What was asked so far, before which frames: the session again, with the same seed and rate."""
-    commands = [{"frame": at, **to_json(command)} for at, command in taken[-10_000:]]
-    return {"type": "recorded", "seed": begun.seed, "fps": begun.fps, "frames": number, "commands": commands}
+    commands = [
+        {"frame": one.frame, **to_json(one.command), **({"person": one.person + 1} if begun.people > 1 else {})}
+        for one in taken[-10_000:]
+    ]
+    return {
+        "type": "recorded", "seed": begun.seed, "fps": begun.fps, "people": begun.people, "frames": number,
+        "commands": commands,
+    }  # fmt: skip

@@ -4,7 +4,7 @@ Both are sampled together by one frozen prior and the block that makes two peopl
 knows the last half second of both and their relative pose. Their bodies follow as one person's does.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import torch
@@ -14,18 +14,19 @@ from motionloom.edits.steering import Correction
 from motionloom.features import pair as two
 from motionloom.features.layout import FPS
 from motionloom.goals.goal import Placement
-from motionloom.live.commands import Say
+from motionloom.live.commands import Command, Say
 from motionloom.live.live import Frame, Stage, check
 from motionloom.live.person import Person, Request
 from motionloom.live.settings import Settings
 from motionloom.live.window import leaving
 from motionloom.motion import Motion
+from motionloom.skeleton import Skeleton
 from motionloom.tasks.pair import Duet, PairEdits, PairSampling, known_state, pair_features, placement, prompts_of
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
 
-class LivePair(Stage):
+class LivePair(Stage[tuple[Frame, Frame]]):
     """Two people who move without end.
 
     pair = LivePair(prior, PairBlock.load("duet", prior), seed=1)
@@ -45,31 +46,36 @@ class LivePair(Stage):
         seed: int = 0,
         fps: float = FPS,
         start: Duet | None = None,
+        skeleton: Skeleton | None = None,
         settings: Settings | None = None,
     ) -> None:
         """block: weights that make two people of this prior. start: what both did before, in one world; without it
-        the first person begins at the origin facing +Z and the words decide where the second is. Otherwise as `Live`.
+        the first person begins at the origin facing +Z and the words say where the second stands. skeleton: both are
+        shown on it. Otherwise as `Live`.
         The solver and how the levels are spread are those of every duet. Raises `MotionloomError` for what cannot be.
         """
         check(prior, seed)
         chosen = settings or Settings()
         pasts: tuple[Motion | None, Motion | None] = start or (None, None)
-        people = [Person(prior, chosen, start=past, skeleton=None) for past in pasts]
+        people = [Person(prior, chosen, start=past, skeleton=skeleton) for past in pasts]
         super().__init__(people, chosen, fps)
         self._prior, self._net, self._seed, self._calls = prior, block.net(prior), seed, 0
 
     def say(self, text: str) -> None:
         """What both do from now on, or what each does: "A :: B"."""
-        for person, words in zip(self.people, prompts_of(text) if text.strip() else ("", ""), strict=True):
-            person.ask(Say(words))
+        self.ask(Say(text))
+
+    def addressed(self, command: Command, person: int | None = None) -> list[tuple[Command, int]]:
+        """As of `Stage`; words for everybody may say what each does, "A :: B"."""
+        if isinstance(command, Say) and person is None and command.text:
+            first, second = prompts_of(command.text)
+            return [(Say(first), 0), (Say(second), 1)]
+        return super().addressed(command, person)
 
     @property
     def calls(self) -> int:
         """Guided calls of the network so far."""
         return self._calls
-
-    def __iter__(self) -> Iterator[tuple[Frame, Frame]]:
-        return self
 
     def __next__(self) -> tuple[Frame, Frame]:
         first, second = self.frames()

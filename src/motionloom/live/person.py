@@ -1,5 +1,6 @@
 """One person of a live motion: what is asked of him, the frames sampled for him, and the body that was shown."""
 
+import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
@@ -16,9 +17,9 @@ from motionloom.goals.goal import Goal, Placement, body_facing, overlaid
 from motionloom.goals.paths import WALKING
 from motionloom.live.body import body, put
 from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer
-from motionloom.live.course import ARRIVED, Course, Trail, steered
+from motionloom.live.course import ARRIVED, Course, Trail, braking, steered
 from motionloom.live.settings import Settings
-from motionloom.live.words import STANDS, for_pace
+from motionloom.live.words import STANDS, for_pace, is_standing
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.long import Past
@@ -28,6 +29,9 @@ Array = NDArray[np.float64]
 
 STAY = 4
 """Frames that a joint is asked to stay where it was asked to be."""
+RUNS = 1.6
+"""Metres per second from which on somebody who is to stand still first slows down: words alone stop a runner in half a
+second."""
 LOGGED = 100_000
 """Commands that are remembered with their frames."""
 MOST_ASKED = 64
@@ -174,7 +178,7 @@ class Person(Asked):
         edits: list[Correction] = []
         turns: list[Correction] = []
         if not goal.empty:
-            edits.append(toward(goal.seen_from(course.place), self._prior, first=len(known)))
+            edits.append(toward(goal.seen_from(course.place), self._prior, first=len(known), known=True))
         if self._trail is None and self._steer.speed is None and self._steer.direction is not None:
             turns.append(heading_for(self._steer.direction - course.place.facing, self._prior, first=len(known)))
         return Request(known, begin, words, edits, turns, again)
@@ -229,7 +233,8 @@ class Person(Asked):
             again = max(self._settings.rest, min(again, over))
             words = words or for_pace(self._trail.speed, None, None)
         else:
-            goal = steered(course, steer, frames, FPS)
+            stops = steer.speed is None and is_standing(words) and FPS * math.hypot(*course.velocity) > RUNS
+            goal = braking(course, frames) if stops else steered(course, steer, frames, FPS)
             pace = (0.0 if steer.direction is None else WALKING) if steer.speed is None else steer.speed
             words = words or for_pace(pace, steer.direction, steer.facing)
         while self._due and self._due[0].frame + STAY <= frame:

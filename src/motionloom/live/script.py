@@ -7,7 +7,8 @@
       - {at: 4, steer: {direction: 90, speed: 1.4}}
       - {at: 8, path: {points: [[2, 3], [4, 0]]}}
 
-Times are seconds; what the commands hold is what their JSON objects hold (`commands.from_json`).
+Times are seconds; what the commands hold is what their JSON objects hold (`commands.from_json`). With ``people: 2`` a
+command may name its ``person``, 1 or 2; without that it is for both.
 """
 
 import json
@@ -15,12 +16,14 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from motionloom.errors import MotionloomError
 from motionloom.goals.lined_file import LinedFile
 from motionloom.io.lined_yaml import Lined, read_lined
-from motionloom.live.commands import Command, from_json, to_json
-from motionloom.live.live import Frame, Live
+from motionloom.live.commands import Command, Say, from_json, person_of, to_json
+from motionloom.live.live import Frame, Stage
+from motionloom.tasks.pair import prompts_of
 
 LONGEST = 3600.0
 """Seconds of a session that is written to files."""
@@ -30,22 +33,35 @@ MAX_BYTES = 4_000_000
 _TYPES = ("say", "steer", "path", "reach", "pose")
 
 
+class Timed(NamedTuple):
+    """What is asked at a time."""
+
+    at: float
+    """Seconds."""
+    command: Command
+    person: int | None = None
+    """0 or 1; None: everybody."""
+
+
 @dataclass(frozen=True)
 class Script:
     """What is asked when."""
 
     seconds: float
-    commands: tuple[tuple[float, Command], ...]
-    """Seconds and what is asked then, times rising."""
+    commands: tuple[Timed, ...]
+    """Times rising."""
     seed: int = 0
+    people: int = 1
+    """1 or 2."""
 
-    def run(self, live: Live) -> Iterator[Frame]:
-        """The frames of the session, each command asked before the frame of its time."""
+    def run(self, live: Stage) -> Iterator[tuple[Frame, ...]]:
+        """The frames of everybody, each command asked before the frames of its time."""
         waiting = list(self.commands)[::-1]
         for number in range(max(1, round(self.seconds * live.fps))):
-            while waiting and waiting[-1][0] * live.fps <= number + 1e-6:
-                live.ask(waiting.pop()[1])
-            yield next(live)
+            while waiting and waiting[-1].at * live.fps <= number + 1e-6:
+                _, command, person = waiting.pop()
+                live.ask(command, person)
+            yield live.frames()
 
 
 def read_script(path: Path | str) -> Script:
@@ -56,12 +72,15 @@ def read_script(path: Path | str) -> Script:
 
 def written(script: Script) -> str:
     """The text of a script file that `read_script` reads as this script."""
-    lines = [f"seconds: {script.seconds:g}", f"seed: {script.seed}", "commands:" if script.commands else "commands: []"]
-    for at, command in script.commands:
+    lines = [f"seconds: {script.seconds:g}", f"seed: {script.seed}"]
+    lines += [f"people: {script.people}"] if script.people > 1 else []
+    lines += ["commands:" if script.commands else "commands: []"]
+    for at, command, person in script.commands:
+        whom = {} if person is None else {"person": person + 1}
         said = to_json(command)
         kind = said.pop("type")
         value = said["text"] if kind == "say" else said
-        lines.append(f"  - {_PAIR.sub(_whole, json.dumps({'at': round(at, 6), kind: value}))}")
+        lines.append(f"  - {_PAIR.sub(_whole, json.dumps({'at': round(at, 6), **whom, kind: value}))}")
     return "\n".join(lines) + "\n"
 
 
@@ -77,22 +96,25 @@ def _whole(pair: re.Match[str]) -> str:
 @dataclass(frozen=True)
 class _Reader(LinedFile):
     def script(self, found: Lined) -> Script:
-        parts = self.mapping(found, ("seconds", "seed", "commands"), "a live script")
+        parts = self.mapping(found, ("seconds", "seed", "people", "commands"), "a live script")
         seconds = self.number(parts.get("seconds"), "seconds", low=0.05, high=LONGEST, unit="seconds")
         if seconds is None:
             self.fail(found.line, "a live script says how long it is: give 'seconds'")
         seed = self.number(parts.get("seed"), "seed", low=0, high=2**62 - 1)
         if seed is not None and not isinstance(seed, int):
             self.fail(parts["seed"].line, f"'seed' must be a whole number; got {seed:g}")
+        people = self.number(parts.get("people"), "people", low=1, high=2)
+        if people is not None and not isinstance(people, int):
+            self.fail(parts["people"].line, f"'people' must be 1 or 2; got {people:g}")
         listed = parts.get("commands")
         entries: Sequence[Lined] = []
         if listed is not None and listed.value != []:
             entries = self.items(listed, "commands", of="command", most=MOST)
-        commands = sorted((self._command(entry) for entry in entries), key=lambda pair: pair[0])
-        return Script(float(seconds), tuple(commands), int(seed or 0))
+        commands = sorted((self._command(entry, people or 1) for entry in entries), key=lambda one: one.at)
+        return Script(float(seconds), tuple(commands), int(seed or 0), people or 1)
 
-    def _command(self, entry: Lined) -> tuple[float, Command]:
-        parts = self.mapping(entry, ("at", *_TYPES), "a command")
+    def _command(self, entry: Lined, people: int) -> Timed:
+        parts = self.mapping(entry, ("at", "person", *_TYPES), "a command")
         at = self.number(parts.get("at"), "at", low=0, high=LONGEST, unit="seconds")
         kinds = [kind for kind in _TYPES if kind in parts]
         if at is None or len(kinds) != 1:
@@ -102,7 +124,12 @@ class _Reader(LinedFile):
         fields = {"text": said} if kinds[0] == "say" else {} if said is None else said
         if not isinstance(fields, dict):
             self.fail(value.line, f"'{kinds[0]}' must be a mapping; got {self.got(value)}")
+        person = self.number(parts.get("person"), "person", low=1, high=people)
+        whom = person_of({"person": person})
         try:
-            return float(at), from_json({**fields, "type": kinds[0]})
+            command = from_json({**fields, "type": kinds[0]})
+            if isinstance(command, Say) and people > 1 and whom is None:
+                prompts_of(command.text)
+            return Timed(float(at), command, whom)
         except MotionloomError as error:
             self.fail(value.line, str(error))

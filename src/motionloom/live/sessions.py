@@ -5,12 +5,15 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from motionloom.errors import MotionloomError
 from motionloom.live.clock import Player
 from motionloom.live.live import Frame, Live
 from motionloom.live.messages import Hello
+from motionloom.live.pair import LivePair
 from motionloom.live.settings import Settings
+from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
 MOST = 4
@@ -21,14 +24,14 @@ KEPT = 120.0
 
 @dataclass(eq=False)
 class Session:
-    """Somebody who moves for one client. Without a client he waits: his buffer is full, and nothing is sampled."""
+    """One person or two who move for one client. Without a client they wait: the buffer is full, nothing is sampled."""
 
     key: str
     begun: Hello
-    player: Player
+    player: Player[Any]
     number: int = 0
     """Of the frame that is sent next."""
-    pending: Frame | None = None
+    pending: Frame | tuple[Frame, Frame] | None = None
     """A frame that was taken from the player and could not be sent."""
     left: float | None = None
     """When the client was lost; None while there is one."""
@@ -41,12 +44,14 @@ class Sessions:
         self,
         prior: Callable[[], Prior],
         *,
+        block: Callable[[Prior], PairBlock] = lambda prior: PairBlock.load("duet", prior),
         most: int = MOST,
         settings: Settings | None = None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        """prior: gives the weights, called in the thread of the first session (it may take seconds)."""
-        self._prior, self._most, self._settings, self._now = prior, most, settings, now
+        """prior: gives the weights, called in the thread of the first session (it may take seconds). block: gives what
+        makes two people of them; `MotionloomError` where there is none for these weights."""
+        self._prior, self._block, self._most, self._settings, self._now = prior, block, most, settings, now
         self._open: dict[str, Session] = {}
         self._lock = threading.Lock()
 
@@ -58,8 +63,7 @@ class Sessions:
                 return self._again(asked.session)
             if len(self._open) >= self._most and not self._make_room():
                 raise MotionloomError(f"this server plays {self._most} live sessions and no more; come back later")
-            live = Live(self._prior(), seed=asked.seed, fps=asked.fps, skeleton=asked.skeleton, settings=self._settings)
-            session = Session(secrets.token_urlsafe(16), asked, Player(live).start())
+            session = Session(secrets.token_urlsafe(16), asked, self._player(asked).start())
             self._open[session.key] = session
             return session
 
@@ -81,6 +85,14 @@ class Sessions:
 
     def __len__(self) -> int:
         return len(self._open)
+
+    def _player(self, asked: Hello) -> Player[Any]:
+        prior = self._prior()
+        if asked.people == 1:
+            return Player(Live(prior, seed=asked.seed, fps=asked.fps, skeleton=asked.skeleton, settings=self._settings))
+        block = self._block(prior)
+        pair = LivePair(prior, block, seed=asked.seed, fps=asked.fps, skeleton=asked.skeleton, settings=self._settings)
+        return Player(pair)
 
     def _again(self, key: str) -> Session:
         session = self._open.get(key)

@@ -14,8 +14,8 @@ from typing import Any, Protocol
 
 from motionloom.errors import MotionloomError, one_line
 from motionloom.live import messages
-from motionloom.live.clock import Pace
-from motionloom.live.commands import from_json
+from motionloom.live.clock import Pace, first_of
+from motionloom.live.commands import from_json, person_of
 from motionloom.live.sessions import Session, Sessions
 
 RATE, BURST = 200.0, 100.0
@@ -114,7 +114,7 @@ async def _heard(websocket: Socket, session: Session, said: Mapping[str, Any]) -
     elif kind == "record":
         await _send(websocket, messages.recorded(session.begun, session.player.taken, session.number))
     else:
-        session.player.ask(from_json(said))
+        session.player.ask(from_json(said), person_of(said))
     return True
 
 
@@ -123,15 +123,15 @@ async def _play(websocket: Socket, session: Session) -> None:
     pace, reported = Pace(time.monotonic), time.monotonic()
     player = session.player
     while True:
-        while (frame := session.pending or player.take(timeout=0.0)) is None:
+        while (found := session.pending or player.take(timeout=0.0)) is None:
             if player.ended:
                 raise MotionloomError("the live session ended")
             await asyncio.sleep(LOOK)
-        session.pending = frame  # until it is sent: the client may go in between
+        session.pending, frame = found, first_of(found)  # until it is sent: the client may go in between
         await asyncio.sleep(pace.until(frame))
         late = pace.late(frame)
         player.shown(late)
-        await _send(websocket, messages.frame(frame, late))
+        await _send(websocket, messages.frame(found, late))
         session.number, session.pending = frame.number + 1, None
         if time.monotonic() - reported > EVERY:
             reported = time.monotonic()

@@ -1,6 +1,7 @@
 """The words for what somebody does who is steered and has no prompt: plain ones, which every prior knows."""
 
 import math
+import re
 
 from motionloom.goals.goal import turn_between
 
@@ -12,6 +13,14 @@ _FORWARD = (
     (math.inf, "a person runs forward"),
 )
 _BACKWARDS, _SIDEWAYS = "a person walks backwards", "a person walks sideways"
+
+
+_STANDING = re.compile(r"\b(stands?|standing|stops?|halts?)\b", re.IGNORECASE)
+
+
+def is_standing(words: str) -> bool:
+    """Whether words ask for somebody who stays where he is."""
+    return bool(_STANDING.search(words))
 
 
 def for_pace(speed: float, direction: float | None, facing: float | None) -> str:
