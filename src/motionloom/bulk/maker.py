@@ -18,6 +18,7 @@ from motionloom.goals.goal import placement_of
 from motionloom.io.stream import joined
 from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22
+from motionloom.retarget.hands import HandPose, pose_hands
 from motionloom.tasks.adapting import adapt
 from motionloom.tasks.control import Controlled, judged, moved, steered_features
 from motionloom.tasks.long import compose
@@ -53,8 +54,12 @@ class Options:
     """Seed of rows that do not say."""
     skeleton: str | None = None
     """A file with the skeleton of rows that name none; None: the 22-joint person."""
+    hands: HandPose = "as-is"
+    """Pose of the hands; a row whose skeleton has no fingers then fails."""
     format: str = "npz"
     """One of `FORMATS`."""
+    unit: float = 1.0
+    """Metres per unit of BVH files."""
     filter: str | None = None
     """See `motionloom.bulk.measures.Filter`; motions that do not pass are dropped."""
     judge: str | None = None
@@ -62,7 +67,8 @@ class Options:
 
     def of_motions(self, weights: str) -> dict[str, Any]:
         """What determines every motion of the batch; ``weights``: `hash_weights`."""
-        return {
+        later = {"hands": (self.hands, "as-is"), "unit": (self.unit, 1.0)}  # left out as they always were: old ids hold
+        return {name: value for name, (value, usual) in later.items() if value != usual} | {
             "weights": weights, "steps": self.steps, "guidance": self.guidance, "solver": self.solver,
             "raw": self.raw, "fps": self.fps, "bf16": self.bf16,
         }  # fmt: skip
@@ -206,4 +212,5 @@ class Maker:
         measures = {**measure(motion, asked.text, self.judge), **measured}
         if asked.target is not None:
             motion = from_smpl22(motion, asked.target)
+        motion = pose_hands(motion, self.options.hands)
         return Made(motion if self.options.fps is None else motion.resample(self.options.fps), measures)

@@ -178,7 +178,7 @@ class _Shard:
         file: Writer | None = None
         try:
             if carried:
-                file = writer(self.batch.options.format, place)
+                file = self._writer(place)
                 file.carry(self.store.data(self.task.shard), set(carried))
             begin = self._begin if self.notes.careful else None
             for one, made in self.maker.make(list(todo.values()), begin=begin):
@@ -191,13 +191,16 @@ class _Shard:
                 if passes is not None and not passes.holds(made.measures):
                     self.entries[number] = self._entry(number, "dropped", one, **told)
                     continue
-                file = file or writer(self.batch.options.format, place)
+                file = file or self._writer(place)
                 file.add(made.motion, told)
                 self.entries[number] = self._entry(number, "made", one, **told)
         finally:
             if file is not None:
                 file.close()
         return place if file is not None else None
+
+    def _writer(self, place: Path) -> Writer:
+        return writer(self.batch.options.format, place, unit=self.batch.options.unit)
 
     def _begin(self, one: Asked) -> None:
         self.notes.note(f"row {one.key}")

@@ -17,6 +17,7 @@ import numpy as np
 
 from motionloom.bulk.jobs import arrow, parquet
 from motionloom.io import save
+from motionloom.io.bvh_writer import save_bvh
 from motionloom.io.npz import save_npz
 from motionloom.motion import Motion
 
@@ -50,13 +51,17 @@ class Writer(ABC):
 class Files(Writer):
     """A folder with a file for each motion."""
 
-    def __init__(self, path: Path, suffix: str) -> None:
+    def __init__(self, path: Path, suffix: str, unit: float) -> None:
         super().__init__(path)
-        self.kind = suffix
+        self.kind, self.unit = suffix, unit
         path.mkdir()
 
     def add(self, motion: Motion, about: dict[str, Any]) -> None:
-        save(motion, self.path / f"{about['id']}{self.kind}")
+        place = self.path / f"{about['id']}{self.kind}"
+        if self.kind == ".bvh":
+            save_bvh(motion, place, unit=self.unit)
+        else:
+            save(motion, place)
 
     def carry(self, old: Path, ids: Collection[str]) -> None:
         for name in ids:
@@ -161,11 +166,11 @@ def parquet_row(motion: Motion, about: dict[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def writer(kind: str, path: Path) -> Writer:
-    """A writer of one of `motionloom.bulk.maker.FORMATS` at a path where nothing is."""
+def writer(kind: str, path: Path, *, unit: float = 1.0) -> Writer:
+    """A writer of one of `motionloom.bulk.maker.FORMATS` at a path where nothing is; ``unit``: metres, of a BVH."""
     if kind == "webdataset":
         return Tar(path)
-    return Parquet(path) if kind == "parquet" else Files(path, f".{kind}")
+    return Parquet(path) if kind == "parquet" else Files(path, f".{kind}", unit)
 
 
 def suffix(kind: str) -> str:
