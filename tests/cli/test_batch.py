@@ -3,17 +3,21 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from motionloom import io
 from motionloom.cli import main
 from motionloom.io.atomic import finished
+from motionloom.io.bvh import read_bvh
+from motionloom.io.bvh_writer import save_bvh
 from motionloom.tasks.adapting import adapt
 from motionloom.tasks.text import generate
 from motionloom.weights.prior import Prior
 from tests.bulk.rows import rows, written
 from tests.cli.said import complaint
 from tests.io.motions import largest_distance
+from tests.retarget.test_hands import handed, still
 from tests.tasks.test_adapting import adapter
 
 
@@ -41,6 +45,28 @@ def test_variants_of_prompts_are_made_once(weights: str, capsys: pytest.CaptureF
     assert command(weights, *words) == 0
     assert json.loads(capsys.readouterr().out) == {"folder": "out", "tried": 0, "made": 4}
     assert sorted(path.name for path in Path("out").rglob("*.npz")) == made
+
+
+def test_hands_and_unit_are_in_the_files(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Files in centimetres hold a hundred times the numbers; a fist closes, and has no fingers to close on smpl22."""
+    save_bvh(still(handed()), "hands.bvh")
+    words = ("--prompts", "prompts.txt", "--seconds", "0.5", "--format", "bvh", "--skeleton", "hands.bvh")
+    made = {}
+    for name, more in (("open", ()), ("fist", ("--hands", "fist", "--out-unit", "cm"))):
+        assert (
+            main(["batch", *words, *more, "--out", name, "--weights", weights, "--steps", "2", "--workers", "1"]) == 0
+        )
+        (path, *_) = sorted(Path(name).rglob("*.bvh"))
+        made[name] = read_bvh(path)
+    assert (made["open"].unit, made["fist"].unit) == (1.0, 0.01)
+    tip, wrist = (made["fist"].motion.skeleton.index(name) for name in ("leftHandMiddle4", "left_wrist"))
+    far = {k: np.linalg.norm(np.diff(f.motion.positions()[:, [tip, wrist]], axis=1), axis=-1) for k, f in made.items()}
+    assert far["fist"].max() < 0.8 * far["open"].min()
+    capsys.readouterr()
+    assert command(weights, *words[:4], "--hands", "fist") == 1
+    assert "no fingers" in capsys.readouterr().err
+    assert main(["batch", *words[:4], "--out-unit", "cm", "--out", "other", "--weights", weights]) == 2
+    assert "--out-unit is for BVH" in complaint(capsys)
 
 
 def test_what_was_taught_is_in_the_motions_and_in_their_names(weights: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -83,6 +83,11 @@ def test_checks_are_tried_on_real_clips(built: Path, tmp_path: Path, capsys: pyt
     assert "0 of 1 checks are sound" in capsys.readouterr().out  # nobody bows there
     assert "no example" in (out / "checks.md").read_text()
     assert json.loads((out / "checks.json").read_text())["checks"]["bow"]["shown"] == [0, 0]
+    again = ["evaluate", "checks", "--data", str(built), "--only", "bow", "--out", str(out)]
+    assert main(again) == 0
+    assert f"note: {out / 'checks.md'} was there and is written over" in capsys.readouterr().err
+    assert main([*again, "--force"]) == 0
+    assert "note:" not in capsys.readouterr().err
 
 
 def test_realism_against_a_built_set(built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

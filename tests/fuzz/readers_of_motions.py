@@ -9,11 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from motionloom import io
+from motionloom.io.character import load_character
+from motionloom.io.glb import read_document
 from motionloom.io.gltf_read import load_glb_people
 from motionloom.motion import Motion
 from motionloom.rotations import IDENTITY
 from motionloom.skeleton import SMPL22
 from tests.fuzz.reader import reader
+from tests.io.rigged import Hero, wave
 from tests.io.test_asf import AMC, ASF
 from tests.io.test_bvh import ARM
 
@@ -67,6 +70,24 @@ def gltf(folder: Path) -> None:
     (folder / "a.gltf").write_text(json.dumps(said))
 
 
+def hero(folder: Path) -> None:
+    """A character with a mesh, feet on a control and a clip."""
+    Hero(hang={"left_ankle": "pelvis"}).clip("wave", wave(3)).write(folder / "a.glb")
+
+
+def carried(path: Path) -> None:
+    """The character's meshes, and its own file with a motion in it."""
+    character = load_character(path)
+    for surface in character.surfaces():
+        assert np.isfinite(surface.points).all()
+        assert np.isfinite(surface.weights).all()
+        assert surface.triangles.max(initial=0) < len(surface.points)
+    turns = np.tile(IDENTITY, (2, len(character.skeleton), 1))
+    moving = Motion(character.skeleton, 30.0, np.zeros((2, 3)), turns)
+    out = character.save(moving, path.with_name("out.glb"))
+    assert read_document(out).items("animations")[-1]["channels"]
+
+
 def places(folder: Path) -> None:
     np.savez_compressed(folder / "a.npz", positions=motion().positions().astype(np.float32), fps=np.array(20.0))
 
@@ -76,6 +97,7 @@ reader("bvh of a person", saved("a.bvh"), {"a.bvh": "text"}, lambda f: looked_at
 reader("asf and amc", two_texts, {"a.asf": "text", "a.amc": "text"}, lambda f: looked_at(io.load(f / "a.amc")))
 reader("glb", saved("a.glb"), {"a.glb": "glb"}, lambda f: looked_at(io.load(f / "a.glb")), weight=6)
 reader("gltf", gltf, {"a.gltf": "json"}, lambda f: [looked_at(m) for m in load_glb_people(f / "a.gltf")], weight=6)
+reader("character", hero, {"a.glb": "glb"}, lambda f: carried(f / "a.glb"), weight=10)
 reader("npz", saved("a.npz"), {"a.npz": "npz"}, lambda f: looked_at(io.load(f / "a.npz")), weight=6)
 reader("npz of places", places, {"a.npz": "npz"}, lambda f: looked_at(io.load(f / "a.npz")), weight=3)
 

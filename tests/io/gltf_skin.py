@@ -104,6 +104,16 @@ class Scene:
             found[i] = np.concatenate(pieces, axis=1)[..., :3]
         return found
 
+    def used(self, node: int) -> np.ndarray:
+        """Numbers of the vertices of `vertices` (all of them) that triangles name, in their order."""
+        pieces, start = [], 0
+        for primitive in self.json["meshes"][self.nodes[node]["mesh"]]["primitives"]:
+            count = self.json["accessors"][primitive["attributes"]["POSITION"]]["count"]
+            named = self.values(primitive["indices"])[:, 0] if "indices" in primitive else np.arange(count)
+            pieces.append(start + np.unique(named.astype(int)))
+            start += count
+        return np.concatenate(pieces)
+
     def weight_of(self, node: int, joints: set[int], *, at_most: int = 500) -> np.ndarray:
         """(vertices,) how much of each vertex of `vertices` follows the given joints."""
         pieces = []

@@ -8,6 +8,7 @@ import json
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,14 @@ import pytest
 
 from motionloom import rotations as rot
 from motionloom.io import save
+from motionloom.io.character import load_character
 from motionloom.motion import Motion
+from motionloom.retarget import retarget
+from motionloom.retarget.named import NAMED, named_skeleton
 from motionloom.skeleton import SMPL22
+from tests.io.in_blender import VARIABLE, Job, Shown, apart, python_with_bpy, shown
+from tests.io.rigged import Hero, wave
+from tests.shared import shared
 
 pytestmark = pytest.mark.blender
 
@@ -124,3 +131,79 @@ def test_blender_sees_the_bvh_with_its_rate_height_facing_and_path(tmp_path: Pat
         np.testing.assert_allclose(ours(joints), motion.positions()[frame], atol=1e-3)
     rest = ours(seen["people"][0]["rest"])
     assert 1.5 < np.ptp(rest[:, 1]) < 1.9
+
+
+# Characters ----------------------------------------------------------------------------------------------------------
+
+
+def waver() -> Motion:
+    """Somebody who goes ahead and waves with everything."""
+    way = np.arange(40)[:, None] * [0.002, 0.0, 0.02]
+    return Motion(SMPL22, 30.0, SMPL22.offsets[0] + way, rot.rotvec_to_quat(wave()))
+
+
+def as_glb_and_bvh(path: Path, folder: Path) -> tuple[Motion, Path, Path]:
+    """The waver on a character: the motion, the character's own file with it, and the same as BVH."""
+    character = load_character(path)
+    made = retarget(waver(), character.skeleton)
+    out = character.save(made, folder / f"out{path.suffix}", name="ours")
+    return made, out.rename(folder / f"{path.stem}_ours.glb"), save(made, folder / f"{path.stem}.bvh")
+
+
+def check_in_blender(made: dict[str, tuple[Motion, Path, Path]]) -> None:
+    """Every vertex to 1 mm, as the glTF specification has it, and every joint of the BVH."""
+    frames = (0, 17, 39)
+    jobs = [Job(glb, frames, clip="ours") for _, glb, _ in made.values()]
+    jobs += [Job(bvh, tuple(f + 1 for f in frames)) for _, _, bvh in made.values()]
+    seen = shown(jobs)
+    for (name, (motion, glb, _)), of_glb, of_bvh in zip(made.items(), seen[: len(made)], seen[len(made) :]):
+        assert not of_glb.error, (name, of_glb.error)
+        largest, count = apart(glb, "ours", frames, 30.0, of_glb)
+        assert count
+        assert largest < 1e-3, name
+        check_joints(name, motion, of_bvh, frames)
+
+
+def check_joints(name: str, motion: Motion, seen: Shown, frames: tuple[int, ...]) -> None:
+    assert not seen.error, (name, seen.error)
+    places = motion.positions()[list(frames)]
+    for j, joint in enumerate(motion.skeleton.names):
+        if j not in motion.skeleton.ends:
+            np.testing.assert_allclose(seen.bones[joint], places[:, j], atol=1e-3, err_msg=f"{name}: {joint}")
+
+
+@pytest.fixture
+def bpy_is_there() -> None:
+    if python_with_bpy() is None:
+        pytest.skip(f"needs bpy, here or in the Python named by {VARIABLE}")
+
+
+@pytest.mark.usefixtures("bpy_is_there")
+def test_blender_sees_our_own_characters_to_a_millimetre(tmp_path: Path) -> None:
+    """Turned bones, feet on controls, other clips that would leave their pose behind, another size."""
+    heroes = {
+        "turned": Hero(seed=3),
+        "other_clip": Hero(seed=4).clip("other", wave(seed=5)),
+        "feet_on_controls": Hero(hang={"left_ankle": "pelvis", "right_ankle": "pelvis"}),
+        "giant": Hero(size=1.3),
+    }
+    paths = {name: hero.write(tmp_path / f"{name}.glb") for name, hero in heroes.items()}
+    check_in_blender({name: as_glb_and_bvh(path, tmp_path) for name, path in paths.items()})
+
+
+@pytest.mark.usefixtures("bpy_is_there")
+def test_blender_sees_the_skeletons_that_have_a_name(tmp_path: Path) -> None:
+    motions = {name: retarget(waver(), named_skeleton(name)) for name in NAMED}
+    frames = (0, 17, 39)
+    jobs = [Job(save(m, tmp_path / f"{name}.bvh"), tuple(f + 1 for f in frames)) for name, m in motions.items()]
+    for (name, motion), seen in zip(motions.items(), shown(jobs)):
+        check_joints(name, motion, seen, frames)
+
+
+@pytest.mark.usefixtures("bpy_is_there")
+def test_blender_sees_characters_of_others_to_a_millimetre(tmp_path: Path) -> None:
+    names = ("gdbot", "kaykit_knight", "robot_expressive", "sophia", "ue_m2m_anim", "vrm1_example")
+    found = {path.stem: path for path in shared("rigs").iterdir() if path.suffix in (".glb", ".vrm")}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        check_in_blender({name: as_glb_and_bvh(found[name], tmp_path) for name in names})

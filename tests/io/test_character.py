@@ -106,6 +106,23 @@ def test_bones_that_are_not_driven_keep_their_rest(tmp_path: Path) -> None:
     assert 23 not in {channel["target"]["node"] for channel in new["animations"][-1]["channels"]}
 
 
+def test_what_another_clip_moves_has_one_key_at_rest(tmp_path: Path) -> None:
+    """Programs that go from clip to clip leave a node where the last clip had it, unless the next one says."""
+    hero = Hero().clip("wave", wave())
+    animation = hero.json["animations"][0]
+    keys = hero.add(np.tile([0.0, 1.0, 0.0], (40, 1)), 5126, "VEC3")
+    animation["samplers"].append({"input": animation["samplers"][0]["input"], "output": keys})
+    animation["channels"].append({"sampler": 22, "target": {"node": 23, "path": "translation"}})
+    path = hero.write(tmp_path / "hero.glb")
+    _, out = onto(path, tmp_path / "moving.glb")
+    check_only_one_animation_is_new(path, out)
+    scene = Scene(out)
+    ours = scene.clip("ours")
+    (held,) = [c for c in ours["channels"] if c["target"] == {"node": 23, "path": "translation"}]
+    np.testing.assert_allclose(scene.values(ours["samplers"][held["sampler"]]["output"]), [[0.05, 0.02, 0.01]])
+    assert scene.values(ours["samplers"][held["sampler"]]["input"]).tolist() == [[0.0]]
+
+
 def test_feet_on_controls_are_carried_along(tmp_path: Path) -> None:
     """Feet that hang on the root instead of on their shins, as in rigs made for IK, stay on their legs."""
     hang = {"left_ankle": "pelvis", "right_ankle": "pelvis"}

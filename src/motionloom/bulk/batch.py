@@ -115,6 +115,8 @@ def check_options(options: Options) -> None:
         raise MotionloomError(f"the pair guidance must be 0 to 1; got {options.pair_guidance:g}")
     if options.shard_rows is not None and not 1 <= options.shard_rows <= MOST:
         raise MotionloomError(f"a shard has 1 to {MOST:,} rows; got {options.shard_rows:,}")
+    if options.unit != 1.0 and options.format != "bvh":
+        raise MotionloomError(f"--out-unit is for BVH files; the format is {options.format}, which states its unit")
     if options.fps is not None and not 1 <= options.fps <= 1000:
         raise MotionloomError(f"the frame rate must be 1 to 1000; got {options.fps:g}")
     if options.skeleton is not None and options.skeleton != "smpl22" and not Path(options.skeleton).is_file():

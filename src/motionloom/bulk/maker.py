@@ -19,6 +19,7 @@ from motionloom.goals.goal import placement_of
 from motionloom.io.stream import joined
 from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22
+from motionloom.retarget.hands import HandPose, pose_hands
 from motionloom.tasks.adapting import adapt
 from motionloom.tasks.control import Controlled, judged, moved, steered_features
 from motionloom.tasks.duet import compose_pair
@@ -62,10 +63,14 @@ class Options:
     """Seed of rows that do not say."""
     skeleton: str | None = None
     """A file with the skeleton of rows that name none; None: the 22-joint person."""
+    hands: HandPose = "as-is"
+    """Pose of the hands; a row whose skeleton has no fingers then fails."""
     format: str = "npz"
     """One of `FORMATS`."""
     shard_rows: int | None = None
     """Rows of a shard, up to `motionloom.bulk.jobs.MOST`; None: as suits the job's size."""
+    unit: float = 1.0
+    """Metres per unit of BVH files."""
     filter: str | None = None
     """See `motionloom.bulk.measures.Filter`; motions that do not pass are dropped."""
     judge: str | None = None
@@ -73,7 +78,8 @@ class Options:
 
     def of_motions(self, weights: str) -> dict[str, Any]:
         """What determines every motion of the batch; ``weights``: `hash_weights`."""
-        return {
+        later = {"hands": (self.hands, "as-is"), "unit": (self.unit, 1.0)}  # left out as they always were: old ids hold
+        return {name: value for name, (value, usual) in later.items() if value != usual} | {
             "weights": weights, "steps": self.steps, "guidance": self.guidance, "solver": self.solver,
             "raw": self.raw, "fps": self.fps, "bf16": self.bf16,
         }  # fmt: skip
@@ -284,6 +290,7 @@ class Maker:
     def _finished(self, asked: Asked, people: Sequence[Motion], measured: Sequence[Values]) -> Made:
         if asked.target is not None:
             people = [from_smpl22(motion, asked.target) for motion in people]
+        people = [pose_hands(motion, self.options.hands) for motion in people]
         if self.options.fps is not None:
             people = [motion.resample(self.options.fps) for motion in people]
         return Made(tuple(people), tuple(measured))

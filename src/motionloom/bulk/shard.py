@@ -186,7 +186,7 @@ class _Shard:
         file: Writer | None = None
         try:
             if carried:
-                file = writer(self.batch.options.format, place)
+                file = self._writer(place)
                 file.carry(self.store.data(self.task.shard), set(carried))
             begin = self._begin if self.notes.careful else None
             for one, made in self.maker.make(list(todo.values()), begin=begin):
@@ -199,13 +199,16 @@ class _Shard:
                 if not made.passes(passes):
                     self.entries[number] = self._entry(number, "dropped", one, **about)
                     continue
-                file = file or writer(self.batch.options.format, place)
+                file = file or self._writer(place)
                 file.add(made.people, about)
                 self.entries[number] = self._entry(number, "made", one, **about)
         finally:
             if file is not None:
                 file.close()
         return place if file is not None else None
+
+    def _writer(self, place: Path) -> Writer:
+        return writer(self.batch.options.format, place, unit=self.batch.options.unit)
 
     def _begin(self, one: Asked) -> None:
         self.notes.note(f"row {one.key}")

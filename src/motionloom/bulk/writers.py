@@ -18,6 +18,7 @@ import numpy as np
 from motionloom.bulk.jobs import arrow, parquet
 from motionloom.bulk.measures import MEANING, SECOND, SHARED
 from motionloom.io import save, save_scene
+from motionloom.io.bvh_writer import save_bvh
 from motionloom.io.npz import save_npz
 from motionloom.motion import Motion
 
@@ -51,9 +52,9 @@ class Writer(ABC):
 class Files(Writer):
     """A folder with a file for each motion."""
 
-    def __init__(self, path: Path, suffix: str) -> None:
+    def __init__(self, path: Path, suffix: str, unit: float) -> None:
         super().__init__(path)
-        self.kind = suffix
+        self.kind, self.unit = suffix, unit
         path.mkdir()
 
     def add(self, people: Sequence[Motion], about: dict[str, Any]) -> None:
@@ -62,7 +63,10 @@ class Files(Writer):
             save_scene(people, self.path / names[0], names=PEOPLE)
             return
         for motion, name in zip(people, names, strict=True):
-            save(motion, self.path / name)
+            if self.kind == ".bvh":
+                save_bvh(motion, self.path / name, unit=self.unit)
+            else:
+                save(motion, self.path / name)
 
     def carry(self, old: Path, ids: Collection[str]) -> None:
         for place in old.iterdir():
@@ -181,11 +185,11 @@ def file_names(name: str, kind: str, people: int) -> list[str]:
     return [f"{name}.{person}{kind}" for person in PEOPLE]
 
 
-def writer(kind: str, path: Path) -> Writer:
-    """A writer of one of `motionloom.bulk.maker.FORMATS` at a path where nothing is."""
+def writer(kind: str, path: Path, *, unit: float = 1.0) -> Writer:
+    """A writer of one of `motionloom.bulk.maker.FORMATS` at a path where nothing is; ``unit``: metres, of a BVH."""
     if kind == "webdataset":
         return Tar(path)
-    return Parquet(path) if kind == "parquet" else Files(path, f".{kind}")
+    return Parquet(path) if kind == "parquet" else Files(path, f".{kind}", unit)
 
 
 def suffix(kind: str) -> str:

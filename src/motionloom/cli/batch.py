@@ -5,7 +5,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionloom.cli.reading import as_unit
 from motionloom.cli.sampling import add_adapters, fail
+from motionloom.cli.skeletons import HANDS
 
 if TYPE_CHECKING:
     from motionloom.bulk.batch import Where
@@ -47,6 +49,10 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "--seed", type=int, default=0, help="seed of rows that do not say, of the first variant (default 0)"
     )
     parser.add_argument("--skeleton", metavar="FILE|smpl22", help="put the motions on this skeleton")
+    parser.add_argument("--hands", choices=HANDS, default="as-is", help="pose of the hands, on skeletons with fingers")
+    parser.add_argument(
+        "--out-unit", type=as_unit, default=1.0, metavar="UNIT", help="unit of --format bvh: m (default), cm, inch ..."
+    )
     parser.add_argument("--guidance", type=float, help="strength of the text (default 2.5)")
     parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 24)")
     parser.add_argument("--solver", help="ddim, ddpm (the default), dpm2m or dpm2m-sde")
@@ -121,6 +127,7 @@ def _options(arguments: argparse.Namespace) -> "Options":
         weights=arguments.weights, adapters=arguments.adapter, device=arguments.device, bf16=arguments.bf16,
         raw=arguments.raw, fps=arguments.fps, pair_weights=arguments.pair_weights,
         pair_guidance=arguments.pair_guidance, shard_rows=arguments.shard_rows,
+        hands=arguments.hands, unit=arguments.out_unit,
         seconds=arguments.seconds, seed=arguments.seed, skeleton=arguments.skeleton, format=arguments.format,
         filter=arguments.filter, judge=JUDGE if obeys else None,
         **{name: value for name, value in given.items() if value is not None},

@@ -6,6 +6,7 @@ from typing import Any
 
 from motionloom.cli.measuring import say
 from motionloom.cli.sampling import fail
+from motionloom.cli.writing import add_force, check_overwriting
 
 
 def add(subparsers) -> None:
@@ -21,6 +22,7 @@ def add(subparsers) -> None:
     )
     parser.add_argument("--device", default="cpu", help="cpu or cuda for the network's part (default cpu)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to this file as well")
+    add_force(parser)
     parser.set_defaults(run=_bench)
 
 
@@ -30,6 +32,7 @@ def _bench(arguments: argparse.Namespace) -> None:
 
     if arguments.json:
         check_report(arguments.json)
+        check_overwriting(arguments, [arguments.json])
     if arguments.long and arguments.prediction:
         fail("--long and --prediction are two measurements; ask for one")
     found = _predicted(arguments) if arguments.prediction else _generated(arguments)

@@ -1,10 +1,12 @@
 """`motionloom evaluate`: does it do what the words say, does it look real, and did it get better."""
 
 import argparse
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
 from motionloom.cli.measuring import say
+from motionloom.cli.writing import add_force, check_overwriting
 
 PARTS = (
     "evaluate_checks", "evaluate_text", "evaluate_transitions", "evaluate_control", "evaluate_prediction",
@@ -20,6 +22,25 @@ def add(subparsers) -> None:
     _physical(commands)
     for part in PARTS:
         import_module(f"motionloom.cli.{part}").add(commands)
+    for name, parser in commands.choices.items():
+        if name != "compare":
+            add_force(parser)
+            parser.set_defaults(run=_saying_what_is_there(parser.get_default("run")))
+
+
+def _saying_what_is_there(
+    run: Callable[[argparse.Namespace], int | None],
+) -> Callable[[argparse.Namespace], int | None]:
+    """The command, after a note about finished pages that it writes over; what a stopped run left has none."""
+
+    def run_with_note(arguments: argparse.Namespace) -> int | None:
+        out = getattr(arguments, "out", None)
+        if out is not None:
+            pages = [out] if out.is_file() else sorted({*out.glob("*.md"), *out.glob("*/report.md")})
+            check_overwriting(arguments, pages)
+        return run(arguments)
+
+    return run_with_note
 
 
 def _physical(commands) -> None:

@@ -70,6 +70,6 @@ def _inputs(arguments: argparse.Namespace) -> list[Path]:
     for name, value in vars(arguments).items():
         if name == "skeleton" and isinstance(value, str):
             found.append(Path(value))
-        elif name not in ("out", "output", "blender"):
+        elif name not in ("out", "output", "json", "blender"):
             found += value if isinstance(value, list | tuple) else [value]
     return [value for value in found if isinstance(value, Path)]

@@ -57,8 +57,9 @@ class Character:
         """Write the character's own file with one more animation, or with ``replace`` this one only.
 
         ``motion`` is on `skeleton`, in metres and +Y up. Keyed are the joints of its body and those between them, and
-        places of those that move against what they hang on; all others keep their rest. ``name`` of the animation
-        (``motion``) gets a number where the file has one of that name. The new file ends as the old one.
+        places of those that move against what they hang on; all others keep their rest, those that the file's other
+        animations move by one key of it. ``name`` of the animation (``motion``) gets a number where the file has one
+        of that name. The new file ends as the old one.
         Raises `MotionloomError` for a motion of another skeleton, another suffix, or a place that cannot be written.
         """
         path = Path(path)
@@ -73,8 +74,12 @@ class Character:
         animation = {"name": self._free_name(name or "motion", replace), "channels": [], "samplers": []}
         animation["extras"] = {"fps": motion.fps}
         clock = new.add(np.arange(len(motion))[:, None] / motion.fps, bounds=True)
-        for node, path_, values in self._keys(motion):
-            animation["samplers"].append({"input": clock, "output": new.add(values), "interpolation": "LINEAR"})
+        keys = self._keys(motion)
+        held = [] if replace else self._held({(node, path_) for node, path_, _ in keys})
+        start = new.add(np.zeros((1, 1)), bounds=True) if held else clock
+        for node, path_, values in keys + held:
+            times = clock if len(values) == len(motion) else start
+            animation["samplers"].append({"input": times, "output": new.add(values), "interpolation": "LINEAR"})
             channel = {"sampler": len(animation["samplers"]) - 1, "target": {"node": node, "path": path_}}
             animation["channels"].append(channel)
             _use_parts(document["nodes"][node], self.nodes[node])
@@ -115,6 +120,22 @@ class Character:
                     keys.append((n, "translation", place))
             now = worlds(self.nodes, parents, [n], sampled, above=now)
         return keys
+
+    def _held(self, keyed: set[tuple[int, str]]) -> list[tuple[int, str, Array]]:
+        """The rest, once, of what the file's animations move and the new one does not.
+
+        Without it Blender and Godot would leave such a node where the animation that was shown before had it.
+        """
+        inside = set(self.rig.nodes)
+        moved = {key for channels in self.file.channels for key in channels if key[0] in inside}
+        rest = {
+            (n, path): {
+                "translation": self.nodes[n].place, "rotation": np.roll(self.nodes[n].turn, -1),
+                "scale": self.nodes[n].scale,
+            }[path]
+            for n, path in moved - keyed
+        }  # fmt: skip
+        return [(n, path, value[None]) for (n, path), value in sorted(rest.items(), key=lambda item: item[0])]
 
     def _free(self, motion: Motion) -> set[int]:
         """The joints whose places are not what the bones above them say: the root, and those that a control holds."""

@@ -227,11 +227,14 @@ def _spread(goals: _Goals, left: Array) -> _Goals:
 
 def _smooth_left(pose: _Pose, fps: float) -> Array:
     """(frames, 3) where the left of the pelvis is, so smooth in time that planted feet hardly slide."""
-    left = rot.rotate(pose.frames[:, 0], np.eye(3)[1])
-    reach = max(1, round(0.4 * fps))
+    return _smooth(rot.rotate(pose.frames[:, 0], np.eye(3)[1]), max(1, round(0.4 * fps)))
+
+
+def _smooth(values: Array, reach: int) -> Array:
+    """(frames, n) with each frame the mean of those up to ``reach`` away, near ones more."""
     kernel = np.hanning(2 * reach + 3)[1:-1]
-    padded = np.pad(left, ((reach, reach), (0, 0)), mode="edge")
-    smooth = [np.convolve(padded[:, i], kernel / kernel.sum(), mode="valid") for i in range(3)]
+    padded = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
+    smooth = [np.convolve(column, kernel / kernel.sum(), mode="valid") for column in padded.T]
     return np.asarray(np.stack(smooth, axis=-1), dtype=np.float64)
 
 
@@ -295,7 +298,11 @@ def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
     root = goals.hips + shift - places[:, [1, 2]].mean(axis=1)
     places = places + root[:, None]
     ankles = ankles + (1.0 - goals.low) * (goals.ankles + shift[:, None] - ankles)
-    ankles = _on_soles(ankles, goals, body, world=world, places=places - root[:, None])
+    if body.skeleton.soles:
+        lack = _lack(ankles, goals, body, world=world, places=places - root[:, None])
+        ankles, raised = _on_soles(ankles, goals, lack, fps)
+        lift = np.array([0.0, raised, 0.0])
+        root, places = root + lift, places + lift
     drop = _drop(places, ankles, body)
     root, places = root - drop, places - drop[:, None]
     for side, (hip, knee, ankle) in enumerate(((1, 4, 7), (2, 5, 8))):
@@ -307,15 +314,29 @@ def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
     return Motion(body.skeleton, fps, root, _locals(body.skeleton, world))
 
 
-def _on_soles(ankles: Array, goals: _Goals, body: Body, *, world: Array, places: Array) -> Array:
-    """The ankles' goals (frames, 2, 3), raised where a foot of a character's own shape would be in the ground.
+def _on_soles(ankles: Array, goals: _Goals, lack: Array, fps: float) -> tuple[Array, float]:
+    """The ankles' goals (frames, 2, 3), and by how many metres the whole body is raised, for feet of another shape.
 
-    ``places`` (frames, 22, 3) are of the body with joint 0 at the origin. A foot that the source has below y = 0, such
-    as down a stair, may be as low there. What both feet lack is left: it may as well be a pose in the air, which games
+    What both feet ``lack`` (`_lack`) while one of them stands flat, in the middle over the clip, raises everybody; what
+    is left raises a foot. What both lack while neither stands is left: it may as well be a pose in the air, which games
     play in one place.
     """
-    if not body.skeleton.soles:
-        return ankles
+    common, flat = lack.min(axis=1), goals.flat.any(axis=1)
+    whole = float(np.median(common[flat])) if flat.sum() >= 3 else 0.0
+    reach = max(1, round(0.2 * fps))
+    near = np.lib.stride_tricks.sliding_window_view(np.pad(flat, reach), 2 * reach + 1).max(axis=1)
+    stands = _smooth(near.astype(np.float64)[:, None], reach)[:, 0]
+    lack = np.maximum(lack - whole, 0.0)
+    lack = lack - (lack.min(axis=1) * (1.0 - stands))[:, None]
+    return ankles + (whole + lack[..., None]) * np.array([0.0, 1.0, 0.0]), whole
+
+
+def _lack(ankles: Array, goals: _Goals, body: Body, *, world: Array, places: Array) -> Array:
+    """(frames, 2) metres by which the feet of a character's own shape would be in the ground.
+
+    ``places`` (frames, 22, 3) are of the body with joint 0 at the origin. A foot that the source has below y = 0, such
+    as down a stair, may be as low there.
+    """
     joints = _positions(body.skeleton, world)
     lack = np.zeros(ankles.shape[:2])
     for side, foot in enumerate(FEET):
@@ -326,8 +347,7 @@ def _on_soles(ankles: Array, goals: _Goals, body: Body, *, world: Array, places:
             under = (points - places[:, None, foot])[..., 1].min(axis=1)
             ground = np.minimum(goals.toes[:, side, 1] - body.toe_height, 0.0)
             lack[:, side] = np.maximum(lack[:, side], ground - under - ankles[:, side, 1])
-    lack = lack - lack.min(axis=1, keepdims=True)
-    return ankles + lack[..., None] * np.array([0.0, 1.0, 0.0])
+    return lack
 
 
 def _make_up(goals: _Goals, ankles: Array) -> Array:
