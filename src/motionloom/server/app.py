@@ -288,8 +288,8 @@ async def timeline_to_json(request: Request) -> Response:
 # What goes wrong
 
 
-def _answer(status: int, sentence: str, headers: Mapping[str, str] | None = None) -> Response:
-    return JSONResponse({"error": sentence}, status_code=status, headers=headers)
+def _answer(status: int, sentence: str, headers: Mapping[str, str] | None = None, *, where: str = "") -> Response:
+    return JSONResponse({"error": sentence} | ({"where": where} if where else {}), status_code=status, headers=headers)
 
 
 async def _refused(request: Request, error: Exception) -> Response:
@@ -298,7 +298,8 @@ async def _refused(request: Request, error: Exception) -> Response:
 
 
 async def _mistaken(request: Request, error: Exception) -> Response:
-    return _answer(400, studio_of(request).project.without_paths(str(error)))
+    sentence = studio_of(request).project.without_paths(str(error))
+    return _answer(400, sentence, where=getattr(error, "where", ""))
 
 
 async def _no_route(request: Request, error: Exception) -> Response:

@@ -6,6 +6,7 @@ import {
   type Clip,
   type Project,
   type Take,
+  NOTHING_ASKED,
   begins,
   clamp,
   keptTake,
@@ -17,7 +18,8 @@ import {
 } from "../project/model";
 import { freeze, unfrozen } from "../project/timeline";
 import { type Result, motion, takeOf } from "../server/api";
-import { type App, shownClip } from "./app";
+import { isAway } from "../server/jobs";
+import { type App, problemOf, shownClip } from "./app";
 import type { Drawer } from "./drawing";
 import { NOTHING } from "./session";
 
@@ -52,13 +54,13 @@ export class Deeds {
   async predict(): Promise<void> {
     const take = keptTake(this.app.project.value);
     if (!take) return this.say("There is no motion yet that could go on.");
-    const results = await this.drawer.once({
-      task: "predict",
-      motion: take.motion,
-      seconds: FUTURE_SECONDS,
-      count: FUTURES,
-      seed: this.app.project.value.seed,
-    });
+    const common = { seconds: FUTURE_SECONDS, count: FUTURES, seed: this.app.project.value.seed };
+    const results = await this.drawer.once(
+      // Futures of two people are drawn together: what one does depends on the other.
+      take.people > 1
+        ? { task: "duet", past: take.motion, ...common }
+        : { task: "predict", motion: take.motion, ...common },
+    );
     if (!results?.length) return;
     const clips = await Promise.all(results.map((one) => motion(one.id)));
     const fan = { clips, motions: results.map((one) => one.id), past: take.seconds };
@@ -87,14 +89,16 @@ export class Deeds {
   async loop(): Promise<void> {
     const take = keptTake(this.app.project.value);
     if (!take) return this.say("There is no motion yet to make a loop of.");
-    const results = await this.drawer.once({
-      task: "edit",
-      motion: take.motion,
-      loop: true,
-      seed: this.app.project.value.seed,
-      count: 1,
-    });
-    if (results?.[0]) this.take(results[0], "looped", "close the loop");
+    let motion = take.motion;
+    let result: Result | undefined;
+    for (let person = 0; person < take.people; person += 1) {
+      const { seed } = this.app.project.value;
+      const results = await this.drawer.once({ task: "edit", motion, person, loop: true, seed, count: 1 });
+      result = results?.[0];
+      if (!result) return;
+      motion = result.id;
+    }
+    if (result) this.take(result, "looped", "close the loop");
   }
 
   /** One clip going over into another. */
@@ -114,7 +118,7 @@ export class Deeds {
       segment("", SWITCH_SECONDS),
       segment(to.name, round(to.seconds)),
     ];
-    this.put(result, `switch from ${from.name} to ${to.name}`, names);
+    this.put(result, `switch from ${from.name} to ${to.name}`, names, "switched");
   }
 
   /** A clip becomes what is on the timeline; words then change stretches of it. */
@@ -171,15 +175,25 @@ export class Deeds {
     );
   }
 
-  say(error: string): void {
-    this.app.session.update({ error });
+  /** What was done live becomes the motion; each stretch of the same words is a block. */
+  putRecording(result: Result, segments: Project["segments"]): void {
+    this.put(result, "keep what was done live", segments, "live");
+  }
+
+  fail(error: unknown): void {
+    if (isAway(error)) this.app.session.update({ connected: false });
+    else this.app.session.update({ error: problemOf(this.app, error) });
+  }
+
+  say(message: string): void {
+    this.app.session.update({ error: { message, at: null } });
   }
 
   private take(result: Result, how: string, label: string): void {
     this.app.project.change(label, (old) => settled(old, takeOf(result, how)));
   }
 
-  private put(result: Result, label: string, segments: Project["segments"]): void {
+  private put(result: Result, label: string, segments: Project["segments"], how: string): void {
     const total = round(segments.reduce((sum, one) => sum + one.seconds, 0));
     const last = segments.at(-1)!;
     const fitted = [
@@ -187,7 +201,10 @@ export class Deeds {
       { ...last, seconds: Math.max(round(last.seconds + result.seconds - total), 0.2) },
     ];
     this.app.session.update({ time: 0, selection: NOTHING });
-    this.app.project.change(label, (old) => settled({ ...old, segments: fitted }, takeOf(result, "switched")));
+    const people = [NOTHING_ASKED];
+    this.app.project.change(label, (old) =>
+      settled({ ...old, people, given: null, segments: fitted }, takeOf(result, how)),
+    );
   }
 }
 
@@ -213,6 +230,7 @@ function pieces(name: string, seconds: number): Project["segments"] {
     text: name,
     other: "",
     transition: null,
+    given: null,
     seconds: index < count - 1 ? part : Math.max(round(seconds - part * (count - 1)), 0.2),
   }));
 }

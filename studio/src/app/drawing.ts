@@ -6,7 +6,7 @@ import { type Job, type Plan, plan, planKey } from "../project/plan";
 import { type JobRequest, type Result, motion, takeOf } from "../server/api";
 import { Refused } from "../server/http";
 import { type Watcher, isAway, runJob } from "../server/jobs";
-import { type App, shownClip } from "./app";
+import { type App, problemOf, shownClip } from "./app";
 
 /** Network calls of a preview; the full draw takes the server's own number. */
 const PREVIEW_STEPS = 6;
@@ -155,7 +155,7 @@ export class Drawer {
     if (running.signal.aborted && this.running !== running) return;
     if (error instanceof DOMException && error.name === "AbortError") return;
     if (isAway(error)) this.app.session.update({ connected: false });
-    else this.app.session.update({ error: (error as Error).message });
+    else this.app.session.update({ error: problemOf(this.app, error) });
   }
 
   /** The clips of the project's takes, after undo for instance. */
@@ -177,7 +177,7 @@ export class Drawer {
   private lost(error: unknown, ids: string): void {
     if (isAway(error)) return this.app.session.update({ connected: false });
     if (!(error instanceof Refused) || error.status !== 404)
-      return this.app.session.update({ error: (error as Error).message });
+      return this.app.session.update({ error: problemOf(this.app, error) });
     const { value } = this.app.project;
     if (value.takes.map((take) => take.motion).join() !== ids) return;
     const isBased = keptTake(value)?.motion === value.base?.motion;

@@ -4,7 +4,7 @@ import { type Project, exampleProject } from "../project/model";
 import { checked, written } from "../project/file";
 import { isUp, saveProject, savedProject } from "../server/api";
 import { isAway } from "../server/jobs";
-import type { App } from "./app";
+import { type App, problemOf } from "./app";
 
 const KEY = "motionloom-studio";
 const QUIET = 500;
@@ -63,7 +63,7 @@ export class Saver {
     } catch (error) {
       this.app.session.update({
         saved: "here",
-        ...(isAway(error) ? { connected: false } : { error: (error as Error).message }),
+        ...(isAway(error) ? { connected: false } : { error: problemOf(this.app, error) }),
       });
     }
   }

@@ -2,6 +2,7 @@
 
 import type { MotionClip } from "../body/clip";
 import type { Range } from "../project/model";
+import type { Problem } from "../project/places";
 import { Signal } from "./signal";
 
 export type Tool = "select" | "path" | "target";
@@ -49,8 +50,8 @@ export interface Session {
   readonly fan: Fan | null;
   /** The clips of the project's takes, as far as they are here. */
   readonly clips: readonly MotionClip[];
-  /** The server's sentence about the last draw. */
-  readonly error: string | null;
+  /** What went wrong last. */
+  readonly error: Problem | null;
   readonly connected: boolean;
   readonly saved: "saved" | "saving" | "here";
 }

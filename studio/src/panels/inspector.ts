@@ -8,9 +8,18 @@ import { NOTHING } from "../app/session";
 import { jointName } from "../body/skeleton";
 import { changePoint, changeTarget, removePose, removeTarget, setPath, setSpeed } from "../project/asks";
 import { UNMET, isMeasurable, pathMiss, poseMiss, targetMiss } from "../project/misses";
-import { type Person, type Project, type Segment, begins, length, round } from "../project/model";
+import { type Given, type Person, type Project, type Segment, begins, length, round } from "../project/model";
 import { pathLength, timed } from "../project/path";
-import { freezeRest, longestTransition, resizeSegment, setPeople, setTransition, write } from "../project/timeline";
+import type { Place } from "../project/places";
+import {
+  changeSegment,
+  freezeRest,
+  longestTransition,
+  resizeSegment,
+  setPeople,
+  setTransition,
+  write,
+} from "../project/timeline";
 import { clipsSection, fanSection, takesSection } from "./takes";
 import { miss, numberField, section, textButton } from "./parts";
 
@@ -39,7 +48,7 @@ export function inspector(app: App, actions: Actions, deeds: Deeds, root: HTMLEl
   };
   app.project.subscribe(render);
   app.session.subscribe((now, before) => {
-    const keys = ["selection", "clips", "fan", "person", "tool", "sideBySide", "drawing"] as const;
+    const keys = ["selection", "clips", "fan", "person", "tool", "sideBySide", "drawing", "error"] as const;
     if (keys.some((key) => now[key] !== before[key])) render();
   });
   render();
@@ -69,6 +78,7 @@ function words(app: App, project: Project): HTMLElement {
         ),
         peopleField(app, project),
       ),
+      kept(project.given, () => app.project.change("drop what the file asked", (old) => ({ ...old, given: null }))),
     );
   }
   const two = project.people.length > 1;
@@ -76,6 +86,10 @@ function words(app: App, project: Project): HTMLElement {
     `Block ${index + 1}`,
     area(app, one, false),
     two && area(app, one, true),
+    wrong(app, "segment", one.id),
+    kept(one.given, () =>
+      app.project.change("drop what the file asked", (old) => changeSegment(old, one.id, { given: null })),
+    ),
     h(
       "div",
       { class: "pair" },
@@ -104,13 +118,37 @@ function words(app: App, project: Project): HTMLElement {
       { class: "row" },
       textButton(
         "Draw only this block",
-        () => app.project.change("draw only this block", (old) => ({ ...freezeRest(old, one.id), seed: old.seed + 1 })),
+        () =>
+          app.project.change("draw only this block", (old) => ({
+            ...freezeRest({ ...old, only: null }, one.id),
+            seed: old.seed + 1,
+          })),
         {
           title: "The rest of the motion stays as it is",
           disabled: !project.takes.length || project.segments.length < 2,
         },
       ),
     ),
+  );
+}
+
+/** What the server said about this part of the project. */
+function wrong(app: App, kind: Place["kind"], id?: string): HTMLElement | false {
+  const { error } = app.session.value;
+  const isHere = error?.at?.kind === kind && (!id || !("id" in error.at) || error.at.id === id);
+  return isHere && h("p", { class: "unmet" }, error.message);
+}
+
+/** What a timeline file asks besides, and a way to be rid of it. */
+function kept(given: Given | null, drop: () => void): HTMLElement | null {
+  if (!given) return null;
+  const goal = typeof given.path === "object" ? Object.keys(given.path ?? {}) : [];
+  const names = [...Object.keys(given).filter((key) => key !== "path"), ...goal].join(", ");
+  return h(
+    "div",
+    { class: "row" },
+    h("span", { class: "quiet grow" }, `Kept from the file: ${names || "path"}`),
+    textButton("Drop", drop, { title: "The file's own goals are asked no more" }),
   );
 }
 
@@ -203,6 +241,7 @@ function pathPanel(app: App, project: Project, person: Person, who: number): HTM
         { class: "unmet" },
         `At ${path.speed} m/s this path takes longer than the timeline's ${seconds.toFixed(1)} s; it is walked faster. Make a block longer or the path shorter.`,
       ),
+    wrong(app, "path"),
     off &&
       h("p", {}, "Off the path: ", miss(off[0], OFF_PATH), " on average, ", miss(off[1], OFF_PATH * 2), " at most"),
     h(
@@ -261,6 +300,7 @@ function targetPanel(app: App, project: Project, person: Person, who: number): H
   const chosen = selection.kind === "target" ? person.targets.find((one) => one.id === selection.id) : undefined;
   return section(
     "Targets",
+    wrong(app, "target"),
     h(
       "ul",
       { class: "list" },
@@ -331,6 +371,7 @@ function posePanel(app: App, project: Project, person: Person, who: number, acti
   const clip = shownClip(app);
   return section(
     "Poses",
+    wrong(app, "pose"),
     h(
       "ul",
       { class: "list" },

@@ -2,7 +2,7 @@
 
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
-import type { App } from "../app/app";
+import { type App, problemOf } from "../app/app";
 import { keptTake } from "../project/model";
 import { bytes, motionFile } from "../server/api";
 import type { Scene } from "./scene";
@@ -53,7 +53,7 @@ export class Character {
       this.scene.scene.add(...actors.map((one) => one.root));
       this.app.session.update({ clips: [...this.app.session.value.clips] });
     } catch (error) {
-      if (key === this.key) this.app.session.update({ error: (error as Error).message });
+      if (key === this.key) this.app.session.update({ error: problemOf(this.app, error) });
     }
   }
 

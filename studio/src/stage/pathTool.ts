@@ -257,7 +257,7 @@ function disc(radius: number, color: string): THREE.Mesh {
   return flat(new THREE.CircleGeometry(radius, 32), color);
 }
 
-function ring(radius: number, color: string): THREE.Mesh {
+export function ring(radius: number, color: string): THREE.Mesh {
   return flat(new THREE.RingGeometry(radius - 0.02, radius, 40), color);
 }
 

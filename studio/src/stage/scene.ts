@@ -85,6 +85,19 @@ export class Scene {
     this.camera.position.add(step);
   }
 
+  /** Where the camera looks over the floor: radians from +Z towards +X. */
+  yaw(): number {
+    const { target } = this.orbit;
+    return Math.atan2(target.x - this.camera.position.x, target.z - this.camera.position.z);
+  }
+
+  /** Turn the camera about what it looks at. */
+  turn(radians: number): void {
+    const arm = this.camera.position.clone().sub(this.orbit.target);
+    this.camera.position.copy(this.orbit.target).add(arm.applyAxisAngle(new THREE.Vector3(0, 1, 0), radians));
+    this.invalidate();
+  }
+
   /** Where a place of the picture meets the floor; null: nowhere near. */
   floorAt(clientX: number, clientY: number, height = 0): THREE.Vector3 | null {
     const plane = new THREE.Plane(new THREE.Vector3(0, 1, 0), -height);
