@@ -100,6 +100,12 @@ function show(parts: Parts, timeline: TimelineView): void {
   livePanel(app, live, part("live"));
   help(app, all, part<HTMLDialogElement>("help"));
   listen(app, timeline, part("tracks"));
+  const busy = () => {
+    const { drawing, pending } = app.session.value;
+    part("stage").setAttribute("aria-busy", String(drawing !== null || pending));
+  };
+  app.session.subscribe(busy);
+  busy();
   part("tracks").addEventListener("click", (event) => {
     if (!(event.target as Element).closest("[data-act=add]")) return;
     app.project.change("add a block", (old) => addSegment(old));

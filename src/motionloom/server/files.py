@@ -50,7 +50,7 @@ def as_json(stored: Stored, encode: Any) -> dict[str, Any]:
 
 
 def from_json(part: Path, name: str) -> list[Motion]:
-    """Motions of the 22-joint person as `as_json` gives them: ``fps`` and ``people`` with ``root`` and ``rotations``."""
+    """Motions of the 22-joint person as `as_json` gives them: ``fps``, ``people``, their ``root`` and ``rotations``."""
     found = Field(parse_json(part.read_bytes(), name), name)
     given = found.mapping(("fps", "people", "id", "frames", "seconds", "about"), ("fps", "people"))
     fps = given["fps"].number(1.0, 240.0)

@@ -6,16 +6,15 @@ import {
   type Clip,
   type Project,
   type Take,
-  NOTHING_ASKED,
   begins,
   clamp,
   keptTake,
   length,
-  newId,
   round,
   segment,
   toFrame,
 } from "../project/model";
+import { continued, pieces, settled, withMotion } from "../project/settled";
 import { freeze, unfrozen } from "../project/timeline";
 import { type Result, motion, takeOf } from "../server/api";
 import { isAway } from "../server/jobs";
@@ -79,10 +78,7 @@ export class Deeds {
       people: clip.people.length,
       how: "continued",
     };
-    this.app.project.change(`go on with future ${index + 1}`, (old) => {
-      const tail = round(toFrame(clip.seconds - length(old)));
-      return settled(tail >= 0.2 ? { ...old, segments: [...old.segments, segment("", tail)] } : old, take);
-    });
+    this.app.project.change(`go on with future ${index + 1}`, (old) => continued(old, take));
   }
 
   /** Make the end of the take go over into its beginning. */
@@ -125,9 +121,7 @@ export class Deeds {
   putOnTimeline(clip: Clip): void {
     const take: Take = { motion: clip.motion, seed: 0, seconds: clip.seconds, people: 1, how: "from a file" };
     this.app.session.update({ time: 0, selection: NOTHING, fan: null });
-    this.app.project.change(`open ${clip.name}`, (old) =>
-      settled({ ...old, segments: pieces(clip.name, clip.seconds) }, take),
-    );
+    this.app.project.change(`open ${clip.name}`, (old) => withMotion(old, take, pieces(clip.name, clip.seconds)));
   }
 
   /** Put the kept take aside, among the clips. */
@@ -194,43 +188,7 @@ export class Deeds {
   }
 
   private put(result: Result, label: string, segments: Project["segments"], how: string): void {
-    const total = round(segments.reduce((sum, one) => sum + one.seconds, 0));
-    const last = segments.at(-1)!;
-    const fitted = [
-      ...segments.slice(0, -1),
-      { ...last, seconds: Math.max(round(last.seconds + result.seconds - total), 0.2) },
-    ];
     this.app.session.update({ time: 0, selection: NOTHING });
-    const people = [NOTHING_ASKED];
-    this.app.project.change(label, (old) =>
-      settled({ ...old, people, given: null, segments: fitted }, takeOf(result, how)),
-    );
+    this.app.project.change(label, (old) => withMotion(old, takeOf(result, how), segments));
   }
-}
-
-/** A project whose motion is there and stays, until somebody changes the words of a block. */
-function settled(project: Project, take: Take): Project {
-  return {
-    ...project,
-    base: take,
-    takes: [take],
-    kept: 0,
-    frozen: [[0, Math.max(take.seconds, length(project))]],
-    drawn: "[]",
-    count: 1,
-  };
-}
-
-/** A long clip as blocks of at most ten seconds, so that words can change a part of it. */
-function pieces(name: string, seconds: number): Project["segments"] {
-  const count = Math.max(Math.ceil(seconds / 10), 1);
-  const part = round(toFrame(seconds / count));
-  return Array.from({ length: count }, (_, index) => ({
-    id: newId(),
-    text: name,
-    other: "",
-    transition: null,
-    given: null,
-    seconds: index < count - 1 ? part : Math.max(round(seconds - part * (count - 1)), 0.2),
-  }));
 }

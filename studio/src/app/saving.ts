@@ -48,12 +48,17 @@ export class Saver {
       this.app.session.update({ saved: "saving" });
       this.timer = window.setTimeout(() => void this.save(), QUIET);
     });
+    // A tab that is left or closed waits for nothing.
+    addEventListener("pagehide", () => {
+      if (this.app.session.value.saved === "saving") void this.save();
+    });
     app.session.subscribe((now, before) => {
       if (before.connected && !now.connected) this.wait();
     });
   }
 
   async save(): Promise<void> {
+    clearTimeout(this.timer);
     const saving = this.app.project.value;
     try {
       await saveProject(saving);

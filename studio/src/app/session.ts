@@ -47,6 +47,8 @@ export interface Session {
   readonly snapping: boolean;
   readonly help: boolean;
   readonly drawing: Drawing | null;
+  /** A draw begins soon. */
+  readonly pending: boolean;
   readonly fan: Fan | null;
   /** The clips of the project's takes, as far as they are here. */
   readonly clips: readonly MotionClip[];
@@ -76,6 +78,7 @@ export function newSession(): Signal<Session> {
     snapping: true,
     help: false,
     drawing: null,
+    pending: false,
     fan: null,
     clips: [],
     error: null,

@@ -1,4 +1,4 @@
-/** The bar of live mode over the stage: what is done, a box for words, the keys, and the one that keeps it. */
+/** Live mode in the timeline's place: what is done, a box for words, the keys, and the one that keeps it. */
 
 import type { App } from "../app/app";
 import { h, morph } from "../app/dom";

@@ -46,7 +46,7 @@ export function notices(app: App, retry: () => void, root: HTMLElement): void {
       now.error !== before.error ||
       now.person !== before.person ||
       now.connected !== before.connected ||
-      now.drawing !== before.drawing ||
+      !now.drawing !== !before.drawing ||
       now.clips !== before.clips
     )
       render();

@@ -50,6 +50,7 @@ export class Character {
       );
       if (key !== this.key) return;
       this.actors = actors;
+      this.scene.canvas.dataset.character = character;
       this.scene.scene.add(...actors.map((one) => one.root));
       this.app.session.update({ clips: [...this.app.session.value.clips] });
     } catch (error) {
@@ -72,6 +73,7 @@ export class Character {
   private leave(): void {
     for (const { root } of this.actors) this.scene.scene.remove(root);
     this.actors = [];
+    delete this.scene.canvas.dataset.character;
     this.scene.invalidate();
   }
 }

@@ -105,6 +105,19 @@ export class Scene {
     return hit && hit.length() < 100 ? hit : null;
   }
 
+  /** Pixels of the window, and the depth from -1 to 1. */
+  onScreen(place: THREE.Vector3): [number, number, number] {
+    const box = this.canvas.getBoundingClientRect();
+    const at = place.clone().project(this.camera);
+    return [box.left + ((at.x + 1) / 2) * box.width, box.top + ((1 - at.y) / 2) * box.height, at.z];
+  }
+
+  /** Say in the page where something is on the screen; null: it is not there. */
+  tell(name: string, at: readonly number[] | null): void {
+    if (at) this.canvas.dataset[name] = at.map(Math.round).slice(0, 2).join();
+    else delete this.canvas.dataset[name];
+  }
+
   ray(clientX: number, clientY: number): THREE.Raycaster {
     const box = this.canvas.getBoundingClientRect();
     const at = new THREE.Vector2(

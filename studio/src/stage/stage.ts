@@ -43,7 +43,10 @@ export class Stage {
     this.goal.visible = false;
     this.scene.scene.add(this.goal);
     this.scene.step = (elapsed) => this.step(elapsed);
-    this.scene.painted = () => this.path.tell();
+    this.scene.painted = () => {
+      this.path.tell();
+      this.targets.tell();
+    };
     this.listen(canvas);
     app.project.subscribe(() => this.update());
     app.session.subscribe((now, before) => this.changed(now, before));
@@ -84,7 +87,6 @@ export class Stage {
     if (now.tool !== before.tool) this.buttons();
     const kept = [
       "clips",
-      "drawing",
       "tool",
       "person",
       "joint",
@@ -96,6 +98,7 @@ export class Stage {
       "playing",
     ] as const;
     if (kept.some((key) => now[key] !== before[key])) this.update();
+    else if (!now.drawing !== !before.drawing) this.place();
     else if (now.time !== before.time) this.place();
   }
 

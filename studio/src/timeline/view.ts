@@ -3,7 +3,7 @@
 import { type App, duration, shownClip } from "../app/app";
 import { h, morph } from "../app/dom";
 import { jointName } from "../body/skeleton";
-import { UNMET, isMeasurable, pathMiss, poseMiss, targetMiss } from "../project/misses";
+import { UNMET, isMeasurable, isUnmet, pathMiss, poseMiss, targetMiss } from "../project/misses";
 import { type Person, type Project, begins, length, round } from "../project/model";
 import { timed } from "../project/path";
 import type { Place } from "../project/places";
@@ -38,7 +38,7 @@ export class TimelineView {
     app.project.subscribe(() => this.render());
     app.session.subscribe((now, before) => {
       if (now.time !== before.time) this.movePlayhead();
-      const keys = ["clips", "selection", "range", "person", "fan", "drawing", "error"] as const;
+      const keys = ["clips", "selection", "range", "person", "fan", "error"] as const;
       if (keys.some((key) => now[key] !== before[key])) this.render();
       if (now.error !== before.error)
         this.content.querySelector(".said")?.scrollIntoView({ block: "nearest", inline: "nearest" });
@@ -308,8 +308,8 @@ export class TimelineView {
       const miss = isMeasurable(project, clip) ? targetMiss(clip, who, target) : null;
       const chosen = selection.kind === "target" && selection.id === target.id;
       const name = `${jointName(target.joint)} at ${target.time.toFixed(2)} s${miss === null ? "" : `, ${miss.toFixed(1)} cm off`}`;
-      const isUnmet = (miss !== null && miss > UNMET) || this.isWrong("target", target.id);
-      const state = `${chosen ? " chosen" : ""}${isUnmet ? " unmet" : ""}`;
+      const bad = (isMeasurable(project, clip) && isUnmet(clip, who, target)) || this.isWrong("target", target.id);
+      const state = `${chosen ? " chosen" : ""}${bad ? " unmet" : ""}`;
       return h(
         "button",
         {
