@@ -11,11 +11,13 @@ import { h } from "./app/dom";
 import { Drawer } from "./app/drawing";
 import { Files } from "./app/files";
 import { Saver, restored } from "./app/saving";
+import { Live, type LiveState } from "./app/live";
 import { newSession } from "./app/session";
 import { Signal } from "./app/signal";
 import type { MotionClip } from "./body/clip";
 import { stageBar, topBar, transport } from "./panels/bars";
 import { inspector } from "./panels/inspector";
+import { livePanel } from "./panels/live";
 import { drops, help, notices, takeNames } from "./panels/overlays";
 import { History } from "./project/history";
 import { addSegment, write } from "./project/timeline";
@@ -44,11 +46,14 @@ async function start(): Promise<void> {
     project: new History(project),
     session: newSession(),
     denoising: new Signal<MotionClip | null>(null),
+    live: new Signal<LiveState | null>(null),
   };
   const stage = new Stage(app, part<HTMLCanvasElement>("canvas"), isDark());
   const drawer = new Drawer(app);
   const deeds = new Deeds(app, drawer);
   const files = new Files(app, deeds);
+  const live = new Live(app, drawer, deeds, stage.scene);
+  stage.sentTo = (place) => live.go(place);
   new Saver(app, () => {
     drawer.loadTakes();
     drawer.schedule();
@@ -63,6 +68,7 @@ async function start(): Promise<void> {
     drawer,
     deeds,
     files,
+    live,
     stage,
     choose: drops(files, document.body),
     editWords: (id) => timeline.edit(id),
@@ -83,7 +89,7 @@ async function start(): Promise<void> {
 
 /** The panels, each in its place of the page. */
 function show(parts: Parts, timeline: TimelineView): void {
-  const { app, drawer, deeds, files } = parts;
+  const { app, drawer, deeds, files, live } = parts;
   const all = actions(parts);
   topBar(app, all, files, part("top"));
   stageBar(app, all, part("tools"), part("views"));
@@ -91,8 +97,15 @@ function show(parts: Parts, timeline: TimelineView): void {
   inspector(app, all, deeds, part("inspector"));
   notices(app, () => drawer.schedule(), part("notices"));
   takeNames(app, part("names"));
+  livePanel(app, live, part("live"));
   help(app, all, part<HTMLDialogElement>("help"));
   listen(app, timeline, part("tracks"));
+  const busy = () => {
+    const { drawing, pending } = app.session.value;
+    part("stage").setAttribute("aria-busy", String(drawing !== null || pending));
+  };
+  app.session.subscribe(busy);
+  busy();
   part("tracks").addEventListener("click", (event) => {
     if (!(event.target as Element).closest("[data-act=add]")) return;
     app.project.change("add a block", (old) => addSegment(old));
@@ -101,6 +114,8 @@ function show(parts: Parts, timeline: TimelineView): void {
   const byKey = new Map(Object.values(all).flatMap((action) => action.keys.map((key) => [key, action] as const)));
   addEventListener("keydown", (event) => {
     if (isTyping(event)) return;
+    if (live.press(event)) return event.preventDefault();
+    if (live.isOn && !LIVE_TOO.some((name) => all[name]!.keys.includes(keyOf(event)))) return;
     if (numbered(event, parts)) return;
     const action = byKey.get(keyOf(event));
     const isButton = event.target instanceof HTMLElement && event.target.matches("button, summary");
@@ -110,7 +125,12 @@ function show(parts: Parts, timeline: TimelineView): void {
     event.preventDefault();
     action.run();
   });
+  addEventListener("keyup", (event) => live.release(event));
+  addEventListener("blur", () => live.letGo());
 }
+
+/** What can be done in live mode besides steering. */
+const LIVE_TOO = ["live", "follow", "above", "theme", "help"];
 
 /** Keys belong to the field that is written in, but for undo and whatever else goes with Ctrl and is no editing. */
 function isTyping(event: KeyboardEvent): boolean {

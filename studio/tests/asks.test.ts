@@ -41,7 +41,7 @@ describe("targets", () => {
     expect(timelineOf(one).path).toBeUndefined();
     expect(timelineOf(one).segments[0]!.goal!.joints).toHaveLength(1);
     expect(needsWay(several)).toBe(0);
-    expect(plan(several).missing).toContain("way");
+    expect(plan(several).missing).toMatchObject({ at: { kind: "path", who: 0 } });
     const walking = Float32Array.from({ length: 130 * 66 }, (_, n) =>
       n % 66 === 2 ? Math.floor(n / 66) / 20 : n % 66 === 3 ? 1 : 0,
     );
@@ -90,7 +90,11 @@ describe("what is drawn", () => {
 
   it("says which block has no words", () => {
     const project = { ...exampleProject(), segments: [segment("walk", 2), segment(" ", 2)] };
-    expect(plan(project)).toEqual({ jobs: [], missing: "Block 2 has no words yet; say what the person does." });
+    const at = { kind: "segment", id: project.segments[1]!.id };
+    expect(plan(project)).toEqual({
+      jobs: [],
+      missing: { message: "Block 2 has no words yet; say what the person does.", at },
+    });
   });
 
   it("is only what is not frozen, block by block", () => {

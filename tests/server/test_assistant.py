@@ -4,6 +4,7 @@ import asyncio
 import json
 import os
 import sys
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,11 @@ from motionloom import load
 mcp = pytest.importorskip("mcp", reason="needs the extra 'mcp': pip install 'motionloom[mcp]'", exc_type=ImportError)
 
 
-def talk(project: Path, *calls: tuple[str, dict[str, Any]]) -> tuple[list[str], list[Any]]:
-    """Names of the tools, and what each call answers."""
+Call = tuple[str, dict[str, Any]]
+
+
+def talk(project: Path, *calls: Call | Callable[[list[Any]], Call]) -> tuple[list[str], list[Any]]:
+    """Names of the tools, and what each call answers; a call may be made of the answers before it."""
 
     async def session() -> tuple[list[str], list[Any]]:
         from mcp.client.stdio import StdioServerParameters
@@ -25,7 +29,10 @@ def talk(project: Path, *calls: tuple[str, dict[str, Any]]) -> tuple[list[str], 
         inherited = {k: v for k, v in os.environ.items() if k in ("PYTHONPATH", "OMP_NUM_THREADS", "PATH")}
         async with mcp.Client(StdioServerParameters(command=sys.executable, args=command, env=inherited)) as client:
             listed = await client.list_tools()
-            answers = [await client.call_tool(name, given) for name, given in calls]
+            answers: list[Any] = []
+            for call in calls:
+                name, given = call(answers) if callable(call) else call
+                answers.append(await client.call_tool(name, given))
             return [tool.name for tool in listed.tools], answers
 
     with ThreadPoolExecutor(1) as thread:  # a browser's tests may have a loop running in this one
@@ -40,20 +47,19 @@ def plain(answer: Any) -> Any:
 
 
 def test_an_assistant_makes_motion_and_exports_it(tmp_path: Path) -> None:
-    names, (one, long) = talk(
+    def long_one(answers: list[Any]) -> str:
+        return plain(answers[1])[0]["id"]
+
+    names, (one, _, written, refused, escaped) = talk(
         tmp_path,
         ("generate_motion", {"prompt": "a person jumps", "seconds": 1.0, "seed": 3, "count": 2}),
         ("compose", {"segments": [{"text": "a person walks", "seconds": 1}, {"text": "a person waves", "seconds": 1}]}),
+        lambda made: ("export", {"motion": long_one(made), "format": "bvh", "name": "walk-and-wave"}),
+        ("export", {"motion": "0" * 16}),
+        lambda made: ("export", {"motion": long_one(made), "name": "../evil"}),
     )
     assert set(names) == {"generate_motion", "compose", "export"}
     assert [take["seed"] for take in plain(one)] == [3, 4]
-    motion = plain(long)[0]["id"]
-    _, (written, refused, escaped) = talk(
-        tmp_path,
-        ("export", {"motion": motion, "format": "bvh", "name": "walk-and-wave"}),
-        ("export", {"motion": "0" * 16}),
-        ("export", {"motion": motion, "name": "../evil"}),
-    )
     file = Path(plain(written)["file"])
     assert file == (tmp_path / "exports" / "walk-and-wave.bvh").resolve()
     assert load(file).seconds == pytest.approx(2.0)

@@ -1,5 +1,6 @@
 """Files in and out: exports that read back, uploads, characters, and names that are no names."""
 
+import socket
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,13 @@ def test_a_file_that_is_sent_can_be_drawn_from(server: Server, walk: str, tmp_pa
     assert made["results"][0]["frames"] == 50
 
 
+def test_what_a_page_was_given_it_can_send_back(server: Server, walk: str) -> None:
+    _, found = server.json("GET", f"/motions/{walk}")
+    status, sent = server.json("POST", "/motions?name=live.json", found)
+    assert (status, sent["frames"], sent["people"], sent["name"]) == (201, 40, 1, "live.json")
+    assert np.abs(places(server, sent["id"]) - places(server, walk)).max() < 1e-4
+
+
 def test_a_character_is_given_back_and_moves(server: Server, walk: str, tmp_path: Path) -> None:
     rig = tmp_path / "hero.glb"
     body = named_skeleton("mixamo")
@@ -99,6 +107,9 @@ def test_a_character_is_given_back_and_moves(server: Server, walk: str, tmp_path
         ("walk.glb", b"glTF" + b"\xff" * 40, "glb"),
         ("walk.amc", b":FULLY-SPECIFIED\n", "send the .asf first"),
         ("walk.vrm", b"\x00" * 100, "vrm"),
+        ("live.json", b"[", "not JSON"),
+        ("live.json", b'{"fps": 20}', "has no 'people'"),
+        ("live.json", b'{"fps": 20, "people": [{"root": "", "rotations": "AAAA"}]}', "base64 of float32"),
     ],
 )
 def test_a_broken_file_is_refused_with_one_sentence(server: Server, name: str, data: bytes, said: str) -> None:
@@ -138,7 +149,11 @@ def test_a_name_with_folders_in_it_is_a_name_only(server: Server, walk: str, tmp
     assert (server.project / "motions" / f"{sent['id']}.npz").is_file()
 
 
-def test_exports_leave_nothing_behind(server: Server, walk: str) -> None:
+def test_exports_leave_nothing_behind_even_while_they_are_sent(server: Server, walk: str) -> None:
+    with socket.create_connection(("127.0.0.1", server.port), timeout=60) as connection:
+        connection.sendall(f"GET /motions/{walk}.glb HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+        assert b"200" in connection.recv(20)
+        assert not list((server.project / "temporary").iterdir())
     server.ask("GET", f"/motions/{walk}.png")
     status, answer = server.json("GET", f"/motions/{walk}.png?person=3")
     assert (status, "there is no person 3" in answer["error"]) == (400, True)

@@ -61,7 +61,7 @@ def test_one_greedy_client_does_not_keep_others_waiting(server: Server) -> None:
 
 @pytest.mark.slow
 def test_readers_who_do_not_read_hold_nobody_up(server: Server) -> None:
-    job = server.submit(task="generate", prompt="a person walks", seconds=10.0, count=8, steps=60)
+    job = server.submit(task="generate", prompt="a person walks", seconds=10.0, count=8, steps=12)
     sleepers = []
     for _ in range(20):
         connection = socket.create_connection(("127.0.0.1", server.port), timeout=60)

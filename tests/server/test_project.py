@@ -45,6 +45,23 @@ def test_a_mistake_in_a_timeline_is_reported_with_its_line(server: Server) -> No
     assert (status, "the timeline" in answer["error"]) == (400, True)
 
 
+@pytest.mark.parametrize(
+    ("segment", "path", "where"),
+    [
+        ({"seconds": "x"}, None, "segments[1].seconds"),
+        ({"text": " "}, None, "segments[1].text"),
+        ({"goal": {"joints": [{"joint": "head", "points": [{"time": 9, "position": [0, 1, 0]}]}]}}, None,
+         "segments[1].goal.joints[0].points[0].time"),
+        ({}, {"path": {"points": [[0, 0], [0, 99]], "times": [0, 1]}}, "path.path"),
+    ],
+)  # fmt: skip
+def test_a_mistake_says_which_keys_are_its_cause(server: Server, segment: dict, path: dict | None, where: str) -> None:
+    segments = [{"text": "a person walks", "seconds": 2.0}, {"text": "a person sits", "seconds": 2.0} | segment]
+    timeline = {"segments": segments} | ({"path": path} if path else {})
+    status, answer = server.json("POST", "/jobs", {"task": "compose", "timeline": timeline})
+    assert (status, answer["where"]) == (400, where)
+
+
 def test_the_command_line_makes_the_same_motion_of_the_yaml(server: Server, tmp_path: Path) -> None:
     (made,) = server.draw(task="compose", timeline=TIMELINE, steps=4)["results"]
     (tmp_path / "t.yaml").write_bytes(server.ask("POST", "/timeline.yaml", TIMELINE)[2])

@@ -1,4 +1,7 @@
-"""A real server and a real browser for the tests of the page; skipped, with the reason, where one is missing."""
+"""A real server and a real browser for the tests of the page; skipped, with the reason, where one is missing.
+
+One server and one browser serve all tests, one tab those of a file; every test loads the page anew in it.
+"""
 
 from collections.abc import Iterator
 
@@ -9,28 +12,34 @@ from tests.studio.studio import Studio
 
 
 @pytest.fixture(scope="session")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address of a server of its own, with an empty project."""
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[started.Server]:
+    """A server of its own, with an empty project."""
     try:
         started.check()
     except started.Missing as missing:
         pytest.skip(str(missing))
-    with started.server(tmp_path_factory.mktemp("project")) as address:
-        yield address
+    with started.server(tmp_path_factory.mktemp("project")) as running:
+        yield running
 
 
 @pytest.fixture(scope="session")
-def browser(server: str) -> Iterator:
+def browser(server: started.Server) -> Iterator:
     """One browser for all tests."""
     with started.browser() as opened:
         yield opened
 
 
-@pytest.fixture
-def studio(server: str, browser) -> Iterator[Studio]:
-    """A page with a project of one short block that nobody has touched."""
+@pytest.fixture(scope="module")
+def tab(server: started.Server, browser) -> Iterator[Studio]:
+    """One tab for the tests of a file."""
     context = browser.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True, color_scheme="light")
-    page = Studio(context.new_page(), server)
-    page.open(("a person walks forward", 2.0))
-    yield page
+    yield Studio(context.new_page(), server)
     context.close()
+
+
+@pytest.fixture
+def studio(tab: Studio) -> Studio:
+    """The page as it is opened, with a project of one short block that nobody has touched."""
+    tab.faults.clear()
+    tab.open(("a person walks forward", 2.0))
+    return tab

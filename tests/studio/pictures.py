@@ -23,10 +23,10 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     folder = parser.parse_args().folder
     started.check()
-    with tempfile.TemporaryDirectory() as place, started.server(Path(place)) as address, started.browser() as browser:
+    with tempfile.TemporaryDirectory() as place, started.server(Path(place)) as server, started.browser() as browser:
         view = {"width": 1280, "height": 720}
         page = Studio(
-            browser.new_context(viewport=view, color_scheme="light", accept_downloads=True).new_page(), address
+            browser.new_context(viewport=view, color_scheme="light", accept_downloads=True).new_page(), server
         )
         walk(page, folder)
 

@@ -27,8 +27,8 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     started.check()
-    with tempfile.TemporaryDirectory() as folder, started.server(Path(folder)) as address, started.browser() as browser:
-        page = Studio(browser.new_context(viewport={"width": 1280, "height": 720}).new_page(), address)
+    with tempfile.TemporaryDirectory() as folder, started.server(Path(folder)) as server, started.browser() as browser:
+        page = Studio(browser.new_context(viewport={"width": 1280, "height": 720}).new_page(), server)
         ready, rounds = measured(page, options.rounds)
         found = {
             "page_ready_s": ready,

@@ -1,6 +1,7 @@
 """A real server and a real browser, for tests and for the scripts that measure and take pictures."""
 
 import importlib.util
+import json
 import os
 import shutil
 import socket
@@ -11,11 +12,13 @@ import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 """WebGL is drawn in software; `CHROMIUM_FLAGS` says otherwise, such as --use-gl=angle --use-angle=gl."""
-PATIENCE = 120.0
+PATIENCE = 600.0
 """Seconds until a server that starts is given up."""
+TOKEN = "a-token-for-tests"
 
 
 class Missing(Exception):
@@ -49,21 +52,62 @@ def page_folder() -> Path:
     return Path(package.origin).with_name("page")
 
 
+class Server:
+    """`motionloom serve` with a token, which the page has to send; it can be killed and come back."""
+
+    def __init__(self, folder: Path) -> None:
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = free.getsockname()[1]
+        self.folder = folder
+        self.address = f"http://127.0.0.1:{self.port}"
+        self.page = f"{self.address}/?token={TOKEN}"
+        self.start()
+
+    def start(self) -> None:
+        """Start the process and wait until its prior is loaded."""
+        options = ["--host", "0.0.0.0", "--token", TOKEN, "--port", str(self.port), "--project", str(self.folder)]
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "motionloom", "serve", *options],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end and self.process.poll() is None:
+            try:
+                if self.ask("/health")["warm"]:
+                    return
+            except OSError:
+                pass
+            time.sleep(0.1)
+        raise RuntimeError(f"the server at {self.address} did not start")
+
+    def kill(self) -> None:
+        """End it as a crash would."""
+        self.process.kill()
+        self.process.wait()
+
+    def end(self) -> None:
+        """End it as its user would."""
+        self.process.terminate()
+        self.process.wait(60)
+
+    def ask(self, path: str, body: Any = None, *, method: str = "GET") -> Any:
+        """The JSON of an answer."""
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(self.address + path, data, {"Authorization": f"Bearer {TOKEN}"}, method=method)
+        with urllib.request.urlopen(request, timeout=120) as response:
+            return json.load(response)
+
+
 @contextmanager
-def server(folder: Path) -> Iterator[str]:
-    """The address of a server of its own, with its project in ``folder`` and the prior loaded."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    command = [sys.executable, "-m", "motionloom", "serve", "--port", str(port), "--project", str(folder)]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    address = f"http://127.0.0.1:{port}"
+def server(folder: Path) -> Iterator[Server]:
+    """A server of its own, with its project in ``folder`` and the prior loaded."""
+    running = Server(folder)
     try:
-        _wait(address, process)
-        yield address
+        yield running
     finally:
-        process.terminate()
-        process.wait(30)
+        running.end()
 
 
 @contextmanager
@@ -76,16 +120,3 @@ def browser() -> Iterator:
         opened = playwright.chromium.launch(executable_path=chromium(), args=flags)
         yield opened
         opened.close()
-
-
-def _wait(address: str, process: subprocess.Popen) -> None:
-    end = time.monotonic() + PATIENCE
-    while time.monotonic() < end and process.poll() is None:
-        try:
-            with urllib.request.urlopen(f"{address}/health", timeout=5) as response:
-                if b'"warm":true' in response.read().replace(b" ", b""):
-                    return
-        except OSError:
-            pass
-        time.sleep(0.3)
-    raise RuntimeError(f"the server at {address} did not start")

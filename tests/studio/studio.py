@@ -1,11 +1,14 @@
 """The page as a test uses it: keys and the mouse, and what came of them."""
 
+import base64
 import io
 import json
-import urllib.request
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from tests.studio.started import Server
 
 SLOW = 240_000
 """Milliseconds that a draw may take on a busy machine."""
@@ -19,39 +22,42 @@ NOTHING: dict[str, Any] = {"path": None, "targets": [], "poses": []}
 class Studio:
     """One tab. Everything that changes something goes through `page.keyboard` and `page.mouse`."""
 
-    def __init__(self, page, server: str) -> None:
+    def __init__(self, page, server: Server) -> None:
         self.page, self.server = page, server
         self.faults: list[str] = []
+        self._drawn: dict[str, dict[str, Any]] = {}
         page.set_default_timeout(SLOW)
         page.on("pageerror", lambda error: self.faults.append(str(error)))
+        page.add_init_script("if (window.name !== 'kept') { localStorage.clear(); window.name = 'kept' }")
 
     # -- beginnings
 
     def open(self, *blocks: tuple[str, float], people: int = 1, **more: Any) -> None:
-        """Put a project on the server and open it."""
+        """Open a project of these blocks, with the motion that was drawn for it before, if it was."""
         segments = [
             {"id": f"s{number}", "text": text, "other": "", "seconds": seconds, "transition": None}
             for number, (text, seconds) in enumerate(blocks)
         ]
-        self.put({**PROJECT, "segments": segments, "people": [NOTHING] * people, **more})
-        self.page.add_init_script("if (!sessionStorage.kept) { localStorage.clear(); sessionStorage.kept = 'yes'; }")
+        project = {**PROJECT, "segments": segments, "people": [NOTHING] * people, **more}
+        known = self._drawn.get(json.dumps(project))
+        self.page.goto("about:blank")  # what the page before had not saved is saved before
+        self.put(known or project)
+        self.page.evaluate("window.name = ''")
         self.load()
+        if known is None:
+            self._drawn[json.dumps(project)] = self.project()
 
     def load(self) -> None:
         """Open the page, and stop what plays."""
-        self.page.goto(self.server)
+        self.page.goto(self.server.page)
         self.page.wait_for_selector("body[data-ready]")
-        self.drawn()
         if self.page.locator("#transport button[aria-label=Pause]").count():
             self.key("Space")
+        self.drawn()
 
     def put(self, project: dict[str, Any]) -> None:
         """Save a project as the page would."""
-        body = json.dumps(project).encode()
-        request = urllib.request.Request(
-            f"{self.server}/project", body, {"Content-Type": "application/json"}, method="PUT"
-        )
-        urllib.request.urlopen(request, timeout=60).close()
+        self.server.ask("/project", project, method="PUT")
 
     # -- deeds
 
@@ -77,21 +83,44 @@ class Studio:
         box = self.page.locator(selector).nth(number).bounding_box()
         return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
+    def at(self, name: str) -> tuple[float, float]:
+        """Where a handle of the stage is on the screen: `path-end`, `facing` or `gizmo`."""
+        self.page.wait_for_selector(f"#canvas[data-{name}]")
+        self.page.wait_for_timeout(300)  # the camera comes to rest
+        x, y = str(self.page.locator("#canvas").get_attribute(f"data-{name}")).split(",")
+        return float(x), float(y)
+
+    def drop(self, *files: Path) -> None:
+        """Let go of files over the stage, as a hand would."""
+        data = [{"name": one.name, "data": base64.b64encode(one.read_bytes()).decode()} for one in files]
+        self.page.evaluate(
+            """files => { const transfer = new DataTransfer();
+                for (const {name, data} of files) transfer.items.add(new File(
+                    [Uint8Array.from(atob(data), letter => letter.charCodeAt(0))], name));
+                for (const type of ["dragover", "drop"]) document.querySelector("#canvas").dispatchEvent(
+                    new DragEvent(type, {bubbles: true, cancelable: true, dataTransfer: transfer})); }""",
+            data,
+        )
+
+    def export(self, name: str) -> bytes:
+        """The file that an entry of the export menu gives, by mouse."""
+        self.page.locator(".menu summary").click()
+        with self.page.expect_download() as file:
+            self.page.locator(".sheet .row").filter(has=self.page.get_by_text(name, exact=True)).click()
+        return Path(file.value.path()).read_bytes()
+
     # -- what came of it
 
     def drawn(self) -> None:
         """Wait until nothing is being drawn and the project is saved."""
-        self.page.wait_for_timeout(700)
-        self.page.wait_for_function(
-            "document.querySelector('progress').classList.contains('idle')"
-            " && document.querySelector('.state').textContent === 'saved'"
-        )
+        self.page.wait_for_selector("#stage[aria-busy=false]", state="attached")
+        self.page.evaluate("dispatchEvent(new Event('pagehide'))")  # saves now, not half a second later
+        self.page.wait_for_function("document.querySelector('.state').textContent === 'saved'")
 
     def project(self) -> dict[str, Any]:
         """The project as it was saved, after all draws."""
         self.drawn()
-        with urllib.request.urlopen(f"{self.server}/project", timeout=60) as response:
-            return json.load(response)
+        return self.server.ask("/project")
 
     def blocks(self) -> list[tuple[str, float]]:
         """Words and seconds of the blocks."""
@@ -99,12 +128,9 @@ class Studio:
 
     def motion(self, project: dict[str, Any] | None = None) -> np.ndarray:
         """Places (people, frames, 22, 3) of the kept take."""
-        import base64
-
         project = project or self.project()
         take = project["takes"][project["kept"]]
-        with urllib.request.urlopen(f"{self.server}/motions/{take['motion']}", timeout=60) as response:
-            people = json.load(response)["people"]
+        people = self.server.ask(f"/motions/{take['motion']}")["people"]
         arrays = [np.frombuffer(base64.b64decode(one["positions"]), "<f4") for one in people]
         return np.stack([array.reshape(-1, 22, 3) for array in arrays])
 

@@ -99,5 +99,6 @@ def test_keys_are_listed_and_the_theme_changes(studio: Studio, scheme: str):
 
 def test_an_empty_block_says_what_is_missing(studio: Studio):
     studio.key("a", "Enter")
-    studio.page.wait_for_selector(".notice")
-    assert "has no words yet" in studio.page.locator(".notice").inner_text()
+    said = studio.page.locator(".track.words .said")
+    assert "has no words yet" in said.inner_text()
+    assert studio.page.locator(".block.wrong").count() == 1

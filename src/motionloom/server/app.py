@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from starlette.applications import Starlette
-from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
@@ -29,6 +28,7 @@ from motionloom.server.limits import Limits
 from motionloom.server.mmcp.routes import capabilities_of
 from motionloom.server.mmcp.routes import routes as mmcp_routes
 from motionloom.server.openapi import as_page, document
+from motionloom.server.outgoing import file_once
 from motionloom.server.project import Project, Stored
 from motionloom.server.refusal import Refusal
 from motionloom.server.streaming import events
@@ -217,10 +217,7 @@ async def motion(request: Request) -> Response:
         return files.export(studio.project, stored, kind, skeleton=skeleton, person=person)
 
     part = await _with_file(studio, made)
-    return FileResponse(
-        part, media_type=files.FORMATS[kind], filename=f"motion-{name[:8]}{part.suffix}",
-        background=BackgroundTask(part.unlink, missing_ok=True),
-    )  # fmt: skip
+    return file_once(part, media_type=files.FORMATS[kind], name=f"motion-{name[:8]}{part.suffix}")
 
 
 def _person(request: Request) -> int | None:
@@ -291,8 +288,8 @@ async def timeline_to_json(request: Request) -> Response:
 # What goes wrong
 
 
-def _answer(status: int, sentence: str, headers: Mapping[str, str] | None = None) -> Response:
-    return JSONResponse({"error": sentence}, status_code=status, headers=headers)
+def _answer(status: int, sentence: str, headers: Mapping[str, str] | None = None, *, where: str = "") -> Response:
+    return JSONResponse({"error": sentence} | ({"where": where} if where else {}), status_code=status, headers=headers)
 
 
 async def _refused(request: Request, error: Exception) -> Response:
@@ -301,7 +298,8 @@ async def _refused(request: Request, error: Exception) -> Response:
 
 
 async def _mistaken(request: Request, error: Exception) -> Response:
-    return _answer(400, studio_of(request).project.without_paths(str(error)))
+    sentence = studio_of(request).project.without_paths(str(error))
+    return _answer(400, sentence, where=getattr(error, "where", ""))
 
 
 async def _no_route(request: Request, error: Exception) -> Response:

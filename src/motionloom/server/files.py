@@ -1,5 +1,6 @@
 """Motions as files and files as motions: what the server sends and takes beside JSON."""
 
+import base64
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -7,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from motionloom.errors import MotionloomError
+from motionloom.goals.fields import Field
 from motionloom.io import GLTF, READS, load, load_scene, save, save_scene
 from motionloom.io.character import load_character
+from motionloom.io.text import parse_json
 from motionloom.motion import Motion
 from motionloom.retarget import joint_map, retarget, to_smpl22
 from motionloom.retarget.named import NAMED, named_skeleton
@@ -25,7 +28,7 @@ FORMATS = {
     "png": "image/png",
 }
 ONE_PERSON = ("bvh", "npz")
-UPLOADS = tuple(suffix for suffix in READS if suffix not in (".gltf", ".vrma"))
+UPLOADS = (*(suffix for suffix in READS if suffix not in (".gltf", ".vrma")), ".json")
 SUFFIXES = (".glb", ".vrm", ".gltf", ".bvh")
 """Of characters."""
 
@@ -44,6 +47,39 @@ def as_json(stored: Stored, encode: Any) -> dict[str, Any]:
     first = stored.people[0]
     about = {"id": stored.id, "fps": first.fps, "frames": len(first), "seconds": round(first.seconds, 4)}
     return about | {"people": people, "about": stored.about}
+
+
+def from_json(part: Path, name: str) -> list[Motion]:
+    """Motions of the 22-joint person as `as_json` gives them: ``fps``, ``people``, their ``root`` and ``rotations``."""
+    found = Field(parse_json(part.read_bytes(), name), name)
+    given = found.mapping(("fps", "people", "id", "frames", "seconds", "about"), ("fps", "people"))
+    fps = given["fps"].number(1.0, 240.0)
+    return [_person(one, fps) for one in given["people"].items(most=8)]
+
+
+def _person(found: Field, fps: float) -> Motion:
+    given = found.mapping(("root", "rotations", "positions"), ("root", "rotations"))
+    root, rotations = _decoded(given["root"], 3), _decoded(given["rotations"], 4 * len(SMPL22))
+    lengths = np.linalg.norm(rotations.reshape(len(rotations), -1, 4), axis=-1, keepdims=True)
+    if len(root) != len(rotations):
+        found.fail(f"has {len(root)} places of the root and rotations for {len(rotations)} frames; make them as many")
+    if not (np.abs(lengths - 1) < 0.01).all():
+        given["rotations"].fail("must be quaternions (w, x, y, z) of length 1")
+    return Motion(SMPL22, fps, root, rotations.reshape(len(rotations), -1, 4) / lengths)
+
+
+def _decoded(found: Field, width: int) -> np.ndarray:
+    """(frames, width) numbers out of base64 of little-endian float32."""
+    try:
+        data = base64.b64decode(found.value, validate=True)
+    except (TypeError, ValueError):
+        data = b""
+    if not data or len(data) % (4 * width):
+        found.wrong(f"base64 of float32 in little-endian order, {width} for each frame")
+    values = np.frombuffer(data, "<f4").astype(np.float64).reshape(-1, width)
+    if not (np.isfinite(values).all() and np.abs(values).max() < 1e5):
+        found.fail("holds what is no place or rotation")
+    return values
 
 
 def export(project: Project, stored: Stored, kind: str, *, skeleton: str | None, person: int | None) -> Path:
@@ -100,6 +136,8 @@ def read_upload(project: Project, part: Path, name: str, *, asf: str | None, lim
             raise MotionloomError("an AMC file needs its skeleton: send the .asf first, then the AMC with &asf=ID")
         skeleton, _ = project.character(asf)
         people = [load(part, asf=skeleton)]
+    elif suffix == ".json":
+        people = from_json(part, name)
     else:
         people = load_scene(part) if suffix in GLTF else [load(part)]
     if len(people) > limits.people:

@@ -17,6 +17,7 @@ import { type App, duration } from "./app";
 import type { Deeds } from "./deeds";
 import type { Drawer } from "./drawing";
 import type { Files } from "./files";
+import type { Live } from "./live";
 import { NOTHING, type Session, type Tool } from "./session";
 
 export interface Action {
@@ -46,6 +47,7 @@ export interface Parts {
   readonly stage: Stage;
   readonly toggleTheme: () => void;
   readonly editWords: (id: string) => void;
+  readonly live: Live;
   readonly choose: () => void;
   readonly zoom: (factor: number) => void;
 }
@@ -164,7 +166,7 @@ function removeSelected({ project, session }: App): void {
   if (selection.kind === "point") project.change("delete a point", (old) => removePoint(old, person, selection.index));
 }
 
-function stage({ app, deeds, stage }: Parts): Actions {
+function stage({ app, deeds, live, stage }: Parts): Actions {
   const { project, session } = app;
   const group = "On the stage" as const;
   const tool = (name: Tool) => () =>
@@ -179,6 +181,7 @@ function stage({ app, deeds, stage }: Parts): Actions {
     path: { group, label: "Draw a path", keys: ["P"], run: tool("path") },
     target: { group, label: "Drag joints", keys: ["T"], run: tool("target") },
     pose: { group, label: "Keyframe the pose at hand", keys: ["O"], run: () => deeds.keyframe() },
+    live: { group, label: "Live: steer somebody who moves", keys: ["J"], run: () => live.toggle() },
     follow: { group, label: "Camera follows", keys: ["C"], run: flip("follow") },
     above: { group, label: "Look from above", keys: ["X"], run: () => stage.fromAbove() },
     ghosts: { group, label: "Ghosts of other takes", keys: ["H"], run: flip("ghosts") },

@@ -3,6 +3,9 @@
 import type { MotionClip } from "../body/clip";
 import type { History } from "../project/history";
 import { type Project, length } from "../project/model";
+import { type Problem, placeOf, withoutLine } from "../project/places";
+import { Refused } from "../server/http";
+import type { LiveState } from "./live";
 import type { Session } from "./session";
 import type { Signal } from "./signal";
 
@@ -11,12 +14,21 @@ export interface App {
   readonly session: Signal<Session>;
   /** The pose while it is denoised; null: nothing is being drawn, or nothing of it was sent. */
   readonly denoising: Signal<MotionClip | null>;
+  /** Live mode; null: it is off. What is done then is shown as what is denoised is. */
+  readonly live: Signal<LiveState | null>;
 }
 
 /** The motion that is on the stage. */
 export function shownClip(app: App): MotionClip | null {
   const { clips } = app.session.value;
   return clips[app.project.value.kept] ?? clips[0] ?? null;
+}
+
+/** An error as a sentence with its place in the project. */
+export function problemOf(app: App, error: unknown): Problem {
+  const { message } = error as Error;
+  if (!(error instanceof Refused)) return { message, at: null };
+  return { message: withoutLine(message), at: placeOf(app.project.value, message, error.where) };
 }
 
 /** Seconds that the playhead may go to. */

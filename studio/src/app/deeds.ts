@@ -10,14 +10,15 @@ import {
   clamp,
   keptTake,
   length,
-  newId,
   round,
   segment,
   toFrame,
 } from "../project/model";
+import { continued, pieces, settled, withMotion } from "../project/settled";
 import { freeze, unfrozen } from "../project/timeline";
 import { type Result, motion, takeOf } from "../server/api";
-import { type App, shownClip } from "./app";
+import { isAway } from "../server/jobs";
+import { type App, problemOf, shownClip } from "./app";
 import type { Drawer } from "./drawing";
 import { NOTHING } from "./session";
 
@@ -52,13 +53,13 @@ export class Deeds {
   async predict(): Promise<void> {
     const take = keptTake(this.app.project.value);
     if (!take) return this.say("There is no motion yet that could go on.");
-    const results = await this.drawer.once({
-      task: "predict",
-      motion: take.motion,
-      seconds: FUTURE_SECONDS,
-      count: FUTURES,
-      seed: this.app.project.value.seed,
-    });
+    const common = { seconds: FUTURE_SECONDS, count: FUTURES, seed: this.app.project.value.seed };
+    const results = await this.drawer.once(
+      // Futures of two people are drawn together: what one does depends on the other.
+      take.people > 1
+        ? { task: "duet", past: take.motion, ...common }
+        : { task: "predict", motion: take.motion, ...common },
+    );
     if (!results?.length) return;
     const clips = await Promise.all(results.map((one) => motion(one.id)));
     const fan = { clips, motions: results.map((one) => one.id), past: take.seconds };
@@ -77,24 +78,23 @@ export class Deeds {
       people: clip.people.length,
       how: "continued",
     };
-    this.app.project.change(`go on with future ${index + 1}`, (old) => {
-      const tail = round(toFrame(clip.seconds - length(old)));
-      return settled(tail >= 0.2 ? { ...old, segments: [...old.segments, segment("", tail)] } : old, take);
-    });
+    this.app.project.change(`go on with future ${index + 1}`, (old) => continued(old, take));
   }
 
   /** Make the end of the take go over into its beginning. */
   async loop(): Promise<void> {
     const take = keptTake(this.app.project.value);
     if (!take) return this.say("There is no motion yet to make a loop of.");
-    const results = await this.drawer.once({
-      task: "edit",
-      motion: take.motion,
-      loop: true,
-      seed: this.app.project.value.seed,
-      count: 1,
-    });
-    if (results?.[0]) this.take(results[0], "looped", "close the loop");
+    let motion = take.motion;
+    let result: Result | undefined;
+    for (let person = 0; person < take.people; person += 1) {
+      const { seed } = this.app.project.value;
+      const results = await this.drawer.once({ task: "edit", motion, person, loop: true, seed, count: 1 });
+      result = results?.[0];
+      if (!result) return;
+      motion = result.id;
+    }
+    if (result) this.take(result, "looped", "close the loop");
   }
 
   /** One clip going over into another. */
@@ -114,16 +114,14 @@ export class Deeds {
       segment("", SWITCH_SECONDS),
       segment(to.name, round(to.seconds)),
     ];
-    this.put(result, `switch from ${from.name} to ${to.name}`, names);
+    this.put(result, `switch from ${from.name} to ${to.name}`, names, "switched");
   }
 
   /** A clip becomes what is on the timeline; words then change stretches of it. */
   putOnTimeline(clip: Clip): void {
     const take: Take = { motion: clip.motion, seed: 0, seconds: clip.seconds, people: 1, how: "from a file" };
     this.app.session.update({ time: 0, selection: NOTHING, fan: null });
-    this.app.project.change(`open ${clip.name}`, (old) =>
-      settled({ ...old, segments: pieces(clip.name, clip.seconds) }, take),
-    );
+    this.app.project.change(`open ${clip.name}`, (old) => withMotion(old, take, pieces(clip.name, clip.seconds)));
   }
 
   /** Put the kept take aside, among the clips. */
@@ -171,48 +169,26 @@ export class Deeds {
     );
   }
 
-  say(error: string): void {
-    this.app.session.update({ error });
+  /** What was done live becomes the motion; each stretch of the same words is a block. */
+  putRecording(result: Result, segments: Project["segments"]): void {
+    this.put(result, "keep what was done live", segments, "live");
+  }
+
+  fail(error: unknown): void {
+    if (isAway(error)) this.app.session.update({ connected: false });
+    else this.app.session.update({ error: problemOf(this.app, error) });
+  }
+
+  say(message: string): void {
+    this.app.session.update({ error: { message, at: null } });
   }
 
   private take(result: Result, how: string, label: string): void {
     this.app.project.change(label, (old) => settled(old, takeOf(result, how)));
   }
 
-  private put(result: Result, label: string, segments: Project["segments"]): void {
-    const total = round(segments.reduce((sum, one) => sum + one.seconds, 0));
-    const last = segments.at(-1)!;
-    const fitted = [
-      ...segments.slice(0, -1),
-      { ...last, seconds: Math.max(round(last.seconds + result.seconds - total), 0.2) },
-    ];
+  private put(result: Result, label: string, segments: Project["segments"], how: string): void {
     this.app.session.update({ time: 0, selection: NOTHING });
-    this.app.project.change(label, (old) => settled({ ...old, segments: fitted }, takeOf(result, "switched")));
+    this.app.project.change(label, (old) => withMotion(old, takeOf(result, how), segments));
   }
-}
-
-/** A project whose motion is there and stays, until somebody changes the words of a block. */
-function settled(project: Project, take: Take): Project {
-  return {
-    ...project,
-    base: take,
-    takes: [take],
-    kept: 0,
-    frozen: [[0, Math.max(take.seconds, length(project))]],
-    drawn: "[]",
-    count: 1,
-  };
-}
-
-/** A long clip as blocks of at most ten seconds, so that words can change a part of it. */
-function pieces(name: string, seconds: number): Project["segments"] {
-  const count = Math.max(Math.ceil(seconds / 10), 1);
-  const part = round(toFrame(seconds / count));
-  return Array.from({ length: count }, (_, index) => ({
-    id: newId(),
-    text: name,
-    other: "",
-    transition: null,
-    seconds: index < count - 1 ? part : Math.max(round(seconds - part * (count - 1)), 0.2),
-  }));
 }

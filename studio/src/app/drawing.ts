@@ -6,7 +6,7 @@ import { type Job, type Plan, plan, planKey } from "../project/plan";
 import { type JobRequest, type Result, motion, takeOf } from "../server/api";
 import { Refused } from "../server/http";
 import { type Watcher, isAway, runJob } from "../server/jobs";
-import { type App, shownClip } from "./app";
+import { type App, problemOf, shownClip } from "./app";
 
 /** Network calls of a preview; the full draw takes the server's own number. */
 const PREVIEW_STEPS = 6;
@@ -38,11 +38,12 @@ export class Drawer {
     const key = planKey(value);
     if (key === value.drawn || !jobs.length) {
       this.stop();
-      this.app.session.update({ error: missing });
+      this.app.session.update({ error: missing, pending: false });
       return;
     }
-    if (key === this.key && this.running) return;
+    if (key === this.key && this.running) return this.app.session.update({ pending: false });
     performance.mark(MARKS.asked);
+    this.app.session.update({ pending: true });
     this.timer = window.setTimeout(() => void this.draw(), delay);
   }
 
@@ -88,10 +89,12 @@ export class Drawer {
     this.stop();
     const running = (this.running = new AbortController());
     this.key = planKey(value);
-    this.app.session.update({ error: null, fan: null, drawing: { done: 0, of: 1, preview: true } });
+    const drawing = { done: 0, of: 1, preview: true };
+    this.app.session.update({ error: null, fan: null, pending: false, drawing });
     try {
-      await this.preview(jobs, running);
-      const results = await this.chain(jobs, running);
+      const shown = await this.preview(jobs, running);
+      // The full draw is asked for while the preview is on its way to the stage.
+      const [results] = await Promise.all([this.chain(jobs, running), shown()]);
       await this.keep(value, this.key, results, running.signal);
       performance.mark(MARKS.full);
     } catch (error) {
@@ -101,20 +104,22 @@ export class Drawer {
     }
   }
 
-  private async preview(jobs: readonly Job[], running: AbortController): Promise<void> {
+  /** Draw quickly; gives what fetches the motion and puts it on the stage. */
+  private async preview(jobs: readonly Job[], running: AbortController): Promise<() => Promise<void>> {
     const [job] = jobs;
-    if (!job || jobs.length > 1) return;
-    const [result] = await runJob(
-      { ...job, count: 1, steps: PREVIEW_STEPS },
-      running.signal,
-      this.watcher(running, true),
-    );
-    if (!result) return;
-    const clip = await motion(result.id);
-    running.signal.throwIfAborted();
-    this.app.denoising.value = null;
-    this.app.session.update({ clips: [clip] });
-    performance.mark(MARKS.preview);
+    if (!job || jobs.length > 1) return () => Promise.resolve();
+    // A quick draw is too short to be watched, and it would hide the motion that is there.
+    const levels = !this.app.session.value.clips.length;
+    const asked = { ...job, count: 1, steps: PREVIEW_STEPS, levels };
+    const [result] = await runJob(asked, running.signal, this.watcher(running, true));
+    return async () => {
+      if (!result) return;
+      const clip = await motion(result.id);
+      if (running.signal.aborted || this.running !== running) return;
+      this.app.denoising.value = null;
+      this.app.session.update({ clips: [clip] });
+      performance.mark(MARKS.preview);
+    };
   }
 
   /** Jobs one after the other; an edit without a motion goes on from the one before. */
@@ -144,9 +149,7 @@ export class Drawer {
     return {
       progress: (done, of) => isCurrent() && this.app.session.update({ drawing: { done, of, preview } }),
       level: ({ clip, row }) => {
-        // A quick draw is too short to be watched, and it would hide the motion that is there.
-        if (isCurrent() && row === 0 && (!preview || !this.app.session.value.clips.length))
-          this.app.denoising.value = clip;
+        if (isCurrent() && row === 0) this.app.denoising.value = clip;
       },
     };
   }
@@ -155,7 +158,7 @@ export class Drawer {
     if (running.signal.aborted && this.running !== running) return;
     if (error instanceof DOMException && error.name === "AbortError") return;
     if (isAway(error)) this.app.session.update({ connected: false });
-    else this.app.session.update({ error: (error as Error).message });
+    else this.app.session.update({ error: problemOf(this.app, error) });
   }
 
   /** The clips of the project's takes, after undo for instance. */
@@ -177,7 +180,7 @@ export class Drawer {
   private lost(error: unknown, ids: string): void {
     if (isAway(error)) return this.app.session.update({ connected: false });
     if (!(error instanceof Refused) || error.status !== 404)
-      return this.app.session.update({ error: (error as Error).message });
+      return this.app.session.update({ error: problemOf(this.app, error) });
     const { value } = this.app.project;
     if (value.takes.map((take) => take.motion).join() !== ids) return;
     const isBased = keptTake(value)?.motion === value.base?.motion;

@@ -1,8 +1,9 @@
 /** Files that are dropped or chosen, and files that are written. */
 
 import { SUFFIX, checked, read, written } from "../project/file";
-import { timelineOf } from "../project/goals";
-import { type Project, exampleProject, keptTake, newId } from "../project/model";
+import { asked, timelineOf } from "../project/goals";
+import { type Project, keptTake } from "../project/model";
+import { opened } from "../project/opened";
 import {
   type Format,
   bytes,
@@ -58,8 +59,9 @@ export class Files {
   private async exportYaml(project: Project, name: string): Promise<void> {
     if (project.base)
       throw new Error("frozen stretches are not in a timeline file; unfreeze them, or export the motion itself.");
-    const blob = await timelineYaml(timelineOf(project, keptTake(project)?.seed ?? project.seed));
-    download(blob, `${name}.yaml`);
+    if (project.reactTo) throw new Error("an answer to a clip is not in a timeline file; export the motion itself.");
+    const yaml = await timelineYaml(timelineOf(project, keptTake(project)?.seed ?? project.seed));
+    download(new Blob([`# motionloom ${command(project, `${name}.yaml`)}\n`, yaml]), `${name}.yaml`);
   }
 
   private async openOne(file: File): Promise<void> {
@@ -87,28 +89,9 @@ export class Files {
   }
 
   private async openTimeline(file: File): Promise<void> {
-    const found = (await timelineJson(file)) as {
-      seed?: number;
-      segments: (string | { text: string; seconds?: number; transition?: number })[];
-    };
-    const segments = found.segments.map((one) => {
-      const { text, seconds = 5, transition = null } = typeof one === "string" ? { text: one } : one;
-      const [first, second = ""] = text.split("::").map((part) => part.trim());
-      return { id: newId(), text: first!, other: second, seconds, transition };
-    });
-    const two = segments.some((one) => one.other);
-    const nothing = exampleProject().people[0]!;
-    const people = two ? [nothing, nothing] : [nothing];
-    this.replace(
-      checked({
-        ...exampleProject(),
-        name: file.name.replace(/\.ya?ml$/i, ""),
-        seed: found.seed ?? 0,
-        segments,
-        people,
-      }),
-      file.name,
-    );
+    const found = (await timelineJson(file)) as Record<string, unknown>;
+    const second = /^#.* --person 2\b/.test(await file.slice(0, 500).text());
+    this.replace(checked(opened(found, file.name.replace(/\.ya?ml$/i, ""), second ? 1 : 0)), file.name);
   }
 
   private replace(project: Project, name: string): void {
@@ -123,9 +106,17 @@ export class Files {
     } catch (error) {
       if (isAway(error)) this.app.session.update({ connected: false });
       const { message } = error as Error;
-      this.app.session.update({ error: message.startsWith(what) ? message : `${what}: ${message}` });
+      this.app.session.update({
+        error: { message: message.startsWith(what) ? message : `${what}: ${message}`, at: null },
+      });
     }
   }
+}
+
+/** What makes the same motion of a timeline file. */
+function command(project: Project, file: string): string {
+  if (project.people.length === 1) return `compose ${file}`;
+  return `duet --timeline ${file} --person ${asked(project) + 1}`;
 }
 
 function isAsf(file: File): boolean {

@@ -4,7 +4,7 @@ import { type Project, exampleProject } from "../project/model";
 import { checked, written } from "../project/file";
 import { isUp, saveProject, savedProject } from "../server/api";
 import { isAway } from "../server/jobs";
-import type { App } from "./app";
+import { type App, problemOf } from "./app";
 
 const KEY = "motionloom-studio";
 const QUIET = 500;
@@ -48,12 +48,17 @@ export class Saver {
       this.app.session.update({ saved: "saving" });
       this.timer = window.setTimeout(() => void this.save(), QUIET);
     });
+    // A tab that is left or closed waits for nothing.
+    addEventListener("pagehide", () => {
+      if (this.app.session.value.saved === "saving") void this.save();
+    });
     app.session.subscribe((now, before) => {
       if (before.connected && !now.connected) this.wait();
     });
   }
 
   async save(): Promise<void> {
+    clearTimeout(this.timer);
     const saving = this.app.project.value;
     try {
       await saveProject(saving);
@@ -63,7 +68,7 @@ export class Saver {
     } catch (error) {
       this.app.session.update({
         saved: "here",
-        ...(isAway(error) ? { connected: false } : { error: (error as Error).message }),
+        ...(isAway(error) ? { connected: false } : { error: problemOf(this.app, error) }),
       });
     }
   }

@@ -2,6 +2,7 @@
 
 import type { MotionClip } from "../body/clip";
 import type { Range } from "../project/model";
+import type { Problem } from "../project/places";
 import { Signal } from "./signal";
 
 export type Tool = "select" | "path" | "target";
@@ -46,11 +47,13 @@ export interface Session {
   readonly snapping: boolean;
   readonly help: boolean;
   readonly drawing: Drawing | null;
+  /** A draw begins soon. */
+  readonly pending: boolean;
   readonly fan: Fan | null;
   /** The clips of the project's takes, as far as they are here. */
   readonly clips: readonly MotionClip[];
-  /** The server's sentence about the last draw. */
-  readonly error: string | null;
+  /** What went wrong last. */
+  readonly error: Problem | null;
   readonly connected: boolean;
   readonly saved: "saved" | "saving" | "here";
 }
@@ -75,6 +78,7 @@ export function newSession(): Signal<Session> {
     snapping: true,
     help: false,
     drawing: null,
+    pending: false,
     fan: null,
     clips: [],
     error: null,

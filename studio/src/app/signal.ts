@@ -16,7 +16,7 @@ export class Signal<T> {
   }
 
   /** Change some fields of a value that is a mapping. */
-  update(part: Partial<T>): void {
+  update(part: Partial<NonNullable<T>>): void {
     const same = Object.entries(part).every(([key, value]) => Object.is(this.current[key as keyof T], value));
     if (!same) this.value = { ...this.current, ...part };
   }

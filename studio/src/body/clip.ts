@@ -1,7 +1,7 @@
 /** A motion in the page: places of 22 joints for each person and frame. */
 
 import type { Vec3 } from "../project/model";
-import { COUNT, LEFT_HIP, RIGHT_HIP } from "./skeleton";
+import { COUNT, LEFT, RIGHT } from "./skeleton";
 
 /** Numbers of one pose. */
 export const POSE = COUNT * 3;
@@ -51,6 +51,6 @@ export function places(pose: ArrayLike<number>): Vec3[] {
 
 /** Degrees that somebody faces at a time, by the hips; 0 is +Z and 90 is +X. */
 export function facingAt(clip: MotionClip, person: number, time: number): number {
-  const [left, right] = [jointAt(clip, person, LEFT_HIP, time), jointAt(clip, person, RIGHT_HIP, time)];
+  const [left, right] = [jointAt(clip, person, LEFT.hip, time), jointAt(clip, person, RIGHT.hip, time)];
   return (Math.atan2(right[2] - left[2], left[0] - right[0]) * 180) / Math.PI;
 }

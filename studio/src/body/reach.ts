@@ -5,48 +5,22 @@
 
 import type { Vec3 } from "../project/model";
 import { POSE, vec } from "./clip";
-import {
-  COUNT,
-  HEAD,
-  LEFT_ANKLE,
-  LEFT_COLLAR,
-  LEFT_ELBOW,
-  LEFT_FOOT,
-  LEFT_HIP,
-  LEFT_KNEE,
-  LEFT_SHOULDER,
-  LEFT_WRIST,
-  NECK,
-  PARENTS,
-  PELVIS,
-  RIGHT_ANKLE,
-  RIGHT_COLLAR,
-  RIGHT_ELBOW,
-  RIGHT_FOOT,
-  RIGHT_HIP,
-  RIGHT_KNEE,
-  RIGHT_SHOULDER,
-  RIGHT_WRIST,
-  SPINE1,
-  SPINE2,
-  SPINE3,
-} from "./skeleton";
+import { COUNT, HEAD, NECK, PARENTS, PELVIS, SIDES, SPINE1, SPINE2, SPINE3 } from "./skeleton";
 
 /** From what stays to what is dragged; the first joint of a chain does not move unless the target is out of reach. */
 const CHAINS: Record<number, readonly number[]> = {
-  [LEFT_WRIST]: [LEFT_SHOULDER, LEFT_ELBOW, LEFT_WRIST],
-  [RIGHT_WRIST]: [RIGHT_SHOULDER, RIGHT_ELBOW, RIGHT_WRIST],
-  [LEFT_ELBOW]: [LEFT_SHOULDER, LEFT_ELBOW],
-  [RIGHT_ELBOW]: [RIGHT_SHOULDER, RIGHT_ELBOW],
-  [LEFT_SHOULDER]: [SPINE3, LEFT_COLLAR, LEFT_SHOULDER],
-  [RIGHT_SHOULDER]: [SPINE3, RIGHT_COLLAR, RIGHT_SHOULDER],
-  [LEFT_ANKLE]: [LEFT_HIP, LEFT_KNEE, LEFT_ANKLE],
-  [RIGHT_ANKLE]: [RIGHT_HIP, RIGHT_KNEE, RIGHT_ANKLE],
-  [LEFT_FOOT]: [LEFT_HIP, LEFT_KNEE, LEFT_ANKLE, LEFT_FOOT],
-  [RIGHT_FOOT]: [RIGHT_HIP, RIGHT_KNEE, RIGHT_ANKLE, RIGHT_FOOT],
-  [LEFT_KNEE]: [LEFT_HIP, LEFT_KNEE],
-  [RIGHT_KNEE]: [RIGHT_HIP, RIGHT_KNEE],
   [HEAD]: [PELVIS, SPINE1, SPINE2, SPINE3, NECK, HEAD],
+  ...Object.assign(
+    {},
+    ...SIDES.map(({ hip, knee, ankle, foot, collar, shoulder, elbow, wrist }) => ({
+      [wrist]: [shoulder, elbow, wrist],
+      [elbow]: [shoulder, elbow],
+      [shoulder]: [SPINE3, collar, shoulder],
+      [ankle]: [hip, knee, ankle],
+      [foot]: [hip, knee, ankle, foot],
+      [knee]: [hip, knee],
+    })),
+  ),
 };
 
 const ROUNDS = 12;

@@ -32,44 +32,56 @@ export const COUNT = JOINTS.length;
 const at = (name: (typeof JOINTS)[number]) => JOINTS.indexOf(name);
 
 export const PELVIS = at("pelvis");
-export const LEFT_HIP = at("left_hip");
-export const RIGHT_HIP = at("right_hip");
 export const SPINE1 = at("spine1");
 export const SPINE2 = at("spine2");
 export const SPINE3 = at("spine3");
 export const NECK = at("neck");
 export const HEAD = at("head");
-export const LEFT_COLLAR = at("left_collar");
-export const RIGHT_COLLAR = at("right_collar");
-export const LEFT_SHOULDER = at("left_shoulder");
-export const RIGHT_SHOULDER = at("right_shoulder");
-export const LEFT_ELBOW = at("left_elbow");
-export const RIGHT_ELBOW = at("right_elbow");
-export const LEFT_WRIST = at("left_wrist");
-export const RIGHT_WRIST = at("right_wrist");
-export const LEFT_KNEE = at("left_knee");
-export const RIGHT_KNEE = at("right_knee");
-export const LEFT_ANKLE = at("left_ankle");
-export const RIGHT_ANKLE = at("right_ankle");
-export const LEFT_FOOT = at("left_foot");
-export const RIGHT_FOOT = at("right_foot");
+/** The joints of a leg and an arm, outwards. */
+export interface Side {
+  readonly hip: number;
+  readonly knee: number;
+  readonly ankle: number;
+  readonly foot: number;
+  readonly collar: number;
+  readonly shoulder: number;
+  readonly elbow: number;
+  readonly wrist: number;
+}
+
+function side(name: "left" | "right"): Side {
+  return {
+    hip: at(`${name}_hip`),
+    knee: at(`${name}_knee`),
+    ankle: at(`${name}_ankle`),
+    foot: at(`${name}_foot`),
+    collar: at(`${name}_collar`),
+    shoulder: at(`${name}_shoulder`),
+    elbow: at(`${name}_elbow`),
+    wrist: at(`${name}_wrist`),
+  };
+}
+
+export const LEFT = side("left");
+export const RIGHT = side("right");
+export const SIDES = [LEFT, RIGHT] as const;
 
 /** Joints that one drags, in the order that the keyboard goes through them. */
 export const TARGETS = [
-  RIGHT_WRIST,
-  LEFT_WRIST,
-  RIGHT_ANKLE,
-  LEFT_ANKLE,
+  RIGHT.wrist,
+  LEFT.wrist,
+  RIGHT.ankle,
+  LEFT.ankle,
   HEAD,
   PELVIS,
-  RIGHT_ELBOW,
-  LEFT_ELBOW,
-  RIGHT_KNEE,
-  LEFT_KNEE,
-  RIGHT_FOOT,
-  LEFT_FOOT,
-  RIGHT_SHOULDER,
-  LEFT_SHOULDER,
+  RIGHT.elbow,
+  LEFT.elbow,
+  RIGHT.knee,
+  LEFT.knee,
+  RIGHT.foot,
+  LEFT.foot,
+  RIGHT.shoulder,
+  LEFT.shoulder,
 ] as const;
 
 /** "left_wrist" as somebody reads it. */

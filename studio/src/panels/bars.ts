@@ -108,6 +108,7 @@ export function stageBar(app: App, actions: Actions, left: HTMLElement, right: H
       iconButton(actions.path!, "path", { pressed: tool === "path" }),
       iconButton(actions.target!, "target", { pressed: tool === "target" }),
       iconButton(actions.pose!, "pose"),
+      iconButton(actions.live!, "live", { pressed: app.live.value !== null }),
       ...(two
         ? [
             h(
@@ -131,6 +132,9 @@ export function stageBar(app: App, actions: Actions, left: HTMLElement, right: H
     ]);
   };
   app.project.subscribe(render);
+  app.live.subscribe((now, before) => {
+    if (!now !== !before) render();
+  });
   app.session.subscribe((now, before) => {
     if ((["tool", "follow", "ghosts", "trails", "person"] as const).some((key) => now[key] !== before[key])) render();
   });

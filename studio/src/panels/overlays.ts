@@ -9,7 +9,8 @@ import { shownKey } from "./parts";
 
 export function notices(app: App, retry: () => void, root: HTMLElement): void {
   const render = () => {
-    const { error, connected, drawing } = app.session.value;
+    const { error, connected, drawing, person } = app.session.value;
+    const isElsewhere = !error?.at || (error.at.kind !== "segment" && error.at.who !== person);
     const waiting = !shownClip(app) && drawing;
     morph(root, [
       ...(connected
@@ -21,12 +22,13 @@ export function notices(app: App, retry: () => void, root: HTMLElement): void {
               "The server does not answer. Your work is kept in this browser and goes on as soon as the server is back.",
             ),
           ]),
-      ...(error
+      // What belongs to a block, a path or a target is said there.
+      ...(error && isElsewhere
         ? [
             h(
               "p",
               { class: "notice", role: "alert" },
-              h("span", {}, error),
+              h("span", {}, error.message),
               h("button", { class: "text", onclick: retry }, "Try again"),
               h(
                 "button",
@@ -42,8 +44,9 @@ export function notices(app: App, retry: () => void, root: HTMLElement): void {
   app.session.subscribe((now, before) => {
     if (
       now.error !== before.error ||
+      now.person !== before.person ||
       now.connected !== before.connected ||
-      now.drawing !== before.drawing ||
+      !now.drawing !== !before.drawing ||
       now.clips !== before.clips
     )
       render();

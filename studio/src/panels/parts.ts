@@ -1,7 +1,9 @@
 /** Parts that every panel is made of. */
 
 import type { Action } from "../app/actions";
+import type { App } from "../app/app";
 import { h } from "../app/dom";
+import type { Place } from "../project/places";
 import { type Icon, icon } from "./icons";
 
 /** A button of an action with its picture; its words and its key are in the title. */
@@ -108,4 +110,11 @@ export function shownKey(key: string): string {
 export function miss(centimetres: number | null, limit: number): HTMLElement {
   if (centimetres === null) return h("span", { class: "miss" }, "–");
   return h("span", { class: centimetres > limit ? "miss unmet" : "miss" }, `${centimetres.toFixed(1)} cm`);
+}
+
+/** What the server said about this part of the project. */
+export function wrong(app: App, kind: Place["kind"], id?: string): HTMLElement | false {
+  const { error } = app.session.value;
+  const isHere = error?.at?.kind === kind && (!id || !("id" in error.at) || error.at.id === id);
+  return isHere && h("p", { class: "unmet" }, error.message);
 }

@@ -29,32 +29,32 @@ export function setPath(project: Project, who: number, path: Path | null): Proje
 export function drawPath(project: Project, who: number, line: readonly Ground[]): Project {
   const points = simplified(line).map(({ x, z }) => pathPoint(x, z));
   if (points.length < 2) return project;
-  return setPath(project, who, { points, speed: project.people[who]?.path?.speed ?? null, times: null });
+  return setPath(project, who, { points, speed: project.people[who]?.path?.speed ?? null, times: null, given: null });
 }
 
 /** One more point at the end; the first one makes a path that begins at `start`. */
 export function addPoint(project: Project, who: number, at: Ground, start: Ground): Project {
   const path = project.people[who]?.path ?? { points: [pathPoint(start.x, start.z)], speed: null };
-  return setPath(project, who, { ...path, times: null, points: [...path.points, pathPoint(at.x, at.z)] });
+  return setPath(project, who, { ...path, times: null, given: null, points: [...path.points, pathPoint(at.x, at.z)] });
 }
 
 export function changePoint(project: Project, who: number, index: number, part: Partial<PathPoint>): Project {
   const path = project.people[who]?.path;
   if (!path?.points[index]) return project;
   const points = path.points.map((one, n) => (n === index ? { ...one, ...part } : one));
-  return setPath(project, who, { ...path, points, times: part.stop === undefined ? path.times : null });
+  return setPath(project, who, { ...path, points, given: null, times: part.stop === undefined ? path.times : null });
 }
 
 export function removePoint(project: Project, who: number, index: number): Project {
   const path = project.people[who]?.path;
   if (!path?.points[index]) return project;
   const points = path.points.filter((_, n) => n !== index);
-  return setPath(project, who, points.length < 2 ? null : { ...path, times: null, points });
+  return setPath(project, who, points.length < 2 ? null : { ...path, times: null, given: null, points });
 }
 
 export function setSpeed(project: Project, who: number, speed: number | null): Project {
   const path = project.people[who]?.path;
-  return path ? setPath(project, who, { ...path, speed, times: null }) : project;
+  return path ? setPath(project, who, { ...path, speed, times: null, given: null }) : project;
 }
 
 /**
@@ -62,8 +62,12 @@ export function setSpeed(project: Project, who: number, speed: number | null): P
  * know the way to say where a joint is.
  */
 export function needsWay(project: Project): number {
-  if (project.segments.length < 2) return -1;
+  if (project.segments.length < 2 || hasPath(project.given?.path)) return -1;
   return project.people.findIndex((one) => !one.path && (one.targets.length > 0 || one.poses.length > 0));
+}
+
+function hasPath(goal: unknown): boolean {
+  return typeof goal === "string" || (typeof goal === "object" && goal !== null && "path" in goal);
 }
 
 /** The way of a motion as it is, as a path with its times and facings. */
@@ -75,7 +79,7 @@ export function keepWay(project: Project, who: number, clip: MotionClip): Projec
     const [x, , z] = jointAt(clip, who, PELVIS, time);
     return { ...pathPoint(x, z), facing: round(facingAt(clip, who, time)) };
   });
-  return setPath(project, who, { points, speed: null, times });
+  return setPath(project, who, { points, speed: null, times, given: null });
 }
 
 /** Ask for a joint at a time: its target there moves, or a new one with this name appears. */

@@ -1,11 +1,12 @@
 /** A project as one file, and back. A file may come from anybody: it is checked before anything is made of it. */
 
 import { JOINTS } from "../body/skeleton";
-import { type Project, FPS, LONGEST, SHORTEST, exampleProject } from "./model";
+import { type Given, type Project, FPS, LONGEST, SHORTEST, exampleProject } from "./model";
 
 export const SUFFIX = ".loom.json";
 const MOST_SEGMENTS = 500;
 const MOST_POINTS = 2000;
+const MOST_GIVEN = 2e6;
 
 export class ProjectError extends Error {}
 
@@ -49,35 +50,47 @@ export function checked(found: unknown): Project {
       return [from!, to!] as const;
     }),
     base: top.base ? take(top.base, "base") : null,
+    only: top.only == null ? null : number(top.only, "only", 0, 1),
     reactTo: top.reactTo ? clip(top.reactTo, "reactTo") : null,
     takes,
     kept: Math.min(number(top.kept ?? 0, "kept", 0, 16), Math.max(takes.length - 1, 0)),
     drawn: typeof top.drawn === "string" ? top.drawn : "",
     clips: list(top.clips ?? [], "clips", 100).map((one, index) => clip(one, `clips[${index}]`)),
     character: top.character ? character(top.character) : null,
+    given: given(top.given, "given"),
   };
 }
 
 type Mapping = Record<string, unknown>;
 
 function segment(found: unknown, name: string) {
-  const given = mapping(found, name);
+  const one = mapping(found, name);
   return {
-    id: word(given.id, `${name}.id`),
-    text: word(given.text, `${name}.text`),
-    other: word(given.other ?? "", `${name}.other`),
-    seconds: number(given.seconds, `${name}.seconds`, SHORTEST, LONGEST),
-    transition: given.transition == null ? null : number(given.transition, `${name}.transition`, 0.05, LONGEST / 2),
+    id: word(one.id, `${name}.id`),
+    text: word(one.text, `${name}.text`),
+    other: word(one.other ?? "", `${name}.other`),
+    seconds: number(one.seconds, `${name}.seconds`, SHORTEST, LONGEST),
+    transition: one.transition == null ? null : number(one.transition, `${name}.transition`, 0.05, LONGEST / 2),
+    given: given(one.given, `${name}.given`),
   };
 }
 
+/** Parts of a timeline file that the server reads and the page only keeps. */
+function given(found: unknown, name: string): Given | null {
+  if (found == null) return null;
+  if (JSON.stringify(found).length > MOST_GIVEN)
+    throw new ProjectError(`${name} holds more than ${MOST_GIVEN / 1e6} million characters; shorten it.`);
+  return mapping(found, name);
+}
+
 function person(found: unknown, name: string) {
-  const given = mapping(found, name);
-  const path = given.path ? mapping(given.path, `${name}.path`) : null;
+  const asked = mapping(found, name);
+  const path = asked.path ? mapping(asked.path, `${name}.path`) : null;
   return {
     path: path && {
       times: path.times ? numbers(path.times, `${name}.path.times`, list(path.points, name, MOST_POINTS).length) : null,
       speed: path.speed == null ? null : number(path.speed, `${name}.path.speed`, 0.05, 12),
+      given: given(path.given, `${name}.path.given`),
       points: list(path.points, `${name}.path.points`, MOST_POINTS).map((one, index) => {
         const at = `${name}.path.points[${index}]`;
         const point = mapping(one, at);
@@ -89,7 +102,7 @@ function person(found: unknown, name: string) {
         };
       }),
     },
-    targets: list(given.targets ?? [], `${name}.targets`, MOST_POINTS).map((one, index) => {
+    targets: list(asked.targets ?? [], `${name}.targets`, MOST_POINTS).map((one, index) => {
       const at = `${name}.targets[${index}]`;
       const target = mapping(one, at);
       return {
@@ -100,7 +113,7 @@ function person(found: unknown, name: string) {
         position: place(target.position, `${at}.position`),
       };
     }),
-    poses: list(given.poses ?? [], `${name}.poses`, 200).map((one, index) => {
+    poses: list(asked.poses ?? [], `${name}.poses`, 200).map((one, index) => {
       const at = `${name}.poses[${index}]`;
       const pose = mapping(one, at);
       const positions = list(pose.positions, `${at}.positions`, JOINTS.length).map((row) =>

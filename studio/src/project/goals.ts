@@ -1,16 +1,24 @@
 /** A project in the server's words: the structure of a timeline file and of a goal file. */
 
 import { JOINTS } from "../body/skeleton";
-import { type Person, type Project, type Vec3, FPS, length, round, toFrame } from "./model";
+import { type Path, type Person, type Project, type Segment, type Vec3, FPS, length, round, toFrame } from "./model";
 import { facings, timed } from "./path";
 import { transitionOf } from "./timeline";
 
-type Point = { time: number; position: number[] };
-type JointGoal = { joint: string; points: Point[]; curve?: boolean };
+export type Point = { time: number; position: number[] };
+export type JointGoal = { joint: string; points: Point[]; curve?: boolean };
+
+export interface PathGoal {
+  points: number[][];
+  times: number[];
+  facing?: number[];
+}
 
 export interface Goal {
-  path?: { points: number[][]; times: number[]; facing?: number[] };
+  path?: PathGoal;
   joints?: JointGoal[];
+  /** What a file asks besides. */
+  [key: string]: unknown;
 }
 
 export interface SegmentJson {
@@ -18,45 +26,67 @@ export interface SegmentJson {
   seconds: number;
   transition?: number;
   goal?: Goal;
+  [key: string]: unknown;
 }
 
 export interface TimelineJson {
   seed: number;
   segments: SegmentJson[];
   path?: Goal;
+  [key: string]: unknown;
 }
 
 /** What is asked of a person over `seconds`, as a goal file has it; null: nothing. */
 export function goalOf(person: Person, seconds: number): Goal | null {
   const goal: Goal = {};
-  const path = person.path && timed(person.path, seconds);
-  if (path) {
-    const degrees = facings(path);
-    goal.path = { points: path.points.map(({ x, z }) => [x, z]), times: [...path.times] };
-    if (degrees) goal.path.facing = degrees;
-  }
+  const path = person.path && pathGoal(person.path, seconds);
+  if (path) goal.path = path;
   const joints = [...held(person, seconds), ...single(person, seconds)];
   if (joints.length) goal.joints = joints;
   return goal.path || goal.joints ? goal : null;
 }
 
-/** The timeline of a project; the words of both people where they differ. */
+function pathGoal(path: Path, seconds: number): PathGoal | null {
+  const given = path.given as unknown as Partial<PathGoal> | null | undefined;
+  if (given && !(given.times && given.times.at(-1)! > seconds)) return given as PathGoal;
+  const walked = timed(path, seconds);
+  if (!walked) return null;
+  const degrees = facings(walked);
+  const points = walked.points.map(({ x, z }) => [x, z]);
+  return { points, times: [...walked.times], ...(degrees ? { facing: degrees } : {}) };
+}
+
+/** The timeline of a project; the words of both people where there are two. */
 export function timelineOf(project: Project, seed = project.seed): TimelineJson {
+  const { path: kept, ...given } = project.given ?? {};
   const timeline: TimelineJson = {
     seed,
+    ...given,
     segments: project.segments.map((one, index) => {
-      const both = project.people.length > 1 && one.other.trim();
-      const json: SegmentJson = { text: both ? `${one.text} :: ${one.other}` : one.text, seconds: one.seconds };
+      const json: SegmentJson = { text: wordsOf(project, one), seconds: one.seconds };
       if (index < project.segments.length - 1) json.transition = round(transitionOf(project, index));
-      return json;
+      return { ...json, ...one.given };
     }),
   };
   const person = project.people[asked(project)]!;
-  const goal = goalOf(person, length(project));
+  const goal = joinedGoals(goalOf(person, length(project)), kept);
+  const [first] = timeline.segments;
   // Who has no path begins at the origin facing +Z, and what a first block asks is seen from there: the world.
-  if (goal && !goal.path) timeline.segments[0]!.goal = goal;
-  else if (goal) timeline.path = goal;
+  const inFirst = goal && !kept && !goal.path && !first!.goal && !first!.goals;
+  if (inFirst) first!.goal = goal;
+  else if (goal) timeline.path = goal as Goal;
   return timeline;
+}
+
+function wordsOf(project: Project, one: Segment): string {
+  return project.people.length > 1 ? `${one.text} :: ${one.other.trim() || one.text}` : one.text;
+}
+
+/** What the page asks, and what a file asks that the page only keeps. */
+function joinedGoals(own: Goal | null, kept: unknown): Goal | null {
+  if (!kept || typeof kept !== "object") return own ?? (kept as Goal | null) ?? null;
+  const joints = [...(own?.joints ?? []), ...((kept as Goal).joints ?? [])];
+  return { ...own, ...(kept as Goal), ...(joints.length ? { joints } : {}) };
 }
 
 /** A duet keeps to the goals of one person: the first who has any. */

@@ -1,11 +1,17 @@
 /** How far a motion is from what was asked, in centimetres. */
 
 import { type MotionClip, jointAt } from "../body/clip";
+import { LEFT, RIGHT } from "../body/skeleton";
 import { type Person, type Pose, type Target, length, type Project } from "./model";
 import { distance, placeAt, timed } from "./path";
 
 /** Beyond this a target counts as not met. */
 export const UNMET = 5;
+
+/** Nobody's feet leave the floor by more, not even in a jump. */
+export const FLYING = 45;
+
+const FEET = [LEFT.ankle, RIGHT.ankle];
 
 /** Farthest from the target in its time, centimetres. */
 export function targetMiss(clip: MotionClip, person: number, target: Target): number {
@@ -15,6 +21,19 @@ export function targetMiss(clip: MotionClip, person: number, target: Target): nu
     worst = Math.max(worst, distance(jointAt(clip, person, target.joint, time), target.position));
   }
   return worst * 100;
+}
+
+/** How far the body had to leave the floor for a target, centimetres: both feet above where they stand otherwise. */
+export function targetLift(clip: MotionClip, person: number, target: Target): number {
+  const height = (time: number) => Math.min(...FEET.map((joint) => jointAt(clip, person, joint, time)[1]));
+  const heights = Array.from({ length: clip.frames }, (_, frame) => height(frame / clip.fps)).sort((a, b) => a - b);
+  const standing = heights[Math.floor(heights.length / 10)] ?? 0;
+  return Math.max(height(target.time) - standing, 0) * 100;
+}
+
+/** Whether a target was missed, or met by somebody who flies. */
+export function isUnmet(clip: MotionClip, person: number, target: Target): boolean {
+  return targetMiss(clip, person, target) > UNMET || targetLift(clip, person, target) > FLYING;
 }
 
 /** Mean over the joints, centimetres. */

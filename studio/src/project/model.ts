@@ -21,7 +21,12 @@ export interface Segment {
   readonly seconds: number;
   /** Seconds shared with the next segment; null: one second, or half of the shorter one. */
   readonly transition: number | null;
+  /** What a timeline file asks of this stretch and the page does not change: `guidance`, `goal`, `goals`. */
+  readonly given: Given | null;
 }
+
+/** Keys of a timeline file that are kept as they came and go out again. */
+export type Given = Readonly<Record<string, unknown>>;
 
 export interface PathPoint {
   readonly x: number;
@@ -38,6 +43,8 @@ export interface Path {
   readonly speed: number | null;
   /** When each point is reached, for a way that was walked already; null: as `speed` and stops say. */
   readonly times: readonly number[] | null;
+  /** The path of a timeline file, as long as nobody has changed it. */
+  readonly given?: Given | null;
 }
 
 /** A joint that is asked to be somewhere. */
@@ -95,6 +102,8 @@ export interface Project {
   /** Stretches of `base` that stay as they are, sorted and apart; the rest is drawn between them. */
   readonly frozen: readonly Range[];
   readonly base: Take | null;
+  /** Whose motion is drawn between them where there are two people: 0 or 1; null: everybody's. */
+  readonly only: number | null;
   /** Whom the second person reacts to, if it does: a motion of the first. */
   readonly reactTo: Clip | null;
   readonly takes: readonly Take[];
@@ -104,6 +113,8 @@ export interface Project {
   readonly clips: readonly Clip[];
   /** The user's own character, as the server knows it. */
   readonly character: { readonly id: string; readonly name: string } | null;
+  /** What a timeline file asks of the whole and the page does not change: `guidance`, `start`, `path`. */
+  readonly given: Given | null;
 }
 
 let counter = 0;
@@ -117,7 +128,7 @@ export function newId(): string {
 export const NOTHING_ASKED: Person = { path: null, targets: [], poses: [] };
 
 export function segment(text: string, seconds: number): Segment {
-  return { id: newId(), text, other: "", seconds, transition: null };
+  return { id: newId(), text, other: "", seconds, transition: null, given: null };
 }
 
 /** What somebody sees who opens the page for the first time. */
@@ -131,12 +142,14 @@ export function exampleProject(): Project {
     people: [NOTHING_ASKED],
     frozen: [],
     base: null,
+    only: null,
     reactTo: null,
     takes: [],
     kept: 0,
     drawn: "",
     clips: [],
     character: null,
+    given: null,
   };
 }
 

@@ -3,6 +3,7 @@
 import { type Project, type Range, begins, length } from "./model";
 import { type Goal, type TimelineJson, asked, goalOf, timelineOf } from "./goals";
 import { needsWay } from "./asks";
+import type { Place, Problem } from "./places";
 import { between } from "./timeline";
 
 /** One job; where `motion` is missing in an edit, it is the result of the job before. */
@@ -11,17 +12,22 @@ export type Job =
   | { task: "duet"; timeline: TimelineJson; seed: number; count: number; person: number }
   | { task: "duet"; prompt: string; seconds: number; goals: Goal; seed: number; count: number; person: number }
   | { task: "duet"; react_to: string; prompt: string; seed: number; count: number }
-  | { task: "edit"; motion?: string; prompt: string; redraw: Range[]; seed: number; count: number };
+  | { task: "edit"; motion?: string; prompt: string; redraw: Range[]; person: number; seed: number; count: number };
 
-/** Jobs one after the other, the first line that says what is missing, or nothing to do. */
-export type Plan = { jobs: Job[]; missing: null } | { jobs: []; missing: string | null };
+/** Jobs one after the other, what is missing, or nothing to do. */
+export type Plan = { jobs: Job[]; missing: null } | { jobs: []; missing: Problem | null };
 
 export function plan(project: Project): Plan {
   if (project.base) return redraw(project);
   const empty = project.segments.findIndex((one) => !one.text.trim());
-  if (empty >= 0) return { jobs: [], missing: `Block ${empty + 1} has no words yet; say what the person does.` };
-  if (needsWay(project) >= 0) {
-    return { jobs: [], missing: "Joints and poses over several blocks need the person's way; draw a path (P)." };
+  if (empty >= 0) {
+    const at: Place = { kind: "segment", id: project.segments[empty]!.id };
+    return { jobs: [], missing: { message: `Block ${empty + 1} has no words yet; say what the person does.`, at } };
+  }
+  const who = needsWay(project);
+  if (who >= 0) {
+    const message = "Joints and poses over several blocks need the person's way; draw a path (P).";
+    return { jobs: [], missing: { message, at: { kind: "path", who } } };
   }
   const { seed, count } = project;
   const timeline = timelineOf(project);
@@ -41,17 +47,26 @@ function redraw(project: Project): Plan {
   const at = begins(project.segments);
   const jobs: Job[] = [];
   for (const [from, to] of between(project.frozen, Math.min(base.seconds, length(project)))) {
-    const parts = project.segments.flatMap((one, index): { text: string; range: Range }[] => {
-      const range: Range = [Math.max(from, at[index]!), Math.min(to, at[index + 1]!)];
-      return range[1] - range[0] > 0.01 && one.text.trim() ? [{ text: one.text, range }] : [];
-    });
-    for (const { text, range } of parts) jobs.push({ task: "edit", prompt: text, redraw: [range], seed, count: 1 });
+    for (const person of redrawn(project)) {
+      project.segments.forEach((one, index) => {
+        const range: Range = [Math.max(from, at[index]!), Math.min(to, at[index + 1]!)];
+        const prompt = (person === 1 && one.other.trim()) || one.text.trim();
+        if (range[1] - range[0] > 0.01 && prompt)
+          jobs.push({ task: "edit", prompt, redraw: [range], person, seed, count: 1 });
+      });
+    }
   }
   const [first, last] = [jobs[0], jobs.at(-1)];
   if (!first || !last) return { jobs: [], missing: null };
   if (first.task === "edit") first.motion = base.motion;
   last.count = project.count;
   return { jobs, missing: null };
+}
+
+/** Who of the take is drawn anew. */
+function redrawn({ base, only }: Project): number[] {
+  const people = base?.people ?? 1;
+  return only !== null && only < people ? [only] : Array.from({ length: people }, (_, person) => person);
 }
 
 /** Two people: both from words with the path of one, or the second as an answer to the first. */
@@ -64,6 +79,6 @@ function duet(project: Project): Job {
   const person = asked(project);
   const goals = goalOf(project.people[person]!, length(project));
   const timeline = timelineOf(project);
-  if (!goals || goals.path) return { task: "duet", timeline, seed, count, person };
+  if (!goals || goals.path || person === 0) return { task: "duet", timeline, seed, count, person };
   return { task: "duet", prompt: timeline.segments[0]!.text, seconds: length(project), goals, seed, count, person };
 }

@@ -39,7 +39,7 @@ export function write(project: Project, id: string, text: string, second = false
     ...project,
     segments: project.segments.map((one) => (one.id === id ? { ...one, [key]: text } : one)),
   };
-  return project.base ? freezeRest({ ...changed, base: null }, id) : changed;
+  return project.base ? freezeRest({ ...changed, base: null, only: second ? 1 : 0 }, id) : changed;
 }
 
 /** Drag the end of a segment to a time; those behind it move along. */
@@ -132,7 +132,8 @@ export function freeze(project: Project, range: Range): Project {
   const from = clamp(toFrame(Math.min(...range)), 0, end);
   const to = clamp(toFrame(Math.max(...range)), 0, end);
   if (to - from < 1 / FPS) return project;
-  return { ...project, base: project.base ?? keptTake(project), frozen: joined([...project.frozen, [from, to]]) };
+  const frozen = joined([...project.frozen, [from, to]]);
+  return { ...project, base: project.base ?? keptTake(project), only: null, frozen };
 }
 
 /** Freeze all but one segment. */
@@ -151,7 +152,7 @@ export function freezeRest(project: Project, id: string): Project {
 
 /** Nothing stays as it was; the words draw all of it. */
 export function unfrozen(project: Project): Project {
-  return project.frozen.length || project.base ? { ...project, frozen: [], base: null } : project;
+  return project.frozen.length || project.base ? { ...project, frozen: [], base: null, only: null } : project;
 }
 
 /** The stretches of 0 to `end` that are in none of `ranges`. */

@@ -97,7 +97,9 @@ export async function savedProject(): Promise<unknown> {
 }
 
 export async function saveProject(project: Project): Promise<void> {
-  await request("project", json("PUT", project));
+  const init = json("PUT", project);
+  // Small ones arrive though the tab is closed meanwhile; browsers send no more than 64 KB so.
+  await request("project", { ...init, keepalive: String(init.body).length < 60_000 });
 }
 
 /** The timeline as the YAML file that the command line reads. */

@@ -11,6 +11,8 @@ export class Refused extends Error {
   constructor(
     message: string,
     readonly status: number,
+    /** Keys of what was sent that are the cause, such as `segments[1].goal`; empty: not known. */
+    readonly where = "",
   ) {
     super(message);
   }
@@ -37,7 +39,7 @@ export async function request(path: string, init: RequestInit = {}): Promise<Res
     throw new Unreachable();
   }
   if (response.ok) return response;
-  throw new Refused(await sentence(response), response.status);
+  throw await refusal(response);
 }
 
 export async function getJson<T>(path: string, init: RequestInit = {}): Promise<T> {
@@ -48,12 +50,20 @@ export function json(method: string, body: unknown): RequestInit {
   return { method, body: JSON.stringify(body), headers: { "Content-Type": "application/json" } };
 }
 
-async function sentence(response: Response): Promise<string> {
+async function refusal(response: Response): Promise<Refused> {
   try {
-    const body = (await response.json()) as { error?: unknown };
-    if (typeof body.error === "string") return body.error;
+    const { error, where } = (await response.json()) as { error?: unknown; where?: unknown };
+    if (typeof error === "string") return new Refused(error, response.status, typeof where === "string" ? where : "");
   } catch {
     /* not the server's own answer */
   }
-  return `The server answered ${response.status} ${response.statusText}.`;
+  return new Refused(`The server answered ${response.status} ${response.statusText}.`, response.status);
+}
+
+/** Where a path of the server is as a WebSocket, which sends its token in the address. */
+export function webSocketAddress(path: string): string {
+  const address = new URL(path, location.href);
+  address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
+  address.search = TOKEN ? new URLSearchParams({ token: TOKEN }).toString() : "";
+  return address.href;
 }

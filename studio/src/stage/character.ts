@@ -2,7 +2,7 @@
 
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
-import type { App } from "../app/app";
+import { type App, problemOf } from "../app/app";
 import { keptTake } from "../project/model";
 import { bytes, motionFile } from "../server/api";
 import type { Scene } from "./scene";
@@ -50,10 +50,11 @@ export class Character {
       );
       if (key !== this.key) return;
       this.actors = actors;
+      this.scene.canvas.dataset.character = character;
       this.scene.scene.add(...actors.map((one) => one.root));
       this.app.session.update({ clips: [...this.app.session.value.clips] });
     } catch (error) {
-      if (key === this.key) this.app.session.update({ error: (error as Error).message });
+      if (key === this.key) this.app.session.update({ error: problemOf(this.app, error) });
     }
   }
 
@@ -72,6 +73,7 @@ export class Character {
   private leave(): void {
     for (const { root } of this.actors) this.scene.scene.remove(root);
     this.actors = [];
+    delete this.scene.canvas.dataset.character;
     this.scene.invalidate();
   }
 }

@@ -1,60 +1,29 @@
 /** A figure of turned wood: capsules between the 22 joints, set from their places alone. */
 
 import * as THREE from "three";
-import {
-  HEAD,
-  LEFT_ANKLE,
-  LEFT_COLLAR,
-  LEFT_ELBOW,
-  LEFT_FOOT,
-  LEFT_HIP,
-  LEFT_KNEE,
-  LEFT_SHOULDER,
-  LEFT_WRIST,
-  NECK,
-  PELVIS,
-  RIGHT_ANKLE,
-  RIGHT_COLLAR,
-  RIGHT_ELBOW,
-  RIGHT_FOOT,
-  RIGHT_HIP,
-  RIGHT_KNEE,
-  RIGHT_SHOULDER,
-  RIGHT_WRIST,
-  SPINE1,
-  SPINE2,
-  SPINE3,
-} from "../body/skeleton";
+import { HEAD, LEFT, NECK, PELVIS, RIGHT, SIDES, SPINE1, SPINE2, SPINE3 } from "../body/skeleton";
 import type { FigureLook } from "./theme";
 
 /** From joint, to joint, radius there and here (metres). */
 const LIMBS: readonly (readonly [number, number, number, number])[] = [
-  [LEFT_HIP, LEFT_KNEE, 0.082, 0.054],
-  [RIGHT_HIP, RIGHT_KNEE, 0.082, 0.054],
-  [LEFT_KNEE, LEFT_ANKLE, 0.054, 0.034],
-  [RIGHT_KNEE, RIGHT_ANKLE, 0.054, 0.034],
-  [LEFT_COLLAR, LEFT_SHOULDER, 0.045, 0.048],
-  [RIGHT_COLLAR, RIGHT_SHOULDER, 0.045, 0.048],
-  [LEFT_SHOULDER, LEFT_ELBOW, 0.047, 0.036],
-  [RIGHT_SHOULDER, RIGHT_ELBOW, 0.047, 0.036],
-  [LEFT_ELBOW, LEFT_WRIST, 0.037, 0.025],
-  [RIGHT_ELBOW, RIGHT_WRIST, 0.037, 0.025],
+  ...SIDES.flatMap(({ hip, knee, ankle, collar, shoulder, elbow, wrist }) => [
+    [hip, knee, 0.082, 0.054] as const,
+    [knee, ankle, 0.054, 0.034] as const,
+    [collar, shoulder, 0.045, 0.048] as const,
+    [shoulder, elbow, 0.047, 0.036] as const,
+    [elbow, wrist, 0.037, 0.025] as const,
+  ]),
   [NECK, HEAD, 0.042, 0.04],
 ];
 
 /** Balls where limbs meet. */
-const BALLS: readonly (readonly [number, number])[] = [
-  [LEFT_KNEE, 0.056],
-  [RIGHT_KNEE, 0.056],
-  [LEFT_ANKLE, 0.038],
-  [RIGHT_ANKLE, 0.038],
-  [LEFT_SHOULDER, 0.055],
-  [RIGHT_SHOULDER, 0.055],
-  [LEFT_ELBOW, 0.04],
-  [RIGHT_ELBOW, 0.04],
-  [LEFT_WRIST, 0.028],
-  [RIGHT_WRIST, 0.028],
-];
+const BALLS: readonly (readonly [number, number])[] = SIDES.flatMap(({ knee, ankle, shoulder, elbow, wrist }) => [
+  [knee, 0.056] as const,
+  [ankle, 0.038] as const,
+  [shoulder, 0.055] as const,
+  [elbow, 0.04] as const,
+  [wrist, 0.028] as const,
+]);
 
 interface Part {
   readonly mesh: THREE.Mesh;
@@ -90,14 +59,8 @@ export class Mannequin {
       ...this.torso(),
       this.head(),
       this.nose(),
-      ...[
-        [LEFT_ELBOW, LEFT_WRIST],
-        [RIGHT_ELBOW, RIGHT_WRIST],
-      ].map(([a, b]) => this.hand(a!, b!)),
-      ...[
-        [LEFT_KNEE, LEFT_ANKLE, LEFT_FOOT],
-        [RIGHT_KNEE, RIGHT_ANKLE, RIGHT_FOOT],
-      ].map(([a, b, c]) => this.foot(a!, b!, c!)),
+      ...SIDES.map(({ elbow, wrist }) => this.hand(elbow, wrist)),
+      ...SIDES.map(({ knee, ankle, foot }) => this.foot(knee, ankle, foot)),
     ];
     for (const { mesh } of this.parts) {
       mesh.castShadow = look.opacity === 1;
@@ -154,7 +117,7 @@ export class Mannequin {
         place: (j, f) =>
           ellipsoid(
             pelvis,
-            middle.lerpVectors(j[PELVIS]!, j[LEFT_HIP]!.clone().add(j[RIGHT_HIP]!).multiplyScalar(0.5), 0.35),
+            middle.lerpVectors(j[PELVIS]!, j[LEFT.hip]!.clone().add(j[RIGHT.hip]!).multiplyScalar(0.5), 0.35),
             f.hips,
             f.pelvisUp,
             [0.15, 0.115, 0.112],
@@ -244,12 +207,12 @@ function material(color: string, look: FigureLook): THREE.MeshStandardMaterial {
 }
 
 function frameOf(j: readonly THREE.Vector3[]): Frame {
-  const hips = j[LEFT_HIP]!.clone().sub(j[RIGHT_HIP]!).normalize();
-  const chest = j[LEFT_SHOULDER]!.clone().sub(j[RIGHT_SHOULDER]!).normalize();
+  const hips = j[LEFT.hip]!.clone().sub(j[RIGHT.hip]!).normalize();
+  const chest = j[LEFT.shoulder]!.clone().sub(j[RIGHT.shoulder]!).normalize();
   const chestUp = j[NECK]!.clone().sub(j[SPINE2]!).normalize();
   const pelvisUp = j[SPINE2]!.clone().sub(j[PELVIS]!).normalize();
   const headUp = j[HEAD]!.clone().sub(j[NECK]!).normalize();
-  const collars = j[LEFT_COLLAR]!.clone().sub(j[RIGHT_COLLAR]!).normalize().add(chest).normalize();
+  const collars = j[LEFT.collar]!.clone().sub(j[RIGHT.collar]!).normalize().add(chest).normalize();
   return { hips, chest, chestUp, pelvisUp, face: collars.cross(headUp).normalize() };
 }
 

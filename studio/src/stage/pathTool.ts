@@ -69,12 +69,13 @@ export class PathTool {
     this.scene.invalidate();
   }
 
-  /** Where the path's end is on the screen, for those who cannot see it. */
+  /** Where the path's end and the chosen point's facing handle are on the screen, for scripts. */
   tell(): void {
-    const last = this.app.project.value.people[this.app.session.value.person]?.path?.points.at(-1);
-    const { canvas } = this.scene;
-    if (last) canvas.dataset.pathEnd = this.onScreen(last).map(Math.round).slice(0, 2).join();
-    else delete canvas.dataset.pathEnd;
+    const { selection, person } = this.app.session.value;
+    const points = this.app.project.value.people[person]?.path?.points ?? [];
+    const chosen = selection.kind === "point" && points[selection.index] ? selection.index : -1;
+    this.scene.tell("pathEnd", points.at(-1) ? this.onScreen(points.at(-1)!) : null);
+    this.scene.tell("facing", chosen >= 0 ? this.onScreen(tip(points, chosen)) : null);
   }
 
   /** Show where on the path the person should be. */
@@ -190,9 +191,7 @@ export class PathTool {
 
   /** Pixels of the window, and the depth from -1 to 1. */
   private onScreen(place: Ground): [number, number, number] {
-    const box = this.scene.canvas.getBoundingClientRect();
-    const at = new THREE.Vector3(place.x, HEIGHT, place.z).project(this.scene.camera);
-    return [box.left + ((at.x + 1) / 2) * box.width, box.top + ((1 - at.y) / 2) * box.height, at.z];
+    return this.scene.onScreen(new THREE.Vector3(place.x, HEIGHT, place.z));
   }
 
   /** Only the chosen point and those with a facing of their own show a handle. */
@@ -257,7 +256,7 @@ function disc(radius: number, color: string): THREE.Mesh {
   return flat(new THREE.CircleGeometry(radius, 32), color);
 }
 
-function ring(radius: number, color: string): THREE.Mesh {
+export function ring(radius: number, color: string): THREE.Mesh {
   return flat(new THREE.RingGeometry(radius - 0.02, radius, 40), color);
 }
 

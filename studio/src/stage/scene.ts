@@ -85,11 +85,37 @@ export class Scene {
     this.camera.position.add(step);
   }
 
+  /** Where the camera looks over the floor: radians from +Z towards +X. */
+  yaw(): number {
+    const { target } = this.orbit;
+    return Math.atan2(target.x - this.camera.position.x, target.z - this.camera.position.z);
+  }
+
+  /** Turn the camera about what it looks at. */
+  turn(radians: number): void {
+    const arm = this.camera.position.clone().sub(this.orbit.target);
+    this.camera.position.copy(this.orbit.target).add(arm.applyAxisAngle(new THREE.Vector3(0, 1, 0), radians));
+    this.invalidate();
+  }
+
   /** Where a place of the picture meets the floor; null: nowhere near. */
   floorAt(clientX: number, clientY: number, height = 0): THREE.Vector3 | null {
     const plane = new THREE.Plane(new THREE.Vector3(0, 1, 0), -height);
     const hit = this.ray(clientX, clientY).ray.intersectPlane(plane, new THREE.Vector3());
     return hit && hit.length() < 100 ? hit : null;
+  }
+
+  /** Pixels of the window, and the depth from -1 to 1. */
+  onScreen(place: THREE.Vector3): [number, number, number] {
+    const box = this.canvas.getBoundingClientRect();
+    const at = place.clone().project(this.camera);
+    return [box.left + ((at.x + 1) / 2) * box.width, box.top + ((1 - at.y) / 2) * box.height, at.z];
+  }
+
+  /** Say in the page where something is on the screen; null: it is not there. */
+  tell(name: string, at: readonly number[] | null): void {
+    if (at) this.canvas.dataset[name] = at.map(Math.round).slice(0, 2).join();
+    else delete this.canvas.dataset[name];
   }
 
   ray(clientX: number, clientY: number): THREE.Raycaster {

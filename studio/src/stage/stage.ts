@@ -3,13 +3,17 @@
 import * as THREE from "three";
 import { type App, duration, shownClip } from "../app/app";
 import { jointAt } from "../body/clip";
+import type { Ground } from "../project/path";
 import { Cast, type Ghost } from "./cast";
 import { Character } from "./character";
-import { PathTool } from "./pathTool";
+import { PathTool, ring } from "./pathTool";
 import { Scene } from "./scene";
 import { TargetTool } from "./targetTool";
 import { DARK, GHOSTS, LIGHT, type StageTheme } from "./theme";
 import { Trails } from "./trails";
+
+/** Pixels that the pointer may move in a click. */
+const CLICKED = 5;
 
 export class Stage {
   readonly scene: Scene;
@@ -18,6 +22,10 @@ export class Stage {
   private readonly cast: Cast;
   private readonly trails: Trails;
   private readonly character: Character;
+  /** Where somebody is sent in live mode. */
+  private readonly goal: THREE.Mesh;
+  /** Called in live mode with the place on the floor that was clicked. */
+  sentTo: (place: Ground) => void = () => undefined;
 
   constructor(
     private readonly app: App,
@@ -31,12 +39,23 @@ export class Stage {
     this.character = new Character(app, this.scene);
     this.path = new PathTool(app, this.scene, theme);
     this.targets = new TargetTool(app, this.scene, this.cast, theme);
+    this.goal = ring(0.16, theme.path[0]);
+    this.goal.visible = false;
+    this.scene.scene.add(this.goal);
     this.scene.step = (elapsed) => this.step(elapsed);
-    this.scene.painted = () => this.path.tell();
+    this.scene.painted = () => {
+      this.path.tell();
+      this.targets.tell();
+    };
     this.listen(canvas);
     app.project.subscribe(() => this.update());
     app.session.subscribe((now, before) => this.changed(now, before));
     app.denoising.subscribe(() => this.place());
+    app.live.subscribe((live) => {
+      this.goal.visible = Boolean(live?.goal);
+      if (live?.goal) this.goal.position.set(live.goal.x, 0.012, live.goal.z);
+      this.scene.invalidate();
+    });
   }
 
   look(dark: boolean): void {
@@ -68,7 +87,6 @@ export class Stage {
     if (now.tool !== before.tool) this.buttons();
     const kept = [
       "clips",
-      "drawing",
       "tool",
       "person",
       "joint",
@@ -80,6 +98,7 @@ export class Stage {
       "playing",
     ] as const;
     if (kept.some((key) => now[key] !== before[key])) this.update();
+    else if (!now.drawing !== !before.drawing) this.place();
     else if (now.time !== before.time) this.place();
   }
 
@@ -96,7 +115,7 @@ export class Stage {
     const clip = this.app.denoising.value ?? shownClip(this.app);
     const isFuture = fan !== null && time > fan.past;
     // A character has the kept take's motion; what is being drawn is shown by the mannequin.
-    const dressed = this.character.at(time, !sideBySide && !isFuture && drawing === null);
+    const dressed = this.character.at(time, !sideBySide && !isFuture && drawing === null && !this.app.live.value);
     this.cast.show(clip, time, dressed || isFuture);
     this.cast.showGhosts(this.ghosts(), time);
     this.path.at(time);
@@ -177,10 +196,13 @@ export class Stage {
 
   private listen(canvas: HTMLCanvasElement): void {
     let held = false;
+    let pressed: [number, number] = [0, 0];
     // In the capture phase, before the orbit hears of it.
     canvas.addEventListener(
       "pointerdown",
       (event) => {
+        pressed = [event.clientX, event.clientY];
+        if (this.app.live.value) return;
         if (this.app.session.value.sideBySide) return this.keepUnder(event);
         held = this.path.press(event);
         if (held) {
@@ -199,6 +221,11 @@ export class Stage {
     };
     canvas.addEventListener("pointerup", end);
     canvas.addEventListener("pointercancel", end);
+    canvas.addEventListener("click", (event) => {
+      const isStill = Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) < CLICKED;
+      const place = this.app.live.value && isStill ? this.scene.floorAt(event.clientX, event.clientY) : null;
+      if (place) this.sentTo({ x: place.x, z: place.z });
+    });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   }
 

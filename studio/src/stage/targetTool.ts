@@ -7,7 +7,7 @@ import { POSE, poseAt, vec } from "../body/clip";
 import { reach } from "../body/reach";
 import { TARGETS } from "../body/skeleton";
 import { putTarget, targetAt } from "../project/asks";
-import { UNMET, isMeasurable, targetMiss } from "../project/misses";
+import { isMeasurable, isUnmet } from "../project/misses";
 import { type Vec3, newId, toFrame } from "../project/model";
 import type { Cast } from "./cast";
 import { Line } from "./lines";
@@ -82,17 +82,20 @@ export class TargetTool {
   /** True: a joint was picked. */
   press(event: PointerEvent): boolean {
     if (!this.isOn() || this.gizmo.axis !== null) return this.isOn() && this.gizmo.axis !== null;
-    const box = this.scene.canvas.getBoundingClientRect();
     let [best, nearest] = [-1, GRAB];
     this.dots.forEach((dot, index) => {
-      const at = dot.position.clone().project(this.scene.camera);
-      const [x, y] = [box.left + ((at.x + 1) / 2) * box.width, box.top + ((1 - at.y) / 2) * box.height];
+      const [x, y] = this.scene.onScreen(dot.position);
       const distance = Math.hypot(event.clientX - x, event.clientY - y);
       if (distance < nearest) [best, nearest] = [index, distance];
     });
     if (best < 0) return false;
     this.choose(TARGETS[best]!);
     return true;
+  }
+
+  /** Where the gizmo is on the screen, for scripts. */
+  tell(): void {
+    this.scene.tell("gizmo", this.isOn() ? this.scene.onScreen(this.proxy.position) : null);
   }
 
   choose(joint: number): void {
@@ -162,12 +165,12 @@ export class TargetTool {
     if (session.value.sideBySide) return;
     project.value.people.forEach((person, who) => {
       for (const target of person.targets) {
-        const miss = isMeasurable(project.value, clip) ? targetMiss(clip, who, target) : 0;
-        const color = miss > UNMET ? this.theme.unmet : this.theme.path[who]!;
+        const bad = isMeasurable(project.value, clip) && isUnmet(clip, who, target);
+        const color = bad ? this.theme.unmet : this.theme.path[who]!;
         const mark = new THREE.Mesh(new THREE.OctahedronGeometry(0.035), new THREE.MeshBasicMaterial({ color }));
         mark.position.set(...target.position);
         this.marks.add(mark);
-        if (miss <= UNMET || !clip) continue;
+        if (!bad || !clip) continue;
         const line = new Line(color, 1.5);
         const at = poseAt(clip, who, target.time, new Float32Array(POSE));
         line.through([target.position, vec(at, target.joint)]);

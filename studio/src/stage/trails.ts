@@ -2,11 +2,11 @@
 
 import type * as THREE from "three";
 import { type MotionClip, jointAt } from "../body/clip";
-import { LEFT_WRIST, PELVIS, RIGHT_WRIST } from "../body/skeleton";
+import { LEFT, PELVIS, RIGHT } from "../body/skeleton";
 import { Line } from "./lines";
 import type { StageTheme } from "./theme";
 
-const JOINTS = [PELVIS, LEFT_WRIST, RIGHT_WRIST];
+const JOINTS = [PELVIS, LEFT.wrist, RIGHT.wrist];
 
 export class Trails {
   private readonly lines: Line[];

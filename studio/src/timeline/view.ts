@@ -3,9 +3,10 @@
 import { type App, duration, shownClip } from "../app/app";
 import { h, morph } from "../app/dom";
 import { jointName } from "../body/skeleton";
-import { UNMET, isMeasurable, pathMiss, poseMiss, targetMiss } from "../project/misses";
+import { UNMET, isMeasurable, isUnmet, pathMiss, poseMiss, targetMiss } from "../project/misses";
 import { type Person, type Project, begins, length, round } from "../project/model";
 import { timed } from "../project/path";
+import type { Place } from "../project/places";
 import { transitionOf } from "../project/timeline";
 
 export interface TimelineCalls {
@@ -37,8 +38,10 @@ export class TimelineView {
     app.project.subscribe(() => this.render());
     app.session.subscribe((now, before) => {
       if (now.time !== before.time) this.movePlayhead();
-      const keys = ["clips", "selection", "range", "person", "fan", "drawing"] as const;
+      const keys = ["clips", "selection", "range", "person", "fan", "error"] as const;
       if (keys.some((key) => now[key] !== before[key])) this.render();
+      if (now.error !== before.error)
+        this.content.querySelector(".said")?.scrollIntoView({ block: "nearest", inline: "nearest" });
     });
     this.render();
   }
@@ -156,7 +159,35 @@ export class TimelineView {
       ...blocks,
       ...frozen,
       ...(second ? [] : [add]),
+      !second &&
+        this.said((at) =>
+          at.kind === "segment"
+            ? begins(project.segments)[project.segments.findIndex((one) => one.id === at.id)]!
+            : null,
+        ),
     );
+  }
+
+  /** What went wrong here, beside its cause; `time` gives where that is, or null where it is elsewhere. */
+  private said(time: (at: Place) => number | null): HTMLElement | false {
+    const { error } = this.app.session.value;
+    const at = error?.at ? time(error.at) : null;
+    if (!error || at === null) return false;
+    const left = Math.max(Math.min(at * this.scale, this.scroll.clientWidth + this.scroll.scrollLeft - 440), 4);
+    const close = () => this.app.session.update({ error: null });
+    return h(
+      "p",
+      { class: "said", role: "alert", "data-key": "said", style: `left:${round(left)}px` },
+      h("span", {}, error.message),
+      h("button", { class: "text", onclick: () => this.calls.written() }, "Try again"),
+      h("button", { class: "cross", "aria-label": "Close", onclick: close }, "×"),
+    );
+  }
+
+  /** Whether the last problem belongs to this part of the project. */
+  private isWrong(kind: Place["kind"], id?: string): boolean {
+    const at = this.app.session.value.error?.at;
+    return at?.kind === kind && (!id || !("id" in at) || at.id === id);
   }
 
   private block(project: Project, index: number, at: number, second: boolean): HTMLElement {
@@ -182,7 +213,7 @@ export class TimelineView {
     return h(
       "div",
       {
-        class: `block${chosen ? " chosen" : ""}`,
+        class: `block${chosen ? " chosen" : ""}${this.isWrong("segment", one.id) ? " wrong" : ""}`,
         style: this.span(at, at + one.seconds),
         tabindex: "0",
         role: "listitem",
@@ -250,7 +281,10 @@ export class TimelineView {
       ? [
           h(
             "div",
-            { class: `way${miss && miss[0] > 15 ? " unmet" : ""}`, style: this.span(0, path.times.at(-1)!) },
+            {
+              class: `way${(miss && miss[0] > 15) || this.isWrong("path") ? " unmet" : ""}`,
+              style: this.span(0, path.times.at(-1)!),
+            },
             `${path.speed.toFixed(1)} m/s${miss ? ` · ${miss[0].toFixed(0)} cm off` : ""}`,
           ),
           ...path.times.map((time, index) =>
@@ -263,7 +297,8 @@ export class TimelineView {
           ),
         ]
       : [h("span", { class: "hint" }, "P, then draw on the floor")];
-    return h("div", { class: "track path", "data-key": "path", "aria-label": "Path" }, ...children);
+    const said = this.said((at) => (at.kind === "path" && at.who === who ? 0 : null));
+    return h("div", { class: "track path", "data-key": "path", "aria-label": "Path" }, ...children, said);
   }
 
   private jointTrack(project: Project, person: Person, who: number): HTMLElement {
@@ -273,7 +308,8 @@ export class TimelineView {
       const miss = isMeasurable(project, clip) ? targetMiss(clip, who, target) : null;
       const chosen = selection.kind === "target" && selection.id === target.id;
       const name = `${jointName(target.joint)} at ${target.time.toFixed(2)} s${miss === null ? "" : `, ${miss.toFixed(1)} cm off`}`;
-      const state = `${chosen ? " chosen" : ""}${miss !== null && miss > UNMET ? " unmet" : ""}`;
+      const bad = (isMeasurable(project, clip) && isUnmet(clip, who, target)) || this.isWrong("target", target.id);
+      const state = `${chosen ? " chosen" : ""}${bad ? " unmet" : ""}`;
       return h(
         "button",
         {
@@ -293,6 +329,9 @@ export class TimelineView {
       "div",
       { class: "track joints", "data-key": "joints", "aria-label": "Targets of joints" },
       ...(keys.length ? keys : [h("span", { class: "hint" }, "T, then drag a joint")]),
+      this.said((at) =>
+        at.kind === "target" && at.who === who ? (person.targets.find((one) => one.id === at.id)?.time ?? null) : null,
+      ),
     );
   }
 
@@ -304,7 +343,7 @@ export class TimelineView {
       const chosen = selection.kind === "pose" && selection.id === pose.id;
       const name = `${pose.name} at ${pose.time.toFixed(2)} s${miss === null ? "" : `, ${miss.toFixed(1)} cm off`}`;
       return h("button", {
-        class: `key pose${chosen ? " chosen" : ""}${miss !== null && miss > UNMET ? " unmet" : ""}`,
+        class: `key pose${chosen ? " chosen" : ""}${(miss !== null && miss > UNMET) || this.isWrong("pose", pose.id) ? " unmet" : ""}`,
         style: this.left(pose.time),
         "data-drag": "pose",
         "data-id": pose.id,
@@ -317,6 +356,9 @@ export class TimelineView {
       "div",
       { class: "track poses", "data-key": "poses", "data-drop": "pose", "aria-label": "Poses" },
       ...(keys.length ? keys : [h("span", { class: "hint" }, "O keeps the pose at hand")]),
+      this.said((at) =>
+        at.kind === "pose" && at.who === who ? (person.poses.find((one) => one.id === at.id)?.time ?? null) : null,
+      ),
     );
   }
 

@@ -144,12 +144,7 @@ def _drawn(models: Models, segments: list[Segment], asked: Asked, seed: int, opt
     """The segments, steered to what is asked of them; poses without a place are asked where a first sample is."""
     goal = asked.goal
     if asked.floating:
-        first = _steered(models, segments, goal, seed, options).positions()
-        for pose in asked.floating:
-            other = as_goal(standing_as(pose, first[pose.frame]), len(goal))
-            goal = replace(other, positions=np.where(goal.asked, goal.positions, other.positions),
-                           asked=goal.asked | other.asked, facing=goal.facing,
-                           facing_asked=goal.facing_asked)  # fmt: skip
+        goal = _posed(goal, asked, _steered(models, segments, goal, seed, options))
     return _steered(models, segments, goal, seed, options)
 
 
@@ -171,12 +166,18 @@ def _steered(models: Models, segments: list[Segment], goal: Goal, seed: int, opt
 
 def _bent(motion: Motion, asked: Asked) -> Motion:
     """A motion that is drawn already, fitted to what is asked."""
-    goal = asked.goal
-    for pose in asked.floating:
-        other = as_goal(standing_as(pose, motion.positions()[pose.frame]), len(goal))
-        goal = replace(goal, positions=np.where(goal.asked, goal.positions, other.positions),
-                       asked=goal.asked | other.asked)  # fmt: skip
+    goal = _posed(asked.goal, asked, motion)
     return motion if goal.empty else fit(motion, goal)
+
+
+def _posed(goal: Goal, asked: Asked, motion: Motion) -> Goal:
+    """The goal, and the poses that say no place of their own where ``motion`` stands then."""
+    places = motion.positions()
+    for pose in asked.floating:
+        other = as_goal(standing_as(pose, places[pose.frame]), len(goal))
+        positions = np.where(goal.asked, goal.positions, other.positions)
+        goal = replace(goal, positions=positions, asked=goal.asked | other.asked)
+    return goal
 
 
 def _poses(models: Models, request: Any, seed: int, options: dict[str, Any]) -> Motion:

@@ -1,0 +1,106 @@
+"""Characters and motions of others: dropped, on the stage, and exported."""
+
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from motionloom import load
+from motionloom.io.character import load_character
+from tests.io.rigged import Hero
+from tests.shared import shared
+from tests.studio.studio import Studio
+
+SIDES = """{0}hipjoint root {1}0.6 -0.8 0.1 2|{0}femur {0}hipjoint {1}0.34 -0.94 0 7|{0}tibia {0}femur {1}0.34 -0.94 0 7
+{0}foot {0}tibia 0 -0.3 1 2|{0}toes {0}foot 0 0 1 1|{0}clavicle thorax {1}1 0.2 0 3.5|{0}humerus {0}clavicle {1}1 0 0 5
+{0}radius {0}humerus {1}1 0 0 3.5|{0}wrist {0}radius {1}1 0 0 1.5|{0}hand {0}wrist {1}1 0 0 0.7"""
+MIDDLE = """lowerback root 0 1 0 2|upperback lowerback 0 1 0 2|thorax upperback 0 1 0 2|lowerneck thorax 0 1 0 1.5
+upperneck lowerneck 0 1 0 1.5|head upperneck 0 1 0 1.6"""
+
+
+def skeleton() -> str:
+    """An ASF of a standing person with the names of the CMU recordings."""
+    rows = "\n".join([MIDDLE, SIDES.format("l", ""), SIDES.format("r", "-")]).replace("|", "\n").split("\n")
+    bones = [(name, parent, direction) for name, parent, *direction in (row.split() for row in rows)]
+    head = ":version 1.10|:name person|:units|  mass 1.0|  length 0.45|  angle deg|:root|  order TX TY TZ RX RY RZ"
+    text = [*f"{head}|  axis XYZ|  position 0 0 0|  orientation 0 0 0|:bonedata".split("|")]
+    for number, (name, _, (x, y, z, size)) in enumerate(bones, start=1):
+        x, y, z = np.array([x, y, z], float) / np.linalg.norm(np.array([x, y, z], float))
+        text += ["  begin", f"    id {number}", f"    name {name}", f"    direction {x:.6f} {y:.6f} {z:.6f}",
+                 f"    length {size}", "    axis 0 0 0 XYZ", "    dof rx ry rz", "  end"]  # fmt: skip
+    text += [":hierarchy", "  begin"]
+    for parent in dict.fromkeys(parent for _, parent, _ in bones):
+        text.append(f"    {parent} {' '.join(name for name, above, _ in bones if above == parent)}")
+    return "\n".join([*text, "  end", ""])
+
+
+def recording(frames: int = 120) -> str:
+    """An AMC of 120 frames a second: the person sways to and fro."""
+    rows = [":FULLY-SPECIFIED", ":DEGREES"]
+    for frame in range(frames):
+        rows += [str(frame + 1), f"root 0 17 {frame / 60:.4f} 0 0 0", f"lowerback {10 * np.sin(frame / 20):.4f} 0 0"]
+    return "\n".join([*rows, ""])
+
+
+def as_vrm(hero: Hero) -> Hero:
+    """The same file as VRM 1 says whose bones are whose."""
+    names = {
+        "pelvis": "hips",
+        "spine1": "spine",
+        "spine2": "chest",
+        "spine3": "upperChest",
+        "neck": "neck",
+        "head": "head",
+    }
+    sides = {"hip": "UpperLeg", "knee": "LowerLeg", "ankle": "Foot", "foot": "Toes", "collar": "Shoulder",
+             "shoulder": "UpperArm", "elbow": "LowerArm", "wrist": "Hand"}  # fmt: skip
+    names |= {f"{side}_{part}": f"{side}{bone}" for side in ("left", "right") for part, bone in sides.items()}
+    bones = {names[node["name"]]: {"node": n} for n, node in enumerate(hero.json["nodes"]) if node["name"] in names}
+    hero.json["extensions"] = {"VRMC_vrm": {"specVersion": "1.0", "humanoid": {"humanBones": bones}}}
+    hero.json["extensionsUsed"] = ["VRMC_vrm"]
+    return hero
+
+
+def test_own_characters_are_on_the_stage_and_in_the_exports(studio: Studio, tmp_path: Path):
+    mannequin = studio.picture()
+    for file in (Hero().write(tmp_path / "hero.glb"), as_vrm(Hero(seed=3)).write(tmp_path / "hero.vrm")):
+        studio.drop(file)
+        studio.page.wait_for_selector(f"#inspector b:text-is('{file.name}')")
+        studio.page.wait_for_selector("#canvas[data-character]")
+        assert (np.abs(studio.picture() - mannequin).max(axis=-1) > 30).mean() > 0.003, "the stage shows the mannequin"
+        moving = tmp_path / f"moving{file.suffix}"
+        moving.write_bytes(studio.export("GLB"))
+        assert load_character(moving).skeleton.names == load_character(file).skeleton.names
+        assert abs(load(moving).seconds - 2.0) < 0.11
+        studio.key("Control+z")
+    assert studio.project()["character"] is None
+    assert not studio.faults
+
+
+def test_films_and_sheets_are_written_by_mouse(studio: Studio):
+    assert studio.export("PNG").startswith(b"\x89PNG")
+    film = studio.export("MP4")
+    assert film[4:8] == b"ftyp"
+    assert len(film) > 5000
+
+
+def test_a_skeleton_and_its_recording_become_a_clip(studio: Studio, tmp_path: Path):
+    (tmp_path / "sway.asf").write_text(skeleton())
+    (tmp_path / "sway.amc").write_text(recording())
+    studio.drop(tmp_path / "sway.amc", tmp_path / "sway.asf")
+    studio.page.wait_for_selector(".clip, .notice")
+    [clip] = studio.project()["clips"]
+    assert (clip["name"], clip["seconds"]) == ("sway.amc", 1.0)
+
+
+def test_other_peoples_characters_are_on_the_stage(studio: Studio):
+    for name in ("vrm1_example.vrm", "m2m_mixamo.glb"):
+        studio.drop(shared(f"rigs/{name}"))
+        studio.page.wait_for_selector(f"#inspector b:text-is('{name}')")
+        studio.page.wait_for_selector("#canvas[data-character]")
+        data = studio.export("GLB")
+        (length,) = struct.unpack_from("<I", data, 12)
+        assert json.loads(data[20 : 20 + length])["skins"]
+        studio.key("Control+z")
+    assert not studio.faults

@@ -1,0 +1,32 @@
+"""A server that is killed in the middle of a draw, and one that is asked without its token."""
+
+import numpy as np
+
+from tests.studio.studio import Studio
+
+
+def test_a_killed_server_comes_back_and_nothing_is_lost(studio: Studio):
+    page = studio.page
+    studio.open(("a person walks", 2), ("a person waves", 8), ("a person runs", 8), ("a person jumps", 8))
+    before = studio.project()
+    studio.key("g")
+    page.wait_for_selector("#stage[aria-busy=true]", state="attached")
+    studio.server.kill()
+    page.wait_for_selector(".notice.away")
+    studio.key("Control+z", "End")  # what is here can be worked on
+    studio.key("d")
+    studio.server.start()
+    page.wait_for_selector(".notice.away", state="detached")
+    project = studio.project()
+    assert len(project["segments"]) == 5
+    assert [one["id"] for one in project["segments"][:4]] == [one["id"] for one in before["segments"]]
+    motion = studio.motion(project)
+    assert motion.shape[1] == 20 * sum(one["seconds"] for one in project["segments"])
+    assert np.isfinite(motion).all()
+    assert not studio.faults
+
+
+def test_without_the_token_the_page_says_so(studio: Studio):
+    studio.page.goto(studio.server.address)
+    studio.page.wait_for_selector(".notice")
+    assert "token" in studio.page.locator(".notice").inner_text()

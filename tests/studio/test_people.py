@@ -1,0 +1,41 @@
+"""Two people: an answer to a clip, the path of one, words of one that change."""
+
+import numpy as np
+
+from tests.studio.studio import NOTHING, Studio
+
+LINE = {"speed": None, "times": None, "points": [{"x": x, "z": 0.8, "stop": 0, "facing": None} for x in (0.0, 1.2)]}
+
+
+def test_one_of_two_walks_a_path_and_only_the_second_is_drawn_for_new_words(studio: Studio):
+    studio.open(("two people greet each other", 2), people=2, seed=4)
+    studio.put({**studio.project(), "people": [NOTHING, {**NOTHING, "path": LINE}], "drawn": ""})
+    studio.load()
+    project = studio.project()
+    before = studio.motion(project)
+    assert np.abs(before[1, -1, 0, [0, 2]] - [1.2, 0.8]).max() < 0.3
+    x, y = studio.middle(".track.other .block")
+    studio.page.mouse.click(x, y)
+    studio.key("d")  # two blocks, of which the second changes
+    studio.drawn()
+    both = studio.motion()
+    studio.page.locator(".content .ruler").click(position={"x": 30, "y": 10})
+    box = studio.page.locator(".content .ruler").bounding_box()
+    studio.drag((box["x"] + 2, box["y"] + 12), (box["x"] + 2 * 84, box["y"] + 12), hold="Shift")
+    studio.key("f")
+    studio.page.mouse.dblclick(*studio.middle(".track.other .block", 1))
+    studio.page.keyboard.type("a person jumps")
+    studio.key("Enter")
+    after = studio.motion()
+    assert np.abs(after[0] - both[0]).max() < 1e-3, "the first person was not drawn"
+    assert np.abs(after[1, 50:] - both[1, 50:]).max() > 0.05
+
+
+def test_a_second_person_answers_a_clip(studio: Studio):
+    studio.key("w")
+    alone = studio.motion()
+    studio.page.locator(".clip select").select_option(label="Answer it with a second person")
+    motion = studio.motion()
+    assert motion.shape[0] == 2
+    assert np.abs(motion[0] - alone[0]).max() < 1e-3
+    assert np.linalg.norm(motion[1, :, 0] - motion[0, :, 0], axis=-1).min() > 0.2
