@@ -81,6 +81,7 @@ class Cluster:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self.ports = iter(range(PORT + 1000, PORT + 9000))
         self.raylets: list[subprocess.Popen[bytes]] = []
         self.head = self._start("--head", f"--port={PORT}", "--num-cpus=0", "--include-dashboard=false")
         self._wait()
@@ -127,7 +128,9 @@ class Cluster:
             kill_all(one)
 
     def _start(self, *words: str) -> "subprocess.Popen[bytes]":
-        command = [*RAY, "--object-store-memory=100000000", *words]
+        agents = ("dashboard-agent-grpc", "dashboard-agent-listen", "runtime-env-agent", "metrics-export")
+        known = [f"--{agent}-port={next(self.ports)}" for agent in agents]  # else a raylet gives up on a busy machine
+        command = [*RAY, "--object-store-memory=100000000", *known, *words]
         with (self.folder / "ray.log").open("ab") as log:
             return subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
 
@@ -211,6 +214,9 @@ def job(path: Path, count: int, *, poisoned: bool) -> None:
 
 def beat(cluster: Cluster, one: Driver, disk: Disk, *, blows: int, pause: float, dice: random.Random) -> Counter[str]:
     """All the blows, unless the batch is ready before; how many of which kind."""
+    while one.popen.poll() is None and not any(disk.place.glob("out/records/*.jsonl")):
+        cluster.check()
+        time.sleep(0.5)
     struck, full = Counter[str](), [round(blows * share) for share in FULL_AT] if disk.mounted else []
     while struck.total() - struck["full disk"] < blows and one.report() is None:
         time.sleep(pause * dice.random())
@@ -293,6 +299,7 @@ def main() -> None:
     parser.add_argument("--weights", default="default")
     parser.add_argument("--steps", type=int, default=24)
     arguments = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # and so end what was started
     here = str(Path(__file__).resolve().parent)
     os.environ["PYTHONPATH"] = os.pathsep.join([here, *filter(None, [os.environ.get("PYTHONPATH")])])
     os.environ |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(16)}  # this cluster's own
