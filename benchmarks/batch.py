@@ -30,6 +30,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
@@ -215,19 +216,23 @@ def profile(rows: int, steps: int, weights: str) -> None:
 def bits(rows: int, ways: list[str], options: list[str]) -> bool:
     """Print how far the motions of every way are apart from those made one by one; whether all are the same."""
     from motionloom import batch, read_batch
-    from motionloom.bulk.maker import Options
+    from motionloom.bulk.maker import TOGETHER, Options
 
     known = dict(zip(options[::2], options[1::2], strict=True))
-    print(f"\nthe same bits: {rows} rows of 1 to 2.5 s; metres from each row made alone (at most {TOLERANCE:g})")
+    print(f"\nthe same bits: {rows} rows of 1 to 2.5 s, every eighth of two people; metres from each row made alone "
+          f"(at most {TOLERANCE:g})")  # fmt: skip
     with tempfile.TemporaryDirectory(prefix="motionloom-") as name:
         folder = Path(name)
         lines = job(folder / "jobs.jsonl", rows, 1.0, 1.5, 2.0, 2.5).read_text().splitlines()
+        if known["--weights"] == "default":  # others have no block for two people
+            lines[3::8] = [json.dumps({**json.loads(line), "task": "duet"}) for line in lines[3::8]]
+        (folder / "jobs.jsonl").write_text("\n".join(lines) + "\n")
         random.Random(0).shuffle(shuffled := list(lines))
         (folder / "shuffled.jsonl").write_text("\n".join(shuffled) + "\n")
         more = {key.lstrip("-"): value for key, value in known.items()}
         here = Options(weights=more["weights"], steps=int(more["steps"]))
-        alone = {line: next(iter(batch([json.loads(line)], options=here))).motion for line in lines}
-        exact = {(row["prompt"], row["seed"]): motion for line, motion in alone.items() for row in [json.loads(line)]}
+        alone = {line: next(iter(batch([json.loads(line)], options=here))).people for line in lines}
+        exact = {(row["prompt"], row["seed"]): people for line, people in alone.items() for row in [json.loads(line)]}
         kinds = [(way, "jobs.jsonl", WAYS[way]) for way in ways]
         kinds += [("shuffled", "shuffled.jsonl", WAYS["one process"])]
         good = True
@@ -235,19 +240,29 @@ def bits(rows: int, ways: list[str], options: list[str]) -> bool:
             out = folder / f"out{number}"
             for words in way:
                 subprocess.run([*command(folder / jobs, out, options), *words], check=True, stdout=subprocess.DEVNULL)
-            found = {(one.about["text"], one.about["seed"]): one.motion for one in read_batch(out)}
+            found = {(one.about["text"], one.about["seed"]): one.people for one in read_batch(out)}
             assert found.keys() == exact.keys()
             apart = max(_apart(found[key], exact[key]) for key in exact)
             good &= apart <= TOLERANCE
             print(f"{what:<14} {apart:.1e}", flush=True)
-        together = list(batch([json.loads(line) for line in lines], options=here))
-        apart = max(_apart(one.motion, exact[one.about["text"], one.about["seed"]]) for one in together)
-        print(f"{'all in one':<14} {apart:.1e}", flush=True)
-    return good and apart <= TOLERANCE
+        for together in (4, 5, 8, 16):
+            with mock.patch.dict(TOGETHER, cpu=together):
+                found = {
+                    (one.about["text"], one.about["seed"]): one.people for one in batch(rows_of(lines), options=here)
+                }
+            apart = max(_apart(found[key], exact[key]) for key in exact)
+            good &= apart <= TOLERANCE
+            print(f"{f'calls of {together}':<14} {apart:.1e}", flush=True)
+    return good
+
+
+def rows_of(lines: list[str]) -> list[dict[str, Any]]:
+    """Rows of JSON lines."""
+    return [json.loads(line) for line in lines]
 
 
 def _apart(a: Any, b: Any) -> float:
-    return float(np.abs(a.positions() - b.positions()).max())
+    return max(float(np.abs(one.positions() - other.positions()).max()) for one, other in zip(a, b, strict=True))
 
 
 # All of it

@@ -1,6 +1,7 @@
 """Random blows to a batch on a local Ray cluster of several processes: is every row there exactly once?
 
     python benchmarks/batch_faults.py --blows 20 --seed 0
+    python benchmarks/batch_faults.py --blows 20 --seed 0 --without-ray      # the processes of one machine
 
 A head and two more raylets are started on this machine, and `motionloom batch --ray` on them. Then, at random times, a
 worker, a raylet or the driver is killed (SIGKILL); raylets and drivers are started again, as a cluster manager and a
@@ -34,7 +35,6 @@ from motionloom.bulk.metadata import read_batch
 PORT = 26379
 RAY = [sys.executable, "-m", "ray.scripts.scripts", "start", "--block", "--disable-usage-stats"]
 POISON = "a person swallows poison"
-KINDS = ("worker", "worker", "raylet", "driver")
 ROOM = "256m"
 FULL_AT = (0.3, 0.7)
 """After these shares of the blows the disk is full."""
@@ -68,6 +68,15 @@ def family(process: "subprocess.Popen[bytes]") -> list[int]:
     return below
 
 
+def _called(word: bytes, pids: list[int]) -> list[int]:
+    """Those whose command line has this word."""
+    found = []
+    for pid in pids:
+        with suppress(OSError):
+            found += [pid] if word in Path(f"/proc/{pid}/cmdline").read_bytes() else []
+    return found
+
+
 def kill_all(process: "subprocess.Popen[bytes]") -> None:
     """End a process that was started here and everything below it."""
     for pid in family(process):
@@ -76,11 +85,34 @@ def kill_all(process: "subprocess.Popen[bytes]") -> None:
     process.wait()
 
 
-class Cluster:
+class Alone:
+    """No cluster: the driver's own processes are the workers."""
+
+    kinds = ("worker", "worker", "driver")
+
+    def workers(self, driver: "subprocess.Popen[bytes]") -> list[int]:
+        """Processes that hold a prior."""
+        return _called(b"motionloom.bulk.worker", family(driver))
+
+    def kill_raylet(self, dice: random.Random) -> None:
+        """There is none."""
+        raise AssertionError(dice)
+
+    def check(self) -> None:
+        """Nothing can be wrong."""
+
+    def end(self) -> None:
+        """The driver's own processes end with it."""
+
+
+class Cluster(Alone):
     """A head without processors, and two raylets with one each."""
+
+    kinds = ("worker", "worker", "raylet", "driver")
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self.ports = iter(range(PORT + 1000, PORT + 9000))
         self.raylets: list[subprocess.Popen[bytes]] = []
         self.head = self._start("--head", f"--port={PORT}", "--num-cpus=0", "--include-dashboard=false")
         self._wait()
@@ -107,13 +139,9 @@ class Cluster:
         """Another raylet."""
         self.raylets.append(self._start(f"--address=127.0.0.1:{PORT}", "--num-cpus=1"))
 
-    def workers(self) -> list[int]:
+    def workers(self, driver: "subprocess.Popen[bytes]") -> list[int]:
         """Processes that hold a prior."""
-        found = []
-        for pid in (pid for raylet in self.raylets for pid in family(raylet)):
-            with suppress(OSError):
-                found += [pid] if b"ray::Hand" in Path(f"/proc/{pid}/cmdline").read_bytes() else []
-        return found
+        return _called(b"ray::Hand", [pid for raylet in self.raylets for pid in family(raylet)])
 
     def kill_raylet(self, dice: random.Random) -> None:
         """One raylet and what it runs, gone at once; a new one takes its place."""
@@ -127,7 +155,9 @@ class Cluster:
             kill_all(one)
 
     def _start(self, *words: str) -> "subprocess.Popen[bytes]":
-        command = [*RAY, "--object-store-memory=100000000", *words]
+        agents = ("dashboard-agent-grpc", "dashboard-agent-listen", "runtime-env-agent", "metrics-export")
+        known = [f"--{agent}-port={next(self.ports)}" for agent in agents]  # else a raylet gives up on a busy machine
+        command = [*RAY, "--object-store-memory=100000000", *known, *words]
         with (self.folder / "ray.log").open("ab") as log:
             return subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
 
@@ -209,8 +239,11 @@ def job(path: Path, count: int, *, poisoned: bool) -> None:
     path.write_text("".join(json.dumps(row) + "\n" for row in rows))
 
 
-def beat(cluster: Cluster, one: Driver, disk: Disk, *, blows: int, pause: float, dice: random.Random) -> Counter[str]:
+def beat(cluster: Alone, one: Driver, disk: Disk, *, blows: int, pause: float, dice: random.Random) -> Counter[str]:
     """All the blows, unless the batch is ready before; how many of which kind."""
+    while one.popen.poll() is None and not any(disk.place.glob("out/records/*.jsonl")):
+        cluster.check()
+        time.sleep(0.5)
     struck, full = Counter[str](), [round(blows * share) for share in FULL_AT] if disk.mounted else []
     while struck.total() - struck["full disk"] < blows and one.report() is None:
         time.sleep(pause * dice.random())
@@ -225,8 +258,8 @@ def beat(cluster: Cluster, one: Driver, disk: Disk, *, blows: int, pause: float,
             fill(one, disk, cluster)
             struck["full disk"] += 1
             continue
-        kind = dice.choice(KINDS)
-        victims = cluster.workers()
+        kind = dice.choice(cluster.kinds)
+        victims = cluster.workers(one.popen)
         if kind == "worker" and not victims:
             continue
         if kind == "worker":
@@ -242,7 +275,7 @@ def beat(cluster: Cluster, one: Driver, disk: Disk, *, blows: int, pause: float,
     return struck
 
 
-def fill(one: Driver, disk: Disk, cluster: Cluster) -> None:
+def fill(one: Driver, disk: Disk, cluster: Alone) -> None:
     """The disk is full until the driver has ended over it."""
     disk.fill()
     print(f"{time.strftime('%X')} full disk", flush=True)
@@ -290,9 +323,11 @@ def main() -> None:
     parser.add_argument("--rows", type=int, default=600)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--pause", type=float, default=20.0, help="seconds between blows, at most (default 20)")
+    parser.add_argument("--without-ray", action="store_true", help="only the processes of one machine")
     parser.add_argument("--weights", default="default")
     parser.add_argument("--steps", type=int, default=24)
     arguments = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # and so end what was started
     here = str(Path(__file__).resolve().parent)
     os.environ["PYTHONPATH"] = os.pathsep.join([here, *filter(None, [os.environ.get("PYTHONPATH")])])
     os.environ |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(16)}  # this cluster's own
@@ -313,10 +348,12 @@ def strike(folder: Path, disk: Disk, arguments: argparse.Namespace) -> list[str]
     job(folder / "jobs.jsonl", arguments.rows, poisoned=True)
     command = [
         sys.executable, __file__, "--driver", str(folder / "jobs.jsonl"), "--out", str(out), "--format", "webdataset",
-        "--ray", f"127.0.0.1:{PORT}", "--workers", "2", "--weights", arguments.weights, "--steps",
+        "--workers", "2", "--weights", arguments.weights, "--steps",
         str(arguments.steps), "--filter", "obeys", "--json",
     ]  # fmt: skip
-    cluster = Cluster(folder)
+    command += [] if arguments.without_ray else ["--ray", f"127.0.0.1:{PORT}"]
+    cluster = Alone() if arguments.without_ray else Cluster(folder)
+    one = None
     try:
         one = Driver(command, folder)
         dice = random.Random(arguments.seed)
@@ -345,6 +382,8 @@ def strike(folder: Path, disk: Disk, arguments: argparse.Namespace) -> list[str]
         print("\n".join(wrong) or "every row is there exactly once")
         return wrong
     finally:
+        if one is not None and one.popen.poll() is None:
+            kill_all(one.popen)
         cluster.end()
 
 

@@ -93,7 +93,7 @@ def test_every_task_comes_from_every_kind_of_file(ready: Maker, folder: Path) ->
         ("duet", "a :: b", 1.0, 3, None, json.dumps(GOAL), 2),
         ("duet", None, None, None, "two.yaml", None, None),
     ]
-    found = [dict(zip(columns, row, strict=True)) for row in table]
+    found: list[dict[str, Any]] = [dict(zip(columns, row, strict=True)) for row in table]
     written(folder / "a.jsonl", found)
     with (folder / "a.csv").open("w", newline="") as file:
         csv.writer(file).writerows([columns, *table])
@@ -114,11 +114,12 @@ def test_every_task_comes_from_every_kind_of_file(ready: Maker, folder: Path) ->
 
 def test_both_people_are_measured_and_both_must_pass(ready: Maker) -> None:
     (one,) = made(ready, DUET)
-    first, second = one.measured
+    first, second = (dict[str, Any](person) for person in one.measured)
+    together: dict[str, Any] = one.measures
     hips = np.linalg.norm(one.people[0].positions()[:, 0] - one.people[1].positions()[:, 0], axis=-1)
-    assert one.measures["apart"] == pytest.approx(float(hips.mean()), abs=1e-3)
-    assert 0 <= one.measures["nearest"] <= hips.min() + 1e-3
-    assert (one.measures["travel"], one.measures["second_travel"]) == (first["travel"], second["travel"])
+    assert together["apart"] == pytest.approx(float(hips.mean()), abs=1e-3)
+    assert 0 <= together["nearest"] <= hips.min() + 1e-3
+    assert (together["travel"], together["second_travel"]) == (first["travel"], second["travel"])
     assert first["travel"] != second["travel"]
     low, high = sorted((first["travel"], second["travel"]))
     for limit, state in ((low - 0.001, "dropped"), ((low + high) / 2, "dropped"), (high + 0.001, "made")):
