@@ -3,24 +3,24 @@
     python benchmarks/live.py [PART ...] [--seeds 10] [--minutes 10] [--out benchmarks/live.json]
 
 Parts: words, steering, speed, latency, abuse. `words` and `steering` count frames and look at no clock; the others must
-have the machine for themselves.
+have the machine for themselves. ``--minutes`` is of what is shown in `speed`, of the clock in `latency` and `abuse`;
+``--seeds`` counts sessions of `words` and `steering`. Clients of `latency` and `abuse` are in memory: what they see has
+gone through all of the server but its sockets.
 """
 
 import argparse
 import asyncio
 import json
 import random
-import resource
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 
-from motionloom.errors import MotionloomError
 from motionloom.features.layout import FEET, FPS
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.feet import planted_feet
@@ -28,11 +28,11 @@ from motionloom.kinematics.physics import speed
 from motionloom.lab.metrics.obedience import check
 from motionloom.lab.metrics.skate import slide
 from motionloom.lab.metrics.transitions import mean_jerk
-from motionloom.live.clock import LATE, Pace, Player
-from motionloom.live.commands import Command, Say, Steer
+from motionloom.live.clock import LATE, WAITING
+from motionloom.live.commands import Command, Say, Steer, to_json
 from motionloom.live.commands import Path as Way
 from motionloom.live.live import Live, motion_of
-from motionloom.live.sessions import Sessions
+from motionloom.live.sessions import Session, Sessions
 from motionloom.live.socket import live_session
 from motionloom.tasks.long import compose
 from motionloom.weights.prior import Prior
@@ -101,17 +101,25 @@ def _near(speeds: np.ndarray) -> np.ndarray:
     return np.concatenate([speeds[at - 1 : at + NEAR] for at in range(count, len(speeds), count)])
 
 
-def _planted_slide(places: np.ndarray) -> float:
-    """mm per frame that a foot moves over the floor while it is planted (`kinematics.feet`)."""
-    planted = planted_feet(places, FPS)
-    steps = 1000 * np.linalg.norm(np.diff(places[:, list(FEET)][..., [0, 2]], axis=0), axis=-1)
+def _planted(places: np.ndarray) -> np.ndarray:
+    """(frames - 1, 2) mm that a planted foot moves over the floor in a frame, NaN where it is not (`kinematics.feet`).
+
+    A foot turns about what is planted of it: that are its toes where they are, else its ankle.
+    """
+    planted = planted_feet(places, FPS).reshape(-1, 2, 2)
     both = planted[1:] & planted[:-1]
-    return float(steps[both].mean())
+    feet = places[:, list(FEET)][..., [0, 2]].reshape(-1, 2, 2, 2)
+    steps = 1000 * np.linalg.norm(np.diff(feet, axis=0), axis=-1)
+    return np.where(both[..., 1], steps[..., 1], np.where(both[..., 0], steps[..., 0], np.nan))
+
+
+def _planted_slide(places: np.ndarray) -> float:
+    return float(np.nanmean(_planted(places)))
 
 
 def steering(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
     """Frames from a word to running, from a steer to the new way; how a foot that is planted slides meanwhile."""
-    running, turns, slides, plain = [], [], [], []
+    running, turns, slides, plain, stood = [], [], [], [], []
     for seed in range(seeds):
         live = Live(prior, seed=seed)
         live.say("a person walks forward")
@@ -128,12 +136,26 @@ def steering(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
             live.steer(turn, pace_asked)
             places = live.take(60).positions()
             turns.append(_turned(places, turn))
-            slides.append(_planted_slide(places))
+            slides.append(_planted(places))
+            stood.append(_stood(places))
     return {
         "to_running_s": {"median": statistics.median(running), "worst": max(running)},
         "to_the_new_way_s": {"median": statistics.median(turns), "worst": max(turns)},
-        "planted_slide_mm_per_frame": {"steered": statistics.mean(slides), "walking": statistics.mean(plain)},
-    }
+        "planted_slide_mm_per_frame": {
+            "steered": float(np.nanmean(np.concatenate(slides))), "walking": statistics.mean(plain),
+            "steered_worst": float(np.nanmax(np.concatenate(slides))),
+        },
+        "standing_foot_moved_mm": {"mean": statistics.mean(stood), "worst": max(stood)},
+    }  # fmt: skip
+
+
+def _stood(places: np.ndarray) -> float:
+    """mm that a foot goes, of those that are planted in the first frames behind a command, until it is lifted."""
+    steps, gone = _planted(places), [0.0]
+    for foot in steps.T:
+        lifted = np.flatnonzero(np.isnan(foot))
+        gone.append(float(foot[: lifted[0] if len(lifted) else None].sum()))
+    return max(gone)
 
 
 def _turned(places: np.ndarray, turn: float) -> float:
@@ -154,119 +176,201 @@ def _random(dice: random.Random) -> Command:
     return Say("")
 
 
+def _memory() -> float:
+    """MB that the process holds now."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * 4096 / 1e6
+
+
 def speed_(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
     """Minutes of random commands, one in two seconds, as fast as frames can be made: how much faster than shown."""
     live, dice = Live(prior, seed=1), random.Random(1)
-    begun, marks, calls = time.monotonic(), [], 0
-    count = round(minutes * 60 * FPS)
+    count = max(20, round(minutes * 60 * FPS))
+    marks: list[float] = []
+    begun = time.monotonic()
     for number in range(count):
         if dice.random() < 1 / (2 * FPS):
             live.ask(_random(dice))
         next(live)
-        if number % (count // 5) == count // 10:
-            marks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
-    calls = live.calls
+        if (number + 1) % (count // 10) == 0:
+            marks.append(round(_memory(), 1))
     return {
         "times_faster": count / FPS / (time.monotonic() - begun),
         "minutes": minutes,
-        "network_calls_per_second_shown": calls / (count / FPS),
-        "memory_mb": marks,
+        "commands": len(live.taken),
+        "network_calls_per_second_shown": live.calls / (count / FPS),
+        "memory_mb_at_each_tenth": marks,
     }
 
 
-def latency(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
-    """Against the clock: late frames, and seconds from a command to the first frame that it changed."""
-    live, dice = Live(prior, seed=2), random.Random(2)
-    waits, asked, health = [], {}, None
-    with Player(live) as player:
-        pace, count = Pace(time.monotonic), round(minutes * 60 * FPS)
-        next_at, known = 40, 0
-        for number in range(count):
-            frame = player.take()
-            if frame is None:
-                raise MotionloomError("the player ended before the benchmark")
-            time.sleep(pace.until(frame))
-            player.shown(pace.late(frame))
-            taken = player.taken
-            for at, command in taken[known:]:
-                asked[at] = command
-            known = len(taken)
-            if frame.number in asked and waits and waits[-1] < 0:
-                waits[-1] += time.monotonic()
-            if number >= next_at:
-                next_at = number + dice.randrange(30, 60)
-                if not waits or waits[-1] >= 0:
-                    waits.append(-time.monotonic())
-                    player.ask(_random(dice))
-        health = player.health
-    done = sorted(wait for wait in waits if wait >= 0)
-    return {
-        "median_s": statistics.median(done), "p99_s": done[min(len(done) - 1, int(0.99 * len(done)))],
-        "commands": len(done), "frames": health.shown, "late": health.late, "worst_s": health.worst,
-        "late_means_s": LATE, "ahead_s": health.ahead,
-    }  # fmt: skip
+class _Client:
+    """The far end of a connection, in memory. It says what ``says`` gives: a text, None for nothing yet, or "GONE"."""
 
-
-class _Pipe:
-    """A WebSocket in memory whose client says what a generator gives."""
-
-    def __init__(self, said: Callable[[], str | None]) -> None:
-        self.said, self.sent, self.times = said, 0, []
+    def __init__(self, says: Callable[[], str | None], *, takes: float = 0.0) -> None:
+        """takes: seconds for which it keeps the server waiting with every message."""
+        self.says, self.takes = says, takes
+        self.numbers: list[int] = []
+        self.arrived: list[float] = []
+        self.welcome: dict[str, Any] = {}
+        self.others: dict[str, int] = {}
 
     async def accept(self) -> None: ...
 
     async def receive(self) -> Mapping[str, Any]:
-        text = self.said()
-        while text is None:
-            await asyncio.sleep(0.05)
-            text = self.said()
+        while (text := self.says()) is None:
+            await asyncio.sleep(0.005)
+        await asyncio.sleep(0)
         return {"type": "websocket.disconnect"} if text == "GONE" else {"type": "websocket.receive", "text": text}
 
     async def send_text(self, data: str) -> None:
+        await asyncio.sleep(self.takes)
         said = json.loads(data)
         if said["type"] == "frame":
-            self.times.append((said["frame"], said["late"]))
+            self.numbers.append(said["frame"])
+            self.arrived.append(time.monotonic())
+        elif said["type"] == "welcome":
+            self.welcome = said
+        self.others[said["type"]] = self.others.get(said["type"], 0) + 1
 
     async def close(self, code: int = 1000, reason: str | None = None) -> None: ...
 
+    def late(self) -> list[float]:
+        """Seconds that each frame came after its time by the client's own clock, which waits for a late one."""
+        waits, shift = [], self.arrived[0] if self.arrived else 0.0
+        for k, arrived in enumerate(self.arrived):
+            late = max(0.0, arrived - shift - k / FPS)
+            shift += late if late > LATE else 0.0
+            waits.append(late)
+        return waits
+
+    def whole(self) -> bool:
+        """Whether no frame was left out and none came twice."""
+        return self.numbers == list(range(self.numbers[0], self.numbers[0] + len(self.numbers)))
+
+
+def _counted(client: _Client) -> dict[str, Any]:
+    late = client.late()
+    return {
+        "frames": len(late), "nothing_lost": client.whole(), "late": sum(wait > LATE for wait in late),
+        "worst_s": max(late, default=0.0), "late_means_s": LATE,
+    }  # fmt: skip
+
+
+def latency(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
+    """As a client sees it: late frames, and seconds from a command to the first frame that it changed."""
+    sessions, dice = Sessions(lambda: prior), random.Random(2)
+    asked: list[float] = []
+
+    def words() -> Iterator[str | None]:
+        yield json.dumps({"type": "hello", "seed": 2})
+        pause, answered = 40, 0
+        while not client.numbers:
+            yield None
+        end = time.monotonic() + 60 * minutes
+        while time.monotonic() < end:
+            taken = [one.frame for session in sessions._open.values() for one in session.player.taken]
+            if len(taken) == len(asked) and (not taken or len(client.numbers) > taken[-1]):
+                answered = answered or len(client.numbers)
+                if len(client.numbers) >= answered + pause:
+                    pause, answered = dice.randrange(4, 24), 0
+                    asked.append(time.monotonic())
+                    yield json.dumps(to_json(_random(dice)))
+            yield None
+        yield "GONE"
+
+    said = words()
+    client = _Client(lambda: next(said, "GONE"))
+    asyncio.run(live_session(client, sessions))
+    (session,) = sessions._open.values()
+    first = client.numbers[0]
+    taken = [one.frame for one in session.player.taken]
+    at = [client.arrived[frame - first] for frame in taken if frame - first < len(client.arrived)]
+    waits = sorted(came - when for when, came in zip(asked, at, strict=False))
+    health = session.player.health
+    sessions.close()
+    if not waits:
+        raise SystemExit("no command was answered in this time; give more --minutes")
+    return {
+        "median_s": statistics.median(waits), "p99_s": waits[min(len(waits) - 1, int(0.99 * len(waits)))],
+        "commands": len(waits), **_counted(client), "ahead_s": health.ahead, "times_faster": health.times,
+        "problem": health.problem,
+    }  # fmt: skip
+
+
+BEHAVIOUR = ("flood", "rubbish", "slow", "silent", "comes back")
+
+
+def _bad(kind: str, end: float, hello: dict[str, Any], dice: random.Random) -> Iterator[str | None]:
+    """What a client says that behaves badly, until ``end``: commands as fast as they are read, rubbish, nothing."""
+    if kind == "silent":
+        while time.monotonic() < end:
+            yield None
+        return
+    yield json.dumps(hello)
+    while time.monotonic() < end:
+        if kind == "flood":
+            yield json.dumps({"type": "steer", "direction": dice.randrange(360)})
+        elif kind == "rubbish":
+            yield dice.choice(["\x00{", "[]", '{"type":"fly"}', '{"type":"say"}', '{"type":"path","points":"x"}'])
+        else:
+            yield None
+
 
 def abuse(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
-    """One client who behaves, one who floods with 10,000 commands a second, says rubbish, goes and comes back."""
-    sessions, end = Sessions(lambda: prior), time.monotonic() + 60 * minutes
-    good_said = iter(['{"type":"hello","seed":1}', '{"type":"say","text":"a person walks forward"}'])
-    good = _Pipe(lambda: "GONE" if time.monotonic() > end else next(good_said, None))
-    came_back = 0
+    """One client who behaves, and one who floods, says rubbish, takes nothing, says nothing, goes and comes back."""
+    Live(prior).take(1)  # what is made once is made before the clock runs
+    sessions, end, dice = Sessions(lambda: prior), time.monotonic() + 60 * minutes, random.Random(3)
+    said = iter(['{"type":"hello","seed":1}', '{"type":"say","text":"a person walks forward"}'])
+    good = _Client(lambda: "GONE" if time.monotonic() > end else next(said, None))
+    seen: dict[str, int] = dict.fromkeys(BEHAVIOUR, 0)
+    lost, queue, memory, read = 0, [0], [], [0, 0.0]
 
     async def bad() -> None:
-        nonlocal came_back
-        dice = random.Random(3)
+        nonlocal lost
+        hello: dict[str, Any] = {"type": "hello", "seed": 2}
+        number = -1
+        for turn in range(1 << 30):
+            if time.monotonic() > end:
+                return
+            kind = BEHAVIOUR[turn % len(BEHAVIOUR)]
+            begun = time.monotonic()
+            words = _bad(kind, min(end, begun + dice.uniform(2, 6)), hello, dice)
+
+            def says(words: Iterator[str | None] = words, kind: str = kind) -> str | None:
+                text = next(words, "GONE")
+                read[0] += kind == "flood" and text not in (None, "GONE")
+                return text
+
+            client = _Client(says, takes=0.5 if kind == "slow" else 0.0)
+            await live_session(client, sessions)
+            read[1] += time.monotonic() - begun if kind == "flood" else 0.0
+            seen[kind] += 1
+            if client.numbers:  # nothing lost: the session goes on with the next frame
+                lost += bool(number >= 0 and hello.get("session") and client.numbers[0] > number + 1)
+                lost += not client.whole()
+                number = client.numbers[-1]
+            if client.welcome:
+                hello = {"type": "hello", "session": client.welcome["session"]}
+            if kind == "rubbish":  # sent away; the session is kept for it all the same
+                await asyncio.sleep(0.2)
+
+    async def look() -> None:
         while time.monotonic() < end:
-            stop, first = time.monotonic() + dice.uniform(2, 10), iter(['{"type":"hello","seed":2}'])
-            rubbish = dice.random() < 0.5
+            open_now: list[Session] = list(sessions._open.values())
+            queue[0] = max([queue[0], *(len(session.player._inbox) for session in open_now)])
+            memory.append(_memory())
+            await asyncio.sleep(max(0.2, 0.6 * minutes))
 
-            def said(stop: float = stop, first: Any = first, rubbish: bool = rubbish) -> str:
-                if (hello := next(first, None)) is not None:
-                    return hello
-                if time.monotonic() > min(stop, end):
-                    return "GONE"
-                return "\x00{" if rubbish else json.dumps({"type": "steer", "direction": dice.randrange(360)})
+    async def everybody() -> None:
+        await asyncio.gather(live_session(good, sessions), bad(), look())
 
-            await live_session(_Pipe(said), sessions)
-            came_back += 1
-            await asyncio.sleep(0.2)
-
-    async def both() -> None:
-        await asyncio.gather(live_session(good, sessions), bad())
-
-    asyncio.run(both())
-    late = [wait for _, wait in good.times]
-    whole = [number for number, _ in good.times] == list(range(len(good.times)))
-    most = max(len(session.player._inbox) for session in sessions._open.values()) if len(sessions) else 0
+    asyncio.run(everybody())
+    left = len(sessions)
     sessions.close()
     return {
-        "minutes": minutes, "frames": len(late), "nothing_lost": whole, "late": sum(wait > LATE for wait in late),
-        "worst_s": max(late, default=0.0), "came_back": came_back, "longest_queue": most,
-        "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "minutes": minutes, "good": _counted(good), "bad_connections": seen, "frames_lost_by_the_bad_one": lost,
+        "flood_read_per_second": read[0] / max(read[1], 1e-9), "longest_queue": queue[0], "queue_limit": WAITING,
+        "sessions_left": left, "memory_mb": [round(mb, 1) for mb in memory[:: max(1, len(memory) // 10)]],
     }  # fmt: skip
 
 

@@ -51,6 +51,25 @@ def sheets(folder: Path, work: Path) -> list[Path]:
     return [folder / f"{name}.png" for name in SHEETS]
 
 
+def live(folder: Path, work: Path) -> list[Path]:
+    """The scripted sessions of examples/live, as small sheets of few colours."""
+    made = []
+    for script in ("session", "two_people"):
+        sheet, out = work / f"{script}.png", folder / f"live_{script}.png"
+        run(["live", str(ROOT / "examples" / "live" / f"{script}.yaml"), "--out", str(sheet)])
+        made.append(shrunk(sheet, out))
+    return made
+
+
+def shrunk(sheet: Path, out: Path) -> Path:
+    """A sheet 900 pixels wide with 40 colours."""
+    with Image.open(sheet) as picture, atomic_path(out) as temporary:
+        size = 900, round(900 * picture.height / picture.width)
+        small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS).quantize(40)
+        small.save(temporary, format="PNG", optimize=True)
+    return out
+
+
 def controlled(folder: Path, work: Path) -> list[Path]:
     """Motions of `motionloom control` with what was asked of them in yellow: a path from above, a letter in the air."""
     eight, letter = (GOALS / f"{name}.json" for name in ("figure_eight", "letter"))
@@ -113,4 +132,5 @@ if __name__ == "__main__":
     into = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs" / "pictures"
     into.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as temporary:
-        print(*sheets(into, Path(temporary)), *controlled(into, Path(temporary)), sep="\n")
+        work = Path(temporary)
+        print(*sheets(into, work), *controlled(into, work), *live(into, work), sep="\n")

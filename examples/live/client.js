@@ -1,5 +1,6 @@
 // One live session over a WebSocket, in plain JavaScript: `new LiveClient(url, {seed: 1}, {frame: pose => ...})`.
-// What is asked and answered stands in docs/live.md. A lost connection is taken up again where it was.
+// What is asked and answered stands in docs/live.md. A lost connection is taken up again where it was. Of two people
+// (hello {people: 2}) `live.of(2).steer(90)` asks the second one; `live` itself asks both.
 export class LiveClient {
   constructor(url, hello = {}, on = {}) {
     this.url = url;
@@ -27,8 +28,13 @@ export class LiveClient {
     this.on[said.type]?.(said);
   }
 
+  of(person) {
+    return Object.assign(Object.create(this), { person });
+  }
+
   send(said) {
-    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(said));
+    const whom = this.person ? { person: this.person } : {};
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ ...said, ...whom }));
   }
 
   say(text) {

@@ -1,6 +1,6 @@
-"""Steer somebody over the network for ten seconds and say where he goes (`pip install websockets`).
+"""Steer one person, or two, over the network for ten seconds and say where they go (`pip install websockets`).
 
-python examples/live/client.py ws://127.0.0.1:8765/live
+python examples/live/client.py ws://127.0.0.1:8765/live [2]
 """
 
 import json
@@ -23,7 +23,7 @@ class LiveClient:
         self.url, self.hello = url, hello
 
     def ask(self, type: str, **fields: Any) -> None:
-        """Such as ask("steer", direction=90, speed=1.3): degrees and metres per second; while frames come."""
+        """Such as ask("steer", direction=90, speed=1.3, person=2): degrees, metres per second; while frames come."""
         self.socket.send(json.dumps({"type": type, **fields}))
 
     def frames(self) -> Iterator[dict[str, Any]]:
@@ -47,16 +47,18 @@ class LiveClient:
 
 
 if __name__ == "__main__":
-    live = LiveClient(sys.argv[1] if len(sys.argv) > 1 else "ws://127.0.0.1:8765/live", seed=1)
-    script = {0: ("say", {"text": "a person walks forward"}), 60: ("steer", {"direction": 90}),
+    url = sys.argv[1] if len(sys.argv) > 1 else "ws://127.0.0.1:8765/live"
+    people = 2 if sys.argv[2:] == ["2"] else 1
+    live = LiveClient(url, seed=1, people=people)
+    script = {0: ("say", {"text": "a person walks forward"}), 60: ("steer", {"direction": 90, "person": people}),
               120: ("path", {"points": [[0, 0]]})}  # fmt: skip
     for pose in live.frames():
         if pose["frame"] in script:
             kind, fields = script[pose["frame"]]
             live.ask(kind, **fields)
         if pose["frame"] % 20 == 0:
-            x, _, z = pose["root"]
-            print(f"{pose['time']:5.1f} s  x {x:5.2f}  z {z:5.2f}  {pose['words']}")
+            for x, _, z, words in ((*one["root"], one["words"]) for one in pose.get("people", [pose])):
+                print(f"{pose['time']:5.1f} s  x {x:5.2f}  z {z:5.2f}  {words}")
         if pose["frame"] >= 200:
             live.ask("bye")
             break

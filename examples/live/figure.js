@@ -55,7 +55,8 @@ export class Camera {
   }
 }
 
-export function draw(camera, skeleton, found, marks) {
+// People (places of their joints, one after the other) on the floor, with crosses at the marks.
+export function draw(camera, skeleton, people, marks) {
   const pen = camera.canvas.getContext("2d");
   pen.fillStyle = "#f6f8fb";
   pen.fillRect(0, 0, camera.canvas.width, camera.canvas.height);
@@ -81,14 +82,14 @@ export function draw(camera, skeleton, found, marks) {
     line([a - 0.12, 0, b], [a + 0.12, 0, b], "#8a4fbf", 0.02);
     line([a, 0, b - 0.12], [a, 0, b + 0.12], "#8a4fbf", 0.02);
   });
-  skeleton.parents.forEach((parent, joint) => {
-    if (parent < 0) return;
+  const bones = people.flatMap((found) => skeleton.parents.map((parent, joint) => [found, parent, joint]));
+  const near = bones.filter(([, parent]) => parent >= 0);
+  near.forEach(([found, parent, joint]) => {
     const [a, b] = [found[parent], found[joint]];
     line([a[0], 0, a[2]], [b[0], 0, b[2]], "#dfe5ee", 0.06);
   });
-  const near = skeleton.parents.map((parent, joint) => [parent, joint]).filter(([parent]) => parent >= 0);
-  const depth = ([, joint]) => camera.seen(found[joint])?.[2] ?? 0;
-  near.sort((a, b) => depth(b) - depth(a)).forEach(([parent, joint]) => {
+  const depth = ([found, , joint]) => camera.seen(found[joint])?.[2] ?? 0;
+  near.sort((a, b) => depth(b) - depth(a)).forEach(([found, parent, joint]) => {
     const name = skeleton.names[joint].toLowerCase();
     const colour = name.includes("left") ? "#e8743b" : name.includes("right") ? "#2f6fd0" : "#6d7684";
     line(found[parent], found[joint], colour, name.includes("head") ? 0.16 : 0.075);

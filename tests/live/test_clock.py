@@ -9,6 +9,7 @@ from motionloom.live import clock
 from motionloom.live.clock import Pace, Player
 from motionloom.live.commands import Say, Steer
 from motionloom.live.live import Frame, Live
+from motionloom.live.settings import Settings
 from tests.live import people
 from tests.live.people import QUICK
 
@@ -86,6 +87,51 @@ def test_a_slow_machine_says_so_and_a_command_waits_longer() -> None:
     assert health.ahead == pytest.approx(1.5 * 0.5)
     assert "takes 0.50 s for a window" in health.problem
     assert "followed every 0.65 s and 0.75 s late" in health.problem
+
+
+class Slowly(Live):
+    """Each window takes so many seconds by a clock of its own."""
+
+    clock, each = 0.0, 0.0
+
+    def _windows(self, requests) -> None:
+        super()._windows(requests)
+        self.clock += self.each
+
+
+def lateness(live: Slowly, count: int, flood: bool) -> list[float]:
+    """Seconds that each frame is late for somebody who shows them at their times, by the clock of the planner: what it
+    would make meanwhile is made in turn, without a thread."""
+    player, made, late, begun = Player(live, now=lambda: live.clock), [], [], None
+    for k in range(count):
+        if flood:
+            player.ask(Steer(0.1 * k, 1.0))
+        due = 0.0 if begun is None else begun + k / 20
+        while len(player._buffer) < player._room() and (live.clock <= due or not player._buffer):
+            player._make()
+            made.append(live.clock)
+        full = len(player._buffer) >= player._room()
+        assert player.take(0.0) is not None
+        begun = made[0] if begun is None else begun
+        late.append(max(0.0, made[k] - max(due, begun)))
+        begun += late[-1] if late[-1] > clock.LATE else 0.0
+        live.clock = max(live.clock, due) if full else live.clock  # it waited for room
+    return late
+
+
+@pytest.mark.parametrize("flood", [False, True])
+@pytest.mark.parametrize("each", [0.05, 0.5, 1.2])
+def test_windows_that_take_long_make_commands_wait_and_no_frame_late(each: float, flood: bool) -> None:
+    live = Slowly(people.prior(), settings=Settings(steps=1, known=6, ahead=50, used=40))
+    live.each = each
+    assert max(lateness(live, 130, flood)) <= clock.LATE
+
+
+def test_a_machine_that_cannot_keep_up_is_late_and_leaves_nothing_out() -> None:
+    live = Slowly(people.prior(), settings=Settings(steps=1, known=6, ahead=50, used=40))
+    live.each = 3.0
+    late = lateness(live, 130, flood=False)
+    assert sum(wait > clock.LATE for wait in late) == 3, "once for each window: the clock waits, then all is on time"
 
 
 def test_an_error_of_the_planner_reaches_who_takes_frames() -> None:
