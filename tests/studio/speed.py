@@ -1,15 +1,18 @@
-"""How long it takes from letting go of a path's point to the new motion on the stage.
+"""How quick the studio is, on the machine that this runs on.
 
-`python -m tests.studio.speed` opens the page on a real server, drags the end of a path for ten seconds of motion again
-and again, and prints medians: until the preview is on the stage, until the full motion is, and the server's own
-sampling of the same timeline in a fresh call, as `motionloom.compose` makes it.
+`python -m tests.studio.speed` starts a server, opens the page and prints: seconds from the command until the server
+answers, the prior is loaded and the page can be used; until somebody moves in a new project; medians from letting go of
+a path's point, for ten seconds of motion, to the preview and to the full motion on the stage; the same timeline by
+`motionloom.compose` and its words by `motionloom.generate` in this process; pictures per second; the page's code.
 """
 
 import argparse
+import gzip
 import json
 import statistics
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from tests.studio import started
@@ -27,21 +30,32 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     started.check()
+    view = {"width": 1280, "height": 720}
     with tempfile.TemporaryDirectory() as folder, started.server(Path(folder)) as server, started.browser() as browser:
-        page = Studio(browser.new_context(viewport={"width": 1280, "height": 720}).new_page(), server)
-        ready, rounds = measured(page, options.rounds)
-        found = {
-            "page_ready_s": ready,
-            "preview_s": statistics.median(first for first, _ in rounds),
-            "full_s": statistics.median(full for _, full in rounds),
-            "frames_per_second": frames(page),
-            "sampling_s": sampling(page, options.rounds),
-        }
-    found["full_over_sampling"] = found["full_s"] / found["sampling_s"]
+        page = Studio(browser.new_context(viewport=view).new_page(), server)
+        found = {"answers_s": server.answered, "prior_warm_s": server.warm, "first_motion_s": first_motion(page)}
+        found["page_ready_s"], rounds = measured(page, options.rounds)
+        found["command_to_page_s"] = server.answered + found["page_ready_s"]
+        found["preview_s"] = statistics.median(first for first, _ in rounds)
+        found["full_s"] = statistics.median(full for _, full in rounds)
+        found["frames_per_second"] = frames(page)
+        found |= sampling(options.rounds)
+    found["full_over_compose"] = found["full_s"] / found["compose_s"]
+    found["full_over_generate"] = found["full_s"] / found["generate_s"]
+    found["code_kb"] = sum(len(gzip.compress(one.read_bytes())) for one in started.page_folder().rglob("*.*")) / 1000
     for name, value in found.items():
         print(f"{name:22} {value:8.2f}")
     if options.json:
         options.json.write_text(json.dumps(found, indent=1))
+
+
+def first_motion(page: Studio) -> float:
+    """Seconds from the page's address until somebody moves, in a project that is new."""
+    page.page.goto(page.server.page)
+    page.page.wait_for_function("performance.getEntriesByName('draw-preview').length > 0")
+    seconds = page.page.evaluate("performance.getEntriesByName('draw-preview')[0].startTime") / 1000
+    page.drawn()
+    return seconds
 
 
 def measured(page: Studio, rounds: int) -> tuple[float, list[tuple[float, float]]]:
@@ -84,19 +98,31 @@ def frames(page: Studio, seconds: float = 3.0) -> float:
     return count
 
 
-def sampling(page: Studio, rounds: int) -> float:
-    """Seconds of the library's own call for the same timeline, in this process."""
-    from motionloom import Prior, compose
+def sampling(rounds: int) -> dict[str, float]:
+    """Seconds of the library's own calls in this process: the same timeline, and its words alone."""
+    from motionloom import Prior, compose, generate
     from motionloom.goals.goal_file import read_goal
     from motionloom.goals.segment import Segment
 
     prior = Prior.load()
     goal = read_goal({"path": {"points": [[p["x"], p["z"]] for p in PATH["points"]]}}, frames=200, folder=Path())
+
+    def composed() -> None:
+        list(compose(prior, [Segment("a person walks", 10.0)], seed=3, path=goal))
+
+    def generated() -> None:
+        generate(prior, "a person walks", seconds=10.0, seed=3)
+
+    return {"compose_s": median(composed, rounds), "generate_s": median(generated, rounds)}
+
+
+def median(call: Callable[[], None], rounds: int) -> float:
+    """Seconds that a call takes, once it is warm."""
+    call()
     times = []
     for _ in range(rounds):
         begin = time.perf_counter()
-        for _piece in compose(prior, [Segment("a person walks", 10.0)], seed=3, path=goal):
-            pass
+        call()
         times.append(time.perf_counter() - begin)
     return statistics.median(times)
 

@@ -67,6 +67,11 @@ class Server:
     def start(self) -> None:
         """Start the process and wait until its prior is loaded."""
         options = ["--host", "0.0.0.0", "--token", TOKEN, "--port", str(self.port), "--project", str(self.folder)]
+        begin = time.monotonic()
+        self.answered: float | None = None
+        """Seconds from the command to the first answer."""
+        self.warm = 0.0
+        """Seconds from the command until the prior is loaded."""
         self.process = subprocess.Popen(
             [sys.executable, "-m", "motionloom", "serve", *options],
             stdout=subprocess.DEVNULL,
@@ -75,11 +80,14 @@ class Server:
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end and self.process.poll() is None:
             try:
-                if self.ask("/health")["warm"]:
+                found = self.ask("/health")
+                self.answered = self.answered or time.monotonic() - begin
+                if found["warm"]:
+                    self.warm = time.monotonic() - begin
                     return
             except OSError:
                 pass
-            time.sleep(0.1)
+            time.sleep(0.05)
         raise RuntimeError(f"the server at {self.address} did not start")
 
     def kill(self) -> None:

@@ -16,6 +16,8 @@ PROJECT = {
     "version": 1, "name": "Test", "seed": 3, "count": 1, "kept": 0, "drawn": "", "takes": [], "clips": [],
     "frozen": [], "base": None, "reactTo": None, "character": None,
 }  # fmt: skip
+FORGET = "if (location.protocol === 'http:' && name !== 'kept') { localStorage.clear(); name = 'kept' }"
+"""What the page of an earlier test kept in the browser is gone; what this one keeps stays."""
 NOTHING: dict[str, Any] = {"path": None, "targets": [], "poses": []}
 
 
@@ -28,7 +30,7 @@ class Studio:
         self._drawn: dict[str, dict[str, Any]] = {}
         page.set_default_timeout(SLOW)
         page.on("pageerror", lambda error: self.faults.append(str(error)))
-        page.add_init_script("if (window.name !== 'kept') { localStorage.clear(); window.name = 'kept' }")
+        page.add_init_script(FORGET)
 
     # -- beginnings
 
@@ -42,7 +44,7 @@ class Studio:
         known = self._drawn.get(json.dumps(project))
         self.page.goto("about:blank")  # what the page before had not saved is saved before
         self.put(known or project)
-        self.page.evaluate("window.name = ''")
+        self.page.evaluate("name = ''")
         self.load()
         if known is None:
             self._drawn[json.dumps(project)] = self.project()

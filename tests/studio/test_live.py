@@ -5,21 +5,28 @@ import numpy as np
 from tests.studio.studio import Studio
 
 
+def done(studio: Studio, words: str) -> None:
+    """Wait until this has been done for a second."""
+    at = "Number.parseFloat(document.querySelector('#live small').textContent)"
+    studio.page.wait_for_function(f"/{words}/.test(document.querySelector('#live b').textContent)")
+    begun = studio.page.evaluate(at)
+    studio.page.wait_for_function(f"{at} > {begun + 1.0}")
+
+
 def test_somebody_is_steered_live_and_all_of_it_is_kept(studio: Studio):
     page = studio.page
     before = studio.project()
     studio.key("j")
     page.wait_for_function("document.querySelector('#live small')?.textContent > '0.3'")
     page.keyboard.down("w")
-    page.wait_for_function("/walk/.test(document.querySelector('#live b').textContent)")
+    done(studio, "walk")
     page.keyboard.up("w")
     x, y = studio.middle("#canvas")
     page.mouse.click(x + 120, y + 120)
     studio.key("Enter")
     page.keyboard.type("a person jumps up")
     studio.key("Enter")
-    page.wait_for_function("/jumps/.test(document.querySelector('#live b').textContent)")
-    page.wait_for_timeout(600)
+    done(studio, "jumps")
     studio.key("r")
     page.wait_for_selector("#live", state="hidden")
     page.wait_for_function("document.querySelector('#inspector .take small')?.textContent === 'live'")

@@ -37,7 +37,7 @@ def test_a_timeline_file_comes_in_whole_and_goes_out_again(studio: Studio, tmp_p
     file = tmp_path / "both.yaml"
     file.write_text(GIVEN)
     studio.drop(file)
-    studio.page.wait_for_function("document.querySelectorAll('.track.words').length === 2")
+    studio.page.wait_for_selector(".content .track.other")
     project = studio.project()
     assert [one["path"] is not None for one in project["people"]] == [False, True]
     assert [(one["joint"], one["time"]) for one in project["people"][1]["targets"]] == [(21, 1), (21, 2)]
