@@ -13,11 +13,12 @@ from motionloom.features import humanml
 from motionloom.features.layout import WIDTH
 from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22
+from motionloom.retarget.onto import match_root
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.edit import Extend, Loop, Redraw, edit, kept_numbers
 from motionloom.tasks.inpaint import inpaint_motion
 from motionloom.tasks.sampling import Sampling
-from motionloom.tasks.splice import carried, kept_parts, match_root, person_at_20, splice, standing
+from motionloom.tasks.splice import carried, kept_parts, person_at_20, splice, standing
 from motionloom.weights.prior import Prior
 from tests.nets import tiny
 

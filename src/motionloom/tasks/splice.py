@@ -12,22 +12,20 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.blending import smoothstep
 from motionloom.edits.boundary import match_boundary, match_rotations
-from motionloom.errors import MotionloomError
 from motionloom.features.humanml import resample_positions
-from motionloom.features.layout import FEET, FPS
+from motionloom.features.layout import FPS
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
-from motionloom.retarget import joints22, retarget, to_smpl22
+from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.anatomy import read_body
-from motionloom.retarget.measured import mean_rotation
+from motionloom.retarget.onto import match_root, onto, place_of, with_place
 from motionloom.skeleton import Skeleton
 from motionloom.tasks.inpaint import Inpainted
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-LEAVES = (10, 11, 15, 20, 21)
 EASE = 0.3
 """Seconds over which a difference of pose at a border fades."""
 
@@ -84,62 +82,9 @@ def apply_positions(
     places: Array, old: Motion, *, foot_lock: bool, contacts: Array | None = None, known: int | None = None
 ) -> Motion:
     """Places (frames of ``old``, 22, 3) metres of the uniform person that the old motion is, on its skeleton, over its
-    floor; feet cleaned, by contacts (frames, 4) or by what the feet do.
-
-    known: how many of the first places are the old motion's own, if what follows them is not: they show where it is.
-    """
+    floor; feet cleaned, by contacts (frames, 4) or by what the feet do. ``known``: as of `onto`."""
     person = motion_from_positions(places, old.fps)
-    if foot_lock:
-        person = clean_feet(person, contacts=contacts)
-    made = match_root(old, retarget(person, old.skeleton))
-    back = made.frames(0, known) if known else match_root(old, retarget(to_smpl22(old), old.skeleton))
-    seen, carrier = old.frames(0, len(back)), _carrier(old.skeleton)
-    apart = rot.multiply(seen.world_rotations()[:, carrier], rot.inverse(back.world_rotations()[:, carrier]))
-    if np.median(np.abs(apart[:, 0])) < np.cos(np.radians(30)):
-        raise MotionloomError("the clip does not stand upright along +Y; say which axis of its file is up (--up z)")
-    apart = (_place(seen) - _place(back)).mean(axis=0)
-    if known:
-        lowest, own = (joints22(motion)[:, list(FEET), 1].min(axis=1) for motion in (back, seen))
-        apart[1] = (own - lowest).mean()  # legs of another build stand as high, their hips need not
-        made = _held_alike(made, old, known)
-    return _with_place(made, _place(made) + apart)
-
-
-def _held_alike(made: Motion, old: Motion, known: int) -> Motion:
-    """``made`` with hands, head and toes held as they usually are in the first ``known`` frames of ``old``.
-
-    Places do not say how; without it they would turn to how the uniform person holds them, in a blink.
-    """
-    drivers, rotations = read_body(made.skeleton).drivers, made.rotations.copy()
-    now, was = made.frames(0, known).world_rotations(), old.frames(0, known).world_rotations()
-    for joint in (drivers[leaf] for leaf in LEAVES):
-        if joint is not None and drivers.count(joint) == 1:
-            apart = mean_rotation(rot.multiply(rot.inverse(now[:, joint]), was[:, joint]), np.ones(known))
-            rotations[:, joint] = rot.multiply(rotations[:, joint], apart)
-    return replace(made, rotations=rotations)
-
-
-def match_root(old: Motion, made: Motion) -> Motion:
-    """The same poses as the old motion's files hold them, of as many frames: which joint carries the path.
-
-    Files may hold the root still and move the hips in it; then the bones' changing lengths stay the old ones.
-    """
-    if old.translations is None:
-        return made
-    carrier = _carrier(old.skeleton)
-    if carrier == 0:
-        return replace(made, translations=old.translations)
-    parent = old.skeleton.parents[carrier]
-    above, place = old.world_rotations()[:, parent], old.positions()[:, parent]
-    rotations, translations = made.rotations.copy(), old.translations.copy()
-    chain = parent
-    while chain >= 0:
-        rotations[:, chain] = old.rotations[:, chain]
-        chain = old.skeleton.parents[chain]
-    undo = rot.inverse(above)
-    rotations[:, carrier] = rot.multiply(undo, made.world_rotations()[:, carrier])
-    translations[:, carrier] = rot.rotate(undo, made.positions()[:, carrier] - place)
-    return Motion(old.skeleton, old.fps, old.root, rotations, translations)
+    return onto(clean_feet(person, contacts=contacts) if foot_lock else person, old, known=known)
 
 
 def splice(old: Motion, made: Motion, first: int, *, last: int | None = None, kept: Kept | None = None) -> Motion:
@@ -158,11 +103,11 @@ def splice(old: Motion, made: Motion, first: int, *, last: int | None = None, ke
             turns = match_rotations(turns, old.rotations, border, step, ease)
     inside, before = slice(first, last), max(first - 1, 0)
     turns = np.where(kept.joints[:, None], old.rotations, turns)
-    rotations, place = old.rotations.copy(), _place(old).copy()
+    rotations, place = old.rotations.copy(), place_of(old).copy()
     rotations[inside] = rot.unroll(np.concatenate([old.rotations[before : before + 1], turns[inside]]))[1:]
-    way = _eased_places(place, _place(made), first, last, ease)
+    way = _eased_places(place, place_of(made), first, last, ease)
     place[inside] = np.where(kept.place, place, way)[inside]
-    return _with_place(replace(old, rotations=rotations), place)
+    return with_place(replace(old, rotations=rotations), place)
 
 
 def continued(tail: Motion, places: Array, *, foot_lock: bool, contacts: Array | None = None) -> Motion:
@@ -190,8 +135,8 @@ def overlaid(motion: Motion, source: Motion, joints: Array, place: Array) -> Mot
     turns = rot.slerp(motion.rotations, source.rotations, joints)
     turns = np.where(joints[..., None] >= 1, source.rotations, np.where(joints[..., None] > 0, turns, motion.rotations))
     share = place[:, None]
-    way = np.where(share >= 1, _place(source), (1 - share) * _place(motion) + share * _place(source))
-    return _with_place(replace(motion, rotations=turns), way)
+    way = np.where(share >= 1, place_of(source), (1 - share) * place_of(motion) + share * place_of(source))
+    return with_place(replace(motion, rotations=turns), way)
 
 
 def carried(motion: Motion, turn: Array, about: Array, to: Array) -> Motion:
@@ -223,29 +168,6 @@ def concatenated(*parts: Motion) -> Motion:
         rotations=np.concatenate([p.rotations for p in parts]),
         translations=None if moved is None else np.concatenate(moved),
     )
-
-
-# Parts
-
-
-def _carrier(skeleton: Skeleton) -> int:
-    """The joint that turns the pelvis."""
-    return read_body(skeleton).drivers[0] or 0
-
-
-def _place(motion: Motion) -> Array:
-    """(frames, 3) what carries the way through the world."""
-    carrier = 0 if motion.translations is None else _carrier(motion.skeleton)
-    return motion.root if carrier == 0 or motion.translations is None else motion.translations[:, carrier]
-
-
-def _with_place(motion: Motion, place: Array) -> Motion:
-    carrier = 0 if motion.translations is None else _carrier(motion.skeleton)
-    if carrier == 0 or motion.translations is None:
-        return replace(motion, root=place)
-    translations = motion.translations.copy()
-    translations[:, carrier] = place
-    return replace(motion, translations=translations)
 
 
 def _eased_places(old: Array, made: Array, first: int, last: int, ease: int) -> Array:
