@@ -75,7 +75,7 @@ def test_with_z_up_height_is_the_third_number_and_nothing_is_mirrored() -> None:
     np.testing.assert_array_equal(np.cross(numbers[0], [0, 0, 1]), numbers[1])  # x cross y is z, wherever they go
 
 
-def test_a_person_at_the_origin_facing_z_is_reported_as_it_stands() -> None:
+def test_a_person_at_the_origin_facing_z_is_encoded_as_they_are() -> None:
     """Left is +X: the left hip and shoulder lie there. The root's height stays, its place becomes the origin."""
     p = np.zeros((2, 22, 3))
     p[:, 0], p[:, 15] = [5.0, 0.9, 7.0], [5.0, 1.6, 7.1]

@@ -93,7 +93,7 @@ def test_nothing_jumps_at_a_border() -> None:
     assert (made.rotations[1:] * made.rotations[:-1]).sum(-1).min() > 0.9
 
 
-def test_signs_stay_when_a_block_is_reported_with_the_other_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_signs_stay_when_a_block_begins_with_the_other_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every second block comes with all quaternions negated, and no border shows it."""
     count = 0
 

@@ -94,7 +94,7 @@ def test_the_numbers_that_a_goal_is_about() -> None:
     assert mask[3].nonzero().ravel().tolist() == [0, 1, 2, 64, 65, 66]
 
 
-def test_adapters_are_reported_the_last_steered_guess_and_none_that_change_nothing_change_little(prior: Prior) -> None:
+def test_adapters_see_the_last_steered_estimate_and_none_that_change_nothing_change_little(prior: Prior) -> None:
     """An adapter of zeros is the prior; what it is shown is the steered guess in the numbers asked, noise-free."""
     blank = adapter(prior)
     made = control(prior, "a person walks", path(), seed=1, steps=3, adapters=[(blank, 0.25), (blank, 0.75)])[0]

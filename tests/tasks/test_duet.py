@@ -115,7 +115,7 @@ def test_rows_denoised_together_or_alone_make_the_same(prior: Prior, block: Pair
     assert again.abs().max() > 1e-3
 
 
-def test_only_who_listens_hears_what_the_other_is_reported(prior: Prior, block: PairBlock) -> None:
+def test_only_who_listens_hears_the_prompt_of_the_other(prior: Prior, block: PairBlock) -> None:
     changed = [SEGMENTS[0], replace(SEGMENTS[1], text="a person turns :: a person walks left"), SEGMENTS[2]]
     for one, deaf in ((block, False), (block_of(prior, fresh=True), True)):
         rows = [[tasks._asked(some, i, None, 0) for i in (0, 1)] for some in (SEGMENTS, changed)]
@@ -123,7 +123,7 @@ def test_only_who_listens_hears_what_the_other_is_reported(prior: Prior, block: 
         assert torch.allclose(first, second, atol=1e-5) == deaf
 
 
-def test_each_row_is_reported_and_led_from_where_the_two_stand_when_it_begins(
+def test_each_row_is_shown_and_moved_from_where_the_two_are_when_it_begins(
     prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A network that always guesses the same: D of a later row, as shown without its noise, is what bodies made of

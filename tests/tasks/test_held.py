@@ -113,7 +113,7 @@ def test_a_source_that_ends_early_lets_go_without_a_jump() -> None:
     assert np.abs(np.diff(share)).max() < 0.3
 
 
-def test_what_is_held_is_reported_to_the_network_and_changes_the_free_joints() -> None:
+def test_what_is_held_is_shown_to_the_network_and_changes_the_free_joints() -> None:
     kicking = SOURCE.rotations.copy()
     kicking[:, [1, 2], 1] += 0.4
     other = Motion(SMPL22, 30.0, SOURCE.root, rot.normalize(kicking))
@@ -123,7 +123,7 @@ def test_what_is_held_is_reported_to_the_network_and_changes_the_free_joints() -
     assert np.abs(apart).max() > 1e-3
 
 
-def test_the_network_is_reported_the_source_at_its_own_moments_from_the_first_predicted_frame_on() -> None:
+def test_the_network_sees_the_source_at_its_own_moments_from_the_first_predicted_frame_on() -> None:
     after = person(3.0, 60.0).frames(60, 150)
     ready = given(
         PREDICTOR,

@@ -267,7 +267,7 @@ def test_neither_seam_of_a_switch_jumps(seconds: float, fps: float) -> None:
     assert speed[near].max() < (2.0 if seconds >= 0.5 else 5.0) * usual
 
 
-def test_the_network_is_reported_the_target_from_the_moment_on_when_it_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_network_sees_the_target_from_the_moment_on_when_it_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
     told, draw = [], WindowSampler.window
 
     def window(self, person, seeds, number, known, **asked):

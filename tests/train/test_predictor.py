@@ -74,7 +74,7 @@ def test_half_of_the_windows_are_mirror_images():
     assert 0.4 < higher < 0.6
 
 
-def test_a_smoothed_past_is_what_is_shown_and_the_recorded_one_is_what_is_guessed():
+def test_a_smoothed_past_is_the_condition_and_the_recorded_one_is_predicted():
     data = protocol()
     plain = Windows(data.split("train"), data, variant="masked").draw(1, 1, 40)
     smooth = Windows(data.split("train"), data, variant="masked", smoothed=1.0).draw(1, 1, 40)

@@ -58,7 +58,7 @@ def test_a_published_state_is_the_spectrum_in_metres() -> None:
 # What the network is told
 
 
-def test_published_networks_are_reported_the_spectrum_of_the_padded_observation() -> None:
+def test_published_networks_see_the_spectrum_of_the_padded_observation() -> None:
     made, features = predictor("published"), some(2, 20, 9)
     mask = torch.zeros(2, 20, 3)
     mask[:, :5] = 1
@@ -66,7 +66,7 @@ def test_published_networks_are_reported_the_spectrum_of_the_padded_observation(
     torch.testing.assert_close(made.condition(features, mask, features[:, 4]), made.basis.to_spectrum(padded))
 
 
-def test_ours_is_reported_what_is_known_where_and_from_which_pose() -> None:
+def test_ours_sees_what_is_known_where_and_from_which_pose() -> None:
     made, features = predictor(), some(2, 20, 12)
     pose, mask = features[:, 4], torch.zeros(2, 20, 4)
     mask[:, :5], mask[0, 12:, 2] = 1, 1

@@ -121,10 +121,10 @@ class _Reader:
             top.fail(f"asks for nothing; give it one or several of {listed(KEYS)}")
         start = self.start(given["start"]) if "start" in given else _Start()
         goal, start = self.path(given["path"], start) if "path" in given else (Goal.nothing(self.frames), start)
-        given = start.position is not None or start.facing is not None
+        placed = start.position is not None or start.facing is not None
         x, z = start.position or (0.0, 0.0)
         origin = GroundPose(x, z, start.facing or 0.0)
-        goal = replace(goal, start=origin if given else None)
+        goal = replace(goal, start=origin if placed else None)
         for item in given["poses"].items() if "poses" in given else ():
             goal = self.joined(goal, self.pose(item, goal, origin), item)
         for item in given["joints"].items() if "joints" in given else ():

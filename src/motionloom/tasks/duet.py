@@ -311,7 +311,7 @@ class _PairDenoiser:
         for row, count, level, one, (state, _) in zip(rows, frames, at, denoised, parts, strict=True):
             places, motion = part(one)
             people = zip(motion[:, :count], row.people, strict=True)
-            motion = torch.stack([person.correct(one, level) for one, person in people])
+            motion = torch.stack([person.correct(part_of, level) for part_of, person in people])
             begin = self._begin_or(places, row, level)
             motion = self._moved(row, level, motion, begin, state=state)
             made.append(_strung(motion, places))

@@ -374,7 +374,7 @@ def sample_chain(
             waiting[number] = row
             yield Link(row.length, row.overlap, first + number)
 
-    def denoise(numbers: Sequence[int], states: Sequence[State], at: Sequence[int]) -> Sequence[State]:
+    def reported(numbers: Sequence[int], states: Sequence[State], at: Sequence[int]) -> Sequence[State]:
         here = [state.to(prior.mean) for state in states]  # the noise that rows begin with is the CPU's
         some = [waiting[number] for number in numbers]
         denoised = denoise(some, here, at)
@@ -383,7 +383,7 @@ def sample_chain(
         return denoised
 
     made = staggered(
-        links(), denoise, levels=way, solver=SOLVERS[sampling.solver], schedule=prior.schedule, features=features,
+        links(), reported, levels=way, solver=SOLVERS[sampling.solver], schedule=prior.schedule, features=features,
         together=sampling.batch(batch_size), moved=progress or (lambda count: None),
     )  # fmt: skip
     for number, state in enumerate(made):

@@ -78,7 +78,7 @@ def test_the_same_action_in_other_words_is_no_negative() -> None:
     assert labelled.tolist() == [[False, False, True], [False, False, False], [True, False, False]]
 
 
-def test_opposite_directions_are_reported_from_both_and_from_none() -> None:
+def test_opposite_directions_are_told_from_both_and_from_none() -> None:
     """Left against right, forward against backward; a sentence that names both opposes nothing."""
     said = ["steps left", "steps right", "left then right", "walks forward", "walks backwards", "waves"]
     found = opposed(senses(said), senses(said)).tolist()

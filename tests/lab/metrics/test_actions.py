@@ -25,7 +25,7 @@ def test_nothing_changes_when_the_world_is_turned_and_moved(person: np.ndarray) 
     assert there == pytest.approx(measure(person, FPS), abs=2e-4)
 
 
-def test_backwards_and_sideways_are_reported_from_forward() -> None:
+def test_backwards_and_sideways_are_told_from_forward() -> None:
     back = measure(moved(spun(standing(), np.full(80, np.pi)), np.linspace(0, 2, 80)[:, None] * [0, 0, 1.0]), FPS)
     side = measure(moved(standing(), np.linspace(0, 2, 80)[:, None] * [1.0, 0, 0]), FPS)
     assert back["advance"] == pytest.approx(-2, rel=0.05)

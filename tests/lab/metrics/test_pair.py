@@ -259,7 +259,7 @@ def test_what_groups_compare_are_the_same_numbers_frame_by_frame():
     assert means == pytest.approx({name: getattr(found, name) for name in groups.SERIES})
 
 
-def test_speeds_and_skate_are_reported_at_the_rate_of_the_frames_and_of_both_people():
+def test_speeds_and_skate_are_measured_at_the_rate_of_the_frames_and_of_both_people():
     rng = np.random.default_rng(1)
     first, second = people.walking(0.7, 3.0, fps=30.0), people.standing(3.0, fps=30.0)
     ways = np.cumsum(rng.normal(0, 0.03, (2, 90, 3)) * [1, 0, 1], axis=1)
@@ -340,7 +340,7 @@ def test_shuffling_gives_everybody_a_stranger_who_begins_where_the_partner_did()
             groups.shuffled(few, shift=shift)
 
 
-def test_true_partners_of_a_common_path_are_reported_from_strangers():
+def test_true_partners_of_a_common_path_are_told_from_shuffled_ones():
     stand = people.standing(6.0)
     paths = [0.05 * np.random.default_rng(n).standard_normal((120, 3)).cumsum(axis=0) * [1, 0, 1] for n in range(5)]
     pairs = [np.stack([people.moved(stand, p), people.moved(stand, p + np.array([1.0, 0, 0]))]) for p in paths]

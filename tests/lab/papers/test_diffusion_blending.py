@@ -146,7 +146,7 @@ def test_rows_do_not_depend_on_each_other_and_nothing_leaks_from_what_is_not_giv
     assert torch.equal(draw_of(prior, [other], hidden, flags), both)
 
 
-def test_networks_are_reported_what_is_given_only_without_noise(prior, other):
+def test_networks_see_what_is_given_only_without_noise(prior, other):
     """MDM's inpainting tells no network what is given; algorithm 2 tells those that can be told."""
     known, flags = given()
     full = adapter_of(trained(prior.net), prior.net)

@@ -334,7 +334,7 @@ def test_paper_rows_do_not_see_the_padding_and_published_rows_do() -> None:
     assert not torch.allclose(first_rows("published", 75), first_rows("published", 90), atol=1e-3)
 
 
-def test_a_network_with_flags_is_reported_what_is_shared() -> None:
+def test_a_network_with_flags_sees_what_is_shared() -> None:
     """Handshake frames are flagged in the first take, so that another handshake changes frames far from it."""
     from dataclasses import replace
 

@@ -145,7 +145,7 @@ def test_a_target_longer_than_the_window_is_refused() -> None:
 
 
 @pytest.mark.parametrize(("count", "share", "told"), [(50, 0.5, 25), (50, 1.0, 50), (50, 0.0, 0), (10, 0.26, 3)])
-def test_a_share_of_the_samples_is_reported_the_first_ones(count: int, share: float, told: int) -> None:
+def test_a_share_of_the_samples_is_conditioned_the_first_ones(count: int, share: float, told: int) -> None:
     assert told_samples(count, share) == [True] * told + [False] * (count - told)
 
 

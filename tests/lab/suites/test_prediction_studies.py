@@ -88,7 +88,7 @@ def test_a_stopped_network_goes_on(small: None, tmp_path: Path) -> None:
     assert studies.network(lab(tmp_path), "kept", 3).card.notes["steps"] == 4
 
 
-def test_steps_are_reported_beside_the_most_steps_of_their_kind(keep: Path, tmp_path: Path) -> None:
+def test_steps_are_compared_with_the_most_steps_of_their_kind(keep: Path, tmp_path: Path) -> None:
     found = studies.study("steps", lab(keep))
     assert len(found.rows) == 1 + 2 * 3 * len(SMALL.walks)
     by_name = {row.name: row.values for row in found.rows}
@@ -112,7 +112,7 @@ def test_a_long_future_begins_as_a_short_one_and_goes_on_from_its_end() -> None:
     assert steps[:, :, AHEAD - 1].max() < 5 * steps.max(initial=0.01)
 
 
-def test_a_horizon_is_reported_second_by_second_beside_real_motion(keep: Path) -> None:
+def test_a_horizon_is_measured_second_by_second_beside_real_motion(keep: Path) -> None:
     found = studies.study("horizon", replace(lab(keep), budget=replace(SMALL, seconds=2.0)))
     assert [row.name for row in found.rows] == [REAL, "second 1", "second 2"]
     real = found.rows[0].values
@@ -167,7 +167,7 @@ def test_poses_are_compared_with_those_that_were_trained_on() -> None:
         assert bool(away.max() < 1e-5) == near
 
 
-def test_every_second_of_a_long_future_is_reported_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_second_of_a_long_future_is_measured_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """The first second stands, the second goes 1 m/s; the two real windows are of different people."""
     walks = np.stack([gliding(60), gliding(60)])
     walks[:, :, :, 0] = walks[:, :1, :, 0] + np.maximum(np.arange(60) - 30, 0)[:, None] / 30
