@@ -14,7 +14,7 @@ from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import body
-from motionloom.tasks.body import Places, bodies, posed
+from motionloom.tasks.body import Places, solve, solve_stream
 from tests.tasks.test_edit import person
 
 
@@ -54,7 +54,7 @@ def far_from(borders: list[int], frames: int) -> np.ndarray:
 def test_blocks_are_the_whole_where_nothing_is_planted() -> None:
     """High above the floor no foot stands, and a body is a matter of its own frame and a few beside it."""
     whole = places(250, high=2.0)
-    once, made = posed(whole, 20.0), strung(list(bodies(cut(whole, [70, 1, 99, 80]), 20.0)))
+    once, made = solve(whole, 20.0), strung(list(solve_stream(cut(whole, [70, 1, 99, 80]), 20.0)))
     apart = np.abs(once.positions() - made.positions()).max(axis=(1, 2))
     assert apart[far_from([60, 120, 180], 250)].max() < 1e-6
     assert apart.max() < 1e-6
@@ -62,7 +62,7 @@ def test_blocks_are_the_whole_where_nothing_is_planted() -> None:
 
 def test_blocks_are_nearly_the_whole_where_feet_stand() -> None:
     whole = places(250, planted=True)
-    once, made = posed(whole, 20.0), strung(list(bodies([whole], 20.0)))
+    once, made = solve(whole, 20.0), strung(list(solve_stream([whole], 20.0)))
     apart = np.linalg.norm(once.positions() - made.positions(), axis=-1).max(axis=1)
     assert apart.max() < 0.02
     assert apart[:60].max() < 0.005
@@ -73,14 +73,14 @@ def test_clean_and_contacts_are_those_of_the_frames() -> None:
     whole = places(80, planted=True)
     raw = motion_from_positions(whole.positions, 20.0)
     for clean, expected in ((False, raw), (True, clean_feet(raw, contacts=whole.contacts))):
-        made = strung(list(bodies(cut(whole, [30, 50]), 20.0, foot_lock=clean)))
+        made = strung(list(solve_stream(cut(whole, [30, 50]), 20.0, foot_lock=clean)))
         np.testing.assert_allclose(made.positions(), expected.positions(), atol=1e-9)
     assert not np.allclose(raw.positions(), clean_feet(raw, contacts=whole.contacts).positions(), atol=1e-4)
 
 
 def test_nothing_jumps_at_a_border() -> None:
     """Neither place nor speed nor the sign of a quaternion: frames at borders are as calm as all are."""
-    made = strung(list(bodies([places(400, planted=True)], 20.0)))
+    made = strung(list(solve_stream([places(400, planted=True)], 20.0)))
     points = made.positions()
     borders = np.arange(60, 400, 60)
     calm = np.setdiff1d(np.arange(2, 399), (borders[:, None] + np.arange(-2, 16)).ravel())
@@ -104,11 +104,11 @@ def test_signs_stay_when_a_block_begins_with_the_other_ones(monkeypatch: pytest.
         return replace(made, rotations=made.rotations * (-1) ** (count // 2))
 
     monkeypatch.setattr(body, "motion_from_positions", moody)
-    made = strung(list(bodies([places(400)], 20.0, foot_lock=False)))
+    made = strung(list(solve_stream([places(400)], 20.0, foot_lock=False)))
     assert count >= 5
     assert (made.rotations[1:] * made.rotations[:-1]).sum(-1).min() > 0.9
     monkeypatch.undo()
-    np.testing.assert_allclose(made.positions(), posed(places(400), 20.0, foot_lock=False).positions(), atol=1e-6)
+    np.testing.assert_allclose(made.positions(), solve(places(400), 20.0, foot_lock=False).positions(), atol=1e-6)
 
 
 @pytest.mark.parametrize("frame", [59, 60, 66, 118, 125])
@@ -117,9 +117,9 @@ def test_a_goal_beside_a_border_is_met(frame: int) -> None:
     whole = places(200)
     wrist = SMPL22.index("left_wrist")
     goal = Goal.nothing(200)
-    once = posed(whole, 20.0).positions()[frame, wrist]
+    once = solve(whole, 20.0).positions()[frame, wrist]
     goal.positions[frame, wrist], goal.asked[frame, wrist] = once + np.array([0, 0.1, 0]), True
-    made = strung(list(bodies(cut(replace(whole, goal=goal), [50, 50, 25, 75]), 20.0))).positions()
+    made = strung(list(solve_stream(cut(replace(whole, goal=goal), [50, 50, 25, 75]), 20.0))).positions()
     assert np.linalg.norm(made[frame, wrist] - goal.positions[frame, wrist]) < 0.005
     assert np.abs(made[frame, SMPL22.index("right_wrist")] - once).max() > 0.1
 
@@ -136,9 +136,9 @@ def test_every_frame_comes_once(data: st.DataObject) -> None:
     with pytest.MonkeyPatch.context() as patch:
         for name, value in (("BLOCK", block), ("MARGIN", margin), ("FADE", fade)):
             patch.setattr(body, name, value)
-        patch.setattr(body, "posed", lambda places, fps, foot_lock: standing(places.positions[:, 0]))
+        patch.setattr(body, "solve", lambda places, fps, foot_lock: standing(places.positions[:, 0]))
         whole = Places(np.arange(total)[:, None, None] * np.ones((1, 22, 3)), np.zeros((total, 4)), Goal.nothing(total))
-        made = list(bodies(cut(whole, sizes), 20.0))
+        made = list(solve_stream(cut(whole, sizes), 20.0))
     assert np.allclose(strung(made).root[:, 0], np.arange(total))
     assert all(len(one) == block for one in made[:-1])
 
@@ -156,8 +156,8 @@ def test_a_block_begins_as_the_one_before_saw_it(monkeypatch: pytest.MonkeyPatch
         count += 1
         return standing(np.tile([float(count), 1.0, 0.0], (len(places), 1)))
 
-    monkeypatch.setattr(body, "posed", aside)
-    x = strung(list(bodies([places(170)], 20.0))).root[:, 0]
+    monkeypatch.setattr(body, "solve", aside)
+    x = strung(list(solve_stream([places(170)], 20.0))).root[:, 0]
     assert x[:60] == pytest.approx(1)
     assert x[75:120] == pytest.approx(2)
     assert 0 < x[60] - 1 < 0.05
@@ -168,7 +168,7 @@ def test_a_block_begins_as_the_one_before_saw_it(monkeypatch: pytest.MonkeyPatch
 
 def test_how_frames_arrive_does_not_matter() -> None:
     whole = places(230, planted=True)
-    one, other = (strung(list(bodies(cut(whole, sizes), 20.0))) for sizes in ([230], [7, 100, 3, 60, 60]))
+    one, other = (strung(list(solve_stream(cut(whole, sizes), 20.0))) for sizes in ([230], [7, 100, 3, 60, 60]))
     assert np.array_equal(one.root, other.root)
     assert np.array_equal(one.rotations, other.rotations)
-    assert list(bodies([], 20.0)) == []
+    assert list(solve_stream([], 20.0)) == []

@@ -45,7 +45,7 @@ def prior(monkeypatch: pytest.MonkeyPatch) -> Iterator[Prior]:
         NetConfig(variant="modulated", features=263, width=16, layers=1, heads=2, hidden=16, text=8, patch=4)
     )
     monkeypatch.setattr(net, "forward", lambda x, level, bound: 0.5 * x)
-    monkeypatch.setattr(body, "posed", stands)
+    monkeypatch.setattr(body, "solve", stands)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     yield Prior(net.eval(), cosine(20), torch.zeros(263), torch.full((263,), 0.01), Words(), Card("tiny"))

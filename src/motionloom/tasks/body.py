@@ -48,24 +48,24 @@ class Places:
         return Places(self.positions[first:last], self.contacts[first:last], self.goal.crop(first, last))
 
 
-def bodies(pieces: Iterable[Places], fps: float, *, foot_lock: bool = True) -> Iterator[Motion]:
-    """Consecutive blocks of the 22-joint person, as many frames in all as the pieces have; see `posed`."""
+def solve_stream(pieces: Iterable[Places], fps: float, *, foot_lock: bool = True) -> Iterator[Motion]:
+    """Consecutive blocks of the 22-joint person, as many frames in all as the pieces have; see `solve`."""
     waiting: Places | None = None
     before, tail = 0, None
     for piece in pieces:
         waiting = piece if waiting is None else _strung(waiting, piece)
         while len(waiting) >= before + BLOCK + MARGIN:
-            made = _as(tail, posed(waiting.crop(0, before + BLOCK + MARGIN), fps, foot_lock=foot_lock), before)
+            made = _as(tail, solve(waiting.crop(0, before + BLOCK + MARGIN), fps, foot_lock=foot_lock), before)
             yield _faded(tail, made.frames(before, before + BLOCK))
             tail = made.frames(before + BLOCK, before + BLOCK + FADE)
             waiting = waiting.crop(before + BLOCK - MARGIN, len(waiting))
             before = MARGIN
     if waiting is not None and len(waiting) > before:
-        made = _as(tail, posed(waiting, fps, foot_lock=foot_lock), before)
+        made = _as(tail, solve(waiting, fps, foot_lock=foot_lock), before)
         yield _faded(tail, made.frames(before, len(waiting)))
 
 
-def posed(places: Places, fps: float, *, foot_lock: bool = True) -> Motion:
+def solve(places: Places, fps: float, *, foot_lock: bool = True) -> Motion:
     """A person with constant bones who takes these places, planted feet still (``foot_lock``), and meets the goal."""
     motion = motion_from_positions(places.positions, fps)
     if foot_lock:

@@ -31,7 +31,7 @@ from motionloom.nets.prior import PriorNet
 from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.body import bodies
+from motionloom.tasks.body import solve_stream
 from motionloom.tasks.control import moved
 from motionloom.tasks.long import Row, Track, bound_together, chain_rows, in_world, same_net
 from motionloom.tasks.pair import (
@@ -173,7 +173,7 @@ def compose_pair(
         poses = poses_at(poses, track.place(0), person)
     pieces = tee(chain([features], (piece for piece, _ in sampled)))
     people = [
-        bodies(
+        solve_stream(
             in_world(
                 prior, _of(pieces[i], i), deque(segment.goal for segment in asked[i]), placement(poses[i]),
                 track if i == person else None,

@@ -34,7 +34,7 @@ from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
 from motionloom.nets.prior import Bound, PriorNet
 from motionloom.tasks.adapting import AdaptedPriors, loaded
-from motionloom.tasks.body import Places, bodies
+from motionloom.tasks.body import Places, solve_stream
 from motionloom.tasks.sampling import Moves, Sampling, Settings, sample_chain
 from motionloom.tasks.splice import person_at_20
 from motionloom.tasks.watching import ChainView
@@ -119,7 +119,7 @@ def compose(
 
     pieces = long_features(prior, asked(), past=past, sampling=chosen, progress=progress)
     place = past.end if past else track.place(0) if track else GroundPose()
-    return bodies(in_world(prior, pieces, goals, place, track), prior.fps, foot_lock=foot_lock)
+    return solve_stream(in_world(prior, pieces, goals, place, track), prior.fps, foot_lock=foot_lock)
 
 
 @renamed({"together": "batch_size"})
