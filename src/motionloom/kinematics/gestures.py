@@ -113,12 +113,6 @@ def pelvis_height(positions: np.ndarray) -> Array:
     return (p[:, 0, 1] - p[:, ANKLES, 1].min(axis=1)) / leg_length(p)
 
 
-def pelvis_drop(positions: np.ndarray) -> float:
-    """Leg lengths between the highest and the lowest place of the pelvis (95th and 5th percentile)."""
-    height = np.asarray(positions)[:, 0, 1] / leg_length(positions)
-    return float(np.percentile(height, 95) - np.percentile(height, 5))
-
-
 def torso_inclination(positions: np.ndarray) -> Array:
     """(frames,) radians between the line from pelvis to neck and the vertical."""
     p = np.asarray(positions, dtype=np.float64)
@@ -171,19 +165,10 @@ def _swings(path: Array, amplitude: float) -> int:
     return oscillations(centred @ axis, amplitude)
 
 
-def wrist_extension_speed(positions: np.ndarray, fps: float) -> Array:
-    """(frames, 2) m/s at which the left and right wrist move away from their shoulder; drawing back is negative."""
-    return _extension(positions, fps, WRISTS, (J["left_shoulder"], J["right_shoulder"]))
-
-
 def foot_extension_speed(positions: np.ndarray, fps: float) -> Array:
     """(frames, 2) m/s at which the left and right ankle move away from their hip: the snap of a kick."""
-    return _extension(positions, fps, ANKLES, (J["left_hip"], J["right_hip"]))
-
-
-def _extension(positions: np.ndarray, fps: float, tips: tuple[int, int], bases: tuple[int, int]) -> Array:
     p = np.asarray(positions, dtype=np.float64)
-    return velocity(np.linalg.norm(p[:, list(tips)] - p[:, list(bases)], axis=-1), fps)
+    return velocity(np.linalg.norm(p[:, ANKLES] - p[:, (J["left_hip"], J["right_hip"])], axis=-1), fps)
 
 
 def limb_speed(positions: np.ndarray, fps: float, joints: tuple[int, ...]) -> Array:

@@ -116,12 +116,6 @@ def winding(positions: np.ndarray, fps: float, *, step: float = 0.3) -> float:
     return float((angle[-1] - angle[0]) * count / (count - 1))
 
 
-def path_curvature(positions: np.ndarray, fps: float) -> float:
-    """Mean signed curvature of the path in 1/m, + left: 1/radius on a circle, 0 where nobody travels."""
-    length = travel(positions, fps)
-    return winding(positions, fps) / length if length > 0.6 else 0.0
-
-
 # ---- how real it looks -------------------------------------------------------------------------------------------
 
 

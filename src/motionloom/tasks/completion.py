@@ -27,7 +27,6 @@ from motionloom.weights.predictor import Predictor
 Array = NDArray[np.float64]
 
 STEPS, SOLVER, SPACING = PredictionSampling.steps, PredictionSampling.solver, PredictionSampling.spacing
-TEMPERATURE = PredictionSampling.temperature
 FUTURES = 10
 """Futures that are made unless asked otherwise."""
 EASE = 0.4

@@ -280,8 +280,7 @@ def _goal_of(goals: tuple[Goal | None, Goal | None], settings: Any) -> tuple[Goa
 
 def placement(pose: np.ndarray) -> GroundPose:
     """A ground pose (4,) of `features.pair` as a `GroundPose`."""
-    c, s, x, z = (float(number) for number in pose)
-    return GroundPose(x, z, float(np.arctan2(s, c)))
+    return GroundPose.of_numbers(pose)
 
 
 def poses_at(poses: Array, place: GroundPose, person: int) -> Array:
