@@ -52,3 +52,11 @@ def test_a_foot_that_is_carried_goes_by_the_mean_of_each_stance() -> None:
     for start, stop in ((10, 20), (28, 35), (50, 60)):
         np.testing.assert_allclose(gone[start:stop], np.tile(shift[start:stop].mean(0), (stop - start, 1)))
     np.testing.assert_allclose(carried(shift, np.zeros(FRAMES, bool)), shift)
+
+
+def test_a_foot_that_stands_in_known_frames_keeps_the_place_that_it_has_there() -> None:
+    ankle, toe = sliding(0.003)
+    change = stilled(ankle, toe, STANDING, known=14)
+    np.testing.assert_allclose(change[13], 0, atol=1e-12)
+    assert np.ptp((toe + change)[10:24, [0, 2]], axis=0).max() < 1e-12
+    np.testing.assert_allclose(change[28:35].mean(0), 0, atol=1e-12)

@@ -87,6 +87,19 @@ def test_what_was_shown_stays_and_a_foot_that_stands_stands_on_there(shown: int)
     assert steps[shown - 1].max() < before[shown - 2 : shown + 1].max() + 0.02, "no jump where the shown frames end"
 
 
+def test_a_foot_that_comes_down_with_the_first_new_frame_stands_from_there() -> None:
+    motion = slider()
+    planted = planted_feet(motion.positions(), FPS)
+    begins = np.flatnonzero(planted[1:, 1] & ~planted[:-1, 1]) + 1
+    assert len(begins)
+    for shown in begins[begins > 3]:
+        stop = shown
+        while stop < len(planted) and planted[stop, 1] and stop - shown < 12:
+            stop += 1
+        places = clean_feet(motion, shown=int(shown)).positions()[shown:stop, FEET[1]]
+        assert np.ptp(places[:, [0, 2]], axis=0).max() < 0.01
+
+
 def test_feet_come_out_of_the_floor() -> None:
     motion = slider(sink=0.04)
     assert depth(motion) > 0.03

@@ -64,7 +64,7 @@ def clean_feet(motion: Motion, *, contacts: np.ndarray | None = None, floor: flo
         directions[:, i] = _steady_direction(foot, flags[:, 0] & flags[:, 1], motion.fps, shown)
         tip = directions[:, i] * np.linalg.norm(foot, axis=-1, keepdims=True)
         since = max(shown - 1, 0)
-        moved = _correction(
+        moved = correction(
             places[since:, ankle], (places[:, ankle] + tip)[since:], flags[since:], motion.fps, held=shown > 0
         )
         targets[since:, i] += moved
@@ -146,10 +146,11 @@ def _steady_direction(foot: Array, flat: Flags, fps: float, shown: int = 0) -> A
     return result / np.linalg.norm(result, axis=-1, keepdims=True).clip(1e-9)
 
 
-def _correction(ankle: Array, toe: Array, planted: Flags, fps: float, *, held: bool = False) -> Array:
+def correction(ankle: Array, toe: Array, planted: Flags, fps: float, *, held: bool = False) -> Array:
     """(frames, 3) metres to add to the foot so that whatever is planted does not move; eased in and out.
 
-    held: nothing is added to frame 0, which was shown; stances that begin soon after it keep near where they begin.
+    ankle, toe: (frames, 3) metres; planted: (frames, 2) flags for the two. held: nothing is added to frame 0, which was
+    shown; stances that begin soon after it keep near where they begin.
     """
     steps = np.zeros((len(ankle) - 1, 3))
     for place, flags in ((ankle, planted[:, 0]), (toe, planted[:, 1])):

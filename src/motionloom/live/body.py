@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.edits.boundary import JOIN, match_boundary, match_rotations
-from motionloom.kinematics.feet import clean_feet
+from motionloom.features.layout import FEET
+from motionloom.kinematics.feet import clean_feet, correction, planted_feet
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
 from motionloom.retarget import retarget
+from motionloom.retarget.transfer import joints22, move_feet
 from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
@@ -32,11 +34,23 @@ def body(positions: Array, contacts: Array, fps: float, shown: Motion | None) ->
 
 
 def put(motion: Motion, skeleton: Skeleton, shown: Motion | None) -> Motion:
-    """A motion of the 22-joint person on another skeleton, begun with the frames that were shown on that."""
+    """A motion of the 22-joint person on another skeleton, begun with the frames that were shown on that.
+
+    A foot is planted there when the 22-joint person's is.
+    """
     if skeleton == SMPL22:
         return motion
     retargeted = retarget(motion, skeleton)
-    return retargeted if shown is None else _begun(shown, _continuing(retargeted, shown))
+    if shown is None:
+        return retargeted
+    continued, since = _continuing(retargeted, shown), len(shown) - 1
+    places, planted = joints22(continued)[since:], planted_feet(motion.positions(), motion.fps)[since:]
+    shift = np.zeros((len(motion), 2, 3))
+    for i in (0, 1):
+        ankle, toe = FEET[2 * i : 2 * i + 2]
+        flags = planted[:, 2 * i : 2 * i + 2]
+        shift[since:, i] = correction(places[:, ankle], places[:, toe], flags, motion.fps, held=True)
+    return _begun(shown, move_feet(continued, shift))
 
 
 def _begun(shown: Motion, made: Motion) -> Motion:

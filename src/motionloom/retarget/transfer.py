@@ -314,6 +314,29 @@ def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
     return Motion(body.skeleton, fps, root, _locals(body.skeleton, world))
 
 
+def move_feet(motion: Motion, shift: Array) -> Motion:
+    """A motion of any humanoid whose feet go elsewhere while its hips and the directions of its feet stay.
+
+    shift: (frames, 2, 3) metres by which the left and the right ankle go; a leg that is too short goes as far as
+    it can.
+    """
+    body, world = read_body(motion.skeleton), motion.world_rotations()
+    places = body.places(motion.positions(), world)
+    for side, (hip, knee, ankle) in enumerate(((1, 4, 7), (2, 5, 8))):
+        line = places[:, ankle] - places[:, hip]
+        line = line / np.linalg.norm(line, axis=-1, keepdims=True).clip(1e-9)
+        out = places[:, knee] - places[:, hip]
+        out = out - (out * line).sum(-1, keepdims=True) * line
+        lack = (0.01 - np.linalg.norm(out, axis=-1, keepdims=True)).clip(0)
+        middle, end = bend(
+            places[:, hip], places[:, ankle] + shift[:, side], out + lack * (places[:, TOES[side]] - places[:, ankle]),
+            upper=body.bone(hip), lower=body.bone(knee),
+        )  # fmt: skip
+        world = _aim(world, body, hip, places[:, knee] - places[:, hip], middle - places[:, hip])
+        world = _aim(world, body, knee, places[:, ankle] - places[:, knee], end - middle)
+    return replace(motion, rotations=_locals(motion.skeleton, world))
+
+
 def _on_soles(ankles: Array, goals: _Goals, lack: Array, fps: float) -> tuple[Array, float]:
     """The ankles' goals (frames, 2, 3), and by how many metres the whole body is raised, for feet of another shape.
 
