@@ -94,7 +94,7 @@ async def _listen(websocket: Socket, session: Session) -> None:
         if room < 0:
             await asyncio.sleep(-room / RATE)
         try:
-            if not await _heard(websocket, session, messages.read(text)):
+            if not await _followed(websocket, session, messages.read(text)):
                 return
             wrong = max(0.0, wrong - 0.1)
         except MotionloomError as error:
@@ -104,7 +104,7 @@ async def _listen(websocket: Socket, session: Session) -> None:
             await _send(websocket, {"type": "error", "message": one_line(str(error))[:300]})
 
 
-async def _heard(websocket: Socket, session: Session, said: Mapping[str, Any]) -> bool:
+async def _followed(websocket: Socket, session: Session, said: Mapping[str, Any]) -> bool:
     """Do what one message says; False where it ends the session."""
     kind = said["type"]
     if kind == "bye":

@@ -1,4 +1,4 @@
-"""The words for what somebody does who is steered and has no prompt: plain ones, which every prior knows."""
+"""The words for what somebody does who is steered without words: plain ones, which every prior knows."""
 
 import math
 import re
