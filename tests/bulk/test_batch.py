@@ -17,7 +17,7 @@ import pytest
 
 from motionloom.bulk import batch as batch_module
 from motionloom.bulk.batch import Where, array_task, batch, run
-from motionloom.bulk.crew import _Process
+from motionloom.bulk.crew import _Process, gpu_of
 from motionloom.bulk.folder import Store
 from motionloom.bulk.jobs import Jobs
 from motionloom.bulk.maker import Options
@@ -163,6 +163,13 @@ def test_the_same_command_goes_on_where_a_driver_ended(
     check_whole(out, exact)
     third = start(weights, jobs, out)
     assert third.communicate(timeout=60)[0].startswith("nothing was left to make: ")
+
+
+@pytest.mark.parametrize(
+    ("process", "visible", "count", "gpu"), [(1, "", 2, "1"), (3, "", 2, "1"), (0, "5,7", 2, "5"), (5, "5,7", 2, "7")]
+)
+def test_processes_share_out_the_gpus_that_may_be_used(process: int, visible: str, count: int, gpu: str) -> None:
+    assert gpu_of(process, visible, count) == gpu
 
 
 @pytest.mark.slow

@@ -178,6 +178,28 @@ def test_a_row_that_ends_its_process_every_time_is_found_out(ready: Maker, monke
     assert make(ready, rows(3)) == Report(0, 3, {"made": 3}, 1)
 
 
+def test_rows_that_were_made_before_the_one_that_ends_its_process_are_not_blamed(
+    ready: Maker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Killed(BaseException):
+        pass
+
+    finished = Maker._finished
+
+    def deadly(self: Maker, asked: Any, *more: Any) -> Any:
+        if asked.seed == 3:
+            raise Killed
+        return finished(self, asked, *more)
+
+    found = [{"prompt": "a person walks", "seconds": 1.0, "seed": seed} for seed in range(6)]
+    monkeypatch.setattr(Maker, "_finished", deadly)
+    for _ in range(CAREFUL + FATAL):
+        with pytest.raises(Killed):
+            make(ready, found)
+    assert make(ready, found).counts == {"made": 5, "failed": 1}
+    assert [one.row for one in results() if one.state == "failed"] == [3]
+
+
 def test_the_same_row_twice_is_one_motion_and_an_id_names_one_row(ready: Maker) -> None:
     same = rows(1)[0]
     found = [same, same, same | {"id": "a"}, rows(2)[1] | {"id": "a"}]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from motionloom.bulk.crew import alone, cores
+from motionloom.bulk.crew import alone, cores, gpus
 from motionloom.bulk.folder import Head, Store, digest, open_folder
 from motionloom.bulk.jobs import MOST, Jobs, parquet, shard_size
 from motionloom.bulk.maker import FORMATS, Made, Maker, Options
@@ -210,11 +210,7 @@ def _found(options: Options) -> Options:
 
 
 def _workers(options: Options) -> int:
-    if options.device == "cuda":
-        import torch
-
-        return max(torch.cuda.device_count(), 1)
-    return cores()
+    return gpus() if options.device == "cuda" else cores()
 
 
 def _check_left_over(store: Store, shards: int) -> None:

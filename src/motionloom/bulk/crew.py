@@ -31,6 +31,22 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def gpus() -> int:
+    """GPUs that this process may use; 1 where there is none, so that the processes can say what is wrong."""
+    import torch
+
+    return max(torch.cuda.device_count(), 1)
+
+
+def gpu_of(process: int, visible: str, count: int) -> str:
+    """The GPU of a process by its number, of those that CUDA_VISIBLE_DEVICES names, or else of so many.
+
+    Where there are more processes than GPUs, some share one.
+    """
+    given = [place for place in visible.split(",") if place] or [str(number) for number in range(count)]
+    return given[process % len(given)]
+
+
 def too_many_deaths(deaths: int, rows: int) -> bool:
     """Whether a shard ended so many processes that its rows cannot be the reason alone."""
     return deaths > 3 * rows + 10
@@ -53,8 +69,9 @@ class _Process:
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
         environment |= dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
         if self.batch.options.device == "cuda":
-            given = [place for place in os.environ.get("CUDA_VISIBLE_DEVICES", "").split(",") if place]
-            environment["CUDA_VISIBLE_DEVICES"] = given[self.number % len(given)] if given else str(self.number)
+            environment["CUDA_VISIBLE_DEVICES"] = gpu_of(
+                self.number, os.environ.get("CUDA_VISIBLE_DEVICES", ""), gpus()
+            )
         command = [sys.executable, "-P", "-m", "motionloom.bulk.worker"]
         self.popen = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
         threading.Thread(target=self._listen, daemon=True).start()

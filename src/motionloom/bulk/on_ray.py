@@ -107,7 +107,8 @@ class _Crew:
         gpu = batch.options.device == "cuda"
         found = ray.cluster_resources().get("GPU" if gpu else "CPU", 0)
         self.workers = workers or max(int(found), 1)
-        self.kind = ray.remote(num_cpus=1, num_gpus=1 if gpu else 0, max_restarts=0)(Hand)
+        share = 1 / max(-(-self.workers // max(int(found), 1)), 1) if gpu else 0  # several actors may share a GPU
+        self.kind = ray.remote(num_cpus=1, num_gpus=share, max_restarts=0)(Hand)
         self.flight: dict[Any, tuple[Any, Task | None]] = {}
         """What is waited for: of which actor, and for which task (None: until it is ready)."""
         self.idle: list[Any] = []

@@ -83,6 +83,10 @@ class _Attempts:
     def careful(self) -> bool:
         return self.seen["begin"] >= CAREFUL
 
+    def unended(self, key: str) -> int:
+        """How often a row was begun alone and not ended."""
+        return self.seen[f"row {key}"] - self.seen[f"end {key}"]
+
     def note(self, line: str) -> None:
         with self.place.open("a") as file:
             file.write(line + "\n")
@@ -173,7 +177,7 @@ class _Shard:
                 self.entries[number] = self._entry(number, state, one, error=why)
                 continue
             seen[one.id] = number
-            if self.notes.seen[f"row {one.key}"] >= FATAL:
+            if self.notes.unended(one.key) >= FATAL:
                 why = f"it ended the process that made it, {FATAL} times; its length or its goal may be too much"
                 self.entries[number] = self._entry(number, "failed", one, error=why)
                 continue
@@ -192,6 +196,8 @@ class _Shard:
             for one, made in self.maker.make(list(todo.values()), begin=begin):
                 number = numbers[id(one)]
                 self.moved(1)
+                if begin is not None:
+                    self.notes.note(f"end {one.key}")
                 if isinstance(made, str):
                     self.entries[number] = self._entry(number, "failed", one, error=made)
                     continue
