@@ -95,7 +95,8 @@ def read_rig(
     """The skeleton of a person's ``joints``, of which ``tips`` are mere bone tips."""
     order = parents_first(joints, parents)
     above = upwards(parents[order[0]], parents)[::-1] if parents[order[0]] != -1 else []
-    _check_scales(document, nodes, [*above, *order])
+    inner = {parents[n] for n in order}
+    _check_scales(document, nodes, [*above, *(n for n in order if n in inner)])  # of a last bone nothing else depends
     rest = worlds(nodes, parents, [*above, *order], {})
     turns, places = _bound(document, nodes, parents, order, rest)
     if not all(np.isfinite(p).all() and np.abs(p).max() < FAR for p in places.values()):
@@ -150,7 +151,8 @@ def _check_scales(document: Document, nodes: list[Node], line: list[int]) -> Non
         scale = nodes[number].scale
         if not (scale > 1e-9).all() or np.ptp(scale) > 0.02 * scale.max():
             raise document.bad(
-                f"node {number} is scaled by {scale.tolist()}; only one positive scale for all axes is read"
+                f"node {number}, {nodes[number].name[:80]!r}, is scaled by {scale.tolist()}; only one positive scale "
+                "for all axes is read: apply scales in the program that made it (in Blender Object, Apply, Scale)"
             )
         size = max(size, float(scale.max())) if size > 1 else float(scale.max()) * size
         if not 1e-9 < size < 1e9:

@@ -24,6 +24,7 @@ from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
 _LEG = 0.82
+_DEEPEST = 0.08
 _LEGS = (0.2, 2.5)
 """Metres of thigh and shin: of the uniform person, and of bodies whose feet are looked at as they are."""
 
@@ -300,7 +301,7 @@ def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
     ankles = ankles + (1.0 - goals.low) * (goals.ankles + shift[:, None] - ankles)
     if body.skeleton.soles:
         lack = _lack(ankles, goals, body, world=world, places=places - root[:, None])
-        ankles, raised = _on_soles(ankles, goals, lack, fps)
+        ankles, raised = _on_soles(ankles, goals, lack, fps, deepest=_DEEPEST * body.leg)
         lift = np.array([0.0, raised, 0.0])
         root, places = root + lift, places + lift
     drop = _drop(places, ankles, body)
@@ -337,14 +338,15 @@ def move_feet(motion: Motion, shift: Array) -> Motion:
     return replace(motion, rotations=_locals(motion.skeleton, world))
 
 
-def _on_soles(ankles: Array, goals: _Goals, lack: Array, fps: float) -> tuple[Array, float]:
+def _on_soles(ankles: Array, goals: _Goals, lack: Array, fps: float, *, deepest: float) -> tuple[Array, float]:
     """The ankles' goals (frames, 2, 3), and by how many metres the whole body is raised, for feet of another shape.
 
     What both feet ``lack`` (`_lack`) while one of them stands flat, in the middle over the clip, raises everybody; what
-    is left raises a foot. What both lack while neither stands is left: it may as well be a pose in the air, which games
-    play in one place.
+    is left raises a foot. What both lack while neither stands, or by more than the ``deepest`` metres that the shapes
+    of feet make, is left: it may as well be a pose in the air with pointed toes, which games play in one place.
     """
-    common, flat = lack.min(axis=1), goals.flat.any(axis=1)
+    common = lack.min(axis=1)
+    flat = goals.flat.any(axis=1) & (common < deepest)
     whole = float(np.median(common[flat])) if flat.sum() >= 3 else 0.0
     reach = max(1, round(0.2 * fps))
     near = np.lib.stride_tricks.sliding_window_view(np.pad(flat, reach), 2 * reach + 1).max(axis=1)
@@ -357,9 +359,11 @@ def _on_soles(ankles: Array, goals: _Goals, lack: Array, fps: float) -> tuple[Ar
 def _lack(ankles: Array, goals: _Goals, body: Body, *, world: Array, places: Array) -> Array:
     """(frames, 2) metres by which the feet of a character's own shape would be in the ground.
 
-    ``places`` (frames, 22, 3) are of the body with joint 0 at the origin. A foot that the source has below y = 0, such
-    as down a stair, may be as low there.
+    ``places`` (frames, 22, 3) are of the body with joint 0 at the origin. The ground is as low as the lowest corner at
+    rest. A foot that the source has below it, such as down a stair, may be as low there.
     """
+    rest = body.skeleton.rest_positions()
+    floor = min(0.0, *(float((rest[j] + corners)[:, 1].min()) for j, corners in body.skeleton.soles.items()))
     joints = _positions(body.skeleton, world)
     lack = np.zeros(ankles.shape[:2])
     for side, foot in enumerate(FEET):
@@ -368,7 +372,7 @@ def _lack(ankles: Array, goals: _Goals, body: Body, *, world: Array, places: Arr
         for j in own:
             points = rot.rotate(world[:, None, j], body.skeleton.soles[j][None]) + joints[:, None, j]
             under = (points - places[:, None, foot])[..., 1].min(axis=1)
-            ground = np.minimum(goals.toes[:, side, 1] - body.toe_height, 0.0)
+            ground = floor + np.minimum(goals.toes[:, side, 1] - body.toe_height, 0.0)
             lack[:, side] = np.maximum(lack[:, side], ground - under - ankles[:, side, 1])
     return lack
 
