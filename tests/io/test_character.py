@@ -4,6 +4,7 @@ import copy
 import json
 import struct
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -121,6 +122,33 @@ def test_what_another_clip_moves_has_one_key_at_rest(tmp_path: Path) -> None:
     (held,) = [c for c in ours["channels"] if c["target"] == {"node": 23, "path": "translation"}]
     np.testing.assert_allclose(scene.values(ours["samplers"][held["sampler"]]["output"]), [[0.05, 0.02, 0.01]])
     assert scene.values(ours["samplers"][held["sampler"]]["input"]).tolist() == [[0.0]]
+
+
+def test_last_bones_may_be_stretched_or_mirrored_and_others_not(tmp_path: Path) -> None:
+    for scale in ([1.0, 2.0, 1.0], [-1.0, 1.0, 1.0]):
+        hero = Hero().clip("wave", 0.5 * wave())
+        hero.json["nodes"][23]["scale"] = scale
+        motion, out = onto(path := hero.write(tmp_path / "hero.glb"), tmp_path / "moving.glb")
+        assert errors(path, out, 0, motion)["all"] < 1.0
+        hero.json["nodes"][20]["scale"] = scale
+        with pytest.raises(MotionloomError, match=r"'left_wrist', is scaled .* apply scales"):
+            load_character(hero.write(tmp_path / "hero.glb"))
+
+
+def test_soles_that_dip_raise_the_whole_character_but_no_leap(tmp_path: Path) -> None:
+    """Heels that are 3 cm in the floor while toes are planted come out of it; 8 cm are a pose in the air and stay."""
+    character = load_character(Hero().write(tmp_path / "hero.glb"))
+    rest = min(s.points[:, 1].min() for s in character.surfaces())
+    for angle, raised in ((-0.7, True), (-1.4, False)):
+        turns = np.zeros((30, 22, 3))
+        turns[:, [7, 8], 0] = angle
+        standing = Motion(SMPL22, 30.0, np.tile(SMPL22.offsets[0], (30, 1)), rot.rotvec_to_quat(turns))
+        lower = standing.positions()[0, 10, 1] - SMPL22.rest_positions()[10, 1]
+        made = retarget(replace(standing, root=standing.root - [0.0, lower, 0.0]), character.skeleton)
+        scene = Scene(character.save(made, tmp_path / "out.glb", name="ours"))
+        places = scene.vertices(scene.worlds(scene.clip("ours"), np.arange(30) / 30.0))
+        low = min(vertices[..., 1].min() for vertices in places.values())
+        assert (low > rest - 0.01) == raised, (angle, low, rest)
 
 
 def test_feet_on_controls_are_carried_along(tmp_path: Path) -> None:
