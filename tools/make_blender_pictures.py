@@ -30,7 +30,7 @@ from tests.io.rigged import Hero
 
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "docs" / "pictures"
-SIZE = (480, 400)
+SIZE = (360, 320)
 # Runs inside Blender: files side by side, one picture per frame.
 _SCRIPT = """
 import json, math, sys
@@ -80,7 +80,7 @@ for number, (file, aside) in enumerate(job["files"]):
             thing.location.x += aside
 
 bpy.ops.mesh.primitive_plane_add(size=30)
-bpy.context.object.data.materials.append(material((0.82, 0.82, 0.82, 1), "floor"))
+bpy.context.object.data.materials.append(material((0.45, 0.45, 0.45, 1), "floor"))
 for axis, colour in ((0, (0.8, 0.05, 0.05, 1)), (1, (0.1, 0.55, 0.1, 1)), (2, (0.05, 0.1, 0.8, 1))):
     bpy.ops.mesh.primitive_cylinder_add(radius=0.012, depth=0.6)
     rod = bpy.context.object
@@ -88,12 +88,12 @@ for axis, colour in ((0, (0.8, 0.05, 0.05, 1)), (1, (0.1, 0.55, 0.1, 1)), (2, (0
     rod.location = [job["axes"][k] + (0.3 if k == axis else 0) for k in range(3)]
     rod.data.materials.append(material(colour, f"axis {axis}"))
 sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
-sun.data.energy, sun.data.angle, sun.rotation_euler = 3, 0.2, (0.7, 0.2, 0.5)
+sun.data.energy, sun.data.angle, sun.rotation_euler = 1.6, 0.2, (0.7, 0.2, 0.5)
 scene.collection.objects.link(sun)
 scene.world = bpy.data.worlds.new("world")
 scene.world.use_nodes = True
 scene.world.node_tree.nodes["Background"].inputs[0].default_value = (0.9, 0.93, 1, 1)
-scene.world.node_tree.nodes["Background"].inputs[1].default_value = 0.7
+scene.world.node_tree.nodes["Background"].inputs[1].default_value = 0.5
 camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
 scene.collection.objects.link(camera)
 scene.camera = camera
@@ -114,8 +114,8 @@ for number, frame in enumerate(job["frames"]):
 
 
 def rendered(files: list[tuple[Path, float]], frames: list[int], *, fps: float, axes: tuple[float, float, float],
-             camera: tuple[float, float, float], target: tuple[float, float, float], lens: float = 45.0,
-             samples: int = 16) -> Image.Image:  # fmt: skip
+             camera: tuple[float, float, float], target: tuple[float, float, float], lens: float = 70.0,
+             samples: int = 8) -> Image.Image:  # fmt: skip
     """One row of pictures, one per frame."""
     python = os.environ.get("MOTIONLOOM_BLENDER_PYTHON", sys.executable)
     with tempfile.TemporaryDirectory() as folder:
