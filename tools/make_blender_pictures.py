@@ -2,7 +2,7 @@
 
 MOTIONLOOM_BLENDER_PYTHON=PYTHON python tools/make_blender_pictures.py [NAME ...]
 
-PYTHON can import bpy. Shown are only this project's own bodies: the mannequin, and the character that the tests build.
+PYTHON can import bpy. Shown is only this project's own mannequin, which as a .glb is a character like any other.
 
 bvh       a BVH as it comes in: bones stand upright, on the floor, facing Blender's front
 walking   a character's own file with a walk in it, at three moments
@@ -26,7 +26,6 @@ from motionloom.io.character import load_character
 from motionloom.motion import Motion
 from motionloom.retarget import retarget
 from motionloom.retarget.named import named_skeleton
-from tests.io.rigged import Hero
 
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "docs" / "pictures"
@@ -161,11 +160,9 @@ def draw(names: list[str], folder: Path) -> None:
         file = save(motion, folder / "walk.bvh")
         kept(rendered([(file, 0.0)], [m + 1 for m in moments], axes=(at[0] - 1.2, at[1], 0.0), **view), "bvh")
     if "walking" in names:
-        hero = load_character(Hero(seed=3).write(folder / "hero.glb"))
-        moving = hero.save(retarget(motion, hero.skeleton), folder / "moving.glb", name="walk")
-        ours = save(motion, folder / "ours.glb")
-        picture = rendered([(moving, 0.6), (ours, -0.6)], moments, axes=(at[0] - 1.4, at[1], 0.0), **view)
-        kept(picture, "walking")
+        hero = load_character(save(motion, folder / "hero.glb"))
+        moving = hero.save(retarget(motion, hero.skeleton), folder / "moving.glb", name="walk", replace=True)
+        kept(rendered([(moving, 0.0)], moments, axes=(at[0] - 1.2, at[1], 0.0), **view), "walking")
     if "rigify" in names:
         rig = save(retarget(motion, named_skeleton("rigify")), folder / "rigify.bvh")
         ours = save(motion, folder / "plain.bvh")
