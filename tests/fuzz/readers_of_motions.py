@@ -220,3 +220,29 @@ reader("polyline", text_file("a.svg", POINTS), {"a.svg": "svg"}, read_drawing)
 reader("mask", text_file("a.yaml", MASK), {"a.yaml": "text"}, read_mask)
 reader("prompts", text_file("a.txt", "a person walks\nsomeone jumps\n"), {"a.txt": "text"}, read_prompts)
 reader("joint map", joint_map, {"a.json": "json"}, read_joint_map, weight=3)
+
+
+# What the page sends -------------------------------------------------------------------------------------------------
+
+
+def played(folder: Path) -> None:
+    """A motion as the server gives it to the page, and takes it back."""
+    import base64
+
+    def encoded(values: np.ndarray) -> str:
+        return base64.b64encode(values.astype("<f4").tobytes()).decode()
+
+    one = {"root": encoded(motion().root), "rotations": encoded(motion().rotations)}
+    (folder / "a.json").write_text(json.dumps({"fps": 20, "people": [one]}))
+
+
+def read_played(folder: Path) -> object:
+    from motionloom.server.files import from_json
+
+    people = from_json(folder / "a.json", "a.json")
+    for person in people:
+        looked_at(person)
+    return people
+
+
+reader("motion of a page", played, {"a.json": "json"}, read_played, weight=3)
