@@ -1,16 +1,18 @@
 """A server that is killed in the middle of a draw, and one that is asked without its token."""
 
 import numpy as np
+import pytest
 
 from tests.studio.studio import Studio
 
 
+@pytest.mark.slow
 def test_a_killed_server_comes_back_and_nothing_is_lost(studio: Studio):
     page = studio.page
-    studio.open(("a person walks", 2), ("a person waves", 8), ("a person runs", 8), ("a person jumps", 8))
+    studio.open(("a person walks", 2), ("a person waves", 4), ("a person runs", 4))
     before = studio.project()
     studio.key("g")
-    page.wait_for_selector("#stage[aria-busy=true]", state="attached")
+    page.wait_for_function("document.querySelector('progress').value > 0")
     studio.server.kill()
     page.wait_for_selector(".notice.away")
     studio.key("Control+z", "End")  # what is here can be worked on
@@ -18,8 +20,8 @@ def test_a_killed_server_comes_back_and_nothing_is_lost(studio: Studio):
     studio.server.start()
     page.wait_for_selector(".notice.away", state="detached")
     project = studio.project()
-    assert len(project["segments"]) == 5
-    assert [one["id"] for one in project["segments"][:4]] == [one["id"] for one in before["segments"]]
+    assert len(project["segments"]) == 4
+    assert [one["id"] for one in project["segments"][:3]] == [one["id"] for one in before["segments"]]
     motion = studio.motion(project)
     assert motion.shape[1] == 20 * sum(one["seconds"] for one in project["segments"])
     assert np.isfinite(motion).all()

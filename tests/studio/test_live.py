@@ -1,6 +1,7 @@
 """Live mode: steered by keys and the floor, kept with one key."""
 
 import numpy as np
+import pytest
 
 from tests.studio.studio import Studio
 
@@ -13,6 +14,7 @@ def done(studio: Studio, words: str) -> None:
     studio.page.wait_for_function(f"{at} > {begun + 1.0}")
 
 
+@pytest.mark.slow
 def test_somebody_is_steered_live_and_all_of_it_is_kept(studio: Studio):
     page = studio.page
     before = studio.project()
