@@ -14,15 +14,11 @@ def test_one_of_two_walks_a_path_and_only_the_second_is_drawn_for_new_words(stud
     project = studio.project()
     before = studio.motion(project)
     assert np.abs(before[1, -1, 0, [0, 2]] - [1.2, 0.8]).max() < 0.3
-    x, y = studio.middle(".track.other .block")
-    studio.page.mouse.click(x, y)
     studio.key("d")  # two blocks, of which the second changes
-    studio.drawn()
-    both = studio.motion()
-    studio.page.locator(".content .ruler").click(position={"x": 30, "y": 10})
     box = studio.page.locator(".content .ruler").bounding_box()
     studio.drag((box["x"] + 2, box["y"] + 12), (box["x"] + 2 * 84, box["y"] + 12), hold="Shift")
     studio.key("f")
+    both = studio.motion()
     studio.page.mouse.dblclick(*studio.middle(".track.other .block", 1))
     studio.page.keyboard.type("a person jumps")
     studio.key("Enter")
