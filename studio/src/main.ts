@@ -2,6 +2,7 @@
 
 import "./style/base.css";
 import "./style/help.css";
+import "./style/live.css";
 import "./style/panels.css";
 import "./style/timeline.css";
 import { type Parts, actions, keyOf, nudged } from "./app/actions";

@@ -16,7 +16,8 @@ import yaml
 from motionloom.errors import MotionloomError
 from motionloom.goals.fields import Field, listed
 from motionloom.goals.timeline import Timeline, read_timeline, timeline_of
-from motionloom.io.lined_yaml import Lined, meant, read_lined
+from motionloom.io.lined_yaml import meant, read_lined
+from motionloom.server.causes import keys_at
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project, Stored
 
@@ -366,38 +367,11 @@ def _as_file(text: str, project: Project) -> Iterator[Path]:
         place.write_text(text, encoding="utf-8")
         yield place
     except MotionloomError as error:
-        raise TimelineError(str(error).replace(str(place), "the timeline"), _where(place, str(error))) from None
+        raise TimelineError(str(error).replace(str(place), "the timeline"), keys_at(place, str(error))) from None
     except UnicodeEncodeError:
         raise MotionloomError("the timeline holds characters that are no text; write it in UTF-8") from None
     finally:
         place.unlink(missing_ok=True)
-
-
-def _where(place: Path, sentence: str) -> str:
-    """The keys of what stands on the line that a sentence about a timeline names."""
-    said = re.search(r", line (\d+): ", sentence)
-    if said is None:
-        return ""
-    line = int(said[1])
-    try:
-        found, names = read_lined(place), ""
-    except MotionloomError:  # it is no YAML
-        return ""
-    while isinstance(found.value, dict | list):
-        inner = found.value.items() if isinstance(found.value, dict) else enumerate(found.value)
-        above = [(key, one) for key, one in inner if (one.key_line or one.line) <= line]
-        if not above:
-            break
-        key, found = above[-1]
-        names += f".{key}" if isinstance(key, str) else f"[{key}]"
-        if (found.key_line or found.line) == line and not _begins_inside(found, line):
-            break
-    return names.removeprefix(".")
-
-
-def _begins_inside(found: Lined, line: int) -> bool:
-    """Whether a list or mapping of several keys begins on the line where its first entry stands."""
-    return not found.key_line and isinstance(found.value, dict | list) and found.line == line
 
 
 def read_timeline_json(value: Any, project: Project, limits: Limits) -> Timeline:
