@@ -248,8 +248,8 @@ def test_a_full_disk_leaves_the_folder_as_it_was(ready: Maker, monkeypatch: pyte
     before = everything()
     add = shard_module.writer
 
-    def full(kind: str, path: Path) -> Any:
-        made = add(kind, path)
+    def full(*given: Any, **options: Any) -> Any:
+        made = add(*given, **options)
         monkeypatch.setattr(made, "add", lambda *_: (_ for _ in ()).throw(OSError(errno.ENOSPC, "No space left")))
         return made
 

@@ -11,7 +11,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from motionloom.diffusion import SCHEDULES, Dct, Draw, Schedule, from_betas, from_noise
+from motionloom.diffusion import SCHEDULES, Dct, NoiseSource, Schedule, from_betas, from_noise
 from motionloom.lab.papers.humanmac import PARTS, Fixed, Padding, Target, padded, published_completion
 from motionloom.nets.predictor import NetConfig, TransLinear, waves
 from tests.conformance import runner
@@ -68,7 +68,7 @@ def test_names_and_shapes_of_the_weights_are_the_published_ones(recorded: Case) 
     assert len(found) == recorded.lists["n_entries"]
 
 
-def counted(draw: Draw) -> tuple[Draw, list[tuple[int, ...]]]:
+def counted(draw: NoiseSource) -> tuple[NoiseSource, list[tuple[int, ...]]]:
     shapes: list[tuple[int, ...]] = []
 
     def drawn(like: Tensor) -> Tensor:

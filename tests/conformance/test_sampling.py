@@ -15,7 +15,7 @@ from torch import Tensor
 from motionloom.diffusion import (
     DDPM,
     Denoiser,
-    Draw,
+    NoiseSource,
     chain,
     cosine,
     guide,
@@ -40,7 +40,7 @@ def to_motion(state: Tensor) -> np.ndarray:
     return state.numpy().swapaxes(1, 2)[:, :, None]
 
 
-def recorded_draw(recorded: Case) -> Draw:
+def recorded_draw(recorded: Case) -> NoiseSource:
     """The stream of noise of a run, one array after the other."""
     rng = stream(recorded.config["seed"], NOISE)
     return lambda like: to_state(normal(rng, recorded.config["shape"]))
@@ -91,7 +91,7 @@ def mask_of(recorded: Case) -> Tensor:
     return mask
 
 
-def start_of(recorded: Case, known: Tensor, draw: Draw) -> tuple[Tensor, int]:
+def start_of(recorded: Case, known: Tensor, draw: NoiseSource) -> tuple[Tensor, int]:
     """The starting state and its level."""
     schedule, skip = cosine(recorded.config["steps"]), recorded.config["skip"]
     level = schedule.steps - skip

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from motionloom.diffusion import Denoiser, Draw, Schedule, State
+from motionloom.diffusion import Denoiser, NoiseSource, Schedule, State
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def points(data: Tensor, schedule: Schedule) -> Denoiser:
     return denoise
 
 
-def shared_draw(seed: int) -> Draw:
+def shared_draw(seed: int) -> NoiseSource:
     """Quick noise for many rows, from one generator."""
     generator = torch.Generator().manual_seed(seed)
     return lambda like: torch.randn(like.shape, generator=generator, dtype=like.dtype)

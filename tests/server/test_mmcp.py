@@ -187,7 +187,7 @@ def test_rest_rotations_are_taken_out_and_put_back() -> None:
     generator = np.random.default_rng(6)
     turns = np.roll(rot.normalize(generator.normal(size=(3, len(rig.skeleton), 4))), -1, axis=-1)
     motion = rig.motion(rig.skeleton.names, turns, np.zeros((3, 3)), 20.0)
-    again = rig.told(motion)
+    again = rig.rotations_of(motion)
     assert np.abs(np.abs((turns * again).sum(-1)) - 1).max() < 1e-9
     assert np.abs(rig.skeleton.offsets[1:] - 1.2 * named_skeleton("mixamo").offsets[1:]).max() < 1e-9
 

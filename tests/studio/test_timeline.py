@@ -42,7 +42,7 @@ def test_blocks_are_added_split_duplicated_moved_and_deleted_by_keys(studio: Stu
 
 def test_undo_and_redo_go_through_everything(studio: Studio):
     first = studio.project()
-    studio.key("s")  # at the beginning there is nothing to split
+    studio.key("Home", "s")  # at the beginning there is nothing to split
     for _ in range(4):
         studio.key("d")
     assert len(studio.blocks()) == 5

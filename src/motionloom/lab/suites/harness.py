@@ -96,7 +96,7 @@ def takes_run(*, place: int = 0, first: str = "weights", weights: str = "default
 
     def wrap(suite: F) -> F:
         @wraps(suite)
-        def call(*args: Any, **given: Any) -> Any:
+        def _call(*args: Any, **given: Any) -> Any:
             if "run" in given or any(isinstance(one, Run) for one in args):
                 return suite(*args, **given)
             say(f"{suite.__module__}.{suite.__name__} with {first}, data and the like", "one with a Run of them")
@@ -105,7 +105,7 @@ def takes_run(*, place: int = 0, first: str = "weights", weights: str = "default
             kept = {field.name: given.pop(field.name) for field in fields(Run) if field.name in given}
             return suite(*args[:place], Run(**{"weights": weights, **kept}), *args[place + 1 :], **given)
 
-        return call  # type: ignore[return-value]
+        return _call  # type: ignore[return-value]
 
     return wrap
 

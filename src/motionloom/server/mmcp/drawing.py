@@ -65,7 +65,7 @@ def answer(models: Models, request: Any, progress: Progress) -> Iterator[Answer]
         drawn = _sample(models, request, rig, clock, asked, seed + number)
         motions.append(rig.put(clock.resampled(drawn)))
         progress(number + 1, count)
-    places = [rig.told_places(motion) for motion in motions]
+    places = [rig.places_of(motion) for motion in motions]
     free = [one for one in places if one is not None]
     yield Answer(
         np.stack([rig.rotations_of(motion) for motion in motions]), np.stack([motion.root for motion in motions]),

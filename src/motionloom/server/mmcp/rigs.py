@@ -74,7 +74,7 @@ class Rig:
         turned = rot.multiply(rot.inverse(np.array(parents))[None], rot.multiply(motion.rotations, self.rest[None]))
         return np.roll(rot.normalize(turned), -1, axis=-1)
 
-    def told_places(self, motion: Motion) -> Array | None:
+    def places_of(self, motion: Motion) -> Array | None:
         """(frames, joints, 3) places of joints in their parents' frames, the root's in the world; None: at rest."""
         if motion.translations is None:
             return None
