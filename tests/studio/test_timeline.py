@@ -15,9 +15,13 @@ def test_a_person_is_seen_and_moves(studio: Studio):
     assert not studio.faults
 
 
-def test_words_that_are_typed_make_another_motion(studio: Studio):
+@pytest.mark.parametrize("begun", ["key", "mouse"])
+def test_words_that_are_typed_make_another_motion(studio: Studio, begun: str):
     before = studio.motion()
-    studio.key("Enter")
+    if begun == "key":
+        studio.key("Enter")
+    else:
+        studio.page.mouse.dblclick(*studio.middle(".track.words .block"))
     studio.page.keyboard.type("a person jumps")
     studio.key("Enter")
     project = studio.project()

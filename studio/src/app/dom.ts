@@ -32,7 +32,6 @@ const HANDLERS = [
   "onpointerdown",
   "onfocus",
   "onblur",
-  "ondblclick",
   "ondragstart",
   "ondragover",
   "ondragleave",

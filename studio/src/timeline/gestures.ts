@@ -32,6 +32,11 @@ export function listen(app: App, view: TimelineView, root: HTMLElement): void {
   };
   root.addEventListener("pointerup", end);
   root.addEventListener("pointercancel", end);
+  // Clicks go to whoever captured the pointer, not to the block under it.
+  root.addEventListener("dblclick", (event) => {
+    const block = document.elementFromPoint(event.clientX, event.clientY)?.closest<HTMLElement>(".block");
+    if (block?.dataset.id) view.edit(block.dataset.id, block.dataset.drag === "second");
+  });
   root.addEventListener(
     "wheel",
     (event) => {

@@ -222,7 +222,6 @@ export class TimelineView {
         "data-key": one.id,
         "aria-label": `Block ${index + 1}: ${shown}, ${one.seconds} seconds`,
         onfocus: () => this.app.session.update({ selection: { kind: "segment", id: one.id } }),
-        ondblclick: () => this.edit(one.id, second),
       },
       words,
       h("small", {}, `${round(one.seconds)} s`),
