@@ -15,6 +15,7 @@ def test_one_of_two_walks_a_path_and_only_the_second_is_drawn_for_new_words(stud
     before = studio.motion(project)
     assert np.abs(before[1, -1, 0, [0, 2]] - [1.2, 0.8]).max() < 0.3
     studio.key("d")  # two blocks, of which the second changes
+    assert studio.motion().shape[1] == 80
     box = studio.page.locator(".content .ruler").bounding_box()
     studio.drag((box["x"] + 2, box["y"] + 12), (box["x"] + 2 * 84, box["y"] + 12), hold="Shift")
     studio.key("f")
