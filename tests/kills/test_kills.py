@@ -50,7 +50,7 @@ def test_compose_keeps_what_was_finished_and_shows_nothing_half_written(weights:
     """SIGINT and SIGTERM end it alike: the file has the frames that were finished, the same as without them."""
     words = ["compose", *["walk", "jump", "sit"] * 6, "--seconds", "1", "--steps", "3", "--weights", weights,
              "--out", "a.bvh", "--out", "b.npz"]  # fmt: skip
-    _, chosen = moments(words, tmp_path / "whole", kills(6), seed=SEED)
+    _, chosen = moments(words, tmp_path / "whole", kills(10), seed=SEED)
     right = {name: io.load(tmp_path / "whole" / name) for name in ("a.bvh", "b.npz")}
     some = 0
     for at in chosen:
@@ -115,7 +115,7 @@ def test_every_command_with_a_count_keeps_what_was_finished(
 ) -> None:
     """Several are drawn at a time: the first ones, those that were finished, are there, bit for bit."""
     words, count = counted(command, inputs, weights)
-    _, chosen = moments(words, tmp_path / "whole", kills(5 if command == "generate" else 2), seed=SEED)
+    _, chosen = moments(words, tmp_path / "whole", kills(8 if command == "generate" else 3), seed=SEED)
     names = sorted(path.name for path in finished(tmp_path / "whole", "*"))
     assert len(names) == count
     for at in chosen:
