@@ -122,6 +122,22 @@ def test_what_another_clip_moves_has_one_key_at_rest(tmp_path: Path) -> None:
     (held,) = [c for c in ours["channels"] if c["target"] == {"node": 23, "path": "translation"}]
     np.testing.assert_allclose(scene.values(ours["samplers"][held["sampler"]]["output"]), [[0.05, 0.02, 0.01]])
     assert scene.values(ours["samplers"][held["sampler"]]["input"]).tolist() == [[0.0]]
+    pose = load_character(path)
+    still = Motion(pose.skeleton, 30.0, np.zeros((1, 3)), np.tile(rot.IDENTITY, (1, len(pose.skeleton), 1)))
+    check_only_one_animation_is_new(path, pose.save(still, tmp_path / "pose.glb"))  # one frame needs no second clock
+
+
+def test_json_too_deep_to_be_written_again_is_refused(tmp_path: Path) -> None:
+    hero = Hero()
+    deep: list = []
+    for _ in range(700):
+        deep = [deep]
+    hero.json["extras"] = deep
+    character = load_character(hero.write(tmp_path / "hero.glb"))
+    still = Motion(SMPL22, 30.0, np.zeros((1, 3)), np.tile(rot.IDENTITY, (1, 22, 1)))
+    with pytest.raises(MotionloomError, match="too deep"):
+        character.save(retarget(still, character.skeleton), tmp_path / "out.glb")
+    assert not list(tmp_path.glob("out*"))
 
 
 def test_last_bones_may_be_stretched_or_mirrored_and_others_not(tmp_path: Path) -> None:

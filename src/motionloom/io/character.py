@@ -79,7 +79,7 @@ class Character:
         clock = new.add(np.arange(len(motion))[:, None] / motion.fps, bounds=True)
         keys = self._keys(motion)
         held = [] if replace else self._held({(node, path_) for node, path_, _ in keys})
-        start = new.add(np.zeros((1, 1)), bounds=True) if held else clock
+        start = new.add(np.zeros((1, 1)), bounds=True) if held and len(motion) > 1 else clock
         for node, path_, values in keys + held:
             times = clock if len(values) == len(motion) else start
             animation["samplers"].append({"input": times, "output": new.add(values), "interpolation": "LINEAR"})
