@@ -95,7 +95,7 @@ def test_a_skeleton_and_its_recording_become_a_clip(studio: Studio, tmp_path: Pa
 
 
 def test_other_peoples_characters_are_on_the_stage(studio: Studio):
-    for name in ("vrm1_example.vrm", "m2m_mixamo.glb"):
+    for name in ("vrm1_example.vrm", "gdbot.glb"):
         studio.drop(shared(f"rigs/{name}"))
         studio.page.wait_for_selector(f"#inspector b:text-is('{name}')")
         studio.page.wait_for_selector("#canvas[data-character]")
