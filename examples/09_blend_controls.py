@@ -36,7 +36,7 @@ def of_the_wrist(level: int) -> float:
 
 
 shipped = adapters()
-chosen = [Adapter.load(name, prior) for name in ("trajectory", "right_wrist") if name in shipped]
+chosen = [Adapter.load(name, prior) for name in ("trajectory", "any") if name in shipped]
 weighted = list(zip(chosen, [of_the_path, of_the_wrist])) if len(chosen) == 2 else chosen
 [made] = control(prior, "a person walks", goal, adapters=weighted, seed=1, steps=8)
 save(made.motion, "blended.bvh")

@@ -18,7 +18,7 @@ from motionloom.tasks.control import Net
 from motionloom.tasks.sampling import BATCH as ROWS
 from motionloom.tasks.sampling import Observed
 from motionloom.tasks.text import SOLVER, SPACING, sample_features, smooth, to_motion
-from motionloom.weights.adapter import Adapter, adapted
+from motionloom.weights.adapter import Adapter, adapted, adapters
 from motionloom.weights.prior import Prior
 
 UNCONTROLLED, EXPORTED = "uncontrolled", "uncontrolled, as exported"
@@ -67,11 +67,12 @@ def fits(one: Kind, name: str) -> bool:
 
 
 def maker(prior: Prior, how: Sampling) -> Maker:
-    """The methods of a prior and the adapters that are shipped for it."""
+    """The methods of a prior and the adapters that are shipped for it; a control without one of its own takes ``any``."""
+    shipped = adapters()
 
     @cache
     def net(name: str):
-        return adapted(prior.net, Adapter.load(name, prior)).to(prior.mean.device)
+        return adapted(prior.net, Adapter.load(name if name in shipped else "any", prior)).to(prior.mean.device)
 
     def make(one: Kind, name: str) -> Method:
         if name in (UNCONTROLLED, EXPORTED):
