@@ -43,6 +43,18 @@ def test_export_puts_a_walk_on_a_character() -> None:
     assert open_glb("moving.glb").clips == ["go"]
 
 
+def test_a_character_that_lies_at_rest_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    lying = Hero()
+    lying.json["nodes"][22]["rotation"] = [-(0.5**0.5), 0, 0, 0.5**0.5]
+    lying.write(Path("lying.glb"))
+    assert main(["export", "walk.bvh", "--skeleton", "lying.glb", "--out", "moving.glb"]) == 0
+    assert "does not stand along +Y at rest" in capsys.readouterr().err
+    body = to_smpl22(load_glb("moving.glb")).positions()
+    assert (body[:, 15, 1] - body[:, 0, 1]).min() > 0.3
+    assert main(["export", "walk.bvh", "--skeleton", "hero.glb", "--out", "other.glb"]) == 0
+    assert "+Y" not in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     "words",
     [

@@ -119,6 +119,15 @@ def test_a_character_keeps_its_mesh(tmp_path: Path) -> None:
     assert same_mesh(Hero(seed=4).write(tmp_path / "hero.glb"), tmp_path) < 1e-4
 
 
+def test_a_mesh_that_cannot_be_read_is_said(tmp_path: Path) -> None:
+    hero = Hero(seed=4)
+    [piece] = hero.json["meshes"][0]["primitives"]
+    hero.json["accessors"][piece["attributes"]["POSITION"]]["sparse"] = {}
+    character = load_character(hero.write(tmp_path / "hero.glb"))
+    with pytest.warns(UserWarning, match="1 of its 1 pieces of mesh are left out"):
+        assert character.surfaces(remark=True) == []
+
+
 @pytest.mark.parametrize("name", ["kaykit_knight", "sophia", "robot_expressive", "gdbot"])
 def test_other_peoples_characters_keep_their_meshes(tmp_path: Path, name: str) -> None:
     assert same_mesh(shared(f"rigs/{name}.glb"), tmp_path) < 1e-4

@@ -18,6 +18,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
+import pytest
+
+needs_signals = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs forks and signals")
+SEED = 7
+"""Of the moments that are drawn."""
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGKILL]
 PRELOADED = ["tests.kills.programs", "motionloom.cli.generate", "motionloom.tasks.long", "motionloom.tasks.text",
              "motionloom.data.build", "tests.train.runs"]  # fmt: skip
@@ -55,6 +60,18 @@ def run(words: Sequence[str], folder: Path, *, at: int = 0, number: int = 0) -> 
     (log / "marks").unlink(missing_ok=True)
     code = running.exitcode if running.exitcode is not None else 1
     return Ended(code, (log / "out").read_text(), (log / "err").read_text(), marks[0], tuple(marks[1:]))
+
+
+def kills(usual: int) -> int:
+    """How many moments of each are tried: ``KILLS`` of the environment, else ``usual``."""
+    return int(os.environ.get("KILLS", usual))
+
+
+def ended_by(number: int, ended: Ended) -> bool:
+    """Whether the command ended as this signal ends commands, with one sentence."""
+    if number == signal.SIGKILL:
+        return ended.code == -signal.SIGKILL
+    return ended.code == 130 and ended.said.count("\n") <= 1 and "Traceback" not in ended.said
 
 
 def moments(words: Sequence[str], folder: Path, count: int, *, seed: int) -> tuple[Ended, list[int]]:

@@ -1,6 +1,7 @@
 """What the commands that write motions share about skeletons: ``--skeleton`` and how a motion is put on it."""
 
 import argparse
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -87,7 +88,7 @@ class Target:
         if self.character is not None and path.suffix.lower() == ".usda":
             from motionloom.io.usda import save_usda
 
-            return save_usda([motion], path, surfaces=self.character.surfaces() or None)
+            return save_usda([motion], path, surfaces=self.character.surfaces(remark=True) or None)
         if path.suffix.lower() == ".bvh":
             from motionloom.io.bvh_writer import save_bvh
 
@@ -144,6 +145,12 @@ def _check_humanoid(target: Target) -> None:
         body = read_body(target.skeleton, target.joint_map)
     except MotionloomError as error:
         raise MotionloomError(f"--skeleton {target.name}: {error} (--target-map)") from None
+    if body.upright and body.up[1] < 0.9:
+        warnings.warn(
+            f"--skeleton {target.name} does not stand along +Y at rest (it lies, or was made with another axis up); "
+            "its motions do",
+            stacklevel=2,
+        )
     if target.hands != "as-is":
         check_fingers(body)
 

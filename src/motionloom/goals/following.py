@@ -43,9 +43,9 @@ def tracks(positions: np.ndarray, joints: Sequence[int], *, frames: int, at: Seq
     for joint in joints:
         goal.positions[rows, joint] = positions[rows, joint]
         goal.asked[rows, joint] = True
-    return replace(goal, start=stands(positions[0]))
+    return replace(goal, start=ground_pose(positions[0]))
 
 
-def stands(places: np.ndarray) -> GroundPose:
+def ground_pose(places: np.ndarray) -> GroundPose:
     """Where a person of places (22, 3) stands."""
     return GroundPose.of(places[0], body_facing(places))

@@ -17,7 +17,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features.humanml import resample_positions
 from motionloom.goals.drawing import read_drawing
 from motionloom.goals.fields import Field, listed
-from motionloom.goals.following import follow, stands, tracks
+from motionloom.goals.following import follow, ground_pose, tracks
 from motionloom.goals.goal import FPS, Goal, merged, placement_of, turn_between
 from motionloom.goals.paths import CURVES, WALKING, curve, lengths_along, root_path, through, turned_to
 from motionloom.goals.reach import check_reach
@@ -374,7 +374,7 @@ class _Reader:
         if facing is not None:
             place = replace(place, facing=facing)
         result = Goal.nothing(self.frames)
-        result.positions[frame] = place.to_world(stands(body).from_world(body))
+        result.positions[frame] = place.to_world(ground_pose(body).from_world(body))
         result.asked[frame] = True
         return replace(result, start=place) if frame == 0 else result
 

@@ -49,9 +49,9 @@ class Character:
         """The skeleton that motions must have to be written into the file."""
         return self.rig.skeleton
 
-    def surfaces(self) -> list[Surface]:
-        """The meshes of the file at rest, on `skeleton`; those that are compressed are left out."""
-        return read_surfaces(self.file.document, self.nodes, self.file.parents, self.rig)
+    def surfaces(self, *, remark: bool = False) -> list[Surface]:
+        """The meshes of the file at rest, on `skeleton`; what is left out (compressed) is said with ``remark``."""
+        return read_surfaces(self.file.document, self.nodes, self.file.parents, self.rig, remark=remark)
 
     def save(self, motion: Motion, path: str | Path, *, name: str | None = None, replace: bool = False) -> Path:
         """Write the character's own file with one more animation, or with ``replace`` this one only.

@@ -1,5 +1,6 @@
 """A character's meshes at rest, with the joints that carry them: for files that are not the character's own."""
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,15 +41,18 @@ class Surface:
     """Red, green, blue, linear, 0 to 1."""
 
 
-def read_surfaces(document: Document, nodes: list[Node], parents: list[int], rig: Rig) -> list[Surface]:
+def read_surfaces(
+    document: Document, nodes: list[Node], parents: list[int], rig: Rig, *, remark: bool = False
+) -> list[Surface]:
     """The meshes that hang on a rig, skinned or not, in the rig's rest pose.
 
-    What is compressed (Draco, meshopt) or stored in another unusual way is left out, so that the list may be empty.
+    What is compressed (Draco, meshopt) or stored in another unusual way is left out, so that the list may be empty;
+    ``remark``: with a warning.
     Raises `MotionloomError` for a file that declares more than memory should hold.
     """
     rest = _Rest(nodes, parents, rig)
     found: list[Surface] = []
-    pieces = vertices = 0
+    pieces = vertices = unread = 0
     for number, entry in enumerate(document.items("nodes")):
         if entry.get("mesh") is None:
             continue
@@ -59,12 +63,18 @@ def read_surfaces(document: Document, nodes: list[Node], parents: list[int], rig
             try:
                 surface = _surface(document, entry, number, piece, rest)
             except MotionloomError:
+                unread += 1
                 continue  # compressed, sparse or damaged: what moves does not depend on it
             if surface is not None:
                 found.append(surface)
                 vertices += len(surface.points)
             if pieces > MAX_PIECES or vertices > MAX_VERTICES:
                 raise document.bad(f"it has more than {MAX_PIECES} pieces of mesh or {MAX_VERTICES:,} vertices")
+    if remark and unread:
+        warnings.warn(
+            f"{document.name}: {unread} of its {pieces} pieces of mesh are left out (compressed, sparse or damaged)",
+            stacklevel=2,
+        )
     return found
 
 

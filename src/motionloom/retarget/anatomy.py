@@ -128,8 +128,8 @@ def read_body(skeleton: Skeleton, override: Override | None = None) -> Body:
     drivers = found.drivers(skeleton)
     if axes is not None:
         # of the uniform person, whose legs differ by millimetres, it is measured, as when the weights were trained
-        stands = skeleton.on_floor and axes[1][1] > 0.9 and skeleton != SMPL22
-        height = float(rest[list(TOES), 1].mean()) if stands else _toe_height(skeleton, found, rest, axes[1])
+        upright = skeleton.on_floor and axes[1][1] > 0.9 and skeleton != SMPL22
+        height = float(rest[list(TOES), 1].mean()) if upright else _toe_height(skeleton, found, rest, axes[1])
         return Body(skeleton, points, drivers, rest, _rest_frames(rest, axes), True, axes[1], height, tips)
     known = _is_bandai(skeleton)
     frames = _bandai_frames(rest) if known else _odd_frames(rest)

@@ -350,9 +350,9 @@ def _on_soles(ankles: Array, goals: _Goals, lack: Array, fps: float, *, deepest:
     whole = float(np.median(common[flat])) if flat.sum() >= 3 else 0.0
     reach = max(1, round(0.2 * fps))
     near = np.lib.stride_tricks.sliding_window_view(np.pad(flat, reach), 2 * reach + 1).max(axis=1)
-    stands = _smooth(near.astype(np.float64)[:, None], reach)[:, 0]
+    planted = _smooth(near.astype(np.float64)[:, None], reach)[:, 0]
     lack = np.maximum(lack - whole, 0.0)
-    lack = lack - (lack.min(axis=1) * (1.0 - stands))[:, None]
+    lack = lack - (lack.min(axis=1) * (1.0 - planted))[:, None]
     return ankles + (whole + lack[..., None]) * np.array([0.0, 1.0, 0.0]), whole
 
 

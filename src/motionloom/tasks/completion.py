@@ -66,22 +66,22 @@ def complete(
     can.
     """
     chosen = PredictionSampling.of(sampling, settings)
-    told = predictor.condition(features, mask, pose)
-    yes, no = (torch.full((len(told),), flag, device=told.device) for flag in (True, False))
+    condition = predictor.condition(features, mask, pose)
+    yes, no = (torch.full((len(condition),), flag, device=condition.device) for flag in (True, False))
 
     def net(x: Tensor, level: int, cond: tuple[Tensor, Tensor]) -> Tensor:
         return predictor.denoiser(*cond)(x, level)
 
     draw = row_draw(seeds)
-    made = chosen.temperature * draw(torch.empty(len(told), *predictor.mean.shape, device=told.device))
+    made = chosen.temperature * draw(torch.empty(len(condition), *predictor.mean.shape, device=condition.device))
     way = chosen.levels(predictor.schedule)
     walk = sample(
-        guide(net, (told, yes), (told, no), chosen.guidance), made,
+        guide(net, (condition, yes), (condition, no), chosen.guidance), made,
         levels=way, solver=SOLVERS[chosen.solver], schedule=predictor.schedule, draw=draw,
     )  # fmt: skip
     if poses is not None:
         view = View(lambda states: poses(predictor.to_features(states, pose)))
-        walk = view.reported(walk, len(way) - 1, range(len(told)))
+        walk = view.reported(walk, len(way) - 1, range(len(condition)))
     for snapshot in walk:
         made = snapshot.state
     return joined(predictor.to_features(made, pose), features, mask, ease=max(round(EASE * predictor.fps), 1))

@@ -212,8 +212,8 @@ def paint_body(
     middles = ((depth[a] + depth[b]) / 2 + 0.08 * shape.height * inside).tolist()
     for i, (parent, child) in enumerate(shape.bones):
         if child not in shape.trunk:
-            stands = not tinted and _stands(shape, frame, parent, child)
-            parts.append((middles[i], outer[i], inner[i], CONTACT if stands else colours[shape.sides[child]]))
+            planted = not tinted and _stands(shape, frame, parent, child)
+            parts.append((middles[i], outer[i], inner[i], CONTACT if planted else colours[shape.sides[child]]))
     for joints, radius in ((shape.chest, 0.047), (shape.hips, 0.056)):
         if joints:
             at, r = seen[list(joints)], radius * shape.height * scale[list(joints)]

@@ -216,7 +216,7 @@ def published_futures(
     if min(count, rows) < 1:
         raise MotionloomError(f"there must be at least one future and one row at a time, not {count} and {rows}")
     place = predictor.layout.place(past[:, -1])
-    told = torch.tensor(told_samples(count, told_share, coin=coin))
+    conditioned = torch.tensor(told_samples(count, told_share, coin=coin))
     observed = torch.from_numpy(predictor.layout.encode(past, place)).float().to(predictor.mean.device)
     made: list[Tensor] = []
     for first in range(0, len(past) * count, rows):
@@ -224,22 +224,22 @@ def published_futures(
         window, sample = index // count, index % count
         seeds = [row_seed(seed, w, i) for w, i in zip(window.tolist(), sample.tolist())]
         own = observed[window.to(observed.device)]
-        made.append(_complete(predictor, own, told[sample], draw=row_draw(seeds), steps=steps).cpu())
+        made.append(_complete(predictor, own, conditioned[sample], draw=row_draw(seeds), steps=steps).cpu())
     future = torch.cat(made)[:, predictor.observed :].unflatten(0, (len(past), count)).double().numpy()
     return np.stack([predictor.layout.decode(future[:, i], place) for i in range(count)], axis=1)
 
 
 @torch.inference_mode()
 def _complete(predictor: Predictor, observed: Tensor, keep: Tensor, *, draw: NoiseSource, steps: int) -> Tensor:
-    """Windows (rows, frames, channels) after observed ones (rows, h, channels); ``keep`` (rows,): which are told."""
+    """Windows (rows, frames, channels) after observed ones (rows, h, channels); ``keep`` (rows,): which see it."""
     rows, h, channels = observed.shape
     pose, schedule = observed[:, -1], predictor.schedule
     window = padded(observed, predictor.frames)
     mask = torch.zeros(rows, predictor.frames, channels, device=observed.device)
     mask[:, :h] = 1
     known = predictor.to_state(window, pose)
-    told = predictor.condition(window, mask[..., ::3], pose) if bool(keep.any()) else None
-    denoise = predictor.denoiser(told, None if bool(keep.all()) else keep.to(observed.device))
+    condition = predictor.condition(window, mask[..., ::3], pose) if bool(keep.any()) else None
+    denoise = predictor.denoiser(condition, None if bool(keep.all()) else keep.to(observed.device))
     constrain = mixed_in_time(
         [Held(known, mask.bool())], lambda x: predictor.to_features(x, pose), lambda x: predictor.to_state(x, pose),
         schedule, draw,

@@ -254,18 +254,18 @@ def on_ground(motion: Motion, ground: Array) -> Motion:
     feet = positions[:, list(FEET)]
     away = np.linalg.norm(feet[:, :, None, [0, 2]] - ground[None, None, :, :2], axis=-1)
     near, height = away.min(axis=-1) < NEAR, ground[away.argmin(axis=-1), 2]
-    stands = planted & near
-    frames = np.flatnonzero(stands.any(axis=1))
+    standing = planted & near
+    frames = np.flatnonzero(standing.any(axis=1))
     if len(frames) == 0:
         return motion
-    level = [float(height[frame][stands[frame]].mean()) for frame in frames]
+    level = [float(height[frame][standing[frame]].mean()) for frame in frames]
     rise = np.interp(np.arange(len(motion)), frames, level)
     kernel = np.hanning(9)[1:-1] / np.hanning(9)[1:-1].sum()
     rise = np.convolve(np.pad(rise, 3, mode="edge"), kernel, mode="valid")
     raised = replace(motion, root=motion.root + rise[:, None] * [0.0, 1.0, 0.0])
     goal, joints = Goal.nothing(len(motion)), list(FEET)
     for foot, joint in enumerate(joints):
-        at = stands[:, foot]
+        at = standing[:, foot]
         goal.positions[at, joint] = feet[at, foot] + height[at, foot, None] * [0.0, 1.0, 0.0]
         goal.asked[at, joint] = True
     return fit(raised, goal)
