@@ -156,3 +156,30 @@ def test_climbing_stays_up_and_jumping_comes_down() -> None:
     assert gestures.stance_rise(p[::-1], FPS) < 0.01
     assert gestures.stance_rise(jumping(0.4), FPS) < 0.1
     assert gestures.stance_rise(standing()[:3], FPS) == 0
+
+
+def sitting(high: float, *, ahead: float = 0.4, seconds: float = 3.0) -> np.ndarray:
+    """Standing for a second, then the hips at ``high`` metres with the feet on the floor ``ahead`` of them."""
+    p = standing(seconds + 1.0)
+    still = round(FPS)
+    drop = np.where(np.arange(len(p)) < still, 0.0, p[0, J["left_hip"], 1] - high)
+    feet = [J[f"{side}_{joint}"] for side in ("left", "right") for joint in ("ankle", "foot")]
+    rest = [j for j in range(22) if j not in feet]
+    p[:, rest, 1] -= drop[:, None]
+    p[still:, feet, 2] += ahead
+    for side in ("left", "right"):  # knees above the feet, legs as long as they are
+        p[still:, J[f"{side}_knee"]] = p[still:, J[f"{side}_ankle"]] + [0.0, 0.42, 0.0]
+    return moved(p, np.full((len(p), 3), [1.0, 0.0, 2.0]))
+
+
+def test_a_seat_belongs_where_somebody_sits() -> None:
+    (seat,) = gestures.seats(sitting(0.54), FPS)
+    assert seat.height == pytest.approx(0.54 - gestures.FLESH, abs=0.01)
+    assert (seat.begin, seat.end) == (pytest.approx(1.0, abs=0.2), pytest.approx(4.0, abs=0.1))
+    p = sitting(0.54)
+    assert (seat.x, seat.z) == (pytest.approx(p[-1, 0, 0]), pytest.approx(p[-1, 0, 2]))
+
+
+def test_who_stands_walks_squats_or_sits_on_the_floor_needs_no_seat() -> None:
+    for p in (standing(), walking(1.2), sitting(0.5, ahead=0.0), sitting(0.12), sitting(0.54, seconds=0.3)):
+        assert gestures.seats(p, FPS) == []

@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,7 @@ from motionloom.cli.writing import check_overwriting
 
 if TYPE_CHECKING:
     from motionloom.goals.timeline import Timeline
+    from motionloom.kinematics.gestures import Seat
     from motionloom.motion import Motion
     from motionloom.weights.prior import Prior
 
@@ -72,15 +74,39 @@ def _generate(arguments: argparse.Namespace) -> int:
     remarks = remark_unknown(prior, [segment.text for found in timelines.values() for segment in found.segments])
     made = finished_motions(files, captions, target, unit=arguments.out_unit, rate=arguments.fps)
     drawn = _drawn(arguments, prior, [timelines[caption] for caption in captions])
-    interrupted = made.take([motion] for motion in drawn)
+    seated: list[list[Seat]] = []
+    interrupted = made.take([motion] for motion in _noting(seated, drawn))
     motions = [
-        {"prompt": caption, "seed": arguments.seed + i, "segments": _segments(timelines[caption])}
-        for i, caption in enumerate(captions[: made.count])
-    ]
+        {"prompt": caption, "seed": arguments.seed + i, "segments": _segments(timelines[caption]),
+         "seats": [asdict(seat) for seat in seats]}
+        for i, (caption, seats) in enumerate(zip(captions[: made.count], seated))
+    ]  # fmt: skip
+    _remark_seats(seated[: made.count])
     length = SECONDS if arguments.seconds is None else arguments.seconds
     about = {"motions": motions, "seconds": length, "weights": str(arguments.weights), "remarks": remarks}
     report(arguments, about, made.written, made.sampling)
     return made.ended(interrupted)
+
+
+def _noting(seated: "list[list[Seat]]", motions: "Iterator[Motion]") -> "Iterator[Motion]":
+    """The motions as they come; the seats of each are put into ``seated``."""
+    from motionloom.kinematics.gestures import seats
+
+    for motion in motions:
+        seated.append(seats(motion.positions(), motion.fps))
+        yield motion
+
+
+def _remark_seats(seated: "list[list[Seat]]") -> None:
+    """Say on stderr where a seat belongs: nothing is drawn but the person."""
+    for number, seats in enumerate(seated, start=1):
+        whose = f"motion {number} " if len(seated) > 1 else ""
+        for one in seats[:3]:
+            print(
+                f"motionloom: {whose}sits from {one.begin:.1f} to {one.end:.1f} s: a seat {one.height:.2f} m high "
+                f"belongs at x {one.x:.2f}, z {one.z:.2f} m",
+                file=sys.stderr,
+            )
 
 
 def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str) -> "Timeline":

@@ -120,6 +120,42 @@ def torso_inclination(positions: np.ndarray) -> Array:
     return np.arctan2(np.linalg.norm(spine[:, [0, 2]], axis=-1), spine[:, 1])
 
 
+@dataclass(frozen=True)
+class Seat:
+    """What somebody sits on who is drawn without it: when, how high, and where."""
+
+    begin: float
+    end: float
+    """Seconds."""
+    height: float
+    """Metres of its top over the floor y = 0, from the middle of the hip joints."""
+    x: float
+    z: float
+    """Metres: below the pelvis."""
+
+
+FLESH = 0.09
+"""Metres from a hip joint down to what one sits on."""
+
+
+def seats(positions: np.ndarray, fps: float, *, shortest: float = 0.5) -> list[Seat]:
+    """Where somebody sits for at least ``shortest`` seconds: still, upright, low, with the feet ahead and on the floor.
+
+    Who sits on the floor itself needs no seat and has none here; who squats, kneels or crouches has the feet below.
+    """
+    p = np.asarray(positions, dtype=np.float64)
+    leg, hips = leg_length(p), p[:, [J["left_hip"], J["right_hip"]], 1].mean(axis=1)
+    still = np.linalg.norm(smooth(velocity(p[:, 0], fps), odd(fps / 4)), axis=-1) < 0.25
+    ahead = in_body(p)[:, ANKLES, 2].mean(axis=1) > 0.12 * leg
+    low = (hips - p[:, ANKLES, 1].min(axis=1) < 0.7 * leg) & (hips > FLESH + 0.15)
+    sits = still & ahead & low & (torso_inclination(p) < np.radians(50)) & (p[:, ANKLES, 1].max(axis=1) < 0.3 * leg)
+    return [
+        Seat(a / fps, b / fps, float(np.median(hips[a:b])) - FLESH, *np.median(p[a:b, 0][:, [0, 2]], axis=0).tolist())
+        for a, b in true_spans(sits)
+        if b - a >= shortest * fps
+    ]
+
+
 def forward_bend(positions: np.ndarray) -> Array:
     """(frames,) radians by which pelvis to neck leans to where the person faces; backwards is negative."""
     spine = in_body(positions)[:, J["neck"]] - in_body(positions)[:, 0]
