@@ -167,5 +167,5 @@ def test_the_wheel_carries_every_file_of_the_package(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not WEIGHTS, reason="no shipped weights in src/motionloom/weights")
 def test_shipped_weights_are_small() -> None:
-    """Each shipped weight file stays under 40 MB."""
-    assert all(w.stat().st_size < 40e6 for w in WEIGHTS)
+    """Each shipped weight file stays under 45 MB."""
+    assert all(w.stat().st_size < 45e6 for w in WEIGHTS)
