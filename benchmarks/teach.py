@@ -133,7 +133,7 @@ ACTIONS = (
     Action("flip", "a person does a flip", ("a person does a flip", "someone does a somersault in the air"),
            ("88_01", "87_b1", "90_08"), r"flip|spring|somersault", flip),
 )  # fmt: skip
-"""``recipes/everyday.toml`` leaves their clips out of the set that the default prior is trained on."""
+"""``recipes/default.toml`` leaves their clips out of the set that the default prior is trained on."""
 
 
 def find_clips(packs: Sequence[Path]) -> list[dict[str, Any]]:
