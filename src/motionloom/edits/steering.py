@@ -155,6 +155,12 @@ def _plan(goal: Goal, first: int, width: float) -> _Plan:
     )  # fmt: skip
 
 
+def _times(first: Array, second: Array) -> Array:
+    """The matrix product, by torch: numpy would start threads of its own, which then wait, on the cores that the
+    network's threads need for its next estimate."""
+    return (torch.from_numpy(first) @ torch.from_numpy(second)).numpy()
+
+
 def _bell(frames: int, width: float) -> Array:
     lag = np.arange(frames)[:, None] - np.arange(frames)
     return np.exp(-0.5 * (lag / width) ** 2)
@@ -168,8 +174,10 @@ def _summed(velocity: Array, first: int) -> Array:
 
 def _gain(covariance: Array, asked: NDArray[np.intp], noise: Array) -> Array:
     """(rows, asked): the posterior mean from what is seen at ``asked``, with noise of these standard deviations."""
+    if not len(asked):
+        return np.zeros((len(covariance), 0))
     inner = covariance[np.ix_(asked, asked)] + np.diag(noise**2)
-    return np.asarray(np.linalg.solve(inner, covariance[asked]).T, dtype=np.float64)
+    return torch.linalg.solve(torch.from_numpy(inner), torch.from_numpy(covariance[asked])).numpy().T
 
 
 def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Array | None) -> _Limbs | None:
@@ -180,7 +188,7 @@ def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Ar
     if still is not None:
         inner += still[np.ix_(t, t)]
     inner[np.diag_indices_from(inner)] += EXACT**2
-    return _Limbs((t, j), np.asarray(np.linalg.inv(inner), dtype=np.float64), together)
+    return _Limbs((t, j), torch.linalg.inv(torch.from_numpy(inner)).numpy(), together)
 
 
 def _thinned(asked: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -243,16 +251,18 @@ def _bent(features: Array, plan: _Plan, known: int) -> Array:
     """Features (frames, 263), not standardised, changed to meet the goal; of which some are ``known``."""
     denoised = _decoded(features, plan.first)
     error = np.where(plan.goal.asked, plan.goal.positions - denoised.world(), 0.0)
-    path = denoised.path + plan.move @ _asked_of_root(denoised.world(), error, plan.goal)[plan.moving]
+    path = denoised.path + _times(plan.move, _asked_of_root(denoised.world(), error, plan.goal)[plan.moving])
     facing = denoised.facing + _turning_with(denoised.path, path, plan.first)
     denoised = replace(denoised, path=path, facing=facing)
     if len(plan.lifting):
         local = denoised.local.copy()
-        local[..., 1] += np.outer(plan.lift @ _out_of_reach(denoised.world(), plan.goal)[plan.lifting], _CARRIED)
+        local[..., 1] += np.outer(
+            _times(plan.lift, _out_of_reach(denoised.world(), plan.goal)[plan.lifting]), _CARRIED
+        )
         denoised = replace(denoised, local=local)
     if len(plan.turning):
         denoised = replace(
-            denoised, facing=facing + plan.turn @ _facing_error(denoised.world(), plan.goal)[plan.turning]
+            denoised, facing=facing + _times(plan.turn, _facing_error(denoised.world(), plan.goal)[plan.turning])
         )
     error = np.where(plan.goal.asked, plan.goal.positions - denoised.world(), 0.0)
     far = np.linalg.norm(error[:, 1:], axis=-1, keepdims=True)
@@ -262,10 +272,10 @@ def _bent(features: Array, plan: _Plan, known: int) -> Array:
         if limbs is None:
             continue
         pull = np.zeros(error.shape[:2])
-        pull[limbs.asked] = limbs.inverse @ error[..., c][limbs.asked]
-        change[..., c] = plan.body @ pull @ limbs.together
+        pull[limbs.asked] = _times(limbs.inverse, error[..., c][limbs.asked])
+        change[..., c] = _times(plan.body, pull @ limbs.together)
         if c != 1:
-            path[:, c // 2] += plan.still @ pull.sum(1)
+            path[:, c // 2] += _times(plan.still, pull.sum(1))
     local = denoised.local + _turned(change, -denoised.facing[:-1, None])
     denoised = replace(denoised, path=path, local=local)
     steps = _standing(denoised.world(), features[:, LAYOUT["contacts"]], plan.goal, known)
@@ -332,6 +342,8 @@ def _asked_of_root(places: Array, error: Array, goal: Goal) -> Array:
     far = np.linalg.norm(error, axis=-1, keepdims=True)
     beyond = (error * np.clip(1 - _SLACKS[:, None] / far.clip(1e-9), 0, None))[..., [0, 2]]
     for joint, (base, reach) in _REACH.items():
+        if not goal.asked[:, joint].any():
+            continue
         line = np.where(goal.asked[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
         room = np.sqrt((reach**2 - line[:, 1] ** 2).clip((0.2 * reach) ** 2))
         flat = line[:, [0, 2]]
@@ -361,7 +373,7 @@ def _turning_with(old: Array, new: Array, first: int) -> Array:
     ways = [np.append(way, way[-1]) for way in ways]
     turn = ways[1] * ways[0].conj()
     kernel = _bell(len(turn), _TURN_OVER)
-    turn = kernel @ turn + kernel.sum(1) * _SLOW**2  # where nobody goes anywhere nothing turns
+    turn = _times(kernel.astype(complex), turn) + kernel.sum(1) * _SLOW**2  # where nobody goes anywhere nothing turns
     angle = np.unwrap(np.angle(turn))
     start = np.arange(len(turn)) - first
     return (angle - 2 * np.pi * np.round(angle[first] / (2 * np.pi))) * (1 - np.exp(-0.5 * (start / _TURN_OVER) ** 2))
