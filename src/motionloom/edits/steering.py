@@ -147,11 +147,13 @@ def _plan(goal: Goal, first: int, width: float) -> _Plan:
     turning = np.flatnonzero(goal.facing_asked)
     lifting = np.flatnonzero(goal.asked[:, list(_REACH)].all(axis=-1).any(axis=-1) & ~goal.asked[:, 0, 1])
     still = _STILL**2 * pace
-    limbs = tuple(_limb_plan(goal.asked[..., c], _TOGETHER[c], body, None if c == 1 else still) for c in range(3))
+    x, y = (_limb_plan(goal.asked[..., c], _TOGETHER[c], body, still if c == 0 else None) for c in (0, 1))
+    same = np.array_equal(goal.asked[..., 0], goal.asked[..., 2])
+    z = x if same else _limb_plan(goal.asked[..., 2], _TOGETHER[2], body, still)
     return _Plan(
         goal, first, moving, _gain(_PACE**2 * pace, moving, noise),
         turning, _gain(_YAW**2 * pace, turning, np.full(len(turning), 0.02)),
-        lifting, _gain(_LIFT**2 * body, lifting, np.full(len(lifting), FEW)), limbs, body, still[:, :frames],
+        lifting, _gain(_LIFT**2 * body, lifting, np.full(len(lifting), FEW)), (x, y, z), body, still[:, :frames],
     )  # fmt: skip
 
 
@@ -256,9 +258,7 @@ def _bent(features: Array, plan: _Plan, known: int) -> Array:
     denoised = replace(denoised, path=path, facing=facing)
     if len(plan.lifting):
         local = denoised.local.copy()
-        local[..., 1] += np.outer(
-            _times(plan.lift, _out_of_reach(denoised.world(), plan.goal)[plan.lifting]), _CARRIED
-        )
+        local[..., 1] += np.outer(_times(plan.lift, _out_of_reach(denoised.world(), plan.goal)[plan.lifting]), _CARRIED)
         denoised = replace(denoised, local=local)
     if len(plan.turning):
         denoised = replace(
