@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from motionloom.diffusion import Denoiser
+from motionloom.edits.reach import REACH, lowered, out_of_reach, room_above
 from motionloom.edits.stances import EASE, stilled
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
@@ -39,12 +40,11 @@ _PACE, _YAW = 0.015, 0.03
 """Standard deviations of the root's velocity (metres a frame) and of the heading's (radians a frame)."""
 _STILL, _HEIGHT = 0.003, 0.06
 """The same for the root's velocity where a limb can do it (metres a frame), and for its going up and down (metres)."""
-_LIFT, _HOPELESS = 0.3, 1.0
-"""Metres that the body goes up or down to bring a target into reach; the need beyond which it does not try."""
+_LIFT = 0.3
+"""Standard deviation of how far the body goes up or down to bring a target into reach (metres)."""
 _WIDTHS = ((0.9, 12.0), (0.5, 8.0), (0.0, 5.0))
 """Frames over which a change is spread, from noises (of the schedule) above the first number of each pair."""
 _SWING, _SLACK = costs.by_number(costs.BONE_SWING), costs.by_number(costs.SLACK)
-_REACH = {j: (costs.beside(j, base), metres) for j, (base, metres) in costs.by_number(costs.REACH).items()}
 _LONGEST = 0.8
 """Metres that a limb is moved at most: what is out of reach is pointed at."""
 _TURN_OVER, _SLOW = 6.0, 0.01
@@ -145,7 +145,7 @@ def _plan(goal: Goal, first: int, width: float) -> _Plan:
     moving = np.flatnonzero(goal.asked[..., [0, 2]].any(axis=(1, 2)))
     noise = np.where(goal.asked[moving, 0][:, [0, 2]].any(axis=-1), EXACT, FEW)
     turning = np.flatnonzero(goal.facing_asked)
-    lifting = np.flatnonzero(goal.asked[:, list(_REACH)].all(axis=-1).any(axis=-1) & ~goal.asked[:, 0, 1])
+    lifting = np.flatnonzero(goal.asked[:, list(REACH)].all(axis=-1).any(axis=-1) & ~goal.asked[:, 0, 1])
     still = _STILL**2 * pace
     x, y = (_limb_plan(goal.asked[..., c], _TOGETHER[c], body, still if c == 0 else None) for c in (0, 1))
     same = np.array_equal(goal.asked[..., 0], goal.asked[..., 2])
@@ -256,15 +256,18 @@ def _bent(features: Array, plan: _Plan, known: int) -> Array:
     path = denoised.path + _times(plan.move, _asked_of_root(denoised.world(), error, plan.goal)[plan.moving])
     facing = denoised.facing + _turning_with(denoised.path, path, plan.first)
     denoised = replace(denoised, path=path, facing=facing)
-    if len(plan.lifting):
-        local = denoised.local.copy()
-        local[..., 1] += np.outer(_times(plan.lift, _out_of_reach(denoised.world(), plan.goal)[plan.lifting]), _CARRIED)
-        denoised = replace(denoised, local=local)
+    goal = plan.goal
+    if goal.asked[:, 1:, 1].any():
+        places = denoised.world()
+        room, local = room_above(places), denoised.local.copy()
+        need = np.minimum(out_of_reach(places, goal), room)[plan.lifting]
+        local[..., 1] += np.outer(_times(plan.lift, need), _CARRIED)
+        goal, denoised = lowered(goal, places, room), replace(denoised, local=local)
     if len(plan.turning):
         denoised = replace(
             denoised, facing=facing + _times(plan.turn, _facing_error(denoised.world(), plan.goal)[plan.turning])
         )
-    error = np.where(plan.goal.asked, plan.goal.positions - denoised.world(), 0.0)
+    error = np.where(goal.asked, goal.positions - denoised.world(), 0.0)
     far = np.linalg.norm(error[:, 1:], axis=-1, keepdims=True)
     error[:, 1:] *= np.minimum(1.0, _LONGEST / far.clip(1e-9))
     path, change = denoised.path.copy(), np.zeros_like(denoised.local)
@@ -341,7 +344,7 @@ def _asked_of_root(places: Array, error: Array, goal: Goal) -> Array:
     """
     far = np.linalg.norm(error, axis=-1, keepdims=True)
     beyond = (error * np.clip(1 - _SLACKS[:, None] / far.clip(1e-9), 0, None))[..., [0, 2]]
-    for joint, (base, reach) in _REACH.items():
+    for joint, (base, reach) in REACH.items():
         if not goal.asked[:, joint].any():
             continue
         line = np.where(goal.asked[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
@@ -353,18 +356,6 @@ def _asked_of_root(places: Array, error: Array, goal: Goal) -> Array:
     mean = beyond.sum(axis=1) / goal.asked.any(axis=-1).sum(axis=1).clip(1)[:, None]
     own = goal.asked[:, 0][:, [0, 2]]
     return np.where(own.any(axis=-1, keepdims=True), np.where(own, error[:, 0][:, [0, 2]], 0.0), mean)
-
-
-def _out_of_reach(places: Array, goal: Goal) -> Array:
-    """(frames,) metres: how far up the body must go so that limbs reach what is above or below them."""
-    need = np.zeros(len(places))
-    for joint, (base, reach) in _REACH.items():
-        asked = goal.asked[:, joint].all(axis=-1, keepdims=True)
-        line = np.where(asked, goal.positions[:, joint] - places[:, base], 0.0)
-        room = np.sqrt((reach**2 - (line[:, [0, 2]] ** 2).sum(-1)).clip((0.3 * reach) ** 2))
-        beyond = np.sign(line[:, 1]) * (np.abs(line[:, 1]) - room).clip(0)
-        need = np.where(np.abs(beyond) > np.abs(need), beyond, need)
-    return np.where(np.abs(need) < _HOPELESS, need, 0.0)
 
 
 def _turning_with(old: Array, new: Array, first: int) -> Array:
