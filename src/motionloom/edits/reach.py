@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 REACH = {j: (costs.beside(j, base), metres) for j, (base, metres) in costs.by_number(costs.REACH).items()}
 """Of the joints of limbs: where the limb begins, and metres that it reaches."""
-_TIPTOE, _SHRUG, _JUMP = 0.07, 0.05, 0.45
+_TIPTOE, _SHRUG, _JUMP = 0.07, 0.05, 0.38
 """Metres that the ankles of somebody who stands go up, the shoulder of a raised arm, and somebody who jumps."""
 _FLYING = 0.1
 """Metres that both feet are above the floor of somebody who jumps."""
