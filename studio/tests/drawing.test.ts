@@ -68,7 +68,14 @@ async function drawn({ app, jobs, drawer }: ReturnType<typeof begun>): Promise<v
   await drawer.finished();
 }
 
-beforeEach(() => vi.stubGlobal("window", globalThis));
+/** Milliseconds that a picture takes. */
+let picture = 16;
+
+beforeEach(() => {
+  picture = 16;
+  vi.stubGlobal("window", globalThis);
+  vi.stubGlobal("requestAnimationFrame", (call: () => void) => setTimeout(call, picture / 2));
+});
 afterEach(() => {
   vi.unstubAllGlobals();
   performance.clearMarks();
@@ -92,6 +99,19 @@ describe("a draw", () => {
     drawer.again();
     await vi.waitFor(() => expect(jobs.asked).toHaveLength(2));
     expect(jobs.asked[1]).toMatchObject({ levels: 6 });
+  });
+
+  it("shows no more than its preview where pictures are slow", async () => {
+    const { app, jobs, drawer } = begun();
+    picture = 120;
+    drawer.schedule();
+    await vi.waitFor(() => jobs.level(6));
+    await vi.waitFor(() => expect(app.denoising.value).not.toBeNull());
+    const preview = app.denoising.value;
+    await new Promise((resume) => setTimeout(resume, 2 * picture));
+    jobs.level(12);
+    await new Promise((resume) => setTimeout(resume, 30));
+    expect(app.denoising.value).toBe(preview);
   });
 
   it("on its way is finished before a stretch of it is frozen", async () => {

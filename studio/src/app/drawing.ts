@@ -21,6 +21,9 @@ const TYPING = 550;
 /** Milliseconds between two states of the progress bar: each is a new picture of the page. */
 const TELLING = 150;
 
+/** Milliseconds of a picture beyond which only the preview is shown: without a GPU pictures are drawn by processors. */
+const SLOW = 45;
+
 /** When the last draws were asked and seen, for scripts that measure (`performance` marks). */
 export const MARKS = { asked: "draw-asked", preview: "draw-preview", full: "draw-full" } as const;
 
@@ -29,6 +32,7 @@ export class Drawer {
   private key = "";
   private timer = 0;
   private isPreviewed = false;
+  private isSlow = false;
 
   constructor(private readonly app: App) {
     app.project.subscribe((_, change) => {
@@ -167,12 +171,15 @@ export class Drawer {
 
   /** Put what is predicted for the motion on the stage; an edit's part lies in the motion that it changes. */
   private show(job: JobRequest, { level, of, clip, begin }: Level): void {
+    if (this.isPreviewed && this.isSlow) return;
     const { denoising } = this.app;
     const whole = job.task === "edit" ? (denoising.value ?? shownClip(this.app)) : null;
     denoising.value = whole ? overlaid(whole, clip, Number(job.person ?? 0), begin) : clip;
     if (this.isPreviewed || level / of < PREVIEW) return;
     this.isPreviewed = true;
     performance.mark(MARKS.preview);
+    const begun = performance.now();
+    requestAnimationFrame(() => requestAnimationFrame(() => (this.isSlow = performance.now() - begun > SLOW)));
   }
 
   private say(error: unknown, running: AbortController): void {
