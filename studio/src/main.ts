@@ -21,7 +21,7 @@ import { inspector } from "./panels/inspector";
 import { livePanel } from "./panels/live";
 import { drops, help, notices, takeNames } from "./panels/overlays";
 import { History } from "./project/history";
-import { addSegment, write } from "./project/timeline";
+import { addSegment } from "./project/timeline";
 import { Stage } from "./stage/stage";
 import { listen } from "./timeline/gestures";
 import { TimelineView } from "./timeline/view";
@@ -60,8 +60,7 @@ async function start(): Promise<void> {
     drawer.schedule();
   });
   const timeline = new TimelineView(app, part("tracks"), {
-    write: (id, text, second) =>
-      app.project.change("write", (old) => write(old, id, text, second), { merge: `text:${id}${second}`, typed: true }),
+    write: (id, text, second) => deeds.write(id, text, second),
     written: () => drawer.schedule(),
   });
   const parts: Parts = {

@@ -37,6 +37,13 @@ def test_every_level_arrives_in_order_and_ends_at_the_motion(server: Server) -> 
     assert np.linalg.norm(last - poses(server, motion), axis=-1).mean() < 0.05
 
 
+def test_every_third_level_arrives_where_that_is_asked_and_none_where_none_is(server: Server) -> None:
+    asked = {"task": "generate", "prompt": "a person walks", "seconds": 1.0, "steps": 7}
+    for levels, expected in ((3, [3, 6]), (False, [])):
+        job = server.submit(**asked, levels=levels)
+        assert [data["level"] for _, kind, data in server.events(job) if kind == "level"] == expected
+
+
 def test_a_stream_goes_on_behind_the_event_that_was_seen_last(server: Server) -> None:
     job = server.submit(task="generate", prompt="a person walks", seconds=2.0, seed=3, steps=6)
     whole = [event for event in server.events(job) if event[1] != "progress"]  # of which only the latest is told again
@@ -85,6 +92,18 @@ def test_an_edit_keeps_what_is_outside_of_its_stretch(server: Server, walk: str)
         after = poses(server, one["id"])
         assert np.abs(after[:10] - before[:10]).max() < 1e-5
         assert np.abs(after[12:28] - before[12:28]).max() > 0.02
+
+
+def test_levels_of_an_edit_say_where_in_the_motion_they_begin(server: Server) -> None:
+    (long,) = server.draw(task="generate", prompt="a person walks", seconds=9.0, steps=4)["results"]
+    job = server.submit(task="edit", motion=long["id"], prompt="a person waves", redraw=[[6.0, 7.0]], steps=4)
+    events = list(server.events(job))
+    [*_, last] = [data for _, kind, data in events if kind == "level"]
+    assert 0 < last["begin"] < 6.0
+    first = round(last["begin"] * 20)
+    shown = decoded(last["positions"], 1, last["frames"], 22, 3)[0]
+    before = poses(server, long["id"])[first : first + 10]
+    assert np.abs(shown[:10] - before).max() < 0.05
 
 
 def test_futures_begin_with_their_past(server: Server, walk: str) -> None:

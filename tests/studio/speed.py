@@ -4,6 +4,8 @@
 answers, the prior is loaded and the page can be used; until somebody moves in a new project; medians from letting go of
 a path's point, for ten seconds of motion, to the preview and to the full motion on the stage; the same timeline by
 `motionloom.compose` and its words by `motionloom.generate` in this process; pictures per second; the page's code.
+`--library` measures the last two alone, without a browser, by turns: seconds, and seconds of processors, which say the
+same on a busy machine if `OMP_NUM_THREADS` is 1.
 """
 
 import argparse
@@ -28,7 +30,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--library", action="store_true")
     options = parser.parse_args()
+    if options.library:
+        return told(sampling(options.rounds), options.json)
     started.check()
     view = {"width": 1280, "height": 720}
     with tempfile.TemporaryDirectory() as folder, started.server(Path(folder)) as server, started.browser() as browser:
@@ -43,10 +48,15 @@ def main() -> None:
     found["full_over_compose"] = found["full_s"] / found["compose_s"]
     found["full_over_generate"] = found["full_s"] / found["generate_s"]
     found["code_kb"] = sum(len(gzip.compress(one.read_bytes())) for one in started.page_folder().rglob("*.*")) / 1000
+    told(found, options.json)
+
+
+def told(found: dict[str, float], path: Path | None) -> None:
+    """Print what was found, and write it where that is asked."""
     for name, value in found.items():
         print(f"{name:22} {value:8.2f}")
-    if options.json:
-        options.json.write_text(json.dumps(found, indent=1))
+    if path:
+        path.write_text(json.dumps(found, indent=1))
 
 
 def first_motion(page: Studio) -> float:
@@ -113,18 +123,23 @@ def sampling(rounds: int) -> dict[str, float]:
     def generated() -> None:
         generate(prior, "a person walks", seconds=10.0, seed=3)
 
-    return {"compose_s": median(composed, rounds), "generate_s": median(generated, rounds)}
-
-
-def median(call: Callable[[], None], rounds: int) -> float:
-    """Seconds that a call takes, once it is warm."""
-    call()
-    times = []
+    calls = {"compose": composed, "generate": generated}
+    times: dict[str, list[tuple[float, float]]] = {name: [timed(call)] for name, call in calls.items()}
     for _ in range(rounds):
-        begin = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - begin)
-    return statistics.median(times)
+        for name, call in calls.items():
+            times[name].append(timed(call))
+    found = {}
+    for name, both in times.items():
+        found[f"{name}_s"], found[f"{name}_cpu_s"] = (statistics.median(column[1:]) for column in zip(*both))
+    found["compose_over_generate"] = found["compose_cpu_s"] / found["generate_cpu_s"]
+    return found
+
+
+def timed(call: Callable[[], None]) -> tuple[float, float]:
+    """Seconds that a call takes, and seconds of processors."""
+    begin, busy = time.perf_counter(), time.process_time()
+    call()
+    return time.perf_counter() - begin, time.process_time() - busy
 
 
 if __name__ == "__main__":

@@ -35,6 +35,23 @@ def test_a_frozen_stretch_stays_and_the_rest_is_drawn(studio: Studio):
     assert studio.project()["frozen"] == []
 
 
+def test_a_stretch_that_is_frozen_during_a_draw_is_of_the_motion_that_comes_of_it(studio: Studio):
+    studio.open(("a person walks", 3), ("a person waves", 3))
+    old = studio.project()["takes"][0]["motion"]
+    box = studio.page.locator(".content .ruler").bounding_box()
+    left, y = box["x"], box["y"] + 12
+    studio.drag((left + 2, y), (left + 3 * 84, y), hold="Shift")
+    studio.key("r", "f")
+    studio.page.wait_for_selector(".frozen")
+    project = studio.project()
+    assert project["base"]["motion"] != old
+    assert project["base"]["seed"] == project["seed"]
+    assert (
+        np.abs(studio.motion(project)[0, :55] - studio.motion({"takes": [project["base"]], "kept": 0})[0, :55]).max()
+        < 0.02
+    )
+
+
 def test_a_future_is_chosen(studio: Studio):
     studio.key("n")
     studio.page.wait_for_selector("#inspector >> text=What could come next")

@@ -155,3 +155,19 @@ def test_the_shipped_prior_walks_a_bent_path_to_a_centimetre() -> None:
     places = made.motion.positions()
     assert places[..., 1].min() > -0.05
     assert np.linalg.norm(np.diff(places, axis=0), axis=-1).max() < 0.4
+
+
+@pytest.mark.parametrize(
+    ("words", "least", "most"), [("a person stands", -0.02, 0.12), ("a person jumps up", 0.3, 0.6)]
+)
+def test_a_hand_that_is_asked_too_high_lifts_nobody_but_who_jumps(words: str, least: float, most: float) -> None:
+    """2.9 m is beyond both: the feet stay on the floor, or leave it as far as people jump, and it is said."""
+    goal, wrist = Goal.nothing(60), SMPL22.index("right_wrist")
+    goal.positions[30, wrist], goal.asked[30, wrist] = [-0.2, 2.9, 0.3], True
+    (made,) = control(Prior.load(), words, goal, seed=1, steps=12)
+    places = made.motion.positions()
+    ankles = places[:, [7, 8], 1].min(axis=1)
+    assert least < ankles[30] - np.percentile(ankles, 10) < most
+    assert made.worst > 0.3
+    assert made.missed[0].startswith("right_wrist at 1.50 s")
+    assert places[30, wrist, 1] > 2.0

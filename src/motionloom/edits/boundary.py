@@ -40,6 +40,8 @@ class InpaintWindow:
     """Whether the sampled person must face at frame ``last`` as the known one does there."""
     place: bool = True
     """Whether it must also be at the same place."""
+    begin: float = 0.0
+    """Seconds of the clip at which the window begins; of meaning for who is `watching` alone."""
 
     def __len__(self) -> int:
         return len(self.positions) - 1

@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.blending import smoothstep
-from motionloom.kinematics.gestures import true_spans
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -22,9 +21,10 @@ def carried(shift: Array, standing: Flags) -> Array:
 
     standing: (frames,) flags. Between stances it goes with the body and what leads from one to the other.
     """
-    stances = true_spans(standing)
-    extra = [shift[start:stop].mean(0) - shift[start:stop] for start, stop in stances]
-    return shift + _between(len(shift), stances, extra, BEYOND)
+    extra = np.zeros_like(shift)
+    for start, stop in zip(*_ends(standing), strict=True):
+        extra[start:stop] = shift[start:stop].mean(0) - shift[start:stop]
+    return shift + _between(extra, standing, BEYOND)
 
 
 def stilled(ankle: Array, toe: Array, planted: Flags, *, known: int = 0) -> Array:
@@ -33,35 +33,44 @@ def stilled(ankle: Array, toe: Array, planted: Flags, *, known: int = 0) -> Arra
     ankle, toe: (frames, 3) metres in the world; planted: (frames, 2) flags for the two. A stance keeps its mean place;
     one that begins in the first ``known`` frames keeps the place that it has in the last of them.
     """
-    steps = np.zeros((len(ankle) - 1, 3))
+    steps = np.zeros_like(ankle)
     for place, flags in ((ankle, planted[:, 0]), (toe, planted[:, 1])):
         both = flags[1:] & flags[:-1]
-        steps[both] = -np.diff(place, axis=0)[both]  # toes last: the foot turns about them while all of it stands
+        steps[1:][both] = -np.diff(place, axis=0)[both]  # toes last: the foot turns about them while all of it stands
     steps[:, 1] = 0
-    stances, paths = true_spans(planted[:, 0] | planted[:, 1]), []
-    for start, stop in stances:
-        path = np.concatenate([np.zeros((1, 3)), np.cumsum(steps[start : stop - 1], axis=0)])
-        path -= path[known - 1 - start] if start < known < stop else path.mean(0)
-        paths.append(path * min(1.0, FAR / max(float(np.linalg.norm(path, axis=-1).max()), 1e-9)))
-    return _between(len(ankle), stances, paths, EASE)
+    path, standing = np.cumsum(steps, axis=0), planted[:, 0] | planted[:, 1]
+    result, (starts, stops) = np.zeros_like(path), _ends(standing)
+    if not len(starts):
+        return result
+    frames = stops - starts
+    stance = np.repeat(np.arange(len(starts)), frames)
+    place = np.stack([np.bincount(stance, column) for column in path[standing].T], axis=-1) / frames[:, None]
+    place[(starts < known) & (known < stops)] = path[known - 1]
+    away = path[standing] - place[stance]
+    furthest = np.maximum.reduceat(np.linalg.norm(away, axis=-1), np.cumsum(frames) - frames)
+    result[standing] = away * np.minimum(1.0, FAR / furthest.clip(1e-9))[stance, None]
+    return _between(result, standing, EASE)
 
 
-def _between(frames: int, stances: list[tuple[int, int]], values: list[Array], ease: int) -> Array:
-    """(frames, 3): the values (frames of the stance, 3) in each stance, what leads from one to the next between them.
+def _ends(standing: Flags) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The first frame of each stance, and the first one behind it."""
+    change = np.diff(standing.astype(np.int8), prepend=0, append=0)
+    return np.flatnonzero(change > 0), np.flatnonzero(change < 0)
+
+
+def _between(values: Array, standing: Flags, ease: int) -> Array:
+    """(frames, 3): the values in each stance, what leads from one stance to the next between them.
 
     Further than ``ease`` from all stances it is 0.
     """
-    result = np.zeros((frames, 3))
-    ends = [(-ease, -ease), *stances, (frames + ease, frames + ease)]
-    known = [np.zeros((1, 3)), *values, np.zeros((1, 3))]
-    for i in range(len(stances) + 1):
-        left, right = ends[i][1] - 1, ends[i + 1][0]
-        at = np.arange(max(left + 1, 0), min(right, frames))
-        if right - left <= 2 * ease:
-            fading, coming = 1 - smoothstep((at - left) / (right - left)), smoothstep((at - left) / (right - left))
-        else:
-            fading, coming = 1 - smoothstep((at - left) / ease), 1 - smoothstep((right - at) / ease)
-        result[at] = fading[:, None] * known[i][-1] + coming[:, None] * known[i + 1][0]
-    for (start, stop), path in zip(stances, values, strict=True):
-        result[start:stop] = path
+    starts, stops = _ends(standing)
+    at, result, nothing = np.flatnonzero(~standing), values.copy(), np.zeros((1, 3))
+    gap = np.searchsorted(starts, at)
+    left = np.concatenate([[-ease - 1], stops - 1])[gap]
+    right = np.concatenate([starts, [len(values) + ease]])[gap]
+    near = right - left <= 2 * ease
+    across = smoothstep((at - left) / np.where(near, right - left, ease))
+    coming = np.where(near, across, 1 - smoothstep((right - at) / ease))
+    last, first = np.concatenate([nothing, values[stops - 1]])[gap], np.concatenate([values[starts], nothing])[gap]
+    result[at] = (1 - across)[:, None] * last + coming[:, None] * first
     return result

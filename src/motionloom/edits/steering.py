@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from motionloom.diffusion import Denoiser
+from motionloom.edits.reach import REACH, lowered, out_of_reach, room_above
 from motionloom.edits.stances import EASE, stilled
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
@@ -39,12 +40,11 @@ _PACE, _YAW = 0.015, 0.03
 """Standard deviations of the root's velocity (metres a frame) and of the heading's (radians a frame)."""
 _STILL, _HEIGHT = 0.003, 0.06
 """The same for the root's velocity where a limb can do it (metres a frame), and for its going up and down (metres)."""
-_LIFT, _HOPELESS = 0.3, 1.0
-"""Metres that the body goes up or down to bring a target into reach; the need beyond which it does not try."""
+_LIFT = 0.3
+"""Standard deviation of how far the body goes up or down to bring a target into reach (metres)."""
 _WIDTHS = ((0.9, 12.0), (0.5, 8.0), (0.0, 5.0))
 """Frames over which a change is spread, from noises (of the schedule) above the first number of each pair."""
 _SWING, _SLACK = costs.by_number(costs.BONE_SWING), costs.by_number(costs.SLACK)
-_REACH = {j: (costs.beside(j, base), metres) for j, (base, metres) in costs.by_number(costs.REACH).items()}
 _LONGEST = 0.8
 """Metres that a limb is moved at most: what is out of reach is pointed at."""
 _TURN_OVER, _SLOW = 6.0, 0.01
@@ -145,14 +145,22 @@ def _plan(goal: Goal, first: int, width: float) -> _Plan:
     moving = np.flatnonzero(goal.asked[..., [0, 2]].any(axis=(1, 2)))
     noise = np.where(goal.asked[moving, 0][:, [0, 2]].any(axis=-1), EXACT, FEW)
     turning = np.flatnonzero(goal.facing_asked)
-    lifting = np.flatnonzero(goal.asked[:, list(_REACH)].all(axis=-1).any(axis=-1) & ~goal.asked[:, 0, 1])
+    lifting = np.flatnonzero(goal.asked[:, list(REACH)].all(axis=-1).any(axis=-1) & ~goal.asked[:, 0, 1])
     still = _STILL**2 * pace
-    limbs = tuple(_limb_plan(goal.asked[..., c], _TOGETHER[c], body, None if c == 1 else still) for c in range(3))
+    x, y = (_limb_plan(goal.asked[..., c], _TOGETHER[c], body, still if c == 0 else None) for c in (0, 1))
+    same = np.array_equal(goal.asked[..., 0], goal.asked[..., 2])
+    z = x if same else _limb_plan(goal.asked[..., 2], _TOGETHER[2], body, still)
     return _Plan(
         goal, first, moving, _gain(_PACE**2 * pace, moving, noise),
         turning, _gain(_YAW**2 * pace, turning, np.full(len(turning), 0.02)),
-        lifting, _gain(_LIFT**2 * body, lifting, np.full(len(lifting), FEW)), limbs, body, still[:, :frames],
+        lifting, _gain(_LIFT**2 * body, lifting, np.full(len(lifting), FEW)), (x, y, z), body, still[:, :frames],
     )  # fmt: skip
+
+
+def _times(first: Array, second: Array) -> Array:
+    """The matrix product, by torch: numpy would start threads of its own, which then wait, on the cores that the
+    network's threads need for its next estimate."""
+    return (torch.from_numpy(first) @ torch.from_numpy(second)).numpy()
 
 
 def _bell(frames: int, width: float) -> Array:
@@ -168,8 +176,10 @@ def _summed(velocity: Array, first: int) -> Array:
 
 def _gain(covariance: Array, asked: NDArray[np.intp], noise: Array) -> Array:
     """(rows, asked): the posterior mean from what is seen at ``asked``, with noise of these standard deviations."""
+    if not len(asked):
+        return np.zeros((len(covariance), 0))
     inner = covariance[np.ix_(asked, asked)] + np.diag(noise**2)
-    return np.asarray(np.linalg.solve(inner, covariance[asked]).T, dtype=np.float64)
+    return torch.linalg.solve(torch.from_numpy(inner), torch.from_numpy(covariance[asked])).numpy().T
 
 
 def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Array | None) -> _Limbs | None:
@@ -180,7 +190,7 @@ def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Ar
     if still is not None:
         inner += still[np.ix_(t, t)]
     inner[np.diag_indices_from(inner)] += EXACT**2
-    return _Limbs((t, j), np.asarray(np.linalg.inv(inner), dtype=np.float64), together)
+    return _Limbs((t, j), torch.linalg.inv(torch.from_numpy(inner)).numpy(), together)
 
 
 def _thinned(asked: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -243,18 +253,21 @@ def _bent(features: Array, plan: _Plan, known: int) -> Array:
     """Features (frames, 263), not standardised, changed to meet the goal; of which some are ``known``."""
     denoised = _decoded(features, plan.first)
     error = np.where(plan.goal.asked, plan.goal.positions - denoised.world(), 0.0)
-    path = denoised.path + plan.move @ _asked_of_root(denoised.world(), error, plan.goal)[plan.moving]
+    path = denoised.path + _times(plan.move, _asked_of_root(denoised.world(), error, plan.goal)[plan.moving])
     facing = denoised.facing + _turning_with(denoised.path, path, plan.first)
     denoised = replace(denoised, path=path, facing=facing)
-    if len(plan.lifting):
-        local = denoised.local.copy()
-        local[..., 1] += np.outer(plan.lift @ _out_of_reach(denoised.world(), plan.goal)[plan.lifting], _CARRIED)
-        denoised = replace(denoised, local=local)
+    goal = plan.goal
+    if goal.asked[:, 1:, 1].any():
+        places = denoised.world()
+        room, local = room_above(places), denoised.local.copy()
+        need = np.minimum(out_of_reach(places, goal), room)[plan.lifting]
+        local[..., 1] += np.outer(_times(plan.lift, need), _CARRIED)
+        goal, denoised = lowered(goal, places, room), replace(denoised, local=local)
     if len(plan.turning):
         denoised = replace(
-            denoised, facing=facing + plan.turn @ _facing_error(denoised.world(), plan.goal)[plan.turning]
+            denoised, facing=facing + _times(plan.turn, _facing_error(denoised.world(), plan.goal)[plan.turning])
         )
-    error = np.where(plan.goal.asked, plan.goal.positions - denoised.world(), 0.0)
+    error = np.where(goal.asked, goal.positions - denoised.world(), 0.0)
     far = np.linalg.norm(error[:, 1:], axis=-1, keepdims=True)
     error[:, 1:] *= np.minimum(1.0, _LONGEST / far.clip(1e-9))
     path, change = denoised.path.copy(), np.zeros_like(denoised.local)
@@ -262,10 +275,10 @@ def _bent(features: Array, plan: _Plan, known: int) -> Array:
         if limbs is None:
             continue
         pull = np.zeros(error.shape[:2])
-        pull[limbs.asked] = limbs.inverse @ error[..., c][limbs.asked]
-        change[..., c] = plan.body @ pull @ limbs.together
+        pull[limbs.asked] = _times(limbs.inverse, error[..., c][limbs.asked])
+        change[..., c] = _times(plan.body, pull @ limbs.together)
         if c != 1:
-            path[:, c // 2] += plan.still @ pull.sum(1)
+            path[:, c // 2] += _times(plan.still, pull.sum(1))
     local = denoised.local + _turned(change, -denoised.facing[:-1, None])
     denoised = replace(denoised, path=path, local=local)
     steps = _standing(denoised.world(), features[:, LAYOUT["contacts"]], plan.goal, known)
@@ -331,7 +344,9 @@ def _asked_of_root(places: Array, error: Array, goal: Goal) -> Array:
     """
     far = np.linalg.norm(error, axis=-1, keepdims=True)
     beyond = (error * np.clip(1 - _SLACKS[:, None] / far.clip(1e-9), 0, None))[..., [0, 2]]
-    for joint, (base, reach) in _REACH.items():
+    for joint, (base, reach) in REACH.items():
+        if not goal.asked[:, joint].any():
+            continue
         line = np.where(goal.asked[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
         room = np.sqrt((reach**2 - line[:, 1] ** 2).clip((0.2 * reach) ** 2))
         flat = line[:, [0, 2]]
@@ -343,25 +358,13 @@ def _asked_of_root(places: Array, error: Array, goal: Goal) -> Array:
     return np.where(own.any(axis=-1, keepdims=True), np.where(own, error[:, 0][:, [0, 2]], 0.0), mean)
 
 
-def _out_of_reach(places: Array, goal: Goal) -> Array:
-    """(frames,) metres: how far up the body must go so that limbs reach what is above or below them."""
-    need = np.zeros(len(places))
-    for joint, (base, reach) in _REACH.items():
-        asked = goal.asked[:, joint].all(axis=-1, keepdims=True)
-        line = np.where(asked, goal.positions[:, joint] - places[:, base], 0.0)
-        room = np.sqrt((reach**2 - (line[:, [0, 2]] ** 2).sum(-1)).clip((0.3 * reach) ** 2))
-        beyond = np.sign(line[:, 1]) * (np.abs(line[:, 1]) - room).clip(0)
-        need = np.where(np.abs(beyond) > np.abs(need), beyond, need)
-    return np.where(np.abs(need) < _HOPELESS, need, 0.0)
-
-
 def _turning_with(old: Array, new: Array, first: int) -> Array:
     """(frames + 1,) radians by which the way turned when the path (frames + 1, 2) changed: the body turns with it."""
     ways = [np.diff(path[:, 1] + 1j * path[:, 0]) for path in (old, new)]
     ways = [np.append(way, way[-1]) for way in ways]
     turn = ways[1] * ways[0].conj()
     kernel = _bell(len(turn), _TURN_OVER)
-    turn = kernel @ turn + kernel.sum(1) * _SLOW**2  # where nobody goes anywhere nothing turns
+    turn = _times(kernel.astype(complex), turn) + kernel.sum(1) * _SLOW**2  # where nobody goes anywhere nothing turns
     angle = np.unwrap(np.angle(turn))
     start = np.arange(len(turn)) - first
     return (angle - 2 * np.pi * np.round(angle[first] / (2 * np.pi))) * (1 - np.exp(-0.5 * (start / _TURN_OVER) ** 2))

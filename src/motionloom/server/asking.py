@@ -51,8 +51,8 @@ class Request:
     count: int
     steps: int | None
     guidance: float | None
-    levels: bool
-    """Whether the poses at every level are kept for event streams."""
+    levels: int
+    """Poses are kept for event streams after every so many network calls; 0: not at all."""
     options: dict[str, Any]
     """The task's own values, by the names of `KEYS`."""
     timeline: Timeline | None = None
@@ -109,7 +109,7 @@ class _Reader:
             "task": task, "seed": self.whole("seed", 0, MAX_SEED) or 0,
             "count": self.whole("count", 1, self.limits.count) or 1,
             "steps": self.whole("steps", 1, self.limits.steps), "guidance": self.number("guidance", -100.0, 100.0),
-            "levels": self.flag("levels", missing=True), "options": options,
+            "levels": self.levels(), "options": options,
         }  # fmt: skip
         return getattr(self, task)(common, options)
 
@@ -221,6 +221,12 @@ class _Reader:
 
     def flag(self, key: str, *, missing: bool = False) -> bool:
         return self.given[key].flag() if key in self.given else missing
+
+    def levels(self) -> int:
+        """True: every network call; a number: every so many."""
+        if isinstance(self.given["levels"].value if "levels" in self.given else True, bool):
+            return int(self.flag("levels", missing=True))
+        return self.whole("levels", 1, self.limits.steps) or 1
 
     def prompt(self) -> str | None:
         if "prompt" not in self.given:

@@ -84,10 +84,10 @@ class Job:
             self._progress = self._event("progress", {"done": done, "of": of})
         self._tell()
 
-    def level(self, level: int, of: int, row: int, poses: np.ndarray) -> None:
-        """What the network predicts for one motion of the job: poses (people, frames, 22, 3)."""
+    def level(self, level: int, of: int, row: int, poses: np.ndarray, begin: float = 0.0) -> None:
+        """What the network predicts for a motion: poses (people, frames, 22, 3) from its second ``begin`` on."""
         people, frames = poses.shape[:2]
-        about = {"level": level, "of": of, "row": row, "people": people, "frames": frames}
+        about = {"level": level, "of": of, "row": row, "people": people, "frames": frames, "begin": round(begin, 4)}
         with self._lock:
             self._levels.append(self._event("level", about, poses.astype("<f4")))
             self.log_bytes += people * frames * 22 * 12

@@ -32,7 +32,10 @@ def _properties(limits: Limits) -> dict[str, dict[str, Any]]:
         "count": {"type": "integer", "minimum": 1, "maximum": limits.count, "default": 1},
         "steps": {"type": "integer", "minimum": 1, "maximum": limits.steps, "description": "network calls a motion"},
         "guidance": _number(minimum=-100, maximum=100, description="strength of the text"),
-        "levels": _FLAG | {"default": True, "description": "send the pose after every network call as events"},
+        "levels": {
+            "oneOf": [_FLAG, {"type": "integer", "minimum": 1, "maximum": limits.steps}], "default": True,
+            "description": "send the poses as events after every network call, or after every so many",
+        },
         "prompt": _TEXT | {"maxLength": limits.prompt, "description": "what the person does; two people: 'A :: B'"},
         "seconds": _number(exclusiveMinimum=0, description="length; of predict and switch what is drawn"),
         "as_one": _FLAG | {"description": "do not part 'A, then B' into actions that follow each other"},

@@ -200,18 +200,23 @@ class Worker:
             if jobs[0].request.task == "switch":  # which reports no progress itself
                 count = jobs[0].request.count
                 jobs[0].progress(min(walks - 1, count - 1) * denoised.of + denoised.done, count * denoised.of)
-            if not any(job.request.levels and not job.finished for job in jobs):
+            if not any(_wants(job, denoised.done) for job in jobs):
                 return
             for row, poses in zip(denoised.rows, denoised.positions(), strict=True):
                 job, number = owners[row] if denoised.rows != (0,) else _alone(jobs[0], walks)
-                if job.request.levels and not job.finished:
-                    job.level(denoised.done, denoised.of, number, placed(job.request, poses))
+                if _wants(job, denoised.done):
+                    job.level(denoised.done, denoised.of, number, placed(job.request, poses), denoised.begin)
 
         return seen
 
     def _check(self, jobs: Sequence[Job]) -> None:
         if all(job.finished for job in jobs):
             raise _Cancelled
+
+
+def _wants(job: Job, done: int) -> bool:
+    """Whether a job's poses are sent after so many network calls."""
+    return not job.finished and job.request.levels > 0 and done % job.request.levels == 0
 
 
 def _alone(job: Job, walks: int) -> tuple[Job, int]:

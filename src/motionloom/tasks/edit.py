@@ -119,7 +119,8 @@ class Extend:
         tail = clip.frames(max(len(clip) - round(CONTEXT[1] * clip.fps), 0), len(clip))
         added = max(round(self.seconds * clip.fps), 1)
         window = concatenated(tail, *[tail.frames(len(tail) - 1, len(tail))] * added)
-        made = sampler.sample(window, _window(window, len(tail), len(window)), seed)
+        stretch = replace(_window(window, len(tail), len(window)), begin=(len(clip) - len(tail)) / clip.fps)
+        made = sampler.sample(window, stretch, seed)
         spliced = splice(window, made, len(tail))
         return concatenated(clip, spliced.frames(len(tail), len(window)))
 
@@ -295,7 +296,7 @@ def _redrawn(sampler: _Sampler, motion: Motion, span: tuple[int, int], change: R
     window = motion.frames(begin, end)
     first, last = start - begin, stop - begin
     stretch = _window(window, first, last, keep=kept_numbers(change.keep), strength=change.strength)
-    made = sampler.sample(window, stretch, seed)
+    made = sampler.sample(window, replace(stretch, begin=begin / motion.fps), seed)
     spliced = splice(window, made, first, last=last, kept=kept_joints(motion, change.keep))
     before, behind = (_some(motion.frames, span) for span in ((0, start), (stop, len(motion))))
     return concatenated(*before, spliced.frames(first, last), *behind)
@@ -315,7 +316,8 @@ def _looped(sampler: _Sampler, motion: Motion, blend: float, seed: int) -> Motio
     first, last = len(tail), len(tail) + len(gap)
     window = concatenated(tail, gap, head)
     stretch = _window(window, first, last)
-    made = sampler.sample(window, replace(stretch, facing=straight, place=here), seed)
+    begin = max(rest - around, 0) / motion.fps
+    made = sampler.sample(window, replace(stretch, facing=straight, place=here, begin=begin), seed)
     if not here:
         (to, sampled), (begin, faced) = standing(made, last), standing(window, last)
         turn = rot.IDENTITY if straight else rot.multiply(sampled, rot.inverse(faced))

@@ -62,7 +62,7 @@ def inpaint_motion(
     observed = Observed((known - prior.mean) / spread, mask, strength=window.strength)
     rows = Rows([text], [known.shape[1]], [seed])
     [(_, state)] = sample(
-        prior, rows, sampling, edits=[bent], observed=observed, progress=progress, view=View(poses)
+        prior, rows, sampling, edits=[bent], observed=observed, progress=progress, view=View(poses, begin=window.begin)
     )  # fmt: skip
     made = state[None] * spread + prior.mean
     made = reach(meet(torch.where(mask, known, smooth(made) if prior.net.config.patch > 1 else made)))

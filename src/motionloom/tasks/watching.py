@@ -39,6 +39,8 @@ class Denoised:
     """Numbers of the motions that are sampled together in this walk; else 0."""
     decode: Callable[[], np.ndarray]
     """Gives what `positions` gives; any float type."""
+    begin: float = 0.0
+    """Seconds of the motion at which the poses begin: an `edit` shows the part of the clip that it samples."""
 
     def positions(self) -> Array:
         """(rows, people, frames, 22, 3) metres, +Y up; bones may breathe.
@@ -76,20 +78,22 @@ class View:
     """Denoised states (rows, tokens, features) to (motions, people, frames, 22, 3)."""
     people: int = 1
     """Rows of one motion, which lie next to each other."""
+    begin: float = 0.0
+    """As of `Denoised`."""
 
     def reported(self, walk: Iterator[Snapshot], of: int, rows: Sequence[int]) -> Iterator[Snapshot]:
         """The snapshots of a walk of ``of`` moves, each reported before it is handed on; rows: their numbers."""
         motions = [row // self.people for row in rows[:: self.people]]
         for done, snapshot in enumerate(walk, start=1):
-            report(done, of, motions, lambda snapshot=snapshot: self.poses(snapshot.clean))
+            report(done, of, motions, lambda snapshot=snapshot: self.poses(snapshot.clean), begin=self.begin)
             yield snapshot
 
 
-def report(done: int, of: int, rows: Sequence[int], decode: Callable[[], np.ndarray]) -> None:
+def report(done: int, of: int, rows: Sequence[int], decode: Callable[[], np.ndarray], *, begin: float = 0.0) -> None:
     """Report one network call to whoever watches; nothing happens where nobody does."""
     callback = _callback.get()
     if callback is not None:
-        callback(Denoised(done, of, tuple(rows), decode))
+        callback(Denoised(done, of, tuple(rows), decode, begin))
 
 
 R = TypeVar("R")

@@ -235,7 +235,7 @@ function takes({ app, deeds, drawer }: Parts): Actions {
       run: () => session.update({ sideBySide: !session.value.sideBySide }),
     },
     another: { group, label: "Keep the next take", keys: ["K"], run: next },
-    freeze: { group, label: "Freeze the marked stretch or the block", keys: ["F"], run: () => deeds.freeze() },
+    freeze: { group, label: "Freeze the marked stretch or the block", keys: ["F"], run: () => void deeds.freeze() },
     unfreeze: { group, label: "Unfreeze everything", keys: ["Shift+F"], run: () => deeds.unfreeze() },
     predict: { group, label: "What could come next", keys: ["N"], run: () => void deeds.predict() },
     loop: { group, label: "Make it a loop", keys: ["L"], run: () => void deeds.loop() },

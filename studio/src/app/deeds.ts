@@ -14,8 +14,9 @@ import {
   segment,
   toFrame,
 } from "../project/model";
+import { isDrawn } from "../project/plan";
 import { continued, pieces, settled, withMotion } from "../project/settled";
-import { freeze, unfrozen } from "../project/timeline";
+import { freeze, freezeRest, unfrozen, write } from "../project/timeline";
 import { type Result, motion, takeOf } from "../server/api";
 import { isAway } from "../server/jobs";
 import { type App, problemOf, shownClip } from "./app";
@@ -32,8 +33,14 @@ export class Deeds {
     private readonly drawer: Drawer,
   ) {}
 
-  /** Keep what is marked, or the block that is selected, as it is. */
-  freeze(): void {
+  /** Change the words of a block while they are typed. */
+  write(id: string, text: string, second: boolean): void {
+    const options = { merge: `text:${id}${second}`, typed: true };
+    this.app.project.change("write", (old) => write(old, id, text, second, isDrawn(old)), options);
+  }
+
+  /** Keep what is marked, or the block that is selected, as it is; of a draw that is on its way, what comes of it. */
+  async freeze(): Promise<void> {
     const { range, selection } = this.app.session.value;
     const { segments } = this.app.project.value;
     const index = selection.kind === "segment" ? segments.findIndex((one) => one.id === selection.id) : -1;
@@ -41,8 +48,18 @@ export class Deeds {
     const stretch = range ?? (index >= 0 ? ([at[index]!, at[index + 1]!] as const) : null);
     if (!stretch)
       return this.say("Mark a stretch on the ruler with Shift and drag, or select a block; then freeze it.");
+    await this.drawer.finished();
     this.app.project.change("freeze a stretch", (old) => freeze(old, stretch));
     this.app.session.update({ range: null });
+  }
+
+  /** Draw one block anew; the rest stays as it is. */
+  async redraw(id: string): Promise<void> {
+    await this.drawer.finished();
+    this.app.project.change("draw only this block", (old) => ({
+      ...freezeRest({ ...old, only: null }, id),
+      seed: old.seed + 1,
+    }));
   }
 
   unfreeze(): void {
@@ -51,6 +68,7 @@ export class Deeds {
 
   /** What could come next: several futures of the kept take, to choose from. */
   async predict(): Promise<void> {
+    await this.drawer.finished();
     const take = keptTake(this.app.project.value);
     if (!take) return this.say("There is no motion yet that could go on.");
     const common = { seconds: FUTURE_SECONDS, count: FUTURES, seed: this.app.project.value.seed };
@@ -83,6 +101,7 @@ export class Deeds {
 
   /** Make the end of the take go over into its beginning. */
   async loop(): Promise<void> {
+    await this.drawer.finished();
     const take = keptTake(this.app.project.value);
     if (!take) return this.say("There is no motion yet to make a loop of.");
     let motion = take.motion;

@@ -1,17 +1,28 @@
-/** Draws again on its own: whatever changes what is asked makes a new motion, a quick one first. */
+/** Draws again on its own: whatever changes what is asked makes a new motion, which is shown as it takes shape. */
 
 import { keepWay, needsWay } from "../project/asks";
+import { overlaid } from "../body/clip";
 import { type Project, keptTake } from "../project/model";
 import { type Job, type Plan, plan, planKey } from "../project/plan";
 import { type JobRequest, type Result, motion, takeOf } from "../server/api";
 import { Refused } from "../server/http";
-import { type Watcher, isAway, runJob } from "../server/jobs";
+import { type Level, isAway, runJob } from "../server/jobs";
 import { type App, problemOf, shownClip } from "./app";
 
-/** Network calls of a preview; the full draw takes the server's own number. */
-const PREVIEW_STEPS = 6;
+/**
+ * Where a motion is there already, what is predicted for the new one is shown after every so many network calls: from
+ * the first quarter of them on it is as near to the full motion as a draw of a quarter of the steps.
+ */
+const SHOWN_EVERY = 6;
+const PREVIEW = 0.25;
 /** Milliseconds that somebody pauses in typing before their words are drawn. */
 const TYPING = 550;
+
+/** Milliseconds between two states of the progress bar: each is a new picture of the page. */
+const TELLING = 150;
+
+/** Milliseconds of a picture beyond which only the preview is shown: without a GPU pictures are drawn by processors. */
+const SLOW = 45;
 
 /** When the last draws were asked and seen, for scripts that measure (`performance` marks). */
 export const MARKS = { asked: "draw-asked", preview: "draw-preview", full: "draw-full" } as const;
@@ -20,6 +31,8 @@ export class Drawer {
   private running: AbortController | null = null;
   private key = "";
   private timer = 0;
+  private isPreviewed = false;
+  private isSlow = false;
 
   constructor(private readonly app: App) {
     app.project.subscribe((_, change) => {
@@ -68,13 +81,27 @@ export class Drawer {
     this.app.session.update({ drawing: null });
   }
 
+  /** Until nothing is being drawn any more, nor about to be: what is done with the take then is done with the new one. */
+  finished(): Promise<void> {
+    const { session } = this.app;
+    const isIdle = () => session.value.drawing === null && !session.value.pending;
+    return new Promise((resolve) => {
+      if (isIdle()) return resolve();
+      const leave = session.subscribe(() => {
+        if (!isIdle()) return;
+        leave();
+        resolve();
+      });
+    });
+  }
+
   /** Run one job beside the timeline, such as a prediction; null where it failed, which is then said. */
   async once(job: JobRequest): Promise<readonly Result[] | null> {
-    this.stop();
+    await this.finished();
     const running = (this.running = new AbortController());
-    this.app.session.update({ error: null, drawing: { done: 0, of: 1, preview: false } });
+    this.app.session.update({ error: null, drawing: { done: 0, of: 1 } });
     try {
-      return await runJob(job, running.signal, this.watcher(running, false));
+      return await this.run(job, running);
     } catch (error) {
       this.say(error, running);
       return null;
@@ -86,15 +113,15 @@ export class Drawer {
   private async draw(): Promise<void> {
     const { value } = this.app.project;
     const { jobs }: Plan = plan(value);
-    this.stop();
+    // What was predicted for a draw that is given up stays on the stage until there is something of this one.
+    this.running?.abort();
     const running = (this.running = new AbortController());
     this.key = planKey(value);
-    const drawing = { done: 0, of: 1, preview: true };
-    this.app.session.update({ error: null, fan: null, pending: false, drawing });
+    this.isPreviewed = false;
+    if (value.base) this.app.denoising.value = null;
+    this.app.session.update({ error: null, fan: null, pending: false, drawing: { done: 0, of: 1 } });
     try {
-      const shown = await this.preview(jobs, running);
-      // The full draw is asked for while the preview is on its way to the stage.
-      const [results] = await Promise.all([this.chain(jobs, running), shown()]);
+      const results = await this.chain(jobs, running);
       await this.keep(value, this.key, results, running.signal);
       performance.mark(MARKS.full);
     } catch (error) {
@@ -104,30 +131,12 @@ export class Drawer {
     }
   }
 
-  /** Draw quickly; gives what fetches the motion and puts it on the stage. */
-  private async preview(jobs: readonly Job[], running: AbortController): Promise<() => Promise<void>> {
-    const [job] = jobs;
-    if (!job || jobs.length > 1) return () => Promise.resolve();
-    // A quick draw is too short to be watched, and it would hide the motion that is there.
-    const levels = !this.app.session.value.clips.length;
-    const asked = { ...job, count: 1, steps: PREVIEW_STEPS, levels };
-    const [result] = await runJob(asked, running.signal, this.watcher(running, true));
-    return async () => {
-      if (!result) return;
-      const clip = await motion(result.id);
-      if (running.signal.aborted || this.running !== running) return;
-      this.app.denoising.value = null;
-      this.app.session.update({ clips: [clip] });
-      performance.mark(MARKS.preview);
-    };
-  }
-
   /** Jobs one after the other; an edit without a motion goes on from the one before. */
   private async chain(jobs: readonly Job[], running: AbortController): Promise<readonly Result[]> {
     let results: readonly Result[] = [];
     for (const job of jobs) {
       const request = job.task === "edit" && !job.motion ? { ...job, motion: results[0]!.id } : job;
-      results = await runJob(request, running.signal, this.watcher(running, false));
+      results = await this.run(request, running);
     }
     return results;
   }
@@ -144,14 +153,33 @@ export class Drawer {
     this.app.session.update({ clips });
   }
 
-  private watcher(running: AbortController, preview: boolean): Watcher {
+  /** Run one job and show how it comes along. */
+  private run(job: JobRequest, running: AbortController): Promise<readonly Result[]> {
     const isCurrent = () => this.running === running && !running.signal.aborted;
-    return {
-      progress: (done, of) => isCurrent() && this.app.session.update({ drawing: { done, of, preview } }),
-      level: ({ clip, row }) => {
-        if (isCurrent() && row === 0) this.app.denoising.value = clip;
+    // The first motion is seen as it comes out of the noise; a later one would hide the motion that is there.
+    const levels = this.app.session.value.clips.length ? SHOWN_EVERY : true;
+    let told = 0;
+    return runJob({ levels, ...job }, running.signal, {
+      progress: (done, of) => {
+        if (!isCurrent() || performance.now() - told < TELLING) return;
+        told = performance.now();
+        this.app.session.update({ drawing: { done, of } });
       },
-    };
+      level: (level) => isCurrent() && level.row === 0 && this.show(job, level),
+    });
+  }
+
+  /** Put what is predicted for the motion on the stage; an edit's part lies in the motion that it changes. */
+  private show(job: JobRequest, { level, of, clip, begin }: Level): void {
+    if (this.isPreviewed && this.isSlow) return;
+    const { denoising } = this.app;
+    const whole = job.task === "edit" ? (denoising.value ?? shownClip(this.app)) : null;
+    denoising.value = whole ? overlaid(whole, clip, Number(job.person ?? 0), begin) : clip;
+    if (this.isPreviewed || level / of < PREVIEW) return;
+    this.isPreviewed = true;
+    performance.mark(MARKS.preview);
+    const begun = performance.now();
+    requestAnimationFrame(() => requestAnimationFrame(() => (this.isSlow = performance.now() - begun > SLOW)));
   }
 
   private say(error: unknown, running: AbortController): void {

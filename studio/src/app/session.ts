@@ -18,7 +18,6 @@ export type Selection =
 export interface Drawing {
   readonly done: number;
   readonly of: number;
-  readonly preview: boolean;
 }
 
 /** Futures to choose from. */

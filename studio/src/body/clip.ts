@@ -19,6 +19,16 @@ export function motionClip(fps: number, people: readonly Float32Array[]): Motion
   return { fps, frames, seconds: frames / fps, people };
 }
 
+/** A clip of which one person does, from second `begin` on, what another clip holds; no longer than it was. */
+export function overlaid(clip: MotionClip, part: MotionClip, person: number, begin: number): MotionClip {
+  const people = clip.people.map((one) => one.slice());
+  const data = people[person];
+  const last = Math.min(clip.frames - 1, Math.floor((begin + part.seconds - 1 / part.fps) * clip.fps + 1e-6));
+  for (let frame = Math.ceil(begin * clip.fps - 1e-6); data && frame <= last; frame += 1)
+    poseAt(part, 0, frame / clip.fps - begin, data.subarray(frame * POSE, (frame + 1) * POSE));
+  return { ...clip, people };
+}
+
 /** Write the pose at a time into `out`; between frames it is mixed, beyond the ends it is the first or last one. */
 export function poseAt(clip: MotionClip, person: number, time: number, out: Float32Array): Float32Array {
   const data = clip.people[Math.min(person, clip.people.length - 1)]!;

@@ -195,7 +195,7 @@ function targetPanel(app: App, project: Project, person: Person, who: number): H
 /** How far the body left the floor for a target, where that is more than a step. */
 function flight(centimetres: number): HTMLElement | false {
   if (centimetres < STEP) return false;
-  const title = "The limb is too short: the drawing lifts the whole person, who cannot fly";
+  const title = "The limb is too short: the whole person leaves the floor for it";
   return h("span", { class: centimetres > FLYING ? "miss unmet" : "miss", title }, `↑ ${centimetres.toFixed(0)} cm`);
 }
 

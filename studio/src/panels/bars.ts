@@ -24,9 +24,7 @@ export function topBar(app: App, actions: Actions, files: Files, root: HTMLEleme
     const state = !connected
       ? "server away"
       : drawing
-        ? drawing.preview
-          ? "drawing a preview"
-          : "drawing"
+        ? "drawing"
         : { saved: "saved", saving: "saving", here: "kept in this browser" }[saved];
     morph(root, [
       h("strong", { class: "brand" }, "motionloom"),

@@ -5,15 +5,7 @@ import type { App } from "../app/app";
 import type { Deeds } from "../app/deeds";
 import { h, morph } from "../app/dom";
 import { type Given, type Project, type Segment, begins, length } from "../project/model";
-import {
-  changeSegment,
-  freezeRest,
-  longestTransition,
-  resizeSegment,
-  setPeople,
-  setTransition,
-  write,
-} from "../project/timeline";
+import { changeSegment, longestTransition, resizeSegment, setPeople, setTransition } from "../project/timeline";
 import { clipsSection, fanSection, takesSection } from "./takes";
 import { askedPanels } from "./asked";
 import { numberField, section, textButton, wrong } from "./parts";
@@ -31,7 +23,7 @@ export function inspector(app: App, actions: Actions, deeds: Deeds, root: HTMLEl
         ? [fanSection(app, deeds, fan)]
         : [
             ...(isTool ? asked : []),
-            words(app, value),
+            words(app, value, deeds),
             ...(isTool ? [] : asked),
             takesSection(app, value, actions),
             clipsSection(app, value, deeds),
@@ -46,7 +38,7 @@ export function inspector(app: App, actions: Actions, deeds: Deeds, root: HTMLEl
   render();
 }
 
-function words(app: App, project: Project): HTMLElement {
+function words(app: App, project: Project, deeds: Deeds): HTMLElement {
   const { selection } = app.session.value;
   const index = selection.kind === "segment" ? project.segments.findIndex((one) => one.id === selection.id) : -1;
   const one = project.segments[index];
@@ -76,8 +68,8 @@ function words(app: App, project: Project): HTMLElement {
   const two = project.people.length > 1;
   return section(
     `Block ${index + 1}`,
-    area(app, one, false),
-    two && area(app, one, true),
+    area(deeds, one, false),
+    two && area(deeds, one, true),
     wrong(app, "segment", one.id),
     kept(one.given, () =>
       app.project.change("drop what the file asked", (old) => changeSegment(old, one.id, { given: null })),
@@ -108,18 +100,10 @@ function words(app: App, project: Project): HTMLElement {
     h(
       "div",
       { class: "row" },
-      textButton(
-        "Draw only this block",
-        () =>
-          app.project.change("draw only this block", (old) => ({
-            ...freezeRest({ ...old, only: null }, one.id),
-            seed: old.seed + 1,
-          })),
-        {
-          title: "The rest of the motion stays as it is",
-          disabled: !project.takes.length || project.segments.length < 2,
-        },
-      ),
+      textButton("Draw only this block", () => void deeds.redraw(one.id), {
+        title: "The rest of the motion stays as it is",
+        disabled: !project.takes.length || project.segments.length < 2,
+      }),
     ),
   );
 }
@@ -137,7 +121,7 @@ function kept(given: Given | null, drop: () => void): HTMLElement | null {
   );
 }
 
-function area(app: App, one: Segment, second: boolean): HTMLElement {
+function area(deeds: Deeds, one: Segment, second: boolean): HTMLElement {
   const label = second ? "What the second person does; empty: the same" : "What the person does";
   return h(
     "textarea",
@@ -149,11 +133,7 @@ function area(app: App, one: Segment, second: boolean): HTMLElement {
       "data-key": `${one.id}${second}`,
       maxlength: "2000",
       spellcheck: "true",
-      oninput: (event: Event) =>
-        app.project.change("write", (old) => write(old, one.id, (event.target as HTMLTextAreaElement).value, second), {
-          merge: `text:${one.id}${second}`,
-          typed: true,
-        }),
+      oninput: (event: Event) => deeds.write(one.id, (event.target as HTMLTextAreaElement).value, second),
       onkeydown: (event: KeyboardEvent) => {
         if (event.key !== "Escape" && (event.key !== "Enter" || event.shiftKey)) return;
         event.preventDefault();

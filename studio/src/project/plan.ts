@@ -40,6 +40,11 @@ export function planKey(project: Project): string {
   return JSON.stringify(plan(project).jobs);
 }
 
+/** Whether the takes are what the project asks for. */
+export function isDrawn(project: Project): boolean {
+  return project.drawn === planKey(project);
+}
+
 /** The motion without its stretches that stay, each drawn from the words that are there. */
 function redraw(project: Project): Plan {
   const { base, seed } = project;

@@ -30,8 +30,11 @@ export function changeSegment(project: Project, id: string, part: Partial<Segmen
   return { ...project, segments: project.segments.map((one) => (one.id === id ? { ...one, ...part } : one)) };
 }
 
-/** Change the words of a block. Where stretches are frozen, all but this block becomes frozen. */
-export function write(project: Project, id: string, text: string, second = false): Project {
+/**
+ * Change the words of a block. Where stretches are frozen, all but this block becomes frozen; or, where the takes do not
+ * have yet what was asked before, this block is drawn with it.
+ */
+export function write(project: Project, id: string, text: string, second = false, isDrawn = true): Project {
   const index = project.segments.findIndex((one) => one.id === id);
   const key = second ? "other" : "text";
   if (index < 0 || project.segments[index]![key] === text) return project;
@@ -39,7 +42,19 @@ export function write(project: Project, id: string, text: string, second = false
     ...project,
     segments: project.segments.map((one) => (one.id === id ? { ...one, [key]: text } : one)),
   };
-  return project.base ? freezeRest({ ...changed, base: null, only: second ? 1 : 0 }, id) : changed;
+  if (!project.base) return changed;
+  const only = second ? 1 : 0;
+  if (isDrawn) return freezeRest({ ...changed, base: null, only }, id);
+  const at = begins(project.segments);
+  const frozen = project.frozen.flatMap(([from, to]): Range[] => [
+    [from, Math.min(to, at[index]!)],
+    [Math.max(from, at[index + 1]!), to],
+  ]);
+  return {
+    ...changed,
+    frozen: frozen.filter(([from, to]) => to - from >= 1 / FPS),
+    only: project.only === only ? only : null,
+  };
 }
 
 /** Drag the end of a segment to a time; those behind it move along. */

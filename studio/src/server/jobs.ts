@@ -11,6 +11,8 @@ export interface Level {
   readonly level: number;
   readonly of: number;
   readonly row: number;
+  /** Seconds of the motion at which the pose begins: an edit shows the part that it draws. */
+  readonly begin: number;
   readonly clip: MotionClip;
 }
 
@@ -25,6 +27,7 @@ interface LevelJson {
   row: number;
   people: number;
   frames: number;
+  begin: number;
   positions: string;
 }
 
@@ -83,7 +86,7 @@ function levelOf(json: LevelJson): Level {
   const all = floats(json.positions);
   const size = json.frames * POSE;
   const people = Array.from({ length: json.people }, (_, person) => all.subarray(person * size, (person + 1) * size));
-  return { level: json.level, of: json.of, row: json.row, clip: motionClip(FPS, people) };
+  return { level: json.level, of: json.of, row: json.row, begin: json.begin, clip: motionClip(FPS, people) };
 }
 
 /** Whether an error means that the server is away rather than that it said no. */

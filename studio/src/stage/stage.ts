@@ -98,7 +98,6 @@ export class Stage {
       "playing",
     ] as const;
     if (kept.some((key) => now[key] !== before[key])) this.update();
-    else if (!now.drawing !== !before.drawing) this.place();
     else if (now.time !== before.time) this.place();
   }
 
@@ -111,11 +110,12 @@ export class Stage {
 
   /** Everybody where they are at the playhead. */
   private place(): void {
-    const { time, fan, sideBySide, drawing } = this.app.session.value;
-    const clip = this.app.denoising.value ?? shownClip(this.app);
+    const { time, fan, sideBySide } = this.app.session.value;
+    const denoised = this.app.denoising.value;
+    const clip = denoised ?? shownClip(this.app);
     const isFuture = fan !== null && time > fan.past;
     // A character has the kept take's motion; what is being drawn is shown by the mannequin.
-    const dressed = this.character.at(time, !sideBySide && !isFuture && drawing === null && !this.app.live.value);
+    const dressed = this.character.at(time, !sideBySide && !isFuture && denoised === null && !this.app.live.value);
     this.cast.show(clip, time, dressed || isFuture);
     this.cast.showGhosts(this.ghosts(), time);
     this.path.at(time);
