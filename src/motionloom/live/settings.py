@@ -25,7 +25,7 @@ class Settings:
     used: int = 40
     """Frames of a window that are shown before the next one is sampled, when nothing is asked."""
     rest: int = 4
-    """Frames between two windows at least: what is asked more often is put together."""
+    """Frames at least between two windows that take up what is asked: what is asked more often is put together."""
 
     def __post_init__(self) -> None:
         if self.solver not in SOLVERS or self.spacing not in SPACINGS:

@@ -15,8 +15,10 @@ from torch.nn import functional as F
 from motionloom.diffusion import SOLVERS, Denoiser, NoiseSource, guide, inpaint, levels, observe, row_seed, sample
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction
+from motionloom.features import humanml
 from motionloom.live.settings import Settings
 from motionloom.nets.prior import Bound
+from motionloom.tasks.watching import report
 from motionloom.weights.prior import Prior
 
 TEXTS = 64
@@ -84,14 +86,18 @@ class Drawer:
             self.calls += 1
             return changed(inpaint(free, data, mask)(state, level)[0], level)[None]
 
+        def poses(clean: Tensor) -> np.ndarray:
+            return humanml.decode_positions((clean * spread + prior.mean).cpu().double().numpy()[0])[None, None]
+
         hold = observe(data, mask, prior.schedule, draw)
         state = hold(draw(data), self._levels[0])
         walk = sample(
             denoise, state, levels=self._levels, solver=SOLVERS[self.settings.solver], schedule=prior.schedule,
             draw=draw, constrain=hold,
         )  # fmt: skip
-        for snapshot in walk:
+        for done, snapshot in enumerate(walk, start=1):
             state = snapshot.state
+            report(done, len(self._levels) - 1, [0], lambda clean=snapshot.clean: poses(clean))
         return torch.where(mask, given, state * spread + prior.mean)[0].cpu().double().numpy()
 
     def _guided(self, text: str, frames: int) -> Denoiser:
