@@ -1,11 +1,11 @@
 """Every figure of a live motion: what it costs, how soon it obeys, how it looks beside `compose`, what it survives.
 
-    python benchmarks/live.py [PART ...] [--seeds 10] [--minutes 10] [--out benchmarks/live.json]
+    python benchmarks/live.py [PART ...] [--seeds 10] [--minutes 10 | --hours 4] [--out benchmarks/live.json]
 
-Parts: words, steering, speed, latency, abuse. `words` and `steering` count frames and look at no clock; the others must
-have the machine for themselves. ``--minutes`` is of what is shown in `speed`, of the clock in `latency` and `abuse`;
-``--seeds`` counts sessions of `words` and `steering`. Clients of `latency` and `abuse` are in memory: what they see has
-gone through all of the server but its sockets.
+Parts: words, steering, speed, pair, latency, abuse. `words` and `steering` count frames and look at no clock; the
+others must have the machine for themselves. ``--minutes`` is of what is shown in `speed` and `pair`, of the clock in
+`latency` and `abuse`; ``--seeds`` counts sessions of `words` and `steering`. Clients of `latency` and `abuse` are in
+memory: what they see has gone through all of the server but its sockets.
 """
 
 import argparse
@@ -32,9 +32,11 @@ from motionloom.live.clock import LATE, WAITING
 from motionloom.live.commands import Command, Say, Steer, to_json
 from motionloom.live.commands import Path as Way
 from motionloom.live.live import Live, motion_of
+from motionloom.live.pair import LivePair
 from motionloom.live.sessions import Session, Sessions
 from motionloom.live.socket import live_session
 from motionloom.tasks.long import compose
+from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
 WORDS = ("walk forward", "walk backward", "walk sideways", "run", "jog", "turn left", "turn right", "walk in a circle")
@@ -184,20 +186,33 @@ def _memory() -> float:
 
 def speed_(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
     """Minutes of random commands, one in two seconds, as fast as frames can be made: how much faster than shown."""
-    live, dice = Live(prior, seed=1), random.Random(1)
+    return _made(Live(prior, seed=1), minutes)
+
+
+def pair(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
+    """The same with two people, who are asked in turn or both."""
+    return _made(LivePair(prior, PairBlock.load("duet", prior), seed=1), minutes)
+
+
+def _made(live: Live | LivePair, minutes: float) -> dict[str, Any]:
+    dice, windows, drawn = random.Random(1), 0, live.drawn
     count = max(20, round(minutes * 60 * FPS))
     marks: list[float] = []
-    begun = time.monotonic()
+    begun, busy = time.monotonic(), time.process_time()
     for number in range(count):
         if dice.random() < 1 / (2 * FPS):
-            live.ask(_random(dice))
+            whom = dice.choice([None, 0, 1]) if len(live.people) > 1 else None
+            live.ask(_random(dice), whom)
         next(live)
+        windows, drawn = windows + (live.drawn != drawn), live.drawn
         if (number + 1) % (count // 10) == 0:
             marks.append(round(_memory(), 1))
     return {
         "times_faster": count / FPS / (time.monotonic() - begun),
         "minutes": minutes,
         "commands": len(live.taken),
+        "windows": windows,
+        "processor_s_per_window": (time.process_time() - busy) / windows,
         "network_calls_per_second_shown": live.calls / (count / FPS),
         "memory_mb_at_each_tenth": marks,
     }
@@ -374,7 +389,7 @@ def abuse(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-PARTS = {"words": words, "steering": steering, "speed": speed_, "latency": latency, "abuse": abuse}
+PARTS = {"words": words, "steering": steering, "speed": speed_, "pair": pair, "latency": latency, "abuse": abuse}
 
 
 def main() -> None:
@@ -382,13 +397,15 @@ def main() -> None:
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--hours", type=float, help="instead of --minutes, as for a long `abuse`")
     parser.add_argument("--weights", default="default")
     parser.add_argument("--out", type=Path)
     arguments = parser.parse_args()
+    minutes = arguments.minutes if arguments.hours is None else 60 * arguments.hours
     prior = Prior.load(arguments.weights)
     result: dict[str, Any] = {"threads": torch.get_num_threads()}
     for part in arguments.parts or PARTS:
-        result[part] = PARTS[part](prior, arguments.seeds, arguments.minutes)
+        result[part] = PARTS[part](prior, arguments.seeds, minutes)
         print(json.dumps({part: result[part]}, indent=1), flush=True)
         if arguments.out:
             arguments.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")

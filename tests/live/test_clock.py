@@ -1,15 +1,16 @@
 """A player: bounded queues, frames as its `Live` makes them, late frames delay the rest. Time is what the test says."""
 
-import threading
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pytest
 
 from motionloom.live import clock
 from motionloom.live.clock import Pace, Player
-from motionloom.live.commands import Say, Steer
+from motionloom.live.commands import Command, Say, Steer
 from motionloom.live.live import Frame, Live
 from motionloom.live.settings import Settings
+from motionloom.tasks.watching import Denoised, watching
 from tests.live import people
 from tests.live.people import QUICK
 
@@ -43,6 +44,8 @@ def test_a_player_gives_the_frames_of_its_live_and_says_how_to_make_them_again()
         player.ask(Say("a person walks"))
         made = [taken(player) for _ in range(10)]
         player.ask(Steer(1.0, 1.0))
+        while len(player.taken) < 2:
+            made.append(taken(player))
         made += [taken(player) for _ in range(60)]
         asked = player.taken
     assert [one.command for one in asked] == [Say("a person walks"), Steer(1.0, 1.0)]
@@ -65,73 +68,136 @@ def test_queues_are_bounded_and_what_is_dropped_is_counted() -> None:
     with player:
         first = taken(player)
         assert first.number == 0
-    assert live.number <= 1 + player._room() + 1, "nobody took frames, so none were drawn ahead of the buffer"
+    assert live.number <= clock.LONGEST * live.fps + 1, "nobody took frames, so none were drawn ahead of the buffer"
     assert player.taken[-1].command == Steer(0.999, 1.0), "the newest is what counts"
 
 
-def test_a_slow_machine_says_so_and_a_command_waits_longer() -> None:
-    now = 0.0
-    lock = threading.Lock()
-
-    def slowly() -> float:
-        nonlocal now
-        with lock:
-            now += 0.5  # each look at the clock: a window seems to take that long
-            return now
-
-    live = Live(people.prior(), settings=QUICK)
-    with Player(live, now=slowly) as player:
-        for _ in range(30):
-            taken(player)
-        health = player.health
-    assert health.ahead == pytest.approx(1.5 * 0.5)
-    assert "takes 0.50 s for a window" in health.problem
-    assert "followed every 0.65 s and 0.75 s late" in health.problem
+LONG = Settings(steps=2, known=6, ahead=50, used=40)
 
 
-class Slowly(Live):
-    """Each window takes so many seconds by a clock of its own."""
+class Simulation:
+    """A player by a clock that only network calls move on, and somebody who takes each frame when it is due.
 
-    clock, each = 0.0, 0.0
+    What would happen in several threads happens in turn, in steps of a hundredth of a second.
+    """
 
-    def _windows(self, requests) -> None:
-        super()._windows(requests)
-        self.clock += self.each
+    def __init__(self, took: Callable[[int], float], asked: Mapping[float, Command]) -> None:
+        """took: seconds of each window by its number; asked: commands by their times."""
+        self.clock, self.windows, self.given_up = 0.0, 0, 0
+        self.live = Live(people.prior(), seed=2, settings=LONG)
+        self.player = Player(self.live, now=lambda: self.clock)
+        self.frames: list[Frame] = []
+        self.times: list[float] = []
+        self.late: list[float] = []
+        self._took, self._asked = took, sorted(asked.items(), key=lambda one: one[0])
+        self._pace = Pace(lambda: self.clock)
 
+    def run(self, count: int) -> "Simulation":
+        """Until so many frames were shown."""
+        with watching(self._call):
+            while len(self.frames) < count:
+                if task := self.player._task():
+                    task()
+                else:
+                    self._pass(0.01)
+                self._take()
+        return self
 
-def lateness(live: Slowly, count: int, flood: bool) -> list[float]:
-    """Seconds that each frame is late for somebody who shows them at their times, by the clock of the planner: what it
-    would make meanwhile is made in turn, without a thread."""
-    player, made, late, begun = Player(live, now=lambda: live.clock), [], [], None
-    for k in range(count):
-        if flood:
-            player.ask(Steer(0.1 * k, 1.0))
-        due = 0.0 if begun is None else begun + k / 20
-        while len(player._buffer) < player._room() and (live.clock <= due or not player._buffer):
-            player._make()
-            made.append(live.clock)
-        full = len(player._buffer) >= player._room()
-        assert player.take(0.0) is not None
-        begun = made[0] if begun is None else begun
-        late.append(max(0.0, made[k] - max(due, begun)))
-        begun += late[-1] if late[-1] > clock.LATE else 0.0
-        live.clock = max(live.clock, due) if full else live.clock  # it waited for room
-    return late
+    def _call(self, denoised: Denoised) -> None:
+        self.windows += denoised.done == 1
+        self._pass(self._took(self.windows) / LONG.steps)
+        try:
+            self.player._look(denoised)
+        except clock._GivenUp:
+            self.given_up += 1
+            raise
+
+    def _pass(self, seconds: float) -> None:
+        end = self.clock + seconds
+        while self.clock < end - 1e-9:
+            self.clock = min(end, self.clock + 0.01)
+            while self._asked and self._asked[0][0] <= self.clock:
+                self.player.ask(self._asked.pop(0)[1])
+            self._take()
+
+    def _take(self) -> None:
+        while (coming := self.player.coming(0.0)) is not None and self._pace.until(coming) <= 1e-9:
+            found = self.player.take(0.0)
+            assert found is not None
+            self.late.append(self._pace.late(found))
+            self.frames.append(found)
+            self.times.append(self.clock)
+
+    def replayed(self) -> bool:
+        """Whether what was taken makes the same motion again."""
+        live, asked = Live(people.prior(), seed=2, settings=LONG), self.player.taken
+        for old in self.frames:
+            for one in asked:
+                if one.frame == old.number:
+                    live.ask(one.command, one.person)
+            new = next(live)
+            if not (np.array_equal(old.root, new.root) and np.array_equal(old.rotations, new.rotations)):
+                return False
+        return True
 
 
 @pytest.mark.parametrize("flood", [False, True])
 @pytest.mark.parametrize("each", [0.05, 0.5, 1.2])
 def test_windows_that_take_long_make_commands_wait_and_no_frame_late(each: float, flood: bool) -> None:
-    live = Slowly(people.prior(), settings=Settings(steps=1, known=6, ahead=50, used=40))
-    live.each = each
-    assert max(lateness(live, 130, flood)) <= clock.LATE
+    asked: dict[float, Command] = {0.03 * k: Steer(0.1 * k, 1.0) for k in range(150)} if flood else {}
+    made = Simulation(lambda window: each, asked).run(130)
+    assert [frame.number for frame in made.frames] == list(range(len(made.frames)))
+    assert max(made.late) <= clock.LATE
+    assert made.replayed()
 
 
 def test_a_machine_that_cannot_keep_up_is_late_and_leaves_nothing_out() -> None:
-    live = Slowly(people.prior(), settings=Settings(steps=1, known=6, ahead=50, used=40))
-    live.each = 3.0
-    late = lateness(live, 130, flood=False)
-    assert sum(wait > clock.LATE for wait in late) == 3, "once for each window: the clock waits, then all is on time"
+    late = Simulation(lambda window: 3.0, {}).run(130).late
+    assert sum(wait > clock.LATE for wait in late[:130]) == 3, (
+        "once for each window: the clock waits, then all is on time"
+    )
+
+
+def test_a_command_waits_for_one_window_however_long_the_buffer_is() -> None:
+    """Whatever the planner does when it comes; windows that nobody asked for are given up for it."""
+    times = [2.0 + 1.4 * k + 0.03 * k * k for k in range(8)]
+    made = Simulation(lambda window: 0.2, {at: Steer(at, 1.0) for at in times}).run(280)
+    waits = [made.times[one.frame] - at for at, one in zip(times, made.player.taken, strict=True)]
+    assert max(waits) < 0.2 * clock.SPARE + 0.05 + 0.02 + 0.2 / LONG.steps, "and one call of a window that is given up"
+    assert made.given_up > 0
+    assert made.player._length == pytest.approx(0.6), "a command waits less than frames do in the buffer"
+    assert max(made.late) <= clock.LATE
+    assert made.replayed()
+
+
+def test_a_window_that_comes_too_late_is_sampled_again_and_what_was_shown_stays() -> None:
+    """The windows of three commands take three times as long as the last ones let expect."""
+    asked: dict[float, Command] = {at: Steer(at, 1.0) for at in (3.02, 6.03, 9.01)}
+    slow: list[int] = []
+
+    def took(window: int) -> float:
+        if made.player._calm or len(slow) >= 6:
+            return 0.15
+        slow.append(window)
+        return 0.45
+
+    made = Simulation(took, asked)
+    made.run(250)
+    assert [one.command for one in made.player.taken] == list(asked.values())
+    late = [made.times[one.frame] - at for at, one in zip(asked, made.player.taken, strict=True)]
+    assert max(late) < 1.2
+    assert max(late) > 0.5, "a window came too late"
+    assert max(made.late) <= clock.LATE, "and no frame did"
+    assert made.replayed()
+
+
+def test_a_slow_machine_says_so() -> None:
+    made = Simulation(lambda window: 0.8, {}).run(100)
+    health = made.player.health
+    assert health.ahead == pytest.approx(clock.SPARE * 0.8)
+    assert "takes 0.80 s for a window" in health.problem
+    assert "followed every 1.00 s and 0.92 s late" in health.problem
+    assert not Simulation(lambda window: 0.3, {}).run(100).player.health.problem
 
 
 def test_an_error_of_the_planner_reaches_who_takes_frames() -> None:

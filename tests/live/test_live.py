@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motionloom.errors import MotionloomError
-from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer
+from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer, Taken
 from motionloom.live.live import Frame, Live, motion_of
 from motionloom.live.settings import Settings
 from motionloom.motion import Motion
@@ -38,11 +38,19 @@ def real() -> Prior:
 
 def played(live: Live, script: Mapping[int, list[Command]], count: int) -> list[Frame]:
     frames = []
-    for number in range(count):
+    for number in range(live.number, live.number + count):
         for command in script.get(number, []):
             live.ask(command)
         frames.append(next(live))
     return frames
+
+
+def asked_at(taken: list[Taken]) -> dict[int, list[Command]]:
+    """A script of what was taken."""
+    script: dict[int, list[Command]] = {}
+    for frame, command, _ in taken:
+        script.setdefault(frame, []).append(command)
+    return script
 
 
 def same(first: list[Frame], second: list[Frame]) -> bool:
@@ -89,10 +97,33 @@ def test_what_was_taken_up_replays_the_session_at_any_rate_and_spacing(prior: Pr
         live = Live(prior, seed=5, fps=fps, settings=QUICK)
         live.stretch(0.6)
         made = played(live, SCRIPT, 80)
-        asked: dict[int, list[Command]] = {}
-        for frame, command, _ in live.taken:
-            asked.setdefault(frame, []).append(command)
-        assert same(made, played(Live(prior, seed=5, fps=fps, settings=QUICK), asked, 80)), fps
+        assert same(made, played(Live(prior, seed=5, fps=fps, settings=QUICK), asked_at(live.taken), 80)), fps
+
+
+@pytest.mark.parametrize("fps", [20, 48])
+def test_frames_can_be_made_anew_from_any_on_and_be_as_they_were(prior: Prior, fps: float) -> None:
+    """Going back and asking something makes what asking it then would have made; what was taken up since is asked
+    again."""
+    script: dict[int, list[Command]] = {0: [Say(WALK)], 12: [Path(((0.0, 1.0), (1.0, 2.0)))], 60: [Say(RUN)]}
+    live, marks, frames = Live(prior, seed=3, fps=fps, settings=QUICK), [], []
+    for _ in range(90):
+        marks.append(live.mark())
+        frames += played(live, script, 1)
+    taken = live.taken
+    for at in (0, 13, 41, 59, 60, 75, 89):
+        before = asked_at([one for one in taken if one.frame < at])
+        undo = live.back(marks[at])
+        assert live.number == at
+        live.ask(Steer(2.0, 1.0))
+        made = [next(live) for _ in range(100 - at)]
+        again = [one.command for one in taken if one.frame >= at]
+        expected = played(Live(prior, seed=3, fps=fps, settings=QUICK), {**before, at: [*again, Steer(2.0, 1.0)]}, 100)
+        assert same(made, expected[at:]), at
+        live.forth(undo)
+        assert live.number == 90
+        assert live.taken == taken
+    frames += [next(live) for _ in range(30)]
+    assert same(frames, played(Live(prior, seed=3, fps=fps, settings=QUICK), asked_at(taken), 120))
 
 
 def test_faster_frames_show_the_same_poses_and_what_lies_between(prior: Prior) -> None:

@@ -364,10 +364,16 @@ def _turning_with(old: Array, new: Array, first: int) -> Array:
     ways = [np.append(way, way[-1]) for way in ways]
     turn = ways[1] * ways[0].conj()
     kernel = _bell(len(turn), _TURN_OVER)
-    turn = _times(kernel.astype(complex), turn) + kernel.sum(1) * _SLOW**2  # where nobody goes anywhere nothing turns
+    turn = averaged(kernel, turn) + kernel.sum(1) * _SLOW**2  # where nobody goes anywhere nothing turns
     angle = np.unwrap(np.angle(turn))
     start = np.arange(len(turn)) - first
     return (angle - 2 * np.pi * np.round(angle[first] / (2 * np.pi))) * (1 - np.exp(-0.5 * (start / _TURN_OVER) ** 2))
+
+
+def averaged(kernel: Array, values: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """(frames,) complex numbers times (frames, frames) real ones. As two real products, because numpy makes the kernel
+    complex else, and shares that out to threads that take far longer to wake than it takes to multiply."""
+    return (kernel @ values.view(np.float64).reshape(-1, 2)).view(np.complex128)[:, 0]
 
 
 def _facing_error(places: Array, goal: Goal) -> Array:

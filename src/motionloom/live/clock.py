@@ -1,8 +1,11 @@
 """A `Live` against the time: a thread that samples ahead, a bounded buffer, and frames that are handed out on time.
 
-The buffer is as long as the longest window took lately, and half as much again, so that a command waits no
-longer than it must; on a machine that is too slow it grows, windows follow each other less often, and `Health` says so.
-When frames are late all the same the clock waits: what is shown never jumps.
+Only frames that were handed out are fixed. When something is asked, what is in the buffer is made anew from the first
+frame on that a window can be ready for, so a command waits about as long as a window takes, however long the
+buffer is; a window that is being sampled because the buffer runs short is given up for it. Where a new window comes too
+late, because frames that it was to replace were shown meanwhile, those stay, and it is sampled once more from later on.
+On a slow machine windows follow each other less often, and `Health` says so. When frames are late all the same the
+clock waits: what is shown never jumps.
 """
 
 import threading
@@ -10,13 +13,22 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import islice
+from math import ceil
 from typing import Generic
 
+from motionloom.features.layout import FPS
 from motionloom.live.commands import Command, Taken
-from motionloom.live.live import Frame, Shown, Stage
+from motionloom.live.live import LOGGED, Frame, Mark, Shown, Stage
+from motionloom.tasks.watching import watching
 
-SHORTEST, LONGEST = 0.1, 2.0
+SHORTEST, LONGEST = 0.5, 2.0
 """Seconds of frames that wait in the buffer, at least and at most."""
+WINDOWS = 3.0
+"""As many of the longest windows' times the buffer holds: one that is given up, one for a command, and again."""
+USUAL, SPARE = 0.8, 1.15
+"""A window is expected to take so many times what this share of the last ones took at most."""
 WAITING = 64
 """Commands that wait for the planner; of more the oldest are dropped."""
 SLOW = 0.6
@@ -38,7 +50,7 @@ class Health:
     worst: float
     """Seconds of the worst of these delays."""
     ahead: float
-    """Seconds of frames that the buffer holds when it is full: what a command waits for."""
+    """Seconds from now behind which frames can still be changed: what a command waits for, up to a frame."""
     dropped: int
     """Commands that were thrown away because too many came."""
     times: float
@@ -74,20 +86,38 @@ class Pace:
         return late
 
 
+@dataclass(frozen=True, eq=False)
+class _Ready(Generic[Shown]):
+    """A frame in the buffer."""
+
+    mark: Mark
+    """Before it was made."""
+    shown: Shown
+    taken: list[Taken]
+
+
+class _GivenUp(Exception):
+    """A window that is not needed any more."""
+
+
 class Player(Generic[Shown]):
     """Plays one `Live` or `LivePair` against the time. Commands come from any thread; frames are taken by one."""
 
     def __init__(self, live: Stage[Shown], *, now: Callable[[], float] = time.monotonic) -> None:
         self._live, self._now = live, now
         self._inbox: deque[tuple[Command, int]] = deque()
-        self._buffer: deque[Shown] = deque()
+        self._buffer: deque[_Ready[Shown]] = deque()
+        self._next, self._due = live.number, now()  # the frame that is taken next, and when, as far as one knows
+        self._log: deque[Taken] = deque(maxlen=LOGGED)
         self._changed = threading.Condition()
         self._stopped, self._error = False, None
-        self._ahead = 0.25
+        self._soonest = 0  # the frame at 20 per second from which on something else that is asked is followed
+        self._calm = False  # whether a window is being sampled for which nobody asked
+        self._lead, self._length = 0.25, SHORTEST  # seconds that a window is expected to take; seconds of the buffer
+        self._rest = live.settings.rest
         self._took: deque[float] = deque(maxlen=REMEMBERED)
         self._busy = 0.0
-        self._made = 0
-        self._health = Health(0, 0, 0.0, self._ahead, 0, 0.0)
+        self._health = Health(0, 0, 0.0, self._lead, 0, 0.0)
         self._thread = threading.Thread(target=self._plan, name="motionloom-live", daemon=True)
 
     def start(self) -> "Player[Shown]":
@@ -118,11 +148,11 @@ class Player(Generic[Shown]):
         """Ask for something as soon as possible, as of `Stage.ask`."""
         parts = self._live.addressed(command, person)
         with self._changed:
-            for part in parts:
-                if len(self._inbox) >= WAITING:
-                    self._inbox.popleft()
-                    self._health = replace(self._health, dropped=self._health.dropped + 1)
-                self._inbox.append(part)
+            self._inbox.extend(parts)
+            while len(self._inbox) > WAITING:
+                self._inbox.popleft()
+                self._health = replace(self._health, dropped=self._health.dropped + 1)
+            self._changed.notify_all()
 
     @property
     def health(self) -> Health:
@@ -132,29 +162,41 @@ class Player(Generic[Shown]):
 
     @property
     def taken(self) -> list[Taken]:
-        """What was asked, with the frames that it first changed (`Stage.taken`)."""
-        return self._live.taken
+        """What was asked and is seen in the frames that were taken, with the first of these (`Stage.taken`)."""
+        with self._changed:
+            return list(self._log)
 
     def frames(self) -> Iterator[Shown]:
         """Frames, each at its time; without end, or until `stop`."""
         pace = Pace(self._now)
-        while (found := self.take()) is not None:
-            frame = first_of(found)
-            time.sleep(pace.until(frame))
-            self.shown(pace.late(frame))
+        while (coming := self.coming()) is not None:
+            time.sleep(pace.until(first_of(coming)))
+            found = self.take()
+            assert found is not None
+            self.shown(pace.late(first_of(found)))
             yield found
 
-    def take(self, timeout: float | None = None) -> Shown | None:
-        """The next frame as soon as it is there, whatever the time; None after ``timeout`` seconds or at the end."""
+    def coming(self, timeout: float | None = None) -> Shown | None:
+        """The next frame as it is planned now, as soon as it is there; until it is taken it may be made anew. None
+        after ``timeout`` seconds or at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._buffer or self._stopped or self._error, timeout)
-            if not self._buffer:
-                if self._error is not None:
-                    raise self._error
+            if not self._buffer and self._error is not None:
+                raise self._error
+            return self._buffer[0].shown if self._buffer else None
+
+    def take(self, timeout: float | None = None) -> Shown | None:
+        """The next frame as soon as it is there, whatever the time, which is fixed from now on; None after ``timeout``
+        seconds or at the end. Who shows frames at their times takes each when it is due, so that commands do not wait.
+        """
+        with self._changed:
+            if self.coming(timeout) is None:
                 return None
-            frame = self._buffer.popleft()
+            found = self._buffer.popleft()
+            self._next, self._due = self._next + 1, self._now() + 1 / self._live.fps
+            self._log += found.taken
             self._changed.notify_all()
-            return frame
+            return found.shown
 
     def shown(self, late: float) -> None:
         """Count a frame that was shown, so many seconds after its time."""
@@ -162,48 +204,120 @@ class Player(Generic[Shown]):
             old = self._health
             self._health = replace(old, shown=old.shown + 1, late=old.late + (late > LATE), worst=max(old.worst, late))
 
+    # The planner, in a thread of its own
+
     def _plan(self) -> None:
         try:
-            while self._make():
-                pass
+            with watching(self._look):
+                while self._step():
+                    pass
+        except _GivenUp:
+            pass
         except Exception as error:
             with self._changed:
                 self._error, self._stopped = error, True
                 self._changed.notify_all()
 
-    def _make(self) -> bool:
+    def _step(self) -> bool:
+        """Do what is to be done next, and wait for it; False at the end."""
         with self._changed:
-            self._changed.wait_for(lambda: self._stopped or len(self._buffer) < self._room())
-            if self._stopped:
-                return False
-            while self._inbox:
-                self._live.ask(*self._inbox.popleft())
-        begun, calls = self._now(), self._live.calls
-        frame = next(self._live)
-        took = self._now() - begun
-        with self._changed:
-            self._buffer.append(frame)
-            self._made += 1
-            self._busy += took
-            if self._live.calls > calls:
-                self._fit(took)
-            self._changed.notify_all()
+            self._changed.wait_for(lambda: self._stopped or self._task() is not None)
+            task = self._task()
+        if self._stopped or task is None:
+            return False
+        task()
         return True
 
-    def _room(self) -> int:
-        return max(2, round(self._ahead * self._live.fps))
+    def _task(self) -> Callable[[], None] | None:
+        """What there is to do, the most urgent first."""
+        room = len(self._buffer) < max(2, round(self._length * self._live.fps))
+        if room and self._live.planned:
+            return self._extend
+        if self._inbox:
+            mark = self._place() or self._live.mark()
+            if self._takes(mark):
+                return partial(self._follow, mark)
+        return self._extend if room else None
 
-    def _fit(self, took: float) -> None:
-        """The buffer for how long windows take, and how often they are sampled."""
+    def _place(self) -> Mark | None:
+        """The first frame of the buffer from which on what is asked can be followed: a window is ready before it is
+        due, and what was asked before is not too near."""
+        wait = self._lead - max(0.0, self._due - self._now())
+        first = max(0, ceil(wait * self._live.fps - 1e-6))
+        marks = (ready.mark for ready in islice(self._buffer, first, None))
+        return next((mark for mark in marks if self._takes(mark)), None)
+
+    def _takes(self, mark: Mark) -> bool:
+        return mark.next >= self._soonest and self._live.takes(mark)
+
+    def _look(self, _: object) -> None:
+        """Between two network calls: give the window up where something else is to be done."""
+        with self._changed:
+            if self._stopped or (self._calm and self._inbox and self._place() is not None):
+                raise _GivenUp
+
+    def _extend(self) -> None:
+        """One frame more for the buffer."""
+        begun, mark, drawn = self._now(), self._live.mark(), self._live.drawn
+        self._calm = True
+        try:
+            made = self._made()
+        except _GivenUp:
+            self._live.back(mark)
+            made = None
+        self._calm = False
+        took = self._now() - begun
+        with self._changed:
+            self._busy += took
+            if made is not None:
+                self._buffer.append(made)
+            if self._live.drawn != drawn:
+                self._fit(took)
+            self._changed.notify_all()
+
+    def _made(self) -> _Ready[Shown]:
+        mark, shown = self._live.mark(), next(self._live)
+        return _Ready(mark, shown, self._live.fresh)
+
+    def _follow(self, mark: Mark) -> None:
+        """Take up what was asked from a frame of the buffer on, or behind its last one."""
+        begun, live, made = self._now(), self._live, []
+        with self._changed:
+            asked = list(self._inbox)
+            self._inbox.clear()
+        undo = live.back(mark)
+        for command, person in asked:
+            live.ask(command, person)
+        while live.drawn == mark.drawn:
+            made.append(self._made())
+        took = self._now() - begun
+        with self._changed:
+            self._busy += took
+            if self._next > mark.frame:  # it was shown meanwhile
+                live.forth(undo)
+                self._inbox.extendleft(reversed(asked))
+                self._fit(took, least=took)
+            else:
+                while self._buffer and self._buffer[-1].mark.frame >= mark.frame:
+                    self._buffer.pop()
+                self._buffer.extend(made)
+                self._soonest = live.drawn + self._rest
+                self._fit(took)
+            self._changed.notify_all()
+
+    def _fit(self, took: float, least: float = 0.0) -> None:
+        """How far ahead frames are kept, and how often windows are sampled, for how long these take; the next one is
+        expected to take ``least`` at least."""
         self._took.append(took)
-        longest = max(self._took)
-        self._ahead = min(max(1.5 * longest, SHORTEST), LONGEST)
-        rest = self._live.stretch(1.25 * longest)
-        times = self._made / self._live.fps / max(self._busy, 1e-9)
+        longest, usual = max(self._took), sorted(self._took)[int(USUAL * (len(self._took) - 1))]
+        self._lead = SPARE * max(usual, least)
+        self._length = min(max(WINDOWS * longest, SHORTEST), LONGEST)
+        self._rest = self._live.stretch(1.25 * longest)
+        times = self._live.number / self._live.fps / max(self._busy, 1e-9)
         problem = ""
-        if self._ahead > SLOW:
+        if self._lead > SLOW:
             problem = (
                 f"this machine takes {longest:.2f} s for a window of motion: what is asked is followed every "
-                f"{rest / 20:.2f} s and {self._ahead:.2f} s late"
+                f"{self._rest / FPS:.2f} s and {self._lead:.2f} s late"
             )
-        self._health = replace(self._health, ahead=self._ahead, times=times, problem=problem)
+        self._health = replace(self._health, ahead=self._lead, times=times, problem=problem)

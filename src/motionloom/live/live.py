@@ -3,12 +3,14 @@
 There is one plan: the frames that were sampled and not yet shown. When something is asked, or when the plan runs short,
 a window is sampled from the next frame on (`window`), knowing the last half second; its body follows from the poses
 that were shown (`body`). Everything is counted in frames, no clock is looked at: the same seed and the same commands at
-the same frames make the same motion. `clock` runs one of these against the time; `pair` has two people.
+the same frames make the same motion. What was made and not shown yet can be made anew from any of its frames (`Mark`).
+`clock` runs one of these against the time; `pair` has two people.
 """
 
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -18,8 +20,9 @@ from numpy.typing import NDArray
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.live.commands import Command, Taken
-from motionloom.live.person import Asked, Person, Request
+from motionloom.live.person import Asked, Person, Request, State
 from motionloom.live.settings import Settings
+from motionloom.live.threads import one_thread
 from motionloom.live.window import Drawer, Noise
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22, Skeleton
@@ -27,6 +30,9 @@ from motionloom.tasks.text import LARGEST_SEED
 from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
+
+LOGGED = 100_000
+"""Commands that are remembered with their frames."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +66,41 @@ Shown = TypeVar("Shown", Frame, tuple[Frame, Frame])
 """What is shown at once: the frame of one person, or of both."""
 
 
+@dataclass(frozen=True, eq=False)
+class Mark:
+    """A `Stage` before one of its frames: all it takes to make that frame and what follows, again or otherwise."""
+
+    frame: int
+    """Number of the frame, at the rate that is shown."""
+    next: int
+    """The next frame at 20 per second."""
+    again: int
+    """When a window is sampled though nothing is asked."""
+    drawn: int
+    """Where the last window began."""
+    followed: int
+    """Where the last one began that took up what was asked."""
+    two: list[list[tuple[Array, Array, str]]]
+    """The last two frames at 20 per second, of everybody."""
+    people: tuple[State, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Undo:
+    """What takes a `Stage` to where it was before it went back."""
+
+    at: Mark
+    """Where it went back to."""
+    was: Mark
+    log: list[Taken]
+    """What had been taken up between the two."""
+
+
 class Stage(ABC, Generic[Shown]):
-    """One person or two who move without end: frames are counted, windows are sampled when they must be."""
+    """One person or two who move without end: frames are counted, windows are sampled when they must be.
+
+    Who is `tasks.watching.watching` may end a window between two network calls; `back` then goes to before its frame.
+    """
 
     def __init__(self, people: Sequence[Person], settings: Settings, fps: float) -> None:
         if not (np.isfinite(fps) and 1 <= fps <= 240):
@@ -69,9 +108,14 @@ class Stage(ABC, Generic[Shown]):
         self.people, self.settings, self.fps = tuple(people), settings, float(fps)
         self._frame = 0  # the next one to be shown, at the rate of what is shown
         self._next = self._again = 0  # the next frame at 20 per second, and when to sample anew
-        self._drawn = -settings.used  # where the last window began
+        self._drawn = (
+            self._followed
+        ) = -settings.used  # where the last window began, and the last that took up something
         self._rest, self._open = settings.rest, True  # frames between windows; whether commands may be taken up
         self._two: list[list[tuple[Array, Array, str]]] = []  # the last two frames at 20 per second, of everybody
+        self._log: deque[Taken] = deque(maxlen=LOGGED)
+        self.fresh: list[Taken] = []
+        """What the last frame was the first to know of."""
 
     @property
     def number(self) -> int:
@@ -108,14 +152,59 @@ class Stage(ABC, Generic[Shown]):
     def taken(self) -> list[Taken]:
         """What was asked, with the frames that it first changed: asked before these frames of one of the same seed and
         start, it makes the same motion again."""
-        found = [Taken(at, asked, i) for i, person in enumerate(self.people) for at, asked in person.taken]
-        return sorted(found, key=lambda one: one.frame)
+        return list(self._log)
 
     def stretch(self, seconds: float) -> int:
-        """Draw windows at least so many seconds apart, for machines that are slow; gives the frames back (at 20 per
-        second), which are not below those of the settings."""
+        """Take up what is asked at least so many seconds apart, for machines that are slow; gives the frames back (at
+        20 per second), which are not below those of the settings."""
         self._rest = min(max(int(np.ceil(seconds * FPS)), self.settings.rest), self.settings.used)
         return self._rest
+
+    # Going back
+
+    def mark(self) -> Mark:
+        """The present, to go back to."""
+        states = tuple(person.state() for person in self.people)
+        return Mark(self._frame, self._next, self._again, self._drawn, self._followed, self._two, states)
+
+    def back(self, mark: Mark) -> Undo:
+        """Go back to a mark: the next frame is that of the mark, and what was asked since is asked of it."""
+        undo = Undo(mark, self.mark(), [])
+        while self._log and self._log[-1].frame >= mark.frame:
+            undo.log.insert(0, self._log.pop())
+        self._restore(mark)
+        for i, (person, state) in enumerate(zip(self.people, mark.people, strict=True)):
+            person.restore(replace(state, asked=()))  # what waited then was taken up since, or waits still
+            for command in (*(one.command for one in undo.log if one.person == i), *undo.was.people[i].asked):
+                person.ask(command)
+        return undo
+
+    def forth(self, undo: Undo) -> None:
+        """Be where `back` was called, as if it had not been."""
+        while self._log and self._log[-1].frame >= undo.at.frame:
+            self._log.pop()
+        self._log.extend(undo.log)
+        self._restore(undo.was)
+
+    def _restore(self, mark: Mark) -> None:
+        self._frame, self._next, self._again, self._drawn = mark.frame, mark.next, mark.again, mark.drawn
+        self._followed, self._two = mark.followed, mark.two
+        for person, state in zip(self.people, mark.people, strict=True):
+            person.restore(state)
+
+    @property
+    def drawn(self) -> int:
+        """Where the last window began, in frames at 20 per second."""
+        return self._drawn
+
+    def takes(self, mark: Mark) -> bool:
+        """Whether something asked at a mark is taken up there; it waits where something was taken up just before."""
+        return mark.next >= mark.followed + self._rest
+
+    @property
+    def planned(self) -> bool:
+        """Whether the next frame is there already: nothing is sampled for it, unless something is asked."""
+        return self._needed()[0] < self._again
 
     @abstractmethod
     def _windows(self, requests: Sequence[Request]) -> None:
@@ -123,15 +212,20 @@ class Stage(ABC, Generic[Shown]):
 
     def frames(self) -> tuple[Frame, ...]:
         """The next frame of everybody."""
-        self._open = True
-        at = self._frame / self.fps * FPS
-        low = int(at + 1e-9)
-        part = at - low if at - low > 1e-9 else 0.0
-        while self._next < low + (2 if part else 1):
+        self._open, self.fresh = True, []
+        last, part = self._needed()
+        while self._next <= last:
             self._two = [*self._two, self._advanced()][-2:]
         shown = tuple(self._between(person, i, part) for i, person in enumerate(self.people))
         self._frame += 1
         return shown
+
+    def _needed(self) -> tuple[int, float]:
+        """The last frame at 20 per second that the next one needs, and how far it is behind the one before that; 0
+        where it is that frame itself."""
+        at = self._frame / self.fps * FPS
+        low = int(at + 1e-9)
+        return (low + 1, at - low) if at - low > 1e-9 else (low, 0.0)
 
     def _between(self, person: Person, i: int, part: float) -> Frame:
         root, turns, words = self._two[0 if part else -1][i]
@@ -146,11 +240,15 @@ class Stage(ABC, Generic[Shown]):
         """The next frame at 20 per second."""
         take = self._open and any(person.waiting for person in self.people)
         self._open = False
-        take = take and self._next >= self._drawn + self._rest
+        take = take and self._next >= self._followed + self._rest
         if take or self._next >= self._again:
-            requests = [person.request(self._next, self._frame, take=take) for person in self.people]
-            self._windows(requests)
+            requests = [person.request(self._next, take=take) for person in self.people]
+            self.fresh += [Taken(self._frame, asked, i) for i, one in enumerate(requests) for asked in one.taken]
+            self._log += self.fresh
+            with one_thread():
+                self._windows(requests)
             self._drawn, self._again = self._next, self._next + min(request.again for request in requests)
+            self._followed = self._next if take else self._followed
         made = [person.pose_at(self._next) for person in self.people]
         self._next += 1
         return made

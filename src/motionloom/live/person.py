@@ -4,6 +4,7 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,8 +33,6 @@ STAY = 4
 RUNS = 1.6
 """Metres per second from which on somebody who is to stand still first slows down: words alone stop a runner in half a
 second."""
-LOGGED = 100_000
-"""Commands that are remembered with their frames."""
 MOST_ASKED = 64
 """Commands, and things to reach, that wait at once; of more the oldest are dropped."""
 
@@ -88,6 +87,8 @@ class Request:
     """As of `window.Drawer`."""
     again: int
     """Frames after which to sample again."""
+    taken: list[Command]
+    """What was asked that this window is the first to know of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,15 +115,27 @@ class _Due:
     """Of one frame."""
 
 
+@dataclass(frozen=True, eq=False)
+class State:
+    """A person before some frame: all that changes while he moves."""
+
+    plan: _Plan | None
+    words: str
+    steer: Steer
+    trail: Trail | None
+    due: tuple[_Due, ...]
+    asked: tuple[Command, ...]
+
+
 class Person(Asked):
     """One of those who move. Frames are counted at 20 per second."""
 
     def __init__(self, prior: Prior, settings: Settings, *, start: Motion | None, skeleton: Skeleton | None) -> None:
         self._prior, self._settings, self.skeleton = prior, settings, skeleton or SMPL22
-        self._words, self._steer, self._trail = "", Steer(), None
+        self._words, self._steer = "", Steer()
+        self._trail: Trail | None = None
         self._asked: deque[Command] = deque()
         self._due: deque[_Due] = deque(maxlen=MOST_ASKED)
-        self._taken: deque[tuple[int, Command]] = deque(maxlen=LOGGED)
         self._plan: _Plan | None = None if start is None else self._begun(start)
 
     def ask(self, command: Command) -> None:
@@ -140,10 +153,15 @@ class Person(Asked):
         """Whether something was asked that no window knows of."""
         return bool(self._asked)
 
-    @property
-    def taken(self) -> list[tuple[int, Command]]:
-        """What was asked, with the shown frames that it first changed."""
-        return list(self._taken)
+    def state(self) -> State:
+        """What `restore` brings back."""
+        return State(self._plan, self._words, self._steer, copy(self._trail), tuple(self._due), tuple(self._asked))
+
+    def restore(self, state: State) -> None:
+        """Be as in a state; what was asked since is forgotten."""
+        self._plan, self._words, self._steer, self._trail = state.plan, state.words, state.steer, copy(state.trail)
+        self._due = deque(state.due, maxlen=MOST_ASKED)
+        self._asked = deque(state.asked)
 
     def pose_at(self, frame: int) -> tuple[Array, Array, str]:
         """Root (3,), rotations (joints, 4) and words of a frame of the plan."""
@@ -161,19 +179,18 @@ class Person(Asked):
         motion = body(positions, contacts, FPS, None)
         return _Plan(-len(known), known, places, motion, put(motion, self.skeleton, None), STANDS)
 
-    def request(self, frame: int, shown: int, *, take: bool) -> Request:
-        """What the window from ``frame`` on must be; with ``take`` what was asked is taken up, before the shown frame
-        of that number."""
+    def request(self, frame: int, *, take: bool) -> Request:
+        """What the window from ``frame`` on must be; with ``take`` what was asked is taken up."""
         known, begin = np.zeros((0, WIDTH)), Placement()
         if (plan := self._plan) is not None:
             end = frame - plan.first
             known = plan.features[max(0, end - self._settings.known) : end]
             begin = plan.places[end - len(known)]
         course = _course(known, begin)
+        taken: list[Command] = []
         while take and self._asked:
-            command = self._asked.popleft()
-            self._taken.append((shown, command))
-            self._take_up(command, frame, course)
+            taken.append(self._asked.popleft())
+            self._take_up(taken[-1], frame, course)
         goal, words, again = self._wanted(frame, course)
         edits: list[Correction] = []
         turns: list[Correction] = []
@@ -181,7 +198,7 @@ class Person(Asked):
             edits.append(toward(goal.seen_from(course.place), self._prior, first=len(known), known=True))
         if self._trail is None and self._steer.speed is None and self._steer.direction is not None:
             turns.append(heading_for(self._steer.direction - course.place.facing, self._prior, first=len(known)))
-        return Request(known, begin, words, edits, turns, again)
+        return Request(known, begin, words, edits, turns, again, taken)
 
     def accept(self, request: Request, features: Array, frame: int, begin: Placement | None = None) -> None:
         """Take a window (known and sampled frames, 263) for the plan; ``begin`` where nothing was known."""

@@ -123,12 +123,14 @@ async def _play(websocket: Socket, session: Session) -> None:
     pace, reported = Pace(time.monotonic), time.monotonic()
     player = session.player
     while True:
-        while (found := session.pending or player.take(timeout=0.0)) is None:
+        while (found := session.pending or player.coming(timeout=0.0)) is None:
             if player.ended:
                 raise MotionloomError("the live session ended")
             await asyncio.sleep(LOOK)
-        session.pending, frame = found, first_of(found)  # until it is sent: the client may go in between
-        await asyncio.sleep(pace.until(frame))
+        await asyncio.sleep(pace.until(first_of(found)))
+        # what was taken is kept until it is sent: the client may go in between
+        session.pending = found = session.pending or player.take() or found
+        frame = first_of(found)
         late = pace.late(frame)
         player.shown(late)
         await _send(websocket, messages.frame(found, late))

@@ -15,12 +15,16 @@ from torch.nn import functional as F
 from motionloom.diffusion import SOLVERS, Denoiser, NoiseSource, guide, inpaint, levels, observe, row_seed, sample
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction
+from motionloom.features import humanml
 from motionloom.live.settings import Settings
 from motionloom.nets.prior import Bound
+from motionloom.tasks.watching import report
 from motionloom.weights.prior import Prior
 
 TEXTS = 64
 """Prompts whose vectors are kept."""
+SETTLING = 0.9
+"""The noise of a level below which what is asked is met exactly, also where the way out of the known frames bent it."""
 
 
 class Noise:
@@ -84,18 +88,22 @@ class Drawer:
             self.calls += 1
             return changed(inpaint(free, data, mask)(state, level)[0], level)[None]
 
+        def poses(clean: Tensor) -> np.ndarray:
+            return humanml.decode_positions((clean * spread + prior.mean).cpu().double().numpy()[0])[None, None]
+
         hold = observe(data, mask, prior.schedule, draw)
         state = hold(draw(data), self._levels[0])
         walk = sample(
             denoise, state, levels=self._levels, solver=SOLVERS[self.settings.solver], schedule=prior.schedule,
             draw=draw, constrain=hold,
         )  # fmt: skip
-        for snapshot in walk:
+        for done, snapshot in enumerate(walk, start=1):
             state = snapshot.state
+            report(done, len(self._levels) - 1, [0], lambda clean=snapshot.clean: poses(clean))
         return torch.where(mask, given, state * spread + prior.mean)[0].cpu().double().numpy()
 
     def _guided(self, text: str, frames: int) -> Denoiser:
-        """The prior's denoised estimate under a text; an empty one asks for nothing in particular.
+        """The prior's denoised estimate under a text; an empty one asks for nothing in particular. Guided early.
 
         A token of the network holds several frames, and between tokens it leaves small steps: the last estimate is the
         average over all ways to divide the frames into tokens (as in `tasks.long`), which are rows of one call.
@@ -106,17 +114,20 @@ class Drawer:
             while len(self._bound) > TEXTS:
                 self._bound.popitem(last=False)
         self._bound.move_to_end(text)
-        net, bound, scale = self.prior.net, self._bound[text], self.settings.guidance
-        once, ways = guide(net, *bound, scale), net.config.patch
+        net, (own, null), ways = self.prior.net, self._bound[text], self.prior.net.config.patch
+        early = [level for level in self._levels if self.prior.schedule.at(level)[1] >= self.settings.guided]
+        strong, plain = self.settings.guidance, float(self.settings.guidance != 0)
+        guided, late = guide(net, own, null, strong), guide(net, own, null, plain)
         lengths = torch.arange(frames, frames - ways, -1, device=self.prior.mean.device)
         own, null = (
-            Bound(*(part.repeat_interleave(ways, 0) for part in one))._replace(lengths=lengths) for one in bound
+            Bound(*(part.repeat_interleave(ways, 0) for part in one))._replace(lengths=lengths) for one in (own, null)
         )
-        shifted = guide(net, own, null, scale)
+        last = self._levels[-2]
+        shifted = guide(net, own, null, strong if last in early else plain)
 
         def denoise(state: Tensor, level: int) -> Tensor:
-            if level != self._levels[-2] or ways == 1:
-                return once(state, level)
+            if level != last or ways == 1:
+                return guided(state, level) if level in early else late(state, level)
             rows = shifted(torch.cat([F.pad(state[:, k:], (0, 0, 0, k)) for k in range(ways)]), level)
             total = torch.zeros_like(state)
             for k, row in enumerate(rows):
@@ -130,8 +141,8 @@ class Drawer:
 def leaving(
     prior: Prior, known: Tensor, frames: int, *, edits: Sequence[Correction], turns: Sequence[Correction]
 ) -> Correction:
-    """What every estimate of a window goes through: ``edits``, no jump behind what is known, ``edits`` again,
-    ``turns``.
+    """What every estimate of a window goes through: ``edits``, no jump behind what is known, ``edits`` again in the
+    late ones, ``turns``.
 
     known: (n, 263) features, not standardised, of which ``frames`` are behind; the known ones stay as they are.
     """
@@ -146,7 +157,8 @@ def leaving(
         for edit in edits:
             denoised = edit(denoised, level)
         denoised = ((meet(denoised[None] * spread + prior.mean) - prior.mean) / spread)[0]
-        for turn in (*edits, *turns):  # edits again: a heading bent at the border turns all that is behind it
+        late = prior.schedule.at(level)[1] < SETTLING
+        for turn in (*(edits if late else ()), *turns):  # a heading bent at the border turns all that is behind it
             denoised = turn(denoised, level)
         return torch.where(mask[0], data[0], denoised)
 
