@@ -67,7 +67,7 @@ def fits(one: Kind, name: str) -> bool:
 
 
 def maker(prior: Prior, how: Sampling) -> Maker:
-    """The methods of a prior and the adapters that are shipped for it; a control without one of its own takes ``any``."""
+    """The methods of a prior and its shipped adapters; a control that has none of its own takes ``any``."""
     shipped = adapters()
 
     @cache
