@@ -56,7 +56,7 @@ def lowered(goal: Goal, places: Array, room: Array) -> Goal:
         room: (frames,) metres, as of `room_above`.
     """
     above = np.zeros(goal.positions.shape[:2])
-    for joint in np.flatnonzero(goal.asked[:, 1:, 1].any(axis=0)) + 1:
+    for joint in (np.flatnonzero(goal.asked[:, 1:, 1].any(axis=0)) + 1).tolist():
         base, reach = REACH.get(joint, (joint, costs.TRUNK_SLACK))
         line = np.where(goal.asked[:, joint], goal.positions[:, joint] - places[:, base], 0.0)
         above[:, joint] = (line[:, 1] - _straight(line, reach) - room - _SHRUG).clip(0)
