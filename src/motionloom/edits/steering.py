@@ -8,7 +8,7 @@ which joints are asked when: nothing is differentiated, and the network does not
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import torch
@@ -157,7 +157,7 @@ def _plan(goal: Goal, first: int, width: float) -> _Plan:
     )  # fmt: skip
 
 
-def _times(first: Array, second: Array) -> Array:
+def _times(first: NDArray[Any], second: NDArray[Any]) -> NDArray[Any]:
     """The matrix product, by torch: numpy would start threads of its own, which then wait, on the cores that the
     network's threads need for its next estimate."""
     return (torch.from_numpy(first) @ torch.from_numpy(second)).numpy()

@@ -98,7 +98,9 @@ export class Drawer {
   /** Run one job beside the timeline, such as a prediction; null where it failed, which is then said. */
   async once(job: JobRequest): Promise<readonly Result[] | null> {
     await this.finished();
+    this.running?.abort();
     const running = (this.running = new AbortController());
+    this.isPreviewed = false;
     this.app.session.update({ error: null, drawing: { done: 0, of: 1 } });
     try {
       return await this.run(job, running);
