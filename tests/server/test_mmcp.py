@@ -120,7 +120,7 @@ def test_a_pose_without_a_place_is_taken_where_the_person_is(server: Server, mod
     pose = {"type": "pose_keyframe", "frame": 30, "joint_rotations": turns}
     (free,) = draw(server, model, segments=[text(frames=60)])
     (made,) = draw(server, model, segments=[text(frames=60)], constraints=[pose])
-    assert place(made, "left_wrist")[30, 1] == pytest.approx(place(source, "left_wrist")[20, 1], abs=0.1)
+    assert place(made, "left_wrist")[30, 1] == pytest.approx(place(source, "left_wrist")[20, 1], abs=0.15)
     assert np.linalg.norm(place(made, "pelvis")[30] - place(free, "pelvis")[30]) < 0.5
 
 
