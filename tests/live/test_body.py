@@ -40,6 +40,15 @@ def test_feet_that_stand_stand_on_another_skeleton_too_and_what_was_shown_stays(
     assert extra.max() < 0.03, "no jump where the shown frames end"
 
 
+def test_one_frame_that_was_shown_is_enough_to_go_on_from() -> None:
+    motion = clean_feet(slider())
+    shown = put(motion, long_legged(), None).frames(0, 1)
+    shown = replace(shown, root=shown.root + [0.03, 0.0, 0.02])
+    made = put(motion, long_legged(), shown)
+    assert np.array_equal(made.root[:1], shown.root)
+    assert np.linalg.norm(made.root[1] - made.root[0]) < 0.03
+
+
 def test_a_foot_goes_where_it_is_moved_and_nothing_above_the_hips_does() -> None:
     motion = put(clean_feet(slider()), long_legged(), None)
     shift = np.zeros((len(motion), 2, 3))

@@ -71,7 +71,7 @@ def _continuing(sampled: Motion, shown: Motion) -> Motion:
     off = shown.root - sampled.root[:count]
     root = sampled.root.copy()
     root[:count] = shown.root
-    root[count : count + reach] += match_boundary(off[-1], off[-1] - off[-2], reach)
+    root[count : count + reach] += match_boundary(off[-1], off[-1] - off[max(count - 2, 0)], reach)
     turns = match_rotations(sampled.rotations, shown.rotations, count - 1, 1, reach)
     turns[:count] = shown.rotations
     return replace(sampled, root=root, rotations=rot.unroll(rot.normalize(turns)))
