@@ -43,7 +43,7 @@ def test_feet_that_stand_stand_on_another_skeleton_too_and_what_was_shown_stays(
 def test_one_frame_that_was_shown_is_enough_to_go_on_from() -> None:
     motion = clean_feet(slider())
     shown = put(motion, long_legged(), None).frames(0, 1)
-    shown = replace(shown, root=shown.root + [0.03, 0.0, 0.02])
+    shown = replace(shown, root=shown.root + np.array([0.03, 0.0, 0.02]))
     made = put(motion, long_legged(), shown)
     assert np.array_equal(made.root[:1], shown.root)
     assert np.linalg.norm(made.root[1] - made.root[0]) < 0.03
