@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 pytest.importorskip("starlette", reason="needs the extra 'studio'")
@@ -57,6 +57,7 @@ SEGMENTS = st.lists(PARTS, min_size=1, max_size=4)
 
 @settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(segments=SEGMENTS, seed=st.integers(0, 2**40))
+@example(segments=[{"text": "INF"}], seed=0)
 def test_a_timeline_comes_back_from_yaml_as_it_went(project: Project, segments: list[Any], seed: int) -> None:
     value = {"segments": segments, "seed": seed}
     assert timeline_json(timeline_yaml(value), project, Limits()) == value

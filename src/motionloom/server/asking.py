@@ -318,11 +318,12 @@ def _without(goal: "Goal", other: "Goal") -> "Goal":
 
 
 class _Quoting(yaml.SafeDumper):
-    """Writes in quotes what is not plain words: other readers of YAML know other numbers ("0o7")."""
+    """Writes in quotes what is not plain words: other readers of YAML know other numbers ("0o7", "INF")."""
 
 
 def _quoted(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
-    style = None if re.fullmatch(r"[^\W\d_][^\W\d_]*(?:[ _][^\W\d_]+)*", text) else '"'
+    plain = re.fullmatch(r"(?!(?i:inf|nan|infinity)$)[^\W\d_][^\W\d_]*(?:[ _][^\W\d_]+)*", text)
+    style = None if plain else '"'
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
 
