@@ -177,6 +177,8 @@ def clip(**changes) -> Clip:
         {"notes": (Note(0, 9, "fly"),)},
         {"notes": (Note(0, 9, "human"),)},
         {"split": 3},
+        {"kind": {"made": 1}},
+        {"kind": "drawn"},
     ],
     ids=str,
 )

@@ -18,6 +18,7 @@ SHORTEST = 20
 """Frames of the shortest stretch that is described."""
 THEN, MADE = "then", "made "
 """Groups of notes besides those of `data.actions`: one action and then another; gestures of `data.made`."""
+KINDS = ("capture", "keyed", "made")
 STATES = ("walk", "walk slow", "walk fast", "jog", "run", "walk backward", "jog backward", "stand", "dance",
           "circle left", "circle right", "run circle", "balance", "sidestep left", "sidestep right",
           "sit")  # fmt: skip
@@ -96,6 +97,8 @@ def _check_clip(clip: Clip) -> None:
         raise ValueError(f"its features are not finite float32 numbers of shape (frames, {WIDTH})")
     if not all(isinstance(v, str) for v in (clip.name, clip.source, clip.licence, clip.split, clip.way)):
         raise ValueError("its name, source, licence, split or way is not text")
+    if clip.kind not in KINDS:
+        raise ValueError(f"its kind {clip.kind!r} is none of {', '.join(KINDS)}")
     for note in clip.notes:
         if not 0 <= note.first < note.last <= len(features):
             raise ValueError(f"a note spans frames {note.first} to {note.last} of {len(features)}")

@@ -69,10 +69,7 @@ class Character:
             raise MotionloomError(
                 f"the character of {self.path} is written as such a file; name it *{self.path.suffix}, not {path.name}"
             )
-        try:
-            document = copy.deepcopy(self.file.document.json)
-        except RecursionError:
-            raise MotionloomError("the character's file nests its JSON too deep to be written again") from None
+        document = copy.deepcopy(self.file.document.json)
         new = _Insertion(document, self.file.document)
         animation = {"name": self._free_name(name or "motion", replace), "channels": [], "samplers": []}
         animation["extras"] = {"fps": motion.fps}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
-from motionloom.io.text import read_bytes, shown
+from motionloom.io.text import plain_json, read_bytes, shown
 
 Array = NDArray[np.float64]
 MAX_NUMBERS = 400_000_000
@@ -134,8 +134,8 @@ def read_document(path: str | Path) -> Document:
     if len(data) > MAX_JSON:
         raise MotionloomError(f"{name} has {len(data) / 1e6:.0f} MB of JSON; at most {MAX_JSON / 1e6:.0f} MB are read")
     try:
-        content = json.loads(data.decode("utf-8-sig"), parse_constant=_no_constant)
-    except (ValueError, RecursionError):  # ValueError: not UTF-8, not JSON, NaN, endless digits
+        content = plain_json(data.decode("utf-8-sig"), finite=True)
+    except ValueError:  # not UTF-8, not JSON, NaN, endless digits, endless depth
         raise MotionloomError(f"{name} is not a glTF file: its JSON part cannot be read") from None
     if not isinstance(content, dict):
         raise MotionloomError(f"{name} is not a glTF file: its JSON part is not an object")
@@ -188,10 +188,6 @@ def pack_glb(content: dict[str, Any], binary: bytes, others: Sequence[tuple[byte
     parts += others
     body = b"".join(struct.pack("<I", len(part)) + kind + part for kind, part in parts)
     return b"glTF" + struct.pack("<II", 2, 12 + len(body)) + body
-
-
-def _no_constant(word: str) -> float:
-    raise ValueError(word)
 
 
 def _chunks(data: bytes, name: str) -> tuple[bytes, bytes | None]:

@@ -1,6 +1,7 @@
 """Reading untrusted text files of numbers: size, binary junk, bad numbers, all with the line in the message."""
 
 import json
+import math
 import warnings
 from collections.abc import Iterable
 from pathlib import Path
@@ -86,7 +87,7 @@ def parse_json(data: bytes | str, what: Path | str) -> Any:
 
 
 def plain_json(data: bytes | str, *, finite: bool = False) -> Any:
-    """What JSON says, lying in each other at most `MAX_DEPTH` deep; ``finite``: without NaN and infinity.
+    """What JSON says, lying in each other at most `MAX_DEPTH` deep; ``finite``: without NaN, infinity and 1e999.
 
     Raises ValueError for anything else: what is not UTF-8, endless digits, and depths at which whoever copies or shows
     the values runs out of stack.
@@ -97,8 +98,14 @@ def plain_json(data: bytes | str, *, finite: bool = False) -> Any:
             raise ValueError(f"{name} is no number")
         return float(name.replace("Infinity", "inf"))
 
+    def number(digits: str) -> float:
+        value = float(digits)
+        if finite and not math.isfinite(value):
+            raise ValueError(f"{digits[:20]} is no number that fits")
+        return value
+
     try:
-        value = json.loads(data, parse_constant=constant)
+        value = json.loads(data, parse_constant=constant, parse_float=number)
     except RecursionError:
         raise ValueError("its values lie in each other too deep") from None
     layer = [value]
