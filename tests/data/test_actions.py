@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionloom.data.actions import ACTIONS, action_of, core, sentences, side_of
+from motionloom.data.actions import ACTIONS, action_of, core, sentences, side_of, strike
 from motionloom.data.words import mirror_text
 from tests.kinematics import people
 from tests.work import ends
@@ -30,6 +30,8 @@ from tests.work import ends
         (("a person walks up to a box and picks it up",), "walk and pick up"),
         (("a person kicks a ball with their right foot.",), "soccer"),
         (("a person kicks with the left leg",), "kick"),
+        (("a person does push-ups", "a person lowers the body to the floor and pushes it up again"), "push-up"),
+        (("a person kneels on one knee, out of breath", "a person rests on one knee, tired"), "kneeling"),
         (("a person picks something up from the floor",), "pick up"),
         (("a person throws right punches from a boxing stance",), "punch"),
     ],
@@ -98,3 +100,24 @@ def test_the_core_of_a_change_is_where_it_changes() -> None:
 
 def test_the_core_of_somebody_who_never_changes_is_everything() -> None:
     assert core(np.repeat(people.standing(0.1)[:1], 50, axis=0), 20.0) == (0, 50)
+
+
+def test_the_name_of_a_recording_overrules_its_captions() -> None:
+    captions = ("a person grabbed something and moved backwards",)
+    assert action_of(captions) is None
+    found = action_of(captions, "accad_Male2_E10_BodyHookRight")
+    assert found is not None
+    assert found.name == "punch"
+    assert all("right" in text or "left" not in text for text in sentences(found, side="right"))
+
+
+@pytest.mark.parametrize("hand", [20, 21])
+def test_a_strike_is_where_a_hand_is_fastest_and_names_the_side_that_does_it_alone(hand: int) -> None:
+    body = people.walking(0.0, 5.0)
+    pulse = np.exp(-(((np.arange(len(body)) - 60) / 2.5) ** 2))
+    body[:, hand, 2] += 0.5 * pulse
+    (first, end), side = strike(body, 20.0, "hand")
+    assert first < 60 < end <= 70
+    assert side == {20: "left", 21: "right"}[hand]
+    body[:, 41 - hand, 2] += 0.45 * pulse
+    assert strike(body, 20.0, "hand")[1] == ""

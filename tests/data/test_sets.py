@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from motionloom.data.clips import Clip, Note, write_clip
-from motionloom.data.sets import Batches, _starts, load_set
+from motionloom.data.sets import Batches, _start, _starts, load_set
 from motionloom.features import humanml as hml
 from tests.kinematics import people
 
@@ -39,12 +39,52 @@ def test_a_caption_that_names_an_event_is_shown_with_the_event(tmp_path: Path) -
 
 
 def test_events_are_shown_whole_and_states_in_part(tmp_path: Path) -> None:
-    batches = Batches(load_set(kicking(tmp_path / "set")), windows=(32, 48), shares=(0.5, 0.5))
+    batches = Batches(load_set(jumping(tmp_path / "set")), windows=(32, 48), shares=(0.5, 0.5))
     small = {batches.data.items[i].group for group, _ in batches._pools[32]["label"].values() for i in group}
     assert small == {"walk"}
     assert starts(batches, "label") == {0, 20, 100}
     lengths = batches.draw(0, 1, 64).lengths
     np.testing.assert_array_equal(np.unique(lengths), [32] if lengths.max() == 32 else [48])
+
+
+def jumping(folder: Path) -> Path:
+    """As `kicking`, with a jump and a hop, which are no strikes."""
+    features = hml.encode(hml.canonical(people.walking(1.0, 10.0)), heading="corrected")
+    return described(folder, Note(0, len(features), "walk"), Note(100, 150, "jump"), Note(20, 70, "hop"))
+
+
+def test_windows_of_strikes_hold_the_moment_of_the_strike(tmp_path: Path) -> None:
+    """A hand that shoots forward once in eight seconds, at frame 100: every window begins about 1.3 s before."""
+    body = people.walking(0.0, 8.0)
+    body[:, 21, 2] += 0.5 * np.exp(-(((np.arange(len(body)) - 100) / 2.5) ** 2))
+    features = hml.encode(hml.canonical(body), heading="corrected")
+    note = Note(0, len(features), "action:punch", ("a person punches",), (0, len(features)))
+    folder = described(tmp_path / "set", note)
+    write_clip(folder / "clips", Clip("one_capture", "cmu", "free", "train", "plain", (note,), features))
+    item = load_set(folder).items[0]
+    assert item.core is not None
+    assert 80 <= item.core[0] <= 95
+    assert 100 <= item.core[1] <= 112
+    low, high = _starts(item, 48)
+    assert 65 <= low < high <= 85
+
+
+def test_windows_of_exercises_begin_before_a_repetition(tmp_path: Path) -> None:
+    """Squats whose upright moments are 50 frames apart: windows begin 2 to 10 frames before one of them."""
+    body = people.walking(0.0, 10.0)
+    frames = np.arange(len(body))
+    body[..., 1] -= (0.3 * (0.5 - 0.5 * np.cos(2 * np.pi * frames / 50)))[:, None] * (body[..., 1] > 0.5)
+    features = hml.encode(hml.canonical(body), heading="corrected")
+    note = Note(0, len(features), "action:squat", ("a person squats",))
+    folder = described(tmp_path / "set", note)
+    write_clip(folder / "clips", Clip("one_capture", "cmu", "free", "train", "plain", (note,), features))
+    data = load_set(folder)
+    upright = {0, 50, 100, 150, 199}
+    assert all(min(abs(rest - u) for u in upright) <= 10 for rest in data.items[0].rests)
+    assert {0, 50, 100, 150} <= set(data.items[0].rests)
+    begun = [_start(data.items[0], 48, np.random.default_rng(seed)) for seed in range(60)]
+    assert all(any(rest - 10 <= at <= rest - 2 for rest in data.items[0].rests) or at == 0 for at in begun)
+    assert len(set(begun)) > 8
 
 
 def described(folder: Path, *notes: Note, kind: str = "capture", frames: int = 10) -> Path:

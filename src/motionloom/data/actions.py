@@ -16,7 +16,7 @@ from motionloom.data.words import sentence
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 
-Kind = Literal["cycle", "change", "once", "state"]
+Kind = Literal["cycle", "repeats", "change", "once", "state"]
 PREFIX = "action:"
 """What the kind of a note begins with that names an action."""
 SENTENCES = 20
@@ -34,6 +34,8 @@ class Action:
     unless: str = r"(?!)"
     sided: tuple[str, ...] = ()
     reverse: str = ""
+    clips: str = r"(?!)"
+    limb: Literal["", "hand", "foot"] = ""
 
     def named_by(self, texts: Sequence[str]) -> bool:
         """True where at least half of the captions name this action."""
@@ -71,9 +73,10 @@ def _read() -> dict[str, Action]:
 ACTIONS: dict[str, Action] = _read()
 
 
-def action_of(texts: Sequence[str]) -> Action | None:
-    """The first action that at least half of the captions name; None where there is none."""
-    return next((action for action in ACTIONS.values() if action.named_by(texts)), None)
+def action_of(texts: Sequence[str], clip: str = "") -> Action | None:
+    """The action that the name of the recording says, else the first that at least half of the captions name."""
+    by_clip = next((action for action in ACTIONS.values() if clip and re.search(action.clips, clip)), None)
+    return by_clip or next((action for action in ACTIONS.values() if action.named_by(texts)), None)
 
 
 def side_of(texts: Sequence[str]) -> str:
@@ -82,9 +85,9 @@ def side_of(texts: Sequence[str]) -> str:
     return found.pop() if len(found) == 1 else ""
 
 
-def sentences(action: Action, texts: Sequence[str] = (), *, count: int = SENTENCES) -> tuple[str, ...]:
-    """Other ways of saying an action, as whole sentences; with sides where the captions ``texts`` name one."""
-    side = side_of(texts)
+def sentences(action: Action, texts: Sequence[str] = (), *, side: str = "", count: int = SENTENCES) -> tuple[str, ...]:
+    """Other ways of saying an action, as whole sentences; with a ``side``, or the one that ``texts`` name."""
+    side = side or side_of(texts)
     phrases = [*action.says, *(phrase.format(side=side) for phrase in action.sided if side)]
     if not phrases:
         return ()
@@ -113,3 +116,33 @@ def core(positions: Array, fps: float, *, tail: float = 0.12) -> tuple[int, int]
     first, last = np.searchsorted(total, [tail * total[-1], (1 - tail) * total[-1]])
     margin = round(0.3 * fps)
     return max(0, int(first) - margin), min(len(p), int(last) + margin + 1)
+
+
+_LIMBS = {"hand": (20, 21), "foot": (7, 8)}
+
+
+def strike(positions: Array, fps: float, limb: str) -> tuple[tuple[int, int], str]:
+    """Frames (first, end) about the moment at which a hand (``foot``: ankle) is fastest against the body; its side.
+
+    ``positions`` (frames, 22, 3) metres. The side is empty where the other one is more than 0.6 times as fast.
+    """
+    speeds = np.linalg.norm(ph.velocity(ph.in_body(ph.smooth(positions, 3))[:, _LIMBS[limb]], fps), axis=-1)
+    peaks = speeds.max(axis=0)
+    one = int(peaks.argmax())
+    at = int(speeds[:, one].argmax())
+    around = max(0, at - round(0.5 * fps)), min(len(positions), at + round(0.3 * fps) + 1)
+    return around, ("left", "right")[one] if peaks[1 - one] < 0.6 * peaks[one] else ""
+
+
+def rests(positions: Array, fps: float) -> list[int]:
+    """Frames at which somebody who repeats an exercise is about to begin: pelvis high, hands and feet low.
+
+    ``positions`` (frames, 22, 3) metres. Local maxima over 0.8 s each way, within a quarter of the range from the top.
+    """
+    p = ph.smooth(positions, 3)
+    score = p[:, 0, 1] - 0.5 * p[:, [20, 21], 1].max(axis=1) - 0.5 * p[:, [7, 8], 1].max(axis=1)
+    enough, reach = score.max() - 0.25 * np.ptp(score), round(0.8 * fps)
+    return [
+        i for i, value in enumerate(score)
+        if value >= enough and value == score[max(0, i - reach) : i + reach + 1].max()
+    ]  # fmt: skip

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from motionloom.data import augment
-from motionloom.data.actions import PREFIX, action_of, core, sentences
+from motionloom.data.actions import PREFIX, action_of, core, sentences, side_of, strike
 from motionloom.data.clips import SHORTEST, STATES, Clip, Note, read_clip, write_clip
 from motionloom.data.derived import (
     LOOPED,
@@ -33,6 +33,8 @@ from motionloom.data.derived import (
     lengthened,
     made_clips,
     mixed_clips,
+    posture_clips,
+    there_and_back,
 )
 from motionloom.data.made import hands_up
 from motionloom.data.person import uniform_person
@@ -46,7 +48,7 @@ from motionloom.io.atomic import atomic_path, finished, sweep
 from motionloom.kinematics.physics import Array
 from motionloom.skeleton import SMPL22
 
-_DERIVED = re.compile(r"M?(mixed|joined|made)_\d")
+_DERIVED = re.compile(r"M?(mixed|joined|made|posture|there)_\d")
 _NAME = re.compile(r"\w[\w.+ -]{0,120}")
 BENDS = (0.35, 0.75, 1.0)
 """Radians per second: a wide turn, and circles in 8.4 and 6.3 seconds."""
@@ -100,7 +102,7 @@ def _clip(take: Take, features: np.ndarray, way: str, *, spans: bool = True) -> 
         first, last = round(span.start_s * FPS), min(round(min(span.end_s, 1e6) * FPS), len(features))
         if last - first >= SHORTEST and span.texts:
             notes.append(Note(first, last, span.kind, span.texts))
-            notes += _action_notes(span, features, first, last)
+            notes += _action_notes(span, features[first:last], first, name=take.name)
     said = " | ".join(text for span in take.spans for text in span.texts)
     found = label_clip(hml.decode_positions(features.astype(np.float64)), FPS, said)
     notes += [Note(a, b, label) for a, b, label in join_spans(found)]
@@ -108,20 +110,26 @@ def _clip(take: Take, features: np.ndarray, way: str, *, spans: bool = True) -> 
     return Clip(take.name + suffix, take.source, take.licence, take.split, way, tuple(notes), features, take.kind)
 
 
-def _action_notes(span: Span, features: np.ndarray, first: int, last: int) -> list[Note]:
-    """The note of the action that a described stretch names, if it names one."""
-    action = action_of(span.texts)
-    texts = sentences(action, span.texts) if action else ()
-    if action is None or not texts or last - first < SHORTEST:
+def _action_notes(span: Span, features: np.ndarray, first: int, *, name: str) -> list[Note]:
+    """The note of the action that a described stretch shows, if its captions or the clip's name say one."""
+    action, last = action_of(span.texts, name), first + len(features)
+    if action is None or len(features) < SHORTEST:
+        return []
+    positions = hml.decode_positions(features.astype(np.float64))
+    by_name = bool(re.search(action.clips, name))  # its captions may be wrong
+    said = side_of([*re.findall("left|right", name.lower())]) if by_name else side_of(span.texts)
+    side = strike(positions, FPS, action.limb)[1] if action.limb else ""
+    texts = sentences(action, side=side or said)
+    if not texts:
         return []
     kept = None
     if action.kind in ("change", "once"):
         kept = (first, last)
-        if last - first > LONG:
-            begin, end = core(hml.decode_positions(features[first:last].astype(np.float64)), FPS)
+        if len(features) > LONG:
+            begin, end = core(positions, FPS)
             kept = (first + begin, first + end)
-    written = span.texts if span.kind == "human" else ()
-    if action.name in SEATED and written and hands_up(hml.decode_positions(features[first:last].astype(np.float64))):
+    written = span.texts if span.kind == "human" and not by_name else ()
+    if action.name in SEATED and written and hands_up(positions):
         texts = ()  # people take a seat with their hands down: `lengthened` makes that
     return [Note(first, last, PREFIX + action.name, (*written, *texts), kept)]
 
@@ -142,7 +150,7 @@ def join_spans(spans: Sequence[tuple[int, int, str]]) -> list[tuple[int, int, st
 
 
 _OTHER_LABEL = {"sidestep left": "sidestep right", "turn left": "turn right", "walk left turn": "walk right turn",
-                "circle left": "circle right"}  # fmt: skip
+                "circle left": "circle right", "punch left": "punch right", "kick left": "kick right"}  # fmt: skip
 _OTHER_LABEL |= {b: a for a, b in _OTHER_LABEL.items()}
 
 
@@ -302,7 +310,7 @@ def _derived(clips: Sequence[Clip], mixed: int) -> Iterator[Clip]:
     for seed, licence in enumerate(sorted({clip.licence for clip in clips})):
         same = [clip for clip in clips if clip.licence == licence]
         share = sum(len(clip.features) for clip in same) / frames
-        for derive in (mixed_clips, laid_down, joined_clips, made_clips):
+        for derive in (mixed_clips, laid_down, joined_clips, made_clips, posture_clips, there_and_back):
             for clip in derive(same, round(mixed * share), seed):
                 yield from (clip,) if derive is mixed_clips else _with_mirror(clip)
 

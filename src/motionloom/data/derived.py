@@ -10,10 +10,12 @@ from motionloom.data.actions import ACTIONS, PREFIX, Action, sentences, side_of
 from motionloom.data.clips import MADE, SHORTEST, THEN, Clip, Note
 from motionloom.data.made import GESTURES, hands_up, lower_arms, perform, words_for
 from motionloom.data.person import at_origin
+from motionloom.data.postures import assume, postures
 from motionloom.data.sources import Take
 from motionloom.data.words import sentence
 from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS, LAYOUT
+from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 
 LOOPED = 200
@@ -30,7 +32,7 @@ def lengthened(take: Take, clip: Clip, positions: Array) -> Iterator[Clip]:
         action, frames = ACTIONS[note.kind.removeprefix(PREFIX)], note.last - note.first
         if frames > LOOPED - 40:
             continue
-        if action.kind == "cycle" and frames < 160:
+        if action.kind in ("cycle", "repeats") and frames < 160:
             longer = augment.loop(clip.features[note.first : note.last], LOOPED, limit=0.12)
             if longer is not None:
                 yield _derived(clip, longer, "looped", (replace(note, first=0, last=len(longer), core=None),))
@@ -218,3 +220,103 @@ def _labelled(clips: Sequence[Clip], labels: Sequence[str]) -> dict[str, list[tu
 
 def _positions(clip: Clip, note: Note) -> Array:
     return hml.decode_positions(clip.features[note.first : note.last].astype(np.float64))
+
+
+def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
+    """Changes of the whole body (`data.postures`) on people who stand with hanging arms; training clips of one licence.
+
+    A tenth of ``count`` of each posture.
+    """
+    rng = np.random.default_rng(seed)
+    bodies = [found for found in _labelled(clips, ("stand",)).get("stand", []) if _stands_plainly(*found)]
+    for number in range(round(count / 10) if bodies else 0):
+        below, note = bodies[rng.integers(len(bodies))]
+        body = hml.decode_positions(below.features[note.first : note.first + 60].astype(np.float64))
+        body = augment.held(body, 0, max(0, LOOPED - len(body)), fps=FPS, seed=seed * 100_003 + number)
+        for kind, posture in enumerate(postures(body, rng)):
+            begin = float(rng.uniform(0.4, 1.2))
+            frames = min(len(body), round(FPS * (begin + posture.seconds(kept=float(rng.uniform(1.5, 4.0))))))
+            features = hml.encode(at_origin(assume(body[:frames], posture, fps=FPS, begin=begin)), heading="corrected")
+            action = ACTIONS[posture.action]
+            texts = sentences(action, side="left" if posture.sided else "")
+            start, end = round(FPS * begin), min(round(FPS * (begin + posture.seconds(kept=0.5))), len(features))
+            whole = None if action.kind == "repeats" else (start, end)
+            notes = (Note(0, len(features), PREFIX + action.name, texts, whole),)
+            name = f"posture_{seed}_{number:03d}{kind}"
+            yield Clip(name, below.source, below.licence, "train", "made", notes, features.astype(np.float32), "made")
+
+
+def _stands_plainly(clip: Clip, note: Note) -> bool:
+    """Both feet side by side and both hands down."""
+    if clip.way not in ("plain", "held"):
+        return False
+    p = ph.in_body(hml.decode_positions(clip.features[note.first : note.first + 60].astype(np.float64)))
+    step = np.abs(p[:, 7, 2] - p[:, 8, 2]).max()
+    return bool(step < 0.12 and p[:, [20, 21], 1].max() < p[:, 6, 1].min() and p[..., 1].min() > -0.02)
+
+
+def there_and_back(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
+    """Walks that turn right round and come back: a walk, somebody's turn, another walk; training clips of one licence.
+
+    Recordings hold only a few. A tenth of ``count``.
+    """
+    rng = np.random.default_rng(seed)
+    found = _labelled(clips, ("walk", "turn around"))
+    walks = [f for f in found.get("walk", []) if f[0].way in ("plain", "looped")]
+    turns = [turn for clip in clips for turn in _half_turns(clip)]
+    action, made = ACTIONS["walk turn around"], 0
+    for _ in range(4 * count if walks and turns else 0):
+        if made == round(count / 10):
+            return
+        base, turn = turns[rng.integers(len(turns))]
+        ends = [_walk(*walks[rng.integers(len(walks))], rng) for _ in range(2)]
+        cut = _alike(ends[0], turn[0], 45, len(ends[0]))
+        whole = _between(ends[0][:cut], turn, ends[1])
+        if whole is None or not 80 <= len(whole) <= 196 or np.ptp(whole[:, 0, 1]) > 0.15:
+            continue
+        features = hml.encode(at_origin(whole), heading="corrected").astype(np.float32)
+        turns_at = (max(0, cut - 32), len(features))  # about 2.4 s into every window
+        notes = (Note(0, len(features), PREFIX + action.name, sentences(action), turns_at),)
+        yield replace(base, name=f"there_{seed}_{made:03d}", way="joined", notes=notes, features=features)
+        made += 1
+
+
+def _walk(clip: Clip, note: Note, rng: np.random.Generator) -> Array:
+    length = min(note.last - note.first, 80)
+    first = note.first + int(rng.integers(note.last - note.first - length + 1))
+    return hml.decode_positions(clip.features[first : first + length].astype(np.float64))
+
+
+def _half_turns(clip: Clip) -> Iterator[tuple[Clip, Array]]:
+    """Stretches of a training recording within which somebody who walks turns right round and walks on."""
+    if clip.split != "train" or clip.way != "plain" or not any(n.kind == "turn around" for n in clip.notes):
+        return
+    p = hml.decode_positions(clip.features.astype(np.float64))
+    heading = np.degrees(ph.smooth(np.unwrap(ph.heading(p)), 21))
+    for length in (30, 40, 50, 60):
+        for first in range(15, len(p) - length - 15, 8):
+            end = first + length
+            turned = heading[end] - heading[first]
+            aside = max(abs(heading[first] - heading[first - 15]), abs(heading[end + 14] - heading[end]))
+            upright = p[first:end, 0, 1].min() > 0.75
+            paces = (ph.speed(p[a : a + 15], FPS).mean() for a in (first - 15, end))
+            if 160 < abs(turned) < 200 and aside < 20 and upright and min(paces) > 0.5:
+                yield clip, p[first - 8 : end + 8]
+                return
+
+
+def _between(first: Array, middle: Array, last: Array) -> Array | None:
+    """``middle`` behind ``first``, and ``last`` from where its pose is most like the end of ``middle``."""
+    both = augment.joined(first, middle)
+    if both is None:
+        return None
+    begin = _alike(last, middle[-1], 0, len(last) - 25)
+    return augment.joined(both, last[begin:])
+
+
+def _alike(p: Array, pose: Array, low: int, high: int) -> int:
+    """The frame of ``p`` from ``low`` to before ``high`` whose pose is most like ``pose`` (22, 3), seen from itself."""
+    own = ph.in_body(p)
+    other = ph.in_body(np.stack([pose, pose]))[0]
+    gap = np.sqrt(((own - other) ** 2).sum(-1).mean(-1))[low : max(high, low + 1)]
+    return low + int(gap.argmin())

@@ -9,11 +9,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom.data.actions import PREFIX
+from motionloom.data.actions import ACTIONS, PREFIX, strike
+from motionloom.data.actions import rests as rests_of
 from motionloom.data.clips import MADE, STATES, Clip, Note, read_clip
 from motionloom.data.words import phrases, sentence
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import LAYOUT
+from motionloom.features import humanml as hml
+from motionloom.features.layout import FPS, LAYOUT
 from motionloom.io.atomic import finished
 from motionloom.io.text import parse_json, read_utf8
 
@@ -25,30 +27,27 @@ WEIGHT = {"capture": 1.0, "made": 0.7, "keyed": 0.4}
 """How often a stretch is drawn among those of its action: animated by hand it teaches what, not how."""
 
 FAVOUR: dict[str, float] = {
-    **dict.fromkeys(("climb", "kick"), 4.0),
-    **dict.fromkeys(("circle left", "jump"), 2.5),
+    **dict.fromkeys(("climb", "kick"), 2.5),
+    **dict.fromkeys(("circle left", "jump", "turn around"), 2.5),
+    **dict.fromkeys(("punch left", "punch right", "kick left", "kick right"), 2.5),
     **dict.fromkeys(("sit down", "stand up", "punch", "jog", "hop", "turn left", "turn right"), 1.5),
     **{
         f"action:{name}": weight
         for weight, names in {
-            8.0: ("sit down", "stand up", "lie down", "get up"),
-            6.0: ("kneel", "bow", "pick up", "stop running", "crouch"),
-            4.0: ("sit down and stand up", "stop walking", "walk turn around", "throw", "crawl", "then"),
-            2.0: (
-                "squat",
-                "lunge",
-                "push-up",
-                "climb ladder",
-                "start running",
-                "walk and pick up",
-                "kick",
-                "made clap",
+            7.0: ("sit down", "stand up", "lie down", "get up", "kneel"),
+            5.0: ("bow", "pick up", "stop running", "crouch", "walk turn around", "push-up", "punch", "kick"),
+            4.0: ("sit down and stand up", "stop walking", "throw", "crawl", "then", "lunge", "squat", "touch toes"),
+            2.5: (
+                "climb ladder", "start running", "slow down", "walk and pick up", "made clap", "made arms out", "sway",
+                "made hands on hips", "made swing arms", "made open door", "made drink", "raise arm", "made arm up",
+                "kneel and rise", "duck", "bend over", "stairs", "fall", "leg raise", "high step",
+                "side lunge", "dance", "jump forward", "jump up", "cartwheel", "start walking", "made point",
             ),
-            0.5: ("sword", "basketball", "laugh", "charleston", "wash", "arm back", "rotate arm"),
+            0.5: ("sword", "basketball", "laugh", "wash", "arm back", "rotate arm", "soccer", "carry"),
         }.items()
         for name in names
     },
-}
+}  # fmt: skip
 """Groups drawn more or less often than the others: what came out last, and what is asked for most. A mixture of two
 labels is drawn 0.4 times as often, a made gesture `MADE_SHARE` times."""
 MADE_SHARE = 0.6
@@ -60,6 +59,8 @@ EVENTS = {
     "cartwheel": "cartwheel",
 }  # fmt: skip
 """Measured labels of something that happens at one moment, and how captions speak of it."""
+STRIKES = {"kick": "foot", "punch": "hand"}
+"""How the measured labels begin that name a strike, and the limb that strikes."""
 _MAX_SUMMARY = 64 << 20
 MOMENTS = 3
 """Windows shown for a caption that names an event."""
@@ -80,6 +81,8 @@ class Item:
     """Frames of `MotionSet.features` (first, end) without which a window does not show what is said, such as a jump."""
     weight: float = 1.0
     """How often it is drawn among those of its group."""
+    rests: tuple[int, ...] = ()
+    """Frames of `MotionSet.features` at which a repetition of an exercise begins; windows begin there."""
 
 
 @dataclass(frozen=True)
@@ -134,8 +137,12 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, 
             moments = _moments(clip, note)
             for first, last in ((note.first, note.last), *moments):
                 core = note.core or ((first, last) if moments or _is_event(note) else None)
+                core, rests = _when(clip, note.kind, core, first, last)
                 kept = (start + core[0], start + core[1]) if core else None
-                items.append(Item(start + first, last - first, note.kind, said, kept, WEIGHT.get(clip.kind, 1.0)))
+                begins = tuple(start + rest for rest in rests)
+                items.append(
+                    Item(start + first, last - first, note.kind, said, kept, WEIGHT.get(clip.kind, 1.0), begins)
+                )
         start += len(clip.features)
     features = torch.from_numpy(np.concatenate([c.features for c in clips]))
     features = (features - torch.from_numpy(mean)) / torch.from_numpy(std)
@@ -158,6 +165,22 @@ def _worded(
         made = {sentence(p, rng) for _ in range(WORDINGS) for p in [rng.choice(list(phrases(note.kind)))]}
         wordings[note.kind] = tuple(_number(texts, text) for text in sorted(made))
     return wordings[note.kind]
+
+
+def _when(
+    clip: Clip, kind: str, core: tuple[int, int] | None, first: int, last: int
+) -> tuple[tuple[int, int] | None, list[int]]:
+    """The frames that a window must hold, drawn in to the strike where there is one; and where repetitions begin."""
+    action = ACTIONS.get(kind.removeprefix(PREFIX)) if kind.startswith(PREFIX) else None
+    limb = action.limb if action else next((limb for word, limb in STRIKES.items() if kind.startswith(word)), "")
+    repeats = action is not None and action.kind == "repeats"
+    if not limb and not repeats:
+        return core, []
+    positions = hml.decode_positions(clip.features[first:last].astype(np.float64))
+    if repeats:
+        return None, [first + rest for rest in rests_of(positions, FPS)]
+    (begin, end), _ = strike(positions, FPS, limb)
+    return (first + begin, first + end), []
 
 
 def _is_event(note: Note) -> bool:
@@ -262,7 +285,7 @@ class Batches:
             numbers, shares = groups[names[rng.choice(len(names), p=weights / weights.sum())]]
             item = self.data.items[numbers[np.searchsorted(shares, rng.random())]]
             length = min(item.frames, window)
-            start = int(rng.integers(*_starts(item, length)))
+            start = _start(item, length, rng)
             features[row, :length] = self.data.features[start : start + length]
             lengths.append(length)
             texts.append(item.texts[rng.integers(len(item.texts))])
@@ -271,6 +294,15 @@ class Batches:
 
 BEFORE = 16
 """Frames of a window before a change begins: people begin soon after they are told to."""
+
+
+def _start(item: Item, length: int, rng: np.random.Generator) -> int:
+    """Where a window of so many frames begins: a little before a repetition, or as `_starts` says."""
+    low, high = item.start, item.start + item.frames - length
+    fitting = [rest for rest in item.rests if low <= rest - 2 <= high]
+    if fitting:
+        return max(low, fitting[rng.integers(len(fitting))] - int(rng.integers(2, 11)))
+    return int(rng.integers(*_starts(item, length)))
 
 
 def _starts(item: Item, length: int) -> tuple[int, int]:

@@ -62,6 +62,7 @@ def _limb_measures(p: Array, velocity: Array, body: Array, fps: float) -> Measur
     reach = np.linalg.norm(p[:, _WRISTS] - p[:, _SHOULDERS], axis=-1)
     leg = np.linalg.norm(p[:, _ANKLES] - p[:, _HIPS], axis=-1)
     level = np.abs(p[:, _WRISTS, 1] - p[:, _SHOULDERS, 1]) < 0.4
+    thrust = np.where(level, ph.velocity(reach, fps), 0)
     raised = p[:, _WRISTS, 1] - p[:, 9:10, 1]
     lower = ph.smooth(p[:, [10, 11], 1].min(axis=1), ph.odd(fps / 2))
     fifth = max(1, len(p) // 5)
@@ -73,9 +74,13 @@ def _limb_measures(p: Array, velocity: Array, body: Array, fps: float) -> Measur
         "one_leg": longest(np.asarray(np.abs(apart) > 0.12)) / fps,
         "rise": float(lower[-fifth:].mean() - lower[:fifth].mean()),
         "kick_height": float(np.abs(apart).max() / leg.max()),
+        "left_kick": float(apart.max() / leg.max()),
+        "right_kick": float(-apart.min() / leg.max()),
         "kick_snap": float(ph.velocity(leg, fps).max()),
         "foot_speed": float(np.percentile(np.linalg.norm(ph.velocity(body[:, _ANKLES], fps), axis=-1).max(axis=1), 98)),
-        "punch_speed": float(np.where(level, ph.velocity(reach, fps), 0).max()),
+        "punch_speed": float(thrust.max()),
+        "left_punch": float(thrust[:, 0].max()),
+        "right_punch": float(thrust[:, 1].max()),
         "both_over_head": float((p[:, _WRISTS, 1].min(axis=1) - p[:, 15, 1]).max()),
         "hand_over_neck": float((p[:, _WRISTS, 1] - p[:, 12:13, 1]).max()),
         "hands_up": longest(p[:, _WRISTS, 1].min(axis=1) > p[:, 12, 1]) / fps,
@@ -156,6 +161,7 @@ def _comparisons(text: str) -> tuple[tuple[str, Callable[[float, float], bool], 
 
 
 _KICK, _KICKED = r"kick|geri|karate|martial", "kick_height > 0.5, foot_speed > 4.4"
+_PUNCH = r"punch|strike|boxing|oiduki"
 _JUMP, _JUMPED = r"jump|hop|leap|exercise", "jump_rise > 0.2, jump_clearance > 0.16"
 _STAIRS, _SEAT, _UPRIGHT = r"climb|stair|steps|ladder", r"\bsit|seat|chair|stool", ("squat", "crouch", "bend")
 
@@ -166,8 +172,12 @@ ALONE = (
 """The first of these is a window's only label."""
 
 GESTURES = (
-    Rule("punch", "punch_speed > 1.4", (r"punch|strike|boxing|oiduki",)),
+    Rule("punch,punch left", "left_punch > 1.4, right_punch < 0.9", (_PUNCH,), choice="punch"),
+    Rule("punch,punch right", "right_punch > 1.4, left_punch < 0.9", (_PUNCH,), choice="punch"),
+    Rule("punch", "punch_speed > 1.4", (_PUNCH,), choice="punch"),
     Rule("kick ball", _KICKED, (_KICK, r"soccer|ball"), choice="kick"),
+    Rule("kick,kick left", f"{_KICKED}, left_kick > 0.5, right_kick < 0.25", (_KICK,), choice="kick"),
+    Rule("kick,kick right", f"{_KICKED}, right_kick > 0.5, left_kick < 0.25", (_KICK,), choice="kick"),
     Rule("kick", _KICKED, (_KICK,), choice="kick"),
     Rule("kick ball", "kick_height > 0.3, foot_speed > 5.0", (r"soccer",), choice="kick"),
     Rule("hop", "hops >= 3, flights >= 3", (_JUMP, r"hop|one foot|one leg"), choice="jump"),

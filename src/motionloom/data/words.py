@@ -43,7 +43,11 @@ def mirror_text(text: str) -> str:
 _WORDS = tomllib.loads((resources.files("motionloom.data") / "phrases.toml").read_text(encoding="utf-8"))
 LABELS: dict[str, tuple[str, ...]] = {label: tuple(said) for label, said in _WORDS["labels"].items()}
 """Verb phrases for what a window measurably shows; see `data.windows`."""
-_PEOPLE = (*["a person"] * 4, "someone", "a man", "a woman", "the person", "a figure", "he", "she")
+_PEOPLE = (
+    *["a person"] * 12, *["someone", "a man", "a woman", "he", "she"] * 3, *["the person"] * 2, "a figure", "somebody",
+    "the man", "the woman", "a guy", "a boy", "a girl", "a child", "a kid", "an old man", "a young woman", "a lady",
+    "a dancer", "an athlete", "a fighter", "a soldier", "a worker", "a player", "a character",
+)  # fmt: skip
 
 
 def sentence(verb_phrase: str, rng: np.random.Generator) -> str:
