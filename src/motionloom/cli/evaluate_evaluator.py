@@ -14,7 +14,9 @@ def add(commands) -> None:
     parser.add_argument("--data", type=Path, required=True, help="folder made by 'motionloom data build'")
     parser.add_argument("--evaluator", default="own", help="own (shipped) or a file (default: own)")
     parser.add_argument("--weights", default="default", help="prior whose motions are judged (default: default)")
-    parser.add_argument("--source", action="append", help="use clips of this source (repeatable; default: cmu)")
+    parser.add_argument(
+        "--source", action="append", help="use clips of this source (repeatable; default: cmu, accad, ui_prmd)"
+    )
     parser.add_argument("--repeats", type=int, default=20, help="reshuffles of the real pairs (default 20)")
     parser.add_argument("--seeds", type=int, default=4, help="motions per prompt and way to sample (default 4)")
     parser.add_argument("--out", type=Path, help="folder for the reports")
@@ -31,6 +33,7 @@ def _evaluator(arguments: argparse.Namespace) -> None:
     from motionloom.lab.evaluator.own import validate
     from motionloom.lab.report import report as reports
     from motionloom.lab.report.files import check_report
+    from motionloom.lab.suites.protocol import RECORDED
     from motionloom.weights.prior import Prior
 
     if not 1 <= arguments.repeats <= 10_000 or not 0 <= arguments.seeds <= 1000:
@@ -42,7 +45,7 @@ def _evaluator(arguments: argparse.Namespace) -> None:
     prior = Prior.load(arguments.weights) if arguments.seeds else None
     if arguments.out:
         check_report(arguments.out / "report.json")
-    sources = arguments.source or ["cmu"]
+    sources = arguments.source or [*RECORDED]
     made = [validate(evaluator, arguments.data, sources=sources, repeats=arguments.repeats, progress=say)]
     if prior:
         made.append(agreement(evaluator, prior, seeds=arguments.seeds, progress=say))

@@ -173,4 +173,4 @@ def test_the_commands_train_an_evaluator_and_refuse_what_they_cannot_measure(
     assert main(["evaluate", "evaluator", "--data", str(data), "--evaluator", "run/mine.safetensors"]) == 2
     assert "another text encoder" in capsys.readouterr().err
     assert main(["evaluate", "evaluator", "--data", str(data), "--seeds", "0"]) == 2
-    assert "no clips of source cmu in val, test" in capsys.readouterr().err
+    assert "no clips of source cmu, accad, ui_prmd in val, test" in capsys.readouterr().err

@@ -14,6 +14,8 @@ from motionloom.features.layout import FPS
 from motionloom.tasks.text import GUIDANCE, LARGEST_SEED, SOLVER, SPACING, STEPS
 
 SPLITS = ("train", "val", "test")
+RECORDED = ("cmu", "accad", "ui_prmd")
+"""Recordings with held-out rows that are free for any use."""
 PUBLISHED_CAPTION = 22
 """Tokens: the caption length that MDM before January 2024 and PriorMDM gave their evaluator for generated motions."""
 STRIDE = 1 << 32
@@ -26,7 +28,7 @@ class Selection:
     """Which stretches of which recordings are the real motions."""
 
     splits: tuple[str, ...] = ("val", "test")
-    sources: tuple[str, ...] = ("cmu",)
+    sources: tuple[str, ...] = RECORDED
     """Beginnings of the names of sources; empty: all."""
     mirrored: bool = True
     """With their mirror images, whose captions have left and right exchanged, as in HumanML3D's own test set."""

@@ -26,13 +26,16 @@ from motionloom.lab.evaluator.evaluators import Caption, Evaluator
 from motionloom.lab.metrics.skate import skate
 from motionloom.lab.suites.harness import CHUNK
 from motionloom.lab.suites.items import Item, spread
-from motionloom.lab.suites.protocol import MOST_ITEMS, Protocol, Selection
+from motionloom.lab.suites.protocol import MOST_ITEMS, RECORDED, Protocol, Selection
 
 FORMAT = 1
 LARGEST_FILE = 64 << 20
 PHYSICAL = ("skate_share", "skate_speed", "skate_slide", "penetration", "jerk", "bone_error")
 """Physical numbers of a clip, in the order of the columns of `TextReference.physical`."""
-SOURCE = "derived from mocap.cs.cmu.edu (free for any use) and HumanML3D's captions (MIT, Copyright (c) 2022 Chuan Guo)"
+SOURCE = (
+    "derived from mocap.cs.cmu.edu (free for any use), ACCAD / The Ohio State University, Open Motion Project (CC BY 3.0), "
+    "UI-PRMD (PDDL) and HumanML3D's captions (MIT, Copyright (c) 2022 Chuan Guo)"
+)
 _KINDS = {"motions": np.float16, "frames": np.int32, "physical": np.float32, "probe": np.float32}
 SENTENCE = Caption("a person walks forward.", ("a/DET", "person/NOUN", "walk/VERB", "forward/ADV"))
 
@@ -153,7 +156,7 @@ def save(reference: TextReference, path: Path | str) -> Path:
         "selection": {name: getattr(chosen, name) for name in Selection.__dataclass_fields__},
         "evaluator": reference.evaluator,
         "physical": PHYSICAL,
-        "source": SOURCE if chosen.sources == ("cmu",) else "ask whoever gave you this file",
+        "source": SOURCE if chosen.sources == RECORDED else "ask whoever gave you this file",
     }
     save_tensors(tensors, path, metadata={"reference": json.dumps(about)})
     return path
