@@ -15,7 +15,7 @@ def add(commands) -> None:
     parser.add_argument("--evaluator", default="own", help="own (shipped) or a file (default: own)")
     parser.add_argument("--weights", default="default", help="prior whose motions are judged (default: default)")
     parser.add_argument(
-        "--source", action="append", help="use clips of this source (repeatable; default: cmu, accad, ui_prmd)"
+        "--source", action="append", help="use clips of this source (repeatable; default cmu, accad, ui_prmd)"
     )
     parser.add_argument("--repeats", type=int, default=20, help="reshuffles of the real pairs (default 20)")
     parser.add_argument("--seeds", type=int, default=4, help="motions per prompt and way to sample (default 4)")

@@ -24,7 +24,7 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, help="first seed (default 0)")
     parser.add_argument("--split", type=words, metavar="val,test", help="splits of --data (default val,test)")
     parser.add_argument(
-        "--sources", type=words, metavar="cmu", help="sources of --data (default cmu, accad, ui_prmd; all: every one)"
+        "--sources", type=words, metavar="cmu", help="of --data (default cmu,accad,ui_prmd; all: every one)"
     )
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -101,7 +102,8 @@ def _prior(recipe: Recipe, motions: MotionSet, average: Average, step: int, text
     config = NetConfig.parse(recipe.net)
     net = PriorNet(config)
     net.load_state_dict({k: v.cpu() for k, v in average.weights.items()})
-    notes = {"steps": step, "recipe": recipe.name, "seed": recipe.seed, "minutes": round(motions.minutes, 1)}
+    notes: dict[str, Any] = {"steps": step, "recipe": recipe.name, "seed": recipe.seed}
+    notes |= {"minutes": round(motions.minutes, 1)} | ({"start": recipe.start} if recipe.start else {})
     card = Card(recipe.name, recipe.licence or "; ".join(motions.licences), "; ".join(motions.licences), notes)
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
     return Prior(net.eval().requires_grad_(False), schedule, motions.mean, motions.std, text, card)

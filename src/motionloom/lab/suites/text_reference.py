@@ -33,8 +33,8 @@ LARGEST_FILE = 64 << 20
 PHYSICAL = ("skate_share", "skate_speed", "skate_slide", "penetration", "jerk", "bone_error")
 """Physical numbers of a clip, in the order of the columns of `TextReference.physical`."""
 SOURCE = (
-    "derived from mocap.cs.cmu.edu (free for any use), ACCAD / The Ohio State University, Open Motion Project (CC BY 3.0), "
-    "UI-PRMD (PDDL) and HumanML3D's captions (MIT, Copyright (c) 2022 Chuan Guo)"
+    "derived from mocap.cs.cmu.edu (free for any use), ACCAD / The Ohio State University, Open Motion Project "
+    "(CC BY 3.0), UI-PRMD (PDDL) and HumanML3D's captions (MIT, Copyright (c) 2022 Chuan Guo)"
 )
 _KINDS = {"motions": np.float16, "frames": np.int32, "physical": np.float32, "probe": np.float32}
 SENTENCE = Caption("a person walks forward.", ("a/DET", "person/NOUN", "walk/VERB", "forward/ADV"))
