@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from motionloom.data import build as building
-from motionloom.data.build import build, join_spans
+from motionloom.data.actions import ACTIONS, sentences
+from motionloom.data.build import _mirrored_texts, build, join_spans
 from motionloom.data.clips import Clip, Note, read_clip, write_clip
 from motionloom.data.derived import mixed_clips
 from motionloom.data.sets import Batches, load_set, read_clips
@@ -359,3 +360,15 @@ def test_takes_left_out_leave_nothing_behind(pack: Path, built: tuple[Path, list
     assert not (tmp_path / "other").exists()
     with pytest.raises(MotionloomError, match="already holds go"):
         build([pack], built[0], workers=1, exclude=["go"])
+
+
+def test_a_turn_to_the_right_is_only_described_with_its_side() -> None:
+    """The average of turning round to either side is a straight walk, so that one side goes without saying."""
+    action = ACTIONS["walk turn around"]
+    note = Note(0, 90, "action:walk turn around", sentences(action, side="left"))
+    assert any("left" not in text for text in note.texts)
+    mirrored = _mirrored_texts(note)
+    assert mirrored
+    assert all("right" in text for text in mirrored)
+    assert _mirrored_texts(Note(0, 90, note.kind, mirrored)) == note.texts
+    assert _mirrored_texts(Note(0, 90, "human", ("he turns left",))) == ("he turns right",)

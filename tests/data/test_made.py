@@ -19,7 +19,7 @@ def lengths(positions: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("name", sorted(GESTURES))
 def test_a_gesture_moves_arms_only_and_keeps_bones(name: str) -> None:
     body = people.standing(4.0)
-    made = perform(body, GESTURES[name], "left", fps=20.0, rng=np.random.default_rng(0))
+    made = perform(body, GESTURES[name], "left", fps=20.0, begin=0.5, rng=np.random.default_rng(0))
     np.testing.assert_allclose(lengths(made), lengths(body), atol=1e-6)
     arms = [18, 19, 20, 21]
     rest = [j for j in range(22) if j not in arms]
@@ -30,7 +30,7 @@ def test_a_gesture_moves_arms_only_and_keeps_bones(name: str) -> None:
 
 
 def test_claps_bring_the_wrists_together_again_and_again() -> None:
-    made = perform(people.standing(6.0), GESTURES["clap"], "left", fps=20.0, rng=np.random.default_rng(1))
+    made = perform(people.standing(6.0), GESTURES["clap"], "left", fps=20.0, begin=0.5, rng=np.random.default_rng(1))
     gap = np.linalg.norm(made[:, 20] - made[:, 21], axis=-1)
     near = gap[30:-30] < 0.12
     assert np.count_nonzero(np.diff(near.astype(int)) == 1) >= 3
@@ -38,14 +38,14 @@ def test_claps_bring_the_wrists_together_again_and_again() -> None:
 
 def test_a_hand_of_one_side_leaves_the_other_alone() -> None:
     body = people.standing(3.0)
-    made = perform(body, GESTURES["salute"], "right", fps=20.0, rng=np.random.default_rng(2))
+    made = perform(body, GESTURES["salute"], "right", fps=20.0, begin=0.5, rng=np.random.default_rng(2))
     np.testing.assert_array_equal(made[:, [18, 20]], body[:, [18, 20]])
     assert made[:, 21, 1].max() > body[:, 12, 1].max()
 
 
 def test_lowered_arms_hang_below_the_chest() -> None:
     body = people.standing(3.0)
-    raised = perform(body, GESTURES["arms up"], "left", fps=20.0, rng=np.random.default_rng(0))[30:36]
+    raised = perform(body, GESTURES["arms up"], "left", fps=20.0, begin=0.5, rng=np.random.default_rng(0))[30:36]
     assert hands_up(raised)
     lowered = lower_arms(raised)
     assert not hands_up(lowered)

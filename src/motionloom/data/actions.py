@@ -36,6 +36,7 @@ class Action:
     reverse: str = ""
     clips: str = r"(?!)"
     limb: Literal["", "hand", "foot"] = ""
+    turns: bool = False
 
     def named_by(self, texts: Sequence[str]) -> bool:
         """True where at least half of the captions name this action."""
@@ -88,7 +89,8 @@ def side_of(texts: Sequence[str]) -> str:
 def sentences(action: Action, texts: Sequence[str] = (), *, side: str = "", count: int = SENTENCES) -> tuple[str, ...]:
     """Other ways of saying an action, as whole sentences; with a ``side``, or the one that ``texts`` name."""
     side = side or side_of(texts)
-    phrases = [*action.says, *(phrase.format(side=side) for phrase in action.sided if side)]
+    plain = () if action.turns and side == "right" else action.says
+    phrases = [*plain, *(phrase.format(side=side) for phrase in action.sided if side)]
     if not phrases:
         return ()
     rng = np.random.default_rng(int.from_bytes(action.name.encode()[:8].ljust(8), "little"))
@@ -116,6 +118,12 @@ def core(positions: Array, fps: float, *, tail: float = 0.12) -> tuple[int, int]
     first, last = np.searchsorted(total, [tail * total[-1], (1 - tail) * total[-1]])
     margin = round(0.3 * fps)
     return max(0, int(first) - margin), min(len(p), int(last) + margin + 1)
+
+
+def turned_to(positions: Array) -> str:
+    """``left`` or ``right``: the side to which (frames, 22, 3) turns between its two ends."""
+    heading = ph.heading(positions)
+    return "left" if heading[-1] > heading[0] else "right"
 
 
 _LIMBS = {"hand": (20, 21), "foot": (7, 8)}

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from motionloom.data import augment
-from motionloom.data.actions import PREFIX, action_of, core, sentences, side_of, strike
+from motionloom.data.actions import ACTIONS, PREFIX, action_of, core, sentences, side_of, strike, turned_to
 from motionloom.data.clips import SHORTEST, STATES, Clip, Note, read_clip, write_clip
 from motionloom.data.derived import (
     LOOPED,
@@ -118,7 +118,7 @@ def _action_notes(span: Span, features: np.ndarray, first: int, *, name: str) ->
     positions = hml.decode_positions(features.astype(np.float64))
     by_name = bool(re.search(action.clips, name))  # its captions may be wrong
     said = side_of([*re.findall("left|right", name.lower())]) if by_name else side_of(span.texts)
-    side = strike(positions, FPS, action.limb)[1] if action.limb else ""
+    side = strike(positions, FPS, action.limb)[1] if action.limb else turned_to(positions) if action.turns else ""
     texts = sentences(action, side=side or said)
     if not texts:
         return []
@@ -128,7 +128,7 @@ def _action_notes(span: Span, features: np.ndarray, first: int, *, name: str) ->
         if len(features) > LONG:
             begin, end = core(positions, FPS)
             kept = (first + begin, first + end)
-    written = span.texts if span.kind == "human" and not by_name else ()
+    written = span.texts if span.kind == "human" and not by_name and not action.turns else ()
     if action.name in SEATED and written and hands_up(positions):
         texts = ()  # people take a seat with their hands down: `lengthened` makes that
     return [Note(first, last, PREFIX + action.name, (*written, *texts), kept)]
@@ -149,17 +149,24 @@ def join_spans(spans: Sequence[tuple[int, int, str]]) -> list[tuple[int, int, st
     return result
 
 
-_OTHER_LABEL = {"sidestep left": "sidestep right", "turn left": "turn right", "walk left turn": "walk right turn",
-                "circle left": "circle right", "punch left": "punch right", "kick left": "kick right"}  # fmt: skip
+_OTHER_LABEL = {
+    "sidestep left": "sidestep right", "turn left": "turn right", "walk left turn": "walk right turn",
+    "circle left": "circle right", "turn around": "turn around right", "punch left": "punch right",
+    "kick left": "kick right",
+}  # fmt: skip
 _OTHER_LABEL |= {b: a for a, b in _OTHER_LABEL.items()}
+
+
+def _mirrored_texts(note: Note) -> tuple[str, ...]:
+    action = ACTIONS.get(note.kind.removeprefix(PREFIX))
+    if action and action.turns:  # what is said of a turn to the left says nothing of one to the right
+        return sentences(action, side="right" if side_of(note.texts) == "left" else "left")
+    return tuple(mirror_text(text) for text in note.texts)
 
 
 def _with_mirror(clip: Clip) -> Iterator[Clip]:
     yield clip
-    notes = tuple(
-        replace(n, kind=_OTHER_LABEL.get(n.kind, n.kind), texts=tuple(mirror_text(t) for t in n.texts))
-        for n in clip.notes
-    )
+    notes = tuple(replace(n, kind=_OTHER_LABEL.get(n.kind, n.kind), texts=_mirrored_texts(n)) for n in clip.notes)
     yield replace(clip, name="M" + clip.name, notes=notes, features=hml.mirror(clip.features))
 
 

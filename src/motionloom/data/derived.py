@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from motionloom.data import augment
-from motionloom.data.actions import ACTIONS, PREFIX, Action, sentences, side_of
+from motionloom.data.actions import ACTIONS, PREFIX, Action, sentences, side_of, turned_to
 from motionloom.data.clips import MADE, SHORTEST, THEN, Clip, Note
 from motionloom.data.made import GESTURES, hands_up, lower_arms, perform, words_for
 from motionloom.data.person import at_origin
@@ -173,12 +173,14 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Cli
         first = note.first + int(rng.integers(note.last - note.first - length + 1))
         side = str(rng.choice(["left", "right"]))
         body = hml.decode_positions(below.features[first : first + length].astype(np.float64))
-        positions = perform(body, gesture, side, fps=FPS, rng=rng)
+        begin = float(rng.uniform(0.2, 0.9))
+        positions = perform(body, gesture, side, fps=FPS, begin=begin, rng=rng)
         features = hml.encode(positions, heading="corrected")
         texts = words_for(gesture, side, leads[where], rng)
         if texts:
             group = PREFIX + MADE + gesture.name
-            notes = (Note(0, len(features), group, texts, (0, min(30, len(features)))),)
+            first = round(FPS * begin)
+            notes = (Note(0, len(features), group, texts, (first, min(first + 30, len(features)))),)
             yield Clip(
                 f"made_{seed}_{number:04d}", below.source, below.licence, "train", "made", notes, features, "made"
             )
@@ -276,7 +278,8 @@ def there_and_back(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator
             continue
         features = hml.encode(at_origin(whole), heading="corrected").astype(np.float32)
         turns_at = (max(0, cut - 32), len(features))  # about 2.4 s into every window
-        notes = (Note(0, len(features), PREFIX + action.name, sentences(action), turns_at),)
+        texts = sentences(action, side=turned_to(whole))
+        notes = (Note(0, len(features), PREFIX + action.name, texts, turns_at),)
         yield replace(base, name=f"there_{seed}_{made:03d}", way="joined", notes=notes, features=features)
         made += 1
 
@@ -289,7 +292,7 @@ def _walk(clip: Clip, note: Note, rng: np.random.Generator) -> Array:
 
 def _half_turns(clip: Clip) -> Iterator[tuple[Clip, Array]]:
     """Stretches of a training recording within which somebody who walks turns right round and walks on."""
-    if clip.split != "train" or clip.way != "plain" or not any(n.kind == "turn around" for n in clip.notes):
+    if clip.split != "train" or clip.way != "plain" or not any(n.kind.startswith("turn around") for n in clip.notes):
         return
     p = hml.decode_positions(clip.features.astype(np.float64))
     heading = np.degrees(ph.smooth(np.unwrap(ph.heading(p)), 21))

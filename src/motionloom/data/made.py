@@ -51,15 +51,17 @@ def _read() -> dict[str, Gesture]:
 GESTURES: dict[str, Gesture] = _read()
 
 
-def perform(body: Array, gesture: Gesture, side: str, *, fps: float, rng: np.random.Generator) -> Array:
-    """``body`` (frames, 22, 3) metres with the arms of a gesture; ``side``: the hand of a gesture of one hand."""
+def perform(body: Array, gesture: Gesture, side: str, *, fps: float, begin: float, rng: np.random.Generator) -> Array:
+    """``body`` (frames, 22, 3) metres with the arms of a gesture; ``side``: the hand of a gesture of one hand.
+
+    The hands leave after ``begin`` seconds, and a swing has the same phase then: were it drawn, the average over what a
+    sentence may show would be a hand that is held still.
+    """
     result = body.copy()
     time = np.arange(len(body)) / fps
-    begin = rng.uniform(0.2, 0.9)
     end = time[-1] - rng.uniform(0.2, 0.8) if rng.random() < 0.5 else np.inf
     amount = np.minimum(_ease((time - begin) / _MOVE), 1 - _ease((time - end + _MOVE) / _MOVE))
-    rate, phase = rng.uniform(*gesture.rate), rng.uniform(0, 2 * np.pi)
-    swing = np.cos(2 * np.pi * rate * time + phase)
+    swing = -np.cos(2 * np.pi * rng.uniform(*gesture.rate) * (time - begin))
     shift = rng.normal(0, 0.015, 3)
     for name in ("left", "right") if gesture.hands == "both" else (side,):
         _move_arm(result, gesture, _ARMS[name], amount, swing, shift)

@@ -39,6 +39,7 @@ def _path_measures(p: Array, velocity: Array, fps: float) -> Measures:
     pace = np.linalg.norm(way, axis=-1)
     seconds = len(p) / fps
     moving = pace > 0.3
+    few = min(round(2.5 * fps), len(p) - 1)
     course = np.unwrap(np.arctan2(velocity[moving, 0, 0], velocity[moving, 0, 2])) if moving.sum() > 2 else np.zeros(2)
     travel = max(float(pace.mean() * seconds), 0.3)
     return {
@@ -50,6 +51,7 @@ def _path_measures(p: Array, velocity: Array, fps: float) -> Measures:
         "pace": float(np.median(pace[moving])) if moving.any() else 0.0,
         "gap": float(np.linalg.norm((p[-1, 0] - p[0, 0])[[0, 2]])) / travel,
         "turn": float(np.degrees(heading[-1] - heading[0])),
+        "turn_within": float(np.degrees(np.abs(heading[few:] - heading[:-few]).max())),
         "winding": float(np.degrees(abs(course[-1] - course[0]))),
     }
 
@@ -221,9 +223,9 @@ _CURVE = "facing_share > 0.5, pace < 1.9"
 PATHS = (
     Rule("stand", "stir < 0.28, travel < 0.15, turned < 25, pelvis_low > 0.9, hand_over_neck < -0.2"),
     Rule("", "", (r"danc|salsa|climb|playground|acrobat|karate|cartwheel",)),
-    Rule("turn left,turn around", f"{_ON_THE_SPOT}, turn > 135"),
+    Rule("turn left,turn around", f"{_ON_THE_SPOT}, turn > 135, turn < 225"),
     Rule("turn left", f"{_ON_THE_SPOT}, turn > 60"),
-    Rule("turn right,turn around", f"{_ON_THE_SPOT}, turn < -135"),
+    Rule("turn right,turn around right", f"{_ON_THE_SPOT}, turn < -135, turn > -225"),
     Rule("turn right", f"{_ON_THE_SPOT}, turn < -60"),
     Rule("", "speed < 0.25"),
     Rule("", "pelvis_low < 0.8"),
@@ -241,7 +243,8 @@ PATHS = (
     Rule("sidestep right", _SIDEWAYS),
     Rule("walk left turn", f"{_CURVE}, turn > 55, turn < 135"),
     Rule("walk right turn", f"{_CURVE}, turn < -55, turn > -135"),
-    Rule("turn around", "turned >= 135, winding < 250, facing_share > 0.3, pace < 1.9"),
+    Rule("turn around", "turn > 140, turn < 220, turn_within > 125, facing_share > 0.3, pace < 1.9"),
+    Rule("turn around right", "turn < -140, turn > -220, turn_within > 125, facing_share > 0.3, pace < 1.9"),
 )
 """The first of these names where a window without a gesture goes."""
 
