@@ -122,9 +122,8 @@ def measured() -> str:
 
 Each clip read, put on the uniform person and back onto its character; percent of the character's height between skinned
 vertices, and degrees of twist of limb bones. Targets are 4 over all, 6 for head, hands and feet, 20 degrees; a star
-misses one. Where one does, an animator pulled bones out of their sockets (a head that flies off, shoulders that leave
-the chest), which no other body can carry. Made by
-`python benchmarks/characters.py FOLDER --out benchmarks/characters.txt`.
+misses one. In `Robot_Death` the animator lets the head fly off the neck, which a person of constant bones cannot carry.
+Made by `python benchmarks/characters.py FOLDER --out benchmarks/characters.txt`.
 
 ```
 {place.read_text(encoding="utf-8").rstrip()}
