@@ -77,11 +77,11 @@ def said(words: list[str], folders: dict[str, str]) -> tuple[int, str]:
         code = main(words)
     lines = [line.removeprefix("motionloom: ") for line in errors.getvalue().splitlines()]
     drawn = (" away from its goal", "note: give --unit", "sees the last")  # what random weights and a short walk make
-    text = " ".join(" ".join(line for line in lines if not any(word in line for word in drawn)).split())
+    text = " ".join("; ".join(line for line in lines if not any(word in line for word in drawn)).split())
     for name, short in folders.items():
         text = text.replace(name + "/", "").replace(name, short)
     text = text.replace("|", "/")
-    return code, text if len(text) < 300 else text[:297] + "..."
+    return code, text if len(text) < 400 else f"{text[:230]} ... {text[-160:]}"  # what to do is said at the end
 
 
 def prepare(folder: Path) -> None:

@@ -137,7 +137,7 @@ def _people(
     if skins and known:
         groups = [max(_groups(known, order, parents), key=len), *groups]
     if not groups:
-        raise document.bad("it holds neither a skeleton (skin) nor an animation of nodes")
+        raise document.bad("it holds neither a skeleton (skin) nor an animation of nodes; export it with its armature")
     marked = animated.union(*groups)
     people: dict[int, set[int]] = {}
     for group in groups:
