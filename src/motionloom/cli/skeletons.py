@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from motionloom.retarget.hands import HandPose
     from motionloom.skeleton import Skeleton
 
+CHARACTERS = (".glb", ".vrm", ".gltf", ".fbx")
+"""Files with a mesh, which is written with its motion."""
 ROOTS = ("motion", "hips", "in-place")
 HANDS = ("relaxed", "fist", "flat", "as-is")
 
@@ -74,10 +76,14 @@ class Target:
         """How the character's own file ends."""
         return Path(self.name).suffix.lower() if self.character else None
 
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """How files may end that are the character's own with one more animation."""
+        return () if self.character is None else (*self.character.suffixes, ".fbx")
+
     def writes(self, path: Path) -> bool:
         """Whether a file of this name is the character's own with one more animation."""
-        suffix = path.suffix.lower()
-        return self.character is not None and suffix in (self.suffix, self.character.path.suffix.lower(), ".fbx")
+        return path.suffix.lower() in self.suffixes
 
     def save(self, motion: "Motion", path: Path, *, caption: str | None = None) -> Path:
         """Write a motion that is `put` on the skeleton; the suffix picks the format."""
@@ -111,6 +117,12 @@ class Target:
             return glb_to_fbx(made, path, fps=motion.fps)
 
 
+def own_outs(arguments: argparse.Namespace, name: str, suffix: str = ".bvh") -> list[Path]:
+    """What is written where the line does not say: ``name`` with the suffix, or as the character is."""
+    own = Path(arguments.skeleton or "").suffix.lower()
+    return [Path(name + (own if own in CHARACTERS else suffix))]
+
+
 def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target | None:
     """The skeleton that the line names, if it does; refuses options and files that do not go with it."""
     from motionloom.errors import MotionloomError
@@ -128,6 +140,8 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
         if not any(found.writes(out) or not out.suffix for out in outs) and (arguments.clip_name or arguments.replace):
             raise MotionloomError(f"--clip-name and --replace are for the character's own file, a {path.suffix}")
         for out in outs:
+            if out.suffix.lower() == ".glb" and not found.writes(out):
+                raise MotionloomError(f"{out} would not hold the character; it is written as a {path.suffix}")
             if out.exists() and out.resolve() == path.resolve():
                 raise MotionloomError(f"{out} is the character itself; give the moving one another name with --out")
     elif arguments.clip_name or arguments.replace:
