@@ -12,6 +12,7 @@ from motionloom.cli import main
 from motionloom.io.bvh_writer import save_bvh
 from motionloom.io.gltf import load_glb
 from motionloom.io.gltf_read import open_glb
+from motionloom.kinematics.gestures import Seat
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22, Skeleton
@@ -201,3 +202,15 @@ def test_what_is_mixed_up_is_said(words: tuple[str, ...], said: str, capsys: pyt
     assert main(["export", *words]) == 2
     assert said in complaint(capsys)
     assert not Path("moving.glb").exists()
+
+
+def test_a_seat_is_as_high_and_far_as_the_character_needs(
+    weights: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("motionloom.kinematics.gestures.seats", lambda *_: [Seat(0.0, 1.0, 0.4, 0.1, -0.2)])
+    Hero(size=1.3).write(Path("giant.glb"))
+    line = ["generate", "a person sits", "--seconds", "1", "--weights", weights, *TINY]
+    assert main([*line, "--skeleton", "giant.glb"]) == 0
+    assert "a seat 0.52 m high belongs at x 0.13, z -0.26 m" in capsys.readouterr().err
+    assert main([*line, "--out", "uniform.bvh"]) == 0
+    assert "a seat 0.40 m high" in capsys.readouterr().err

@@ -33,8 +33,8 @@ def add_sampling(
     """
     parser.add_argument(
         "--out", type=Path, action="append", metavar="NAME",
-        help="file to write, repeatable; .bvh .glb .vrma .usda .npz .mp4 .gif .png (default motion.bvh; of a character "
-        "that is the --skeleton its own, such as motion.glb)",
+        help="file to write, repeatable; .bvh .glb .vrma .usda .npz .mp4 .gif .png (default motion.bvh; motion.glb "
+        "for a character)",
     )  # fmt: skip
     parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 24)")
     parser.add_argument(

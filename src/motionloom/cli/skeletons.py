@@ -72,6 +72,14 @@ class Target:
         return pose_hands(made, self.hands, self.joint_map)
 
     @property
+    def size(self) -> float:
+        """How long its legs are, in those of the uniform person: a walk goes so much further on it."""
+        from motionloom.retarget.anatomy import read_body
+        from motionloom.skeleton import SMPL22
+
+        return read_body(self.skeleton, self.joint_map).leg / read_body(SMPL22).leg
+
+    @property
     def suffix(self) -> str | None:
         """How the character's own file ends."""
         return Path(self.name).suffix.lower() if self.character else None
