@@ -214,3 +214,12 @@ def test_a_seat_is_as_high_and_far_as_the_character_needs(
     assert "a seat 0.52 m high belongs at x 0.13, z -0.26 m" in capsys.readouterr().err
     assert main([*line, "--out", "uniform.bvh"]) == 0
     assert "a seat 0.40 m high" in capsys.readouterr().err
+
+
+def test_a_character_that_is_only_read_is_said_not_to_come_out(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "hero.glb", "body.glb"]) == 0
+    assert "--skeleton hero.glb writes that character" in capsys.readouterr().err
+    assert main(["export", "body.glb", "again.glb"]) == 0
+    assert main(["export", "hero.glb", "hero.bvh"]) == 0
+    assert main(["export", "hero.glb", "more.glb", "--skeleton", "hero.glb"]) == 0
+    assert "simple body" not in capsys.readouterr().err

@@ -1,6 +1,7 @@
 """What the commands that write motions share about skeletons: ``--skeleton`` and how a motion is put on it."""
 
 import argparse
+import sys
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -118,7 +119,7 @@ class Target:
         from motionloom.errors import MotionloomError
         from motionloom.io.blender import glb_to_fbx
 
-        if character.path.suffix.lower() != ".glb":
+        if ".glb" not in character.suffixes:
             raise MotionloomError(f"a {character.path.suffix} character is not written as {path}; give it as a .glb")
         with tempfile.TemporaryDirectory() as folder:
             made = character.save(motion, Path(folder) / "moving.glb", name=name, replace=self.replace)
@@ -139,6 +140,7 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
         for name in ("root", "hands", "clip_name", "replace", "target_map"):
             if getattr(arguments, name):
                 raise MotionloomError(f"--{name.replace('_', '-')} goes with a --skeleton; name one")
+        _note_mannequin(arguments, outs)
         return None
     found = _find(arguments)
     found = found if arguments.out_unit is None else replace(found, unit=arguments.out_unit)
@@ -155,6 +157,22 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
     elif arguments.clip_name or arguments.replace:
         raise MotionloomError(f"--clip-name and --replace are for .glb, .gltf and .vrm characters; got {found.name}")
     return found
+
+
+def _note_mannequin(arguments: argparse.Namespace, outs: Sequence[Path]) -> None:
+    """Say that a character whose motion is read does not come out itself."""
+    source = next((getattr(arguments, name) for name in ("input", "clip", "past") if hasattr(arguments, name)), None)
+    bodies = [out for out in outs if out.suffix.lower() in (".glb", ".usda", ".fbx")]
+    if not isinstance(source, Path) or source.suffix.lower() not in CHARACTERS[:3] or not bodies:
+        return
+    from motionloom.io.gltf_read import open_glb
+
+    found = open_glb(source).document.json
+    if found.get("meshes") and found.get("asset", {}).get("generator") != "motionloom":
+        print(
+            f"note: {bodies[0]} gets a simple body; --skeleton {source} writes that character with one more animation",
+            file=sys.stderr,
+        )
 
 
 def _check_humanoid(target: Target) -> None:
