@@ -2,11 +2,12 @@
 
 MOTIONLOOM_BLENDER_PYTHON=PYTHON python tools/make_blender_pictures.py [NAME ...]
 
-PYTHON can import bpy. Shown is only this project's own mannequin, which as a .glb is a character like any other.
+PYTHON can import bpy. Shown are only bodies of our own making: the mannequin, which as a .glb is a character like any
+other, and a person of ellipsoids with a rig that Rigify generates.
 
 bvh       a BVH as it comes in: bones stand upright, on the floor, facing Blender's front
 walking   a character's own file with a walk in it, at three moments
-rigify    the walk on a Rigify deform skeleton beside the mannequin it came from
+rigify    the walk on the controls of a generated Rigify rig, by `examples/blender_rigify.py`
 """
 
 import json
@@ -14,33 +15,30 @@ import os
 import subprocess
 import sys
 import tempfile
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import numpy as np
 from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from motionloom.io import load, save
+from motionloom.io import save
 from motionloom.io.character import load_character
 from motionloom.motion import Motion
 from motionloom.retarget import retarget
-from motionloom.retarget.named import named_skeleton
+from tests.io.rigify import example, make_rig
 
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "docs" / "pictures"
 SIZE = (360, 320)
-# Runs inside Blender: files side by side, one picture per frame.
+# Runs inside Blender: files or a .blend, one picture per frame.
 _SCRIPT = """
 import json, math, sys
 import bpy
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 job = json.load(open(sys.argv[1]))
-bpy.ops.wm.read_factory_settings(use_empty=True)
-scene = bpy.context.scene
-scene.render.fps = job["fps"]
-colours = [(0.75, 0.36, 0.16, 1), (0.16, 0.38, 0.7, 1), (0.2, 0.5, 0.3, 1)]
+file = job["file"]
 
 def material(colour, name):
     made = bpy.data.materials.new(name)
@@ -49,35 +47,37 @@ def material(colour, name):
     made.node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value = 0.7
     return made
 
-def bones_as_bodies(armature, paint):
+def bones_as_bodies(armature):
     # A cone along each bone, that follows it: bones themselves are not rendered.
     for bone in armature.pose.bones:
         length = max(bone.length, 0.01)
         bpy.ops.mesh.primitive_cone_add(vertices=6, radius1=0.1 * length + 0.012, radius2=0.008, depth=length)
         cone = bpy.context.object
-        cone.data.transform(__import__("mathutils").Matrix.Rotation(-math.pi / 2, 4, "X"))
-        cone.data.materials.append(paint)
+        cone.data.transform(Matrix.Rotation(-math.pi / 2, 4, "X"))
         cone.parent, cone.parent_type, cone.parent_bone = armature, "BONE", bone.name
         cone.location = (0, -length / 2, 0)
 
-for number, (file, aside) in enumerate(job["files"]):
-    before = set(bpy.data.objects)
-    if file.endswith(".bvh"):
-        bpy.ops.import_anim.bvh(filepath=file, update_scene_fps=True)
-    else:
-        bpy.ops.import_scene.gltf(filepath=file)
-    paint = material(colours[number], f"paint {number}")
-    new = [o for o in bpy.data.objects if o not in before]
-    for thing in new:
-        if thing.type == "ARMATURE" and file.endswith(".bvh"):
-            bones_as_bodies(thing, paint)
-        if thing.type == "MESH":
-            thing.data.materials.clear()
-            thing.data.materials.append(paint)
-    for thing in new:
-        if thing.parent is None:
-            thing.location.x += aside
-
+if file.endswith(".blend"):
+    bpy.ops.wm.open_mainfile(filepath=file)
+    for thing in list(bpy.data.objects):  # the shapes of a rig's controls
+        if thing.type == "MESH" and not thing.find_armature():
+            bpy.data.objects.remove(thing)
+else:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+scene = bpy.context.scene
+scene.render.fps = job["fps"]
+if file.endswith(".bvh"):
+    bpy.ops.import_anim.bvh(filepath=file, update_scene_fps=True)
+    bones_as_bodies(next(o for o in bpy.data.objects if o.type == "ARMATURE"))
+elif file.endswith(".glb"):
+    bpy.ops.import_scene.gltf(filepath=file)
+paint = material((0.75, 0.36, 0.16, 1), "paint")
+for thing in bpy.data.objects:
+    if thing.type == "MESH":
+        thing.data.materials.clear()
+        thing.data.materials.append(paint)
+        for face in thing.data.polygons:
+            face.use_smooth = not file.endswith(".bvh")
 bpy.ops.mesh.primitive_plane_add(size=30)
 bpy.context.object.data.materials.append(material((0.45, 0.45, 0.45, 1), "floor"))
 for axis, colour in ((0, (0.8, 0.05, 0.05, 1)), (1, (0.1, 0.55, 0.1, 1)), (2, (0.05, 0.1, 0.8, 1))):
@@ -112,20 +112,38 @@ for number, frame in enumerate(job["frames"]):
 """
 
 
-def rendered(files: list[tuple[Path, float]], frames: list[int], *, fps: float, axes: tuple[float, float, float],
-             camera: tuple[float, float, float], target: tuple[float, float, float], lens: float = 70.0,
-             samples: int = 8) -> Image.Image:  # fmt: skip
-    """One row of pictures, one per frame."""
+@dataclass(frozen=True)
+class View:
+    """Which frames are drawn, and from where, in Blender's axes."""
+
+    fps: int
+    frames: list[int]
+    target: tuple[float, float, float]
+    camera: tuple[float, float, float]
+    axes: tuple[float, float, float]
+
+
+def view(motion: Motion) -> View:
+    """Three moments of somebody who walks, from the front and the side."""
+    path, last = motion.root[:, [0, 2]], len(motion) - 1
+    middle = (path.min(axis=0) + path.max(axis=0)) / 2
+    x, y = float(middle[0]), -float(middle[1])  # Blender's axes: ours x, -z, y
+    moments = [round(last * share) for share in (0.15, 0.5, 0.85)]
+    size = float(motion.root[:, 1].mean())
+    camera = (x + 5.1 * size, y - 4.7 * size, 2.1 * size)
+    return View(round(motion.fps), moments, (x, y, 0.95 * size), camera, (x - 1.2, y, 0.0))
+
+
+def rendered(file: Path, seen: View, *, first: int = 0, samples: int = 24) -> Image.Image:
+    """One row of pictures, one per moment, of a file or a .blend; ``first`` is the clip's first frame."""
     python = os.environ.get("MOTIONLOOM_BLENDER_PYTHON", sys.executable)
     with tempfile.TemporaryDirectory() as folder:
-        job = {
-            "files": [(str(file), aside) for file, aside in files], "frames": frames, "fps": round(fps), "axes": axes,
-            "camera": camera, "target": target, "lens": lens, "size": SIZE, "samples": samples, "out": folder,
-        }  # fmt: skip
+        job = asdict(seen) | {"lens": 70.0, "size": SIZE, "samples": samples, "out": folder}
+        job |= {"file": str(file), "frames": [first + frame for frame in seen.frames]}
         (Path(folder) / "job.json").write_text(json.dumps(job))
-        command = [python, "-c", _SCRIPT, str(Path(folder) / "job.json")]
+        command = [python, "-W", "ignore", "-c", _SCRIPT, str(Path(folder) / "job.json")]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        parts = [Image.open(Path(folder) / f"{k}.png").convert("RGB") for k in range(len(frames))]
+        parts = [Image.open(Path(folder) / f"{k}.png").convert("RGB") for k in range(len(seen.frames))]
         whole = Image.new("RGB", (SIZE[0] * len(parts), SIZE[1]))
         for k, part in enumerate(parts):
             whole.paste(part, (k * SIZE[0], 0))
@@ -150,26 +168,21 @@ def walk() -> Motion:
 
 def draw(names: list[str], folder: Path) -> None:
     motion = walk()
-    path = motion.root[:, [0, 2]]
-    middle = (path.min(axis=0) + path.max(axis=0)) / 2
-    at = (float(middle[0]), -float(middle[1]), 0.85)  # Blender's axes: ours x, -z, y
-    last = len(motion) - 1
-    moments = [round(last * share) for share in (0.15, 0.5, 0.85)]
-    view = {"camera": (at[0] + 4.6, at[1] - 4.2, 1.9), "target": at, "fps": motion.fps}
     if "bvh" in names:
         file = save(motion, folder / "walk.bvh")
-        kept(rendered([(file, 0.0)], [m + 1 for m in moments], axes=(at[0] - 1.2, at[1], 0.0), **view), "bvh")
+        kept(rendered(file, view(motion), first=1), "bvh")
     if "walking" in names:
         hero = load_character(save(motion, folder / "hero.glb"))
         moving = hero.save(retarget(motion, hero.skeleton), folder / "moving.glb", name="walk", replace=True)
-        kept(rendered([(moving, 0.0)], moments, axes=(at[0] - 1.2, at[1], 0.0), **view), "walking")
+        kept(rendered(moving, view(motion)), "walking")
     if "rigify" in names:
-        rig = save(retarget(motion, named_skeleton("rigify")), folder / "rigify.bvh")
-        ours = save(motion, folder / "plain.bvh")
-        assert np.isfinite(load(rig).root).all()
-        frames = [m + 1 for m in moments]
-        picture = rendered([(rig, 0.6), (ours, -0.6)], frames, axes=(at[0] - 1.4, at[1], 0.0), **view)
-        kept(picture, "rigify")
+        blend, glb = make_rig(folder / "rig.blend"), folder / "rig.glb"
+        example(blend, "out", str(glb))
+        character = load_character(glb)
+        made = retarget(motion, character.skeleton)
+        moving = character.save(made, folder / "moving_rig.glb", name="walk", replace=True)
+        example(blend, "in", str(moving), str(folder / "moving_rig.blend"))
+        kept(rendered(folder / "moving_rig.blend", view(made)), "rigify")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,7 @@
 """`--skeleton`: every command that makes motion puts it on the user's own character."""
 
+import base64
+import json
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ from motionloom.cli import main
 from motionloom.io.bvh_writer import save_bvh
 from motionloom.io.gltf import load_glb
 from motionloom.io.gltf_read import open_glb
+from motionloom.kinematics.gestures import Seat
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22, Skeleton
@@ -164,3 +167,59 @@ def test_the_same_three_in_a_bvh() -> None:
     np.testing.assert_allclose(np.ptp(found["hips"][:, 0], axis=0), 0, atol=1e-5)
     assert np.ptp(found["motion"][:, 0, 2]) > 0.5
     assert np.ptp(found["in-place"][:, 1, 2]) < 1e-5
+
+
+def test_without_a_name_the_character_itself_is_written(weights: str) -> None:
+    assert (
+        main(["generate", "a person walks", "--seconds", "1", "--weights", weights, *TINY, "--skeleton", "hero.glb"])
+        == 0
+    )
+    check("motion.glb", "a person walks")
+    assert not Path("motion.bvh").exists()
+
+
+def test_a_vrm_is_also_written_as_the_glb_that_it_is() -> None:
+    Path("hero.glb").rename("hero.vrm")
+    assert main(["export", "walk.bvh", "--skeleton", "hero.vrm", "--out", "moving.vrm"]) == 0
+    assert main(["export", "walk.bvh", "--skeleton", "hero.vrm", "--out", "moving.glb"]) == 0
+    assert Path("moving.glb").read_bytes() == Path("moving.vrm").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("walk.bvh", "moving.glb", "--skeleton", "hero.glb", "--clip", "wave"), "--clip-name names the one"),
+        (("hero.glb", "wave.bvh", "--clip", "wawe"), "did you mean 'wave'?"),
+        (("walk.bvh", "moving.glb", "--skeleton", "hero.gltf"), "it is written as a .gltf"),
+    ],
+)
+def test_what_is_mixed_up_is_said(words: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Also that a .gltf's character does not go lost in a .glb of a mannequin."""
+    hero = Hero()
+    uri = "data:application/octet-stream;base64," + base64.b64encode(bytes(hero.data)).decode()
+    content = hero.json | {"buffers": [{"byteLength": len(hero.data), "uri": uri}]}
+    Path("hero.gltf").write_text(json.dumps(content))
+    assert main(["export", *words]) == 2
+    assert said in complaint(capsys)
+    assert not Path("moving.glb").exists()
+
+
+def test_a_seat_is_as_high_and_far_as_the_character_needs(
+    weights: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("motionloom.kinematics.gestures.seats", lambda *_: [Seat(0.0, 1.0, 0.4, 0.1, -0.2)])
+    Hero(size=1.3).write(Path("giant.glb"))
+    line = ["generate", "a person sits", "--seconds", "1", "--weights", weights, *TINY]
+    assert main([*line, "--skeleton", "giant.glb"]) == 0
+    assert "a seat 0.52 m high belongs at x 0.13, z -0.26 m" in capsys.readouterr().err
+    assert main([*line, "--out", "uniform.bvh"]) == 0
+    assert "a seat 0.40 m high" in capsys.readouterr().err
+
+
+def test_a_character_that_is_only_read_is_said_not_to_come_out(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "hero.glb", "body.glb"]) == 0
+    assert "--skeleton hero.glb writes that character" in capsys.readouterr().err
+    assert main(["export", "body.glb", "again.glb"]) == 0
+    assert main(["export", "hero.glb", "hero.bvh"]) == 0
+    assert main(["export", "hero.glb", "more.glb", "--skeleton", "hero.glb"]) == 0
+    assert "simple body" not in capsys.readouterr().err

@@ -28,10 +28,16 @@ def matrix(values):
     return np.array([list(row) for row in values])
 
 def read(job):
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    if job["file"].endswith(".blend"):
+        bpy.ops.wm.open_mainfile(filepath=job["file"])
+    else:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.context.scene.render.fps = max(1, round(job["fps"]))
+        bpy.context.scene.render.fps_base = max(1, round(job["fps"])) / job["fps"]
     scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base = max(1, round(job["fps"])), max(1, round(job["fps"])) / job["fps"]
-    if job["file"].endswith(".bvh"):
+    if job["file"].endswith(".blend"):
+        pass
+    elif job["file"].endswith(".bvh"):
         bpy.ops.import_anim.bvh(filepath=job["file"], update_scene_fps=True, update_scene_duration=True)
     else:
         bpy.ops.import_scene.gltf(filepath=job["file"])

@@ -10,6 +10,7 @@ import pytest
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.retarget import joint_map, joints22
+from motionloom.retarget.named import named_skeleton
 from motionloom.skeleton import SMPL22, Skeleton
 from tests.shared import shared
 
@@ -247,3 +248,15 @@ def test_joints22_agree_with_the_floor_heights_recorded_for_the_real_clips(path:
         recorded = next(float(row["floor_y_m"]) for row in csv.DictReader(file) if row["path"] == path)
     lowest = joints22(motion)[:, [7, 8, 10, 11], 1].min(axis=1)
     assert np.percentile(lowest, 2) == pytest.approx(recorded, abs=2e-3)
+
+
+def test_a_generated_rigify_rig_in_pieces_is_refused_with_the_way_to_join_it() -> None:
+    """Blender exports its limbs beside its spine, each on the armature."""
+    names = ("rig", *named_skeleton("rigify").names)
+    parents = [0 if p < 0 or p == 0 or name.startswith("DEF-shoulder") else p + 1
+               for name, p in zip(names[1:], named_skeleton("rigify").parents)]  # fmt: skip
+    rest = np.vstack([np.zeros(3), named_skeleton("rigify").rest_positions()])
+    parents[names.index("DEF-spine.001") - 1] = names.index("DEF-spine")
+    offsets = rest - np.vstack([np.zeros(3), rest[parents]])
+    with pytest.raises(MotionloomError, match="examples/blender_rigify"):
+        joint_map(Skeleton(names, (-1, *parents), offsets))

@@ -19,7 +19,7 @@ from motionloom.cli.sampling import (
     sampling_of,
     take_text_anywhere,
 )
-from motionloom.cli.skeletons import Target, add_skeleton, put_all, read_target
+from motionloom.cli.skeletons import CHARACTERS, Target, add_skeleton, own_outs, put_all, read_target
 from motionloom.cli.writing import add_writing, at_rate, check_overwriting, check_rate, check_unit
 
 if TYPE_CHECKING:
@@ -309,6 +309,8 @@ def _check_numbers(arguments: argparse.Namespace) -> None:
 def check_pair_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target | None]:
     """The files to write, those of one person in twos of a kind, first that of the first person; and the skeleton."""
     outs = arguments.out or [Path("duet.glb")]
+    if not arguments.out and Path(arguments.skeleton or "").suffix.lower() in CHARACTERS:
+        outs = [out for name in ("duet_a", "duet_b") for out in own_outs(arguments, name)]
     skin = read_target(arguments, outs)
     if len({out.resolve() for out in outs}) != len(outs):
         fail("the same --out is given twice; give each file its own name")
@@ -322,7 +324,7 @@ def check_pair_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target |
 
 def _single(skin: Target | None) -> tuple[str, ...]:
     """The suffixes of files that hold one person; a character's own file does."""
-    return (*SINGLE, skin.suffix) if skin is not None and skin.suffix else SINGLE
+    return SINGLE if skin is None else tuple(dict.fromkeys((*SINGLE, *skin.suffixes)))
 
 
 def _check_sizes(

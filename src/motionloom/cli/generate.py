@@ -3,7 +3,7 @@
 import argparse
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,7 +75,7 @@ def _generate(arguments: argparse.Namespace) -> int:
     made = finished_motions(files, captions, target, unit=arguments.out_unit, rate=arguments.fps)
     drawn = _drawn(arguments, prior, [timelines[caption] for caption in captions])
     seated: list[list[Seat]] = []
-    interrupted = made.take([motion] for motion in _noting(seated, drawn))
+    interrupted = made.take([motion] for motion in _noting(seated, drawn, 1.0 if target is None else target.size))
     motions = [
         {"prompt": caption, "seed": arguments.seed + i, "segments": _segments(timelines[caption]),
          "seats": [asdict(seat) for seat in seats]}
@@ -88,12 +88,13 @@ def _generate(arguments: argparse.Namespace) -> int:
     return made.ended(interrupted)
 
 
-def _noting(seated: "list[list[Seat]]", motions: "Iterator[Motion]") -> "Iterator[Motion]":
-    """The motions as they come; the seats of each are put into ``seated``."""
+def _noting(seated: "list[list[Seat]]", motions: "Iterator[Motion]", size: float) -> "Iterator[Motion]":
+    """The motions as they come; the seats of each, for a body ``size`` times theirs, are put into ``seated``."""
     from motionloom.kinematics.gestures import seats
 
     for motion in motions:
-        seated.append(seats(motion.positions(), motion.fps))
+        found = seats(motion.positions(), motion.fps)
+        seated.append([replace(s, height=s.height * size, x=s.x * size, z=s.z * size) for s in found])
         yield motion
 
 

@@ -285,7 +285,7 @@ def _read_past(arguments: argparse.Namespace, skin: Target | None) -> "tuple[Mot
     check_size(arguments, arguments.past, whole)
     past = crop(whole, arguments)
     if len(past) < 2:
-        fail(f"{arguments.past} has one frame here, and a past has at least two; only they say where the person goes")
+        fail(f"{arguments.past} has one frame here; a past has at least two, to say where one goes: take a longer one")
     return past, Writing(arguments.out_unit or unit or 1.0, orders, skin)
 
 

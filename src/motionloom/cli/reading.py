@@ -86,7 +86,13 @@ def as_unit(text: str) -> float:
 def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float | None, dict[str, str]]":
     """The motion and, of a BVH, the unit of its file and the orders of its rotations."""
     from motionloom import io
+    from motionloom.errors import MotionloomError
 
+    if arguments.animation is not None and path.suffix.lower() not in io.CLIPS:
+        raise MotionloomError(
+            f"--clip picks one of several animations of a {', '.join(io.CLIPS)}, and {path} is none; leave it out "
+            "(--clip-name names the one that is written)"
+        )
     unit, orders = None, {}
     if path.suffix.lower() == ".bvh" and not path.is_dir() and arguments.asf is None:
         from motionloom.io.bvh import read_bvh
@@ -94,8 +100,8 @@ def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float
         file = read_bvh(path, fps=arguments.source_fps, unit=arguments.unit)
         motion, unit, orders = file.motion, file.unit, dict(file.orders)
     else:
-        clip = arguments.animation if path.suffix.lower() in io.CLIPS else None
-        motion = io.load(path, fps=arguments.source_fps, asf=arguments.asf, unit=arguments.unit, clip=clip)
+        options = {"fps": arguments.source_fps, "asf": arguments.asf, "unit": arguments.unit}
+        motion = io.load(path, clip=arguments.animation, **options)
     return _upright(motion, path, arguments), unit, orders
 
 

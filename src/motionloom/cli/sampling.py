@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from motionloom.cli.newcomers import one_sentence, suggestion, with_options
-from motionloom.cli.skeletons import Target, add_skeleton, read_target
+from motionloom.cli.skeletons import Target, add_skeleton, own_outs, read_target
 from motionloom.cli.writing import add_writing, check_rate, check_unit
 
 if TYPE_CHECKING:
@@ -33,7 +33,8 @@ def add_sampling(
     """
     parser.add_argument(
         "--out", type=Path, action="append", metavar="NAME",
-        help="file to write, repeatable; .bvh .glb .vrma .usda .npz .mp4 .gif .png (default motion.bvh)",
+        help="file to write, repeatable; .bvh .glb .vrma .usda .npz .mp4 .gif .png (default motion.bvh; motion.glb "
+        "for a character)",
     )  # fmt: skip
     parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 24)")
     parser.add_argument(
@@ -116,7 +117,7 @@ def check_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target | None
     """The files to write and the skeleton; refuses what cannot be, before any work."""
     from motionloom.io import check_output
 
-    outs = arguments.out or [Path("motion.bvh")]
+    outs = arguments.out or own_outs(arguments, "motion")
     target = read_target(arguments, outs)
     for out in outs:
         check_output(out, own=target and target.suffix)

@@ -1,6 +1,7 @@
 """What the commands that write motions share about skeletons: ``--skeleton`` and how a motion is put on it."""
 
 import argparse
+import sys
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from motionloom.retarget.hands import HandPose
     from motionloom.skeleton import Skeleton
 
+CHARACTERS = (".glb", ".vrm", ".gltf", ".fbx")
+"""Files with a mesh, which is written with its motion."""
 ROOTS = ("motion", "hips", "in-place")
 HANDS = ("relaxed", "fist", "flat", "as-is")
 
@@ -70,14 +73,26 @@ class Target:
         return pose_hands(made, self.hands, self.joint_map)
 
     @property
+    def size(self) -> float:
+        """How long its legs are, in those of the uniform person: a walk goes so much further on it."""
+        from motionloom.retarget.anatomy import read_body
+        from motionloom.skeleton import SMPL22
+
+        return read_body(self.skeleton, self.joint_map).leg / read_body(SMPL22).leg
+
+    @property
     def suffix(self) -> str | None:
         """How the character's own file ends."""
         return Path(self.name).suffix.lower() if self.character else None
 
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """How files may end that are the character's own with one more animation."""
+        return () if self.character is None else (*self.character.suffixes, ".fbx")
+
     def writes(self, path: Path) -> bool:
         """Whether a file of this name is the character's own with one more animation."""
-        suffix = path.suffix.lower()
-        return self.character is not None and suffix in (self.suffix, self.character.path.suffix.lower(), ".fbx")
+        return path.suffix.lower() in self.suffixes
 
     def save(self, motion: "Motion", path: Path, *, caption: str | None = None) -> Path:
         """Write a motion that is `put` on the skeleton; the suffix picks the format."""
@@ -104,11 +119,17 @@ class Target:
         from motionloom.errors import MotionloomError
         from motionloom.io.blender import glb_to_fbx
 
-        if character.path.suffix.lower() != ".glb":
+        if ".glb" not in character.suffixes:
             raise MotionloomError(f"a {character.path.suffix} character is not written as {path}; give it as a .glb")
         with tempfile.TemporaryDirectory() as folder:
             made = character.save(motion, Path(folder) / "moving.glb", name=name, replace=self.replace)
             return glb_to_fbx(made, path, fps=motion.fps)
+
+
+def own_outs(arguments: argparse.Namespace, name: str, suffix: str = ".bvh") -> list[Path]:
+    """What is written where the line does not say: ``name`` with the suffix, or as the character is."""
+    own = Path(arguments.skeleton or "").suffix.lower()
+    return [Path(name + (own if own in CHARACTERS else suffix))]
 
 
 def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target | None:
@@ -119,6 +140,7 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
         for name in ("root", "hands", "clip_name", "replace", "target_map"):
             if getattr(arguments, name):
                 raise MotionloomError(f"--{name.replace('_', '-')} goes with a --skeleton; name one")
+        _note_mannequin(arguments, outs)
         return None
     found = _find(arguments)
     found = found if arguments.out_unit is None else replace(found, unit=arguments.out_unit)
@@ -128,11 +150,29 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
         if not any(found.writes(out) or not out.suffix for out in outs) and (arguments.clip_name or arguments.replace):
             raise MotionloomError(f"--clip-name and --replace are for the character's own file, a {path.suffix}")
         for out in outs:
+            if out.suffix.lower() == ".glb" and not found.writes(out):
+                raise MotionloomError(f"{out} would not hold the character; it is written as a {path.suffix}")
             if out.exists() and out.resolve() == path.resolve():
                 raise MotionloomError(f"{out} is the character itself; give the moving one another name with --out")
     elif arguments.clip_name or arguments.replace:
         raise MotionloomError(f"--clip-name and --replace are for .glb, .gltf and .vrm characters; got {found.name}")
     return found
+
+
+def _note_mannequin(arguments: argparse.Namespace, outs: Sequence[Path]) -> None:
+    """Say that a character whose motion is read does not come out itself."""
+    source = next((getattr(arguments, name) for name in ("input", "clip", "past") if hasattr(arguments, name)), None)
+    bodies = [out for out in outs if out.suffix.lower() in (".glb", ".usda", ".fbx")]
+    if not isinstance(source, Path) or source.suffix.lower() not in CHARACTERS[:3] or not bodies:
+        return
+    from motionloom.io.gltf_read import open_glb
+
+    found = open_glb(source).document.json
+    if found.get("meshes") and found.get("asset", {}).get("generator") != "motionloom":
+        print(
+            f"note: {bodies[0]} gets a simple body; --skeleton {source} writes that character with one more animation",
+            file=sys.stderr,
+        )
 
 
 def _check_humanoid(target: Target) -> None:

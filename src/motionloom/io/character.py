@@ -49,6 +49,12 @@ class Character:
         """The skeleton that motions must have to be written into the file."""
         return self.rig.skeleton
 
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """How the character's own file may end; a .vrm is a .glb of a special kind."""
+        own = self.path.suffix.lower()
+        return (own, ".glb") if own == ".vrm" else (own,)
+
     def surfaces(self, *, remark: bool = False) -> list[Surface]:
         """The meshes of the file at rest, on `skeleton`; what is left out (compressed) is said with ``remark``."""
         return read_surfaces(self.file.document, self.nodes, self.file.parents, self.rig, remark=remark)
@@ -59,13 +65,13 @@ class Character:
         ``motion`` is on `skeleton`, in metres and +Y up. Keyed are the joints of its body and those between them, and
         places of those that move against what they hang on; all others keep their rest, those that the file's other
         animations move by one key of it. ``name`` of the animation (``motion``) gets a number where the file has one
-        of that name. The new file ends as the old one.
+        of that name. The new file ends as the old one, a .vrm also in .glb.
         Raises `MotionloomError` for a motion of another skeleton, another suffix, or a place that cannot be written.
         """
         path = Path(path)
         if motion.skeleton.names != self.skeleton.names or motion.skeleton.parents != self.skeleton.parents:
             raise MotionloomError(f"the motion is not on the skeleton of {self.path}; retarget it first")
-        if path.suffix.lower() != self.path.suffix.lower():
+        if path.suffix.lower() not in self.suffixes:
             raise MotionloomError(
                 f"the character of {self.path} is written as such a file; name it *{self.path.suffix}, not {path.name}"
             )

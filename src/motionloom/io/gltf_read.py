@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +94,9 @@ class OpenedGlb:
         if not 1 <= number <= len(clips):
             listed = ", ".join(f"{k} {name!r}" for k, name in enumerate(clips[:20], start=1))
             more = f" and {len(clips) - 20} more" if len(clips) > 20 else ""
-            raise MotionloomError(f"{self.document.name} has no clip {clip!r}; there are {listed or 'none'}{more}")
+            near = get_close_matches(str(clip), clips, n=1)
+            meant = f"did you mean {near[0]!r}? There" if near else "there"
+            raise MotionloomError(f"{self.document.name} has no clip {clip!r}; {meant} are {listed or 'none'}{more}")
         return number - 1
 
 
@@ -137,7 +140,7 @@ def _people(
     if skins and known:
         groups = [max(_groups(known, order, parents), key=len), *groups]
     if not groups:
-        raise document.bad("it holds neither a skeleton (skin) nor an animation of nodes")
+        raise document.bad("it holds neither a skeleton (skin) nor an animation of nodes; export it with its armature")
     marked = animated.union(*groups)
     people: dict[int, set[int]] = {}
     for group in groups:

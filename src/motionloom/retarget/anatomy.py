@@ -56,6 +56,7 @@ BROADEST = 0.35
 """Human hip joints are at most so far apart, in lengths of the leg."""
 LEGS, FEET, TOES = (1, 2, 4, 5), (7, 8), (10, 11)
 ARMS = (13, 14, 16, 17, 18, 19, 20, 21)
+CHEST, COLLARS, SHOULDERS = 9, (13, 14), (16, 17)
 HEAD = 15
 
 

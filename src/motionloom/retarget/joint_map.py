@@ -179,6 +179,11 @@ def _trunk(skeleton: Skeleton, parts: Parts) -> tuple[int, int, list[int], int, 
     head = parts.get("head", parts.get("neck", chest))
     if not is_above(skeleton, chest, head) or head == chest:
         head = _spine_top(skeleton, chest)
+    if head == chest and "DEF-spine" in skeleton.names:
+        raise MotionloomError(
+            "the skeleton is a generated Rigify rig in pieces: its limbs do not hang on DEF-spine; take it out of "
+            "Blender with examples/blender_rigify.py (docs/blender.md)"
+        )
     if head == chest:
         raise MotionloomError(
             f"the skeleton is not a humanoid that can be read: no head above {skeleton.names[chest]}, where the arms "

@@ -3,7 +3,8 @@
 1. *Read*: the source's 22 joint places and the world orientation of its anatomical frames.
 2. *Scale*: the root's path, hips and feet by the ratio of leg lengths, feet set on the floor.
 3. *Write*: the target's joints take the same anatomical orientation with bones along the same directions.
-4. *Legs*: two-bone IK puts the feet where the scaled source has them, so that a planted foot stays planted.
+4. *Legs*: two-bone IK puts the feet where the scaled source has them, so that a planted foot stays planted. So it
+   does with hands, where one of the two has no collar bones.
 """
 
 from dataclasses import dataclass, replace
@@ -13,10 +14,11 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.motion import Motion
-from motionloom.retarget.anatomy import CHILD, FEET, HEAD, TOES, Body, read_body
+from motionloom.retarget.anatomy import CHEST, CHILD, COLLARS, FEET, HEAD, TOES, Body, read_body
+from motionloom.retarget.arms import reach, shoulders_moved
 from motionloom.retarget.floor import Stance, read_stance
 from motionloom.retarget.joint_map import Override, joint_map
-from motionloom.retarget.limbs import bend
+from motionloom.retarget.limbs import aim, bend, placed
 from motionloom.retarget.measured import frames_of_positions, mean_rotation
 from motionloom.retarget.root import RootMode, place_root
 from motionloom.retarget.topology import ancestors
@@ -91,7 +93,10 @@ def retarget(
     if source.broad or body.broad:
         out = body.broad - source.broad * body.leg / source.leg
         goals = _spread(goals, out * _smooth_left(pose, motion.fps))
-    made = _place(_orient(pose, body), goals, body, motion.fps)
+    world = _orient(pose, body)
+    if any(b.drivers[j] is None for b in (source, body) for j in COLLARS):
+        world = reach(world, pose.shoulders, body)
+    made = _place(world, goals, body, motion.fps)
     return made if root is None else place_root(made, body, root)
 
 
@@ -106,6 +111,8 @@ class _Pose:
     """(frames, 22, 4) world_from_anatomy."""
     hips: Array
     """(frames, 3) metres: the middle between the hip joints."""
+    shoulders: Array
+    """(frames, 2, 3) how far they are from their rest on the chest (`shoulders_moved`)."""
 
 
 def _read_pose(motion: Motion, source: Body) -> _Pose:
@@ -125,7 +132,8 @@ def _read_pose(motion: Motion, source: Body) -> _Pose:
         if CHILD[j] is not None and j not in (0, *FEET):  # the places have the last word on where a bone points
             bone = places[:, CHILD[j]] - places[:, j]
             frames[:, j] = rot.multiply(_turn(rot.rotate(frames[:, j], np.eye(3)[0]), bone), frames[:, j])
-    return _Pose(places, frames, _hips(places, frames, source))
+    moved = shoulders_moved(motion.positions(), world, source, chest_axes=axes[CHEST])
+    return _Pose(places, frames, _hips(places, frames, source), moved)
 
 
 def _hips(places: Array, frames: Array, source: Body) -> Array:
@@ -293,7 +301,7 @@ def _bone_end(body: Body, joint: int) -> int | None:
 
 
 def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
-    places = body.places(_positions(body.skeleton, world), world)
+    places = body.places(placed(body.skeleton, world), world)
     ankles = goals.toes - (places[:, TOES] - places[:, FEET])
     shift = _make_up(goals, ankles)
     root = goals.hips + shift - places[:, [1, 2]].mean(axis=1)
@@ -310,8 +318,8 @@ def _place(world: Array, goals: _Goals, body: Body, fps: float) -> Motion:
         middle, end = bend(
             places[:, hip], ankles[:, side], goals.poles[:, side], upper=body.bone(hip), lower=body.bone(knee)
         )
-        world = _aim(world, body, hip, places[:, knee] - places[:, hip], middle - places[:, hip])
-        world = _aim(world, body, knee, places[:, ankle] - places[:, knee], end - middle)
+        world = aim(world, body, hip, places[:, knee] - places[:, hip], middle - places[:, hip])
+        world = aim(world, body, knee, places[:, ankle] - places[:, knee], end - middle)
     return Motion(body.skeleton, fps, root, _locals(body.skeleton, world))
 
 
@@ -333,8 +341,8 @@ def move_feet(motion: Motion, shift: Array) -> Motion:
             places[:, hip], places[:, ankle] + shift[:, side], out + lack * (places[:, TOES[side]] - places[:, ankle]),
             upper=body.bone(hip), lower=body.bone(knee),
         )  # fmt: skip
-        world = _aim(world, body, hip, places[:, knee] - places[:, hip], middle - places[:, hip])
-        world = _aim(world, body, knee, places[:, ankle] - places[:, knee], end - middle)
+        world = aim(world, body, hip, places[:, knee] - places[:, hip], middle - places[:, hip])
+        world = aim(world, body, knee, places[:, ankle] - places[:, knee], end - middle)
     return replace(motion, rotations=_locals(motion.skeleton, world))
 
 
@@ -364,7 +372,7 @@ def _lack(ankles: Array, goals: _Goals, body: Body, *, world: Array, places: Arr
     """
     rest = body.skeleton.rest_positions()
     floor = min(0.0, *(float((rest[j] + corners)[:, 1].min()) for j, corners in body.skeleton.soles.items()))
-    joints = _positions(body.skeleton, world)
+    joints = placed(body.skeleton, world)
     lack = np.zeros(ankles.shape[:2])
     for side, foot in enumerate(FEET):
         driver = body.drivers[foot]
@@ -390,22 +398,6 @@ def _make_up(goals: _Goals, ankles: Array) -> Array:
     return height * np.array([0.0, 1.0, 0.0]) + float(np.median(ahead)) * goals.forward
 
 
-def _aim(world: Array, body: Body, joint: int, now: Array, wanted: Array) -> Array:
-    """Turn one bone without twist, and with it whatever follows it rigidly."""
-    driver = body.drivers[joint]
-    assert driver is not None
-    turned = world.copy()
-    turn = rot.shortest_arc(now, wanted)
-    stop = {d for j, d in enumerate(body.drivers) if d is not None and d != driver}
-    follows = {driver}
-    for k in range(driver + 1, len(body.skeleton)):
-        if body.skeleton.parents[k] in follows and k not in stop:
-            follows.add(k)
-    for k in follows:
-        turned[:, k] = rot.multiply(turn, world[:, k])
-    return turned
-
-
 def _drop(places: Array, ankles: Array, body: Body) -> Array:
     """(frames, 3) how far the hips must come down so that both feet reach their goals, without jerks."""
     need = np.zeros(len(places))
@@ -420,14 +412,6 @@ def _drop(places: Array, ankles: Array, body: Body) -> Array:
     kernel = np.hanning(9)[1:-1] / np.hanning(9)[1:-1].sum()
     smooth = np.convolve(np.pad(wide, 3, mode="edge"), kernel, mode="valid")
     return smooth[:, None] * np.array([0.0, 1.0, 0.0])
-
-
-def _positions(skeleton: Skeleton, world: Array) -> Array:
-    """(frames, joints, 3) with joint 0 at the origin."""
-    places = np.zeros((*world.shape[:2], 3))
-    for j, p in enumerate(skeleton.parents[1:], start=1):
-        places[:, j] = places[:, p] + rot.rotate(world[:, p], np.broadcast_to(skeleton.offsets[j], (len(world), 3)))
-    return places
 
 
 def _locals(skeleton: Skeleton, world: Array) -> Array:

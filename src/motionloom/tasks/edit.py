@@ -355,6 +355,9 @@ def _check(prior: Prior, motion: Motion, changes: Sequence[Change]) -> None:
         )
     length = motion.seconds
     if length * FPS < SHORTEST - 1e-6 or len(motion) < 3:
-        raise MotionloomError(f"the clip is {length:.2f} s long; at least {SHORTEST / FPS:g} s are needed to edit it")
+        raise MotionloomError(
+            f"the clip is {length:.2f} s long (frames: {len(motion)}); at least {SHORTEST / FPS:g} s and 3 frames are "
+            "needed to edit it: take a longer one"
+        )
     for change in changes:
         length = change.check(length, 1 / motion.fps)

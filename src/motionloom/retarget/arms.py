@@ -1,0 +1,74 @@
+"""Hands where the source has them against its chest, though the shoulders cannot go where the source's go.
+
+Where a rig has no collar bones, its shoulders stay on the chest, or an animator pulls the arms out of their sockets. On
+a body of the other kind arms of the same directions would start elsewhere, and two hands on one sword would part.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.retarget.anatomy import CHEST, SHOULDERS, Body
+from motionloom.retarget.limbs import aim, bend, placed
+
+Array = NDArray[np.float64]
+
+
+def shoulders_moved(positions: Array, world: Array, body: Body, *, chest_axes: Array | None = None) -> Array:
+    """(frames, 2, 3) how far the shoulders are from their rest on the chest, in its frame and in lengths of the arm.
+
+    ``positions`` (frames, joints, 3) metres and ``world`` (frames, joints, 4) are of the body's joints;
+    ``chest_axes`` (4,) stands for the body's own joint_from_anatomy of the chest. Zero where no joint turns the chest.
+    """
+    chest = body.drivers[CHEST]
+    if chest is None:
+        return np.zeros((len(world), 2, 3))
+    axes = body.frames[CHEST] if chest_axes is None else chest_axes
+    now = np.einsum("sj,fjc->fsc", body.points[list(SHOULDERS)], positions) - positions[:, chest, None]
+    rest = body.rest[list(SHOULDERS)] - body.skeleton.rest_positions()[chest]
+    moved = rot.rotate(rot.inverse(world[:, chest])[:, None], now) - rest
+    return np.asarray(rot.rotate(rot.inverse(axes), moved) / _arm(body), dtype=np.float64)
+
+
+def reach(world: Array, moved: Array, body: Body) -> Array:
+    """World rotations (frames, joints, 4) with arms bent so that hands are where other shoulders would put them.
+
+    ``moved`` (frames, 2, 3) says where these are, as `shoulders_moved` of another body does. A hand out of reach goes
+    as far as it can.
+    """
+    chest = body.drivers[CHEST]
+    if chest is None:
+        return world
+    positions = placed(body.skeleton, world)
+    lost = (moved - shoulders_moved(positions, world, body)) * _arm(body)
+    lost = rot.rotate(rot.multiply(world[:, chest], body.frames[CHEST])[:, None], lost)
+    places = body.places(positions, world)
+    for side, (shoulder, elbow, wrist) in enumerate(((16, 18, 20), (17, 19, 21))):
+        upper, lower = places[:, elbow] - places[:, shoulder], places[:, wrist] - places[:, elbow]
+        pole = _elbow_pole(world, body, shoulder, arm=upper + lower, upper=upper)
+        middle, end = bend(
+            places[:, shoulder],
+            places[:, wrist] + lost[:, side],
+            pole,
+            upper=body.bone(shoulder),
+            lower=body.bone(elbow),
+        )
+        world = aim(world, body, shoulder, upper, middle - places[:, shoulder])
+        world = aim(world, body, elbow, lower, end - middle)
+    return world
+
+
+def _elbow_pole(world: Array, body: Body, shoulder: int, *, arm: Array, upper: Array) -> Array:
+    """(frames, 3) where the elbow stands out from the arm; of a nearly straight one, behind the plane it bends in."""
+    line = arm / np.maximum(np.linalg.norm(arm, axis=-1, keepdims=True), 1e-9)
+    out = upper - (upper * line).sum(-1, keepdims=True) * line
+    driver = body.drivers[shoulder]
+    assert driver is not None
+    behind = -rot.rotate(rot.multiply(world[:, driver], body.frames[shoulder]), np.eye(3)[1])
+    lack = (0.03 * _arm(body) - np.linalg.norm(out, axis=-1, keepdims=True)).clip(0)
+    return out + lack * behind
+
+
+def _arm(body: Body) -> float:
+    """Metres of upper arm and forearm, mean of both sides."""
+    return sum(body.bone(j) for j in (16, 17, 18, 19)) / 2
