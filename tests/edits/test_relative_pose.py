@@ -13,7 +13,7 @@ from motionloom.edits.relative_pose import Places, relative_pose_guidance
 from motionloom.features import pair as two
 from motionloom.features.pair import PUBLISHED_CODE
 from motionloom.nets.pair import PairNet, join
-from motionloom.tasks.pair import PairEdits, generate_pair, known_state, pair_draw, pair_features
+from motionloom.tasks.pair import PairEdits, generate_pair, known_state, pair_features, pair_noise
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from tests.nets import tiny
@@ -147,7 +147,7 @@ def test_no_more_than_sixty_frames_are_shown() -> None:
 def test_what_places_are_asked_with_is_not_what_the_duet_begins_as() -> None:
     noise = Places.of([1, 2], 200, [0], [False] * 2).noise
     assert noise.shape == (10, 4)
-    assert not torch.isin(noise, pair_draw([1, 2])(torch.zeros(2, 201, 263))).any()
+    assert not torch.isin(noise, pair_noise([1, 2])(torch.zeros(2, 201, 263))).any()
 
 
 def test_exchanged_people_stay_together_exchanged(prior: Prior, block: PairBlock) -> None:

@@ -8,7 +8,7 @@ import warnings
 from .bases import Basis, Dct, Frames
 from .constraints import Constraint, chain, handshake, observe
 from .denoisers import Denoiser, Weight, blend, from_noise, guide, inpaint, join_rows, mix
-from .sampling import Snapshot, masked_draw, restart, row_draw, row_seed, run, sample
+from .sampling import Snapshot, masked_noise, restart, row_noise, row_seed, run, sample
 from .schedule import (
     SCHEDULES,
     SPACINGS,
@@ -57,11 +57,11 @@ __all__ = [
     "join_rows",
     "levels",
     "linear",
-    "masked_draw",
+    "masked_noise",
     "mix",
     "observe",
     "restart",
-    "row_draw",
+    "row_noise",
     "row_seed",
     "run",
     "sample",
@@ -70,10 +70,12 @@ __all__ = [
     "staggered",
 ]
 
+_OLD = {"Draw": "NoiseSource", "Guess": "RowsDenoiser", "row_draw": "row_noise", "masked_draw": "masked_noise"}
+
 
 def __getattr__(name: str) -> object:
-    """Types under the names that they had, for one release."""
-    new = {"Draw": "NoiseSource", "Guess": "RowsDenoiser"}.get(name)
+    """What is found under its old name, for one release."""
+    new = _OLD.get(name)
     if new is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     warnings.warn(f"{name} is {new} now; the old name goes with the next release", FutureWarning, stacklevel=2)

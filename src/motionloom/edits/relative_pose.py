@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom.diffusion import row_draw, row_seed
+from motionloom.diffusion import row_noise, row_seed
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
 from motionloom.nets.pair import PLACE, PairNet, join, part
@@ -95,7 +95,7 @@ class Places:
         free = 1.0 - torch.tensor([float(one) for one in given]).view(-1, 2)
         shares = free / free.sum(1, keepdim=True).clamp(min=1.0)
         most = max(len(some) for some in anchors)
-        noise = row_draw([row_seed(seed, 0, 2) for seed in seeds])(torch.zeros(len(seeds), max(most, 1), PLACE))
+        noise = row_noise([row_seed(seed, 0, 2) for seed in seeds])(torch.zeros(len(seeds), max(most, 1), PLACE))
         noise = [noise[2 * i : 2 * i + 2, : len(some)].transpose(0, 1).flatten(0, 1) for i, some in enumerate(anchors)]
         return Places(anchors, spread, shares, torch.cat(noise))
 

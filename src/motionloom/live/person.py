@@ -84,7 +84,7 @@ class Request:
     words: str
     edits: list[Correction]
     turns: list[Correction]
-    """As of `window.Drawer`."""
+    """As of `window.Sampler`."""
     again: int
     """Frames after which to sample again."""
     taken: list[Command]

@@ -15,7 +15,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from motionloom._moved import renamed, say
-from motionloom.diffusion import Denoiser, NoiseSource, row_draw, row_seed
+from motionloom.diffusion import Denoiser, NoiseSource, row_noise, row_seed
 from motionloom.edits.fitting import fit
 from motionloom.edits.relative_pose import relative_pose_guidance
 from motionloom.edits.steering import Correction, corrected_rows, toward
@@ -131,7 +131,7 @@ def pair_features(
 
     silent = not any(prompt.strip() for prompt in prompts)
     how = replace(chosen, batch_size=2 * chosen.batch(PAIRS), guidance=1.0 if silent else chosen.guidance)
-    asked = Rows(prompts, [1 + frames] * rows, seeds, pair_draw)
+    asked = Rows(prompts, [1 + frames] * rows, seeds, pair_noise)
     walk = sample(
         prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress, view=_view(prior, net)
     )  # fmt: skip
@@ -158,9 +158,9 @@ def _view(prior: Prior, net: PairNet) -> View:
     return View(poses, people=2)
 
 
-def pair_draw(seeds: Sequence[int]) -> NoiseSource:
+def pair_noise(seeds: Sequence[int]) -> NoiseSource:
     """Noise of rows' own seeds; a motion gets the noise it has where nobody else is there, the slot before it other."""
-    places, motion = row_draw([row_seed(seed, 0, 1) for seed in seeds]), row_draw(seeds)
+    places, motion = row_noise([row_seed(seed, 0, 1) for seed in seeds]), row_noise(seeds)
     return lambda like: torch.cat([places(like[:, :1]), motion(like[:, 1:])], dim=1)
 
 
