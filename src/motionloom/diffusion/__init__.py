@@ -3,7 +3,7 @@
 Nothing here knows about motion. Read `schedule`, `solvers`, `sampling`, then `denoisers` and `constraints`.
 """
 
-import warnings
+from motionloom._moved import old_names
 
 from .bases import Basis, Dct, Frames
 from .constraints import Constraint, chain, handshake, observe
@@ -70,13 +70,6 @@ __all__ = [
     "staggered",
 ]
 
-_OLD = {"Draw": "NoiseSource", "Guess": "RowsDenoiser", "row_draw": "row_noise", "masked_draw": "masked_noise"}
-
-
-def __getattr__(name: str) -> object:
-    """What is found under its old name, for one release."""
-    new = _OLD.get(name)
-    if new is None:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    warnings.warn(f"{name} is {new} now; the old name goes with the next release", FutureWarning, stacklevel=2)
-    return globals()[new]
+__getattr__ = old_names(
+    __name__, {"Draw": "NoiseSource", "Guess": "RowsDenoiser", "row_draw": "row_noise", "masked_draw": "masked_noise"}
+)
