@@ -117,6 +117,7 @@ def test_a_dry_run_says_how_much_and_writes_nothing(weights: str, capsys: pytest
     "words",
     [
         [], ["jobs.jsonl", "--prompts", "prompts.txt"], ["absent.jsonl"], ["prompts.txt"], ["--prompts", "absent.txt"],
+        ["--prompts", "jobs.jsonl"],
         ["jobs.jsonl", "--variants", "2"], ["--prompts", "prompts.txt", "--variants", "0"],
         ["jobs.jsonl", "--filter", "speedy < 2"], ["jobs.jsonl", "--filter", "open('x')"],
         ["jobs.jsonl", "--shard", "2/2"], ["jobs.jsonl", "--shard-rows", "0"],
