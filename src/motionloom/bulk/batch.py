@@ -99,7 +99,7 @@ def run(
         address = None if where.ray == LOCAL else where.ray
         reports = on_ray(items, work, address=address, workers=where.workers, moved=moved)
     else:
-        reports = alone(items, work, workers=where.workers or _workers(options), moved=moved)
+        reports = alone(items, work, workers=where.workers or processes(options), moved=moved)
     made = 0
     for report in reports:
         made += report.made
@@ -217,7 +217,8 @@ def _found(options: Options) -> Options:
     return replace(options, weights=weights, pair_weights=pair, adapters=adapters, skeleton=whole(options.skeleton))
 
 
-def _workers(options: Options) -> int:
+def processes(options: Options) -> int:
+    """How many processes this machine has room for: one per core, with CUDA one per GPU."""
     return gpus() if options.device == "cuda" else cores()
 
 

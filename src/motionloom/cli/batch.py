@@ -157,19 +157,20 @@ def _where(arguments: argparse.Namespace) -> "Where":
 def _estimate(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", where: "Where") -> None:
     import torch
 
-    from motionloom.bulk.crew import cores
+    from motionloom.bulk.batch import processes
     from motionloom.bulk.estimate import estimate
 
     torch.set_num_threads(1)
-    found = estimate(jobs, options, workers=(where.workers or cores()) * (where.shard or (0, 1))[1])
+    found = estimate(jobs, options, workers=(where.workers or processes(options)) * (where.shard or (0, 1))[1])
     if arguments.json:
         import json
 
         about = vars(found) | {"hours": found.hours, "gigabytes": found.gigabytes}
         print(json.dumps(about, indent=1))
         return
+    on = "processes" if options.device == "cuda" else "cores"
     print(
-        f"{found.rows:,} motions: {_time(found.hours * 3600)} on {found.workers} cores, {found.gigabytes:.3g} GB "
+        f"{found.rows:,} motions: {_time(found.hours * 3600)} on {found.workers} {on}, {found.gigabytes:.3g} GB "
         f"({found.seconds_each:.2f} s and {found.bytes_each / 1000:.0f} kB each, by {found.sampled} of the rows)"
     )
     if found.usable < 1:
