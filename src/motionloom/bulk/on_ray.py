@@ -8,6 +8,7 @@ import importlib
 import logging
 import os
 import re
+import socket
 import sys
 from collections import deque
 from collections.abc import Generator, Iterator
@@ -23,6 +24,8 @@ from motionloom.errors import MotionloomError
 
 PATIENCE = 1.0
 """Seconds between two looks at what is done."""
+ANSWERS = 10.0
+"""Seconds in which a cluster's head must answer."""
 
 
 class Hand:
@@ -82,26 +85,41 @@ def on_ray(
 def _start(address: str | None) -> Any:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing is sent to anybody
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+    os.environ.setdefault("RAY_COLOR_PREFIX", "0")
     try:
         ray = importlib.import_module("ray")
     except ImportError:
         raise MotionloomError("--ray needs Ray: pip install 'motionloom[ray]'") from None
+    address = address or os.environ.get("RAY_ADDRESS")
+    if address is not None:
+        _check_answers(address)
     known = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-    local = address is None and "RAY_ADDRESS" not in os.environ
-    known |= {"PYTHONPATH": search_path()} if local else {}
+    known |= {"PYTHONPATH": search_path()} if address is None else {}
     options: dict[str, Any] = {
         "log_to_driver": False, "logging_level": logging.CRITICAL, "runtime_env": {"env_vars": known},
     }  # fmt: skip
     try:
-        if local:
+        if address is None:
             ray.init(address="local", include_dashboard=False, **options)
         else:
             ray.init(address=address, **options)
     except (ConnectionError, RuntimeError, ValueError, TimeoutError) as error:
-        raise MotionloomError(
-            f"there is no Ray cluster at {address or os.environ.get('RAY_ADDRESS') or 'this machine'} ({_said(error)})"
-        ) from None
+        raise MotionloomError(f"there is no Ray cluster at {address or 'this machine'} ({_said(error)})") from None
     return ray
+
+
+def _check_answers(address: str) -> None:
+    """Raise `MotionloomError` where nobody listens at ``host:port``: Ray itself would try for minutes.
+
+    Other addresses, such as ``auto``, are not looked at.
+    """
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host or not port.isdecimal():
+        return
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=ANSWERS).close()
+    except (OSError, OverflowError) as error:
+        raise MotionloomError(f"there is no Ray cluster at {address} ({error}); see 'ray status' there") from None
 
 
 def _said(error: Exception) -> str:
