@@ -8,7 +8,7 @@ loop, the solvers and one edit of each kind on a problem with a known answer. Ne
 
 import torch
 
-from motionloom.diffusion import Ddim, DpmSolver2M, cosine, inpaint, levels, observe, row_draw, run
+from motionloom.diffusion import Ddim, DpmSolver2M, cosine, inpaint, levels, observe, row_noise, run
 
 POINTS = torch.tensor([-1.0, 3.0])
 schedule = cosine(1000)
@@ -22,20 +22,21 @@ def exact(x: torch.Tensor, level: int) -> torch.Tensor:
     return (logits.softmax(-1) * POINTS).sum(-1).to(x.dtype)
 
 
-draw = row_draw(range(rows))  # each row has its own noise: a row is the same in any batch
-start = draw(torch.empty(rows, 4, 1))  # rows, tokens, features
+noise = row_noise(range(rows))  # each row has its own: a row is the same in any batch
+start = noise(torch.empty(rows, 4, 1))  # rows, tokens, features
 
 solvers = {"DDPM, 100 steps": (Ddim(eta=1.0), 100), "DDIM, 25": (Ddim(), 25), "DPM-Solver++, 10": (DpmSolver2M(), 10)}
 for name, (solver, steps) in solvers.items():
-    x = run(exact, start, levels=levels(schedule, steps), solver=solver, schedule=schedule, draw=row_draw(range(rows)))
+    own = row_noise(range(rows))
+    x = run(exact, start, levels=levels(schedule, steps), solver=solver, schedule=schedule, noise=own)
     away = (x[..., None] - POINTS).abs().amin(-1).max()
     print(f"{name:18s} share of 3: {(x > 1).float().mean():.2f}, furthest from a point: {away:.3f}")
 
 # The two edits. Token 0 is known to be 3; the others are free.
 known, mask = torch.full_like(start, 3.0), torch.zeros_like(start)
 mask[:, 0] = 1
-held = observe(known, mask, schedule, row_draw(range(rows)))
+held = observe(known, mask, schedule, row_noise(range(rows)))
 few = levels(schedule, 25)
-edited = run(inpaint(exact, known, mask), start, levels=few, solver=Ddim(), schedule=schedule, draw=draw)
-state = run(exact, start, levels=few, solver=Ddim(), schedule=schedule, draw=draw, constrain=held)
+edited = run(inpaint(exact, known, mask), start, levels=few, solver=Ddim(), schedule=schedule, noise=noise)
+state = run(exact, start, levels=few, solver=Ddim(), schedule=schedule, noise=noise, constrain=held)
 print(f"token 0 by editing the estimate: {edited[:, 0].mean():.3f}, by editing the state: {state[:, 0].mean():.3f}")

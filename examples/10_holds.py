@@ -11,7 +11,7 @@ from pathlib import Path
 import torch
 
 from motionloom import SMPL22, Goal, Prior, load, save
-from motionloom.diffusion import DDPM, chain, guide, inpaint, levels, observe, row_draw, run
+from motionloom.diffusion import DDPM, chain, guide, inpaint, levels, observe, row_noise, run
 from motionloom.edits.steering import corrected, toward
 from motionloom.features import humanml, layout
 from motionloom.tasks.splice import person_at_20
@@ -28,20 +28,20 @@ past[:, :10] = True
 legs = torch.zeros_like(past)
 legs[..., torch.from_numpy(layout.mask("lower_body"))] = True
 
-# What is wished: the left wrist 1.6 m high after a second and a half.
+# The target: the left wrist 1.6 m high after a second and a half.
 wrist = SMPL22.index("left_wrist")
 goal = Goal.nothing(known.shape[1])
 goal.positions[30, wrist, 1] = 1.6
 goal.asked[30, wrist, 1] = True
 
-draw, way = row_draw([1]), levels(prior.schedule, 12, spacing="early")
+noise, way = row_noise([1]), levels(prior.schedule, 12, spacing="early")
 with torch.inference_mode():
     cond = prior.condition(["a person walks and raises the left hand"])
     free = guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), 2.5)
     denoise = inpaint(corrected(free, [toward(goal, prior)]), known, past | legs)
-    hold = chain(observe(known, past, prior.schedule, draw), observe(known, legs, prior.schedule, draw))
-    start = hold(draw(known), way[0])
-    state = run(denoise, start, levels=way, solver=DDPM, schedule=prior.schedule, draw=draw, constrain=hold)
+    hold = chain(observe(known, past, prior.schedule, noise), observe(known, legs, prior.schedule, noise))
+    start = hold(noise(known), way[0])
+    state = run(denoise, start, levels=way, solver=DDPM, schedule=prior.schedule, noise=noise, constrain=hold)
 
 motion = finish(prior, (state * prior.std + prior.mean)[0])
 save(motion, "held.bvh")

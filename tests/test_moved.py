@@ -44,6 +44,23 @@ def test_values_of_both_names_are_of_one_kind() -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.parametrize(
+    ("module", "old", "new"),
+    [
+        ("motionloom.diffusion", "row_draw", "row_noise"),
+        ("motionloom.features.pair", "told_from", "from_world"),
+        ("motionloom.goals.goal", "Placement", "GroundPose"),
+        ("motionloom.goals.goal", "placement_of", "start_of"),
+    ],
+)
+def test_an_old_name_in_a_module_gives_what_it_became_and_says_so(module: str, old: str, new: str) -> None:
+    found = importlib.import_module(module)
+    with pytest.warns(FutureWarning, match=f"{old} is {new} now"):
+        assert getattr(found, old) is getattr(found, new)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        getattr(found, "nothing")  # noqa: B009
+
+
 def test_no_moved_name_is_taken_anew() -> None:
     """No file of the package answers to a name that is given away."""
     for old, _ in PLACES:

@@ -110,6 +110,18 @@ def renamed(keywords: dict[str, str]) -> Callable[[F], F]:
     return wrap
 
 
+def old_names(module: str, names: dict[str, str]) -> Callable[[str], object]:
+    """The `__getattr__` of a module that gives what is asked for under an old name (old name to new name)."""
+
+    def _getattr(name: str) -> object:
+        if name not in names:
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        say(name, names[name])
+        return getattr(sys.modules[module], names[name])
+
+    return _getattr
+
+
 def say(old: str, new: str, *, above: int = 3) -> None:
     """Warn that an old name is another one now, at the line that many calls up."""
     warnings.warn(f"{old} is {new} now; the old name goes with the next release", FutureWarning, stacklevel=above)

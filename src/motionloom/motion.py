@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
+from motionloom.ground import GroundPose
 from motionloom.skeleton import SMPL22, Skeleton
 
 Array = NDArray[np.float64]
@@ -170,3 +171,8 @@ def heading(positions: np.ndarray) -> Array:
     p = np.asarray(positions, dtype=np.float64)
     across = p[:, _LEFT_HIP] - p[:, _RIGHT_HIP] + p[:, _LEFT_SHOULDER] - p[:, _RIGHT_SHOULDER]
     return np.unwrap(np.arctan2(-across[:, 2], across[:, 0]))
+
+
+def ground_pose(places: np.ndarray) -> GroundPose:
+    """Where a person of places (22, 3) metres is on the ground, and which way they face."""
+    return GroundPose.of(places[0], float(heading(places[None])[0]))

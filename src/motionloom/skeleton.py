@@ -87,6 +87,13 @@ class Skeleton:
             below[p].append(j)
         return tuple(map(tuple, below))
 
+    def ancestors(self, joint: int) -> list[int]:
+        """The joint and everything above it, the root last."""
+        line = [joint]
+        while self.parents[line[-1]] >= 0:
+            line.append(self.parents[line[-1]])
+        return line
+
     def resolve(self, names: Iterable[str]) -> tuple[int, ...]:
         """Joint numbers for a mix of joint and group names, in skeleton order."""
         chosen: set[int] = set()

@@ -230,6 +230,33 @@ def test_a_job_that_grew_keeps_its_shards_and_one_that_shrank_is_refused(weights
         list(batch(rows(8), out, options=asked, where=ONE))
 
 
+def test_the_folder_of_another_job_is_refused_unless_it_is_to_go(weights: str, folder: Path) -> None:
+    asked, out = options(weights, shard_rows=2), folder / "out"
+    others = [{"prompt": "a dog", "seconds": 0.6, "seed": i} for i in range(4)]
+    list(batch(rows(4), out, options=asked, where=ONE))
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    with pytest.raises(MotionloomError, match=r"another job: none of 4 .* --force"):
+        list(batch(others, out, options=asked, where=ONE))
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+    list(batch(others, out, options=asked, where=ONE, force=True))
+    assert {text for text, _ in positions(out)} == {"a dog"}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda found: [{**found[0], "prompt": "a dog"}, *found[1:]],
+        lambda found: [{**row, "seconds": 0.5} for row in found],
+        lambda found: [{"prompt": "a dog", "seconds": 0.6}, *found[:3]],
+    ],
+    ids=["one row", "all lengths", "one before"],
+)
+def test_a_job_that_was_mended_is_the_same_job(weights: str, folder: Path, change: Callable[..., Any]) -> None:
+    asked, out = options(weights, shard_rows=1), folder / "out"
+    list(batch(rows(4), out, options=asked, where=ONE))
+    assert [one.state for one in batch(change(rows(4)), out, options=asked, where=ONE)] == ["made"] * 4
+
+
 @pytest.mark.parametrize(
     "change", [{"format": "mp4"}, {"filter": "obeys"}, {"fps": 0}, {"skeleton": "absent.bvh"}], ids=str
 )

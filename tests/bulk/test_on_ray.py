@@ -37,7 +37,9 @@ def _above(pid: int) -> set[int]:
     return found
 
 
-def test_ray_makes_the_same_motions_although_workers_are_killed(weights: str, folder: Path) -> None:
+def test_ray_makes_the_same_motions_although_workers_are_killed(
+    weights: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     exact = {
         (one.about["text"], one.about["seed"]): one.motion.positions()
         for one in batch(rows(COUNT), options=options(weights))
@@ -55,10 +57,11 @@ def test_ray_makes_the_same_motions_although_workers_are_killed(weights: str, fo
                 kills.append(living[0])
                 os.kill(living[0], signal.SIGKILL)
 
-    killer = Thread(target=kill)
+    killer = Thread(target=kill, daemon=True)
     killer.start()
     found = list(batch(rows(COUNT), out, options=options(weights), where=Where(workers=1, ray=LOCAL)))
     killer.join()
     assert kills
     assert [(one.row, one.state) for one in found] == [(i, "made") for i in range(COUNT)]
     assert apart(positions(out), exact) < 3e-6
+    assert not capsys.readouterr().out  # there are results only, which may be JSON

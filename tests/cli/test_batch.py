@@ -1,7 +1,10 @@
 """batch, as somebody types it, on a tiny prior with random weights."""
 
 import json
+import socket
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -117,6 +120,7 @@ def test_a_dry_run_says_how_much_and_writes_nothing(weights: str, capsys: pytest
     "words",
     [
         [], ["jobs.jsonl", "--prompts", "prompts.txt"], ["absent.jsonl"], ["prompts.txt"], ["--prompts", "absent.txt"],
+        ["--prompts", "jobs.jsonl"],
         ["jobs.jsonl", "--variants", "2"], ["--prompts", "prompts.txt", "--variants", "0"],
         ["jobs.jsonl", "--filter", "speedy < 2"], ["jobs.jsonl", "--filter", "open('x')"],
         ["jobs.jsonl", "--shard", "2/2"], ["jobs.jsonl", "--shard-rows", "0"],
@@ -146,7 +150,7 @@ def test_a_column_that_is_none_is_reported_before_the_work(weights: str, capsys:
 def test_parquet_without_pyarrow_says_what_to_install(
     weights: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     assert command(weights, "jobs.jsonl", "--format", "parquet") == 2
     assert "pip install 'motionloom[parquet]'" in complaint(capsys)
 
@@ -154,6 +158,17 @@ def test_parquet_without_pyarrow_says_what_to_install(
 def test_ray_that_is_not_installed_says_what_to_install(
     weights: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "ray", None)
+    monkeypatch.setitem(sys.modules, "ray", None)
     assert command(weights, "jobs.jsonl", "--ray") == 2
     assert "pip install 'motionloom[ray]'" in complaint(capsys)
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:{port}", "ray://127.0.0.1:{port}", "127.0.0.1:99999999"])
+def test_a_ray_cluster_that_is_not_there_is_missed_at_once(
+    weights: str, address: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "ray", ModuleType("ray"))
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    assert command(weights, "jobs.jsonl", "--ray", address.format(port=port)) == 2
+    assert "there is no Ray cluster at" in complaint(capsys)

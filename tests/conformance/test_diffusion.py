@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from motionloom.diffusion import DDPM, Schedule, cosine, linear, masked_draw
+from motionloom.diffusion import DDPM, Schedule, cosine, linear, masked_noise
 from tests.conformance.runner import KNOWN, MASK, MOTION, NOISE, Case, cases, compare, normal, stream
 
 SCHEDULES = {"cosine": cosine, "linear": linear}
@@ -43,7 +43,7 @@ def test_one_step_of_noising_and_of_sampling_is_the_published_one(case):
 
     if case.config.get("mask") == "soft":
         mask = torch.from_numpy(stream(seed, MASK).random(tuple(shape), dtype=np.float32))
-        draw = masked_draw(draw, mask)
+        draw = masked_noise(draw, mask)
     step, done = DDPM.start(schedule), set()
     for t in case.config["t"]:
         results = {

@@ -40,6 +40,6 @@ def test_blended_guesses_and_whole_runs_are_the_published_ones(recorded):
     sample = controlled(
         denoise, Observed(known, torch.from_numpy(mask(config["mask"])).expand_as(known), noise_free=True),
         levels=range(config["steps"], -1, -1), solver=DDPM, schedule=cosine(config["steps"]),
-        draw=lambda like: to_state(normal(rng, shape)), start=known,
+        noise=lambda like: to_state(normal(rng, shape)), start=known,
     )  # fmt: skip
     compare(recorded, "sample", to_motion(sample))

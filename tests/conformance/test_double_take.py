@@ -48,7 +48,7 @@ def taken(recorded: Case) -> tuple[Takes, int]:
     with torch.inference_mode():
         takes = double_take(
             first, second, x, plan, mode=MODES["published"], way=range(config["steps"], -1, -1), schedule=schedule,
-            draws=(draw, draw), second_take_only=config["second_take_only"],
+            noise=(draw, draw), second_take_only=config["second_take_only"],
         )  # fmt: skip
     return takes, count
 

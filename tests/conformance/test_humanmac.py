@@ -99,7 +99,7 @@ def test_whole_runs_give_the_published_motions(recorded: Case) -> None:
     fixed = Fixed(motion, list(PARTS.values())[int(mode[-1])]) if control else None
     target = Target(motion[:1, -2 * h :], relax=20) if mode == "switch" else None
     state, result = published_completion(
-        from_noise(noise, schedule), motion[:, :h], n, basis=basis, schedule=schedule, draw=draw,
+        from_noise(noise, schedule), motion[:, :h], n, basis=basis, schedule=schedule, noise=draw,
         steps=config["ddim_steps"], padding=padding, complete=config["completion"], fixed=fixed, target=target,
     )  # fmt: skip
     assert len(shapes) == config["noise_draws"]
@@ -219,7 +219,7 @@ def oracle(name: str, case: str) -> tuple[Tensor, Tensor, int]:
     control = case == "control_lower"
     state, result = published_completion(
         lambda x, level: clean, motion[:1, :h] if control else motion[:, :h], 2, basis=basis, schedule=schedule,
-        draw=draw, fixed=Fixed(motion[:1], PARTS["lower"]) if control else None,
+        noise=draw, fixed=Fixed(motion[:1], PARTS["lower"]) if control else None,
         target=Target(motion[:1, -2 * h :]) if case == "switch" else None,
     )  # fmt: skip
     return state, result, calls

@@ -127,6 +127,6 @@ def test_whole_runs_give_the_published_samples(recorded):
         if config["noise_masked"]:
             x = constraints[0](x, level)
         walk = range(level, -1, -1)
-        x = run(denoise, x, levels=walk, solver=DDPM, schedule=schedule, draw=counted, constrain=chain(*constraints))
+        x = run(denoise, x, levels=walk, solver=DDPM, schedule=schedule, noise=counted, constrain=chain(*constraints))
     assert count == config["noise_draws"]
     compare(recorded, "sample", to_motion(x))

@@ -135,7 +135,7 @@ def test_whole_runs_of_two_people_give_the_published_samples(recorded: Case):
     if start is None:
         start = draw(torch.empty(0))
     walk = range(schedule.steps, -1, -1)
-    x = run(told, start, levels=walk, solver=DDPM, schedule=schedule, draw=draw, constrain=chain(*constraints))
+    x = run(told, start, levels=walk, solver=DDPM, schedule=schedule, noise=draw, constrain=chain(*constraints))
     assert count == config["noise_draws"]
     compare(recorded, "person0", person(x, 0))
     compare(recorded, "person1", person(x, 1))

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.fft import dct
 
-from motionloom.diffusion import SCHEDULES, Dct, Frames, cosine, observe, row_draw
+from motionloom.diffusion import SCHEDULES, Dct, Frames, cosine, observe, row_noise
 from tests.diffusion.exact import shared_draw
 
 SCHEDULE = cosine(40)
@@ -100,8 +100,8 @@ def test_knowing_frames_is_equation_7_written_out(level: int, soft: bool) -> Non
 def test_in_the_basis_of_frames_knowing_is_as_without_a_basis() -> None:
     x, known = some(2, 5, 3), some(2, 5, 3, seed=1)
     mask = torch.tensor([True, True, False, False, False])[:, None]
-    plain = observe(known, mask, SCHEDULE, row_draw([1, 2]))(x, 9)
-    framed = observe(known, mask, SCHEDULE, row_draw([1, 2]), basis=Frames(5))(x, 9)
+    plain = observe(known, mask, SCHEDULE, row_noise([1, 2]))(x, 9)
+    framed = observe(known, mask, SCHEDULE, row_noise([1, 2]), basis=Frames(5))(x, 9)
     assert torch.equal(plain, framed)
 
 

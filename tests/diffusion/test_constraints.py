@@ -13,9 +13,9 @@ from motionloom.diffusion import (
     handshake,
     inpaint,
     levels,
-    masked_draw,
+    masked_noise,
     observe,
-    row_draw,
+    row_noise,
     run,
 )
 from tests.diffusion.exact import shared_draw, wavy
@@ -42,22 +42,22 @@ def test_observing_without_noise_is_ancestral_sampling_whose_noise_is_masked():
     start, walk, denoise = some(1, 4, 3, seed=1), range(40, -1, -1), inpaint(wavy, known, mask)
     hold = observe(known, mask, SCHEDULE, torch.zeros_like)
     held, filtered = (
-        run(denoise, hold(start, 40), levels=walk, solver=DDPM, schedule=SCHEDULE, draw=draw, constrain=constrain)
-        for draw, constrain in [(row_draw([1]), hold), (masked_draw(row_draw([1]), mask), None)]
+        run(denoise, hold(start, 40), levels=walk, solver=DDPM, schedule=SCHEDULE, noise=draw, constrain=constrain)
+        for draw, constrain in [(row_noise([1]), hold), (masked_noise(row_noise([1]), mask), None)]
     )
     torch.testing.assert_close(held, filtered, atol=1e-5, rtol=1e-5)
 
 
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_run_that_observes_ends_on_the_known_data(name):
-    known, mask, draw = some(2, 4, 3), torch.tensor([[True], [False], [False], [True]]), row_draw([1, 2])
+    known, mask, draw = some(2, 4, 3), torch.tensor([[True], [False], [False], [True]]), row_noise([1, 2])
     end = run(
         wavy,
         some(2, 4, 3, seed=1),
         levels=levels(SCHEDULE, 8),
         solver=SOLVERS[name],
         schedule=SCHEDULE,
-        draw=draw,
+        noise=draw,
         constrain=observe(known, mask, SCHEDULE, draw),
     )
     assert torch.equal(end[:, [0, 3]], known[:, [0, 3]])

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from motionloom.diffusion import SOLVERS, blend, cosine, from_noise, guide, inpaint, levels, row_draw, run
+from motionloom.diffusion import SOLVERS, blend, cosine, from_noise, guide, inpaint, levels, row_noise, run
 from tests.diffusion.exact import TILTED, shared_draw, wavy
 
 SCHEDULE = cosine(40)
@@ -111,9 +111,9 @@ masks = st.lists(st.booleans(), min_size=24, max_size=24).map(lambda bits: torch
 @settings(deadline=None, max_examples=25)
 @given(mask=masks, name=st.sampled_from(sorted(SOLVERS)), soft=st.booleans())
 def test_a_run_ends_exactly_on_what_is_inpainted(mask, name, soft):
-    known, draw = some(9), row_draw([1, 2, 3])
+    known, draw = some(9), row_noise([1, 2, 3])
     denoise = inpaint(wavy, known, mask.float() if soft else mask)
-    end = run(denoise, some(), levels=levels(SCHEDULE, 6), solver=SOLVERS[name], schedule=SCHEDULE, draw=draw)
+    end = run(denoise, some(), levels=levels(SCHEDULE, 6), solver=SOLVERS[name], schedule=SCHEDULE, noise=draw)
     assert torch.equal(end[mask], known[mask])
 
 

@@ -5,13 +5,14 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from motionloom import diffusion
 from motionloom.diffusion import (
     SOLVERS,
     cosine,
     levels,
-    masked_draw,
+    masked_noise,
     restart,
-    row_draw,
+    row_noise,
     run,
     sample,
 )
@@ -21,9 +22,9 @@ SCHEDULE = cosine(40)
 
 
 def made(seeds, *, name="ddpm", tokens=6, lengths=None):
-    draw = row_draw(seeds, lengths)
+    draw = row_noise(seeds, lengths)
     x = draw(torch.empty(len(seeds), tokens, 3))
-    return run(wavy, x, levels=levels(SCHEDULE, 10), solver=SOLVERS[name], schedule=SCHEDULE, draw=draw)
+    return run(wavy, x, levels=levels(SCHEDULE, 10), solver=SOLVERS[name], schedule=SCHEDULE, noise=draw)
 
 
 @settings(deadline=None, max_examples=25)
@@ -48,7 +49,7 @@ def test_a_row_with_a_length_is_the_same_under_any_padding():
 
 
 def test_row_noise_is_standard_normal_new_in_every_draw_and_different_between_rows():
-    draw = row_draw([0, 1])
+    draw = row_noise([0, 1])
     first, second = (draw(torch.empty(2, 100, 100)) for _ in range(2))
     numbers = torch.stack([first, second]).reshape(4, -1)
     torch.testing.assert_close(torch.cov(numbers), torch.eye(4), atol=0.05, rtol=0)
@@ -56,15 +57,15 @@ def test_row_noise_is_standard_normal_new_in_every_draw_and_different_between_ro
 
 
 def test_row_noise_takes_type_and_shape_of_its_argument():
-    noise = row_draw([3])(torch.empty(1, 2, 3, 4, dtype=torch.float64))
+    noise = row_noise([3])(torch.empty(1, 2, 3, 4, dtype=torch.float64))
     assert (noise.dtype, noise.shape) == (torch.float64, (1, 2, 3, 4))
-    assert torch.equal(noise.float(), row_draw([3])(torch.empty(1, 2, 3, 4)))
+    assert torch.equal(noise.float(), row_noise([3])(torch.empty(1, 2, 3, 4)))
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
 def test_row_noise_is_the_same_on_a_gpu():
-    on_gpu = row_draw([3, 4])(torch.empty(2, 5, 6, device="cuda"))
-    assert torch.equal(on_gpu.cpu(), row_draw([3, 4])(torch.empty(2, 5, 6)))
+    on_gpu = row_noise([3, 4])(torch.empty(2, 5, 6, device="cuda"))
+    assert torch.equal(on_gpu.cpu(), row_noise([3, 4])(torch.empty(2, 5, 6)))
 
 
 def test_the_walk_visits_its_levels_guess_then_move_then_edit():
@@ -85,7 +86,7 @@ def test_the_walk_visits_its_levels_guess_then_move_then_edit():
         levels=[9, 4, 0],
         solver=SOLVERS["ddim"],
         schedule=SCHEDULE,
-        draw=torch.zeros_like,
+        noise=torch.zeros_like,
         constrain=constrain,
     )
     assert events == []
@@ -96,14 +97,14 @@ def test_the_walk_visits_its_levels_guess_then_move_then_edit():
 
 def test_a_walk_of_one_level_is_no_walk():
     x = torch.ones(1, 2, 3)
-    assert run(wavy, x, levels=[7], solver=SOLVERS["dpm2m"], schedule=SCHEDULE, draw=torch.zeros_like) is x
+    assert run(wavy, x, levels=[7], solver=SOLVERS["dpm2m"], schedule=SCHEDULE, noise=torch.zeros_like) is x
 
 
 @pytest.mark.parametrize("walk", [[], [3, 3], [1, 2], [41, 0], [3, -1]])
 def test_levels_that_do_not_fall_or_do_not_exist_are_refused_before_anything_runs(walk):
     with pytest.raises(ValueError, match="level"):
         sample(
-            wavy, torch.zeros(1, 1, 1), levels=walk, solver=SOLVERS["ddpm"], schedule=SCHEDULE, draw=torch.zeros_like
+            wavy, torch.zeros(1, 1, 1), levels=walk, solver=SOLVERS["ddpm"], schedule=SCHEDULE, noise=torch.zeros_like
         )
 
 
@@ -111,32 +112,46 @@ def test_a_run_changes_none_of_its_arguments_and_keeps_their_type():
     x = shared_draw(0)(torch.empty(2, 3, 4, dtype=torch.float32))
     before, walk = x.clone(), levels(SCHEDULE, 5)
     for solver in SOLVERS.values():
-        end = run(wavy, x, levels=walk, solver=solver, schedule=SCHEDULE, draw=row_draw([0, 1]))
+        end = run(wavy, x, levels=walk, solver=solver, schedule=SCHEDULE, noise=row_noise([0, 1]))
         assert end.dtype == torch.float32
         assert torch.equal(x, before)
 
 
 def test_a_restart_keeps_what_the_level_leaves_of_the_data():
     clean = torch.full((1, 200, 200), 3.0)
-    noisy = restart(clean, SCHEDULE, 12, row_draw([5]))
+    noisy = restart(clean, SCHEDULE, 12, row_noise([5]))
     signal, noise = SCHEDULE.at(12)
     assert noisy.mean().item() == pytest.approx(3 * signal, abs=0.02)
     assert noisy.std().item() == pytest.approx(noise, abs=0.02)
-    assert torch.equal(restart(clean, SCHEDULE, 0, row_draw([5])), clean)
+    assert torch.equal(restart(clean, SCHEDULE, 0, row_noise([5])), clean)
 
 
-def test_a_masked_draw_is_silent_where_the_mask_holds():
+def test_masked_noise_is_zero_where_the_mask_holds():
     mask = torch.tensor([True, False])
-    noise, plain = (draw(torch.empty(1, 3, 2)) for draw in (masked_draw(row_draw([1]), mask), row_draw([1])))
+    noise, plain = (draw(torch.empty(1, 3, 2)) for draw in (masked_noise(row_noise([1]), mask), row_noise([1])))
     assert torch.equal(noise[..., 0], torch.zeros(1, 3))
     assert torch.equal(noise[..., 1], plain[..., 1])
 
 
 @pytest.mark.parametrize(
     "mistake",
-    [lambda: row_draw([1, 2])(torch.empty(3, 1, 1)), lambda: row_draw([1, 2], [4])],
+    [lambda: row_noise([1, 2])(torch.empty(3, 1, 1)), lambda: row_noise([1, 2], [4])],
     ids=["rows", "lengths"],
 )
 def test_seeds_that_do_not_fit_the_rows_are_refused(mistake):
     with pytest.raises(ValueError, match="seeds"):
         mistake()
+
+
+def test_noise_under_its_old_names_is_the_same_and_says_the_new_ones():
+    with pytest.warns(FutureWarning, match="row_draw is row_noise now"):
+        draw = diffusion.row_draw([3])
+    x = row_noise([3])(torch.empty(1, 2, 3))
+    draw(x)
+    with pytest.warns(FutureWarning, match="draw= is noise= now"):
+        old = run(wavy, x, levels=levels(SCHEDULE, 4), solver=SOLVERS["ddpm"], schedule=SCHEDULE, draw=draw)
+    noise = row_noise([3])
+    noise(x)
+    assert torch.equal(
+        old, run(wavy, x, levels=levels(SCHEDULE, 4), solver=SOLVERS["ddpm"], schedule=SCHEDULE, noise=noise)
+    )

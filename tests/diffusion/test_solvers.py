@@ -23,7 +23,7 @@ def walk_with(scheduler, x, denoise, noises, **options):
 
 def ours(x, denoise, walk, solver, schedule, noises):
     supply = iter(noises)
-    return run(denoise, x, levels=walk, solver=solver, schedule=schedule, draw=lambda like: next(supply))
+    return run(denoise, x, levels=walk, solver=solver, schedule=schedule, noise=lambda like: next(supply))
 
 
 def noises_of(count, shape, seed=3):
@@ -68,7 +68,7 @@ def test_ancestral_sampling_agrees_with_diffusers(schedule):
     for t in range(schedule.steps - 1, -1, -1):
         x = scheduler.step(wavy(x, t + 1), t, x, generator=generator).prev_sample
     walk = range(schedule.steps, -1, -1)
-    mine = run(wavy, start, levels=walk, solver=DDPM, schedule=schedule, draw=shared_draw(7))
+    mine = run(wavy, start, levels=walk, solver=DDPM, schedule=schedule, noise=shared_draw(7))
     torch.testing.assert_close(mine, x, atol=1e-9, rtol=1e-9)
 
 
@@ -121,7 +121,7 @@ def flow_error(solver, moves):
     goals = [ratios[top] + (ratios[low] - ratios[top]) * i / moves for i in range(moves + 1)]
     walk = [min(range(low, top + 1), key=lambda level: abs(ratios[level] - goal)) for goal in goals]
     x = shared_draw(1)(torch.empty(50, 1, 2, dtype=torch.float64))
-    end = run(TILTED.denoiser(schedule), x, levels=walk, solver=solver, schedule=schedule, draw=torch.zeros_like)
+    end = run(TILTED.denoiser(schedule), x, levels=walk, solver=solver, schedule=schedule, noise=torch.zeros_like)
     return (end - TILTED.flow(x, schedule, top, low)).abs().max().item()
 
 
@@ -149,7 +149,7 @@ def test_normal_data_comes_out_with_its_mean_and_covariance(name, steps, spacing
     data = Gaussian(TILTED.mean, TILTED.covariance * scale)
     x = draw(torch.empty(rows, 1, 2, dtype=torch.float64))
     walk = levels(schedule, steps, spacing=spacing)
-    made = run(data.denoiser(schedule), x, levels=walk, solver=SOLVERS[name], schedule=schedule, draw=draw)
+    made = run(data.denoiser(schedule), x, levels=walk, solver=SOLVERS[name], schedule=schedule, noise=draw)
     made, spread = made.reshape(rows, 2), data.covariance.max().item()
     torch.testing.assert_close(made.mean(0), data.mean, atol=tolerance * spread**0.5, rtol=0)
     torch.testing.assert_close(torch.cov(made.T), data.covariance, atol=tolerance * spread, rtol=0)
@@ -161,7 +161,7 @@ def test_a_finite_data_set_comes_back_as_itself(name):
     schedule, draw = cosine(200), shared_draw(2)
     x = draw(torch.empty(3000, 1, 2, dtype=torch.float64))
     walk = levels(schedule, 200 if name == "ddpm" else 50)
-    made = run(points(data, schedule), x, levels=walk, solver=SOLVERS[name], schedule=schedule, draw=draw)
+    made = run(points(data, schedule), x, levels=walk, solver=SOLVERS[name], schedule=schedule, noise=draw)
     distance = torch.cdist(made.reshape(-1, 2), data)
     nearest, which = distance.min(dim=1)
     assert (nearest < 0.05).double().mean() > 0.99
@@ -175,7 +175,7 @@ def test_runs_that_share_a_solver_do_not_meet(name):
     walk = levels(schedule, 6)
 
     def alone(state):
-        return run(wavy, state, levels=walk, solver=solver, schedule=schedule, draw=lambda like: noise)
+        return run(wavy, state, levels=walk, solver=solver, schedule=schedule, noise=lambda like: noise)
 
     steps, states = [solver.start(schedule), solver.start(schedule)], [x, y]
     for t, s in pairwise(walk):
@@ -194,7 +194,7 @@ def test_deterministic_solvers_never_draw_and_others_draw_in_every_step():
             levels=levels(schedule, 6),
             solver=solver,
             schedule=schedule,
-            draw=lambda like, asked=asked: asked.append(1) or torch.zeros_like(like),
+            noise=lambda like, asked=asked: asked.append(1) or torch.zeros_like(like),
         )
         counts[name] = len(asked)
     assert counts == {"ddpm": 6, "ddim": 0, "dpm2m": 0, "dpm2m-sde": 6}

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from motionloom.diffusion import SOLVERS, Link, RowsDenoiser, cosine, handshake, levels, row_draw, run, staggered
+from motionloom.diffusion import SOLVERS, Link, RowsDenoiser, cosine, handshake, levels, row_noise, run, staggered
 
 SCHEDULE, FEATURES = cosine(40), 3
 KINDS = ["ddpm", "ddim", "dpm2m"]
@@ -36,7 +36,7 @@ def walk(links, *, denoise: RowsDenoiser = alone, kind: str = "ddpm", steps: int
         solver=SOLVERS[kind],
         schedule=SCHEDULE,
         features=FEATURES,
-        together=together,
+        batch_size=together,
         **more,
     )
 
@@ -45,7 +45,7 @@ def walk(links, *, denoise: RowsDenoiser = alone, kind: str = "ddpm", steps: int
 def test_it_is_one_batch_with_handshakes_and_shared_noise(kind: str) -> None:
     """Four equal rows; the batch's noise is that of the rows alone, then copied from each row's end to the next."""
     rows, length, overlap = 4, 11, 4
-    own = row_draw(range(rows))
+    own = row_noise(range(rows))
 
     def draw(like: Tensor) -> Tensor:
         noise = own(like)
@@ -63,7 +63,7 @@ def test_it_is_one_batch_with_handshakes_and_shared_noise(kind: str) -> None:
         levels=levels(SCHEDULE, 6),
         solver=SOLVERS[kind],
         schedule=SCHEDULE,
-        draw=draw,
+        noise=draw,
         constrain=handshake([length] * rows, overlap),
     )
     for together in (2, rows):
@@ -73,10 +73,10 @@ def test_it_is_one_batch_with_handshakes_and_shared_noise(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_row_is_plain_sampling(kind: str) -> None:
-    draw = row_draw([7])
+    draw = row_noise([7])
     expected = run(
         near, draw(torch.empty(1, 9, FEATURES)), levels=levels(SCHEDULE, 5), solver=SOLVERS[kind],
-        schedule=SCHEDULE, draw=draw,
+        schedule=SCHEDULE, noise=draw,
     )  # fmt: skip
     denoise: RowsDenoiser = lambda numbers, states, at: [near(states[0][None], at[0])[0]]  # noqa: E731
     made = list(walk([Link(9, 400, 7)], denoise=denoise, kind=kind, steps=5))
@@ -186,7 +186,7 @@ def test_a_walk_that_would_never_end_is_refused(way: list[int], together: int) -
     with pytest.raises(ValueError, match="a walk needs falling levels"):
         staggered(
             repeat(Link(6, 2, 1)), alone, levels=way, solver=SOLVERS["ddpm"], schedule=SCHEDULE, features=FEATURES,
-            together=together,
+            batch_size=together,
         )  # fmt: skip
 
 

@@ -10,7 +10,8 @@ from motionloom import rotations as rot
 from motionloom.edits import fitting
 from motionloom.edits.fitting import ROUND, fit
 from motionloom.errors import MotionloomError
-from motionloom.goals.goal import Goal, Placement
+from motionloom.goals.goal import Goal
+from motionloom.ground import GroundPose
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
@@ -83,7 +84,7 @@ def test_keyframes_are_met_smoothly_and_frames_far_away_stay_exactly() -> None:
 
 def test_a_quarter_turned_world_gives_the_quarter_turned_motion() -> None:
     motion = standing(60)
-    place = Placement(2.0, -1.0, np.pi / 2)
+    place = GroundPose(2.0, -1.0, np.pi / 2)
     goal = asked(motion, WRIST, [30], motion.positions()[30, WRIST] + [0.1, 0.2, 0.0])
     turn = rot.rotvec_to_quat(np.array([0.0, np.pi / 2, 0.0]))
     rotations = motion.rotations.copy()

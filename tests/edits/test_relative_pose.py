@@ -12,8 +12,9 @@ from motionloom.edits import relative_pose as duet_places
 from motionloom.edits.relative_pose import Places, relative_pose_guidance
 from motionloom.features import pair as two
 from motionloom.features.pair import PUBLISHED_CODE
+from motionloom.ground import relative
 from motionloom.nets.pair import PairNet, join
-from motionloom.tasks.pair import PairEdits, generate_pair, known_state, pair_draw, pair_features
+from motionloom.tasks.pair import PairEdits, generate_pair, known_state, pair_features, pair_noise
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from tests.nets import tiny
@@ -73,10 +74,10 @@ def led(prior: Prior, block: PairBlock, places: Places, weight: float = 1.0) -> 
 @pytest.mark.parametrize("weight", [1.0, 0.0], ids=["led", "free"])
 def test_a_drift_is_gone_at_the_anchors(prior: Prior, block: PairBlock, weight: float) -> None:
     before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2), weight)
-    expected = two.seen(BESIDE[0], BESIDE[1])
+    expected = relative(BESIDE[0], BESIDE[1])
     for knot in (40, 80):
-        away = (two.seen(before[0, knot], before[1, knot]) - expected).abs().max()
-        error = (two.seen(after[0, knot], after[1, knot]) - expected).abs().max()
+        away = (relative(before[0, knot], before[1, knot]) - expected).abs().max()
+        error = (relative(after[0, knot], after[1, knot]) - expected).abs().max()
         assert away > 0.3
         assert (error < 1e-4) if weight else (error - away).abs() < 1e-4
     torch.testing.assert_close(after[:, 0], before[:, 0])
@@ -91,7 +92,10 @@ def test_half_led_is_half_of_the_way(prior: Prior, block: PairBlock) -> None:
     torch.testing.assert_close(way[1], (way[0] + way[2]) / 2, rtol=0, atol=1e-4)
     for person in (0, 1):
         torch.testing.assert_close(
-            two.seen(free[person], half[person])[:, :2], two.seen(half[person], whole[person])[:, :2], rtol=0, atol=1e-4
+            relative(free[person], half[person])[:, :2],
+            relative(half[person], whole[person])[:, :2],
+            rtol=0,
+            atol=1e-4,
         )
 
 
@@ -100,7 +104,7 @@ def test_each_goes_half_of_the_way(prior: Prior, block: PairBlock) -> None:
     moved = (after - before)[..., 2:]
     assert moved.abs().max() > 0.2
     torch.testing.assert_close(moved[0], -moved[1], rtol=0, atol=1e-4)
-    turned = [two.seen(before[i], after[i])[:, 1] for i in (0, 1)]
+    turned = [relative(before[i], after[i])[:, 1] for i in (0, 1)]
     assert turned[0].abs().max() > 0.2
     torch.testing.assert_close(turned[0], -turned[1], rtol=0, atol=1e-4)
 
@@ -109,15 +113,15 @@ def test_each_goes_half_of_the_way(prior: Prior, block: PairBlock) -> None:
 def test_nobody_given_is_moved_and_the_other_goes_the_whole_way(prior: Prior, block: PairBlock, given: int) -> None:
     before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [given == 0, given == 1]))
     torch.testing.assert_close(after[given], before[given], rtol=0, atol=1e-5)
-    expected = two.seen(BESIDE[0], BESIDE[1])
-    torch.testing.assert_close(two.seen(after[0, 80], after[1, 80])[:2], expected[:2], rtol=0, atol=1e-4)
+    expected = relative(BESIDE[0], BESIDE[1])
+    torch.testing.assert_close(relative(after[0, 80], after[1, 80])[:2], expected[:2], rtol=0, atol=1e-4)
     assert (after[1 - given] - before[1 - given])[80, 2:].norm() > 0.3
 
 
 def test_frames_before_the_beginning_stay(prior: Prior, block: PairBlock) -> None:
     before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [30], [False] * 2))
     torch.testing.assert_close(after[:, :31], before[:, :31], rtol=0, atol=1e-4)
-    torch.testing.assert_close(two.seen(after[0, 80], after[1, 80]), two.seen(BESIDE[0], BESIDE[1]), rtol=0, atol=1e-4)
+    torch.testing.assert_close(relative(after[0, 80], after[1, 80]), relative(BESIDE[0], BESIDE[1]), rtol=0, atol=1e-4)
 
 
 def test_the_network_is_shown_crops_that_begin_at_the_anchors(prior: Prior, block: PairBlock) -> None:
@@ -147,7 +151,7 @@ def test_no_more_than_sixty_frames_are_shown() -> None:
 def test_what_places_are_asked_with_is_not_what_the_duet_begins_as() -> None:
     noise = Places.of([1, 2], 200, [0], [False] * 2).noise
     assert noise.shape == (10, 4)
-    assert not torch.isin(noise, pair_draw([1, 2])(torch.zeros(2, 201, 263))).any()
+    assert not torch.isin(noise, pair_noise([1, 2])(torch.zeros(2, 201, 263))).any()
 
 
 def test_exchanged_people_stay_together_exchanged(prior: Prior, block: PairBlock) -> None:
@@ -209,7 +213,7 @@ def test_every_question_is_of_its_own_pair_at_its_own_level_and_given_the_noised
         length, own = min(60, FRAMES - frame), int(level[row])
         torch.testing.assert_close(told.state[number, 1 : 1 + length], state[row, 1 + frame : 1 + frame + length])
         assert torch.equal(told.bound.text[number], bound.text[row])
-        there = two.seen(ways[row % 2, frame], ways[1 - row % 2, frame])  # the other, as seen from there
+        there = relative(ways[row % 2, frame], ways[1 - row % 2, frame])  # the other, as seen from there
         signal, noise = prior.schedule.at(own)
         torch.testing.assert_close(told.state[number, 0, :4], signal * there + noise * places.noise[number])
     # what is asked of the one pair changes nothing of the other

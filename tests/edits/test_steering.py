@@ -9,7 +9,8 @@ from torch import Tensor
 
 from motionloom.edits.steering import Correction, corrected, toward
 from motionloom.features import humanml
-from motionloom.goals.goal import Goal, Placement
+from motionloom.goals.goal import Goal
+from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import heading
 from motionloom.skeleton import SMPL22
 from motionloom.weights.prior import Prior
@@ -42,7 +43,7 @@ def decoded(row: Tensor, prior: Prior, first: int = 0) -> np.ndarray:
     places = humanml.decode_positions(features)
     turn, root = humanml.recover_root(features)
     facing = -2 * np.arctan2(turn[first, 2], turn[first, 0])
-    return Placement(float(root[first, 0]), float(root[first, 2]), float(facing)).from_world(places)
+    return GroundPose(float(root[first, 0]), float(root[first, 2]), float(facing)).from_world(places)
 
 
 def asking(frames: int, joint: int, at: dict[int, tuple[float, float, float]]) -> Goal:

@@ -37,15 +37,15 @@ def by_matrix(stands: np.ndarray) -> np.ndarray:
 @given(stand, stand)
 def test_stands_compose_as_rigid_motions_do(a, b):
     np.testing.assert_allclose(by_matrix(pair.compose(a, b)), by_matrix(a) @ by_matrix(b), atol=1e-9)
-    np.testing.assert_allclose(by_matrix(pair.seen(a, b)), np.linalg.inv(by_matrix(a)) @ by_matrix(b), atol=1e-9)
+    np.testing.assert_allclose(by_matrix(pair.relative(a, b)), np.linalg.inv(by_matrix(a)) @ by_matrix(b), atol=1e-9)
     point = np.array([0.4, 1.3, -0.9])
-    np.testing.assert_allclose(pair.put(point, a), (by_matrix(a) @ [*point, 1.0])[:3], atol=1e-9)
-    np.testing.assert_allclose(pair.told_from(pair.put(point, a), a), point, atol=1e-9)
+    np.testing.assert_allclose(pair.to_world(point, a), (by_matrix(a) @ [*point, 1.0])[:3], atol=1e-9)
+    np.testing.assert_allclose(pair.from_world(pair.to_world(point, a), a), point, atol=1e-9)
 
 
 def test_a_stand_faces_where_it_says():
     left = np.array([0.0, 1.0, 2.0, 3.0])  # facing +X
-    np.testing.assert_allclose(pair.put(np.array([0.0, 1.5, 1.0]), left), [3.0, 1.5, 3.0], atol=1e-12)
+    np.testing.assert_allclose(pair.to_world(np.array([0.0, 1.5, 1.0]), left), [3.0, 1.5, 3.0], atol=1e-12)
 
 
 def test_two_people_come_back_to_a_hundredth_of_a_millimetre():
@@ -109,7 +109,7 @@ def test_mirrored_stands_belong_to_mirrored_features():
 def test_numbers_tell_how_two_people_stand_to_each_other(a, b, code):
     stands = np.stack([a, b])
     back = code.decode(code.encode(stands))
-    np.testing.assert_allclose(pair.seen(back[0], back[1]), pair.seen(a, b), atol=1e-7)
+    np.testing.assert_allclose(pair.relative(back[0], back[1]), pair.relative(a, b), atol=1e-7)
 
 
 @settings(max_examples=20, deadline=None)
@@ -125,7 +125,7 @@ def test_guessed_numbers_of_exchanged_people_put_them_to_each_other_as_before():
     guessed = rng.normal(size=(20, 2, 4))
     code = PlaceCode()
     one, two = code.decode(guessed), code.decode(guessed[:, ::-1])
-    there, back = pair.seen(one[:, 0], one[:, 1]), pair.seen(two[:, 1], two[:, 0])
+    there, back = pair.relative(one[:, 0], one[:, 1]), pair.relative(two[:, 1], two[:, 0])
     np.testing.assert_allclose(back, there, atol=1e-9)
 
 
@@ -139,14 +139,14 @@ def test_published_numbers_are_the_entries_of_the_nine():
 
 def test_the_published_drawing_is_right_where_the_first_person_faces_ahead_and_only_there():
     ahead = np.array([[1.0, 0.0, 1.0, 2.0], [0.0, 1.0, -1.0, 4.0]])
-    right = pair.seen(ahead[:1], ahead)
+    right = pair.relative(ahead[:1], ahead)
     np.testing.assert_allclose(pair.as_published(ahead), right, atol=1e-12)
     turned = pair.compose(np.array([0.0, 1.0, 0.0, 0.0])[None], ahead)
     assert np.abs(pair.as_published(turned) - right).max() > 1
     r0, r1 = (by_matrix(s)[:3, :3].T for s in turned)  # world to person
     point = np.array([0.3, 1.0, 0.2])
     expected = r0 @ r1.T @ point + [turned[1, 2] - turned[0, 2], 0, turned[1, 3] - turned[0, 3]]
-    np.testing.assert_allclose(pair.put(point, pair.as_published(turned)[1]), expected, atol=1e-12)
+    np.testing.assert_allclose(pair.to_world(point, pair.as_published(turned)[1]), expected, atol=1e-12)
 
 
 def test_tensors_and_arrays_agree():
@@ -162,8 +162,8 @@ def test_tensors_and_arrays_agree():
 
 def test_no_direction_at_all_is_ahead():
     nothing = np.array([0.0, 0.0, 1.0, 2.0])
-    np.testing.assert_array_equal(pair.upright(nothing), [1.0, 0.0, 1.0, 2.0])
-    np.testing.assert_array_equal(pair.upright(torch.from_numpy(nothing)).numpy(), [1.0, 0.0, 1.0, 2.0])
+    np.testing.assert_array_equal(pair.normalized(nothing), [1.0, 0.0, 1.0, 2.0])
+    np.testing.assert_array_equal(pair.normalized(torch.from_numpy(nothing)).numpy(), [1.0, 0.0, 1.0, 2.0])
 
 
 @pytest.mark.parametrize("shape", [(1, 9, 22, 3), (2, 1, 22, 3), (2, 9, 21, 3), (9, 22, 3)], ids=str)

@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 from motionloom.errors import MotionloomError
 from motionloom.goals.goal import (
     Goal,
-    Placement,
-    body_facing,
     joined,
     merged,
     overlaid,
-    placement_of,
+    start_of,
     turn_between,
 )
+from motionloom.ground import GroundPose
+from motionloom.motion import ground_pose
 from motionloom.skeleton import SMPL22
 
-PLACES = st.builds(Placement, *[st.floats(-50, 50)] * 2, st.floats(-7, 7))
+PLACES = st.builds(GroundPose, *[st.floats(-50, 50)] * 2, st.floats(-7, 7))
 
 
 def asking(frame: int, joint: str, place: list[float], frames: int = 10) -> Goal:
@@ -38,20 +38,20 @@ def facing(frame: int, angle: float, frames: int = 10) -> Goal:
 
 def test_a_quarter_turn_sends_forward_to_the_left() -> None:
     """+Z becomes +X, +X becomes -Z, and the height stays."""
-    quarter = Placement(1.0, 2.0, np.pi / 2)
+    quarter = GroundPose(1.0, 2.0, np.pi / 2)
     assert np.allclose(quarter.to_world([[0, 5, 1], [1, 0, 0]]), [[2, 5, 2], [1, 0, 1]])
 
 
 @given(PLACES, st.lists(st.floats(-9, 9), min_size=3, max_size=3))
-def test_to_the_world_and_back_is_nothing(place: Placement, point: list[float]) -> None:
+def test_to_the_world_and_back_is_nothing(place: GroundPose, point: list[float]) -> None:
     assert np.allclose(place.from_world(place.to_world(point)), point, atol=1e-9)
     assert np.allclose(place.to_world(place.from_world(point)), point, atol=1e-9)
 
 
 @given(PLACES, PLACES)
-def test_a_goal_seen_from_two_places_is_the_same_goal(first: Placement, second: Placement) -> None:
+def test_a_goal_seen_from_two_places_is_the_same_goal(first: GroundPose, second: GroundPose) -> None:
     """Seen from the second as the first sees it, it is what the second sees."""
-    goal = replace(merged(asking(3, "head", [1, 2, 3]), facing(3, 0.5)), start=Placement(1, 2, 0.25))
+    goal = replace(merged(asking(3, "head", [1, 2, 3]), facing(3, 0.5)), start=GroundPose(1, 2, 0.25))
     here = goal.seen_from(first).seen_from(second.seen_from(first))
     there = goal.seen_from(second)
     assert np.allclose(here.positions[goal.asked], there.positions[goal.asked], atol=1e-8)
@@ -64,13 +64,13 @@ def test_a_goal_seen_from_two_places_is_the_same_goal(first: Placement, second: 
 def test_one_horizontal_coordinate_cannot_be_turned() -> None:
     goal = asking(0, "head", [1, 2, 3])
     goal.asked[0, 15, 0] = False
-    assert goal.seen_from(Placement(1, 1, 0.0)).positions[0, 15, 1] == 2
+    assert goal.seen_from(GroundPose(1, 1, 0.0)).positions[0, 15, 1] == 2
     with pytest.raises(MotionloomError, match="only one of x and z"):
-        goal.seen_from(Placement(0, 0, 1.0))
+        goal.seen_from(GroundPose(0, 0, 1.0))
 
 
 def test_parts_of_a_goal_keep_their_frames() -> None:
-    goal = replace(asking(3, "head", [1, 2, 3]), start=Placement(1, 0, 0))
+    goal = replace(asking(3, "head", [1, 2, 3]), start=GroundPose(1, 0, 0))
     assert goal.crop(2, 5).asked[1, 15].all()
     assert goal.crop(2, 5).start is None
     assert goal.crop(0, 5).start == goal.start
@@ -94,13 +94,13 @@ def test_both_targets_are_in_merged_goals() -> None:
     [
         (asking(3, "head", [1, 2.02, 3]), "head at 0.15 s .* 0.02 m apart"),
         (facing(3, 0.3), "at 0.15 s .* 17 degrees apart"),
-        (replace(Goal.nothing(10), start=Placement(0, 1, 0)), "start in two places 1.00 m and 0 degrees"),
+        (replace(Goal.nothing(10), start=GroundPose(0, 1, 0)), "start in two places 1.00 m and 0 degrees"),
         (Goal.nothing(9), "10 and 9 frames"),
     ],
     ids=["place", "facing", "start", "length"],
 )
 def test_contradictions_are_reported(second: Goal, said: str) -> None:
-    first = replace(merged(asking(3, "head", [1, 2, 3]), facing(3, 0)), start=Placement())
+    first = replace(merged(asking(3, "head", [1, 2, 3]), facing(3, 0)), start=GroundPose())
     with pytest.raises(MotionloomError, match=said):
         merged(first, second)
 
@@ -117,17 +117,17 @@ def test_the_place_of_a_goal() -> None:
     path.positions[:, 0, 0] = 3 + np.arange(10) * 0.04
     path.positions[:, 0, 2] = -1 - np.arange(10) * 0.04
     path.asked[:, 0, ::2] = True
-    assert placement_of(path) == Placement(3, -1, pytest.approx(3 * np.pi / 4))
-    assert placement_of(merged(path, facing(0, 1.0))) == Placement(3, -1, 1.0)
-    assert placement_of(replace(path, start=Placement(1, 2, 3))) == Placement(1, 2, 3)
-    assert placement_of(Goal.nothing(4)) == placement_of(path.crop(4, 9).padded(1, 0)) == Placement()
+    assert start_of(path) == GroundPose(3, -1, pytest.approx(3 * np.pi / 4))
+    assert start_of(merged(path, facing(0, 1.0))) == GroundPose(3, -1, 1.0)
+    assert start_of(replace(path, start=GroundPose(1, 2, 3))) == GroundPose(1, 2, 3)
+    assert start_of(Goal.nothing(4)) == start_of(path.crop(4, 9).padded(1, 0)) == GroundPose()
 
 
 @given(PLACES)
-def test_a_whole_pose_says_where_the_person_stands(place: Placement) -> None:
+def test_a_whole_pose_says_where_the_person_stands(place: GroundPose) -> None:
     goal = Goal.nothing(2)
     goal.positions[0], goal.asked[0] = place.to_world(SMPL22.rest_positions()), True
-    found = placement_of(goal)
+    found = start_of(goal)
     assert (found.x, found.z) == pytest.approx((place.x, place.z), abs=1e-9)
     assert abs(turn_between(found.facing, place.facing)) < 1e-3
 
@@ -136,7 +136,7 @@ def test_the_left_side_is_left_of_where_a_body_faces() -> None:
     """Seen from above the left hip and shoulder of somebody who faces +X are at -Z."""
     places = np.zeros((22, 3))
     places[[1, 16], 2], places[[2, 17], 2] = -0.2, 0.2
-    assert body_facing(places) == pytest.approx(np.pi / 2)
+    assert ground_pose(places).facing == pytest.approx(np.pi / 2)
 
 
 def test_goals_of_the_wrong_shape_or_not_finite_are_refused() -> None:
@@ -149,9 +149,9 @@ def test_goals_of_the_wrong_shape_or_not_finite_are_refused() -> None:
 
 def test_joined_goals_are_one_behind_the_other() -> None:
     """Cut anywhere and joined, a goal is itself; the second's start is nobody's."""
-    goal = replace(merged(asking(3, "head", [1, 2, 3]), facing(6, 0.5)), start=Placement(1, 2, 3))
+    goal = replace(merged(asking(3, "head", [1, 2, 3]), facing(6, 0.5)), start=GroundPose(1, 2, 3))
     for cut in range(1, 10):
-        again = joined(goal.crop(0, cut), replace(goal.crop(cut, 10), start=Placement(9, 9, 9)))
+        again = joined(goal.crop(0, cut), replace(goal.crop(cut, 10), start=GroundPose(9, 9, 9)))
         assert np.array_equal(again.positions, goal.positions)
         assert np.array_equal(again.asked, goal.asked)
         assert np.array_equal(again.facing, goal.facing)
@@ -170,23 +170,23 @@ def test_of_overlaid_goals_the_first_one_counts() -> None:
     assert both.positions[3, 15].tolist() == [1, 8, 3]
     assert both.positions[4, 12].tolist() == [4, 5, 6]
     assert (both.facing[2], both.facing[5], both.asked.sum(), both.facing_asked.sum()) == (1.5, 0.25, 6, 2)
-    here, there = (replace(goal, start=Placement(x)) for goal, x in ((first, 1.0), (second, 2.0)))
+    here, there = (replace(goal, start=GroundPose(x)) for goal, x in ((first, 1.0), (second, 2.0)))
     assert [overlaid(*pair).start for pair in ((here, there), (first, there), (here, second))] == [
-        Placement(1.0), Placement(2.0), Placement(1.0),
+        GroundPose(1.0), GroundPose(2.0), GroundPose(1.0),
     ]  # fmt: skip
 
 
 def test_placing_a_goal_turns_and_moves_it() -> None:
     """One ahead of somebody at (5, 7) who faces +X is at (6, 7), and a facing of 0.5 is a quarter turn more."""
-    goal = replace(merged(asking(3, "head", [0, 2, 1]), facing(3, 0.5)), start=Placement(1, 0, 0.25))
-    placed = goal.placed(Placement(5, 7, np.pi / 2))
+    goal = replace(merged(asking(3, "head", [0, 2, 1]), facing(3, 0.5)), start=GroundPose(1, 0, 0.25))
+    placed = goal.placed(GroundPose(5, 7, np.pi / 2))
     assert placed.positions[3, 15] == pytest.approx([6, 2, 7])
     assert placed.facing[3] == pytest.approx(0.5 + np.pi / 2)
-    assert placed.start == Placement(pytest.approx(5), pytest.approx(6), pytest.approx(0.25 + np.pi / 2))
+    assert placed.start == GroundPose(pytest.approx(5), pytest.approx(6), pytest.approx(0.25 + np.pi / 2))
 
 
 @given(PLACES)
-def test_a_goal_placed_and_seen_from_there_is_itself(place: Placement) -> None:
+def test_a_goal_placed_and_seen_from_there_is_itself(place: GroundPose) -> None:
     goal = merged(asking(3, "head", [1, 2, 3]), facing(3, 0.5))
     again = goal.placed(place).seen_from(place)
     assert np.allclose(again.positions[goal.asked], goal.positions[goal.asked], atol=1e-8)

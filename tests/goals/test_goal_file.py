@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from motionloom import io
 from motionloom.errors import MotionloomError
-from motionloom.goals.goal import Goal, Placement, placement_of
+from motionloom.goals.goal import Goal, start_of
 from motionloom.goals.goal_file import SCHEMA, follow, read_goal
+from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.rotations import rotvec_to_quat
@@ -61,7 +62,7 @@ def places(goal: Goal) -> np.ndarray:
 def test_a_path_begins_where_it_says_and_so_does_the_person(read) -> None:
     goal = read(path={"points": [[3, 1], [3, 5]]})
     assert places(goal)[[0, 99]].tolist() == [[3, 1], [3, 5]]
-    assert goal.start == Placement(3, 1, 0)
+    assert goal.start == GroundPose(3, 1, 0)
     goal = read(path={"points": [[3, 1], [1, 1]]}, start={"facing": -90})
     assert (goal.start.x, goal.start.z, goal.start.facing) == pytest.approx((3, 1, -np.pi / 2))
     closed = read(path={"points": [[0, 0], [1, 0], [1, 1]], "closed": True, "smooth": False})
@@ -82,7 +83,7 @@ def test_drawings_and_curves_lie_where_the_person_stands(read) -> None:
     goal = read(path={"svg": "l.svg", "width": 2, "facing": "free"}, start={"position": [5, 1]})
     assert places(goal)[[0, 99]] == pytest.approx(np.array([[5, 1], [7, 5]]))
     assert goal.positions[:67, 0, 0] == pytest.approx(5, abs=0.05)
-    assert goal.start == Placement(5, 1, 0)
+    assert goal.start == GroundPose(5, 1, 0)
     assert places(read(path={"svg": "up.svg", "scale": 0.5}))[99].tolist() == [0, 4]
     assert places(read(path={"svg": "up.svg", "times": [1, 3]}))[60, 1] == pytest.approx(2.4)  # 1.2 m/s
     turned = read(path={"curve": "line", "size": 3}, start={"position": [1, 1], "facing": 90})
@@ -98,7 +99,7 @@ def test_joints_at_times_by_name_and_group(read) -> None:
     assert goal.asked[99, WRIST].tolist() == [False, True, False]
     assert np.flatnonzero(goal.asked[:, WRIST].any(-1)).tolist() == [20, 99]
     assert goal.asked[1].all(axis=-1).nonzero()[0].tolist() == [7, 8, 10, 11]
-    assert placement_of(goal) == Placement()
+    assert start_of(goal) == GroundPose()
 
 
 def test_a_curve_asks_for_every_frame_between_its_points(read) -> None:
@@ -128,7 +129,7 @@ def test_a_pose_stands_where_the_person_does(read) -> None:
     expected = np.stack([-own[:, 2] + own[0, 2] + 1, own[:, 1], own[:, 0] - own[0, 0] + 2], axis=-1)
     assert goal.positions[0] == pytest.approx(expected, abs=2e-3)
     goal = read(poses=[{"time": 0, "from": "walk.bvh", "position": [4, 4], "facing": 90}])
-    assert goal.start == Placement(4, 4, np.pi / 2)
+    assert goal.start == GroundPose(4, 4, np.pi / 2)
     assert goal.positions[0, :, 2] - 4 == pytest.approx(to_smpl22(walker()).positions()[0, :, 2] - 1, abs=2e-3)
     path = {"points": [[0, 0], [4, 0]], "times": [0, 4]}
     goal = read(path=path, poses=[{"time": 2, "from": "walk.bvh"}])
@@ -146,7 +147,7 @@ def test_following_takes_the_places_of_the_other_world(read) -> None:
     assert (goal.start.x, goal.start.z, goal.start.facing) == pytest.approx((2.5, 1, np.pi / 2), abs=2e-3)
     sparse = read(follow=[{"from": "walk.bvh", "joints": ["hands"], "times": [0, 1.5]}], start={"position": [2, 1]})
     assert sparse.asked[:, WRIST].any(-1).nonzero()[0].tolist() == [0, 30]
-    assert sparse.start == Placement(2, 1, 0)
+    assert sparse.start == GroundPose(2, 1, 0)
 
 
 def test_follow_of_a_motion() -> None:

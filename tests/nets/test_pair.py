@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from safetensors.torch import save_file
 from torch import Tensor
 
-from motionloom.diffusion import DDPM, guide, inpaint, levels, observe, row_draw, run
+from motionloom.diffusion import DDPM, guide, inpaint, levels, observe, row_noise, run
 from motionloom.errors import MotionloomError
-from motionloom.features.pair import PUBLISHED_CODE, PlaceCode, along, compose, decode, seen, told_from
+from motionloom.features.pair import PUBLISHED_CODE, PlaceCode, along, compose, decode, from_world, relative
 from motionloom.lab.papers.commdm import adds_of, from_published_pair, is_pair
 from motionloom.lab.papers.published_priors import import_block
 from motionloom.nets.pair import PairConfig, PairNet, Talk, fitting, join, other, part
@@ -151,8 +151,8 @@ def test_an_aware_block_sees_where_the_others_head_and_wrists_are():
     guess = base(x[:, 1:], 1, bound) * std + mean
     world, way = decode(guess, stands), compose(stands[:, None], along(guess))
     for me, him in ((0, 1), (1, 0)):
-        places = told_from(world[him], way[me][:, None])
-        expected = torch.cat([seen(way[me], way[him]), places[:, [15, 20, 21]].flatten(1)], dim=-1)
+        places = from_world(world[him], way[me][:, None])
+        expected = torch.cat([relative(way[me], way[him]), places[:, [15, 20, 21]].flatten(1)], dim=-1)
         torch.testing.assert_close(partner[me, :FRAMES], expected.clamp(-5, 5), rtol=0, atol=1e-4)
 
 
@@ -202,13 +202,13 @@ def test_guidance_and_known_numbers_compose_in_the_one_loop(variant):
     def sample(rows: Tensor, known: Tensor) -> Tensor:
         cond = prior.condition(["the cat sat"] * 4)
         bound, null = chosen(net.bind(cond), rows), chosen(net.bind(cond.null()), rows)
-        draw = row_draw([10, 11, 12, 13][: len(rows)] if len(rows) < 4 else [[10, 11, 12, 13][i] for i in rows])
+        draw = row_noise([10, 11, 12, 13][: len(rows)] if len(rows) < 4 else [[10, 11, 12, 13][i] for i in rows])
         hold = observe(known, mask[: len(rows)], prior.schedule, draw)
         denoise = inpaint(guide(net, bound, null, 2.5), known, mask[: len(rows)])
         x = hold(draw(known), 50)
         way = levels(prior.schedule, 5)
         with torch.inference_mode():
-            return run(denoise, x, levels=way, solver=DDPM, schedule=prior.schedule, draw=draw, constrain=hold)
+            return run(denoise, x, levels=way, solver=DDPM, schedule=prior.schedule, noise=draw, constrain=hold)
 
     whole = sample(torch.arange(4), known)
     assert torch.equal(whole[mask], known[mask])

@@ -8,7 +8,8 @@ import pytest
 import torch
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.goal import Goal, Placement
+from motionloom.goals.goal import Goal
+from motionloom.ground import GroundPose
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.control import control, controlled_numbers, fitting_adapters, judged
 from motionloom.tasks.text import generate
@@ -35,12 +36,12 @@ def path(frames: int = 24, *, turn: float = 0.0) -> Goal:
     goal = Goal.nothing(frames)
     goal.positions[:, 0] = np.stack([1 - np.cos(angle), 0 * angle, np.sin(angle)], axis=-1)
     goal.asked[:, 0, [0, 2]] = True
-    place = Placement(3.0 * bool(turn), 0.0, turn)
+    place = GroundPose(3.0 * bool(turn), 0.0, turn)
     return replace(goal, positions=place.to_world(goal.positions), start=place)
 
 
 def test_no_targets_make_what_generate_makes(prior: Prior) -> None:
-    goal = replace(Goal.nothing(24), start=Placement())
+    goal = replace(Goal.nothing(24), start=GroundPose())
     made = control(prior, "a person walks", goal, seed=4, steps=3, adapters="none")[0]
     plain = generate(prior, "a person walks", seconds=1.2, seed=4, steps=3)[0]
     np.testing.assert_allclose(made.motion.positions(), plain.positions(), atol=1e-6)
@@ -53,7 +54,7 @@ def test_a_path_is_met_and_the_quarter_turned_path_gives_the_quarter_turned_moti
     turned = control(prior, "a person walks", path(turn=np.pi / 2), seed=1, steps=3)[0]
     assert one.error < 0.005
     assert turned.error < 0.005
-    place = Placement(3.0, 0.0, np.pi / 2)
+    place = GroundPose(3.0, 0.0, np.pi / 2)
     np.testing.assert_allclose(turned.motion.positions(), place.to_world(one.motion.positions()), atol=2e-3)
 
 
@@ -65,7 +66,7 @@ def test_motion_i_is_drawn_from_seed_plus_i_whatever_stands_beside_it(prior: Pri
 
 
 def test_what_is_missed_is_said_worst_first(prior: Prior) -> None:
-    goal = replace(Goal.nothing(24), start=Placement())
+    goal = replace(Goal.nothing(24), start=GroundPose())
     goal.positions[12, WRIST], goal.asked[12, WRIST] = [0.0, 4.0, 0.0], True
     goal.positions[6, WRIST], goal.asked[6, WRIST] = [0.0, 6.0, 0.0], True
     made = control(prior, "a person walks", goal, steps=2)[0]
@@ -99,7 +100,7 @@ def test_adapters_see_the_last_steered_estimate_and_none_that_change_nothing_cha
     blank = adapter(prior)
     made = control(prior, "a person walks", path(), seed=1, steps=3, adapters=[(blank, 0.25), (blank, 0.75)])[0]
     assert made.error < 0.005
-    free = replace(Goal.nothing(24), start=Placement())
+    free = replace(Goal.nothing(24), start=GroundPose())
     same = control(prior, "a person walks", free, seed=1, steps=3, adapters=[blank])[0]
     plain = control(prior, "a person walks", free, seed=1, steps=3, adapters="none")[0]
     np.testing.assert_allclose(same.motion.positions(), plain.motion.positions(), atol=1e-5)

@@ -183,7 +183,7 @@ def test_each_row_is_shown_and_moved_from_where_the_two_are_when_it_begins(
             c * way[2] + s * way[0],
         ]
         np.testing.assert_allclose(told[0], expected, atol=1e-3)
-        np.testing.assert_allclose(two.seen(begins[length][0], begins[length][1]), expected, atol=1e-3)
+        np.testing.assert_allclose(two.relative(begins[length][0], begins[length][1]), expected, atol=1e-3)
     assert len({seed for how in leads for seed in how["seeds"]}) == 6
     assert {how["weight"] for how in leads} == {0.7}
     assert not any(any(how["frozen"]) for how in leads)

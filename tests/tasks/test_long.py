@@ -10,8 +10,9 @@ import torch
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
-from motionloom.goals.goal import Goal, Placement
+from motionloom.goals.goal import Goal
 from motionloom.goals.segment import Segment
+from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
@@ -213,7 +214,7 @@ def test_the_place_behind_features_is_where_the_next_ones_begin() -> None:
     """Features of a person's motion cut in two and strung together are the motion."""
     places = person(4.0).positions()
     x, _, z = places[0, 0]
-    begin = Placement(float(x), float(z), float(heading(places[:1])[0]))
+    begin = GroundPose(float(x), float(z), float(heading(places[:1])[0]))
     numbers = humanml.encode(begin.from_world(places)).astype(np.float64)
     first, middle = decoded(numbers[:33], begin)
     second, end = decoded(numbers[33:], middle)

@@ -11,7 +11,8 @@ from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
 from motionloom.features.pair import one_world
-from motionloom.goals.goal import Goal, Placement
+from motionloom.goals.goal import Goal
+from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.nets.pair import PairNet
 from motionloom.retarget import to_smpl22
@@ -25,7 +26,6 @@ from motionloom.tasks.pair import (
     known_state,
     pair_features,
     person_seeds,
-    placement,
     prompts_of,
 )
 from motionloom.tasks.sampling import Observed
@@ -70,8 +70,8 @@ def test_exchanged_people_get_exchanged_motions(prior: Prior, block: PairBlock, 
     one, stands = features(prior, block, SAID, [1, 2], **given)
     other, exchanged = features(prior, block, SAID[::-1], [2, 1], **turned)
     torch.testing.assert_close(one[0], other[0].flip(0), rtol=0, atol=1e-4)
-    expected = two.seen(exchanged[0, 1], exchanged[0, 0])
-    torch.testing.assert_close(two.seen(stands[0, 0], stands[0, 1]), expected, rtol=0, atol=1e-4)
+    expected = two.relative(exchanged[0, 1], exchanged[0, 0])
+    torch.testing.assert_close(two.relative(stands[0, 0], stands[0, 1]), expected, rtol=0, atol=1e-4)
     assert not torch.allclose(one[0, 0], one[0, 1], atol=1e-2)
 
 
@@ -163,7 +163,7 @@ def test_files_keep_the_distance_that_was_drawn(prior: Prior, block: PairBlock) 
     [duet] = generate_pair(prior, block, SAID[0], seconds=0.7, steps=4, seed=1, foot_lock=False)
     made, stands = pair_features(prior, block.net(prior), [SAID[0]] * 2, 14, seeds=person_seeds(1, 0), steps=4)
     alone = np.stack([finish(prior, one, foot_lock=False).positions() for one in made[0]])
-    expected = two.put(alone, stands[0].double().numpy()[:, None, None])
+    expected = two.to_world(alone, stands[0].double().numpy()[:, None, None])
     np.testing.assert_allclose(np.stack([motion.positions() for motion in duet]), expected, atol=1e-4)
 
 
@@ -173,7 +173,7 @@ def walk(frames: int) -> Goal:
     angle = np.linspace(0, np.pi / 2, frames)
     goal.positions[:, 0] = np.stack([1 + 1.3 * np.sin(angle), 0 * angle, 3.3 - 1.3 * np.cos(angle)], axis=-1)
     goal.asked[:, 0] = [True, False, True]
-    return replace(goal, start=Placement(1.0, 2.0, np.pi / 2))
+    return replace(goal, start=GroundPose(1.0, 2.0, np.pi / 2))
 
 
 @pytest.mark.parametrize("person", [0, 1])
@@ -208,7 +208,7 @@ def test_the_other_one_stands_as_drawn_beside_who_follows_a_path(
     [duet] = generate_pair(prior, block, SAID[0], goals=(None, walk(40)), steps=3, foot_lock=False)
     stands = drawn[0][1][0].double().numpy()
     there = np.array([np.cos(np.pi / 2), np.sin(np.pi / 2), 1.0, 2.0])
-    other = placement(two.compose(there, two.seen(stands[1], stands[0])))
+    other = GroundPose.of_numbers(two.compose(there, two.relative(stands[1], stands[0])))
     np.testing.assert_allclose(duet[0].root[0, [0, 2]], [other.x, other.z], atol=0.05)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from motionloom.bulk.crew import alone, cores, gpus
-from motionloom.bulk.folder import Head, Store, digest, open_folder
+from motionloom.bulk.folder import Head, Store, digest, open_folder, read_manifest
 from motionloom.bulk.jobs import MOST, Jobs, parquet, shard_size
 from motionloom.bulk.maker import FORMATS, Made, Maker, Options
 from motionloom.bulk.measures import Filter
@@ -20,6 +20,8 @@ from motionloom.goals.adapters import parse_adapter
 Source = Jobs | Path | str | Iterable[Mapping[str, Any]]
 LOCAL = "local"
 """Ray's address for a cluster of this machine."""
+LOOKED_AT = 8
+"""Shards of a folder that are looked at to see whether it is another job's."""
 
 
 @dataclass(frozen=True)
@@ -40,19 +42,21 @@ def batch(
     *,
     options: Options = Options(),  # noqa: B008
     where: Where = Where(),
+    force: bool = False,
 ) -> Iterator[Result]:
     """Make a motion of every row, and give what became of each, in the job's order.
 
     jobs: a file (JSON lines, CSV, Parquet), or mappings with the columns of docs/batch.md. out: the folder for the
     motions; rows that are already in it are not made again, and processes beside this one do the work. Without
-    ``out`` this process makes the motions one after the other and keeps none: each `Result` has its motion.
-    Raises `MotionloomError` for jobs, options and folders that cannot be; what is wrong with a row is in its result.
+    ``out`` this process makes the motions one after the other and keeps none: each `Result` has its motion. force: take
+    a folder that holds another job's motions, which then go. Raises `MotionloomError` for jobs, options and folders
+    that cannot be; what is wrong with a row is in its result.
     """
     if out is None:
         check_options(options)
         yield from _here(Jobs.of(jobs), options)
         return
-    for _ in run(Jobs.of(jobs), Path(out), options=options, where=where):
+    for _ in run(Jobs.of(jobs), Path(out), options=options, where=where, force=force):
         pass
     yield from read_batch(out, motions=False)
 
@@ -65,14 +69,18 @@ def run(
     where: Where,
     moved: Callable[[int], None] = lambda rows: None,
     rows: int | None = None,
+    force: bool = False,
 ) -> Iterator[Report]:
     """Make what is missing of a batch's folder; a report of each shard when it is whole, those that were at once.
 
-    moved: called with how many more rows were made. rows: how many the job has, where that is known.
+    moved: called with how many more rows were made. rows: how many the job has, where that is known. force: as of
+    `batch`.
     """
     check_options(options)
     count = jobs.count() if rows is None else rows
     check_jobs(jobs, count)
+    if not force:
+        _check_same_job(jobs, out, options)
     manifest = open_folder(out, options, rows=count, shard_rows=options.shard_rows or shard_size(count))
     size = int(manifest["shard_rows"])
     store, shards = Store(out, options.format), -(-count // size)
@@ -91,7 +99,7 @@ def run(
         address = None if where.ray == LOCAL else where.ray
         reports = on_ray(items, work, address=address, workers=where.workers, moved=moved)
     else:
-        reports = alone(items, work, workers=where.workers or _workers(options), moved=moved)
+        reports = alone(items, work, workers=where.workers or processes(options), moved=moved)
     made = 0
     for report in reports:
         made += report.made
@@ -209,7 +217,8 @@ def _found(options: Options) -> Options:
     return replace(options, weights=weights, pair_weights=pair, adapters=adapters, skeleton=whole(options.skeleton))
 
 
-def _workers(options: Options) -> int:
+def processes(options: Options) -> int:
+    """How many processes this machine has room for: one per core, with CUDA one per GPU."""
     return gpus() if options.device == "cuda" else cores()
 
 
@@ -218,6 +227,36 @@ def _check_left_over(store: Store, shards: int) -> None:
         raise MotionloomError(
             f"{store.out} holds more shards than the job has, of rows that it no longer asks for; name another folder"
         )
+
+
+def _check_same_job(jobs: Jobs, out: Path, options: Options) -> None:
+    """Raise `MotionloomError` where the first shards of a folder hold motions, and this job asks for none of them."""
+    manifest = read_manifest(out)
+    if manifest is None:
+        return
+    store, size = Store(out, manifest["files"]), int(manifest["shard_rows"])
+    there, made, asked = set(sorted(store.shards())[:LOOKED_AT]), set(), set()
+    for shard, rows in zip(range(max(there, default=-1) + 1), jobs.shards(size)):
+        if shard not in there or (head := store.head(shard)) is None:
+            continue
+        if head.digest == digest(rows):
+            return
+        made |= {(one["text"], one["seed"]) for one in store.entries(shard) if one["state"] == "made"}
+        asked |= {_words(raw, options.seed) for raw in rows}
+    if made and None not in asked and not made & asked:
+        raise MotionloomError(
+            f"{out} holds motions of another job: none of {len(made):,} looked at is asked for here, and all would go; "
+            "name another folder, or say --force"
+        )
+
+
+def _words(raw: bytes, seed: int) -> tuple[str, int] | None:
+    """The words and the seed of a row; None where a timeline, which is not read here, says them."""
+    try:
+        row = parse(raw)
+    except MotionloomError:
+        return "", -1
+    return None if row.timeline is not None else (row.prompt, seed if row.seed is None else row.seed)
 
 
 def _finish(store: Store, shards: int, *, changed: bool) -> None:

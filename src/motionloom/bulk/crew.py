@@ -47,6 +47,12 @@ def gpu_of(process: int, visible: str, count: int) -> str:
     return given[process % len(given)]
 
 
+def search_path() -> str:
+    """PYTHONPATH for processes that are to find this very package, wherever they are started."""
+    source = str(Path(motionloom.__file__).resolve().parents[1])
+    return os.pathsep.join([source, *filter(None, [os.environ.get("PYTHONPATH")])])
+
+
 def too_many_deaths(deaths: int, rows: int) -> bool:
     """Whether a shard ended so many processes that its rows cannot be the reason alone."""
     return deaths > 3 * rows + 10
@@ -64,9 +70,7 @@ class _Process:
     popen: "subprocess.Popen[bytes]" = field(init=False)
 
     def __post_init__(self) -> None:
-        source = str(Path(motionloom.__file__).parents[1])
-        paths = [source, *filter(None, [os.environ.get("PYTHONPATH")])]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+        environment = {**os.environ, "PYTHONPATH": search_path()}
         environment |= dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
         if self.batch.options.device == "cuda":
             environment["CUDA_VISIBLE_DEVICES"] = gpu_of(

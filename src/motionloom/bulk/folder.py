@@ -68,6 +68,11 @@ class Store:
         """Where it is written what became of a shard's rows."""
         return self.out / RECORDS / f"{shard:06d}.jsonl"
 
+    def shards(self) -> Iterator[int]:
+        """Numbers of the shards that have records, in no order."""
+        names = (path.stem for path in (self.out / RECORDS).glob("[0-9]*.jsonl"))
+        return (int(name) for name in names if name.isdecimal())
+
     @property
     def work(self) -> Path:
         """Where shards are made; nobody reads there."""

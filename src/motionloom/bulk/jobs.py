@@ -58,6 +58,8 @@ class Jobs:
         """``variants`` motions for each line of a text file; variant i has the seed ``seed + i``."""
         if not 1 <= variants <= 10_000_000:
             raise MotionloomError(f"variants must be 1 to 10,000,000; got {variants}")
+        if Path(path).suffix.lower() in READS:
+            raise MotionloomError(f"{path} is a file of jobs by its name; give it without --prompts")
         return Jobs(_found(Path(path)), variants=variants, seed=seed)
 
     @property

@@ -15,7 +15,7 @@ from motionloom.bulk.sampling import LEAST, draw_group, groups
 from motionloom.edits.fitting import fit
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import parse_adapter
-from motionloom.goals.goal import placement_of
+from motionloom.goals.goal import start_of
 from motionloom.io.stream import joined
 from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22
@@ -218,7 +218,7 @@ class Maker:
         goal = rows[0].goal
         assert goal is not None
         self._only_fp32_ddpm(rows[0])
-        place, filled = placement_of(goal), [*rows, *[rows[0]] * (LEAST - len(rows))]
+        place, filled = start_of(goal), [*rows, *[rows[0]] * (LEAST - len(rows))]
         drawn = steered_features(
             self.prior, [one.row.prompt for one in filled], goal.seen_from(place), seeds=[one.seed for one in filled],
             guidance=self.options.guidance, steps=self.options.steps,

@@ -7,19 +7,25 @@ folder, so a driver that died is replaced by the same command.
 import importlib
 import logging
 import os
+import re
+import socket
+import sys
 from collections import deque
 from collections.abc import Generator, Iterator
+from contextlib import redirect_stdout
 from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from motionloom.bulk.crew import Moved, too_many_deaths
+from motionloom.bulk.crew import Moved, search_path, too_many_deaths
 from motionloom.bulk.shard import Batch, Report, Task
 from motionloom.errors import MotionloomError
 
 PATIENCE = 1.0
 """Seconds between two looks at what is done."""
+ANSWERS = 10.0
+"""Seconds in which a cluster's head must answer."""
 
 
 class Hand:
@@ -68,35 +74,58 @@ def on_ray(
         yield item
     else:
         return  # nothing is left to make, and no cluster needed
-    ray = _start(address)
-    try:
-        yield from _Crew(ray, items, batch, workers, moved).run()
-    finally:
-        ray.shutdown()
+    with redirect_stdout(sys.stderr):  # results go there, and Ray says there who died, whatever it is told
+        ray = _start(address)
+        try:
+            yield from _Crew(ray, items, batch, workers, moved).run()
+        finally:
+            ray.shutdown()
 
 
 def _start(address: str | None) -> Any:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing is sent to anybody
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+    os.environ.setdefault("RAY_COLOR_PREFIX", "0")
     try:
         ray = importlib.import_module("ray")
     except ImportError:
         raise MotionloomError("--ray needs Ray: pip install 'motionloom[ray]'") from None
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+    address = address or os.environ.get("RAY_ADDRESS")
+    if address is not None:
+        _check_answers(address)
+    known = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+    known |= {"PYTHONPATH": search_path()} if address is None else {}
     options: dict[str, Any] = {
-        "log_to_driver": False, "logging_level": logging.CRITICAL, "runtime_env": {"env_vars": threads},
+        "log_to_driver": False, "logging_level": logging.CRITICAL, "runtime_env": {"env_vars": known},
     }  # fmt: skip
     try:
-        if address is None and "RAY_ADDRESS" not in os.environ:
+        if address is None:
             ray.init(address="local", include_dashboard=False, **options)
         else:
             ray.init(address=address, **options)
     except (ConnectionError, RuntimeError, ValueError, TimeoutError) as error:
-        said = " ".join(str(error).split())[:200]
-        raise MotionloomError(
-            f"there is no Ray cluster at {address or os.environ.get('RAY_ADDRESS')} ({said})"
-        ) from None
+        raise MotionloomError(f"there is no Ray cluster at {address or 'this machine'} ({_said(error)})") from None
     return ray
+
+
+def _check_answers(address: str) -> None:
+    """Raise `MotionloomError` where nobody listens at ``host:port``: Ray itself would try for minutes.
+
+    Other addresses, such as ``auto``, are not looked at.
+    """
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host or not port.isdecimal():
+        return
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=ANSWERS).close()
+    except (OSError, OverflowError) as error:
+        raise MotionloomError(f"there is no Ray cluster at {address} ({error}); see 'ray status' there") from None
+
+
+def _said(error: Exception) -> str:
+    """What an error of Ray's says, in one line: how it begins, and how it ends, which is where a cause is named."""
+    words = " ".join(re.sub(r"\x1b\[[0-9;]*m", "", str(error)).split())
+    return words if len(words) <= 300 else f"{words[:100]} ... {words[-200:]}"
 
 
 class _Crew:
@@ -153,7 +182,7 @@ class _Crew:
         try:
             answer = self.ray.get(reference)
         except self.ray.exceptions.RayTaskError as error:
-            raise MotionloomError(f"a worker failed: {' '.join(str(error).split())[-300:]}") from None
+            raise MotionloomError(f"a worker failed: {_said(error)}") from None
         except self.ray.exceptions.RayError as error:
             self._lost(task, error)
             return None
@@ -170,8 +199,7 @@ class _Crew:
         if task is None:
             self.stillborn += 1
             if self.stillborn > 10 + 2 * self.workers:
-                said = " ".join(str(error).split())[:200]
-                raise MotionloomError(f"the workers of the Ray cluster end before they begin ({said})")
+                raise MotionloomError(f"the workers of the Ray cluster end before they begin ({_said(error)})")
             return
         self.deaths[task.shard] = self.deaths.get(task.shard, 0) + 1
         if too_many_deaths(self.deaths[task.shard], len(task.rows)):

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom.diffusion import SOLVERS, guide, levels, row_draw, sample
+from motionloom.diffusion import SOLVERS, guide, levels, row_noise, run
 from motionloom.nets.prior import Condition, condition
 from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS, check, smooth
 from motionloom.weights.prior import Prior
@@ -54,13 +54,14 @@ def draw_group(
     chosen = [*range(len(prompts)), *([0] * (LEAST - len(prompts)))]
     lengths = [frames[row] for row in chosen]
     cond = _condition(prior, [prompts[row] for row in chosen], lengths)
-    draw = row_draw([seeds[row] for row in chosen], lengths)
-    state = draw(torch.empty(len(chosen), max(lengths), len(prior.mean), device=device))
+    noise = row_noise([seeds[row] for row in chosen], lengths)
+    state = noise(torch.empty(len(chosen), max(lengths), len(prior.mean), device=device))
     with torch.autocast(device.type, torch.bfloat16, enabled=bf16):
         denoise = guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), guidance)
-        way = levels(prior.schedule, steps, spacing=SPACING)
-        for snapshot in sample(denoise, state, levels=way, solver=SOLVERS[solver], schedule=prior.schedule, draw=draw):
-            state = snapshot.state
+        state = run(
+            denoise, state, levels=levels(prior.schedule, steps, spacing=SPACING), solver=SOLVERS[solver],
+            schedule=prior.schedule, noise=noise,
+        )  # fmt: skip
     finished = (state.float() * prior.std + prior.mean).cpu()
     rows = [finished[row, : frames[row]] for row in range(len(prompts))]
     return [smooth(row) for row in rows] if prior.net.config.patch > 1 else rows

@@ -20,6 +20,8 @@ SHOWN = 10
 """Failed rows listed at the end; the records list all."""
 PAUSE = 10.0
 """Seconds between two lines of progress where there is no terminal."""
+SHORTEST = 3.0
+"""Seconds over which a rate is measured at least: rows come several at a time."""
 
 
 def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -80,6 +82,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument(
         "--ray", nargs="?", const="local", metavar="ADDRESS", help="run on a Ray cluster, or a local one"
     )
+    parser.add_argument("--force", action="store_true", help="make the folder this job's, whatever job made it")
     parser.add_argument("--dry-run", action="store_true", help="only say how many, how long and how large")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
     parser.set_defaults(run=run_batch)
@@ -154,19 +157,20 @@ def _where(arguments: argparse.Namespace) -> "Where":
 def _estimate(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", where: "Where") -> None:
     import torch
 
-    from motionloom.bulk.crew import cores
+    from motionloom.bulk.batch import processes
     from motionloom.bulk.estimate import estimate
 
     torch.set_num_threads(1)
-    found = estimate(jobs, options, workers=(where.workers or cores()) * (where.shard or (0, 1))[1])
+    found = estimate(jobs, options, workers=(where.workers or processes(options)) * (where.shard or (0, 1))[1])
     if arguments.json:
         import json
 
         about = vars(found) | {"hours": found.hours, "gigabytes": found.gigabytes}
         print(json.dumps(about, indent=1))
         return
+    on = "processes" if options.device == "cuda" else "cores"
     print(
-        f"{found.rows:,} motions: {_time(found.hours * 3600)} on {found.workers} cores, {found.gigabytes:.3g} GB "
+        f"{found.rows:,} motions: {_time(found.hours * 3600)} on {found.workers} {on}, {found.gigabytes:.3g} GB "
         f"({found.seconds_each:.2f} s and {found.bytes_each / 1000:.0f} kB each, by {found.sampled} of the rows)"
     )
     if found.usable < 1:
@@ -182,7 +186,10 @@ def _make(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", *, wh
     problems: list[str] = []
     made = 0
     with _Progress(rows if where.shard is None else -(-rows // where.shard[1])) as progress:
-        for report in run(jobs, arguments.out, options=options, where=where, moved=progress.moved, rows=rows):
+        reports = run(
+            jobs, arguments.out, options=options, where=where, moved=progress.moved, rows=rows, force=arguments.force
+        )
+        for report in reports:
             counts.update(report.counts)
             made += report.made
             problems += report.problems[: SHOWN - len(problems)]
@@ -199,11 +206,11 @@ def _make(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", *, wh
 
 
 def _say(out: Path, counts: "dict[str, int]", made: int) -> None:
-    said = [f"{counts['made']:,} motions are in {out}"]
+    said = [f"{counts['made']:,} motion{' is' if counts['made'] == 1 else 's are'} in {out}"]
     said += [f"{counts['dropped']:,} were dropped by the filter"] if counts["dropped"] else []
     said += [f"{counts['repeated']:,} rows repeat others"] if counts["repeated"] else []
     said += (
-        [f"{counts['failed']:,} failed (mend their rows; the same command tries again what may go well)"]
+        [f"{counts['failed']:,} failed (rows count from 0; mend them; the same command tries again what may go well)"]
         if counts["failed"]
         else []
     )
@@ -225,7 +232,7 @@ class _Progress:
         screen = Console(stderr=True)
         columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn())
         self.bar = Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal)
-        self.silent = not screen.is_terminal
+        self.quiet = not screen.is_terminal
         self.task = self.bar.add_task("batch", total=rows, rate="")
 
     def __enter__(self) -> "_Progress":
@@ -249,10 +256,11 @@ class _Progress:
 
     def _show(self) -> None:
         now = self.clock()
-        rate = (self.made - self.since) / max(now - self.began, 1e-9)
+        known = now - self.began > SHORTEST and self.made > self.since
+        rate = (self.made - self.since) / (now - self.began) if known else 0.0
         done = min(self.there + self.made, self.rows)
-        self.bar.update(self.task, completed=done, rate=f"{60 * rate:.0f} a minute")
-        if self.silent and now - self.reported > PAUSE and rate > 0:
+        self.bar.update(self.task, completed=done, rate=f"{60 * rate:.0f} a minute" if known else "")
+        if self.quiet and now - self.reported > PAUSE and known:
             self.reported = now
             left = _time((self.rows - done) / rate)
             print(f"{done:,} of {self.rows:,} rows, {60 * rate:.0f} a minute, {left} left", file=sys.stderr)

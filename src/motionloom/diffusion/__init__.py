@@ -3,12 +3,12 @@
 Nothing here knows about motion. Read `schedule`, `solvers`, `sampling`, then `denoisers` and `constraints`.
 """
 
-import warnings
+from motionloom._moved import old_names
 
 from .bases import Basis, Dct, Frames
 from .constraints import Constraint, chain, handshake, observe
 from .denoisers import Denoiser, Weight, blend, from_noise, guide, inpaint, join_rows, mix
-from .sampling import Snapshot, masked_draw, restart, row_draw, row_seed, run, sample
+from .sampling import Snapshot, masked_noise, restart, row_noise, row_seed, run, sample
 from .schedule import (
     SCHEDULES,
     SPACINGS,
@@ -57,11 +57,11 @@ __all__ = [
     "join_rows",
     "levels",
     "linear",
-    "masked_draw",
+    "masked_noise",
     "mix",
     "observe",
     "restart",
-    "row_draw",
+    "row_noise",
     "row_seed",
     "run",
     "sample",
@@ -70,11 +70,6 @@ __all__ = [
     "staggered",
 ]
 
-
-def __getattr__(name: str) -> object:
-    """Types under the names that they had, for one release."""
-    new = {"Draw": "NoiseSource", "Guess": "RowsDenoiser"}.get(name)
-    if new is None:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    warnings.warn(f"{name} is {new} now; the old name goes with the next release", FutureWarning, stacklevel=2)
-    return globals()[new]
+__getattr__ = old_names(
+    __name__, {"Draw": "NoiseSource", "Guess": "RowsDenoiser", "row_draw": "row_noise", "masked_draw": "masked_noise"}
+)

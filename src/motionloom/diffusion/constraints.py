@@ -11,6 +11,8 @@ from typing import TypeAlias
 import torch
 from torch import Tensor
 
+from motionloom._moved import renamed
+
 from .bases import Basis
 from .denoisers import mix
 from .schedule import NoiseSource, Schedule, State
@@ -19,12 +21,13 @@ Constraint: TypeAlias = Callable[[State, int], State]
 """(state, the level it has just reached) -> edited state, of the same shape."""
 
 
+@renamed({"draw": "noise"})
 def observe(
-    known: State, mask: Tensor, schedule: Schedule, draw: NoiseSource, *, basis: Basis | None = None
+    known: State, mask: Tensor, schedule: Schedule, noise: NoiseSource, *, basis: Basis | None = None
 ) -> Constraint:
-    """Where `mask` is 1 (True) the state becomes signal * known + noise * draw(known), at the level it reached.
+    """Where `mask` is 1 (True) the state becomes signal * known + sigma * noise(known), at the level it reached.
 
-    With a normal draw it is the known half of RePaint (Lugmayr et al. 2022, eq. 8a). With `draw=torch.zeros_like`
+    With normal noise it is the known half of RePaint (Lugmayr et al. 2022, eq. 8a). With `noise=torch.zeros_like`
     it is the noise-filtered sampling of PriorMDM's fine-tuned control, where the network is shown the goal without
     noise. A soft mask mixes linearly. The loop does not edit the starting state: call the constraint on it first.
 
@@ -33,7 +36,7 @@ def observe(
     """
 
     def held(x: State, level: int) -> State:
-        noised = schedule.noised(known, level, draw(known))
+        noised = schedule.noised(known, level, noise(known))
         if basis is None:
             return mix(x, noised, mask)
         return basis.to_spectrum(mix(basis.to_time(x), basis.to_time(noised), mask))

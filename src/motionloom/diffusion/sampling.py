@@ -1,9 +1,9 @@
 """The sampling loop from noise to data: estimate the clean data, move to a cleaner level, and again.
 
-    draw = row_draw(range(seed, seed + rows))
-    x = draw(torch.empty(rows, tokens, features))
+    noise = row_noise(range(seed, seed + rows))
+    x = noise(torch.empty(rows, tokens, features))
     motion = run(guide(net, text, nothing, 2.5), x, levels=levels(schedule, 20), solver=DpmSolver2M(),
-                 schedule=schedule, draw=draw)
+                 schedule=schedule, noise=noise)
 
 There are two places to interfere: the denoiser (an edit of the denoised estimate, `denoisers`) and `constrain` (an
 edit of the state after each move, `constraints`). Gradients are the caller's affair: wrap a run in
@@ -17,6 +17,8 @@ from typing import NamedTuple
 import numpy as np
 import torch
 from torch import Tensor
+
+from motionloom._moved import renamed
 
 from .constraints import Constraint, chain
 from .denoisers import Denoiser
@@ -34,6 +36,7 @@ class Snapshot(NamedTuple):
     """The denoised estimate that the move was made with."""
 
 
+@renamed({"draw": "noise"})
 def sample(
     denoise: Denoiser,
     x: State,
@@ -41,7 +44,7 @@ def sample(
     levels: Sequence[int],
     solver: Solver,
     schedule: Schedule,
-    draw: NoiseSource,
+    noise: NoiseSource,
     constrain: Constraint | None = None,
 ) -> Iterator[Snapshot]:
     """Walk `x`, a state at `levels[0]`, through strictly falling `levels`; one snapshot per move.
@@ -52,18 +55,19 @@ def sample(
         schedule.check(level)
     if not levels or any(s >= t for t, s in pairwise(levels)):
         raise ValueError(f"the levels of a walk must fall strictly, got {list(levels)}")
-    return _walk(denoise, x, levels, solver.start(schedule), draw, constrain or chain())
+    return _walk(denoise, x, levels, solver.start(schedule), noise, constrain or chain())
 
 
 def _walk(
-    denoise: Denoiser, x: State, levels: Sequence[int], step: Step, draw: NoiseSource, constrain: Constraint
+    denoise: Denoiser, x: State, levels: Sequence[int], step: Step, noise: NoiseSource, constrain: Constraint
 ) -> Iterator[Snapshot]:
     for t, s in pairwise(levels):
         clean = denoise(x, t)
-        x = constrain(step(x, clean, t, s, draw), s)
+        x = constrain(step(x, clean, t, s, noise), s)
         yield Snapshot(s, x, clean)
 
 
+@renamed({"draw": "noise"})
 def run(
     denoise: Denoiser,
     x: State,
@@ -71,19 +75,20 @@ def run(
     levels: Sequence[int],
     solver: Solver,
     schedule: Schedule,
-    draw: NoiseSource,
+    noise: NoiseSource,
     constrain: Constraint | None = None,
 ) -> State:
     """The state at the end of `sample`; `x` itself where there is only one level."""
-    state = x
-    for snapshot in sample(denoise, x, levels=levels, solver=solver, schedule=schedule, draw=draw, constrain=constrain):
-        state = snapshot.state
-    return state
+    walk = sample(denoise, x, levels=levels, solver=solver, schedule=schedule, noise=noise, constrain=constrain)
+    for snapshot in walk:
+        x = snapshot.state
+    return x
 
 
-def restart(clean: State, schedule: Schedule, level: int, draw: NoiseSource) -> State:
+@renamed({"draw": "noise"})
+def restart(clean: State, schedule: Schedule, level: int, noise: NoiseSource) -> State:
     """Clean data taken to `level` with fresh noise: the start of a walk that keeps what this noise leaves of it."""
-    return schedule.noised(clean, level, draw(clean))
+    return schedule.noised(clean, level, noise(clean))
 
 
 def row_seed(seed: int, number: int, turn: int = 0) -> int:
@@ -91,29 +96,30 @@ def row_seed(seed: int, number: int, turn: int = 0) -> int:
     return int(np.random.SeedSequence((seed, number, turn)).generate_state(1, np.uint64)[0] >> np.uint64(1))
 
 
-def row_draw(seeds: Sequence[int], lengths: Sequence[int] | None = None) -> NoiseSource:
-    """Noise that belongs to rows: row i draws from its own generator, seeded with `seeds[i]`.
+def row_noise(seeds: Sequence[int], lengths: Sequence[int] | None = None) -> NoiseSource:
+    """Noise that belongs to rows: row i takes it from its own generator, seeded with `seeds[i]`.
 
-    So a row's noise does not depend on the other rows, on their count or order, or on the device: it is drawn
-    in float32 on the CPU and moved. With `lengths` (valid tokens per row) a row draws for those tokens only and
+    So a row's noise does not depend on the other rows, on their count or order, or on the device: it is sampled
+    in float32 on the CPU and moved. With `lengths` (valid tokens per row) a row has noise for those tokens only and
     gets zeros behind them, so that its noise does not depend on the padding either.
     """
     generators = [torch.Generator().manual_seed(seed) for seed in seeds]
     if lengths is not None and len(lengths) != len(generators):
         raise ValueError(f"there are {len(lengths)} lengths for {len(generators)} seeds")
 
-    def draw(like: Tensor) -> Tensor:
+    def noise(like: Tensor) -> Tensor:
         if len(like) != len(generators):
             raise ValueError(f"noise for {len(like)} rows was asked of {len(generators)} seeds: give one seed per row")
-        noise = torch.zeros(like.shape)
+        sampled = torch.zeros(like.shape)
         for row, generator in enumerate(generators):
-            valid = noise[row] if lengths is None else noise[row, : lengths[row]]
+            valid = sampled[row] if lengths is None else sampled[row, : lengths[row]]
             valid.copy_(torch.randn(valid.shape, generator=generator))
-        return noise.to(like)
+        return sampled.to(like)
 
-    return draw
+    return noise
 
 
-def masked_draw(draw: NoiseSource, mask: Tensor) -> NoiseSource:
+@renamed({"draw": "noise"})
+def masked_noise(noise: NoiseSource, mask: Tensor) -> NoiseSource:
     """Noise scaled by (1 - mask): none where the state is to stay noise-free (noise-filtered control, soft too)."""
-    return lambda like: draw(like) * (1.0 - mask.to(like.dtype))
+    return lambda like: noise(like) * (1.0 - mask.to(like.dtype))

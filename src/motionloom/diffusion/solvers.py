@@ -37,7 +37,7 @@ from torch import Tensor
 from .schedule import NoiseSource, Schedule, State
 
 Step: TypeAlias = Callable[[State, State, int, int, NoiseSource], State]
-"""(state, estimate of the clean data, its level t, cleaner level s, draw) -> state at s."""
+"""(state, estimate of the clean data, its level t, cleaner level s, noise) -> state at s."""
 
 
 @runtime_checkable
@@ -85,10 +85,10 @@ class Ddim:
     def start(self, schedule: Schedule) -> Step:
         """See `Solver.start`."""
 
-        def step(x: State, clean: State, t: int, s: int, draw: NoiseSource) -> State:
+        def step(x: State, clean: State, t: int, s: int, noise: NoiseSource) -> State:
             move = self.move(schedule, t, s)
             mean = move.clean * clean + move.state * x
-            return mean + move.noise * draw(x) if self.eta > 0.0 else mean
+            return mean + move.noise * noise(x) if self.eta > 0.0 else mean
 
         return step
 
@@ -106,7 +106,7 @@ class DpmSolver2M:
         """See `Solver.start`."""
         before: tuple[State, float] | None = None  # the estimate and the length of the move before this one
 
-        def step(x: State, clean: State, t: int, s: int, draw: NoiseSource) -> State:
+        def step(x: State, clean: State, t: int, s: int, noise: NoiseSource) -> State:
             nonlocal before
             h = schedule.log_snr(s) - schedule.log_snr(t)
             ahead = _extrapolate(clean, before, h)
@@ -116,7 +116,7 @@ class DpmSolver2M:
             mean = (b_s / b_t * r**self.eta) * x + a_s * (1.0 - r ** (1.0 + self.eta)) * ahead
             if self.eta == 0.0:
                 return mean
-            return mean + b_s * math.sqrt(1.0 - r ** (2.0 * self.eta)) * draw(x)
+            return mean + b_s * math.sqrt(1.0 - r ** (2.0 * self.eta)) * noise(x)
 
         return step
 

@@ -18,6 +18,8 @@ from itertools import pairwise
 import torch
 from torch import Tensor
 
+from motionloom._moved import renamed
+
 from .schedule import NoiseSource, Schedule, State
 from .solvers import Solver, Step
 
@@ -65,6 +67,7 @@ RowsDenoiser = Callable[[Sequence[int], Sequence[State], Sequence[int]], Sequenc
 """(numbers of rows, their states (length, features), their levels) -> estimates of their clean data."""
 
 
+@renamed({"together": "batch_size"})
 def staggered(
     links: Iterable[Link],
     denoise: RowsDenoiser,
@@ -73,28 +76,28 @@ def staggered(
     solver: Solver,
     schedule: Schedule,
     features: int,
-    together: int = 16,
+    batch_size: int = 16,
     moved: Callable[[int], None] = lambda rows: None,
 ) -> Iterator[State]:
     """Clean rows (length, features) in order, overlaps included twice; the copies of an overlap are equal.
 
-    ``links`` is read as the walk gets there. ``together``: rows per network call at most. ``moved`` is called with how
-    many rows made a move. Rows live where the estimates do, on any device. Raises ValueError where the overlaps of a
-    row do not fit into it, and for levels that do not fall.
+    ``links`` is read as the walk gets there. ``batch_size``: rows per network call at most. ``moved`` is called with
+    how many rows made a move. Rows live where the estimates do, on any device. Raises ValueError where the overlaps of
+    a row do not fit into it, and for levels that do not fall.
     """
-    if len(levels) < 2 or any(s >= t for t, s in pairwise(levels)) or together < 1:
-        raise ValueError(f"a walk needs falling levels and a row per call, got {list(levels)} and {together} together")
-    return _Chain(links, denoise, levels, solver, schedule, features, together, moved).walk()
+    if len(levels) < 2 or any(s >= t for t, s in pairwise(levels)) or batch_size < 1:
+        raise ValueError(f"a walk needs falling levels and a row per call, got {list(levels)} and {batch_size} rows")
+    return _Chain(links, denoise, levels, solver, schedule, features, batch_size, moved).walk()
 
 
 class _Chain:
     def __init__(
         self, links: Iterable[Link], denoise: RowsDenoiser, levels: Sequence[int], solver: Solver, schedule: Schedule,
-        features: int, together: int, moved: Callable[[int], None],
+        features: int, batch_size: int, moved: Callable[[int], None],
     ) -> None:  # fmt: skip
         self.links, self.denoise, self.levels = iter(links), denoise, levels
         self.solver, self.schedule = solver, schedule
-        self.features, self.together, self.moved = features, together, moved
+        self.features, self.batch_size, self.moved = features, batch_size, moved
         self.rows: dict[int, _Row] = {}
         self.ended = False
 
@@ -140,8 +143,8 @@ class _Chain:
     def _ready(self) -> list[int]:
         """The first rows whose neighbours are as far as they are."""
         found: list[int] = []
-        number = min(self.rows)
-        while len(found) < self.together and (number in self.rows or (number == max(self.rows) + 1 and self._admit())):
+        number, most = min(self.rows), self.batch_size
+        while len(found) < most and (number in self.rows or (number == max(self.rows) + 1 and self._admit())):
             row = self.rows[number]
             if number + 1 not in self.rows:
                 self._admit()
@@ -156,8 +159,8 @@ class _Chain:
         at = [self.levels[row.done] for row in rows]
         cleans = self.denoise(numbers, [row.state for row in rows], at)
         for number, row, clean, level in zip(numbers, rows, cleans, at, strict=True):
-            draw = self._draw(number, row.done + 1)
-            row.state = row.step(row.state.to(clean), clean, level, self.levels[row.done + 1], draw)
+            noise = self._noise_of(number, row.done + 1)
+            row.state = row.step(row.state.to(clean), clean, level, self.levels[row.done + 1], noise)
             row.moved()
         for number in numbers:
             self._shake(number - 1, number)
@@ -176,7 +179,7 @@ class _Chain:
         a.state = torch.cat([a.state[:-h], shared])
         b.state = torch.cat([shared, b.state[h:]])
 
-    def _draw(self, number: int, move: int) -> NoiseSource:
+    def _noise_of(self, number: int, move: int) -> NoiseSource:
         return lambda like: self._noise(number, move).to(like)
 
     def _noise(self, number: int, move: int) -> Tensor:

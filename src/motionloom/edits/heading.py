@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from motionloom.blending import smoothstep
-from motionloom.edits.steering import Correction, averaged, standing
+from motionloom.edits.steering import Correction, product, standing
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT
 from motionloom.goals.goal import turn_between
@@ -67,7 +67,7 @@ def _ways(features: Array, first: int) -> NDArray[np.complex128]:
     lag = frames[first:, None] - frames[first:]
     kernel = np.exp(-0.5 * (lag / _SWAY) ** 2)
     kernel /= kernel.sum(1, keepdims=True)
-    way = averaged(kernel, steps[first:] + _STANDING * ahead[first:])
+    way = product(kernel, steps[first:] + _STANDING * ahead[first:])
     return way * np.exp(-1j * facing[first])
 
 

@@ -15,9 +15,10 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom.diffusion import row_draw, row_seed
+from motionloom.diffusion import row_noise, row_seed
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
+from motionloom.ground import compose, relative
 from motionloom.nets.pair import PLACE, PairNet, join, part
 from motionloom.nets.prior import Bound
 from motionloom.weights.prior import Prior
@@ -95,7 +96,7 @@ class Places:
         free = 1.0 - torch.tensor([float(one) for one in given]).view(-1, 2)
         shares = free / free.sum(1, keepdim=True).clamp(min=1.0)
         most = max(len(some) for some in anchors)
-        noise = row_draw([row_seed(seed, 0, 2) for seed in seeds])(torch.zeros(len(seeds), max(most, 1), PLACE))
+        noise = row_noise([row_seed(seed, 0, 2) for seed in seeds])(torch.zeros(len(seeds), max(most, 1), PLACE))
         noise = [noise[2 * i : 2 * i + 2, : len(some)].transpose(0, 1).flatten(0, 1) for i, some in enumerate(anchors)]
         return Places(anchors, spread, shares, torch.cat(noise))
 
@@ -111,7 +112,7 @@ class Places:
         places, motion = part(denoised)
         features = motion * spread + prior.mean
         poses = code.decode(places.unflatten(0, (-1, 2)))
-        ways = two.compose(poses.flatten(0, 1)[:, None], two.along(features)).unflatten(0, (-1, 2))
+        ways = compose(poses.flatten(0, 1)[:, None], two.along(features)).unflatten(0, (-1, 2))
         at = [anchor for some in self.anchors for anchor in some]
         now = torch.stack([ways[pair, :, frame] for pair, frame in zip(owner, at, strict=True)])
         rows = torch.tensor([2 * pair + person for pair in owner for person in (0, 1)], device=denoised.device)
@@ -162,11 +163,11 @@ def _spread(at: Sequence[int], frames: int) -> Tensor:
 def _lacking(now: Tensor, asked: Tensor) -> Tensor:
     """(rows, 3): what the second person's facing, x and z lack, relative to the first; from poses (rows, 2, 4)."""
     first, second = now[:, 0], now[:, 1]
-    there = two.seen(asked[:, 0], asked[:, 1])
-    turn = two.seen(two.seen(first, second), there)
+    there = relative(asked[:, 0], asked[:, 1])
+    turn = relative(relative(first, second), there)
     angle = torch.atan2(turn[:, 1], turn[:, 0])
     first, second = _turned(first, -angle / 2), _turned(second, angle / 2)
-    line = two.compose(first, there)[:, 2:] - first[:, 2:]
+    line = compose(first, there)[:, 2:] - first[:, 2:]
     return torch.cat([angle[:, None], line - (second - first)[:, 2:]], dim=1)
 
 

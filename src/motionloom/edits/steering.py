@@ -22,6 +22,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT, WIDTH
 from motionloom.goals.goal import Goal, turn_between
+from motionloom.ground import turned
 from motionloom.kinematics import costs
 from motionloom.motion import heading
 from motionloom.skeleton import SMPL22
@@ -157,10 +158,16 @@ def _plan(goal: Goal, first: int, width: float) -> _Plan:
     )  # fmt: skip
 
 
-def _times(first: NDArray[Any], second: NDArray[Any]) -> NDArray[Any]:
-    """The matrix product, by torch: numpy would start threads of its own, which then wait, on the cores that the
-    network's threads need for its next estimate."""
-    return (torch.from_numpy(first) @ torch.from_numpy(second)).numpy()
+def product(matrix: Array, values: NDArray[Any]) -> NDArray[Any]:
+    """A real matrix (rows, n) times values (n,) or (n, columns), real or complex.
+
+    By torch: numpy would start threads of its own, which then wait, on the cores that the network's threads need for
+    its next estimate. Complex numbers go as two real columns each, so that the matrix stays real.
+    """
+    if np.iscomplexobj(values):
+        columns = values.reshape(len(values), -1).view(np.float64)
+        return product(matrix, columns).view(np.complex128).reshape(len(matrix), *values.shape[1:])
+    return (torch.from_numpy(matrix) @ torch.from_numpy(values)).numpy()
 
 
 def _bell(frames: int, width: float) -> Array:
@@ -244,7 +251,7 @@ class _Estimate:
 
     def world(self) -> Array:
         """(frames, 22, 3) metres."""
-        places = _turned(self.local, self.facing[:-1, None])
+        places = turned(self.local, self.facing[:-1, None])
         places[..., [0, 2]] += self.path[:-1, None]
         return places
 
@@ -253,7 +260,7 @@ def _bent(features: Array, plan: _Plan, known: int) -> Array:
     """Features (frames, 263), not standardised, changed to meet the goal; of which some are ``known``."""
     denoised = _decoded(features, plan.first)
     error = np.where(plan.goal.asked, plan.goal.positions - denoised.world(), 0.0)
-    path = denoised.path + _times(plan.move, _asked_of_root(denoised.world(), error, plan.goal)[plan.moving])
+    path = denoised.path + product(plan.move, _asked_of_root(denoised.world(), error, plan.goal)[plan.moving])
     facing = denoised.facing + _turning_with(denoised.path, path, plan.first)
     denoised = replace(denoised, path=path, facing=facing)
     goal = plan.goal
@@ -261,11 +268,11 @@ def _bent(features: Array, plan: _Plan, known: int) -> Array:
         places = denoised.world()
         room, local = room_above(places), denoised.local.copy()
         need = np.minimum(out_of_reach(places, goal), room)[plan.lifting]
-        local[..., 1] += np.outer(_times(plan.lift, need), _CARRIED)
+        local[..., 1] += np.outer(product(plan.lift, need), _CARRIED)
         goal, denoised = lowered(goal, places, room), replace(denoised, local=local)
     if len(plan.turning):
         denoised = replace(
-            denoised, facing=facing + _times(plan.turn, _facing_error(denoised.world(), plan.goal)[plan.turning])
+            denoised, facing=facing + product(plan.turn, _facing_error(denoised.world(), plan.goal)[plan.turning])
         )
     error = np.where(goal.asked, goal.positions - denoised.world(), 0.0)
     far = np.linalg.norm(error[:, 1:], axis=-1, keepdims=True)
@@ -275,14 +282,14 @@ def _bent(features: Array, plan: _Plan, known: int) -> Array:
         if limbs is None:
             continue
         pull = np.zeros(error.shape[:2])
-        pull[limbs.asked] = _times(limbs.inverse, error[..., c][limbs.asked])
-        change[..., c] = _times(plan.body, pull @ limbs.together)
+        pull[limbs.asked] = product(limbs.inverse, error[..., c][limbs.asked])
+        change[..., c] = product(plan.body, product(pull, limbs.together))
         if c != 1:
-            path[:, c // 2] += _times(plan.still, pull.sum(1))
-    local = denoised.local + _turned(change, -denoised.facing[:-1, None])
+            path[:, c // 2] += product(plan.still, pull.sum(1))
+    local = denoised.local + turned(change, -denoised.facing[:-1, None])
     denoised = replace(denoised, path=path, local=local)
     steps = _standing(denoised.world(), features[:, LAYOUT["contacts"]], plan.goal, known)
-    local = local + _turned(steps, -denoised.facing[:-1, None])
+    local = local + turned(steps, -denoised.facing[:-1, None])
     return _encoded(features, replace(denoised, local=local))
 
 
@@ -291,7 +298,7 @@ def standing(features: Array, first: int) -> Array:
     they stand; a foot that stands before frame ``first`` stays in its place."""
     denoised = _decoded(features, first)
     steps = _standing(denoised.world(), features[:, LAYOUT["contacts"]], Goal.nothing(len(features)), first)
-    return _encoded(features, replace(denoised, local=denoised.local + _turned(steps, -denoised.facing[:-1, None])))
+    return _encoded(features, replace(denoised, local=denoised.local + turned(steps, -denoised.facing[:-1, None])))
 
 
 def _standing(places: Array, contacts: Array, goal: Goal, known: int) -> Array:
@@ -316,7 +323,7 @@ def _decoded(features: Array, first: int) -> _Estimate:
     facing -= facing[first]
     steps = np.zeros((len(features), 3))
     steps[:, [0, 2]] = features[:, 1:3]
-    path = np.concatenate([np.zeros((1, 2)), np.cumsum(_turned(steps, facing[1:])[:, [0, 2]], axis=0)])
+    path = np.concatenate([np.zeros((1, 2)), np.cumsum(turned(steps, facing[1:])[:, [0, 2]], axis=0)])
     local = np.zeros((len(features), len(SMPL22), 3))
     local[:, 0, 1] = features[:, 3]
     local[:, 1:] = features[:, LAYOUT["ric"]].reshape(len(features), -1, 3)
@@ -329,7 +336,7 @@ def _encoded(old: Array, denoised: _Estimate) -> Array:
     steps = np.zeros((len(old), 3))
     steps[:, [0, 2]] = np.diff(denoised.path, axis=0)
     new[:, 0] = -np.diff(denoised.facing) / 2
-    new[:, 1:3] = _turned(steps, -denoised.facing[1:])[:, [0, 2]]
+    new[:, 1:3] = turned(steps, -denoised.facing[1:])[:, [0, 2]]
     new[:, 3] = denoised.local[:, 0, 1]
     new[:, LAYOUT["ric"]] = denoised.local[:, 1:].reshape(len(old), -1)
     before, after = (humanml.displacements(torch.from_numpy(part)).numpy() for part in (old, new))
@@ -364,16 +371,10 @@ def _turning_with(old: Array, new: Array, first: int) -> Array:
     ways = [np.append(way, way[-1]) for way in ways]
     turn = ways[1] * ways[0].conj()
     kernel = _bell(len(turn), _TURN_OVER)
-    turn = averaged(kernel, turn) + kernel.sum(1) * _SLOW**2  # where nobody goes anywhere nothing turns
+    turn = product(kernel, turn) + kernel.sum(1) * _SLOW**2  # where nobody goes anywhere nothing turns
     angle = np.unwrap(np.angle(turn))
     start = np.arange(len(turn)) - first
     return (angle - 2 * np.pi * np.round(angle[first] / (2 * np.pi))) * (1 - np.exp(-0.5 * (start / _TURN_OVER) ** 2))
-
-
-def averaged(kernel: Array, values: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """(frames,) complex numbers times (frames, frames) real ones. As two real products, because numpy makes the kernel
-    complex else, and shares that out to threads that take far longer to wake than it takes to multiply."""
-    return (kernel @ values.view(np.float64).reshape(-1, 2)).view(np.complex128)[:, 0]
 
 
 def _facing_error(places: Array, goal: Goal) -> Array:
@@ -382,13 +383,6 @@ def _facing_error(places: Array, goal: Goal) -> Array:
     at = np.flatnonzero(goal.facing_asked)
     error[at] = np.unwrap(turn_between(goal.facing[at], heading(places)[at]))
     return error
-
-
-def _turned(points: Array, facing: Array) -> Array:
-    """Points (..., 3) of somebody who faces ``facing`` (...) in the frame of somebody who faces +Z."""
-    c, s = np.cos(facing), np.sin(facing)
-    x, z = points[..., 0], points[..., 2]
-    return np.stack([c * x + s * z, points[..., 1], c * z - s * x], axis=-1)
 
 
 _SLACKS = np.array([0.0, *(_SLACK.get(joint, costs.TRUNK_SLACK) for joint in range(1, len(SMPL22)))])

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from motionloom import rotations as rot
+from motionloom.blending import hermite
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FEET, FPS, LAYOUT, WIDTH
 from motionloom.features.layout import mask as mask
@@ -193,8 +194,7 @@ def positions_at(positions: np.ndarray, at: np.ndarray) -> Array:
     low = np.clip(np.floor(at).astype(int), 0, len(x) - 2)
     u = (at - low)[:, None, None]
     tangents = np.gradient(x, axis=0)
-    h00, h10 = 2 * u**3 - 3 * u**2 + 1, u**3 - 2 * u**2 + u
-    h01, h11 = 3 * u**2 - 2 * u**3, u**3 - u**2
+    h00, h10, h01, h11 = hermite(u)
     inside = h00 * x[low] + h10 * tangents[low] + h01 * x[low + 1] + h11 * tangents[low + 1]
     return np.where((u < 0) | (u > 1), x[low] + u * (x[low + 1] - x[low]), inside)
 

@@ -16,7 +16,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motionloom._moved import say
+from motionloom._moved import old_names, say
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.humanml import Heading, recover_root
@@ -28,8 +28,9 @@ from motionloom.retarget import to_smpl22
 from motionloom.retarget.anatomy import read_body
 
 Array = NDArray[np.float64]
-seen, put, told_from, upright = relative, to_world, from_world, normalized
-"""Old names, for one release."""
+__getattr__ = old_names(
+    __name__, {"seen": "relative", "put": "to_world", "told_from": "from_world", "upright": "normalized"}
+)
 __all__ = ["compose", "mirrored"]
 
 

@@ -7,9 +7,8 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import resample_positions
-from motionloom.goals.goal import FPS, Goal, body_facing
-from motionloom.ground import GroundPose
-from motionloom.motion import Motion
+from motionloom.goals.goal import FPS, Goal
+from motionloom.motion import Motion, ground_pose
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 
@@ -44,8 +43,3 @@ def tracks(positions: np.ndarray, joints: Sequence[int], *, frames: int, at: Seq
         goal.positions[rows, joint] = positions[rows, joint]
         goal.asked[rows, joint] = True
     return replace(goal, start=ground_pose(positions[0]))
-
-
-def ground_pose(places: np.ndarray) -> GroundPose:
-    """Where a person of places (22, 3) stands."""
-    return GroundPose.of(places[0], body_facing(places))

@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from motionloom._moved import old_names
 from motionloom.errors import MotionloomError
 from motionloom.ground import GroundPose
+from motionloom.motion import ground_pose
 from motionloom.skeleton import SMPL22
 
 Array = NDArray[np.float64]
@@ -23,11 +25,8 @@ AGREE_TURN = np.radians(5.0)
 """Radians: the same for directions."""
 SET_OUT = 0.05
 """Metres from its beginning at which a path shows its first direction."""
+__getattr__ = old_names(__name__, {"Placement": "GroundPose", "placement_of": "start_of"})
 _ACROSS = list(SMPL22.resolve(["left_hip", "right_hip", "left_shoulder", "right_shoulder"]))
-
-
-Placement = GroundPose
-"""The old name of `GroundPose`, for one release."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +42,7 @@ class Goal:
     facing_asked: Flags
     """(frames,)"""
     start: GroundPose | None = None
-    """The ground pose at frame 0, where that is known; no target: without it `placement_of` goes by the targets."""
+    """The ground pose at frame 0, where that is known; no target: without it `start_of` goes by the targets."""
 
     def __post_init__(self) -> None:
         frames = len(self.positions)
@@ -106,7 +105,7 @@ class Goal:
         return self.seen_from(place.inverse())
 
 
-def placement_of(goal: Goal) -> GroundPose:
+def start_of(goal: Goal) -> GroundPose:
     """The person's ground pose at frame 0: `Goal.start` or, without it, what the targets say.
 
     The place is the pelvis's, the direction that of the facing asked at frame 0, else of the hips and shoulders asked
@@ -122,20 +121,13 @@ def _first_facing(goal: Goal) -> float:
     if goal.facing_asked[0]:
         return float(goal.facing[0])
     if goal.asked[0, _ACROSS][:, [0, 2]].all():
-        return body_facing(goal.positions[0])
+        return ground_pose(goal.positions[0]).facing
     on_path = np.flatnonzero(goal.asked[:, 0][:, [0, 2]].all(axis=-1))
     if len(on_path) == 0 or on_path[0] != 0:
         return 0.0
     way = goal.positions[on_path, 0][:, [0, 2]] - goal.positions[0, 0, [0, 2]]
     away = np.flatnonzero(np.linalg.norm(way, axis=-1) > SET_OUT)
     return float(np.arctan2(*way[away[0]])) if len(away) else 0.0
-
-
-def body_facing(positions: np.ndarray) -> float:
-    """Radians: where a person of places (22, 3) faces, square to hips and shoulders together (HumanML3D's rule)."""
-    left_hip, right_hip, left_shoulder, right_shoulder = positions[_ACROSS]
-    across = left_hip - right_hip + left_shoulder - right_shoulder
-    return float(np.arctan2(-across[2], across[0]))
 
 
 def joined(first: Goal, second: Goal) -> Goal:

@@ -17,13 +17,14 @@ from motionloom.errors import MotionloomError
 from motionloom.features.humanml import resample_positions
 from motionloom.goals.drawing import read_drawing
 from motionloom.goals.fields import Field, listed
-from motionloom.goals.following import follow, ground_pose, tracks
-from motionloom.goals.goal import FPS, Goal, merged, placement_of, turn_between
+from motionloom.goals.following import follow, tracks
+from motionloom.goals.goal import FPS, Goal, merged, start_of, turn_between
 from motionloom.goals.paths import CURVES, WALKING, curve, lengths_along, root_path, through, turned_to
 from motionloom.goals.reach import check_reach
 from motionloom.ground import GroundPose
 from motionloom.io import load
 from motionloom.io.text import read_text
+from motionloom.motion import ground_pose
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 
@@ -259,7 +260,7 @@ class _Reader:
                 f"begins {apart:.2f} m away from the 'start' at {start.position[0]:g}, {start.position[1]:g}; drop the "
                 "start, or let the path begin there"
             )
-        own = placement_of(goal.crop(first, len(goal))).facing
+        own = start_of(goal.crop(first, len(goal))).facing
         if start.facing is None:
             return goal, replace(start, facing=own)
         if first == 0 and goal.facing_asked[0] and abs(turn_between(own, start.facing)) > np.radians(5):

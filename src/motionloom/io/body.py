@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.motion import Motion
-from motionloom.skeleton import Skeleton
 from motionloom.viz.figure import Figure, figure
 
 Array = NDArray[np.float64]
@@ -76,16 +75,8 @@ def _bone(motion: Motion, shape: Figure, world: Array, i: int) -> Piece | None:
     tip = _seen(shape, world, parent, shape.places[:, child])
     piece = _loft(parent, shape.sides[child], np.stack([np.zeros(3), tip]), np.repeat(shape.radii[i], 2).reshape(2, 2))
     below = motion.skeleton.children(child)
-    foot = set(below) <= motion.skeleton.ends and set(shape.hips[:-1]) & set(_ancestors(motion.skeleton, parent))
+    foot = set(below) <= motion.skeleton.ends and set(shape.hips[:-1]) & set(motion.skeleton.ancestors(parent))
     return _with_sole(piece, shape, world, child) if piece is not None and foot else piece
-
-
-def _ancestors(skeleton: Skeleton, joint: int) -> list[int]:
-    """The joint and all above it."""
-    line = [joint]
-    while skeleton.parents[line[-1]] >= 0:
-        line.append(skeleton.parents[line[-1]])
-    return line
 
 
 def _with_sole(piece: Piece, shape: Figure, world: Array, toe: int) -> Piece:

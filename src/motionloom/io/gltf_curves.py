@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.blending import hermite
 from motionloom.io.glb import Document
 from motionloom.io.text import shown
 
@@ -166,6 +167,7 @@ def sample(curve: Curve, times: Array, fps: float, *, turn: bool) -> Array:
     assert curve.arriving is not None
     assert curve.leaving is not None
     wide = gap[:, None]
-    result = (2 * s**3 - 3 * s**2 + 1) * a + (s**3 - 2 * s**2 + s) * wide * curve.leaving[low]
-    result += (3 * s**2 - 2 * s**3) * b + (s**3 - s**2) * wide * curve.arriving[high]
+    first, leaving, last, arriving = hermite(s)
+    result = first * a + leaving * wide * curve.leaving[low]
+    result += last * b + arriving * wide * curve.arriving[high]
     return rot.normalize(result) if turn else result

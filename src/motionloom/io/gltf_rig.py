@@ -99,8 +99,6 @@ def read_rig(
     _check_scales(document, nodes, [*above, *(n for n in order if n in inner)])  # of a last bone nothing else depends
     rest = worlds(nodes, parents, [*above, *order], {})
     turns, places = _bound(document, nodes, parents, order, rest)
-    if not all(np.isfinite(p).all() and np.abs(p).max() < FAR for p in places.values()):
-        raise document.bad(f"a joint is more than {FAR:g} m away; check the units")
     known = humanoid_nodes(document, len(nodes))
     names = dict(zip(order, unique_names([nodes[n].name for n in order])))
     hung = _hung(order, parents, names, places, known)
@@ -172,14 +170,15 @@ def _bound(
     turns = {n: rest.turns[n][0] for n in order}
     places = {n: rest.places[n][0] for n in order}
     bound = _bind_turns(document, rest, set(order), len(nodes))
-    if not any(_angle(bound[n], turns[n]) > _SAME_TURN for n in bound):
-        return turns, places
-    for n in order[1:]:
-        p = parents[n]
-        linear = rest.linear[p]
-        size = 1.0 if linear is None else float(np.cbrt(np.linalg.det(linear[0])))
-        places[n] = places[p] + rot.rotate(turns[p], nodes[n].place * size)
-        turns[n] = bound.get(n, rot.multiply(turns[p], nodes[n].turn))
+    if any(_angle(bound[n], turns[n]) > _SAME_TURN for n in bound):
+        for n in order[1:]:
+            p = parents[n]
+            linear = rest.linear[p]
+            size = 1.0 if linear is None else float(np.cbrt(np.linalg.det(linear[0])))
+            places[n] = places[p] + rot.rotate(turns[p], nodes[n].place * size)
+            turns[n] = bound.get(n, rot.multiply(turns[p], nodes[n].turn))
+    if not all(np.isfinite(p).all() and np.abs(p).max() < FAR for p in places.values()):
+        raise document.bad(f"a joint is more than {FAR:g} m away; check the units")
     return turns, places
 
 

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.blending import smoothstep
-from motionloom.goals.goal import Goal, Placement, turn_between
+from motionloom.goals.goal import Goal, turn_between
 from motionloom.goals.paths import WALKING, even, lengths_along
+from motionloom.ground import GroundPose
 from motionloom.live.commands import Path, Steer
 
 Array = NDArray[np.float64]
@@ -37,7 +38,7 @@ BRAKING = 1.0
 class Course:
     """Where somebody is and how he moves in the first frame that can be changed."""
 
-    place: Placement
+    place: GroundPose
     velocity: tuple[float, float]
     """Metres a frame, x and z in the world."""
 

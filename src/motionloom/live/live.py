@@ -23,7 +23,7 @@ from motionloom.live.commands import Command, Taken
 from motionloom.live.person import Asked, Person, Request, State
 from motionloom.live.settings import Settings
 from motionloom.live.threads import one_thread
-from motionloom.live.window import Drawer, Noise
+from motionloom.live.window import Noise, Sampler
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.text import LARGEST_SEED
@@ -283,13 +283,13 @@ class Live(Stage[Frame], Asked):
         check(prior, seed)
         chosen = settings or Settings()
         super().__init__([Person(prior, chosen, start=start, skeleton=skeleton)], chosen, fps)
-        self._draw = Drawer(prior, chosen)
+        self._sampler = Sampler(prior, chosen)
         self._noise = Noise(seed, chosen.steps, len(prior.mean))
 
     @property
     def calls(self) -> int:
         """Guided calls of the network so far."""
-        return self._draw.calls
+        return self._sampler.calls
 
     def __next__(self) -> Frame:
         return self.frames()[0]
@@ -301,9 +301,9 @@ class Live(Stage[Frame], Asked):
     def _windows(self, requests: Sequence[Request]) -> None:
         (request,), (person,) = requests, self.people
         count, frames = len(request.known), self.settings.ahead
-        draw = self._noise.draw(self._next - count, count + frames, self._draw.prior.mean.device)
+        noise = self._noise.of(self._next - count, count + frames, self._sampler.prior.mean.device)
         known = torch.from_numpy(request.known).float()
-        features = self._draw(request.words, known, frames, draw, edits=request.edits, turns=request.turns)
+        features = self._sampler(request.words, known, frames, noise, edits=request.edits, turns=request.turns)
         person.accept(request, features, self._next)
 
 

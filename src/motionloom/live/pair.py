@@ -11,9 +11,8 @@ import torch
 
 from motionloom.diffusion import row_seed
 from motionloom.edits.steering import Correction
-from motionloom.features import pair as two
 from motionloom.features.layout import FPS
-from motionloom.goals.goal import Placement
+from motionloom.ground import GroundPose, relative
 from motionloom.live.commands import Command, Say
 from motionloom.live.live import Frame, Stage, check
 from motionloom.live.person import Person, Request
@@ -21,7 +20,7 @@ from motionloom.live.settings import Settings
 from motionloom.live.window import leaving
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
-from motionloom.tasks.pair import Duet, PairEdits, PairSampling, known_state, pair_features, placement, prompts_of
+from motionloom.tasks.pair import Duet, PairEdits, PairSampling, known_state, pair_features, prompts_of
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
@@ -87,7 +86,7 @@ class LivePair(Stage[tuple[Frame, Frame]]):
         changes: list[Correction | None] = [None, None]
         observed = None
         if count:
-            poses = two.seen(_pose(requests[0].begin), np.stack([_pose(request.begin) for request in requests]))
+            poses = relative(requests[0].begin.numbers(), np.stack([request.begin.numbers() for request in requests]))
             observed = known_state(prior, self._net, known, torch.from_numpy(poses).float(), count + frames)
         for i, request in enumerate(requests):
             if count or request.edits or request.turns:
@@ -101,12 +100,7 @@ class LivePair(Stage[tuple[Frame, Frame]]):
         )  # fmt: skip
         self._calls += self.settings.steps
         made = features[0].double().numpy()
-        begins: list[Placement | None] = [None, None] if count else [placement(pose) for pose in sampled[0].numpy()]
+        begins = [None if count else GroundPose.of_numbers(pose) for pose in sampled[0].numpy()]
         for i, (person, request) in enumerate(zip(self.people, requests, strict=True)):
             window = np.concatenate([request.known, made[i, count:]])
             person.accept(request, window, self._next, begins[i])
-
-
-def _pose(place: Placement) -> np.ndarray:
-    """(4,) as of `features.pair`."""
-    return np.array([np.cos(place.facing), np.sin(place.facing), place.x, place.z])

@@ -14,14 +14,15 @@ from motionloom.edits.heading import heading_for
 from motionloom.edits.steering import Correction, toward
 from motionloom.features import humanml
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
-from motionloom.goals.goal import Goal, Placement, body_facing, overlaid
+from motionloom.goals.goal import Goal, overlaid
 from motionloom.goals.paths import WALKING
+from motionloom.ground import GroundPose
 from motionloom.live.body import body, put
 from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer
 from motionloom.live.course import ARRIVED, Course, Trail, braking, steered
 from motionloom.live.settings import Settings
 from motionloom.live.words import STANDS, for_pace, is_standing
-from motionloom.motion import Motion
+from motionloom.motion import Motion, ground_pose
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.long import Past
 from motionloom.weights.prior import Prior
@@ -68,8 +69,7 @@ class Asked(ABC):
         """
         if isinstance(places, Motion):
             seen = places.frames(0, 1).positions()
-            there = Placement(float(seen[0, 0, 0]), float(seen[0, 0, 2]), body_facing(seen[0]))
-            places = there.from_world(seen)[0]
+            places = ground_pose(seen[0]).from_world(seen)[0]
         self.ask(Pose(tuple(map(tuple, np.asarray(places, dtype=np.float64).tolist())), within))
 
 
@@ -79,12 +79,12 @@ class Request:
 
     known: Array
     """(frames, 263) features of the last frames, not standardised."""
-    begin: Placement
+    begin: GroundPose
     """Where the person is in the first of them."""
     words: str
     edits: list[Correction]
     turns: list[Correction]
-    """As of `window.Drawer`."""
+    """As of `window.Sampler`."""
     again: int
     """Frames after which to sample again."""
     taken: list[Command]
@@ -98,7 +98,7 @@ class _Plan:
     first: int
     features: Array
     """(frames, 263), not standardised."""
-    places: list[Placement]
+    places: list[GroundPose]
     """Where the person is in each frame, one more than there are frames."""
     motion: Motion
     shown: Motion
@@ -181,7 +181,7 @@ class Person(Asked):
 
     def request(self, frame: int, *, take: bool) -> Request:
         """What the window from ``frame`` on must be; with ``take`` what was asked is taken up."""
-        known, begin = np.zeros((0, WIDTH)), Placement()
+        known, begin = np.zeros((0, WIDTH)), GroundPose()
         if (plan := self._plan) is not None:
             end = frame - plan.first
             known = plan.features[max(0, end - self._settings.known) : end]
@@ -200,7 +200,7 @@ class Person(Asked):
             turns.append(heading_for(self._steer.direction - course.place.facing, self._prior, first=len(known)))
         return Request(known, begin, words, edits, turns, again, taken)
 
-    def accept(self, request: Request, features: Array, frame: int, begin: Placement | None = None) -> None:
+    def accept(self, request: Request, features: Array, frame: int, begin: GroundPose | None = None) -> None:
         """Take a window (known and sampled frames, 263) for the plan; ``begin`` where nothing was known."""
         count = len(request.known)
         positions, contacts, places = decoded(features, begin or request.begin)
@@ -263,24 +263,24 @@ class Person(Asked):
         return goal, words or STANDS, again
 
 
-def decoded(features: Array, begin: Placement) -> tuple[Array, Array, list[Placement]]:
+def decoded(features: Array, begin: GroundPose) -> tuple[Array, Array, list[GroundPose]]:
     """Places (frames, 22, 3) in the world, contacts (frames, 4), and where the person is, one frame more."""
     longer = np.concatenate([features, features[-1:]])
     positions = begin.to_world(humanml.decode_positions(longer))
     facing = begin.facing - 2 * np.concatenate([[0.0], np.cumsum(features[:, 0])])
-    places = [Placement(float(p[0, 0]), float(p[0, 2]), float(f)) for p, f in zip(positions, facing, strict=True)]
+    places = [GroundPose(float(p[0, 0]), float(p[0, 2]), float(f)) for p, f in zip(positions, facing, strict=True)]
     return positions[:-1], features[:, LAYOUT["contacts"]], places
 
 
-def _back(features: Array, end: Placement) -> Placement:
+def _back(features: Array, end: GroundPose) -> GroundPose:
     """Where the person was in the first of some frames behind which he is at ``end``."""
-    last = decoded(features, Placement())[2][-1]
+    last = decoded(features, GroundPose())[2][-1]
     turn = end.facing - last.facing
-    x, _, z = Placement(facing=turn).to_world(np.array([last.x, 0.0, last.z]))
-    return Placement(end.x - float(x), end.z - float(z), turn)
+    x, _, z = GroundPose(facing=turn).to_world(np.array([last.x, 0.0, last.z]))
+    return GroundPose(end.x - float(x), end.z - float(z), turn)
 
 
-def _course(known: Array, begin: Placement) -> Course:
+def _course(known: Array, begin: GroundPose) -> Course:
     if not len(known):
         return Course(begin, (0.0, 0.0))
     places = decoded(known, begin)[2]

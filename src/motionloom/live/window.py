@@ -35,8 +35,8 @@ class Noise:
         self._shape = 2 * moves + 2, features  # each move takes noise, and what is known is shown at noise of its own
         self._kept: dict[int, Tensor] = {}
 
-    def draw(self, first: int, frames: int, device: torch.device) -> NoiseSource:
-        """The noise of the frames from ``first`` on, for one walk: call number k gets that of its k-th draw."""
+    def of(self, first: int, frames: int, device: torch.device) -> NoiseSource:
+        """The noise of the frames from ``first`` on, for one walk: its k-th call gets the k-th part."""
         self._kept = {number: kept for number, kept in self._kept.items() if number >= first}
         for number in range(first, first + frames):
             if number not in self._kept:
@@ -47,8 +47,8 @@ class Noise:
         return lambda like: whole[next(calls)][None].to(like)
 
 
-class Drawer:
-    """Draws windows with one prior; keeps the vectors of what was said last."""
+class Sampler:
+    """Samples windows with one prior; keeps the vectors of what was said last."""
 
     def __init__(self, prior: Prior, settings: Settings) -> None:
         self.prior, self.settings = prior, settings
@@ -63,15 +63,15 @@ class Drawer:
         text: str,
         known: Tensor,
         frames: int,
-        draw: NoiseSource,
+        noise: NoiseSource,
         *,
         edits: Sequence[Correction] = (),
         turns: Sequence[Correction] = (),
     ) -> np.ndarray:
         """(known + frames, 263) float64 features, not standardised, the known ones as they were.
 
-        text: what is done; known: (n, 263) features of the last frames, n may be 0; frames: how many to sample; draw:
-        of `Noise.draw`, for all frames of the window; edits: what every estimate goes through, one after the other,
+        text: what is done; known: (n, 263) features of the last frames, n may be 0; frames: how many to sample; noise:
+        of `Noise.of`, for all frames of the window; edits: what every estimate goes through, one after the other,
         before it is made to leave the known frames without a jump; turns: the same behind that, for edits that jump
         nowhere.
         """
@@ -91,11 +91,11 @@ class Drawer:
         def poses(clean: Tensor) -> np.ndarray:
             return humanml.decode_positions((clean * spread + prior.mean).cpu().double().numpy()[0])[None, None]
 
-        hold = observe(data, mask, prior.schedule, draw)
-        state = hold(draw(data), self._levels[0])
+        hold = observe(data, mask, prior.schedule, noise)
+        state = hold(noise(data), self._levels[0])
         walk = sample(
             denoise, state, levels=self._levels, solver=SOLVERS[self.settings.solver], schedule=prior.schedule,
-            draw=draw, constrain=hold,
+            noise=noise, constrain=hold,
         )  # fmt: skip
         for done, snapshot in enumerate(walk, start=1):
             state = snapshot.state

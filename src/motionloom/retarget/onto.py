@@ -76,10 +76,8 @@ def match_root(old: Motion, made: Motion) -> Motion:
     parent = old.skeleton.parents[carrier]
     above, place = old.world_rotations()[:, parent], old.positions()[:, parent]
     rotations, translations = made.rotations.copy(), old.translations.copy()
-    chain = parent
-    while chain >= 0:
-        rotations[:, chain] = old.rotations[:, chain]
-        chain = old.skeleton.parents[chain]
+    chain = old.skeleton.ancestors(parent)
+    rotations[:, chain] = old.rotations[:, chain]
     undo = rot.inverse(above)
     rotations[:, carrier] = rot.multiply(undo, made.world_rotations()[:, carrier])
     translations[:, carrier] = rot.rotate(undo, made.positions()[:, carrier] - place)

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.goal import Goal, body_facing, placement_of
-from motionloom.ground import GroundPose
-from motionloom.motion import Motion
+from motionloom.goals.goal import Goal, start_of
+from motionloom.motion import Motion, ground_pose
 from motionloom.retarget import to_smpl22
 from motionloom.server.asking import Request
 from motionloom.tasks import duet, long, pair, text
@@ -261,9 +260,7 @@ def placed(request: Request, poses: Array) -> Array:
     """Poses (people, frames, 22, 3) of `watching` in the world of the finished motion."""
     if request.goal is None:
         return poses
-    place, person = placement_of(request.goal), request.options["person"] or 0
+    place, person = start_of(request.goal), request.options["person"] or 0
     if request.task != "duet":
         return place.to_world(poses)
-    first = poses[person, 0]
-    here = GroundPose.of(first[0], body_facing(first))
-    return place.to_world(here.from_world(poses))
+    return place.to_world(ground_pose(poses[person, 0]).from_world(poses))

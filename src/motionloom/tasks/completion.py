@@ -16,7 +16,7 @@ from torch import Tensor
 
 from motionloom._moved import renamed
 from motionloom.blending import quintic_decay
-from motionloom.diffusion import SOLVERS, guide, row_draw, row_seed, sample
+from motionloom.diffusion import SOLVERS, guide, row_noise, row_seed, sample
 from motionloom.edits.boundary import match_boundary
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import bone_lengths, with_bones
@@ -72,12 +72,12 @@ def complete(
     def net(x: Tensor, level: int, cond: tuple[Tensor, Tensor]) -> Tensor:
         return predictor.denoiser(*cond)(x, level)
 
-    draw = row_draw(seeds)
-    made = chosen.temperature * draw(torch.empty(len(condition), *predictor.mean.shape, device=condition.device))
+    noise = row_noise(seeds)
+    made = chosen.temperature * noise(torch.empty(len(condition), *predictor.mean.shape, device=condition.device))
     way = chosen.levels(predictor.schedule)
     walk = sample(
         guide(net, (condition, yes), (condition, no), chosen.guidance), made,
-        levels=way, solver=SOLVERS[chosen.solver], schedule=predictor.schedule, draw=draw,
+        levels=way, solver=SOLVERS[chosen.solver], schedule=predictor.schedule, noise=noise,
     )  # fmt: skip
     if poses is not None:
         view = View(lambda states: poses(predictor.to_features(states, pose)))

@@ -21,7 +21,7 @@ from motionloom.edits.steering import Correction, corrected, toward
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import mask as named
 from motionloom.features.layout import ric
-from motionloom.goals.goal import Goal, placement_of
+from motionloom.goals.goal import Goal, start_of
 from motionloom.goals.segment import LONGEST
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
@@ -83,7 +83,7 @@ def control(
     Args:
         prior: weights that make HumanML3D's 263 numbers.
         prompt: what the person does.
-        goal: in the world, metres, at 20 frames per second; the person stands at its `placement_of` in frame 0.
+        goal: in the world, metres, at 20 frames per second; the person stands at its `start_of` in frame 0.
         adapters: networks trained to see what is asked, each alone or with its weight (the mean of all by default);
             "fitting" takes the shipped ones that fit (`fitting_adapters`), "none" the prior's own network: the shipped
             ones were measured to make no smaller errors but more jerk (docs/decisions/0012).
@@ -102,7 +102,7 @@ def control(
     longest = round(LONGEST * prior.fps)
     if not 4 <= len(goal) <= longest:
         raise MotionloomError(f"a goal of {len(goal)} frames cannot be followed; one of 4 to {longest} can")
-    place = placement_of(goal)
+    place = start_of(goal)
     nets = fitting_adapters(prior, goal) if adapters == "fitting" else () if adapters == "none" else adapters
     made = steered_features(
         prior, [prompt] * chosen.number(), goal.seen_from(place), seeds=chosen.seeds(chosen.number()), adapters=nets,

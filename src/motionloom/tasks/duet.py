@@ -25,6 +25,7 @@ from motionloom.features.layout import FPS, WIDTH
 from motionloom.features.pair import one_world
 from motionloom.goals.goal import Goal
 from motionloom.goals.segment import LONGEST, Segment
+from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.nets.pair import PLACE, PairNet, join, part
 from motionloom.nets.prior import PriorNet
@@ -43,7 +44,6 @@ from motionloom.tasks.pair import (
     pair_features,
     pair_seeds,
     person_seeds,
-    placement,
     poses_at,
     prompts_of,
     stacked,
@@ -111,8 +111,8 @@ def react(
     floor, made = _floor(given), []
     at = np.arange(len(given)) / given.fps * FPS
     for numbers, standing in zip(features, sampled.double().numpy(), strict=True):
-        other_pose = poses_at(standing, placement(poses[0]), 0)[1]
-        other = moved(finish(prior, numbers[1], foot_lock=foot_lock), placement(other_pose)).at(at, given.fps)
+        other_pose = GroundPose.of_numbers(poses_at(standing, GroundPose.of_numbers(poses[0]), 0)[1])
+        other = moved(finish(prior, numbers[1], foot_lock=foot_lock), other_pose).at(at, given.fps)
         height = np.array([0.0, floor, 0.0])
         made.append((given, replace(other, root=other.root * [ratio, 1.0, ratio] + height)))
     return made
@@ -175,7 +175,7 @@ def compose_pair(
     people = [
         solve_stream(
             in_world(
-                prior, _of(pieces[i], i), deque(segment.goal for segment in asked[i]), placement(poses[i]),
+                prior, _of(pieces[i], i), deque(segment.goal for segment in asked[i]), GroundPose.of_numbers(poses[i]),
                 track if i == person else None,
             ),
             prior.fps, foot_lock=foot_lock,

@@ -17,7 +17,7 @@ from motionloom.edits.boundary import InpaintWindow, arrival, joining
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT
 from motionloom.ground import GroundPose
-from motionloom.kinematics.physics import heading
+from motionloom.motion import ground_pose
 from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, Sampling, sample, smooth
 from motionloom.tasks.watching import View
 from motionloom.weights.prior import Prior
@@ -43,7 +43,7 @@ def inpaint_motion(
 
     An empty text asks for nothing in particular. Frames from 0 on are placed by what follows them.
     """
-    place = _placement(window.positions)
+    place = ground_pose(window.positions[0])
     known = torch.from_numpy(humanml.encode(place.from_world(window.positions))).to(prior.mean)[None]
     mask = torch.ones_like(known, dtype=torch.bool)
     mask[:, window.first : window.last] = torch.from_numpy(window.keep).to(mask.device)
@@ -68,10 +68,6 @@ def inpaint_motion(
     made = reach(meet(torch.where(mask, known, smooth(made) if prior.net.config.patch > 1 else made)))
     features = made[0].cpu().double()
     return Inpainted(_placed(features, known[0].cpu().double(), window, place), features[:, LAYOUT["contacts"]].numpy())
-
-
-def _placement(positions: Array) -> GroundPose:
-    return GroundPose(float(positions[0, 0, 0]), float(positions[0, 0, 2]), float(heading(positions[:1])[0]))
 
 
 def _placed(features: Tensor, known: Tensor, window: InpaintWindow, place: GroundPose) -> Array:

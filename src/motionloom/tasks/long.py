@@ -26,12 +26,11 @@ from motionloom.edits.steering import Correction, toward
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
-from motionloom.goals.goal import Goal, merged, overlaid, placement_of
+from motionloom.goals.goal import Goal, merged, overlaid, start_of
 from motionloom.goals.paths import along
 from motionloom.goals.segment import Segment
 from motionloom.ground import GroundPose
-from motionloom.kinematics.physics import heading
-from motionloom.motion import Motion
+from motionloom.motion import Motion, ground_pose
 from motionloom.nets.prior import Bound, PriorNet
 from motionloom.tasks.adapting import AdaptedPriors, loaded
 from motionloom.tasks.body import Places, solve_stream
@@ -301,8 +300,7 @@ class Past:
                 f"the motion to go on from is {motion.seconds:.2f} s long; at least {LOOK_BACK / FPS:g} s are needed"
             )
         positions = positions[-LOOK_BACK - 1 :]
-        x, _, z = positions[0, 0]
-        begin = GroundPose(float(x), float(z), float(heading(positions[:1])[0]))
+        begin = ground_pose(positions[0])
         known = humanml.encode(begin.from_world(positions)).astype(np.float64)
         return Past(torch.from_numpy(known).float(), decoded(known, begin)[1])
 
@@ -339,7 +337,7 @@ class Track:
     def place(self, frame: int) -> GroundPose:
         """Where the person is at that frame."""
         if frame == 0:
-            return placement_of(self.path)
+            return start_of(self.path)
         x, _, z = self.path.positions[frame, 0]
         return GroundPose(float(x), float(z), float(self.ways[frame]))
 

@@ -15,7 +15,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from motionloom._moved import renamed, say
-from motionloom.diffusion import Denoiser, NoiseSource, row_draw, row_seed
+from motionloom.diffusion import Denoiser, NoiseSource, row_noise, row_seed
 from motionloom.edits.fitting import fit
 from motionloom.edits.relative_pose import relative_pose_guidance
 from motionloom.edits.steering import Correction, corrected_rows, toward
@@ -24,9 +24,9 @@ from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
 from motionloom.features.pair import one_world, together
-from motionloom.goals.goal import Goal, placement_of
+from motionloom.goals.goal import Goal, start_of
 from motionloom.goals.segment import LONGEST
-from motionloom.ground import GroundPose
+from motionloom.ground import GroundPose, compose, relative
 from motionloom.motion import Motion
 from motionloom.nets.pair import PairNet, join, part
 from motionloom.retarget import to_smpl22
@@ -131,7 +131,7 @@ def pair_features(
 
     silent = not any(prompt.strip() for prompt in prompts)
     how = replace(chosen, batch_size=2 * chosen.batch(PAIRS), guidance=1.0 if silent else chosen.guidance)
-    asked = Rows(prompts, [1 + frames] * rows, seeds, pair_draw)
+    asked = Rows(prompts, [1 + frames] * rows, seeds, pair_noise)
     walk = sample(
         prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress, view=_view(prior, net)
     )  # fmt: skip
@@ -158,9 +158,9 @@ def _view(prior: Prior, net: PairNet) -> View:
     return View(poses, people=2)
 
 
-def pair_draw(seeds: Sequence[int]) -> NoiseSource:
+def pair_noise(seeds: Sequence[int]) -> NoiseSource:
     """Noise of rows' own seeds; a motion gets the noise it has where nobody else is there, the slot before it other."""
-    places, motion = row_draw([row_seed(seed, 0, 1) for seed in seeds]), row_draw(seeds)
+    places, motion = row_noise([row_seed(seed, 0, 1) for seed in seeds]), row_noise(seeds)
     return lambda like: torch.cat([places(like[:, :1]), motion(like[:, 1:])], dim=1)
 
 
@@ -230,7 +230,7 @@ def generate_pair(
         block: what makes two people of one prior.
         prompt: what both do together, or (what the first does, what the second does); ``"A :: B"`` says the same.
         seconds: length; not looked at where there is a goal, which has its own.
-        goals: what the first or the second person is asked to do in the world, who then starts at its `placement_of`;
+        goals: what the first or the second person is asked to do in the world, who then starts at its `start_of`;
             one of the two may have a goal. Without any the first person starts at the origin facing +Z.
         foot_lock: keep planted feet still.
         sampling: or single settings of it as keywords. Duet i depends on ``seed`` and i alone; two seeds are one for
@@ -246,7 +246,7 @@ def generate_pair(
         raise MotionloomError("a prompt is empty; say in words what the two people do")
     check_pair(prior, count=chosen.number(), seconds=len(goal) / FPS if goal else seconds)
     frames = _goal_frames(goal) if goal else frames_in(seconds, prior.fps)
-    place = placement_of(goal) if goal else GroundPose()
+    place = start_of(goal) if goal else GroundPose()
     change: list[Correction | None] = [None, None]
     if goal:
         change[person] = toward(goal.seen_from(place), prior)
@@ -260,7 +260,7 @@ def generate_pair(
         if goal:
             beside = poses_at(beside, place, person)
         people = [finish(prior, one, foot_lock=foot_lock) for one in numbers]
-        duet = [moved(one, placement(pose)) for one, pose in zip(people, beside, strict=True)]
+        duet = [moved(one, GroundPose.of_numbers(pose)) for one, pose in zip(people, beside, strict=True)]
         if goal:
             duet[person] = fit(duet[person], goal)
         made.append((duet[0], duet[1]))
@@ -278,15 +278,9 @@ def _goal_of(goals: tuple[Goal | None, Goal | None], settings: Any) -> tuple[Goa
     return next((goal for goal in goals if goal), None), int(goals[0] is None and goals[1] is not None)
 
 
-def placement(pose: np.ndarray) -> GroundPose:
-    """A ground pose (4,) of `features.pair` as a `GroundPose`."""
-    return GroundPose.of_numbers(pose)
-
-
 def poses_at(poses: Array, place: GroundPose, person: int) -> Array:
     """Ground poses (2, 4) moved rigidly on the ground so that that of ``person`` is ``place``."""
-    there = np.array([np.cos(place.facing), np.sin(place.facing), place.x, place.z])
-    return two.compose(there, two.seen(poses[person], poses))
+    return compose(place.numbers(), relative(poses[person], poses))
 
 
 def _goal_frames(goal: Goal) -> int:

@@ -26,7 +26,7 @@ from motionloom.diffusion import (
     levels,
     observe,
     restart,
-    row_draw,
+    row_noise,
     staggered,
 )
 from motionloom.diffusion import sample as denoising
@@ -216,7 +216,7 @@ class Rows:
     lengths: Sequence[int]
     """Tokens: frames, and one more for two people."""
     seeds: Sequence[int]
-    noise: Callable[[Sequence[int]], NoiseSource] = row_draw
+    noise: Callable[[Sequence[int]], NoiseSource] = row_noise
     """From seeds to the noise of their rows."""
 
     def batches(self, size: int) -> list[list[int]]:
@@ -284,22 +284,23 @@ def sample(
     batches, done = rows.batches(sampling.batch()), 0
     for numbers in batches:
         batch = Batch(numbers, prior.condition([rows.prompts[i] for i in numbers]), [rows.seeds[i] for i in numbers])
-        draw, constrain = rows.noise(batch.seeds), None
+        noise, constrain = rows.noise(batch.seeds), None
         denoise = guide(net, net.bind(batch.cond), net.bind(batch.cond.null()), sampling.guidance)
         if observed is None:
-            state = draw(torch.empty(len(numbers), rows.lengths[numbers[0]], len(prior.mean), device=prior.mean.device))
+            shape = len(numbers), rows.lengths[numbers[0]], len(prior.mean)
+            state = noise(torch.empty(shape, device=prior.mean.device))
         else:
             here = observed.of(numbers, prior.mean.device)
-            noise = torch.zeros_like if here.noise_free else draw
             denoise = inpaint(denoise, here.values, here.mask)
-            constrain = observe(here.values, here.mask, prior.schedule, noise)
+            shown = torch.zeros_like if here.noise_free else noise
+            constrain = observe(here.values, here.mask, prior.schedule, shown)
             whole = here.strength == 1.0
-            state = draw(here.values) if whole else restart(here.values, prior.schedule, way[0], draw)
+            state = noise(here.values) if whole else restart(here.values, prior.schedule, way[0], noise)
             state = constrain(state, way[0])
         for edit in edits:
             denoise = edit(denoise, batch)
         walk = denoising(
-            denoise, state, levels=way, solver=SOLVERS[sampling.solver], schedule=prior.schedule, draw=draw,
+            denoise, state, levels=way, solver=SOLVERS[sampling.solver], schedule=prior.schedule, noise=noise,
             constrain=constrain,
         )  # fmt: skip
         for snapshot in view.reported(walk, len(way) - 1, numbers) if view else walk:
@@ -384,7 +385,7 @@ def sample_chain(
 
     made = staggered(
         links(), reported, levels=way, solver=SOLVERS[sampling.solver], schedule=prior.schedule, features=features,
-        together=sampling.batch(batch_size), moved=progress or (lambda count: None),
+        batch_size=sampling.batch(batch_size), moved=progress or (lambda count: None),
     )  # fmt: skip
     for number, state in enumerate(made):
         yield waiting.pop(number), state

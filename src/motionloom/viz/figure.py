@@ -81,7 +81,7 @@ def figure(motion: Motion) -> Figure:
     places = motion.positions()
     height = body_height(skeleton, places)
     centre = body_start(skeleton, places)
-    body = [j for j in range(len(skeleton)) if centre in _line(skeleton, j)]
+    body = [j for j in range(len(skeleton)) if centre in skeleton.ancestors(j)]
     sides = joint_sides(skeleton)
     head = _head(skeleton, places, body, sides)
     # Eyes and jaw would litter the ball that is the head.
@@ -89,7 +89,7 @@ def figure(motion: Motion) -> Figure:
     bones = tuple(
         (skeleton.parents[j], j)
         for j in body
-        if j != centre and (j in face or not set(_line(skeleton, j)[1:]) & set(face))
+        if j != centre and (j in face or not set(skeleton.ancestors(j)[1:]) & set(face))
     )
     limbs = _limbs(skeleton, places, bones, sides)
     floor = _floor(places[:, body], height)
@@ -98,7 +98,7 @@ def figure(motion: Motion) -> Figure:
     legs = tuple(start for start, _, arm in limbs if not arm)
     chest = _chest(skeleton, arms, centre)
     whole = len(arms) >= 2 and len(legs) >= 2
-    trunk = frozenset(j for limb in (*arms, *legs) for j in _line(skeleton, limb)) if whole else frozenset()
+    trunk = frozenset(j for limb in (*arms, *legs) for j in skeleton.ancestors(limb)) if whole else frozenset()
     return Figure(
         motion.fps,
         places,
@@ -136,14 +136,6 @@ def joint_sides(skeleton: Skeleton) -> tuple[int, ...]:
 def _side_of_name(name: str, other: str) -> int:
     first = next((a.lower() for a, b in zip(name, other) if a != b), "")
     return {"l": 1, "r": -1}.get(first, 0)
-
-
-def _line(skeleton: Skeleton, joint: int) -> list[int]:
-    """The joint and its ancestors, the root last."""
-    line = [joint]
-    while skeleton.parents[line[-1]] >= 0:
-        line.append(skeleton.parents[line[-1]])
-    return line
 
 
 def _lengths(skeleton: Skeleton, places: Array) -> Array:
@@ -198,13 +190,13 @@ def _limbs(
     height = np.median(places[..., 1], axis=0)
     found: list[tuple[int, int, bool]] = []
     for start in (c for p, c in bones if sides[c] != 0 and sides[p] == 0):
-        inside = [j for j in range(len(skeleton)) if start in _line(skeleton, j)]
+        inside = [j for j in range(len(skeleton)) if start in skeleton.ancestors(j)]
         pairs = [(p, j) for j in inside if (p := skeleton.parents[j]) in inside]
         pairs = [(p, j) for p, j in pairs if skeleton.parents[p] >= 0 and skeleton.children(j)]
         if not pairs:
             continue
         best = max(pairs, key=lambda pair: lengths[pair[1]] + max(lengths[c] for c in skeleton.children(pair[1])))
-        tip = max(inside, key=lambda j: len(_line(skeleton, j)))
+        tip = max(inside, key=lambda j: len(skeleton.ancestors(j)))
         rest_drop = height[tip] - height[start]
         found.append((best[0], best[1], bool(rest_drop > -0.35 * np.ptp(height))))
     return found
@@ -214,7 +206,7 @@ def _chest(skeleton: Skeleton, arms: tuple[int, ...], centre: int) -> tuple[int,
     """Shoulders and the joint where their lines meet."""
     if len(arms) < 2:
         return ()
-    shared = [j for j in _line(skeleton, arms[0]) if all(j in _line(skeleton, a) for a in arms[1:])]
+    shared = [j for j in skeleton.ancestors(arms[0]) if all(j in skeleton.ancestors(a) for a in arms[1:])]
     return (*arms, shared[0]) if shared and shared[0] != centre else arms
 
 
@@ -292,7 +284,7 @@ def _radii(
     starts = {joint: (0.030 if arm else 0.046) for joint, _, arm in limbs}
     radii = np.empty((len(bones), 2))
     for i, (_, child) in enumerate(bones):
-        line = _line(skeleton, child)[1:]
+        line = skeleton.ancestors(child)[1:]
         at = next((k for k, j in enumerate(line) if j in starts), None)
         widest = 0.026 if at is None else starts[line[at]] * 0.76**at
         thick = np.clip(0.23 * lengths[child], 0.009 * height, widest * height)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from motionloom.diffusion import SOLVERS, cosine, guide, levels, row_draw, run
+from motionloom.diffusion import SOLVERS, cosine, guide, levels, row_noise, run
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import mask
 from motionloom.lab.papers.diffusion_blending import control_features, controlled
@@ -54,7 +54,7 @@ def test_the_walk_is_the_published_loop(seed, noise_free):
 
     got = controlled(
         guess, Observed(known, flags, noise_free), levels=range(steps, -1, -1), solver=SOLVERS["ddpm"],
-        schedule=schedule, draw=lambda like: next(drawn),
+        schedule=schedule, noise=lambda like: next(drawn),
     )  # fmt: skip
     bars = [1.0, *torch.cumprod(1 - schedule.betas, 0).tolist()]
     free = (~flags).float() if noise_free else torch.ones_like(known)
@@ -127,10 +127,10 @@ def test_an_empty_mask_is_plain_sampling(prior):
     """The same noise, no control: the motion that the text alone gives."""
     known, flags = given()
     cond = prior.condition(PROMPTS)
-    draw = row_draw([5, 6])
+    draw = row_noise([5, 6])
     plain = run(
         guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), 2.5), draw(known),
-        levels=levels(prior.schedule, 6, spacing="early"), solver=SOLVERS["ddpm"], schedule=prior.schedule, draw=draw,
+        levels=levels(prior.schedule, 6, spacing="early"), solver=SOLVERS["ddpm"], schedule=prior.schedule, noise=draw,
     )  # fmt: skip
     for noise_free in (True, False):
         empty = draw_of(prior, [prior.net], torch.full_like(known, torch.nan), flags & False, noise_free=noise_free)

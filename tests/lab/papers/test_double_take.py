@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from motionloom.diffusion import DDPM, cosine, levels, row_draw, run
+from motionloom.diffusion import DDPM, cosine, levels, row_noise, run
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.lab.papers.double_take import (
@@ -44,13 +44,13 @@ def second_net(x: Tensor, level: int) -> Tensor:
 
 def noise(plan: Plan, seed: int):
     rows = plan.repetitions * len(plan.lengths)
-    draws = row_draw(range(seed, seed + rows)), row_draw(range(seed + 100, seed + 100 + rows - plan.repetitions))
+    draws = row_noise(range(seed, seed + rows)), row_noise(range(seed + 100, seed + 100 + rows - plan.repetitions))
     return draws[0](torch.empty(rows, max(plan.lengths), CHANNELS)), draws
 
 
 def both(plan: Plan, mode: Mode, seed: int = 0, **how) -> Takes:
     x, draws = noise(plan, seed)
-    return double_take(first_net, second_net, x, plan, mode=mode, way=WAY, schedule=SCHEDULE, draws=draws, **how)
+    return double_take(first_net, second_net, x, plan, mode=mode, way=WAY, schedule=SCHEDULE, noise=draws, **how)
 
 
 # ---- the naive version: one frame at a time, everything by its definition ---
@@ -152,7 +152,7 @@ def test_both_copies_of_a_handshake_are_equal_after_the_first_take() -> None:
 def test_one_interval_is_plain_sampling_with_the_same_noise() -> None:
     plan = Plan.of([30])
     x, draws = noise(plan, 3)
-    plain = run(first_net, x, levels=WAY, solver=DDPM, schedule=SCHEDULE, draw=draws[0])
+    plain = run(first_net, x, levels=WAY, solver=DDPM, schedule=SCHEDULE, noise=draws[0])
     assert torch.equal(both(plan, MODES["paper"], seed=3).unfolded, plain)
 
 
@@ -248,10 +248,10 @@ def test_repetitions_are_rows_of_their_own() -> None:
         return torch.tanh(x) + 0.01 * level
 
     def taken(plan: Plan, seeds: list[int], later: list[int]) -> Tensor:
-        draws = row_draw(seeds), row_draw(later)
+        draws = row_noise(seeds), row_noise(later)
         x = draws[0](torch.empty(len(seeds), 60, CHANNELS))
         return double_take(
-            net, net, x, plan, mode=MODES["paper"], way=WAY, schedule=SCHEDULE, draws=draws
+            net, net, x, plan, mode=MODES["paper"], way=WAY, schedule=SCHEDULE, noise=draws
         ).unfolded  # fmt: skip
 
     together = taken(plan, [1, 2, 3, 4, 5, 6], [7, 8, 9, 10])
@@ -387,6 +387,6 @@ def test_first_take_leaves_rows_alone_where_nothing_joins_them() -> None:
     """Second take only: rows are sampled as if they were alone."""
     plan = Plan.of([40, 40], 10, 2)
     x, draws = noise(plan, 0)
-    made = first_take(first_net, x, plan, way=WAY, schedule=SCHEDULE, draw=draws[0], join=False)
+    made = first_take(first_net, x, plan, way=WAY, schedule=SCHEDULE, noise=draws[0], join=False)
     x, draws = noise(plan, 0)
-    assert torch.equal(made, run(first_net, x, levels=WAY, solver=DDPM, schedule=SCHEDULE, draw=draws[0]))
+    assert torch.equal(made, run(first_net, x, levels=WAY, solver=DDPM, schedule=SCHEDULE, noise=draws[0]))

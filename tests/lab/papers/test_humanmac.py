@@ -10,7 +10,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from motionloom.diffusion import Dct, Schedule, cosine, row_draw
+from motionloom.diffusion import Dct, Schedule, cosine, row_noise
 from motionloom.errors import MotionloomError
 from motionloom.lab.papers.humanmac import (
     PARTS,
@@ -78,7 +78,7 @@ def complete(observed: Tensor, rows: int, *, basis: Dct | None = None, steps: in
     basis = basis or Dct(20, 20)
     return published_completion(
         lambda x, level: torch.zeros_like(x), observed, rows, basis=basis, schedule=SCHEDULE,
-        draw=row_draw(range(seed, seed + rows)) if len(observed) == rows else _any_draw(seed), steps=steps, **how,
+        noise=row_noise(range(seed, seed + rows)) if len(observed) == rows else _any_draw(seed), steps=steps, **how,
     )  # fmt: skip
 
 
@@ -130,7 +130,7 @@ def test_a_target_is_imposed_until_the_relaxed_steps(relax: float) -> None:
     target = Target(torch.ones(1, 4, 48), relax)
     _, motion = published_completion(
         lambda x, level: torch.zeros_like(x), torch.zeros(2, 5, 48), 2, basis=Dct(20, 20), schedule=SCHEDULE,
-        draw=draw, steps=10, target=target,
+        noise=draw, steps=10, target=target,
     )  # fmt: skip
     imposed = max(10 - (relax if isinstance(relax, int) else round(10 * relax)), 0)
     assert drawn == 1 + 10 + imposed
@@ -224,7 +224,7 @@ def test_the_published_manner_is_the_sampler_on_plain_tensors() -> None:
     told = made.basis.to_spectrum(padded(numbers, made.frames))
     seed = int(np.random.SeedSequence((7, 0, 0)).generate_state(1, np.uint64)[0] >> np.uint64(1))
     expected = published_completion(
-        made.denoiser(told), numbers, 1, basis=made.basis, schedule=made.schedule, draw=row_draw([seed]), steps=6
+        made.denoiser(told), numbers, 1, basis=made.basis, schedule=made.schedule, noise=row_noise([seed]), steps=6
     )[1][:, h:]
     futures = published_futures(made, past, count=1, seed=7, steps=6)[:, 0]
     found = made.layout.encode(futures, made.layout.place(past[:, -1]))

@@ -9,7 +9,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from motionloom.diffusion import Denoiser, levels, row_draw
+from motionloom.diffusion import Denoiser, levels, row_noise
 from motionloom.goals.segment import TRANSITION, Segment
 from motionloom.io.stream import open_stream
 from motionloom.lab.bench.speed import Entry, Process, Sampling, fit, process, timed
@@ -151,8 +151,8 @@ def published_takes(
     plan = Plan.of([own + half * (1 if i in ends else 2) for i in range(len(texts))], HANDSHAKE, mode.ramp)
     way = levels(prior.schedule, prior.schedule.steps)
     later = restarted(way, prior.schedule, mode.restart)
-    draw = row_draw(range(len(texts)))
-    x = draw(torch.empty(len(texts), max(plan.lengths), len(prior.mean), device=prior.mean.device))
+    noise = row_noise(range(len(texts)))
+    x = noise(torch.empty(len(texts), max(plan.lengths), len(prior.mean), device=prior.mean.device))
     bound = prior.net.bind(prior.condition(list(texts)))
     null = prior.net.bind(prior.condition([""] * len(texts)).null())
     none = prior.net.bind(prior.condition([""] * len(plan.handshakes)).null())
@@ -161,12 +161,12 @@ def published_takes(
     def first() -> Tensor:
         denoise = in_two_calls(prior, bound, null, how.guidance)
         with torch.inference_mode():
-            return first_take(denoise, x, plan, way=way[: steps + 1], schedule=prior.schedule, draw=draw)
+            return first_take(denoise, x, plan, way=way[: steps + 1], schedule=prior.schedule, noise=noise)
 
     def second() -> Tensor:
-        denoise, again = in_two_calls(prior, none, none, 0.0), row_draw(range(len(inside)))
+        denoise, again = in_two_calls(prior, none, none, 0.0), row_noise(range(len(inside)))
         with torch.inference_mode():
-            return second_take(denoise, inside, weights, way=later[: steps + 1], schedule=prior.schedule, draw=again)
+            return second_take(denoise, inside, weights, way=later[: steps + 1], schedule=prior.schedule, noise=again)
 
     def takes(first_s: float, second_s: float) -> tuple[Take, Take]:
         return (

@@ -18,7 +18,7 @@ from torch import Tensor
 from torch.nn.attention import SDPBackend, sdpa_kernel
 from torch.utils.flop_counter import FlopCounterMode
 
-from motionloom.diffusion import DDPM, SOLVERS, Denoiser, Solver, guide, levels, row_draw, sample
+from motionloom.diffusion import DDPM, SOLVERS, Denoiser, Solver, guide, levels, row_noise, sample
 from motionloom.errors import MotionloomError
 from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS
 from motionloom.weights.prior import Prior
@@ -72,7 +72,7 @@ def guided(prior: Prior, rows: int, *, guidance: float) -> Denoiser:
 def noise(prior: Prior, rows: int, seconds: float) -> Tensor:
     """Where a walk of ``rows`` motions starts."""
     shape = (rows, round(seconds * prior.fps), len(prior.mean))
-    return row_draw(range(rows))(torch.empty(shape, device=prior.mean.device))
+    return row_noise(range(rows))(torch.empty(shape, device=prior.mean.device))
 
 
 def timed(jobs: Sequence[Callable[[], Any]], repeats: int, *, warm: int | None = None) -> list[float]:
@@ -99,7 +99,7 @@ def _wait() -> None:
 
 def _walk(prior: Prior, denoise: Denoiser, x: Tensor, way: Sequence[int], *, solver: Solver, stop: int | None) -> None:
     walk = sample(
-        denoise, x, levels=way, solver=solver, schedule=prior.schedule, draw=row_draw(range(len(x)))
+        denoise, x, levels=way, solver=solver, schedule=prior.schedule, noise=row_noise(range(len(x)))
     )  # fmt: skip
     with torch.inference_mode():
         for number, _ in enumerate(walk, start=1):

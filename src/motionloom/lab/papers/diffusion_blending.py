@@ -2,7 +2,7 @@
 
 Given numbers M stay free of noise all the way, as in training (algorithm 1): at every level they are signal * known.
 
-    x_T = signal_T * known * M + noise_T * draw * (1 - M)
+    x_T = signal_T * known * M + noise_T * z * (1 - M)
     denoised = sum of w_i (u_i + s (c_i - u_i))         each network guided by itself, then blended
     denoised = known on M;  x_s from x_t and denoised;  x_s = signal_s * known on M
 
@@ -16,6 +16,7 @@ from typing import Unpack
 import torch
 from torch import Tensor
 
+from motionloom._moved import renamed
 from motionloom.diffusion import (
     SOLVERS,
     Denoiser,
@@ -26,7 +27,7 @@ from motionloom.diffusion import (
     chain,
     inpaint,
     observe,
-    row_draw,
+    row_noise,
     run,
 )
 from motionloom.edits.steering import Correction, corrected
@@ -85,10 +86,11 @@ def control_features(
         denoise = corrected(denoise, corrections)
     return controlled(
         denoise, Observed(known, mask, observed.noise_free), levels=chosen.levels(prior.schedule),
-        solver=SOLVERS[chosen.solver], schedule=prior.schedule, draw=row_draw(seeds),
+        solver=SOLVERS[chosen.solver], schedule=prior.schedule, noise=row_noise(seeds),
     )  # fmt: skip
 
 
+@renamed({"draw": "noise"})
 def controlled(
     denoise: Denoiser,
     observed: Observed,
@@ -96,7 +98,7 @@ def controlled(
     levels: Sequence[int],
     solver: Solver,
     schedule: Schedule,
-    draw: NoiseSource,
+    noise: NoiseSource,
     start: Tensor | None = None,
 ) -> Tensor:
     """The walk of algorithm 2 on any denoiser; (rows, frames, features).
@@ -106,11 +108,11 @@ def controlled(
     """
     known, mask = observed.values, observed.mask
     start = torch.zeros_like(known) if start is None else start
-    x = schedule.noised(start, levels[0], draw(known))
+    x = schedule.noised(start, levels[0], noise(known))
     hold = observe(known, mask, schedule, torch.zeros_like) if observed.noise_free else chain()
     return run(
         inpaint(denoise, known, mask), hold(x, levels[0]), levels=levels,
-        solver=solver, schedule=schedule, draw=draw, constrain=hold,
+        solver=solver, schedule=schedule, noise=noise, constrain=hold,
     )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from motionloom._moved import renamed
 from motionloom.diffusion import (
     DDPM,
     SOLVERS,
@@ -36,7 +37,7 @@ from motionloom.diffusion import (
     inpaint,
     levels,
     restart,
-    row_draw,
+    row_noise,
     run,
 )
 from motionloom.errors import MotionloomError
@@ -219,6 +220,7 @@ def handshakes(plan: Plan) -> Constraint:
     return joined
 
 
+@renamed({"draw": "noise"})
 def first_take(
     denoise: Denoiser,
     x: State,
@@ -226,13 +228,13 @@ def first_take(
     *,
     way: Sequence[int],
     schedule: Schedule,
-    draw: NoiseSource,
+    noise: NoiseSource,
     solver: Solver = DDPM,
     join: bool = True,
 ) -> State:
     """Noise at ``way[0]`` to intervals with shared ends; ``join=False`` leaves them alone (second take only)."""
     constrain = handshakes(plan) if join and plan.handshakes else chain()
-    return run(denoise, x, levels=way, solver=solver, schedule=schedule, draw=draw, constrain=constrain)
+    return run(denoise, x, levels=way, solver=solver, schedule=schedule, noise=noise, constrain=constrain)
 
 
 def sandwiches(x: State, plan: Plan) -> State:
@@ -258,6 +260,7 @@ def keep_weights(plan: Plan, keep: Keep) -> Tensor:
     return result
 
 
+@renamed({"draw": "noise"})
 def second_take(
     denoise: Denoiser,
     sandwich: State,
@@ -265,15 +268,15 @@ def second_take(
     *,
     way: Sequence[int],
     schedule: Schedule,
-    draw: NoiseSource,
+    noise: NoiseSource,
     solver: Solver = DDPM,
 ) -> State:
     """Sandwiches noised to ``way[0]`` and refined, the estimate held to them by ``weights`` (transitions, frames)."""
     repetitions = len(sandwich) // len(weights)
     mask = weights.to(sandwich).repeat(repetitions, 1)[..., None]
-    x = restart(sandwich, schedule, way[0], draw)
+    x = restart(sandwich, schedule, way[0], noise)
     held = inpaint(denoise, sandwich, mask)
-    return run(held, x, levels=way, solver=solver, schedule=schedule, draw=draw)
+    return run(held, x, levels=way, solver=solver, schedule=schedule, noise=noise)
 
 
 def rebuild(first: State, second: State, plan: Plan) -> State:
@@ -310,6 +313,7 @@ class TakeOptions(TypedDict, total=False):
     second_take_only: bool
 
 
+@renamed({"draws": "noise"})
 def double_take(
     first: Denoiser,
     second: Denoiser,
@@ -319,24 +323,24 @@ def double_take(
     mode: Mode,
     way: Sequence[int],
     schedule: Schedule,
-    draws: tuple[NoiseSource, NoiseSource],
+    noise: tuple[NoiseSource, NoiseSource],
     **options: Unpack[TakeOptions],
 ) -> Takes:
     """Both takes; one interval is sampled as ever and has no second take.
 
     ``first`` has the texts of the rows, ``second`` none; each is bound to the lengths it should know. ``x``: noise
-    (repetitions * intervals, longest interval, features) at ``way[0]``. ``draws``: noise for either take.
+    (repetitions * intervals, longest interval, features) at ``way[0]``. ``noise``: for either take.
     """
     solver, second_take_only = options.get("solver", DDPM), options.get("second_take_only", False)
     made = first_take(
-        first, x, plan, way=way, schedule=schedule, draw=draws[0], solver=solver, join=not second_take_only
+        first, x, plan, way=way, schedule=schedule, noise=noise[0], solver=solver, join=not second_take_only
     )
     if not plan.handshakes:
         none = made.new_zeros(0, 0, made.shape[2])
         return Takes(made, none, made.new_zeros(0, 0), none, made, unfold(made, plan))
     inside, weights = sandwiches(made, plan), keep_weights(plan, mode.keep)
     later = restarted(way, schedule, mode.restart)
-    refined = second_take(second, inside, weights, way=later, schedule=schedule, draw=draws[1], solver=solver)
+    refined = second_take(second, inside, weights, way=later, schedule=schedule, noise=noise[1], solver=solver)
     rebuilt = rebuild(made, refined, plan)
     return Takes(made, inside, weights, refined, rebuilt, unfold(rebuilt, plan))
 
@@ -399,16 +403,16 @@ def double_take_features(
     count, joins = len(prompts), len(plan.handshakes)
     seeds = [int(word) for word in np.random.SeedSequence(seed).generate_state(count + joins, np.uint64) >> 2]
     known = (plan.lengths, plan.sandwiches) if chosen.masked else (None, None)
-    draws = row_draw(seeds[:count], known[0]), row_draw(seeds[count:], known[1])
-    x = draws[0](torch.empty(count, max(plan.lengths), len(prior.mean), device=prior.mean.device))
+    noise = row_noise(seeds[:count], known[0]), row_noise(seeds[count:], known[1])
+    x = noise[0](torch.empty(count, max(plan.lengths), len(prior.mean), device=prior.mean.device))
     first = _with_text(prior, prompts, known[0], flags(plan), guidance)
     way, walker = levels(prior.schedule, steps, spacing=spacing), SOLVERS[solver]  # type: ignore[arg-type]
     if first_take_only:
-        made = unfold(first_take(first, x, plan, way=way, schedule=prior.schedule, draw=draws[0], solver=walker), plan)
+        made = unfold(first_take(first, x, plan, way=way, schedule=prior.schedule, noise=noise[0], solver=walker), plan)
     else:
         second = _without_text(prior, joins, known[1])
         made = double_take(
-            first, second, x, plan, mode=chosen, way=way, schedule=prior.schedule, draws=draws, solver=walker,
+            first, second, x, plan, mode=chosen, way=way, schedule=prior.schedule, noise=noise, solver=walker,
             second_take_only=second_take_only,
         ).unfolded  # fmt: skip
     finished = made[0] * prior.std + prior.mean

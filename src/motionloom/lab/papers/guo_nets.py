@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from torch.nn.utils.rnn import pack_padded_sequence
 
 from motionloom.errors import MotionloomError
-from motionloom.lab.papers.torch_file import read_torch_file
+from motionloom.lab.papers.torch_file import is_plain, read_torch_file
 from motionloom.weights.container import fill
 
 UNIT = 4
@@ -172,12 +172,6 @@ def read_guo(path: Path | str) -> dict[str, Tensor]:
         raise MotionloomError(f"{path} has no {missing[0]}; name the finest.tar of text_mot_match, which has all three")
     state = {f"{part}.{key}": value for part in PARTS for key, value in loaded[part].items()}
     for key, value in state.items():
-        if not isinstance(value, Tensor) or not _plain(value):
+        if not isinstance(value, Tensor) or not is_plain(value):
             raise MotionloomError(f"{path}: {key} is not an ordinary array of floating-point numbers; it is not read")
     return state
-
-
-def _plain(value: Tensor) -> bool:
-    """Numbers stored once each: nothing that grows when it is touched."""
-    usual = value.layout == torch.strided and value.device.type == "cpu" and value.is_floating_point()
-    return usual and value.is_contiguous() and value.nbytes <= value.untyped_storage().nbytes()

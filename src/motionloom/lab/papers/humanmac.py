@@ -19,6 +19,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from motionloom._moved import renamed
 from motionloom.diffusion import (
     Basis,
     Constraint,
@@ -28,7 +29,7 @@ from motionloom.diffusion import (
     Schedule,
     State,
     mix,
-    row_draw,
+    row_noise,
     row_seed,
     run,
 )
@@ -103,8 +104,9 @@ class Options(TypedDict, total=False):
     """False leaves the observation to the condition alone."""
 
 
+@renamed({"draw": "noise"})
 def published_completion(
-    denoise: Denoiser, observed: Tensor, rows: int, *, basis: Basis, schedule: Schedule, draw: NoiseSource,
+    denoise: Denoiser, observed: Tensor, rows: int, *, basis: Basis, schedule: Schedule, noise: NoiseSource,
     **options: Unpack[Options],
 ) -> tuple[State, Tensor]:  # fmt: skip
     """DCT-Completion.
@@ -116,7 +118,7 @@ def published_completion(
         rows: how many are sampled.
         basis: the cosines.
         schedule: of the noise.
-        draw: noise: for the start, then in every step for the observation and for the target.
+        noise: for the start, then in every step for the observation and for the target.
         options: see `Options`.
 
     Returns:
@@ -135,9 +137,9 @@ def published_completion(
     held = [Held(basis.to_spectrum(known), mask)] if options.get("complete", True) else []
     if target is not None:
         held.append(_approached(target, rows, walk, basis))
-    start = draw(observed.new_empty(rows, basis.kept, observed.shape[2]))
-    constrain = mixed_in_time(held, basis.to_time, basis.to_spectrum, schedule, draw)
-    state = run(denoise, start, levels=walk, solver=Ddim(), schedule=schedule, draw=draw, constrain=constrain)
+    start = noise(observed.new_empty(rows, basis.kept, observed.shape[2]))
+    constrain = mixed_in_time(held, basis.to_time, basis.to_spectrum, schedule, noise)
+    state = run(denoise, start, levels=walk, solver=Ddim(), schedule=schedule, noise=noise, constrain=constrain)
     return state, basis.to_time(state)
 
 
@@ -151,7 +153,7 @@ class Held:
 
 
 def mixed_in_time(
-    held: Sequence[Held], to_time: Way, to_state: Way, schedule: Schedule, draw: NoiseSource
+    held: Sequence[Held], to_time: Way, to_state: Way, schedule: Schedule, noise: NoiseSource
 ) -> Constraint:
     """Everything known, noised, mixed into the state in time one after the other; then back into coefficients, once.
 
@@ -163,7 +165,7 @@ def mixed_in_time(
         now = [one for one in held if level >= one.last]
         motion = to_time(x)
         for one in now:
-            noised = schedule.noised(one.known, level, draw(one.known))
+            noised = schedule.noised(one.known, level, noise(one.known))
             motion = mix(motion, to_time(noised), one.mask)
         return to_state(motion) if now else x
 
@@ -224,13 +226,13 @@ def published_futures(
         window, sample = index // count, index % count
         seeds = [row_seed(seed, w, i) for w, i in zip(window.tolist(), sample.tolist())]
         own = observed[window.to(observed.device)]
-        made.append(_complete(predictor, own, conditioned[sample], draw=row_draw(seeds), steps=steps).cpu())
+        made.append(_complete(predictor, own, conditioned[sample], noise=row_noise(seeds), steps=steps).cpu())
     future = torch.cat(made)[:, predictor.observed :].unflatten(0, (len(past), count)).double().numpy()
     return np.stack([predictor.layout.decode(future[:, i], place) for i in range(count)], axis=1)
 
 
 @torch.inference_mode()
-def _complete(predictor: Predictor, observed: Tensor, keep: Tensor, *, draw: NoiseSource, steps: int) -> Tensor:
+def _complete(predictor: Predictor, observed: Tensor, keep: Tensor, *, noise: NoiseSource, steps: int) -> Tensor:
     """Windows (rows, frames, channels) after observed ones (rows, h, channels); ``keep`` (rows,): which see it."""
     rows, h, channels = observed.shape
     pose, schedule = observed[:, -1], predictor.schedule
@@ -242,8 +244,8 @@ def _complete(predictor: Predictor, observed: Tensor, keep: Tensor, *, draw: Noi
     denoise = predictor.denoiser(condition, None if bool(keep.all()) else keep.to(observed.device))
     constrain = mixed_in_time(
         [Held(known, mask.bool())], lambda x: predictor.to_features(x, pose), lambda x: predictor.to_state(x, pose),
-        schedule, draw,
+        schedule, noise,
     )  # fmt: skip
-    walk, start = published_levels(schedule, steps), draw(known)
-    state = run(denoise, start, levels=walk, solver=Ddim(), schedule=schedule, draw=draw, constrain=constrain)
+    walk, start = published_levels(schedule, steps), noise(known)
+    state = run(denoise, start, levels=walk, solver=Ddim(), schedule=schedule, noise=noise, constrain=constrain)
     return predictor.to_features(state, pose)

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from motionloom.errors import MotionloomError
 from motionloom.io.text import plain_json, read_bytes
-from motionloom.lab.papers.torch_file import read_torch_file
+from motionloom.lab.papers.torch_file import is_plain, read_torch_file
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.weights.container import fill
 
@@ -103,17 +103,11 @@ def read_published(path: Path | str) -> Published:
     state = loaded["model_avg"] if averaged else loaded.get("model", loaded) if isinstance(loaded, dict) else None
     if not isinstance(state, dict) or not all(isinstance(k, str) and isinstance(v, Tensor) for k, v in state.items()):
         raise MotionloomError(f"{path} is not a state dict of tensors; name a published model*.pt file")
-    if not all(_plain(value) for value in state.values()):
+    if not all(is_plain(value) for value in state.values()):
         raise MotionloomError(
             f"{path} holds tensors that are sparse, overlap or are not floating point; they are not read"
         )
     return Published(state, _options(path.parent / "args.json"), averaged)
-
-
-def _plain(value: Tensor) -> bool:
-    """Ordinary floating-point numbers, each stored once: nothing that grows when it is touched."""
-    usual = value.layout == torch.strided and value.device.type == "cpu" and value.is_floating_point()
-    return usual and value.is_contiguous() and value.nbytes <= value.untyped_storage().nbytes()
 
 
 def _options(path: Path) -> dict[str, Any]:

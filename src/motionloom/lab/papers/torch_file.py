@@ -59,6 +59,12 @@ def read_torch_file(path: Path | str) -> Any:
         raise MotionloomError(f"{path} holds more than tensors or is damaged, and is not opened ({reason})") from None
 
 
+def is_plain(value: Tensor) -> bool:
+    """Whether these are ordinary floating-point numbers, each stored once: nothing that grows when it is touched."""
+    usual = value.layout == torch.strided and value.device.type == "cpu" and value.is_floating_point()
+    return usual and value.is_contiguous() and value.nbytes <= value.untyped_storage().nbytes()
+
+
 def _from_archive(data: bytes) -> object:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = archive.infolist()

@@ -9,6 +9,7 @@ import numpy as np
 from motionloom.data.pairs import Pair
 from motionloom.diffusion import row_seed
 from motionloom.features import pair as two
+from motionloom.ground import GroundPose
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics import pair as mp
@@ -20,7 +21,7 @@ from motionloom.lab.suites.harness import Run, takes_run
 from motionloom.lab.suites.needs import NoData
 from motionloom.tasks.control import moved
 from motionloom.tasks.duet import react
-from motionloom.tasks.pair import Duet, placement
+from motionloom.tasks.pair import Duet
 from motionloom.tasks.text import LARGEST_SEED, frames_in, generate
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -127,7 +128,7 @@ def alone(prior: Prior, given: Windows, how: How) -> Make:
                 prior, caption, seconds=how.seconds, seed=own_seed(seed, number), guidance=how.guidance,
                 steps=how.steps, foot_lock=how.clean,
             )  # fmt: skip
-            begins = placement(two.encode(window).poses[1])
+            begins = GroundPose.of_numbers(two.encode(window).poses[1])
             made.append((motion_from_positions(window[0], mp.FPS), moved(partner, begins)))
         return made
 

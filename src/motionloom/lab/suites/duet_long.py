@@ -10,6 +10,7 @@ from pathlib import Path
 from motionloom.data.pairs import Pair
 from motionloom.errors import MotionloomError
 from motionloom.goals.segment import Segment
+from motionloom.ground import GroundPose
 from motionloom.lab.metrics import pair as mp
 from motionloom.lab.report.report import Report
 from motionloom.lab.suites import duet_text as judged
@@ -20,7 +21,7 @@ from motionloom.motion import Motion
 from motionloom.tasks.control import moved
 from motionloom.tasks.duet import compose_pair
 from motionloom.tasks.long import compose
-from motionloom.tasks.pair import Duet, placement
+from motionloom.tasks.pair import Duet
 from motionloom.tasks.splice import concatenated
 from motionloom.tasks.text import frames_in
 from motionloom.weights.pair import PairBlock
@@ -102,7 +103,8 @@ def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: How
         made = []
         for number, poses in enumerate(begun(count, seed)):
             first, second = (
-                moved(one(caption, own_seed(seed, 2 * number + i)), placement(pose)) for i, pose in enumerate(poses)
+                moved(one(caption, own_seed(seed, 2 * number + i)), GroundPose.of_numbers(pose))
+                for i, pose in enumerate(poses)
             )
             made.append((first, second))
         return made

@@ -17,6 +17,7 @@ import torch
 from motionloom.data.pairs import Pair, windows
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
+from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics import pair as mp
 from motionloom.lab.metrics import pair_groups as groups
@@ -33,7 +34,6 @@ from motionloom.tasks.pair import (
     known_state,
     pair_features,
     person_seeds,
-    placement,
     stacked,
 )
 from motionloom.tasks.text import GUIDANCE, STEPS, finish, frames_in
@@ -181,7 +181,7 @@ def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
         made = []
         for numbers, standing in zip(features, poses.double().numpy(), strict=True):
             first, second = (
-                moved(finish(prior, f, foot_lock=how.clean), placement(s))
+                moved(finish(prior, f, foot_lock=how.clean), GroundPose.of_numbers(s))
                 for f, s in zip(numbers, standing, strict=True)
             )
             made.append((first, second))

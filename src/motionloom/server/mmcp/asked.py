@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.goal import FPS, Goal, body_facing, merged
+from motionloom.goals.goal import FPS, Goal, merged
 from motionloom.goals.paths import root_path
-from motionloom.ground import GroundPose
-from motionloom.motion import Motion
+from motionloom.motion import Motion, ground_pose
 from motionloom.server.mmcp.rigs import Rig
 from motionloom.skeleton import SMPL22
 
@@ -160,11 +159,8 @@ def as_goal(pose: Keyframe, frames: int) -> Goal:
 
 def standing_as(pose: Keyframe, person: Array) -> Keyframe:
     """A pose that does not say where it is, where and as a drawn person (22, 3) stands."""
-
-    def stand(places: Array) -> GroundPose:
-        return GroundPose.of(places[0], body_facing(places))
-
-    return replace(pose, places=stand(person).to_world(stand(pose.places).from_world(pose.places)), placed=True)
+    places = ground_pose(person).to_world(ground_pose(pose.places).from_world(pose.places))
+    return replace(pose, places=places, placed=True)
 
 
 def whole_path(goal: Goal) -> Goal:

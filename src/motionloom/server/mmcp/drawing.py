@@ -12,7 +12,7 @@ from motionloom import rotations as rot
 from motionloom.edits.fitting import fit
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FEET
-from motionloom.goals.goal import FPS, Goal, placement_of
+from motionloom.goals.goal import FPS, Goal, start_of
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.feet import planted_feet
 from motionloom.motion import Motion
@@ -153,7 +153,7 @@ def _steered(models: Models, segments: list[Segment], goal: Goal, seed: int, opt
     if goal.empty:
         return concatenated(*long.compose(models.prior, segments, seed=seed, **options))
     if len(segments) == 1:
-        place = placement_of(goal)
+        place = start_of(goal)
         (only,) = segments
         wanted = replace(only, goal=goal.seen_from(place))
         return moved(concatenated(*long.compose(models.prior, [wanted], seed=seed, **options)), place)
