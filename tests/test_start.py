@@ -77,3 +77,12 @@ def test_a_command_sets_up_no_command_behind_it() -> None:
     code += "with contextlib.suppress(SystemExit): main(sys.argv[1:])\nprint('LOADED', *sys.modules)"
     assert "motionloom.cli.evaluate" not in loaded("generate", "--help", code=code)
     assert {"motionloom.cli.evaluate", "motionloom.cli.weights"} <= loaded("nothing", code=code)
+
+
+def test_the_server_answers_before_it_imports_torch() -> None:
+    """Only the thread that draws needs torch: the page, its project and its motions are there earlier."""
+    pytest.importorskip("uvicorn")
+    pytest.importorskip("starlette")
+    found = loaded(code="import sys, motionloom.server.serving, motionloom.server.files; print('LOADED', *sys.modules)")
+    assert "motionloom.server.app" in found
+    assert not found & {"torch", "scipy", "motionloom.live.live", "motionloom.tasks"}

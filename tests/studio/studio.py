@@ -106,7 +106,6 @@ class Studio:
 
     def export(self, name: str) -> bytes:
         """The file that an entry of the export menu gives, by mouse."""
-        self.drawn()  # the bar is drawn anew when a clip comes, and its menu closes
         self.page.locator(".menu summary").click()
         with self.page.expect_download() as file:
             self.page.locator(".sheet .row").filter(has=self.page.get_by_text(name, exact=True)).click()

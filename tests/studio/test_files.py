@@ -25,6 +25,30 @@ def test_a_bvh_comes_out_and_goes_in_again(studio: Studio, tmp_path: Path):
     assert project["takes"][0]["how"] == "from a file"
 
 
+def test_the_export_menu_stays_open_while_the_page_changes_behind_it(studio: Studio):
+    page, focused = studio.page, "document.activeElement.textContent"
+    menu = page.locator(".menu")
+    old = studio.project()["takes"][0]["motion"]
+    studio.key("r")
+    menu.locator("summary").focus()
+    studio.key("Enter", "ArrowDown", "ArrowDown", "ArrowDown", "ArrowUp")
+    page.wait_for_selector("#top progress:not(.idle)", state="attached")
+    assert page.evaluate(focused).startswith("GLB")
+    assert studio.project()["takes"][0]["motion"] != old, "the clip came while the menu was open"
+    assert menu.get_attribute("open") is not None
+    assert page.evaluate(focused).startswith("GLB")
+    assert studio.download("Enter")[:4] == b"glTF"
+    assert menu.get_attribute("open") is None
+    studio.key("Enter", "ArrowDown", "Escape")
+    assert menu.get_attribute("open") is None
+    assert page.evaluate(focused) == "Export", "the keyboard goes on where the menu was opened"
+    menu.locator("summary").click()
+    assert menu.get_attribute("open") is not None
+    page.mouse.click(*studio.middle("#canvas"))
+    assert menu.get_attribute("open") is None
+    assert [text for text, _ in studio.blocks()] == ["a person walks forward"], "no key went through to the page"
+
+
 def test_one_clip_dragged_onto_another_goes_over_into_it(studio: Studio):
     studio.key("w", "r")
     studio.drawn()

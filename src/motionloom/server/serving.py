@@ -1,11 +1,12 @@
 """Starting the server: the project folder, the door, the worker and uvicorn around them."""
 
+import asyncio
 import secrets
 import socket
 import sys
 import threading
 import webbrowser
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,8 +16,6 @@ from starlette.routing import WebSocketRoute
 from starlette.websockets import WebSocket
 
 from motionloom.errors import MotionloomError
-from motionloom.live.sessions import Sessions
-from motionloom.live.socket import live_session
 from motionloom.server import page
 from motionloom.server.app import build
 from motionloom.server.guard import door, is_loopback
@@ -26,6 +25,7 @@ from motionloom.server.refusal import Refusal
 from motionloom.server.worker import Worker
 
 if TYPE_CHECKING:
+    from motionloom.live.sessions import Sessions
     from motionloom.weights.prior import Prior
 
 CONNECTIONS = 512
@@ -57,8 +57,8 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
     project = Project(options.project, limits or Limits())
     worker = Worker(project, limits or Limits(), weights=options.weights, device=options.device)
     known = door(options.host, token, hosts=options.hosts, origins=options.origins, page=page.files())
-    sessions = Sessions(lambda: _prior(worker))
-    app = build(project, worker, known, more=[_live(sessions)])
+    live = _Live(worker)
+    app = build(project, worker, known, more=[WebSocketRoute("/live", live.answer)])
     bound = _bound(options.host, options.port)
     address = _address(options.host, bound.getsockname()[1], token)
     print(f"motionloom: {address} (project: {project.folder})", file=sys.stderr, flush=True)
@@ -73,23 +73,43 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
     try:
         uvicorn.Server(config).run(sockets=[bound])
     finally:
-        sessions.close()
+        live.close()
 
 
-def _prior(worker: Worker) -> "Prior":
-    try:
-        return worker.prior()
-    except Refusal as refusal:
-        raise MotionloomError(refusal.sentence) from None
+class _Live:
+    """Somebody who is steered while he moves (docs/live.md), behind the same door as everything else.
 
+    Live sessions need torch, whose import takes longer than all the rest of a server's start. So they are made for the
+    first client that asks; the worker's thread imports torch meanwhile, while the page is answered already.
+    """
 
-def _live(sessions: Sessions) -> WebSocketRoute:
-    """Somebody who is steered while he moves (docs/live.md), behind the same door as everything else."""
+    def __init__(self, worker: Worker) -> None:
+        self._worker, self._sessions, self._lock = worker, None, threading.Lock()
 
-    async def live(websocket: WebSocket) -> None:
-        await live_session(websocket, sessions)
+    async def answer(self, websocket: WebSocket) -> None:
+        """Serve one client."""
+        serve_one, sessions = await asyncio.to_thread(self._made)
+        await serve_one(websocket, sessions)
 
-    return WebSocketRoute("/live", live)
+    def close(self) -> None:
+        """End all sessions."""
+        with self._lock:
+            if self._sessions is not None:
+                self._sessions.close()
+
+    def _made(self) -> "tuple[Callable[[WebSocket, Sessions], Awaitable[None]], Sessions]":
+        from motionloom.live.sessions import Sessions
+        from motionloom.live.socket import live_session
+
+        with self._lock:
+            self._sessions = self._sessions or Sessions(self._prior)
+            return live_session, self._sessions
+
+    def _prior(self) -> "Prior":
+        try:
+            return self._worker.prior()
+        except Refusal as refusal:
+            raise MotionloomError(refusal.sentence) from None
 
 
 def _bound(host: str, port: int) -> socket.socket:

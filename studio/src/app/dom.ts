@@ -58,7 +58,11 @@ function alike(a: Node, b: Node): boolean {
 }
 
 function take(there: Element, next: Element): void {
-  for (const { name } of [...there.attributes]) if (!next.hasAttribute(name)) there.removeAttribute(name);
+  for (const { name } of [...there.attributes]) {
+    // Whether a menu is open is up to who opened it.
+    const isOpen = name === "open" && there instanceof HTMLDetailsElement;
+    if (!next.hasAttribute(name) && !isOpen) there.removeAttribute(name);
+  }
   for (const { name, value } of next.attributes) {
     if (there.getAttribute(name) !== value) there.setAttribute(name, value);
   }

@@ -5,17 +5,8 @@ import { type App, duration } from "../app/app";
 import { h, morph } from "../app/dom";
 import type { Files } from "../app/files";
 import { begins } from "../project/model";
+import { exportMenu, menuHabits } from "./menu";
 import { iconButton, textButton } from "./parts";
-
-const EXPORTS = [
-  ["bvh", "BVH", "Motion on the 22 joints, or on your character"],
-  ["glb", "GLB", "For Blender, Godot and the web; on your character if there is one"],
-  ["mp4", "MP4", "A film"],
-  ["png", "PNG", "A sheet of poses"],
-  ["npz", "NPZ", "Numbers for Python"],
-  ["yaml", "Timeline (YAML)", "What the command line runs to the same motion"],
-  ["project", "Project file", "Everything on this page"],
-] as const;
 
 export function topBar(app: App, actions: Actions, files: Files, root: HTMLElement): void {
   const render = () => {
@@ -63,38 +54,12 @@ export function topBar(app: App, actions: Actions, files: Files, root: HTMLEleme
       iconButton(actions.help!, "help"),
     ]);
   };
+  menuHabits(root);
   app.project.subscribe(render);
   app.session.subscribe((now, before) => {
     if (now.connected !== before.connected || now.saved !== before.saved || now.drawing !== before.drawing) render();
   });
   render();
-}
-
-function exportMenu(files: Files): HTMLElement {
-  const close = (event: Event) => (event.currentTarget as Element).closest("details")?.removeAttribute("open");
-  return h(
-    "details",
-    { class: "menu", "data-key": "export" },
-    h("summary", { class: "text strong", "aria-label": "Export" }, "Export"),
-    h(
-      "div",
-      { class: "sheet" },
-      ...EXPORTS.map(([format, name, title]) =>
-        h(
-          "button",
-          {
-            class: "row",
-            onclick: (event: Event) => {
-              close(event);
-              void files.export(format);
-            },
-          },
-          h("b", {}, name),
-          h("small", {}, title),
-        ),
-      ),
-    ),
-  );
 }
 
 export function stageBar(app: App, actions: Actions, left: HTMLElement, right: HTMLElement): void {
