@@ -83,3 +83,13 @@ def test_a_straight_arm_that_must_shorten_bends_its_elbow_backwards() -> None:
     places = person.positions()[-1]
     for shoulder, elbow, wrist in ((16, 18, 20), (17, 19, 21)):
         assert places[elbow, 2] < places[[shoulder, wrist], 2].min() - 0.02
+
+
+def test_arms_without_a_length_are_left_alone() -> None:
+    skeleton = without_collars()
+    offsets = skeleton.offsets.copy()
+    offsets[[skeleton.index(f"{side}_{part}") for side in ("left", "right") for part in ("elbow", "wrist")]] = 0.0
+    stump = replace(skeleton, offsets=offsets)
+    shrug = Motion(SMPL22, 30.0, np.tile(SMPL22.offsets[0], (20, 1)), bent_arms())
+    assert np.isfinite(from_smpl22(shrug, stump).rotations).all()
+    assert np.isfinite(to_smpl22(from_smpl22(shrug, stump)).rotations).all()

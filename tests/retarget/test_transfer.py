@@ -356,3 +356,20 @@ def test_rigs_of_other_trees_take_the_pose_and_give_it_back(rig: str) -> None:
     assert errors(back.positions(), motion.positions(), limbs).mean() < 3.0
     turn = np.degrees(2 * np.arccos(np.abs((back.rotations * motion.rotations).sum(-1)).clip(0, 1)))
     assert turn[:, [0, 16, 17, 18, 19]].max() < 12.0
+
+
+def test_a_rest_pose_with_one_foot_in_the_air_still_walks_on_both() -> None:
+    """A file without a mesh may hold a step of its clip as its rest: the lifted foot is no flat one."""
+    turns = np.zeros((22, 3))
+    turns[2, 0], turns[5, 0], turns[8, 0] = -0.2, 1.2, 0.3
+    step = Motion(SMPL22, 30.0, SMPL22.offsets[:1], rot.rotvec_to_quat(turns)[None])
+    world = step.world_rotations()[0]
+    rest = step.positions()[0]
+    offsets = rest - np.vstack([np.zeros(3), rest[list(SMPL22.parents[1:])]])
+    lifted = Skeleton(SMPL22.names, SMPL22.parents, offsets, on_floor=True)
+    plain = Skeleton(SMPL22.names, SMPL22.parents, SMPL22.offsets, on_floor=True)
+    walk = stroll()
+    made, wanted = from_smpl22(walk, lifted), from_smpl22(walk, plain)
+    assert np.allclose(made.positions(), wanted.positions(), atol=0.02)
+    sole, flat = rot.multiply(made.world_rotations(), world), wanted.world_rotations()
+    assert np.degrees(2 * np.arccos(np.abs((sole * flat).sum(-1)[:, [7, 8]]).min())) < 6

@@ -123,7 +123,10 @@ class Target:
             raise MotionloomError(f"a {character.path.suffix} character is not written as {path}; give it as a .glb")
         with tempfile.TemporaryDirectory() as folder:
             made = character.save(motion, Path(folder) / "moving.glb", name=name, replace=self.replace)
-            return glb_to_fbx(made, path, fps=motion.fps)
+            try:
+                return glb_to_fbx(made, path, fps=motion.fps)
+            except MotionloomError as error:
+                raise MotionloomError(str(error).replace(str(made), str(character.path))) from None
 
 
 def own_outs(arguments: argparse.Namespace, name: str, suffix: str = ".bvh") -> list[Path]:

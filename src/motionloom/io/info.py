@@ -6,7 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
+from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
+from motionloom.retarget.anatomy import read_body
+from motionloom.retarget.transfer import joints22
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.viz.figure import body_height, body_start
 
@@ -18,6 +21,8 @@ _FAMILIES = (
     ("Daz (CMU as BVH)", {"hip", "abdomen", "chest", "lButtock", "lThigh", "lShin", "rForeArm"}),
     ("Bandai Namco", {"joint_Root", "Hips", "UpperLeg_L", "LowerLeg_L", "Toes_L", "UpperArm_R"}),
     ("Mixamo", {"mixamorig:Hips", "mixamorig:LeftUpLeg", "mixamorig:RightForeArm"}),
+    ("Unreal", {"pelvis", "thigh_l", "calf_l", "upperarm_r", "lowerarm_r"}),
+    ("Rigify", {"DEF-spine", "DEF-thigh.L", "DEF-shin.L", "DEF-forearm.R"}),
     ("MotionBuilder", {"Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "RightForeArm"}),
 )
 
@@ -54,9 +59,14 @@ class Info:
 def describe(motion: Motion) -> Info:
     """Measure a motion and look for common faults."""
     places = motion.positions()
-    body = places[:, body_start(motion.skeleton, places) :]
-    ground = body[:, 0, [0, 2]]
-    height = body_height(motion.skeleton, places) if body.shape[1] > 1 else 0.0
+    start = body_start(motion.skeleton, places)
+    body, person = places[:, start:], _person(motion, start)
+    way = body[:, 0] if person is None else person[:, 0]
+    ground = way[:, [0, 2]]
+    if person is not None:
+        height = body_height(SMPL22, person)
+    else:
+        height = body_height(motion.skeleton, places) if body.shape[1] > 1 else 0.0
     floor = float(np.percentile(body[..., 1].min(axis=1), 2))
     low, high = (tuple(float(v) for v in f(body, axis=(0, 1))) for f in (np.min, np.max))
     return Info(
@@ -73,8 +83,17 @@ def describe(motion: Motion) -> Info:
         lowest=low,  # type: ignore[arg-type]
         highest=high,  # type: ignore[arg-type]
         floor=floor,
-        problems=tuple(_problems(motion, body, height, floor)),
+        problems=tuple(_problems(motion, body, way, height, floor)),
     )
+
+
+def _person(motion: Motion, start: int) -> Array | None:
+    """(frames, 22, 3) metres: the person, where joints that are no body (a root bone, controls) are above it."""
+    try:
+        pelvis = read_body(motion.skeleton).drivers[0]
+    except MotionloomError:
+        return None
+    return None if pelvis in (None, start) else joints22(motion)
 
 
 def family(skeleton: Skeleton) -> str:
@@ -82,7 +101,7 @@ def family(skeleton: Skeleton) -> str:
     return next((name for name, some in _FAMILIES if some <= set(skeleton.names)), "unknown")
 
 
-def _problems(motion: Motion, body: Array, height: float, floor: float) -> list[str]:
+def _problems(motion: Motion, body: Array, way: Array, height: float, floor: float) -> list[str]:
     found = []
     spans = np.median(np.ptp(body, axis=1), axis=0)
     if spans[2] > 2 * spans[1] and height > 0.5:
@@ -95,7 +114,7 @@ def _problems(motion: Motion, body: Array, height: float, floor: float) -> list[
         found.append("there is one frame only, a pose")
     if not 10 <= motion.fps <= 500:
         found.append(f"{motion.fps:g} frames per second is unusual")
-    step = np.linalg.norm(np.diff(body[:, 0], axis=0), axis=-1) * motion.fps
+    step = np.linalg.norm(np.diff(way, axis=0), axis=-1) * motion.fps
     if len(step) and step.max() > 15:
         found.append(f"the root jumps at frame {int(step.argmax()) + 1} ({step.max():.0f} m/s)")
     turn = _largest_turn(motion)

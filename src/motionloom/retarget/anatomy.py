@@ -52,6 +52,8 @@ CHILD: tuple[int | None, ...] = (
     None,
 )
 """The SMPL joint each SMPL joint's bone runs to."""
+_STEPPING = np.radians(25)
+"""Flat feet of one body differ by less in how far their bones point down."""
 BROADEST = 0.35
 """Human hip joints are at most so far apart, in lengths of the leg."""
 LEGS, FEET, TOES = (1, 2, 4, 5), (7, 8), (10, 11)
@@ -130,7 +132,9 @@ def read_body(skeleton: Skeleton, override: Override | None = None) -> Body:
     if axes is not None:
         # of the uniform person, whose legs differ by millimetres, it is measured, as when the weights were trained
         upright = skeleton.on_floor and axes[1][1] > 0.9 and skeleton != SMPL22
-        height = float(rest[list(TOES), 1].mean()) if upright else _toe_height(skeleton, found, rest, axes[1])
+        toes = rest[list(TOES), 1]
+        planted = float(toes.mean() if _lifted_foot(rest, axes) is None else toes.min())
+        height = planted if upright else _toe_height(skeleton, found, rest, axes[1])
         return Body(skeleton, points, drivers, rest, _rest_frames(rest, axes), True, axes[1], height, tips)
     known = _is_bandai(skeleton)
     frames = _bandai_frames(rest) if known else _odd_frames(rest)
@@ -221,15 +225,35 @@ def _rest_frames(rest: Array, axes: tuple[Array, Array, Array]) -> Array:
         frames[j] = frame(bone, forward if j in ARMS else left)
     frames[0] = frame(up, left)
     frames[HEAD] = frame(up, left)
-    for foot, toe in zip(FEET, TOES):
+    lifted = _lifted_foot(rest, axes)
+    for side, (foot, toe) in enumerate(zip(FEET, TOES)):
         heading = rest[toe] - rest[foot]
-        heading = heading - float(heading @ up) * up
-        if float(heading @ forward) < 0.2 * np.linalg.norm(rest[toe] - rest[foot]):
-            heading = forward  # an End Site straight below the ankle says nothing
+        if side == lifted:  # its sole slopes against the bone to the toe as the other's does
+            heading = rot.rotate(rot.rotvec_to_quat(-_slopes(rest, axes)[1 - side] * left), heading)
+        else:
+            heading = heading - float(heading @ up) * up
+            if float(heading @ forward) < 0.2 * np.linalg.norm(rest[toe] - rest[foot]):
+                heading = forward  # an End Site straight below the ankle says nothing
         frames[foot] = frames[toe] = frame(heading, left)
     for elbow, wrist in ((18, 20), (19, 21)):
         frames[wrist] = frames[elbow]
     return frames
+
+
+def _slopes(rest: Array, axes: tuple[Array, Array, Array]) -> tuple[float, float]:
+    """Radians by which the bones from the ankles to the toes point down, left and right."""
+    _, up, forward = axes
+    left, right = rest[list(TOES)] - rest[list(FEET)]
+    return tuple(float(np.arctan2(-bone @ up, bone @ forward)) for bone in (left, right))  # type: ignore[return-value]
+
+
+def _lifted_foot(rest: Array, axes: tuple[Array, Array, Array]) -> int | None:
+    """0 for the left and 1 for the right foot where it is lifted at rest, as in a file that holds a step as its rest.
+
+    Then the feet point down by other angles, and the higher ankle's is no flat foot.
+    """
+    slopes, heights = _slopes(rest, axes), rest[list(FEET)] @ axes[1]
+    return None if abs(slopes[0] - slopes[1]) < _STEPPING else int(heights.argmax())
 
 
 def _toe_height(skeleton: Skeleton, found: JointMap, rest: Array, up: Array) -> float:

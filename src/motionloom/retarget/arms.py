@@ -18,10 +18,11 @@ def shoulders_moved(positions: Array, world: Array, body: Body, *, chest_axes: A
     """(frames, 2, 3) how far the shoulders are from their rest on the chest, in its frame and in lengths of the arm.
 
     ``positions`` (frames, joints, 3) metres and ``world`` (frames, joints, 4) are of the body's joints;
-    ``chest_axes`` (4,) stands for the body's own joint_from_anatomy of the chest. Zero where no joint turns the chest.
+    ``chest_axes`` (4,) stands for the body's own joint_from_anatomy of the chest. Zero where no joint turns the chest
+    or arms have no length.
     """
     chest = body.drivers[CHEST]
-    if chest is None:
+    if chest is None or _arm(body) < 1e-6:
         return np.zeros((len(world), 2, 3))
     axes = body.frames[CHEST] if chest_axes is None else chest_axes
     now = np.einsum("sj,fjc->fsc", body.points[list(SHOULDERS)], positions) - positions[:, chest, None]
@@ -44,6 +45,8 @@ def reach(world: Array, moved: Array, body: Body) -> Array:
     lost = rot.rotate(rot.multiply(world[:, chest], body.frames[CHEST])[:, None], lost)
     places = body.places(positions, world)
     for side, (shoulder, elbow, wrist) in enumerate(((16, 18, 20), (17, 19, 21))):
+        if len({body.drivers[shoulder], body.drivers[elbow], None}) < 3:
+            continue  # no joint of its own bends this arm
         upper, lower = places[:, elbow] - places[:, shoulder], places[:, wrist] - places[:, elbow]
         pole = _elbow_pole(world, body, shoulder, arm=upper + lower, upper=upper)
         middle, end = bend(
