@@ -130,10 +130,14 @@ class Cluster(Alone):
         self.check()
 
     def check(self) -> None:
-        """End it all where the head has died, which nobody killed: on a machine that is too busy Ray gives up."""
+        """Start raylets again that gave up, as Ray's do on a machine that is too busy; without a head all is over."""
         if self.head.poll() is not None:
             self.end()
             sys.exit(f"the head ended by itself: {(self.folder / 'ray.log').read_text()[-500:]}")
+        ended = [raylet for raylet in self.raylets if raylet.poll() is not None]
+        for raylet in ended:
+            self.raylets.remove(raylet)
+            self.add()
 
     def add(self) -> None:
         """Another raylet."""
@@ -219,12 +223,18 @@ class Driver:
         except ValueError:
             return None
 
-    def finish(self, most: int) -> tuple[dict[str, Any], float]:
+    def wait(self, cluster: Alone) -> None:
+        """Until it ends, and the cluster is looked after meanwhile."""
+        while self.popen.poll() is None:
+            cluster.check()
+            time.sleep(0.5)
+
+    def finish(self, most: int, cluster: Alone) -> tuple[dict[str, Any], float]:
         """Start it until it comes to its end; what it said, and the seconds of the last start."""
         for _ in range(most):
             self.start()
             began = time.monotonic()
-            self.popen.wait()
+            self.wait(cluster)
             if found := self.report():
                 return found, time.monotonic() - began
         sys.exit(f"{most} drivers came to no end: {self.errors.read_text()[-500:]}")
@@ -280,9 +290,7 @@ def fill(one: Driver, disk: Disk, cluster: Alone) -> None:
     disk.fill()
     print(f"{time.strftime('%X')} full disk", flush=True)
     while True:
-        while one.popen.poll() is None:
-            cluster.check()
-            time.sleep(0.5)
+        one.wait(cluster)
         print(f"{time.strftime('%X')}   the driver ended ({one.popen.poll()}): {said(one)}", flush=True)
         if one.popen.poll() == 2 and "No space left" in said(one):
             break
@@ -331,6 +339,7 @@ def main() -> None:
     here = str(Path(__file__).resolve().parent)
     os.environ["PYTHONPATH"] = os.pathsep.join([here, *filter(None, [os.environ.get("PYTHONPATH")])])
     os.environ |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(16)}  # this cluster's own
+    os.environ |= {"RAY_raylet_start_wait_time_s": "120"}  # on a busy machine
     with tempfile.TemporaryDirectory(prefix="motionloom-") as name:
         folder = Path(name)
         disk = Disk(folder / "disk")
@@ -358,10 +367,9 @@ def strike(folder: Path, disk: Disk, arguments: argparse.Namespace) -> list[str]
         one = Driver(command, folder)
         dice = random.Random(arguments.seed)
         struck = beat(cluster, one, disk, blows=arguments.blows, pause=arguments.pause, dice=dice)
-        if one.popen.poll() is None:
-            one.popen.wait()
+        one.wait(cluster)
         if one.report() is None:
-            one.finish(10)
+            one.finish(10, cluster)
         counts, wrong = look(out, arguments.rows)
         print(f"{dict(struck)}, {one.starts} drivers; {dict(counts)}")
         reasons = [f"row {row.row}: {row.why}" for row in read_batch(out, motions=False) if row.state == "failed"]
@@ -371,9 +379,9 @@ def strike(folder: Path, disk: Disk, arguments: argparse.Namespace) -> list[str]
         if counts != {"made": arguments.rows - 2, "failed": 2}:
             wrong.append("not exactly the two poisoned rows failed")
         job(folder / "jobs.jsonl", arguments.rows, poisoned=False)
-        mended, seconds = one.finish(5)
+        mended, seconds = one.finish(5, cluster)
         print(f"both rows mended: {mended}, {seconds:.0f} s")
-        again, seconds = one.finish(1)
+        again, seconds = one.finish(1, cluster)
         print(f"once more: {again}, {seconds:.1f} s")
         counts, more = look(out, arguments.rows)
         wrong += more

@@ -8,20 +8,24 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from motionloom.bulk import batch as batch_module
+from motionloom.bulk import on_ray
 from motionloom.bulk.batch import Where, array_task, batch, run
 from motionloom.bulk.crew import _Process, gpu_of
 from motionloom.bulk.folder import Store
 from motionloom.bulk.jobs import Jobs
 from motionloom.bulk.maker import Options
 from motionloom.bulk.metadata import Result, read_batch
+from motionloom.bulk.shard import Batch, Task
 from motionloom.errors import MotionloomError
 from tests.bulk.rows import apart, options, positions, rows, written
 
@@ -189,6 +193,18 @@ def test_a_disk_that_is_full_ends_the_batch_in_a_sentence(weights: str, folder: 
     assert not list((out / ".work").iterdir())
     again = start(weights, jobs, out, "--format", "webdataset", "--workers", "1")
     assert again.communicate(timeout=120)[0] == f"{COUNT} motions are in {out}\n"
+
+
+@pytest.mark.parametrize(("task", "times"), [(None, 1), (Task(0, 0, []), 0)], ids=["nobody works", "somebody works"])
+def test_a_cluster_where_nobody_works_is_said_once(task: Task | None, times: int) -> None:
+    ray = SimpleNamespace(cluster_resources=lambda: {"CPU": 1.0}, remote=lambda **_: lambda kind: kind)
+    crew = on_ray._Crew(ray, iter(()), Batch("", "", "", {}, Options()), None, lambda rows: None)
+    crew.flight = {"reference": ("actor", task)}
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        for _ in range(3 * on_ray.LONELY):
+            crew._waited(False)
+    assert [str(one.message)[:24] for one in said] == ["no worker has begun for "] * times
 
 
 def test_results_come_without_a_folder_as_they_are_made(weights: str) -> None:

@@ -87,6 +87,13 @@ def test_what_is_no_file_of_jobs_is_refused(name: str) -> None:
         Jobs.of(name)
 
 
+def test_rows_are_mappings_and_one_is_a_job() -> None:
+    assert list(Jobs.of({"prompt": "a"}).read()) == list(Jobs.of([{"prompt": "a"}]).read()) == [b'{"prompt": "a"}']
+    for wrong in (["a person walks"], [["prompt", "a"]], [{"prompt": "a"}, None]):
+        with pytest.raises(MotionloomError, match="a row is a mapping"):
+            Jobs.of(wrong)  # type: ignore[arg-type]
+
+
 @given(count=st.integers(1, 100_000_000))
 def test_shards_are_small_where_jobs_are_and_never_large(count: int) -> None:
     size = shard_size(count)

@@ -17,7 +17,7 @@ from motionloom.bulk.shard import Batch, Report, Task, problems
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import parse_adapter
 
-Source = Jobs | Path | str | Iterable[Mapping[str, Any]]
+Source = Jobs | Path | str | Mapping[str, Any] | Iterable[Mapping[str, Any]]
 LOCAL = "local"
 """Ray's address for a cluster of this machine."""
 LOOKED_AT = 8

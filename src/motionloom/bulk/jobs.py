@@ -40,12 +40,18 @@ class Jobs:
     """The first variant's seed."""
 
     @staticmethod
-    def of(source: "Jobs | Path | str | Iterable[Mapping[str, Any]]") -> "Jobs":
-        """A file by its path, or mappings; raises `MotionloomError` for another suffix or a missing file."""
+    def of(source: "Jobs | Path | str | Mapping[str, Any] | Iterable[Mapping[str, Any]]") -> "Jobs":
+        """A file by its path, or mappings (one is a job of one row).
+
+        Raises `MotionloomError` for another suffix, a missing file, and for rows that are no mappings.
+        """
         if isinstance(source, Jobs):
             return source
         if not isinstance(source, str | Path):
-            return Jobs(rows=tuple(source))
+            rows: list[Any] = [source] if isinstance(source, Mapping) else list(source)
+            if wrong := [row for row in rows if not isinstance(row, Mapping)]:
+                raise MotionloomError(f"a row is a mapping such as {{'prompt': '...'}}; got {str(wrong[0])[:60]!r}")
+            return Jobs(rows=tuple(rows))
         path = Path(source)
         if path.suffix.lower() not in READS:
             raise MotionloomError(

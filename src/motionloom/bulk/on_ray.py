@@ -10,6 +10,7 @@ import os
 import re
 import socket
 import sys
+import warnings
 from collections import deque
 from collections.abc import Generator, Iterator
 from contextlib import redirect_stdout
@@ -24,6 +25,8 @@ from motionloom.errors import MotionloomError
 
 PATIENCE = 1.0
 """Seconds between two looks at what is done."""
+LONELY = 120
+"""Looks without anybody who works, after which that is said."""
 ANSWERS = 10.0
 """Seconds in which a cluster's head must answer."""
 
@@ -144,6 +147,8 @@ class _Crew:
         self.again: deque[Task] = deque()
         self.deaths: dict[int, int] = {}
         self.stillborn = 0
+        self.looks = 0
+        """Since when nobody has worked or answered, in looks."""
 
     def run(self) -> Iterator[Report]:
         task = yield from self._next()
@@ -155,6 +160,7 @@ class _Crew:
                 self.flight[actor.make.remote(task)] = actor, task
                 task = yield from self._next()
             done, _ = self.ray.wait(list(self.flight), num_returns=1, timeout=PATIENCE)
+            self._waited(bool(done))
             for reference in done:
                 if report := self._over(reference):
                     yield report
@@ -176,6 +182,16 @@ class _Crew:
         for _ in range(0 if self.idle else self.workers - len(self.flight)):
             actor = self.kind.remote(self.batch.to_json())
             self.flight[actor.ready.remote()] = actor, None
+
+    def _waited(self, answered: bool) -> None:
+        """Say once that nobody comes, who would otherwise be waited for in silence: a cluster may still grow."""
+        working = answered or any(task for _, task in self.flight.values())
+        self.looks = 0 if working else self.looks + 1
+        if self.looks == LONELY:
+            warnings.warn(
+                f"no worker has begun for {LONELY * PATIENCE:.0f} s; 'ray status' says what the cluster lacks",
+                stacklevel=2,
+            )
 
     def _over(self, reference: Any) -> Report | None:
         actor, task = self.flight.pop(reference)

@@ -208,7 +208,11 @@ def _make(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", *, wh
 def _say(out: Path, counts: "dict[str, int]", made: int) -> None:
     said = [f"{counts['made']:,} motion{' is' if counts['made'] == 1 else 's are'} in {out}"]
     said += [f"{counts['dropped']:,} were dropped by the filter"] if counts["dropped"] else []
-    said += [f"{counts['repeated']:,} rows repeat others"] if counts["repeated"] else []
+    said += (
+        [f"{counts['repeated']:,} {'row repeats' if counts['repeated'] == 1 else 'rows repeat'} another"]
+        if counts["repeated"]
+        else []
+    )
     said += (
         [f"{counts['failed']:,} failed (rows count from 0; mend them; the same command tries again what may go well)"]
         if counts["failed"]

@@ -43,11 +43,6 @@ Y_UP: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 _Y_UP_QUATERNION: Array = rot.matrix_to_quat(Y_UP)
 
 
-def rotation(joint: int) -> slice:
-    """The rotation of joint 0..21: two matrix rows; joint 0 is the orientation in the world."""
-    return slice(3 + 6 * joint, 9 + 6 * joint)
-
-
 # Motions to features
 
 

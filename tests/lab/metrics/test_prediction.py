@@ -223,14 +223,6 @@ def test_speeds_of_real_futures_are_references() -> None:
     assert tally.result(0.04) == pytest.approx(0.01 * 15)
 
 
-def test_published_references_cover_fifteen_actions_and_seven_sets() -> None:
-    """Sums of the published tables."""
-    assert len(pr.CMD_H36M) == 15
-    assert sum(pr.CMD_H36M.values()) == pytest.approx(0.0724604)
-    assert len(pr.CMD_AMASS) == 7
-    assert sum(pr.CMD_AMASS.values()) == pytest.approx(0.0410691)
-
-
 # ---- what is refused
 
 

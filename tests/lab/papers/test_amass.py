@@ -28,6 +28,7 @@ def test_amass_windows_and_data_sets(tmp_path: Path) -> None:
     assert (read.fps, read.observed, read.future, read.threshold, read.layout.channels) == (60.0, 30, 120, 0.4, 63)
     assert UNIFORM not in read.licence
     assert set(read.speeds) == set(AMASS_SETS["test"]) == set(AMASS_SPEEDS)
+    assert sum(AMASS_SPEEDS.values()) == pytest.approx(0.0410691)
 
 
 def test_amass_data_sets_are_disjoint_and_known_by_their_old_names() -> None:

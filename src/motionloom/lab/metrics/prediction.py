@@ -32,19 +32,6 @@ _CELLS = 1_000_000
 _ROUNDING = 1e-9
 """Squared distances by products are this exact, relative to the squared lengths."""
 
-CMD_H36M: Mapping[str, float] = {
-    "Directions": 0.0045333, "Discussion": 0.0050718, "Eating": 0.0039681, "Greeting": 0.0059260,
-    "Phoning": 0.0035907, "Posing": 0.0041949, "Purchases": 0.0056251, "Sitting": 0.0024797,
-    "SittingDown": 0.0035406, "Smoking": 0.0036022, "Photo": 0.0043476, "Waiting": 0.0042226,
-    "Walking": 0.0075376, "WalkDog": 0.0070660, "WalkTogether": 0.0067542,
-}  # fmt: skip
-"""Mean displacement of a joint by action, metres per frame at 50 fps (BeLFusion)."""
-CMD_AMASS: Mapping[str, float] = {
-    "DFaust": 0.0048603, "DanceDB": 0.0081590, "GRAB": 0.0017740, "HUMAN4D": 0.0043917,
-    "SOMA": 0.0075961, "SSM": 0.0057579, "Transitions": 0.0085301,
-}  # fmt: skip
-"""Mean displacement of a joint by data set, metres per frame at 60 fps (BeLFusion)."""
-
 
 # ---- distances
 

@@ -64,8 +64,7 @@ class Keep:
     """Where the ramp would reach the handshake."""
     handshake: float
     sampling: Literal["even", "published"] = "even"
-    """At distance d = 1 .. b from the handshake: d / b on both sides; ``published``: (d - 1) / b on the right side, and
-    no ramp at all where b is below 2."""
+    """At distance d = 1 .. b from the handshake: d / b; ``published``: right (d - 1) / b, and nothing where b < 2."""
 
     def ramp(self, frames: int, side: Literal["left", "right"]) -> Tensor:
         """(frames,) weights by growing distance from the handshake."""
@@ -331,10 +330,8 @@ def double_take(
     ``first`` has the texts of the rows, ``second`` none; each is bound to the lengths it should know. ``x``: noise
     (repetitions * intervals, longest interval, features) at ``way[0]``. ``noise``: for either take.
     """
-    solver, second_take_only = options.get("solver", DDPM), options.get("second_take_only", False)
-    made = first_take(
-        first, x, plan, way=way, schedule=schedule, noise=noise[0], solver=solver, join=not second_take_only
-    )
+    solver, alone = options.get("solver", DDPM), options.get("second_take_only", False)
+    made = first_take(first, x, plan, way=way, schedule=schedule, noise=noise[0], solver=solver, join=not alone)
     if not plan.handshakes:
         none = made.new_zeros(0, 0, made.shape[2])
         return Takes(made, none, made.new_zeros(0, 0), none, made, unfold(made, plan))
