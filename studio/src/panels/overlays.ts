@@ -108,11 +108,16 @@ export function help(app: App, actions: Actions, root: HTMLDialogElement): void 
           ),
         ),
       ),
-    ),
-    h(
-      "p",
-      { class: "quiet" },
-      "With the path or joint tool the arrow keys move the cursor or the joint (Shift: finer), Page Up and Page Down its height, Enter puts a point. 1 to 9 keep a take or choose a future. Alt while dragging does not snap. Ctrl and the wheel zoom the timeline.",
+      h(
+        "section",
+        {},
+        h("h3", {}, "Besides"),
+        h(
+          "p",
+          { class: "quiet" },
+          "With the path or joint tool the arrow keys move the cursor or the joint (Shift: finer), Page Up and Page Down its height, Enter puts a point. 1 to 9 keep a take or choose a future. Alt while dragging does not snap. Ctrl and the wheel zoom the timeline.",
+        ),
+      ),
     ),
   );
   root.addEventListener("close", close);

@@ -75,6 +75,7 @@ export class Scene {
 
   look(theme: StageTheme): void {
     this.scene.background = new THREE.Color(theme.background);
+    this.renderer.setClearColor(theme.background);
     this.scene.fog = new THREE.Fog(theme.background, 14, 34);
     this.sky.color.set(theme.sky);
     this.sky.groundColor.set(theme.ground);
