@@ -46,7 +46,7 @@ async function start(): Promise<void> {
   const app: App = {
     project: new History(project),
     session: newSession(),
-    denoising: new Signal<MotionClip | null>(null),
+    denoising: new Signal<readonly MotionClip[]>([]),
     live: new Signal<LiveState | null>(null),
   };
   const stage = new Stage(app, part<HTMLCanvasElement>("canvas"), isDark());

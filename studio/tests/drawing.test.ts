@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import type { App } from "../src/app/app";
+import { type App, seenTakes } from "../src/app/app";
 import type { LiveState } from "../src/app/live";
 import { Deeds } from "../src/app/deeds";
 import { Drawer, MARKS } from "../src/app/drawing";
@@ -27,8 +27,8 @@ class Jobs {
     return new Response(body);
   }
 
-  level(level: number): void {
-    this.send("level", { level, of: 24, row: 0, people: 1, frames: 130, begin: 0, positions: base64(130) });
+  level(level: number, row = 0): void {
+    this.send("level", { level, of: 24, row, people: 1, frames: 130, begin: 0, positions: base64(130) });
   }
 
   end(): void {
@@ -53,7 +53,7 @@ function begun(): { app: App; jobs: Jobs; drawer: Drawer; deeds: Deeds } {
   const app = {
     project: new History(exampleProject()),
     session: newSession(),
-    denoising: new Signal<MotionClip | null>(null),
+    denoising: new Signal<readonly MotionClip[]>([]),
     live: new Signal<LiveState | null>(null),
   };
   const drawer = new Drawer(app);
@@ -89,16 +89,40 @@ describe("a draw", () => {
     await vi.waitFor(() => expect(jobs.asked).toHaveLength(1));
     expect(jobs.asked[0]).toMatchObject({ task: "compose", levels: true });
     await vi.waitFor(() => jobs.level(5));
-    await vi.waitFor(() => expect(app.denoising.value).not.toBeNull());
+    await vi.waitFor(() => expect(app.denoising.value).not.toEqual([]));
     expect(performance.getEntriesByName(MARKS.preview)).toHaveLength(0);
     for (const level of [6, 7, 24]) jobs.level(level);
     await vi.waitFor(() => expect(performance.getEntriesByName(MARKS.preview)).toHaveLength(1));
     await drawn(page);
     expect(app.project.value.takes.map((one) => one.motion)).toEqual(["motion0"]);
-    expect(app.denoising.value).toBeNull();
+    expect(app.denoising.value).toEqual([]);
     drawer.again();
     await vi.waitFor(() => expect(jobs.asked).toHaveLength(2));
     expect(jobs.asked[1]).toMatchObject({ levels: 6 });
+  });
+
+  it("of four takes shows all of them on their way, each once where pictures are slow", async () => {
+    const page = begun();
+    const { app, jobs, drawer } = page;
+    picture = 120;
+    drawer.schedule();
+    await drawn(page);
+    app.project.change("draw four takes", (old) => ({ ...old, count: 4 }));
+    await vi.waitFor(() => expect(jobs.asked).toHaveLength(2));
+    expect(jobs.asked[1]).toMatchObject({ count: 4 });
+    await vi.waitFor(() => jobs.level(6, 0));
+    jobs.level(6, 1);
+    await vi.waitFor(() => expect(app.denoising.value).toHaveLength(2));
+    expect(seenTakes(app)).toEqual(app.denoising.value);
+    await new Promise((resume) => setTimeout(resume, 2 * picture));
+    const [first] = app.denoising.value;
+    for (const row of [2, 3]) jobs.level(6, row);
+    for (const row of [0, 1, 2, 3]) jobs.level(12, row);
+    await vi.waitFor(() => expect(app.denoising.value).toHaveLength(4));
+    await new Promise((resume) => setTimeout(resume, 30));
+    expect(app.denoising.value[0]).toBe(first);
+    drawer.stop();
+    expect(seenTakes(app)).toEqual(app.session.value.clips);
   });
 
   it("shows no more than its preview where pictures are slow", async () => {
@@ -106,7 +130,7 @@ describe("a draw", () => {
     picture = 120;
     drawer.schedule();
     await vi.waitFor(() => jobs.level(6));
-    await vi.waitFor(() => expect(app.denoising.value).not.toBeNull());
+    await vi.waitFor(() => expect(app.denoising.value).not.toEqual([]));
     const preview = app.denoising.value;
     await new Promise((resume) => setTimeout(resume, 2 * picture));
     jobs.level(12);

@@ -76,6 +76,19 @@ def test_control_measures_each_goal_and_names_what_is_missed(server: Server) -> 
     assert measures["goals"]["path"]["worst_cm"] < 10
 
 
+def test_all_takes_of_a_timeline_are_seen_at_every_level(server: Server) -> None:
+    segments = [{"text": "a person walks", "seconds": 1.0}, {"text": "a person jumps", "seconds": 1.0}]
+    job = server.submit(task="compose", timeline={"segments": segments}, count=3, seed=5, steps=4, levels=2)
+    events = list(server.events(job))
+    levels = [data for _, kind, data in events if kind == "level"]
+    assert [(data["level"], data["row"]) for data in levels] == [(2, 0), (2, 1), (2, 2), (4, 0), (4, 1), (4, 2)]
+    results = events[-1][2]["results"]
+    assert [one["seed"] for one in results] == [5, 6, 7]
+    for data, one in zip(levels[3:], results, strict=True):
+        last = decoded(data["positions"], 1, 40, 22, 3)[0]
+        assert np.abs(last - poses(server, one["id"])).mean() < 0.05, "seen last: nearly the motion that comes of it"
+
+
 def test_levels_of_a_controlled_motion_stand_in_the_world_of_its_goals(server: Server) -> None:
     goals = {"start": {"position": [3, -2], "facing": 90}, "path": {"points": [[3, -2], [5, -2]]}}
     job = server.submit(task="control", prompt="a person walks", seconds=2.0, steps=6, goals=goals)

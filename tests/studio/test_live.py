@@ -42,3 +42,44 @@ def test_somebody_is_steered_live_and_all_of_it_is_kept(studio: Studio):
     studio.key("Control+z")
     assert studio.project()["segments"] == before["segments"]
     assert not studio.faults
+
+
+PAD = """window.PAD = {axes: [0.1, -0.1], buttons: [{pressed: false}]};
+navigator.getGamepads = () => [null, window.PAD]"""
+"""A gamepad in the second slot, as browsers give it; its stick is not quite in the middle, as sticks are."""
+AWAY, RIGHT = np.array([-2.5, -3.5]) / np.hypot(2.5, 3.5), np.array([3.5, -2.5]) / np.hypot(2.5, 3.5)
+"""Where the camera looks when the page opens, and what is at the right of the picture: x and z."""
+
+
+def shown(studio: Studio, seconds: float) -> None:
+    """Wait until so many seconds more were shown."""
+    at = "Number.parseFloat(document.querySelector('#live small').textContent)"
+    studio.page.wait_for_function(f"{at} > {studio.page.evaluate(at) + seconds}")
+
+
+@pytest.mark.slow
+def test_the_stick_of_a_gamepad_steers(studio: Studio):
+    page = studio.page
+    studio.load()  # the camera is where it begins
+    page.evaluate(PAD)
+    studio.key("j")
+    page.wait_for_function("document.querySelector('#live small')?.textContent > '0.3'")
+    shown(studio, 1.5)
+    page.evaluate("PAD.axes = [0, -0.8]")
+    done(studio, "walk")
+    shown(studio, 3.0)
+    page.evaluate("PAD.axes = [0.8, 0]")
+    shown(studio, 4.0)
+    page.evaluate("PAD.axes = [0, 0]")
+    studio.key("r")
+    page.wait_for_function("document.querySelector('#inspector .take small')?.textContent === 'live'")
+    pelvis = studio.motion()[0][:, 0, [0, 2]]
+    way = np.diff(pelvis, axis=0) * 20  # metres per second
+    assert np.linalg.norm(way[:20], axis=-1).mean() < 0.4, "a stick that nobody holds steers nobody"
+    along, across = way @ AWAY, way @ RIGHT
+    assert pelvis.shape[0] > 160
+    fastest = int(np.convolve(along, np.ones(20), "valid").argmax())
+    assert along[fastest : fastest + 20].mean() > 0.6, "away from the camera"
+    assert across[-20:].mean() > 0.6, "and then to the right of the picture"
+    assert across[-20:].mean() > 3 * abs(along[-20:].mean())
+    assert not studio.faults

@@ -4,10 +4,21 @@ import numpy as np
 
 from tests.studio.studio import Studio
 
+SEEN = """() => {
+    window.SEEN = 0;
+    const [names, stage] = ["#names", "#stage"].map(one => document.querySelector(one));
+    new MutationObserver(() => {
+        if (stage.getAttribute("aria-busy") === "true") window.SEEN = Math.max(window.SEEN, names.children.length)
+    }).observe(names, {childList: true})
+}"""
+"""How many takes are named while they are being drawn."""
+
 
 def test_four_takes_side_by_side_and_one_is_kept(studio: Studio):
+    studio.page.evaluate(SEEN)
     studio.key("g")
     project = studio.project()
+    assert studio.page.evaluate("SEEN") == 4, "all four were seen on their way"
     assert len(project["takes"]) == 4
     assert len({take["seed"] for take in project["takes"]}) == 4
     assert studio.page.locator("#names span").count() == 4

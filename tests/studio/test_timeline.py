@@ -106,3 +106,12 @@ def test_an_empty_block_says_what_is_missing(studio: Studio):
     said = studio.page.locator(".track.words .said")
     assert "has no words yet" in said.inner_text()
     assert studio.page.locator(".block.wrong").count() == 1
+
+
+def test_the_sheet_of_keys_fits_the_window_and_no_key_covers_its_words(studio: Studio):
+    studio.key("?")
+    sheet = studio.page.locator("#help")
+    assert sheet.evaluate("one => one.scrollHeight <= one.clientHeight"), "nothing of it is cut"
+    assert sheet.evaluate("one => [...one.querySelectorAll('dt')].every(dt => dt.scrollWidth <= dt.clientWidth + 1)")
+    assert all(key.strip() for key in sheet.locator("kbd").all_inner_texts())
+    studio.key("Escape")

@@ -16,9 +16,10 @@ from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
-from motionloom.tasks.long import Past, compose, decoded, long_features
+from motionloom.tasks.long import Past, compose, compose_takes, decoded, long_features
 from motionloom.tasks.splice import carried
 from motionloom.tasks.text import sample_features
+from motionloom.tasks.watching import Denoised, watching
 from motionloom.weights.prior import Prior
 from tests.nets import tiny
 from tests.tasks.test_edit import person
@@ -84,6 +85,25 @@ def test_one_segment_is_drawn_as_a_single_motion_is(prior: Prior) -> None:
     made = features(one, [Segment(TURN, 1.0, guidance=4.0)], seed=9)[0]
     other = sample_features(one, [TURN], [20], seeds=[9], steps=3, guidance=4.0)[0]
     torch.testing.assert_close(made, other, atol=1e-5, rtol=0)
+
+
+def test_several_takes_at_once_are_those_that_are_drawn_alone(prior: Prior) -> None:
+    """Also where they are more rows than a network call takes; and each is seen on its way."""
+    segments = [Segment(WALK, 1.0, transition=0.3), Segment(TURN, 1.2, transition=0.2), Segment(WALK, 0.8)]
+    path = on_ground(np.linspace([0.5, 0.0], [1.0, 2.0], 60))
+    for more in ({}, {"batch_size": 4}, {"path": path}):
+        seen: list[Denoised] = []
+        alone = {name: value for name, value in more.items() if name != "batch_size"}
+        with watching(seen.append):
+            takes = list(compose_takes(prior, segments, steps=3, seed=7, count=4, **more))
+        assert len(takes) == 4
+        for number, take in enumerate(takes):
+            expected = whole(prior, segments, seed=7 + number, **alone)
+            assert np.abs(take.positions() - expected.positions()).max() < 1e-3
+            own = [one for one in seen if one.rows == (number,)]
+            assert [one.done for one in own][-1] == 3
+            assert own[-1].positions().shape == (1, 1, 60, 22, 3)
+        assert np.abs(takes[0].positions() - takes[1].positions()).max() > 1e-2
 
 
 def test_seeds_guidance_texts_and_transitions_matter(prior: Prior) -> None:

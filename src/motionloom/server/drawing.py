@@ -62,7 +62,7 @@ def draw(models: Models, request: Request, progress: Progress) -> Iterator[Resul
     """The motions of a request, one after the other as they are finished."""
     if request.call is not None:
         return request.call(models, progress)
-    if request.task in ("generate", "compose", "control") and request.timeline is not None:
+    if at_once(request):
         return _composed(models, request, progress)
     return _TASKS[request.task](models, request, progress)
 
@@ -78,6 +78,11 @@ def batch_key(request: Request) -> tuple[Any, ...] | None:
     if request.task != "generate" or request.timeline is not None or request.call is not None:
         return None
     return text.frames_in(request.options["seconds"], RATE), request.steps, request.guidance
+
+
+def at_once(request: Request) -> bool:
+    """Whether the motions of a request are drawn in the same network calls, rather than one after the other."""
+    return request.call is None and request.task != "duet" and request.timeline is not None
 
 
 def draw_together(models: Models, requests: Sequence[Request], progress: Progress) -> Iterator[tuple[int, Result]]:
@@ -100,15 +105,12 @@ def _composed(models: Models, request: Request, progress: Progress) -> Iterator[
     timeline = request.timeline
     assert timeline is not None
     start = None if timeline.start is None else _loaded(timeline.start)
-    for number in range(request.count):
-        seed = request.seed + number
-        moves = _moves(progress, request, len(timeline.segments), number)
-        blocks = long.compose(
-            models.prior, timeline.segments, seed=seed, start=start, path=timeline.path, progress=moves,
-            **shared(request),
-        )  # fmt: skip
-        motion = concatenated(*blocks)
-        yield Result(number, (motion,), seed, measured(motion, request.parts))
+    made = long.compose_takes(
+        models.prior, timeline.segments, count=request.count, seed=request.seed, start=start, path=timeline.path,
+        progress=_moves(progress, request, len(timeline.segments), 0), **shared(request),
+    )  # fmt: skip
+    for number, motion in enumerate(made):
+        yield Result(number, (motion,), request.seed + number, measured(motion, request.parts))
 
 
 def _controlled(models: Models, request: Request, progress: Progress) -> Iterator[Result]:

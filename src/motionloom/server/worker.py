@@ -188,8 +188,9 @@ class Worker:
 
     def _watcher(self, jobs: Sequence[Job]) -> "Callable[[Denoised], None]":
         """Hands the poses of every network call to the jobs whose rows they are."""
-        from motionloom.server.drawing import placed
+        from motionloom.server.drawing import at_once, placed
 
+        together = len(jobs) > 1 or at_once(jobs[0].request)
         owners = [(job, row) for job in jobs for row in range(job.request.count)]
         walks = 0
 
@@ -203,7 +204,7 @@ class Worker:
             if not any(_wants(job, denoised.done) for job in jobs):
                 return
             for row, poses in zip(denoised.rows, denoised.positions(), strict=True):
-                job, number = owners[row] if denoised.rows != (0,) else _alone(jobs[0], walks)
+                job, number = owners[row] if together or denoised.rows != (0,) else _alone(jobs[0], walks)
                 if _wants(job, denoised.done):
                     job.level(denoised.done, denoised.of, number, placed(job.request, poses), denoised.begin)
 

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 from typing import Unpack
 
 import numpy as np
@@ -35,7 +36,7 @@ from motionloom.nets.prior import Bound, PriorNet
 from motionloom.tasks.adapting import AdaptedPriors, loaded
 from motionloom.tasks.body import Places, solve_stream
 from motionloom.tasks.sampling import Moves, Sampling, Settings, sample_chain
-from motionloom.tasks.splice import person_at_20
+from motionloom.tasks.splice import concatenated, person_at_20
 from motionloom.tasks.watching import ChainView
 from motionloom.weights.prior import Prior
 
@@ -98,14 +99,8 @@ def compose(
 
     (Shafir et al. 2024, section 4, as in docs/decisions/0013.)
     """
-    if len(prior.mean) != WIDTH or prior.fps != FPS:
-        raise MotionloomError(
-            f"these weights make {len(prior.mean)} numbers a frame; long motion needs {WIDTH} at {FPS:g} fps"
-        )
     chosen = Sampling.of(sampling, settings).alone()
-    chosen.levels(prior.schedule)
-    past = None if start is None else Past.of(start)
-    track = None if path is None else Track.along(path, prior.fps)
+    past, track, place = _begun(prior, chosen, start, path)
     goals: deque[Goal | None] = deque()
 
     def asked() -> Iterator[Segment]:
@@ -117,8 +112,52 @@ def compose(
             first += frames
 
     pieces = long_features(prior, asked(), past=past, sampling=chosen, progress=progress)
-    place = past.end if past else track.place(0) if track else GroundPose()
     return solve_stream(in_world(prior, pieces, goals, place, track), prior.fps, foot_lock=foot_lock)
+
+
+def compose_takes(
+    prior: Prior,
+    segments: Sequence[Segment],
+    *,
+    start: Motion | None = None,
+    path: Goal | None = None,
+    foot_lock: bool = True,
+    sampling: Sampling | None = None,
+    progress: Moves | None = None,
+    **settings: Unpack[Settings],
+) -> Iterator[Motion]:
+    """As many motions of the same segments as ``count`` says, sampled in the same network calls, one after the other.
+
+    Motion i is that of `compose` with ``seed + i``, up to the rounding of larger matrix products; all of them are seen
+    at once while they are denoised (`watching`). The arguments and errors are those of `compose`, but that the segments
+    are kept, so that there is an end of them.
+    """
+    chosen = Sampling.of(sampling, settings)
+    past, track, place = _begun(prior, chosen, start, path)
+    asked, first = [], 0
+    for segment in segments:
+        frames = round(segment.seconds * prior.fps)
+        asked.append(track.asked(segment, first, frames) if track else segment)
+        first += frames
+    pieces = long_features(prior, asked, past=past, sampling=chosen, progress=progress)
+    for _ in range(chosen.number()):
+        goals = deque(segment.goal for segment in segments)
+        own = in_world(prior, islice(pieces, len(asked)), goals, place, track)
+        yield concatenated(*solve_stream(own, prior.fps, foot_lock=foot_lock))
+
+
+def _begun(
+    prior: Prior, sampling: Sampling, start: Motion | None, path: Goal | None
+) -> "tuple[Past | None, Track | None, GroundPose]":
+    """What is gone on from, the path, and where the first frame is; raises for what cannot be asked."""
+    if len(prior.mean) != WIDTH or prior.fps != FPS:
+        raise MotionloomError(
+            f"these weights make {len(prior.mean)} numbers a frame; long motion needs {WIDTH} at {FPS:g} fps"
+        )
+    sampling.levels(prior.schedule)
+    past = None if start is None else Past.of(start)
+    track = None if path is None else Track.along(path, prior.fps)
+    return past, track, past.end if past else track.place(0) if track else GroundPose()
 
 
 @renamed({"together": "batch_size"})
@@ -135,11 +174,15 @@ def long_features(
     """Features (frames, 263), not standardised, one piece per segment; strung together they are the long motion.
 
     Piece i has ``round(seconds * fps)`` frames. ``batch_size``: rows per network call; it changes speed and memory, not
-    the result. The others as of `compose`. Raises `MotionloomError` for transitions that do not fit.
+    the result. ``count``: so many motions, the pieces of one behind those of the other; there must be an end of the
+    segments then. The others as of `compose`. Raises `MotionloomError` for transitions that do not fit.
     """
     chosen = Sampling.of(sampling, settings)
     denoise = partial(_corrected, prior, chosen.levels(prior.schedule)[-2])
-    rows = chain_rows(prior, segments, chosen.guidance, past)
+    rows, each = chain_rows(prior, segments, chosen.guidance, past), None
+    if chosen.number() > 1:
+        own = list(rows)
+        rows, each = own * chosen.number(), len(own)
     place = past.end if past else GroundPose()
 
     def features(row: Row, state: Tensor, _: int = 0) -> Tensor:
@@ -150,7 +193,7 @@ def long_features(
 
     made = sample_chain(
         prior, rows, denoise, chosen, features=len(prior.mean), batch_size=BATCH, progress=progress,
-        view=ChainView(features, poses),
+        view=ChainView(features, poses), each=each,
     )  # fmt: skip
     for row, state in made:
         yield features(row, state)

@@ -115,13 +115,14 @@ class Latest(Generic[R]):
     It is kept only where somebody watches, for at most `SHOWN` segments, the newest ones; so memory stays bounded.
     """
 
-    def __init__(self, view: ChainView[R], steps: int) -> None:
-        self.view, self.steps = view, steps
+    def __init__(self, view: ChainView[R], steps: int, each: int | None = None) -> None:
+        """each: rows of one motion where the chain is several of them; None: all are of one."""
+        self.view, self.steps, self.each = view, steps, each
         self.parts: dict[int, Any] = {}
         self.calls: Counter[int] = Counter()
 
     def report(self, numbers: Sequence[int], rows: Sequence[R], states: Sequence[Tensor], at: Sequence[int]) -> None:
-        """Take in what was predicted for some rows, and report what is there if that begins with the first one."""
+        """Take in what was predicted for some rows, and report the motions that begin with their first row."""
         if _callback.get() is None:
             return
         for number, row, state, level in zip(numbers, rows, states, at, strict=True):
@@ -129,6 +130,14 @@ class Latest(Generic[R]):
         self.calls.update(numbers)
         for old in sorted(self.parts)[:-SHOWN]:
             del self.parts[old], self.calls[old]
-        if self.parts and min(self.parts) == 0:
-            parts = [self.parts[number] for number in sorted(self.parts)]
-            report(min(self.calls.values()), self.steps, [0], lambda: self.view.poses(parts)[None])
+        for motion in sorted({self._motion(number) for number in numbers}):
+            own = sorted(number for number in self.parts if self._motion(number) == motion)
+            if own and own[0] == motion * (self.each or 0):
+                parts = [self.parts[number] for number in own]
+                report(
+                    min(self.calls[number] for number in own), self.steps, [motion],
+                    lambda parts=parts: self.view.poses(parts)[None],
+                )  # fmt: skip
+
+    def _motion(self, number: int) -> int:
+        return number // self.each if self.each else 0

@@ -12,8 +12,8 @@ import type { Signal } from "./signal";
 export interface App {
   readonly project: History<Project>;
   readonly session: Signal<Session>;
-  /** The pose while it is denoised; null: nothing is being drawn, or nothing of it was sent. */
-  readonly denoising: Signal<MotionClip | null>;
+  /** The takes while they are denoised, as far as they were sent; empty: nothing is being drawn, or nothing was sent. */
+  readonly denoising: Signal<readonly MotionClip[]>;
   /** Live mode; null: it is off. What is done then is shown as what is denoised is. */
   readonly live: Signal<LiveState | null>;
 }
@@ -22,6 +22,19 @@ export interface App {
 export function shownClip(app: App): MotionClip | null {
   const { clips } = app.session.value;
   return clips[app.project.value.kept] ?? clips[0] ?? null;
+}
+
+/** What is seen of the kept take while it is denoised. */
+export function denoised(app: App): MotionClip | null {
+  const { value } = app.denoising;
+  return value[app.project.value.kept] ?? value[0] ?? null;
+}
+
+/** The takes that are seen beside each other: while they are drawn each as far as it is, before that the old ones. */
+export function seenTakes(app: App): readonly MotionClip[] {
+  const { clips } = app.session.value;
+  const drawn = app.denoising.value;
+  return [...drawn, ...clips.slice(drawn.length)];
 }
 
 /** An error as a sentence with its place in the project. */

@@ -7,7 +7,7 @@ import { type Job, type Plan, plan, planKey } from "../project/plan";
 import { type JobRequest, type Result, motion, takeOf } from "../server/api";
 import { Refused } from "../server/http";
 import { type Level, isAway, runJob } from "../server/jobs";
-import { type App, problemOf, shownClip } from "./app";
+import { type App, denoised, problemOf, shownClip } from "./app";
 
 /**
  * Where a motion is there already, what is predicted for the new one is shown after every so many network calls: from
@@ -31,7 +31,8 @@ export class Drawer {
   private running: AbortController | null = null;
   private key = "";
   private timer = 0;
-  private isPreviewed = false;
+  /** The takes whose preview was shown. */
+  private previewed = new Set<number>();
   private isSlow = false;
 
   constructor(private readonly app: App) {
@@ -77,7 +78,7 @@ export class Drawer {
     this.running?.abort();
     this.running = null;
     this.key = "";
-    this.app.denoising.value = null;
+    this.app.denoising.value = [];
     this.app.session.update({ drawing: null });
   }
 
@@ -100,7 +101,7 @@ export class Drawer {
     await this.finished();
     this.running?.abort();
     const running = (this.running = new AbortController());
-    this.isPreviewed = false;
+    this.previewed.clear();
     this.app.session.update({ error: null, drawing: { done: 0, of: 1 } });
     try {
       return await this.run(job, running);
@@ -119,8 +120,8 @@ export class Drawer {
     this.running?.abort();
     const running = (this.running = new AbortController());
     this.key = planKey(value);
-    this.isPreviewed = false;
-    if (value.base) this.app.denoising.value = null;
+    this.previewed.clear();
+    if (value.base) this.app.denoising.value = [];
     this.app.session.update({ error: null, fan: null, pending: false, drawing: { done: 0, of: 1 } });
     try {
       const results = await this.chain(jobs, running);
@@ -138,7 +139,7 @@ export class Drawer {
     let results: readonly Result[] = [];
     for (const job of jobs) {
       const request = job.task === "edit" && !job.motion ? { ...job, motion: results[0]!.id } : job;
-      results = await this.run(request, running);
+      results = await this.run(request, running, job.count);
     }
     return results;
   }
@@ -147,7 +148,7 @@ export class Drawer {
     const takes = results.map((result) => takeOf(result, project.base ? "redrawn" : "drawn"));
     const clips = await Promise.all(takes.map((take) => motion(take.motion)));
     signal.throwIfAborted();
-    this.app.denoising.value = null;
+    this.app.denoising.value = [];
     this.app.project.amend((now) => {
       const kept = now.kept < takes.length ? now.kept : 0;
       return planKey(now) === key ? { ...now, takes, kept, drawn: key } : now;
@@ -155,8 +156,8 @@ export class Drawer {
     this.app.session.update({ clips });
   }
 
-  /** Run one job and show how it comes along. */
-  private run(job: JobRequest, running: AbortController): Promise<readonly Result[]> {
+  /** Run one job and show how it comes along: the first `takes` of its motions. */
+  private run(job: JobRequest, running: AbortController, takes = 1): Promise<readonly Result[]> {
     const isCurrent = () => this.running === running && !running.signal.aborted;
     // The first motion is seen as it comes out of the noise; a later one would hide the motion that is there.
     const levels = this.app.session.value.clips.length ? SHOWN_EVERY : true;
@@ -167,18 +168,22 @@ export class Drawer {
         told = performance.now();
         this.app.session.update({ drawing: { done, of } });
       },
-      level: (level) => isCurrent() && level.row === 0 && this.show(job, level),
+      level: (level) => isCurrent() && level.row < takes && this.show(job, level, takes),
     });
   }
 
   /** Put what is predicted for the motion on the stage; an edit's part lies in the motion that it changes. */
-  private show(job: JobRequest, { level, of, clip, begin }: Level): void {
-    if (this.isPreviewed && this.isSlow) return;
+  private show(job: JobRequest, { level, of, row, clip, begin }: Level, takes: number): void {
+    if (this.previewed.has(row) && this.isSlow) return;
     const { denoising } = this.app;
-    const whole = job.task === "edit" ? (denoising.value ?? shownClip(this.app)) : null;
-    denoising.value = whole ? overlaid(whole, clip, Number(job.person ?? 0), begin) : clip;
-    if (this.isPreviewed || level / of < PREVIEW) return;
-    this.isPreviewed = true;
+    const shown = denoising.value.slice(0, takes);
+    if (row > shown.length) return;
+    const whole = job.task === "edit" ? (shown[row] ?? denoised(this.app) ?? shownClip(this.app)) : null;
+    shown[row] = whole ? overlaid(whole, clip, Number(job.person ?? 0), begin) : clip;
+    denoising.value = shown;
+    if (this.previewed.has(row) || level / of < PREVIEW) return;
+    this.previewed.add(row);
+    if (this.previewed.size > 1) return;
     performance.mark(MARKS.preview);
     const begun = performance.now();
     requestAnimationFrame(() => requestAnimationFrame(() => (this.isSlow = performance.now() - begun > SLOW)));

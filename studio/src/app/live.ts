@@ -80,7 +80,7 @@ export class Live {
     this.held.clear();
     this.steered = "";
     this.app.live.value = null;
-    this.app.denoising.value = null;
+    this.app.denoising.value = [];
     this.drawer.schedule();
   }
 
@@ -180,9 +180,9 @@ export class Live {
     if (!this.shown) return;
     const { before, now, at } = this.shown;
     const part = Math.min(((performance.now() - at) / 1000) * this.recording.fps, 1);
-    if (part === 1 && this.app.denoising.value?.people[0] === now) return;
+    if (part === 1 && this.app.denoising.value[0]?.people[0] === now) return;
     const pose = part === 1 ? now : now.map((one, n) => before[n]! + (one - before[n]!) * part);
-    this.app.denoising.value = motionClip(this.recording.fps, [pose]);
+    this.app.denoising.value = [motionClip(this.recording.fps, [pose])];
   }
 
   /** Keys and stick as a direction seen from the camera; asked again only when it changes. */

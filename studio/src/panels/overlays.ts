@@ -1,7 +1,7 @@
 /** What lies over the stage: sentences about what went wrong, names of takes, what a key does, dropped files. */
 
 import { type Actions } from "../app/actions";
-import { type App, shownClip } from "../app/app";
+import { type App, seenTakes, shownClip } from "../app/app";
 import { h, morph } from "../app/dom";
 import type { Files } from "../app/files";
 import { icon } from "./icons";
@@ -57,7 +57,8 @@ export function notices(app: App, retry: () => void, root: HTMLElement): void {
 /** The number of each take on its part of the picture. */
 export function takeNames(app: App, root: HTMLElement): void {
   const render = () => {
-    const { sideBySide, clips, fan } = app.session.value;
+    const { sideBySide, fan } = app.session.value;
+    const clips = seenTakes(app);
     root.hidden = !sideBySide || fan !== null;
     const columns = clips.length > 1 ? 2 : 1;
     root.style.gridTemplateColumns = `repeat(${columns}, 1fr)`;
@@ -73,6 +74,9 @@ export function takeNames(app: App, root: HTMLElement): void {
     );
   };
   app.project.subscribe(render);
+  app.denoising.subscribe((now, before) => {
+    if (now.length !== before.length) render();
+  });
   app.session.subscribe((now, before) => {
     if (now.sideBySide !== before.sideBySide || now.clips !== before.clips || now.fan !== before.fan) render();
   });
@@ -104,11 +108,16 @@ export function help(app: App, actions: Actions, root: HTMLDialogElement): void 
           ),
         ),
       ),
-    ),
-    h(
-      "p",
-      { class: "quiet" },
-      "With the path or joint tool the arrow keys move the cursor or the joint (Shift: finer), Page Up and Page Down its height, Enter puts a point. 1 to 9 keep a take or choose a future. Alt while dragging does not snap. Ctrl and the wheel zoom the timeline.",
+      h(
+        "section",
+        {},
+        h("h3", {}, "Besides"),
+        h(
+          "p",
+          { class: "quiet" },
+          "With the path or joint tool the arrow keys move the cursor or the joint (Shift: finer), Page Up and Page Down its height, Enter puts a point. 1 to 9 keep a take or choose a future. Alt while dragging does not snap. Ctrl and the wheel zoom the timeline.",
+        ),
+      ),
     ),
   );
   root.addEventListener("close", close);

@@ -97,13 +97,13 @@ export function shownKey(key: string): string {
     ArrowUp: "↑",
     ArrowDown: "↓",
     Delete: "Del",
+    Backspace: "⌫",
   };
-  return (
-    key
-      .split("+")
-      .map((part) => names[part] ?? part)
-      .join(" ") || "+"
-  );
+  if (key === "+") return key;
+  return key
+    .split("+")
+    .map((part) => names[part] ?? part)
+    .join(" ");
 }
 
 /** Centimetres; red where something is farther away than `limit`. */

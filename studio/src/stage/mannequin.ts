@@ -40,7 +40,9 @@ interface Frame {
 }
 
 const UP = new THREE.Vector3(0, 1, 0);
-const BALL = new THREE.SphereGeometry(1, 28, 20);
+const BALL = new THREE.SphereGeometry(1, 24, 16);
+/** For what is a few centimetres large. */
+const SMALL = new THREE.SphereGeometry(1, 16, 10);
 
 export class Mannequin {
   readonly group = new THREE.Group();
@@ -88,7 +90,7 @@ export class Mannequin {
   }
 
   dispose(): void {
-    for (const { mesh } of this.parts) if (mesh.geometry !== BALL) mesh.geometry.dispose();
+    for (const { mesh } of this.parts) if (mesh.geometry !== BALL && mesh.geometry !== SMALL) mesh.geometry.dispose();
     this.wood.dispose();
     this.dark.dispose();
   }
@@ -99,7 +101,7 @@ export class Mannequin {
   }
 
   private ball(joint: number, radius: number): Part {
-    const mesh = new THREE.Mesh(BALL, this.dark);
+    const mesh = new THREE.Mesh(SMALL, this.dark);
     mesh.scale.setScalar(radius);
     return { mesh, place: (joints) => mesh.position.copy(joints[joint]!) };
   }
@@ -152,7 +154,7 @@ export class Mannequin {
 
   /** Which way somebody looks. */
   private nose(): Part {
-    const mesh = new THREE.Mesh(BALL, this.dark);
+    const mesh = new THREE.Mesh(SMALL, this.dark);
     return {
       mesh,
       place: (joints, frame) => {
@@ -164,7 +166,7 @@ export class Mannequin {
   }
 
   private hand(elbow: number, wrist: number): Part {
-    const mesh = new THREE.Mesh(BALL, this.wood);
+    const mesh = new THREE.Mesh(SMALL, this.wood);
     return {
       mesh,
       place: (joints, frame) => {
@@ -216,12 +218,15 @@ function frameOf(j: readonly THREE.Vector3[]): Frame {
   return { hips, chest, chestUp, pelvisUp, face: collars.cross(headUp).normalize() };
 }
 
+/** Rings of each round end. */
+const RINGS = 4;
+
 /** A capsule of length 1 from the origin along +Y, thinner towards its end. */
 function taper(near: number, far: number): THREE.BufferGeometry {
   const points: THREE.Vector2[] = [];
-  for (let n = 0; n <= 6; n += 1) points.push(cap(near, 0, -Math.PI / 2 + (n / 6) * (Math.PI / 2)));
-  for (let n = 0; n <= 6; n += 1) points.push(cap(far, 1, (n / 6) * (Math.PI / 2)));
-  return new THREE.LatheGeometry(points, 24);
+  for (let n = 0; n <= RINGS; n += 1) points.push(cap(near, 0, -Math.PI / 2 + (n / RINGS) * (Math.PI / 2)));
+  for (let n = 0; n <= RINGS; n += 1) points.push(cap(far, 1, (n / RINGS) * (Math.PI / 2)));
+  return new THREE.LatheGeometry(points, 18);
 }
 
 function cap(radius: number, height: number, angle: number): THREE.Vector2 {

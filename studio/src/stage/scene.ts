@@ -9,6 +9,10 @@ import type { StageTheme } from "./theme";
 const SLOW = 45;
 const PATIENCE = 12;
 const COARSEST = 0.5;
+/** Milliseconds without a new picture until a coarse one is drawn sharp. */
+const REST = 250;
+/** Where processors draw the pictures, as drivers call themselves. */
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
 export class Scene {
   readonly scene = new THREE.Scene();
@@ -23,7 +27,12 @@ export class Scene {
   private readonly fine = Math.min(devicePixelRatio, 2);
   private coarse = this.fine;
   private last = 0;
+  /** When the last picture was drawn, and whether it has fewer pixels than it could have. */
+  private drawn = 0;
+  private isCoarse = false;
 
+  /** True: processors are needed elsewhere; a picture that nobody waits for is drawn sharp later. */
+  busy: () => boolean = () => false;
   /** Called for each frame with the milliseconds since the last one; true: draw. */
   step: (elapsed: number) => boolean = () => false;
   /** Called behind each picture. */
@@ -54,6 +63,7 @@ export class Scene {
     this.orbit.maxDistance = 25;
     this.orbit.addEventListener("change", () => this.invalidate());
     this.look(theme);
+    if (isSoftware(this.renderer.getContext())) this.coarsen(COARSEST);
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
     this.resize();
     requestAnimationFrame((now) => this.frame(now));
@@ -65,6 +75,7 @@ export class Scene {
 
   look(theme: StageTheme): void {
     this.scene.background = new THREE.Color(theme.background);
+    this.renderer.setClearColor(theme.background);
     this.scene.fog = new THREE.Fog(theme.background, 14, 34);
     this.sky.color.set(theme.sky);
     this.sky.groundColor.set(theme.ground);
@@ -135,24 +146,31 @@ export class Scene {
     this.last = now;
     const moved = this.step(elapsed);
     this.orbit.update();
-    if (!moved && !this.dirty) {
-      this.slow = 0;
-      return;
-    }
+    const changed = moved || this.dirty;
+    if (!changed) this.slow = 0;
+    const sharpens = this.isCoarse && now - this.drawn > REST && !this.busy();
+    if (!changed && !sharpens) return;
     this.dirty = false;
-    this.sharpness(moved ? this.coarse : this.fine);
+    // One change alone is drawn as it should be; several at once, and what changes while somebody draws, coarsely first.
+    this.isCoarse = changed && this.coarse < this.fine && (now - this.drawn < REST || this.busy());
+    this.sharpness(this.isCoarse ? this.coarse : this.fine);
+    if (changed) this.drawn = now;
     if (this.paint) this.paint();
     else this.renderer.render(this.scene, this.camera);
     this.painted();
-    this.adapt(elapsed, moved);
+    if (changed) this.adapt(elapsed);
   }
 
   /** Without a GPU fewer pixels keep the motion in real time; what does not move is drawn sharp. */
-  private adapt(elapsed: number, moved: boolean): void {
-    this.slow = moved && elapsed > SLOW ? this.slow + 1 : 0;
+  private adapt(elapsed: number): void {
+    this.slow = elapsed > SLOW ? this.slow + 1 : 0;
     if (this.slow < PATIENCE) return;
     this.slow = 0;
-    this.coarse = Math.max(this.coarse * 0.75, COARSEST);
+    this.coarsen(Math.max(this.coarse * 0.75, COARSEST));
+  }
+
+  private coarsen(ratio: number): void {
+    this.coarse = ratio;
     this.sun.shadow.mapSize.set(512, 512);
     this.sun.shadow.map?.dispose();
     this.sun.shadow.map = null;
@@ -162,6 +180,7 @@ export class Scene {
     if (this.renderer.getPixelRatio() === ratio) return;
     this.renderer.setPixelRatio(ratio);
     this.resize();
+    this.dirty = false;
   }
 
   private resize(): void {
@@ -172,6 +191,11 @@ export class Scene {
     this.camera.updateProjectionMatrix();
     this.invalidate();
   }
+}
+
+function isSoftware(context: WebGLRenderingContext | WebGL2RenderingContext): boolean {
+  const about = context.getExtension("WEBGL_debug_renderer_info");
+  return about !== null && SOFTWARE.test(String(context.getParameter(about.UNMASKED_RENDERER_WEBGL)));
 }
 
 function sunlight(): THREE.DirectionalLight {

@@ -1,7 +1,7 @@
 /** The stage: who is on it at the playhead, the tools on it, and one picture or four side by side. */
 
 import * as THREE from "three";
-import { type App, duration, shownClip } from "../app/app";
+import { type App, denoised, duration, seenTakes, shownClip } from "../app/app";
 import { jointAt } from "../body/clip";
 import type { Ground } from "../project/path";
 import { Cast, type Ghost } from "./cast";
@@ -42,6 +42,7 @@ export class Stage {
     this.goal = ring(0.16, theme.path[0]);
     this.goal.visible = false;
     this.scene.scene.add(this.goal);
+    this.scene.busy = () => app.session.value.drawing !== null || app.session.value.pending;
     this.scene.step = (elapsed) => this.step(elapsed);
     this.scene.painted = () => {
       this.path.tell();
@@ -111,11 +112,11 @@ export class Stage {
   /** Everybody where they are at the playhead. */
   private place(): void {
     const { time, fan, sideBySide } = this.app.session.value;
-    const denoised = this.app.denoising.value;
-    const clip = denoised ?? shownClip(this.app);
+    const drawn = denoised(this.app);
+    const clip = drawn ?? shownClip(this.app);
     const isFuture = fan !== null && time > fan.past;
     // A character has the kept take's motion; what is being drawn is shown by the mannequin.
-    const dressed = this.character.at(time, !sideBySide && !isFuture && denoised === null && !this.app.live.value);
+    const dressed = this.character.at(time, !sideBySide && !isFuture && drawn === null && !this.app.live.value);
     this.cast.show(clip, time, dressed || isFuture);
     this.cast.showGhosts(this.ghosts(), time);
     this.path.at(time);
@@ -125,10 +126,11 @@ export class Stage {
   }
 
   private ghosts(): Ghost[] {
-    const { clips, fan, ghosts, time } = this.app.session.value;
+    const { fan, ghosts, time } = this.app.session.value;
+    const clips = seenTakes(this.app);
     if (fan)
       return time <= fan.past ? [] : fan.clips.map((clip, index) => ({ clip, color: GHOSTS[index % GHOSTS.length]! }));
-    if (!ghosts || clips.length < 2 || this.app.denoising.value) return [];
+    if (!ghosts || clips.length < 2 || this.app.live.value) return [];
     return clips.flatMap((clip, index) =>
       index === this.app.project.value.kept ? [] : [{ clip, color: GHOSTS[index % GHOSTS.length]! }],
     );
@@ -138,7 +140,7 @@ export class Stage {
   private step(elapsed: number): boolean {
     const { session } = this.app;
     const { playing, rate, time, repeat, follow } = session.value;
-    const clip = this.app.denoising.value ?? shownClip(this.app);
+    const clip = denoised(this.app) ?? shownClip(this.app);
     if (playing) {
       const end = duration(this.app);
       const next = time + (elapsed / 1000) * rate;
@@ -161,7 +163,8 @@ export class Stage {
 
   /** Every take in a part of the picture of its own. */
   private paintTakes(): void {
-    const { clips, time } = this.app.session.value;
+    const { time } = this.app.session.value;
+    const clips = seenTakes(this.app);
     const { renderer, scene, camera } = this.scene;
     const size = renderer.getSize(new THREE.Vector2());
     const columns = clips.length > 1 ? 2 : 1;
@@ -231,12 +234,13 @@ export class Stage {
 
   /** A click on one of several pictures keeps that take. */
   private keepUnder(event: PointerEvent): void {
-    const { clips } = this.app.session.value;
+    const clips = seenTakes(this.app);
     const box = (event.target as Element).getBoundingClientRect();
     const columns = clips.length > 1 ? 2 : 1;
     const rows = Math.ceil(clips.length / columns);
     const column = Math.floor(((event.clientX - box.left) / box.width) * columns);
     const index = Math.floor(((event.clientY - box.top) / box.height) * rows) * columns + column;
-    if (index < clips.length) this.app.project.change(`keep take ${index + 1}`, (old) => ({ ...old, kept: index }));
+    if (index < this.app.session.value.clips.length)
+      this.app.project.change(`keep take ${index + 1}`, (old) => ({ ...old, kept: index }));
   }
 }
