@@ -85,7 +85,7 @@ def seek(studio: Studio, seconds: float) -> None:
 
 def keep(studio: Studio, place: Path) -> None:
     """Write the page as it is."""
-    studio.page.wait_for_timeout(500)
+    studio.page.wait_for_timeout(1800)  # a picture that changed during a draw is sharp a second later
     picture = Image.open(io.BytesIO(studio.page.screenshot())).convert("RGB")
     picture.quantize(COLORS, dither=Image.Dither.NONE).save(place, optimize=True)
 

@@ -31,7 +31,7 @@ export class Scene {
   private drawn = 0;
   private isCoarse = false;
 
-  /** True: processors are needed elsewhere; a picture that nobody waits for is drawn sharp later. */
+  /** True: processors are needed elsewhere; a picture that nobody waits for is drawn sharp a second later. */
   busy: () => boolean = () => false;
   /** Called for each frame with the milliseconds since the last one; true: draw. */
   step: (elapsed: number) => boolean = () => false;
@@ -148,7 +148,7 @@ export class Scene {
     this.orbit.update();
     const changed = moved || this.dirty;
     if (!changed) this.slow = 0;
-    const sharpens = this.isCoarse && now - this.drawn > REST && !this.busy();
+    const sharpens = this.isCoarse && now - this.drawn > (this.busy() ? 4 * REST : REST);
     if (!changed && !sharpens) return;
     this.dirty = false;
     // One change alone is drawn as it should be; several at once, and what changes while somebody draws, coarsely first.
