@@ -100,14 +100,18 @@ def _check_clip(clip: Clip) -> None:
     if clip.kind not in KINDS:
         raise ValueError(f"its kind {clip.kind!r} is none of {', '.join(KINDS)}")
     for note in clip.notes:
-        if not 0 <= note.first < note.last <= len(features):
-            raise ValueError(f"a note spans frames {note.first} to {note.last} of {len(features)}")
-        written = note.kind in ("human", "index") or note.kind.startswith(PREFIX)
-        if note.core and not note.first <= note.core[0] < note.core[1] <= note.last:
-            raise ValueError(f"what a window must hold, frames {note.core}, is not within {note.first} to {note.last}")
-        if not all(isinstance(t, str) for t in note.texts) or (written and not note.texts):
-            raise ValueError(f"a note of kind {note.kind} lacks its texts")
-        for text in note.texts:
-            check_caption(text)
-        if not written and not all(label in LABELS for label in note.kind.split("+", 1)):
-            raise ValueError(f"there is no label {note.kind!r}")
+        _check_note(note, len(features))
+
+
+def _check_note(note: Note, frames: int) -> None:
+    if not 0 <= note.first < note.last <= frames:
+        raise ValueError(f"a note spans frames {note.first} to {note.last} of {frames}")
+    written = note.kind in ("human", "index") or note.kind.startswith(PREFIX)
+    if note.core and not note.first <= note.core[0] < note.core[1] <= note.last:
+        raise ValueError(f"what a window must hold, frames {note.core}, is not within {note.first} to {note.last}")
+    if not all(isinstance(t, str) for t in note.texts) or (written and not note.texts):
+        raise ValueError(f"a note of kind {note.kind} lacks its texts")
+    for text in note.texts:
+        check_caption(text)
+    if not written and not all(label in LABELS for label in note.kind.split("+", 1)):
+        raise ValueError(f"there is no label {note.kind!r}")
