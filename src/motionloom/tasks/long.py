@@ -193,7 +193,7 @@ def long_features(
 
     made = sample_chain(
         prior, rows, denoise, chosen, features=len(prior.mean), batch_size=BATCH, progress=progress,
-        view=ChainView(features, poses), each=each,
+        view=ChainView(features, poses, each),
     )  # fmt: skip
     for row, state in made:
         yield features(row, state)

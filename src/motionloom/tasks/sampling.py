@@ -357,33 +357,31 @@ def sample_chain(
     *,
     features: int,
     batch_size: int,
+    view: ChainView[R],
     progress: Moves | None = None,
-    view: ChainView[R] | None = None,
-    each: int | None = None,
 ) -> Iterator[tuple[R, State]]:
     """Rows of a chain whose ends overlap, each with its clean state (length, features), in order.
 
     rows: read as sampling gets there; they may be endless. denoise: rows, their states and levels to the denoised
     states. Row i is sampled from ``seed + i``. batch_size: rows in one call unless ``sampling`` says it. view: how
-    the newest states are seen by who is `watching`; None: nobody can. each: rows of one motion where the chain is
-    several of them, which share nothing; row i of motion m is sampled from ``seed + m + i``.
+    rows make motions and are seen by who is `watching`; where they make several, row i of motion m is sampled from
+    ``seed + m + i``.
     """
     way, [first] = sampling.levels(prior.schedule), sampling.seeds(1)
     waiting: dict[int, R] = {}
-    seen = Latest(view, len(way) - 1, each) if view else None
+    seen = Latest(view, len(way) - 1)
 
     def links() -> Iterator[Link]:
         for number, row in enumerate(rows):
             waiting[number] = row
-            motion, own = divmod(number, each) if each else (0, number)
+            motion, own = divmod(number, view.each) if view.each else (0, number)
             yield Link(row.length, row.overlap, first + motion + own)
 
     def reported(numbers: Sequence[int], states: Sequence[State], at: Sequence[int]) -> Sequence[State]:
         here = [state.to(prior.mean) for state in states]  # the noise that rows begin with is the CPU's
         some = [waiting[number] for number in numbers]
         denoised = denoise(some, here, at)
-        if seen:
-            seen.report(numbers, some, denoised, at)
+        seen.report(numbers, some, denoised, at)
         return denoised
 
     made = staggered(

@@ -101,12 +101,14 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class ChainView(Generic[R]):
-    """How the rows of a long motion are looked at, which are at different levels at the same time."""
+    """How the rows of a chain make long motions, and how these are looked at while rows are at different levels."""
 
     part: Callable[[R, Tensor, int], Any]
     """A row, its denoised state and the level of that to what is kept of it."""
     poses: Callable[[list[Any]], np.ndarray]
     """What was kept of rows, from the first one on and in order, to (people, frames, 22, 3)."""
+    each: int | None = None
+    """Rows of one motion where the chain is several of them, which share nothing; None: all are of one."""
 
 
 class Latest(Generic[R]):
@@ -115,9 +117,8 @@ class Latest(Generic[R]):
     It is kept only where somebody watches, for at most `SHOWN` segments, the newest ones; so memory stays bounded.
     """
 
-    def __init__(self, view: ChainView[R], steps: int, each: int | None = None) -> None:
-        """each: rows of one motion where the chain is several of them; None: all are of one."""
-        self.view, self.steps, self.each = view, steps, each
+    def __init__(self, view: ChainView[R], steps: int) -> None:
+        self.view, self.steps, self.each = view, steps, view.each
         self.parts: dict[int, Any] = {}
         self.calls: Counter[int] = Counter()
 
