@@ -35,4 +35,5 @@ def test_a_second_person_answers_a_clip(studio: Studio):
     motion = studio.motion()
     assert motion.shape[0] == 2
     assert np.abs(motion[0] - alone[0]).max() < 1e-3
-    assert np.linalg.norm(motion[1, :, 0] - motion[0, :, 0], axis=-1).min() > 0.1  # somebody else, somewhere else
+    apart = np.linalg.norm(motion[1, :, 0] - motion[0, :, 0], axis=-1)
+    assert apart.mean() > 0.3, apart.mean()  # somebody else, somewhere else
