@@ -295,7 +295,7 @@ def by_size(sizes: list[int], weights: str, limit: float) -> None:
     print(f"{'rows':>6} {'start s':>8} {'ms each':>8} {'of 1,000':>9} {'driver MB':>10} {'worker MB':>10}")
     options, found = ["--weights", weights, "--steps", str(steps)], {}
     for rows in sizes:
-        if found and rows * max(one.each for one in found.values()) > limit:
+        if found and rows * list(found.values())[-1].each > limit:
             print(f"{rows:>6} rows would take more than {limit:.0f} s here, and are left out")
             continue
         found[rows] = measure(WAYS["two processes"], rows, (seconds,), options)

@@ -1,6 +1,7 @@
 """`motionloom serve` and `motionloom studio`: motion over HTTP, and the page that draws it."""
 
 import argparse
+import os
 from pathlib import Path
 
 from motionloom.cli.sampling import fail
@@ -25,12 +26,14 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         description="Serve generate_motion, compose and export over standard input and output: docs/server.md.",
     )
     _project(assistant)
+    _threads(assistant, "as many as cores")
     _model(assistant)
     assistant.set_defaults(run=run_mcp)
 
 
 def _options(parser: argparse.ArgumentParser) -> None:
     _project(parser)
+    _threads(parser, "one less than there are cores, for the page")
     parser.add_argument("--host", default="127.0.0.1", help="address to bind to (default 127.0.0.1: this machine only)")
     parser.add_argument("--port", type=int, default=8020, help="port, 0 for any that is free (default 8020)")
     parser.add_argument("--token", help="what clients must send; made and printed where --host is not this machine")
@@ -54,7 +57,10 @@ def _project(parser: argparse.ArgumentParser) -> None:
 def _model(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="the prior (default: default)")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
-    parser.add_argument("--threads", type=int, metavar="N", help="CPU threads (default: as many as cores)")
+
+
+def _threads(parser: argparse.ArgumentParser, default: str) -> None:
+    parser.add_argument("--threads", type=int, metavar="N", help=f"CPU threads (default: {default})")
 
 
 def run_serve(arguments: argparse.Namespace) -> None:
@@ -67,6 +73,8 @@ def run_serve(arguments: argparse.Namespace) -> None:
     except ModuleNotFoundError as error:
         fail(f"the server needs {error.name}: install it with pip install 'motionloom[studio]'")
     _set_threads(arguments)
+    if arguments.threads is None:
+        _leave_a_core()
     serve(
         Options(
             arguments.project, arguments.host, arguments.port, arguments.token, tuple(arguments.allow_host),
@@ -94,3 +102,13 @@ def _set_threads(arguments: argparse.Namespace) -> None:
         import torch
 
         torch.set_num_threads(arguments.threads)
+
+
+def _leave_a_core() -> None:
+    """Torch, which the server imports later, gets one thread less than there are cores, unless the user has said it.
+
+    With a thread on every core each layer waits for the one whose core draws the page's pictures: on two cores a draw
+    of 10 s took 8.8 s beside a browser without a GPU, and 1.7 s so (docs/decisions/0023).
+    """
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    os.environ.setdefault("OMP_NUM_THREADS", str(max(cores - 1, 1)))
