@@ -281,8 +281,8 @@ def by_way(ways: list[str], rows: int, options: list[str], arguments: argparse.N
         found = measure(WAYS[way], rows, lengths, options)
         name = way if lengths == (4.0,) else "mixed lengths"
         rates[name] = found.rate
-        share = found.rate / most[1 if way == "one process" else 2] if lengths == (4.0,) else float("nan")
-        print(f"{name:<16} {found.start:8.1f} {found.each:8.3f} {found.rate:9.1f} {share:9.0%} {found.driver:10.0f} "
+        share = f"{found.rate / most[1 if way == 'one process' else 2]:.0%}" if lengths == (4.0,) else "-"
+        print(f"{name:<16} {found.start:8.1f} {found.each:8.3f} {found.rate:9.1f} {share:>9} {found.driver:10.0f} "
               f"{found.worker:10.0f}", flush=True)  # fmt: skip
     for way in ways[1:]:
         print(f"{way}: {rates[way] / rates['one process']:.2f} times one process (the aim is 1.7)")
