@@ -32,6 +32,7 @@ from motionloom.io.atomic import atomic_path
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 from motionloom.lab.suites import obey
+from motionloom.lab.suites.harness import Run
 from motionloom.motion import Motion
 from motionloom.tasks.adapting import adapt
 from motionloom.tasks.text import generate
@@ -196,7 +197,7 @@ def old_ones(prior: Prior, seeds: int) -> dict[str, int]:
         made = generate(prior, list(prompts), seconds=seconds, seed=seed)
         return [motion.positions() for motion in made], made[0].fps
 
-    results = obey.run(drawn, seeds=seeds, first_seed=FIRST_SEED)
+    results = obey.run(Run(), generate=drawn, seeds=seeds, first_seed=FIRST_SEED)
     return {result.name: sum(attempt.obeyed for attempt in result.attempts) for result in results}
 
 
