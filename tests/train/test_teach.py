@@ -10,6 +10,7 @@ import torch
 from motionloom.data.examples import CaptionedClip, Example, make_examples
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
+from motionloom.features.layout import ric
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.nets.text.known import known_sentences
 from motionloom.train import teach as module
@@ -127,14 +128,42 @@ def test_a_step_depends_on_its_number_alone(prior: Prior, examples: list[Example
     assert first == again != other
 
 
-def test_windows_of_a_change_show_all_of_it() -> None:
-    """A change of 30 frames that is held: every window of 60 holds it whole."""
-    example = Example("x", ("x",), np.zeros((230, 263), np.float32), (100, 130))
+@pytest.mark.parametrize("window", [60, 160])
+def test_windows_of_a_change_show_all_of_it_soon(window: int) -> None:
+    """A change of 30 frames that is held: every window holds it whole, within 0.8 s of its beginning."""
+    example = Example("x", ("x",), np.zeros((330, 263), np.float32), (100, 130))
     rng = np.random.default_rng(0)
-    firsts = [module._first(example, 60, rng) for _ in range(200)]
-    assert min(firsts) >= 70
-    assert max(firsts) <= 100
+    firsts = [module._first(example, np.zeros(0, int), window, rng) for _ in range(200)]
+    assert min(firsts) == 84
+    assert max(firsts) == 100
     assert len(set(firsts)) > 10
+
+
+def repeating(period: int | None) -> np.ndarray:
+    """Features (240, 263) of a wrist that goes up and down every ``period`` frames; None: up once and for all."""
+    features = np.random.default_rng(0).normal(0, 0.02, (240, 263)).astype(np.float32)
+    time = np.arange(240)
+    features[:, ric(20)] += ((1 - np.cos(2 * np.pi * time / period)) if period else time / 60)[:, None]
+    return features
+
+
+def test_windows_begin_with_a_repetition() -> None:
+    """Else the same sentence is shown with every phase, of which the mean hardly moves."""
+    features = repeating(50)
+    example = Example("x", ("x",), features, (0, 240))
+    begins = module._beginnings(example, features)
+    np.testing.assert_allclose(begins, [0, 50, 100, 150, 200], atol=3)
+    rng = np.random.default_rng(0)
+    assert {module._first(example, begins, 100, rng) for _ in range(200)} == set(begins[:3].tolist())
+
+
+def test_windows_of_what_is_not_repeated_begin_anywhere() -> None:
+    features = repeating(None)
+    example = Example("x", ("x",), features, (0, 240))
+    begins = module._beginnings(example, features)
+    assert not begins.size
+    rng = np.random.default_rng(0)
+    assert len({module._first(example, begins, 100, rng) for _ in range(200)}) > 50
 
 
 def test_sentences_that_say_what_is_taught_are_not_kept_as_they_were(prior: Prior) -> None:

@@ -44,6 +44,12 @@ SAME = 0.9
 """Cosine of vectors from which on a known sentence says what is taught, and is not kept as it was."""
 LIKE = 16
 """Known sentences that are likest to what is taught: they are kept in any case."""
+AGAIN = 0.5
+"""A pose is the first one again if it is this near to it, beside the median distance of the clip's poses."""
+APART = 8
+"""Frames on each side among which it is the nearest."""
+BEFORE = 16
+"""Frames of a held pose that a window shows at most before a short clip begins."""
 DISPLACEMENT = 0.5
 """Weight of `displacement_error`, which keeps planted feet in their places."""
 
@@ -153,6 +159,7 @@ class Teaching:
         spread = torch.where(prior.std > 0, prior.std, 1.0)
         self.examples = examples
         self.shown = [(torch.from_numpy(e.features).to(prior.mean) - prior.mean) / spread for e in examples]
+        self.begins = [_beginnings(e, shown.cpu().numpy()) for e, shown in zip(examples, self.shown)]
         self.drawn = torch.stack([(f.to(prior.mean) - prior.mean) / spread for _, f in drawn])
         texts = dict.fromkeys(text for e in examples for caption in e.captions for text in wordings(caption))
         texts |= dict.fromkeys(prompt for prompt, _ in drawn)
@@ -192,7 +199,7 @@ class Teaching:
         texts, lengths = [], []
         for row in range(rows - kept):
             number = int(rng.integers(len(self.examples)))
-            first = _first(self.examples[number], window, rng)
+            first = _first(self.examples[number], self.begins[number], window, rng)
             part = self.shown[number][first : first + window]
             clean[row, : len(part)] = part
             said = wordings(str(rng.choice(self.examples[number].captions)))
@@ -217,13 +224,34 @@ class Teaching:
         return error + KEEP_WEIGHT * changed
 
 
-def _first(example: Example, window: int, rng: np.random.Generator) -> int:
-    """Where a window begins: anywhere in a loop or a long clip, else so that it shows all of what was recorded."""
+def _beginnings(example: Example, features: np.ndarray) -> np.ndarray:
+    """Frames at which what is repeated begins anew; none in a clip that repeats nothing.
+
+    features: (frames, 263) of the example, standardised. Windows that begin anywhere in a repetition show the same
+    sentence with every phase, and the mean of all phases is a body that hardly moves.
+    """
+    begin, end = example.shown
+    poses = features[begin:end, LAYOUT["ric"]]
+    far = np.sqrt(((poses - poses[0]) ** 2).mean(axis=1))
+    far = np.convolve(np.pad(far, 2, "edge"), np.full(5, 0.2), "valid")
+    near = [
+        at
+        for at in range(APART, len(far) - APART)
+        if far[at] < AGAIN * np.median(far) and far[at] == far[at - APART : at + APART + 1].min()
+    ]
+    return begin + np.array([0, *near]) if near else np.zeros(0, int)
+
+
+def _first(example: Example, begins: np.ndarray, window: int, rng: np.random.Generator) -> int:
+    """Where a window begins: with a repetition; else anywhere in a loop or a long clip, or so that it shows all of what
+    was recorded, soon."""
     begin, end = example.shown
     frames = len(example.features)
     if end - begin >= window or example.looped:
+        if (fits := begins[begins <= end - window]).size:
+            return int(rng.choice(fits))
         return int(rng.integers(begin, max(end - window, begin) + 1))
-    low, high = max(0, end - window), min(begin, frames - window)
+    low, high = max(0, end - window, min(begin - BEFORE, frames - window)), min(begin, frames - window)
     return int(rng.integers(low, max(low, high) + 1)) if frames > window else 0
 
 
