@@ -63,3 +63,14 @@ def test_a_posture_follows_where_the_person_faces() -> None:
     (plain,), (turned,) = made("high step"), made("high step", turned=1.0)
     np.testing.assert_allclose(ph.turned(plain, 1.0), turned, atol=1e-6)
     assert plain[:, 7, 1].max() > plain[:, 8, 1].max() + 0.3  # the left side, as its words say
+
+
+def test_who_crouches_stays_low_on_both_feet() -> None:
+    for p in made("crouch"):
+        assert p[0, 0, 1] - p[-80:, 0, 1].max() > 0.3
+        assert np.ptp(p[:, [7, 8]], axis=0).max() < 0.02
+
+
+def test_who_balances_stands_on_the_side_that_the_words_say() -> None:
+    (p,) = made("balance with arms out")
+    assert p[-60:, 7, 1].min() > p[-60:, 8, 1].max() + 0.12  # on the right leg

@@ -121,9 +121,10 @@ def test_actions_are_drawn_evenly_and_captures_more_often_than_keyed_clips(tmp_p
     described(folder, Note(0, 100, "action:eat", ("an animated person eats",)), kind="keyed")
     described(folder, Note(0, 100, "action:nod", ("a person nods",)), kind="made")
     batches = Batches(load_set(folder), windows=(48,), shares=(1.0,))
-    said = np.array([batches.data.texts[i] for i in batches.draw(0, 0, 4000).texts.tolist()])
-    assert abs((said == "a person nods").mean() - 0.5) < 0.04
+    said = np.array([batches.data.texts[i] for i in batches.draw(0, 0, 40_000).texts.tolist()])
+    nods = [batches.data.texts[i] for i in batches.data.items[-1].texts]
+    assert abs(np.isin(said, nods).mean() - 0.5) < 0.02
     keyed = (said == "an animated person eats").sum() / np.isin(
         said, ["an animated person eats", "a person eats"]
     ).sum()
-    assert abs(keyed - 0.4 / 9.4) < 0.02
+    assert abs(keyed - 0.4 / 9.4) < 0.03

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionloom.data.words import LABELS, describe_index, imperative, mirror_text, phrases, sentence
+from motionloom.data.words import LABELS, describe_index, gerund, imperative, mirror_text, phrases, sentence
 
 SIDES = st.sampled_from(["left", "right", "Left", "Right", "clockwise", "counterclockwise", "leftwards", "rightmost"])
 OTHER = st.sampled_from(
@@ -56,12 +56,31 @@ def test_commands_are_bare_verbs(phrase: str, command: str) -> None:
     assert imperative(phrase) == command
 
 
-def test_a_sentence_has_a_subject_or_is_a_command() -> None:
+@pytest.mark.parametrize(
+    ("phrase", "fragment"),
+    [
+        ("walks forward", "walking forward"),
+        ("sits down and stands up again", "sitting down and standing up again"),
+        ("walks, turns around and walks back", "walking, turning around and walking back"),
+        ("stands there, hands on the hips", "standing there, hands on the hips"),
+        ("is lying flat", "lying flat"),
+        ("is on hands and knees", "being on hands and knees"),
+        ("lies down", "lying down"),
+        ("carries a box", "carrying a box"),
+        ("begins to walk", "beginning to walk"),
+    ],
+)
+def test_gerunds_of_verb_phrases(phrase: str, fragment: str) -> None:
+    assert gerund(phrase) == fragment
+
+
+def test_a_sentence_has_a_subject_or_is_a_command_or_a_fragment() -> None:
     rng = np.random.default_rng(0)
-    made = {sentence("walks forward", rng) for _ in range(200)}
-    assert "walk forward" in made
-    assert all(text == "walk forward" or text.endswith(" walks forward") for text in made)
-    assert len(made) > 5
+    made = {sentence("walks forward", rng) for _ in range(300)}
+    assert {"walk forward", "walking forward"} < made
+    rest = made - {"walk forward", "walking forward"}
+    assert all(text.endswith((" walks forward", " is walking forward")) for text in rest)
+    assert len(rest) > 5
 
 
 @pytest.mark.parametrize(

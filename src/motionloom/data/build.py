@@ -151,7 +151,8 @@ def join_spans(spans: Sequence[tuple[int, int, str]]) -> list[tuple[int, int, st
 
 _OTHER_LABEL = {
     "sidestep left": "sidestep right", "turn left": "turn right", "walk left turn": "walk right turn",
-    "circle left": "circle right", "turn around": "turn around right", "punch left": "punch right",
+    "circle left": "circle right", "turn around": "turn around right", "walk turn back": "walk turn back right",
+    "punch left": "punch right",
     "kick left": "kick right",
 }  # fmt: skip
 _OTHER_LABEL |= {b: a for a, b in _OTHER_LABEL.items()}

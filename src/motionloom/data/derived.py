@@ -10,7 +10,7 @@ from motionloom.data.actions import ACTIONS, PREFIX, Action, sentences, side_of,
 from motionloom.data.clips import MADE, SHORTEST, THEN, Clip, Note
 from motionloom.data.made import GESTURES, hands_up, lower_arms, perform, words_for
 from motionloom.data.person import at_origin
-from motionloom.data.postures import assume, postures
+from motionloom.data.postures import Posture, assume, postures
 from motionloom.data.sources import Take
 from motionloom.data.words import sentence
 from motionloom.features import humanml as hml
@@ -46,8 +46,7 @@ def lengthened(take: Take, clip: Clip, positions: Array) -> Iterator[Clip]:
             if name in SEATED and hands_up(shown):
                 lowered, said = lower_arms(shown), sentences(ACTIONS[name])
                 yield from _held(clip, lowered, PREFIX + name, said, seed=seed + 2 * number + reverse + 7)
-                if reverse:
-                    continue
+                continue
             yield from _held(clip, shown, PREFIX + name, texts, seed=seed + 2 * number + reverse)
 
 
@@ -168,19 +167,25 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Cli
     for number in range(count if bodies.get("stand") else 0):
         gesture = GESTURES[sorted(GESTURES)[number % len(GESTURES)]]
         where = str(rng.choice([k for k in ("stand", "stand", "stand", "walk", "sit") if k in bodies]))
+        where = "stand" if gesture.times else where
         below, note = bodies[where][rng.integers(len(bodies[where]))]
         length = min(note.last - note.first, int(rng.integers(70, 160)))
         first = note.first + int(rng.integers(note.last - note.first - length + 1))
         side = str(rng.choice(["left", "right"]))
         body = hml.decode_positions(below.features[first : first + length].astype(np.float64))
-        begin = float(rng.uniform(0.2, 0.9))
+        if where == "stand" and rng.random() < 0.7:
+            body = lower_arms(body)
+        begin = float(rng.uniform(0.6, 0.9))
+        needed = round(FPS * (begin + 1.5 * gesture.times))
+        if needed > len(body):
+            body = augment.held(body, 0, needed - len(body), fps=FPS, seed=seed * 100_003 + number)
         positions = perform(body, gesture, side, fps=FPS, begin=begin, rng=rng)
         features = hml.encode(positions, heading="corrected")
         texts = words_for(gesture, side, leads[where], rng)
         if texts:
             group = PREFIX + MADE + gesture.name
             first = round(FPS * begin)
-            notes = (Note(0, len(features), group, texts, (first, min(first + 30, len(features)))),)
+            notes = (Note(0, len(features), group, texts, (first, min(first + max(30, 30 * gesture.times), len(features)))),)
             yield Clip(
                 f"made_{seed}_{number:04d}", below.source, below.licence, "train", "made", notes, features, "made"
             )
@@ -234,18 +239,27 @@ def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[
     for number in range(round(count / 10) if bodies else 0):
         below, note = bodies[rng.integers(len(bodies))]
         body = hml.decode_positions(below.features[note.first : note.first + 60].astype(np.float64))
+        if rng.random() < 0.7:
+            body = lower_arms(body)
         body = augment.held(body, 0, max(0, LOOPED - len(body)), fps=FPS, seed=seed * 100_003 + number)
         for kind, posture in enumerate(postures(body, rng)):
-            begin = float(rng.uniform(0.4, 1.2))
+            begin = float(rng.uniform(0.6, 1.0))
             frames = min(len(body), round(FPS * (begin + posture.seconds(kept=float(rng.uniform(1.5, 4.0))))))
-            features = hml.encode(at_origin(assume(body[:frames], posture, fps=FPS, begin=begin)), heading="corrected")
+            features = hml.encode(at_origin(_assumed(body[:frames], posture, begin, rng)), heading="corrected")
             action = ACTIONS[posture.action]
-            texts = sentences(action, side="left" if posture.sided else "")
+            texts = sentences(action, side=posture.side)
             start, end = round(FPS * begin), min(round(FPS * (begin + posture.seconds(kept=0.5))), len(features))
             whole = None if action.kind == "repeats" else (start, end)
             notes = (Note(0, len(features), PREFIX + action.name, texts, whole),)
             name = f"posture_{seed}_{number:03d}{kind}"
             yield Clip(name, below.source, below.licence, "train", "made", notes, features.astype(np.float32), "made")
+
+
+def _assumed(body: Array, posture: Posture, begin: float, rng: np.random.Generator) -> Array:
+    shown = assume(body, posture, fps=FPS, begin=begin)
+    if not posture.arms_out:
+        return shown
+    return perform(shown, GESTURES["arms out"], "", fps=FPS, begin=begin, rng=rng)
 
 
 def _stands_plainly(clip: Clip, note: Note) -> bool:
@@ -263,7 +277,7 @@ def there_and_back(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator
     Recordings hold only a few. A tenth of ``count``.
     """
     rng = np.random.default_rng(seed)
-    found = _labelled(clips, ("walk", "turn around"))
+    found = _labelled(clips, ("walk",))
     walks = [f for f in found.get("walk", []) if f[0].way in ("plain", "looped")]
     turns = [turn for clip in clips for turn in _half_turns(clip)]
     action, made = ACTIONS["walk turn around"], 0
@@ -292,7 +306,7 @@ def _walk(clip: Clip, note: Note, rng: np.random.Generator) -> Array:
 
 def _half_turns(clip: Clip) -> Iterator[tuple[Clip, Array]]:
     """Stretches of a training recording within which somebody who walks turns right round and walks on."""
-    if clip.split != "train" or clip.way != "plain" or not any(n.kind.startswith("turn around") for n in clip.notes):
+    if clip.split != "train" or clip.way != "plain" or not any(n.kind.startswith("walk turn back") for n in clip.notes):
         return
     p = hml.decode_positions(clip.features.astype(np.float64))
     heading = np.degrees(ph.smooth(np.unwrap(ph.heading(p)), 21))

@@ -35,6 +35,10 @@ class Gesture:
     swing: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rate: tuple[float, float] = (1.0, 1.0)
     pole: tuple[float, float, float] = (0.45, -1.0, -0.35)
+    times: int = 0
+    """So often the hands go to the place and back; 0: once, and as often as not they stay."""
+    thrust: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the hand of ``side`` strikes from the place, fast and once. The other hand stays at its place."""
 
 
 def _read() -> dict[str, Gesture]:
@@ -58,14 +62,38 @@ def perform(body: Array, gesture: Gesture, side: str, *, fps: float, begin: floa
     sentence may show would be a hand that is held still.
     """
     result = body.copy()
-    time = np.arange(len(body)) / fps
-    end = time[-1] - rng.uniform(0.2, 0.8) if rng.random() < 0.5 else np.inf
-    amount = np.minimum(_ease((time - begin) / _MOVE), 1 - _ease((time - end + _MOVE) / _MOVE))
-    swing = -np.cos(2 * np.pi * rng.uniform(*gesture.rate) * (time - begin))
+    time = np.arange(len(body)) / fps - begin
+    amount = _amount(gesture, time, rng)
+    swing = -np.cos(2 * np.pi * rng.uniform(*gesture.rate) * time)
     shift = rng.normal(0, 0.015, 3)
+    struck = _ease((time - _MOVE - 0.1) / 0.16) - _ease((time - _MOVE - 0.36) / 0.35)
+    if gesture.thrust[2]:
+        _turn_chest(result, struck * rng.uniform(15, 30) * _ARMS[side][3])
     for name in ("left", "right") if gesture.hands == "both" else (side,):
-        _move_arm(result, gesture, _ARMS[name], amount, swing, shift)
+        place = shift + (struck if name == side else 0 * struck)[:, None] * np.array(gesture.thrust)
+        _move_arm(result, gesture, _ARMS[name], amount, swing, place)
     return result
+
+
+def _amount(gesture: Gesture, time: Array, rng: np.random.Generator) -> Array:
+    """How far (0 to 1) the hands are on their way to the place at each time, in seconds since they leave."""
+    if gesture.times:
+        period = rng.uniform(1.35, 1.5)
+        moving = (time >= 0) & (time < gesture.times * period)
+        return np.where(moving, _there_and_back(time % period, 0.65), 0.0)
+    end = time[-1] - rng.uniform(0.2, 0.8) if rng.random() < 0.5 else np.inf
+    return _there_and_back(time, end - _MOVE)
+
+
+def _there_and_back(time: Array, leave: float) -> Array:
+    return np.minimum(_ease(time / _MOVE), 1 - _ease((time - leave) / _MOVE))
+
+
+def _turn_chest(body: Array, degrees: Array) -> None:
+    """Turn chest, head and arms about the upright through the spine; the left shoulder comes forward where positive."""
+    centre = body[:, 6:7] * [1, 0, 1]
+    for joint in (9, *range(12, 22)):
+        body[:, joint] = ph.turned(body[:, joint] - centre[:, 0], np.radians(degrees)) + centre[:, 0]
 
 
 def _move_arm(
@@ -117,7 +145,7 @@ def _ease(x: Array) -> Array:
 
 def words_for(gesture: Gesture, side: str, lead: str, rng: np.random.Generator, *, count: int = 8) -> tuple[str, ...]:
     """Sentences for a gesture; ``lead``: what the body does meanwhile, such as ``walks``, or empty."""
-    phrases = [*gesture.says, *(phrase.format(side=side) for phrase in gesture.sided if gesture.hands == "one")]
+    phrases = [*gesture.says, *(phrase.format(side=side) for phrase in gesture.sided)]
     if lead:
         phrases = [f"{lead} and {phrase}" for phrase in phrases]
     return tuple(dict.fromkeys(sentence(phrases[i % len(phrases)], rng) for i in range(count)))

@@ -61,8 +61,10 @@ class Posture:
 
     action: str
     poses: tuple[Pose, ...]
-    sided: bool = False
-    """The left side does it, and the words say so."""
+    side: str = ""
+    """What the words call the side that does it, where they do."""
+    arms_out: bool = False
+    """Both arms are spread meanwhile."""
 
     def seconds(self, *, kept: float) -> float:
         """How long it takes; a last pose that stays is kept for at most so long."""
@@ -78,17 +80,22 @@ def postures(body: Array, rng: np.random.Generator) -> Iterator[Posture]:
     low = _one_knee(thigh, shin, down + some(0.04, 0.1), some(0.26, 0.34), some(0, 12))
     lunge = (replace(low, seconds=0.9 * pace, stay=0.15), Pose(0.9 * pace, stay=0.2))
     yield Posture("lunge", (*lunge, _mirrored(lunge[0]), lunge[1]) * 2)
-    toes = Pose(1.1 * pace, (0.0, some(-0.04, 0.0), some(-0.16, -0.1)), bend=some(132, 150), hands=some(0.85, 1.0))
+    toes = Pose(1.1 * pace, (0.0, some(-0.01, 0.0), some(-0.16, -0.1)), bend=some(132, 150), hands=some(0.85, 1.0))
     yield Posture("touch toes", (replace(toes, hang=1.0, stay=some(0.5, 1.6)), Pose(1.1 * pace, stay=LONG)))
     over = Pose(1.0 * pace, (0.0, 0.0, some(-0.13, -0.06)), bend=some(70, 105), hang=1.0, stay=some(0.4, 1.5))
     yield Posture("bend over", (over, Pose(1.0 * pace, stay=LONG)))
     duck = Pose(0.42 * pace, (0.0, some(-0.4, -0.28), some(-0.12, 0.0)), bend=some(25, 45), stay=some(0.1, 0.4))
     yield Posture("duck", (duck, Pose(0.5 * pace, stay=LONG)))
-    side = Pose(some(0.7, 1.1), (some(0.1, 0.15), -0.005, 0.0))
-    across = replace(side, seconds=1.9 * side.seconds)
+    side = Pose(some(0.85, 0.95), (some(0.12, 0.16), -0.005, 0.0))
+    across = replace(side, seconds=1.7)
     yield Posture("sway", (side, *(_mirrored(across), across) * 4))
     knee = Pose(0.8 * pace, (-0.07, 0.0, 0.0), ((0.0, some(0.36, 0.44), some(0.12, 0.22)), (0.0, 0.0, 0.0)))
-    yield Posture("high step", (replace(knee, stay=some(0.4, 2.0)), Pose(0.8 * pace, stay=LONG)), sided=True)
+    yield Posture("high step", (replace(knee, stay=some(0.4, 2.0)), Pose(0.8 * pace, stay=LONG)), side="left")
+    crouch = Pose(0.9 * pace, (0.0, some(-0.52, -0.38), some(-0.14, -0.04)), bend=some(20, 45), stay=LONG)
+    yield Posture("crouch", (crouch,))
+    foot = ((0.0, some(0.2, 0.36), some(0.0, 0.15)), (0.0, 0.0, 0.0))
+    lifted = Pose(0.8 * pace, (-0.07, 0.0, 0.0), foot, stay=LONG)
+    yield Posture("balance with arms out", (lifted,), side="right", arms_out=True)
 
 
 def _kneeling(knee: Pose, pace: float, rng: np.random.Generator) -> Iterator[Posture]:

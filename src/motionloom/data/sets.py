@@ -12,6 +12,7 @@ from torch import Tensor
 from motionloom.data.actions import ACTIONS, PREFIX, strike
 from motionloom.data.actions import rests as rests_of
 from motionloom.data.clips import MADE, STATES, Clip, Note, read_clip
+from motionloom.data.sayings import sayings
 from motionloom.data.words import phrases, sentence
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
@@ -27,24 +28,26 @@ WEIGHT = {"capture": 1.0, "made": 0.7, "keyed": 0.4}
 """How often a stretch is drawn among those of its action: animated by hand it teaches what, not how."""
 
 FAVOUR: dict[str, float] = {
-    **dict.fromkeys(("climb", "kick"), 2.5),
-    **dict.fromkeys(("circle left", "jump", "turn around"), 2.5),
+    **dict.fromkeys(("climb", "kick", "walk fast"), 2.5),
+    **dict.fromkeys(("hop", "turn around", "turn around right"), 3.0),
+    **dict.fromkeys(("circle left", "jump"), 2.5),
     **dict.fromkeys(("punch left", "punch right", "kick left", "kick right"), 4.0),
-    **dict.fromkeys(("sit down", "stand up", "punch", "jog", "hop", "turn left", "turn right"), 1.5),
+    **dict.fromkeys(("sit down", "stand up", "punch", "jog", "turn left", "turn right"), 1.5),
     **{
         f"action:{name}": weight
         for weight, names in {
-            7.0: ("get up", "walk turn around"),
+            7.0: ("get up", "walk turn around", "kick", "punch"),
             5.0: (
-                "sit down", "stand up", "lie down", "kneel", "push-up", "lunge", "duck", "punch", "kick", "sway",
+                "sit down", "stand up", "lie down", "push-up", "lunge", "duck", "sway", "crouch", "touch toes",
+                "made punch", "balance with arms out", "hop", "made drink", "made hands on hips",
                 "throw", "made swing arms", "made open door", "high step", "slow down", "stop running", "bow",
                 "pick up",
             ),
             4.0: (
-                "crouch", "sit down and stand up", "stop walking", "crawl", "then", "squat", "touch toes", "made drink",
+                "kneel", "sit down and stand up", "stop walking", "crawl", "then", "squat", "made arm up twice",
             ),
             2.5: (
-                "climb ladder", "start running", "walk and pick up", "made clap", "made arms out", "made hands on hips",
+                "climb ladder", "start running", "walk and pick up", "made clap", "made arms out", "made arms up twice",
                 "raise arm", "made arm up", "kneel and rise", "bend over", "stairs", "fall", "leg raise", "side lunge",
                 "dance", "jump forward", "jump up", "cartwheel", "start walking", "made point",
             ),
@@ -163,12 +166,12 @@ def _worded(
 ) -> tuple[int, ...]:
     """Numbers of a note's captions in ``texts``, which grows; ``wordings`` are those of the labels met so far."""
     if note.kind == "human" or note.kind.startswith(PREFIX):
-        return tuple(_number(texts, text) for text in note.texts)
+        return tuple(_number(texts, text) for text in (*note.texts, *sayings(note)))
     if note.kind == "index":
         return tuple(dict.fromkeys(_number(texts, sentence(p, rng)) for p in note.texts for _ in range(3)))
     if note.kind not in wordings:
         made = {sentence(p, rng) for _ in range(WORDINGS) for p in [rng.choice(list(phrases(note.kind)))]}
-        wordings[note.kind] = tuple(_number(texts, text) for text in sorted(made))
+        wordings[note.kind] = tuple(_number(texts, text) for text in (*sorted(made), *sayings(note)))
     return wordings[note.kind]
 
 

@@ -243,8 +243,8 @@ PATHS = (
     Rule("sidestep right", _SIDEWAYS),
     Rule("walk left turn", f"{_CURVE}, turn > 55, turn < 135"),
     Rule("walk right turn", f"{_CURVE}, turn < -55, turn > -135"),
-    Rule("turn around", "turn > 140, turn < 220, turn_within > 125, facing_share > 0.3, pace < 1.9"),
-    Rule("turn around right", "turn < -140, turn > -220, turn_within > 125, facing_share > 0.3, pace < 1.9"),
+    Rule("walk turn back", "turn > 140, turn < 220, turn_within > 125, facing_share > 0.3, pace < 1.9"),
+    Rule("walk turn back right", "turn < -140, turn > -220, turn_within > 125, facing_share > 0.3, pace < 1.9"),
 )
 """The first of these names where a window without a gesture goes."""
 

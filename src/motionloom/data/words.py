@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import resources
 
 import numpy as np
@@ -51,20 +51,72 @@ _PEOPLE = (
 
 
 def sentence(verb_phrase: str, rng: np.random.Generator) -> str:
-    """Put a subject before a verb phrase in the third person; sometimes leave the bare command instead."""
-    if rng.random() < 0.12:
+    """Put a subject before a verb phrase in the third person, or make a command, a gerund or "who is ...ing" of it."""
+    form, who = rng.random(), _PEOPLE[rng.integers(len(_PEOPLE))]
+    if form < 0.12 and not verb_phrase.startswith("is "):
         return imperative(verb_phrase)
-    return f"{_PEOPLE[rng.integers(len(_PEOPLE))]} {verb_phrase}"
+    if form < 0.28:
+        return gerund(verb_phrase)
+    return f"{who} is {gerund(verb_phrase)}" if form < 0.4 else f"{who} {verb_phrase}"
 
 
 def imperative(verb_phrase: str) -> str:
     """'walks forward' to 'walk forward'; verbs after 'and' or 'then' follow."""
+    return _with_verbs(_base, verb_phrase)
 
-    def base(word: str) -> str:
-        return _WORDS["irregular"].get(word, word[:-1] if word.endswith("s") and not word.endswith("ss") else word)
 
+def gerund(verb_phrase: str) -> str:
+    """'sits down and waves' to 'sitting down and waving'; 'is walking' to 'walking'."""
+    return _with_verbs(_ing, verb_phrase.removeprefix("is ") if re.match(r"is \w+ing\b", verb_phrase) else verb_phrase)
+
+
+def _with_verbs(form: Callable[[str], str], verb_phrase: str) -> str:
     words = verb_phrase.split(" ")
-    return " ".join(base(w) if i == 0 or words[i - 1] in ("and", "then") else w for i, w in enumerate(words))
+    opens = [True, *(w in ("and", "then") or w.endswith(",") for w in words[:-1])]
+    verbs = [first and w.rstrip(",").endswith("s") and w not in _NO_VERBS for w, first in zip(words, opens)]
+    return " ".join(form(w.rstrip(",")) + "," * w.endswith(",") if verb else w for w, verb in zip(words, verbs))
+
+
+def _base(word: str) -> str:
+    if word in _WORDS["irregular"]:
+        return _WORDS["irregular"][word]
+    if word.endswith("ies"):
+        return word[:-3] + "y"
+    return word[:-2] if re.search(r"(ch|sh|ss|x)es$", word) else word[:-1]
+
+
+def _ing(word: str) -> str:
+    base = _base(word)
+    if base.endswith("ie"):
+        return base[:-2] + "ying"
+    if base.endswith("e") and not base.endswith(("ee", "oe")) and base != "be":
+        return base[:-1] + "ing"
+    return base + base[-1] * (base in _DOUBLED) + "ing"
+
+
+_DOUBLED = {
+    *("begin", "bob", "clap", "dip", "drop", "flip", "get", "grab", "hit", "hop", "hug", "jog", "lob", "mop", "nod"),
+    *(
+        "put",
+        "rub",
+        "run",
+        "set",
+        "sidestep",
+        "sip",
+        "sit",
+        "skip",
+        "slip",
+        "spin",
+        "squat",
+        "step",
+        "stop",
+        "tap",
+        "trip",
+    ),
+}
+"""Verbs whose last letter is doubled before -ing."""
+_NO_VERBS = {"arms", "forwards", "hands", "knees", "legs", "sideways"}
+"""What ends with s behind "and" and is no verb."""
 
 
 def describe_index(description: str) -> tuple[str, ...]:
