@@ -138,7 +138,10 @@ def _obedience(arguments: argparse.Namespace) -> None:
         f"{found['seeds_obeyed_share']:.1%} of all seeds"
     )
     if "paraphrases_obeyed_share" in found:
-        said += f"; {found['paraphrases_obeyed_share']:.1%} in other words"
+        said += (
+            f"; in other words {found['paraphrases_obeyed']} of {found['paraphrases']}, "
+            f"{found['paraphrases_mostly_obeyed']} and {found['paraphrases_obeyed_share']:.1%}"
+        )
     if arguments.out:
         parts = [files.markdown(themes)] if len(themes) > 1 else []
         text = "\n\n".join([f"# Obedience of {arguments.weights}", f"{said}.", *parts, files.markdown(rows)])

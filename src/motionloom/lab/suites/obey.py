@@ -163,7 +163,8 @@ def totals(results: Sequence[Result], checks: Sequence[Judge] = CHECKS) -> dict[
     prompts = {check.name: check.prompt for check in checks}
     own = [r.of(prompts[r.name]) for r in results]
     tried = [a for row in own for a in row]
-    other = [a for r in results for a in r.attempts if a.prompt != prompts[r.name]]
+    said = [r.of(prompt) for r in results for prompt in dict.fromkeys(a.prompt for a in r.attempts)]
+    other = [row for row in said if row[0].prompt not in prompts.values()]
     found = {
         "prompts": len(own),
         "prompts_obeyed": _enough(own, ENOUGH),
@@ -171,7 +172,11 @@ def totals(results: Sequence[Result], checks: Sequence[Judge] = CHECKS) -> dict[
         "seeds_obeyed_share": round(sum(a.obeyed for a in tried) / max(1, len(tried)), 4),
     }
     if other:
-        found["paraphrases_obeyed_share"] = round(sum(a.obeyed for a in other) / len(other), 4)
+        found["paraphrases"] = len(other)
+        found["paraphrases_obeyed"] = _enough(other, ENOUGH)
+        found["paraphrases_mostly_obeyed"] = _enough(other, MOSTLY)
+        reworded = [a.obeyed for row in other for a in row]
+        found["paraphrases_obeyed_share"] = round(sum(reworded) / len(reworded), 4)
     return found
 
 

@@ -45,7 +45,7 @@ class Everyday:
     grounded: bool = True
     """False for jumps, stairs and ladders, where the lowest joint may be well above y = 0."""
     paraphrases: tuple[str, ...] = field(default=(), kw_only=True)
-    """Empty: every everyday prompt stands in one wording."""
+    """The same wish in other words; `sets` reads them from ``everyday_reworded.toml``."""
 
     @property
     def bounds(self) -> tuple[Bound, ...]:

@@ -1,5 +1,9 @@
 """The sets of checks by name: ``basic`` (the old twenty), ``everyday`` and ``all``."""
 
+import tomllib
+from dataclasses import replace
+from importlib import resources
+
 from motionloom.errors import MotionloomError
 from motionloom.lab.metrics.everyday import arms, exercise, gaits, postures, rows, turns
 from motionloom.lab.metrics.everyday.check import Everyday
@@ -16,8 +20,14 @@ THEMES: dict[str, tuple[Everyday, ...]] = {
 }
 """The everyday checks by theme."""
 
-EVERYDAY: tuple[Everyday, ...] = tuple(check for theme in THEMES.values() for check in theme)
-"""All everyday checks, in the order of their themes."""
+_REWORDED: dict[str, str] = tomllib.loads(
+    (resources.files("motionloom.lab.suites") / "everyday_reworded.toml").read_text(encoding="utf-8")
+)
+
+EVERYDAY: tuple[Everyday, ...] = tuple(
+    replace(check, paraphrases=(_REWORDED[check.name],)) for theme in THEMES.values() for check in theme
+)
+"""All everyday checks, in the order of their themes, each with one other wording."""
 
 SETS: dict[str, tuple[Check | Everyday, ...]] = {"basic": BASIC, "everyday": EVERYDAY, "all": (*BASIC, *EVERYDAY)}
 """Checks by the name of their set."""
