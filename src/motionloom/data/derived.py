@@ -185,7 +185,8 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Cli
         if texts:
             group = PREFIX + MADE + gesture.name
             first = round(FPS * begin)
-            notes = (Note(0, len(features), group, texts, (first, min(first + max(30, 30 * gesture.times), len(features)))),)
+            whole = (first, min(first + 30 * max(1, gesture.times), len(features)))
+            notes = (Note(0, len(features), group, texts, whole),)
             yield Clip(
                 f"made_{seed}_{number:04d}", below.source, below.licence, "train", "made", notes, features, "made"
             )
