@@ -36,7 +36,7 @@ def averaged(before: Prior, after: Prior, share: float) -> Prior:
 
 def main() -> int:
     """Average and write."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="The mean of two priors, of which one began with the other.")
     parser.add_argument("before", type=Path)
     parser.add_argument("after", type=Path)
     parser.add_argument("out", type=Path)
