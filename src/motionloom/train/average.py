@@ -6,6 +6,7 @@ What the file says of itself, the standardisation, the text encoder and the tabl
 """
 
 import argparse
+import copy
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -26,12 +27,13 @@ def averaged(before: Prior, after: Prior, share: float) -> Prior:
     if not 0 <= share <= 1:
         raise MotionloomError(f"the share must be from 0 to 1; got {share}")
     old, new = before.net.state_dict(), after.net.state_dict()
-    after.net.load_state_dict({name: torch.lerp(old[name].double(), new[name].double(), share) for name in new})
+    net = copy.deepcopy(after.net)
+    net.load_state_dict({name: torch.lerp(old[name].double(), new[name].double(), share) for name in new})
     notes = {
         **after.card.notes,
         "average": f"{1 - share:g} of the weights it began with, {share:g} of those it ended with",
     }
-    return replace(after, card=replace(after.card, notes=notes))
+    return replace(after, net=net, card=replace(after.card, notes=notes))
 
 
 def main() -> int:

@@ -50,6 +50,7 @@ def test_paraphrases_are_tried_and_counted_apart() -> None:
     found = obey.totals(results, [FORWARD])
     assert len(results[0].attempts) == 2 * (1 + len(FORWARD.paraphrases))
     assert found["seeds_obeyed_share"] == found["paraphrases_obeyed_share"] == 0.5
+    assert (found["paraphrases"], found["paraphrases_obeyed"]) == (len(FORWARD.paraphrases), 0)
 
 
 def test_a_stopped_run_goes_on_without_doing_anything_twice(tmp_path: Path) -> None:
