@@ -61,6 +61,10 @@ class Studio:
         """Save a project as the page would."""
         self.server.ask("/project", project, method="PUT")
 
+    def says(self, place, text: str) -> None:
+        """Wait until a place of the page, a locator, has the text."""
+        place.filter(has_text=text).first.wait_for()
+
     # -- deeds
 
     def key(self, *keys: str) -> None:

@@ -19,7 +19,7 @@ def test_a_path_drawn_by_hand_is_walked(studio: Studio):
     ends = np.array([[path["points"][n]["x"], path["points"][n]["z"]] for n in (0, -1)])
     assert np.linalg.norm(pelvis[0] - ends[0]) < 0.15
     assert np.linalg.norm(pelvis[-1] - ends[1]) < 0.35
-    assert "Off the path" in studio.page.locator("#inspector").inner_text()
+    studio.says(studio.page.locator("#inspector"), "Off the path")
 
 
 def test_points_are_clicked_dragged_and_put_by_keys(studio: Studio):
@@ -41,7 +41,7 @@ def test_a_hand_goes_where_its_target_is(studio: Studio):
     assert target["time"] == 1.0
     wrist = studio.motion(project)[0, 20, RIGHT_WRIST]
     assert np.linalg.norm(wrist - target["position"]) < 0.05
-    assert "0.0 cm" in studio.page.locator("#inspector .miss").first.inner_text()
+    studio.says(studio.page.locator("#inspector .miss").first, "0.0 cm")
 
 
 def test_targets_that_no_body_can_meet_are_red(studio: Studio):

@@ -89,7 +89,7 @@ def test_a_skeleton_and_its_recording_become_a_clip(studio: Studio, tmp_path: Pa
     (tmp_path / "sway.asf").write_text(skeleton())
     (tmp_path / "sway.amc").write_text(recording())
     studio.drop(tmp_path / "sway.amc", tmp_path / "sway.asf")
-    studio.page.wait_for_selector(".clip, .notice")
+    studio.page.wait_for_selector(".clip, .notice[role=alert]")
     [clip] = studio.project()["clips"]
     assert (clip["name"], clip["seconds"]) == ("sway.amc", 1.0)
 

@@ -30,5 +30,4 @@ def test_a_killed_server_comes_back_and_nothing_is_lost(studio: Studio):
 
 def test_without_the_token_the_page_says_so(studio: Studio):
     studio.page.goto(studio.server.address)
-    studio.page.wait_for_selector(".notice")
-    assert "token" in studio.page.locator(".notice").inner_text()
+    studio.says(studio.page.locator(".notice[role=alert]"), "token")

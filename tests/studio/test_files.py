@@ -91,8 +91,7 @@ def test_a_file_that_is_no_project_is_reported(studio: Studio, tmp_path: Path):
     file.write_text('{"version": 1, "segments": [{"id": "a", "text": 5}]}')
     before = studio.blocks()
     studio.page.locator("input[type=file]").set_input_files(str(file))
-    studio.page.wait_for_selector(".notice")
-    assert "segments[0].text must be text" in studio.page.locator(".notice").inner_text()
+    studio.says(studio.page.locator(".notice[role=alert]"), "segments[0].text must be text")
     assert studio.blocks() == before
 
 

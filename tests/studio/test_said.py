@@ -41,7 +41,7 @@ def test_a_timeline_file_comes_in_whole_and_goes_out_again(studio: Studio, tmp_p
     project = studio.project()
     assert [one["path"] is not None for one in project["people"]] == [False, True]
     assert [(one["joint"], one["time"]) for one in project["people"][1]["targets"]] == [(21, 1), (21, 2)]
-    assert "Kept from the file: guidance, joints" in studio.page.locator("#inspector").inner_text()
+    studio.says(studio.page.locator("#inspector"), "Kept from the file: guidance, joints")
     out = studio.download("Alt+e").decode()
     assert out.startswith("# motionloom duet --timeline both.yaml --person 2\n")
     back, given = yaml.safe_load(out), yaml.safe_load(GIVEN)
@@ -53,8 +53,8 @@ def test_a_target_that_is_out_of_reach_is_said_at_the_target(studio: Studio):
     studio.put({**studio.project(), "people": [high(3.4)], "drawn": ""})
     studio.load()
     said = studio.page.locator(".track.joints .said")
-    assert "right wrist" in said.inner_text()
-    assert "out of anybody's reach" in said.inner_text()
+    studio.says(said, "right wrist")
+    studio.says(said, "out of anybody's reach")
     assert studio.page.locator(".key.unmet").count() == 1
     assert studio.page.locator("#inspector p.unmet").count() == 1
     assert studio.page.locator(".notice").count() == 0
@@ -70,7 +70,7 @@ def test_a_block_that_asks_for_too_much_is_said_at_the_block(studio: Studio):
     blocks = [first, {**first, "id": "other", "given": second}]
     studio.put({**studio.project(), "segments": blocks, "drawn": ""})
     studio.load()
-    assert "'guidance' must be" in studio.page.locator(".track.words .said").inner_text()
+    studio.says(studio.page.locator(".track.words .said"), "'guidance' must be")
     assert studio.page.locator(".block.wrong").get_attribute("data-id") == "other"
 
 

@@ -96,7 +96,7 @@ def test_keys_are_listed_and_the_theme_changes(studio: Studio, scheme: str):
     assert abs(studio.picture().mean() - before) > 60
     studio.key("?")
     assert studio.page.locator("#help").is_visible()
-    assert "Undo" in studio.page.locator("#help").inner_text()
+    studio.says(studio.page.locator("#help"), "Undo")
     studio.key("Escape")
     assert not studio.page.locator("#help").is_visible()
 
@@ -104,7 +104,7 @@ def test_keys_are_listed_and_the_theme_changes(studio: Studio, scheme: str):
 def test_an_empty_block_says_what_is_missing(studio: Studio):
     studio.key("a", "Enter")
     said = studio.page.locator(".track.words .said")
-    assert "has no words yet" in said.inner_text()
+    studio.says(said, "has no words yet")
     assert studio.page.locator(".block.wrong").count() == 1
 
 

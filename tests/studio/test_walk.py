@@ -63,7 +63,7 @@ def test_a_path_of_clicks_has_speed_and_stops_and_the_right_button_turns_the_vie
     field(studio, "Speed, m/s", "0.8")
     project = studio.project()
     assert project["people"][0]["path"]["speed"] == 0.8
-    assert "cm" in studio.page.locator(".way").inner_text()
+    studio.says(studio.page.locator(".way"), "cm")
 
 
 def test_a_joint_is_clicked_dragged_and_pinned_through_time(studio: Studio):
