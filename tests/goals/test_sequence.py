@@ -48,10 +48,37 @@ SEQUENCES = {
     "a person walks and waves and then sits down": ["a person walks and waves", "a person sits down"],
     "someone crouches down and stands back up": ["someone crouches down", "someone stands back up"],
     "a person walks in a circle, followed by sitting down": ["a person walks in a circle", "a person sits down"],
+    "walking to a chair and sitting down": ["a person walks to a chair", "a person sits down"],
+    "a man is walking to a chair and taking a seat": ["a man walks to a chair", "a man takes a seat"],
+    "getting out of bed, then stretching": ["a person gets out of bed", "a person stretches"],
+    "first he jumps, then he speeds up": ["he jumps", "he speeds up"],
+    "crouching down first, then jumping up": ["a person crouches down", "a person jumps up"],
+    # what the second part leaves out is said again
+    "a person kicks with the right foot, then with the left": [
+        "a person kicks with the right foot",
+        "a person kicks with the left foot",
+    ],
+    "the left hand goes up, after that the right one": ["the left hand goes up", "the right hand goes up"],
+    "someone does a kick followed by a punch": ["someone does a kick", "someone does a punch"],
+    "a person walks forward, turns around and walks back": [
+        "a person walks forward",
+        "a person turns around",
+        "a person walks forward",
+    ],
+    "she sits down on a chair, then gets back up": ["she sits down on a chair", "she stands up again"],
+    "she sits down on the floor, then comes back up": ["she sits down on the floor", "she stands up from the floor"],
+    # what only ends an action stays with it
+    "a person bows, straightens up and walks away": ["a person bows and straightens up", "a person walks away"],
 }
 
 WHOLES = [
     "a person walks",
+    "a person bows, then straightens up",
+    "a person ducks and comes right back up",
+    "a person crouches and stays there",
+    "a person squats once and stands back up",
+    "walking and waving",
+    "a person is walking and waving",
     "a person waves with both hands",
     "a person jumps up and down",
     "a person walks back and forth",

@@ -13,6 +13,20 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from motionloom.goals.elided import completed
+from motionloom.goals.verbs import (
+    MOODS,
+    NOUNS_AFTER,
+    PRONOUN,
+    base_of,
+    finite,
+    kind_of,
+    kind_of_verb,
+    mood_of,
+    subject_of,
+    verb_of,
+)
+
 MOST_PARTS = 20
 SHORTEST = 1.2
 """Seconds of the shortest part."""
@@ -34,50 +48,6 @@ _SECONDS = {
 }  # fmt: skip
 """Kinds of verbs, and the seconds such an action takes."""
 
-_VERBS = {
-    "locomotion": "walk run jog sprint march stroll step stride skip tiptoe sneak crawl climb go come move "
-    "pace shuffle sidestep strafe limp stagger rush race swim back return enter leave approach wander hop gallop creep "
-    "stumble",
-    "gesture": "wave clap point nod shake salute raise lift swing stretch reach scratch rub hold carry drag push pull "
-    "bounce dribble look talk shout sing drink eat cheer flap cross fold shrug gesture touch wipe wash stir play "
-    "juggle smile laugh cry yawn beckon lower",
-    "state": "sit stand lie lay rest wait pause balance pose remain stay sleep lean",
-    "change": "kneel crouch bend fall stop rise collapse duck freeze halt",
-    "event": "throw catch pick put place bow roll grab drop take toss pitch stoop cartwheel flip dive trip squat "
-    "lunge curtsy sneeze open close shoot",
-    "jump": "jump leap bound",
-    "turn": "turn spin twist rotate pivot circle twirl",
-    "fight": "kick punch box strike hit block dodge slash fight swipe chop jab",
-    "dance": "dance waltz salsa",
-    "other": "do make perform start begin continue keep try practice give get exercise act pretend",
-}
-_PAST = {
-    "sit": "sat", "stand": "stood", "lie": "lay", "run": "ran", "go": "went", "come": "came", "get": "got",
-    "kneel": "knelt", "bend": "bent", "throw": "threw", "catch": "caught", "swing": "swung", "fall": "fell",
-    "take": "took", "do": "did", "make": "made", "give": "gave", "begin": "began", "keep": "kept", "put": "put",
-    "rise": "rose", "creep": "crept", "swim": "swam", "hold": "held", "drink": "drank", "eat": "ate", "sing": "sang",
-    "shake": "shook", "leap": "leapt", "spin": "spun", "fight": "fought", "hit": "hit", "strike": "struck",
-    "leave": "left", "sleep": "slept", "shoot": "shot",
-}  # fmt: skip
-_DOUBLED = {"run", "sit", "jog", "step", "skip", "hop", "clap", "nod", "stop", "get", "spin", "trip", "drag", "flap",
-            "shrug", "put", "swim", "drop", "flip", "grab", "rub", "hit", "chop", "jab", "begin", "bet"}  # fmt: skip
-_CHANGED_BY = {
-    "sit": ("change", r"\b(down|up)\b"), "stand": ("change", r"\bup\b"), "lie": ("change", r"\bdown\b"),
-    "lay": ("change", r"\bdown\b"), "get": ("change", r"\b(up|down|onto|off)\b"), "lean": ("change", r"\bdown\b"),
-    "turn": ("event", r"\b(around|round|about|back|180)\b"), "climb": ("event", r"\b(onto|over)\b"),
-    "come": ("change", r"\bto a (stop|halt)\b"), "look": ("event", r"\baround\b"),
-}  # fmt: skip
-"""What a word behind the verb makes of it."""
-
-_NOUNS_AFTER = {"do", "make", "perform", "throw", "take", "give", "practice", "play"}
-"""Verbs behind which "kicks and punches" are things."""
-_SUBJECT_WORDS = (
-    r"(?:a|an|the|this|that|one|another|some|somebody|someone|he|she|they|it|i|you|we|person|man|woman|figure)"
-)
-_PRONOUN = re.compile(
-    r"^(?:he|she|they|it|(?:the|this|that) (?:person|man|woman|figure|guy|boy|girl|character|human))\s+", re.IGNORECASE
-)
-_ADVERB = r"(?:(?:\w+ly|then|again|suddenly|once|twice|just|also|first|finally|soon)\s+)*"
 _THEN = re.compile(
     r"(?:\s*[.;]\s*|\s*,\s*|\s+)(?:and\s+|but\s+)?(?:then|afterwards?|after\s+(?:that|this|which)|next|subsequently"
     r"|finally|lastly|followed\s+by)\b\s*,?\s*(?:and\s+)?(?:also\s+)?|\s*[.;]\s+(?=\S)",
@@ -92,34 +62,6 @@ _NUMBER = {"once": 1, "twice": 2, "thrice": 3, "two": 2, "three": 3, "four": 4, 
            "eight": 8, "nine": 9, "ten": 10, "several": 4, "few": 3}  # fmt: skip
 
 
-def _forms() -> dict[str, dict[str, str]]:
-    """Of each mood ("third", "base", "past", "gerund") the forms with their base."""
-    moods: dict[str, dict[str, str]] = {"third": {}, "base": {}, "past": {}, "gerund": {}}
-    for words in _VERBS.values():
-        for base in words.split():
-            moods["third"][_third(base)] = base
-            moods["base"][base] = base
-            stem = base + base[-1] if base in _DOUBLED else base
-            past = f"{stem[:-1]}ied" if stem.endswith("y") and stem[-2] not in "aeo" else f"{stem.removesuffix('e')}ed"
-            moods["past"][_PAST.get(base, past)] = base
-            moods["gerund"]["lying" if base == "lie" else _gerund(stem)] = base
-    return moods
-
-
-def _third(base: str) -> str:
-    if base.endswith("y") and base[-2] not in "aeo":
-        return base[:-1] + "ies"
-    return base + ("es" if re.search(r"(s|sh|ch|x|o|z)$", base) else "s")
-
-
-def _gerund(stem: str) -> str:
-    return (stem[:-1] if stem.endswith("e") and not stem.endswith("ee") else stem) + "ing"
-
-
-_MOODS = _forms()
-_KINDS = {base: kind for kind, words in reversed(_VERBS.items()) for base in words.split()}
-
-
 def split_actions(text: str) -> tuple[Part, ...]:
     """The actions of a sentence that follow each other, each a sentence of its own with the seconds it takes.
 
@@ -128,18 +70,24 @@ def split_actions(text: str) -> tuple[Part, ...]:
     """
     whole = " ".join(text.split()).rstrip(" .;,")
     clauses = [clause for found in _by_time(whole) for clause in _by_then(found)]
-    subject = _subject(clauses[0]) if clauses else ""
+    if len(clauses) > 1:
+        clauses[0] = re.sub(r"^first,? (?=\w+ \w)|,? first$", "", clauses[0], flags=re.IGNORECASE)
+    subject = subject_of(clauses[0]) if clauses else ""
     parts: list[str] = []
     for number, clause in enumerate(clauses):
-        own = _subject(clause)
-        said = clause if not own or number == 0 else _PRONOUN.sub("", clause)
+        own = subject_of(clause)
+        said = clause if not own or number == 0 else PRONOUN.sub("", clause)
         own = own if said == clause else ""
         named = own or subject
-        rest = said[len(own) :].strip() if own else said
-        parts += [_sentence(named, item) for item in _list(_finite(rest))]
+        rest = re.sub(r"^(?:is|are|was|were) (?=\w+ing\b)", "", said[len(own) :].strip())
+        if not named and mood_of(rest) == "gerund":
+            named = "a person"
+        parts += [_sentence(named, finite(item)) for item in _list(rest)]
+    parts = completed(parts)
     if not 1 < len(parts) <= MOST_PARTS:
         return (Part(text, natural_seconds(text)),)
-    return tuple(Part(part, natural_seconds(part)) for part in parts)
+    last = len(parts) - 1
+    return tuple(Part(part, _briefly(part) if i < last else natural_seconds(part)) for i, part in enumerate(parts))
 
 
 def lengths(parts: Sequence[Part], seconds: float | None = None, *, fps: float = 20.0) -> list[float]:
@@ -167,7 +115,7 @@ def natural_seconds(text: str) -> float:
         number = _count(found[1])
         if number:
             return float(min(max(number, SHORTEST), 60.0))
-    kind = next((_kind(word, said) for word in re.findall(r"[a-z]+", said) if _base(word)), "other")
+    kind = next((kind_of_verb(word, said) for word in re.findall(r"[a-z]+", said) if base_of(word)), "other")
     seconds = _SECONDS[kind]
     if found := re.search(r"\b(\w+) (?:small |large |big |slow |quick )?steps\b", said):
         seconds = 1.0 + 0.6 * (_count(found[1]) or 3)
@@ -184,6 +132,13 @@ def natural_seconds(text: str) -> float:
     elif re.search(r"\b(quickly|quick|fast|rapidly|hastily)\b", said):
         seconds *= 0.8
     return float(min(max(seconds, SHORTEST), LONGEST))
+
+
+def _briefly(part: str) -> float:
+    """How long a part takes behind which another comes: who stops to do something stops briefly."""
+    done = part.removeprefix(subject_of(part)).strip()
+    stops = verb_of(done, mood_of(done)) in ("stop", "halt", "pause", "freeze") and " for " not in done
+    return 1.5 if stops else natural_seconds(part)
 
 
 # Clauses
@@ -207,12 +162,12 @@ def _by_time(text: str) -> list[str]:
 
 def _named_alike(clauses: list[str], main: str) -> list[str]:
     """Clauses with the subject of ``main`` where they have none or a pronoun, their verbs finite as there."""
-    subject, mood = _subject(main), _mood(main)
+    subject, mood = subject_of(main), mood_of(main)
     result = []
     for clause in clauses:
-        rest = _PRONOUN.sub("", clause)
-        result.append(clause if clause == main else _sentence(subject, _finite(rest, mood)) if subject else
-                      _finite(rest, mood))  # fmt: skip
+        rest = PRONOUN.sub("", clause)
+        result.append(clause if clause == main else _sentence(subject, finite(rest, mood)) if subject else
+                      finite(rest, mood))  # fmt: skip
     return result
 
 
@@ -238,10 +193,10 @@ def _list(clause: str) -> list[str]:
         return [clause] if clause else []
     tokens = _JOIN.split(clause)
     items, joins = [tokens[0]], []
-    mood = _mood(tokens[0])
+    mood = mood_of(tokens[0])
     for join, piece in zip(tokens[1::2], tokens[2::2], strict=True):
-        piece = _PRONOUN.sub("", piece)
-        if mood and _verb(piece, mood) and not _is_thing(items[-1], join):
+        piece = PRONOUN.sub("", piece)
+        if mood and verb_of(piece, mood) and not _is_thing(items[-1], join):
             items.append(piece)
             joins.append(join)
         else:
@@ -251,7 +206,7 @@ def _list(clause: str) -> list[str]:
     if len(items) > 2:
         return items
     comma = not re.search(r"\band\b", joins[0], re.IGNORECASE)
-    return items if comma or _follows(_kind_of(items[0], mood), _kind_of(items[1], mood)) else [clause]
+    return items if comma or _follows(kind_of(items[0], mood), kind_of(items[1], mood)) else [clause]
 
 
 def _follows(first: str, second: str) -> bool:
@@ -271,83 +226,25 @@ def _follows(first: str, second: str) -> bool:
 # Words
 
 
-def _subject(clause: str) -> str:
-    """The words before the first verb: "a tall man" of "a tall man walks"; empty for a bare verb."""
-    words = clause.split(" ")
-    for count, word in enumerate(words[:7]):
-        plain = word.strip(",").lower()
-        if count == 0 and not re.fullmatch(_SUBJECT_WORDS, plain):
-            return ""
-        if count and (plain in ("is", "are", "was", "were") or plain in _MOODS["third"] or plain in _MOODS["past"]):
-            before = words[:count]
-            while len(before) > 1 and re.fullmatch(r"\w+ly|then", before[-1]):
-                before = before[:-1]
-            return " ".join(before)
-    return words[0] if re.fullmatch(r"someone|somebody|he|she|they", words[0], re.I) else _article(words)
-
-
-def _article(words: list[str]) -> str:
-    """The article and its noun where no verb is known."""
-    return " ".join(words[:2]) if len(words) > 2 and re.fullmatch(r"a|an|the", words[0], re.IGNORECASE) else ""
-
-
 def _sentence(subject: str, action: str) -> str:
     return f"{subject} {action}".strip()
-
-
-def _mood(clause: str) -> str:
-    """The mood of a clause's first verb; empty where none is known."""
-    rest = clause[len(_subject(clause)) :].strip()
-    return next((mood for mood in ("third", "base", "past", "gerund") if _verb(rest, mood)), "")
-
-
-def _verb(phrase: str, mood: str) -> str:
-    """The verb that a phrase begins with, adverbs aside, as its base; empty if it is none of that mood."""
-    found = re.match(rf"\s*{_ADVERB}([A-Za-z]+)", phrase, re.IGNORECASE)
-    return _MOODS[mood].get(found[1].lower(), "") if found else ""
-
-
-def _base(word: str) -> str:
-    return next((forms[word] for forms in _MOODS.values() if word in forms), "")
 
 
 def _is_clause(phrase: str) -> bool:
     """Whether something happens in a phrase: it begins with a gerund, or with a subject and a verb."""
     if re.match(r"(?:that|this|which)\b", phrase, re.IGNORECASE):  # "after that" is a "then"
         return False
-    if _verb(phrase, "gerund"):
+    if verb_of(phrase, "gerund"):
         return True
-    subject = _subject(phrase)
-    return bool(subject) and bool(_mood(phrase)) and bool(_verb(phrase[len(subject) :].strip(), _mood(phrase)))
-
-
-def _finite(phrase: str, mood: str = "third") -> str:
-    """A phrase that begins with a gerund, with its verb in the mood: "sitting down" as "sits down"."""
-    base = _verb(phrase, "gerund")
-    if not base:
-        return phrase
-    said = next(form for form, of in _MOODS[mood or "third"].items() if of == base)
-    return re.sub(rf"^(\s*{_ADVERB})[A-Za-z]+", rf"\g<1>{said}", phrase, count=1, flags=re.IGNORECASE)
-
-
-def _kind_of(item: str, mood: str) -> str:
-    rest = item[len(_subject(item)) :].strip()
-    return _kind(_MOODS[mood].get("", "") or _verb(rest, mood), rest.lower())
-
-
-def _kind(word: str, said: str) -> str:
-    base = _base(word) or word
-    changed = _CHANGED_BY.get(base)
-    if changed and re.search(changed[1], said):
-        return changed[0]
-    return _KINDS.get(base, "other")
+    subject = subject_of(phrase)
+    return bool(subject) and bool(mood_of(phrase)) and bool(verb_of(phrase[len(subject) :].strip(), mood_of(phrase)))
 
 
 def _is_thing(item: str, join: str) -> bool:
     """Whether what follows is one more thing that somebody does, throws ...: "does squats and lunges"."""
-    rest = item[len(_subject(item)) :].strip()
-    base = next((_verb(rest, mood) for mood in _MOODS if _verb(rest, mood)), "")
-    return base in _NOUNS_AFTER and "," not in join and bool(re.search(r"\w+s$", item)) and len(rest.split(" ")) <= 4
+    rest = item[len(subject_of(item)) :].strip()
+    base = next((verb_of(rest, mood) for mood in MOODS if verb_of(rest, mood)), "")
+    return base in NOUNS_AFTER and "," not in join and bool(re.search(r"\w+s$", item)) and len(rest.split(" ")) <= 4
 
 
 def _count(word: str) -> int:

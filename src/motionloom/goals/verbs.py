@@ -1,0 +1,135 @@
+"""Verbs in the words of prompts: their forms, what kind of action each names, and who does it."""
+
+import re
+
+_VERBS = {
+    "locomotion": "walk run jog sprint march stroll step stride skip tiptoe sneak crawl climb go come move "
+    "pace shuffle sidestep strafe limp stagger rush race swim back return enter leave approach wander hop gallop creep "
+    "stumble",
+    "gesture": "wave clap point nod shake salute raise lift swing stretch reach scratch rub hold carry drag push pull "
+    "bounce dribble look talk shout sing drink eat cheer flap cross fold shrug gesture touch wipe wash stir play "
+    "juggle smile laugh cry yawn beckon lower",
+    "state": "sit stand lie lay rest wait pause balance pose remain stay sleep lean",
+    "change": "kneel crouch bend fall stop rise collapse duck freeze halt straighten",
+    "event": "throw catch pick put place bow roll grab drop take toss pitch stoop cartwheel flip dive trip squat "
+    "lunge curtsy sneeze open close shoot",
+    "jump": "jump leap bound",
+    "turn": "turn spin twist rotate pivot circle twirl",
+    "fight": "kick punch box strike hit block dodge slash fight swipe chop jab",
+    "dance": "dance waltz salsa",
+    "other": "do make perform start begin continue keep try practice give get exercise act pretend",
+}
+_PAST = {
+    "sit": "sat", "stand": "stood", "lie": "lay", "run": "ran", "go": "went", "come": "came", "get": "got",
+    "kneel": "knelt", "bend": "bent", "throw": "threw", "catch": "caught", "swing": "swung", "fall": "fell",
+    "take": "took", "do": "did", "make": "made", "give": "gave", "begin": "began", "keep": "kept", "put": "put",
+    "rise": "rose", "creep": "crept", "swim": "swam", "hold": "held", "drink": "drank", "eat": "ate", "sing": "sang",
+    "shake": "shook", "leap": "leapt", "spin": "spun", "fight": "fought", "hit": "hit", "strike": "struck",
+    "leave": "left", "sleep": "slept", "shoot": "shot",
+}  # fmt: skip
+_DOUBLED = {"run", "sit", "jog", "step", "skip", "hop", "clap", "nod", "stop", "get", "spin", "trip", "drag", "flap",
+            "shrug", "put", "swim", "drop", "flip", "grab", "rub", "hit", "chop", "jab", "begin", "bet"}  # fmt: skip
+_CHANGED_BY = {
+    "sit": ("change", r"\b(down|up)\b"), "stand": ("change", r"\bup\b"), "lie": ("change", r"\bdown\b"),
+    "lay": ("change", r"\bdown\b"), "get": ("change", r"\b(up|down|onto|off|out)\b"), "take": ("change", r"\bseat\b"),
+    "lean": ("change", r"\bdown\b"),
+    "turn": ("event", r"\b(around|round|about|back|180)\b"), "climb": ("event", r"\b(onto|over)\b"),
+    "come": ("change", r"\bto a (stop|halt)\b"), "look": ("event", r"\baround\b"),
+}  # fmt: skip
+"""What a word behind the verb makes of it."""
+
+NOUNS_AFTER = {"do", "make", "perform", "throw", "take", "give", "practice", "play"}
+"""Verbs behind which "kicks and punches" are things."""
+_SUBJECT_WORDS = (
+    r"(?:a|an|the|this|that|one|another|some|somebody|someone|he|she|they|it|i|you|we|person|man|woman|figure)"
+)
+PRONOUN = re.compile(
+    r"^(?:he|she|they|it|(?:the|this|that) (?:person|man|woman|figure|guy|boy|girl|character|human))\s+", re.IGNORECASE
+)
+_ADVERB = r"(?:(?:\w+ly|then|again|suddenly|once|twice|just|also|first|finally|soon)\s+)*"
+
+
+def _forms() -> dict[str, dict[str, str]]:
+    """Of each mood ("third", "base", "past", "gerund") the forms with their base."""
+    moods: dict[str, dict[str, str]] = {"third": {}, "base": {}, "past": {}, "gerund": {}}
+    for words in _VERBS.values():
+        for base in words.split():
+            moods["third"][_third(base)] = base
+            moods["base"][base] = base
+            stem = base + base[-1] if base in _DOUBLED else base
+            past = f"{stem[:-1]}ied" if stem.endswith("y") and stem[-2] not in "aeo" else f"{stem.removesuffix('e')}ed"
+            moods["past"][_PAST.get(base, past)] = base
+            moods["gerund"]["lying" if base == "lie" else _gerund(stem)] = base
+    return moods
+
+
+def _third(base: str) -> str:
+    if base.endswith("y") and base[-2] not in "aeo":
+        return base[:-1] + "ies"
+    return base + ("es" if re.search(r"(s|sh|ch|x|o|z)$", base) else "s")
+
+
+def _gerund(stem: str) -> str:
+    return (stem[:-1] if stem.endswith("e") and not stem.endswith("ee") else stem) + "ing"
+
+
+MOODS = _forms()
+_KINDS = {base: kind for kind, words in reversed(_VERBS.items()) for base in words.split()}
+
+
+def subject_of(clause: str) -> str:
+    """The words before the first verb: "a tall man" of "a tall man walks"; empty for a bare verb."""
+    words = clause.split(" ")
+    for count, word in enumerate(words[:7]):
+        plain = word.strip(",").lower()
+        if count == 0 and not re.fullmatch(_SUBJECT_WORDS, plain):
+            return ""
+        if count and (plain in ("is", "are", "was", "were") or plain in MOODS["third"] or plain in MOODS["past"]):
+            before = words[:count]
+            while len(before) > 1 and re.fullmatch(r"\w+ly|then", before[-1]):
+                before = before[:-1]
+            return " ".join(before)
+    return words[0] if re.fullmatch(r"someone|somebody|he|she|they", words[0], re.I) else _article(words)
+
+
+def _article(words: list[str]) -> str:
+    """The article and its noun where no verb is known."""
+    return " ".join(words[:2]) if len(words) > 2 and re.fullmatch(r"a|an|the", words[0], re.IGNORECASE) else ""
+
+
+def mood_of(clause: str) -> str:
+    """The mood of a clause's first verb; empty where none is known."""
+    rest = clause[len(subject_of(clause)) :].strip()
+    return next((mood for mood in ("third", "base", "past", "gerund") if verb_of(rest, mood)), "")
+
+
+def verb_of(phrase: str, mood: str) -> str:
+    """The verb that a phrase begins with, adverbs aside, as its base; empty if it is none of that mood."""
+    found = re.match(rf"\s*{_ADVERB}([A-Za-z]+)", phrase, re.IGNORECASE)
+    return MOODS[mood].get(found[1].lower(), "") if found and mood else ""
+
+
+def base_of(word: str) -> str:
+    return next((forms[word] for forms in MOODS.values() if word in forms), "")
+
+
+def finite(phrase: str, mood: str = "third") -> str:
+    """A phrase that begins with a gerund, with its verb in the mood: "sitting down" as "sits down"."""
+    base = verb_of(phrase, "gerund")
+    if not base:
+        return phrase
+    said = next(form for form, of in MOODS[mood or "third"].items() if of == base)
+    return re.sub(rf"^(\s*{_ADVERB})[A-Za-z]+", rf"\g<1>{said}", phrase, count=1, flags=re.IGNORECASE)
+
+
+def kind_of(item: str, mood: str) -> str:
+    rest = item[len(subject_of(item)) :].strip()
+    return kind_of_verb(verb_of(rest, mood), rest.lower())
+
+
+def kind_of_verb(word: str, said: str) -> str:
+    base = base_of(word) or word
+    changed = _CHANGED_BY.get(base)
+    if changed and re.search(changed[1], said):
+        return changed[0]
+    return _KINDS.get(base, "other")
