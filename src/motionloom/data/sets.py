@@ -28,7 +28,8 @@ WEIGHT = {"capture": 1.0, "made": 0.7, "keyed": 0.4}
 """How often a stretch is drawn among those of its action: animated by hand it teaches what, not how."""
 
 FAVOUR: dict[str, float] = {
-    **dict.fromkeys(("climb", "kick", "walk fast"), 2.5),
+    **dict.fromkeys(("climb", "kick", "walk slow"), 2.5),
+    "walk fast": 3.5,
     **dict.fromkeys(("hop", "turn around", "turn around right"), 3.0),
     **dict.fromkeys(("circle left", "jump"), 2.5),
     **dict.fromkeys(("punch left", "punch right", "kick left", "kick right"), 4.0),
