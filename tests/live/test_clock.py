@@ -196,7 +196,7 @@ def test_a_slow_machine_says_so() -> None:
     health = made.player.health
     assert health.ahead == pytest.approx(clock.SPARE * 0.8)
     assert "takes 0.80 s for a window" in health.problem
-    assert "followed every 1.00 s and 0.92 s late" in health.problem
+    assert "followed every 1.00 s and 0.84 s late" in health.problem
     assert not Simulation(lambda window: 0.3, {}).run(100).player.health.problem
 
 

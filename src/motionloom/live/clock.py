@@ -27,7 +27,7 @@ SHORTEST, LONGEST = 0.5, 2.0
 """Seconds of frames that wait in the buffer, at least and at most."""
 WINDOWS = 3.0
 """As many of the longest windows' times the buffer holds: one that is given up, one for a command, and again."""
-USUAL, SPARE = 0.8, 1.15
+USUAL, SPARE = 0.8, 1.05
 """A window is expected to take so many times what this share of the last ones took at most."""
 WAITING = 64
 """Commands that wait for the planner; of more the oldest are dropped."""

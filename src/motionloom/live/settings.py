@@ -10,7 +10,7 @@ from motionloom.errors import MotionloomError
 class Settings:
     """What a `Live` is sampled with; the defaults are those that docs/live.md measures."""
 
-    steps: int = 8
+    steps: int = 7
     """Guided network calls for one window."""
     guidance: float = 2.5
     """Strength of the words; 0 ignores them."""
