@@ -66,7 +66,7 @@ EACH = [
     for turn, number in enumerate(SIGNALS)
     if command == "generate" or turn == place % len(SIGNALS) or "KILLS" in os.environ
 ]
-"""A command and the signal that ends it: one signal each, every signal for `generate`; every one where `KILLS` is set."""
+"""A command and the signal that ends it: one each, every one for `generate`; all of all where `KILLS` is set."""
 
 
 @pytest.mark.parametrize(("command", "number"), EACH, ids=[f"{command}-{number.name}" for command, number in EACH])
