@@ -77,6 +77,19 @@ def test_everyday_prompts_are_a_set_of_their_own_with_themes_and_a_sheet(
     assert sheet.is_file()
 
 
+def test_checks_are_tried_with_ones_own_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = tmp_path / "words.toml"
+    words.write_text('"bow" = "a waiter takes a deep bow"\n')
+    typed = ["evaluate", "obedience", "--set", "everyday", "--seeds", "2", "--json", "--words", str(words)]
+    assert main(typed) == 0
+    (one,) = json.loads(capsys.readouterr().out)["checks"]
+    assert (one["name"], one["prompt"]) == ("bow", "a waiter takes a deep bow")
+    for wrong in ('"bows" = "a"', '"bow" = 3', "", "bow"):
+        words.write_text(wrong)
+        assert main(typed) == 2
+        assert str(words) in capsys.readouterr().err
+
+
 def test_checks_are_tried_on_real_clips(built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     assert main(["evaluate", "checks", "--data", str(built), "--only", "bow", "--out", str(out), "--misses"]) == 0

@@ -55,6 +55,9 @@ def _physical(commands) -> None:
     obedience.add_argument(
         "--only", action="append", metavar="CHECK", help="only this check, such as 'walk forward' (repeatable)"
     )
+    obedience.add_argument(
+        "--words", type=Path, metavar="FILE.toml", help="your own sentence for each check, by its name, as the prompt"
+    )
     obedience.add_argument("--sheet", type=Path, metavar="FILE.png", help="also draw the first draw of every prompt")
     obedience.set_defaults(run=_obedience, seed=None)
 
@@ -113,13 +116,15 @@ def _settings(arguments: argparse.Namespace) -> dict:
 def _obedience(arguments: argparse.Namespace) -> None:
     import json
 
-    from motionloom.lab.metrics.everyday.sets import chosen
+    from motionloom.lab.metrics.everyday.sets import chosen, in_words
     from motionloom.lab.report import files
     from motionloom.lab.suites import everyday, obey
     from motionloom.lab.suites.reference import known
     from motionloom.viz.film import suffixed
 
     checks = chosen(arguments.prompts, arguments.only)
+    if arguments.words:
+        checks = in_words(checks, arguments.words)
     if arguments.sheet:
         files.check_report(suffixed(arguments.sheet, (".png",)))
     seed = _first_seed(arguments)

@@ -1,10 +1,13 @@
 """The sets of checks by name: ``basic`` (the old twenty), ``everyday`` and ``all``."""
 
 import tomllib
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib import resources
+from pathlib import Path
 
 from motionloom.errors import MotionloomError
+from motionloom.io.text import read_utf8
 from motionloom.lab.metrics.everyday import arms, exercise, gaits, postures, rows, turns
 from motionloom.lab.metrics.everyday.check import Everyday
 from motionloom.lab.metrics.obedience import CHECKS as BASIC
@@ -47,3 +50,21 @@ def chosen(name: str, only: list[str] | None = None) -> tuple[Check | Everyday, 
             f"no check called {wrong!r}; the checks of {name} are {', '.join(c.name for c in checks)}"
         )
     return tuple(by_name[n] for n in only)
+
+
+def in_words(checks: Sequence[Check | Everyday], path: Path) -> tuple[Check | Everyday, ...]:
+    """The checks that a .toml file has a sentence for, ``"walk slowly" = "..."``, with that as their prompt.
+
+    Raises `MotionloomError` for a file that is no such table and for names of no check among these.
+    """
+    try:
+        words = tomllib.loads(read_utf8(path, max_bytes=1 << 16))
+    except (ValueError, RecursionError) as error:
+        raise MotionloomError(f'{path} is no TOML ({error}); give lines such as "walk slowly" = "..."') from None
+    by_name = {check.name: check for check in checks}
+    wrong = next((n for n, said in words.items() if n not in by_name or not isinstance(said, str) or not said), None)
+    if wrong is not None or not words:
+        raise MotionloomError(
+            f"{path} has no sentence for a check at {wrong or 'any line'!r}; the checks are {', '.join(by_name)}"
+        )
+    return tuple(replace(by_name[name], prompt=said, paraphrases=()) for name, said in words.items())
