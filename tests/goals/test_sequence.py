@@ -53,6 +53,7 @@ SEQUENCES = {
     "getting out of bed, then stretching": ["a person gets out of bed", "a person stretches"],
     "first he jumps, then he speeds up": ["he jumps", "he speeds up"],
     "crouching down first, then jumping up": ["a person crouches down", "a person jumps up"],
+    "a person is directing traffic, then sits down": ["a person is directing traffic", "a person sits down"],
     # what the second part leaves out is said again
     "a person kicks with the right foot, then with the left": [
         "a person kicks with the right foot",
@@ -78,6 +79,8 @@ WHOLES = [
     "a person crouches and stays there",
     "a person squats once and stands back up",
     "walking and waving",
+    "a person standing, stretching the right arm out",
+    "a person is dancing, moving around a little",
     "a person is walking and waving",
     "a person waves with both hands",
     "a person jumps up and down",

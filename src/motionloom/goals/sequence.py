@@ -79,7 +79,10 @@ def split_actions(text: str) -> tuple[Part, ...]:
         said = clause if not own or number == 0 else PRONOUN.sub("", clause)
         own = own if said == clause else ""
         named = own or subject
-        rest = re.sub(r"^(?:is|are|was|were) (?=\w+ing\b)", "", said[len(own) :].strip())
+        rest = said[len(own) :].strip()
+        lasting = re.sub(r"^(?:is|are|was|were) (?=\w+ing\b)", "", rest)
+        if verb_of(lasting, "gerund"):
+            rest = lasting if lasting != rest or not own else finite(rest)
         if not named and mood_of(rest) == "gerund":
             named = "a person"
         parts += [_sentence(named, finite(item)) for item in _list(rest)]
@@ -205,7 +208,7 @@ def _list(clause: str) -> list[str]:
         return [clause]
     if len(items) > 2:
         return items
-    comma = not re.search(r"\band\b", joins[0], re.IGNORECASE)
+    comma = mood != "gerund" and not re.search(r"\band\b", joins[0], re.IGNORECASE)
     return items if comma or _follows(kind_of(items[0], mood), kind_of(items[1], mood)) else [clause]
 
 
