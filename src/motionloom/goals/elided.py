@@ -31,6 +31,8 @@ _STAYS = re.compile(
     r"|holds? (?:it|that|this|still|(?:the|this|that) po(?:se|sition))",
     re.IGNORECASE,
 )
+_WALKS = {"walk", "run", "jog", "go", "come", "step", "stroll", "march", "move", "take"}
+"""Who stays somewhere after these stands still, which is an action of its own."""
 _UP_AGAIN = re.compile(
     r"(?:get|come|go|rise)(?:es|s)? (?:right |straight )?(?:back )?(?:up|to (?:his|her|their|your) feet)(?: again)?",
     re.IGNORECASE,
@@ -69,9 +71,6 @@ def _ends(before: str, done: str) -> bool:
         return True
     first = verb_of(before.removeprefix(subject_of(before)).strip(), mood_of(before))
     return bool(_STAYS.fullmatch(done)) and first not in _WALKS
-
-
-_WALKS = {"walk", "run", "jog", "go", "come", "step", "stroll", "march", "move", "take"}
 
 
 def _repeated(before: str, part: str) -> str:

@@ -110,6 +110,7 @@ def verb_of(phrase: str, mood: str) -> str:
 
 
 def base_of(word: str) -> str:
+    """The base of a form of any mood; empty for a word that is none."""
     return next((forms[word] for forms in MOODS.values() if word in forms), "")
 
 
@@ -123,11 +124,13 @@ def finite(phrase: str, mood: str = "third") -> str:
 
 
 def kind_of(item: str, mood: str) -> str:
+    """The kind of the verb in the mood that an item begins with behind its subject."""
     rest = item[len(subject_of(item)) :].strip()
     return kind_of_verb(verb_of(rest, mood), rest.lower())
 
 
 def kind_of_verb(word: str, said: str) -> str:
+    """The kind of action that a verb names in what is ``said``: sitting down is a change, sitting a state."""
     base = base_of(word) or word
     changed = _CHANGED_BY.get(base)
     if changed and re.search(changed[1], said):
