@@ -12,7 +12,7 @@ import pytest
 
 from motionloom.data import build as building
 from motionloom.data.actions import ACTIONS, sentences
-from motionloom.data.build import _mirrored_texts, build, join_spans
+from motionloom.data.build import _mirrored_texts, _with_mirror, build, join_spans
 from motionloom.data.clips import Clip, Note, read_clip, write_clip
 from motionloom.data.derived import mixed_clips
 from motionloom.data.sets import Batches, load_set, read_clips
@@ -372,3 +372,15 @@ def test_a_turn_to_the_right_is_only_described_with_its_side() -> None:
     assert all("right" in text for text in mirrored)
     assert _mirrored_texts(Note(0, 90, note.kind, mirrored)) == note.texts
     assert _mirrored_texts(Note(0, 90, "human", ("he turns left",))) == ("he turns right",)
+
+
+def test_the_mirror_image_of_a_sway_is_not_shown() -> None:
+    """It begins to the other side, and the same words for both would mean standing still."""
+    features = hml.encode(hml.canonical(people.walking(1.0, 4.0)), heading="corrected")
+    notes = (
+        Note(0, len(features), "action:sway", ("a person sways",), (16, 56)),
+        Note(0, len(features), "walk"),
+    )
+    plain, mirrored = _with_mirror(Clip("posture_0", "cmu", "free", "train", "made", notes, features, "made"))
+    assert [note.kind for note in plain.notes] == ["action:sway", "walk"]
+    assert [note.kind for note in mirrored.notes] == ["walk"]

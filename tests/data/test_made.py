@@ -104,3 +104,17 @@ def test_an_arm_goes_up_as_often_as_the_words_say(name: str, times: int) -> None
     up = made[:, 21, 1] > made[:, 15, 1]
     assert np.count_nonzero(np.diff(up.astype(int)) == 1) == times
     assert not up[-1]
+
+
+def test_hands_rest_on_the_hips_of_somebody_who_bends_forward() -> None:
+    """A place seen from the shoulders would lie behind the thighs."""
+    body = people.standing(4.0)
+    lean = np.radians(35) * np.ones(len(body))
+    above = [3, 6, 9, *range(12, 22)]
+    offset = body[:, above] - body[:, :1]
+    body[:, above] = body[:, :1] + np.stack(
+        [offset[..., 0], np.cos(lean)[:, None] * offset[..., 1], np.sin(lean)[:, None] * offset[..., 1]], axis=-1
+    )
+    made = perform(body, GESTURES["hands on hips"], "", fps=20.0, begin=0.5, rng=np.random.default_rng(5))
+    waist = made[40:55, [1, 2]] + [0.0, 0.12, 0.0]
+    assert np.linalg.norm(made[40:55, [20, 21]] - waist, axis=-1).max() < 0.22

@@ -74,3 +74,11 @@ def test_who_crouches_stays_low_on_both_feet() -> None:
 def test_who_balances_stands_on_the_side_that_the_words_say() -> None:
     (p,) = made("balance with arms out")
     assert p[-60:, 7, 1].min() > p[-60:, 8, 1].max() + 0.12  # on the right leg
+
+
+@pytest.mark.parametrize(("action", "times"), [("one squat", 1), ("two squats", 2), ("three squats", 3)])
+def test_squats_are_as_many_as_their_words_say(action: str, times: int) -> None:
+    (p,) = made(action)
+    low = p[:, 0, 1] < p[0, 0, 1] - 0.25
+    assert np.count_nonzero(np.diff(low.astype(int)) == 1) == times
+    np.testing.assert_allclose(p[-1], p[0], atol=0.01)

@@ -128,3 +128,26 @@ def test_actions_are_drawn_evenly_and_captures_more_often_than_keyed_clips(tmp_p
         said, ["an animated person eats", "a person eats"]
     ).sum()
     assert abs(keyed - 0.4 / 9.4) < 0.03
+
+
+def said_of(folder: Path, note: Note) -> tuple[str, ...]:
+    """The sentences that the only item of a set is shown with."""
+    data = load_set(described(folder, note))
+    return tuple(data.texts[number] for number in data.items[0].texts)
+
+
+def test_a_strike_without_a_side_in_words_is_one_of_the_right_hand(tmp_path: Path) -> None:
+    """The average of a punch by either hand would be a guard."""
+    said = {
+        side: said_of(tmp_path / side, Note(0, 190, "action:made punch", (f"he punches with the {side} hand",)))
+        for side in ("left", "right")
+    }
+    assert len(said["left"]) > 5
+    assert all("left" in text for text in said["left"])
+    assert sum("right" not in text for text in said["right"]) > 5
+
+
+def test_a_kick_by_nobody_knows_which_foot_keeps_all_its_words(tmp_path: Path) -> None:
+    said = said_of(tmp_path / "set", Note(0, 190, "action:kick", ("she kicks",)))
+    assert "she kicks" in said
+    assert len(said) > 5

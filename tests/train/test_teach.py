@@ -12,6 +12,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import ric
 from motionloom.kinematics.ik import motion_from_positions
+from motionloom.nets.prior import Condition
 from motionloom.nets.text.known import known_sentences
 from motionloom.train import teach as module
 from motionloom.train.objectives import Conditioned
@@ -128,6 +129,28 @@ def test_a_step_depends_on_its_number_alone(prior: Prior, examples: list[Example
     assert first == again != other
 
 
+def test_near_pure_noise_other_known_sentences_are_kept(prior: Prior, examples: list[Example]) -> None:
+    """They take the place of those of the drawn motions, of which nothing is left there; never that of what is taught."""
+    drawn = [("a person stands", torch.zeros(100, 263) + prior.mean)] * 4
+    net = AdapterNet(prior.net, 2, given_rank=0, taught=True)
+    seen = Teaching(net, prior, examples, drawn, ["a person climbs", "a person crawls"], keep=0.5)
+    asked = []
+    plain = seen.words.condition
+
+    def remembered(texts: torch.Tensor, lengths: torch.Tensor) -> Condition:
+        asked.append(texts.tolist())
+        return plain(texts, lengths)
+
+    seen.words.condition = remembered
+    for step in range(12):
+        seen.loss(Conditioned(net), 3, step, 8)
+    others = set(seen.others)
+    assert not others & {number for row in asked for number in row[:4]}
+    kept = [number for row in asked for number in row[4:]]
+    assert others < set(kept)
+    assert 0.1 < np.mean([number in others for number in kept]) < 0.6
+
+
 @pytest.mark.parametrize("window", [60, 160])
 def test_windows_of_a_change_show_all_of_it_soon(window: int) -> None:
     """A change of 30 frames that is held: every window holds it whole, within 0.8 s of its beginning."""
@@ -167,7 +190,7 @@ def test_windows_of_what_is_not_repeated_begin_anywhere() -> None:
 
 
 def test_sentences_that_say_what_is_taught_are_not_kept_as_they_were(prior: Prior) -> None:
-    prompts = known_prompts(prior, ["a person turns left"], 0)
+    prompts = known_prompts(prior, ["a person turns left"], 0, 4)
     assert len(prompts) == 4
     assert "a person turns left" not in prompts
 
@@ -175,7 +198,7 @@ def test_sentences_that_say_what_is_taught_are_not_kept_as_they_were(prior: Prio
 def test_weights_that_know_nothing_else_cannot_keep_it(prior: Prior) -> None:
     only = replace(prior, known=known_sentences(["walks"], {}, prior.text))
     with pytest.raises(MotionloomError, match="know no other sentences"):
-        known_prompts(only, ["a person walks"], 0)
+        known_prompts(only, ["a person walks"], 0, 4)
 
 
 def test_captions_in_other_words() -> None:

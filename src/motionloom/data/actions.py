@@ -37,6 +37,7 @@ class Action:
     clips: str = r"(?!)"
     limb: Literal["", "hand", "foot"] = ""
     turns: bool = False
+    phase: bool = False
 
     def named_by(self, texts: Sequence[str]) -> bool:
         """True where at least half of the captions name this action."""

@@ -165,9 +165,16 @@ def _mirrored_texts(note: Note) -> tuple[str, ...]:
     return tuple(mirror_text(text) for text in note.texts)
 
 
+PHASED = {PREFIX + name for name, action in ACTIONS.items() if action.phase}
+
+
 def _with_mirror(clip: Clip) -> Iterator[Clip]:
     yield clip
-    notes = tuple(replace(n, kind=_OTHER_LABEL.get(n.kind, n.kind), texts=_mirrored_texts(n)) for n in clip.notes)
+    notes = tuple(
+        replace(n, kind=_OTHER_LABEL.get(n.kind, n.kind), texts=_mirrored_texts(n))
+        for n in clip.notes
+        if not (n.kind in PHASED and n.core)
+    )
     yield replace(clip, name="M" + clip.name, notes=notes, features=hml.mirror(clip.features))
 
 

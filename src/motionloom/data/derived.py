@@ -175,7 +175,7 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Cli
         body = hml.decode_positions(below.features[first : first + length].astype(np.float64))
         if where == "stand" and rng.random() < 0.7:
             body = lower_arms(body)
-        begin = float(rng.uniform(0.6, 0.9))
+        begin = float(rng.uniform(0.8, 1.0))
         needed = round(FPS * (begin + 1.5 * gesture.times))
         if needed > len(body):
             body = augment.held(body, 0, needed - len(body), fps=FPS, seed=seed * 100_003 + number)
@@ -244,12 +244,13 @@ def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[
             body = lower_arms(body)
         body = augment.held(body, 0, max(0, LOOPED - len(body)), fps=FPS, seed=seed * 100_003 + number)
         for kind, posture in enumerate(postures(body, rng)):
-            begin = float(rng.uniform(0.6, 1.0))
+            begin = float(rng.uniform(0.8, 1.0))
             frames = min(len(body), round(FPS * (begin + posture.seconds(kept=float(rng.uniform(1.5, 4.0))))))
             features = hml.encode(at_origin(_assumed(body[:frames], posture, begin, rng)), heading="corrected")
             action = ACTIONS[posture.action]
             texts = sentences(action, side=posture.side)
-            start, end = round(FPS * begin), min(round(FPS * (begin + posture.seconds(kept=0.5))), len(features))
+            shown = 2.0 if action.kind == "cycle" else posture.seconds(kept=0.5)
+            start, end = round(FPS * begin), min(round(FPS * (begin + shown)), len(features))
             whole = None if action.kind == "repeats" else (start, end)
             notes = (Note(0, len(features), PREFIX + action.name, texts, whole),)
             name = f"posture_{seed}_{number:03d}{kind}"

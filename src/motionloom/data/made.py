@@ -39,6 +39,8 @@ class Gesture:
     """So often the hands go to the place and back; 0: once, and as often as not they stay."""
     thrust: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the hand of ``side`` strikes from the place, fast and once. The other hand stays at its place."""
+    hips: bool = False
+    """The place is seen from the pelvis, not from between the shoulders."""
 
 
 def _read() -> dict[str, Gesture]:
@@ -102,7 +104,7 @@ def _move_arm(
     shoulder, elbow, wrist, outward = arm
     own = np.array([outward, 1.0, 1.0])
     angle = -ph.heading(body)[:, None]
-    middle = (body[:, 16] + body[:, 17]) / 2
+    middle = body[:, 0] if gesture.hips else (body[:, 16] + body[:, 17]) / 2
     local = (
         np.array(gesture.place) + shift + swing[:, None] * np.array(gesture.swing)
     ) * own  # shift: one, or by frame

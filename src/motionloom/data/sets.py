@@ -9,9 +9,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom.data.actions import ACTIONS, PREFIX, strike
+from motionloom.data.actions import ACTIONS, PREFIX, side_of, strike
 from motionloom.data.actions import rests as rests_of
 from motionloom.data.clips import MADE, STATES, Clip, Note, read_clip
+from motionloom.data.made import GESTURES
 from motionloom.data.sayings import sayings
 from motionloom.data.words import phrases, sentence
 from motionloom.errors import MotionloomError
@@ -50,7 +51,8 @@ FAVOUR: dict[str, float] = {
             2.5: (
                 "climb ladder", "start running", "walk and pick up", "made clap", "made arms out", "made arms up twice",
                 "raise arm", "made arm up", "kneel and rise", "bend over", "stairs", "fall", "leg raise", "side lunge",
-                "dance", "jump forward", "jump up", "cartwheel", "start walking", "made point",
+                "dance", "jump forward", "jump up", "cartwheel", "start walking", "made point", "one squat", "two squats",
+                "three squats",
             ),
             0.5: ("sword", "basketball", "laugh", "wash", "arm back", "rotate arm", "soccer", "carry", "drink"),
         }.items()
@@ -167,13 +169,26 @@ def _worded(
 ) -> tuple[int, ...]:
     """Numbers of a note's captions in ``texts``, which grows; ``wordings`` are those of the labels met so far."""
     if note.kind == "human" or note.kind.startswith(PREFIX):
-        return tuple(_number(texts, text) for text in (*note.texts, *sayings(note)))
+        return tuple(_number(texts, text) for text in _of_its_side(note, (*note.texts, *sayings(note))))
     if note.kind == "index":
         return tuple(dict.fromkeys(_number(texts, sentence(p, rng)) for p in note.texts for _ in range(3)))
     if note.kind not in wordings:
         made = {sentence(p, rng) for _ in range(WORDINGS) for p in [rng.choice(list(phrases(note.kind)))]}
         wordings[note.kind] = tuple(_number(texts, text) for text in (*sorted(made), *sayings(note)))
     return wordings[note.kind]
+
+
+def _of_its_side(note: Note, said: tuple[str, ...]) -> tuple[str, ...]:
+    """What is said of a strike or a gesture of one hand; of one by the left side only what names that side.
+
+    So "a person punches" means the right hand: the average of both would be a body that keeps its guard.
+    """
+    name = note.kind.removeprefix(PREFIX)
+    gesture = GESTURES.get(name.removeprefix(MADE))
+    one = gesture.hands == "one" or bool(gesture.thrust[2]) if gesture else name in ACTIONS and ACTIONS[name].limb
+    if not one or side_of(note.texts) != "left":
+        return said
+    return tuple(text for text in said if side_of([text]) == "left") or said
 
 
 def _when(
@@ -301,8 +316,8 @@ class Batches:
         return Batch(features, torch.tensor(lengths), torch.tensor(texts))
 
 
-BEFORE = 16
-"""Frames of a window before a change begins: people begin soon after they are told to."""
+BEFORE, ABOUT = 16, 2
+"""Frames of a window before a change begins (people begin soon after they are told to), give or take so many."""
 
 
 def _start(item: Item, length: int, rng: np.random.Generator) -> int:
@@ -317,7 +332,7 @@ def _start(item: Item, length: int, rng: np.random.Generator) -> int:
 def _starts(item: Item, length: int) -> tuple[int, int]:
     """Where a window of so many frames may begin, half-open: within the item, with its core inside.
 
-    The core begins at about the same time in every window (`BEFORE`, give or take four frames): were it anywhere, the
+    The core begins at about the same time in every window (`BEFORE`, give or take `ABOUT`): were it anywhere, the
     average over what a window may show would be a person who stays halfway, and a small network under much noise draws
     averages.
     """
@@ -326,7 +341,7 @@ def _starts(item: Item, length: int) -> tuple[int, int]:
         return low, high + 1
     first, end = item.core
     low, high = max(low, min(end - length, high)), min(high, max(first, low))
-    begin, last = max(low, min(first - BEFORE - 4, high)), min(high, max(first - BEFORE + 4, low))
+    begin, last = max(low, min(first - BEFORE - ABOUT, high)), min(high, max(first - BEFORE + ABOUT, low))
     return begin, max(begin, last) + 1
 
 

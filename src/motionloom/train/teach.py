@@ -34,6 +34,9 @@ WINDOWS, SHARES = (60, 100, 160, 196), (0.2, 0.4, 0.25, 0.15)
 """Frames of the windows that a step sees, and how often."""
 DRAWS, DRAWN_FRAMES, DRAWN_STEPS = 96, 100, 12
 """Motions that the prior draws of what it knows, their frames and the steps each takes."""
+OTHERS, FAR = 2000, 0.9
+"""Known sentences besides those of the drawn motions. Above this share of the levels, where hardly anything of a motion
+is left and it is decided what will be shown, one of these is kept instead of the motion's own."""
 KEEP = 0.5
 """Share of the rows that show what the prior drew."""
 KEEP_WEIGHT = 2.0
@@ -95,14 +98,15 @@ def teach(
     if not examples:
         raise MotionloomError("there is no clip; give at least one to learn from")
     captions = list(dict.fromkeys(text for example in examples for text in example.captions))
-    kept = known_prompts(prior, captions, lesson.seed)
+    known = known_prompts(prior, captions, lesson.seed, DRAWS + OTHERS)
+    kept, others = known[:DRAWS], known[DRAWS:]
     say(f"drawing {len(kept)} motions that are known already")
     drawn = sample_features(
         prior, kept, [DRAWN_FRAMES] * len(kept), seeds=[lesson.seed + i for i in range(len(kept))], steps=DRAWN_STEPS
     )  # fmt: skip
     torch.manual_seed(lesson.seed)
     net = AdapterNet(prior.net, lesson.rank, given_rank=0, taught=True)
-    objective = Teaching(net, prior, examples, list(zip(kept, drawn, strict=True)), keep=lesson.keep)
+    objective = Teaching(net, prior, examples, list(zip(kept, drawn, strict=True)), others, keep=lesson.keep)
     recipe = Recipe(
         name=lesson.name, steps=lesson.steps, batch=lesson.batch, rate=lesson.rate, seed=lesson.seed, warmup=40,
         cooldown=0.5, ema=0.99, decay=0.0, save_every=lesson.steps,
@@ -113,8 +117,8 @@ def teach(
     return _adapter(prior, examples, captions, lesson, average)
 
 
-def known_prompts(prior: Prior, captions: Sequence[str], seed: int) -> list[str]:
-    """`DRAWS` sentences that the prior knows and that do not say what ``captions`` say.
+def known_prompts(prior: Prior, captions: Sequence[str], seed: int, count: int) -> list[str]:
+    """``count`` sentences that the prior knows and that do not say what ``captions`` say; again where it knows fewer.
 
     Those that are likest to the captions come first: from them the new action must be told apart. The sentences are
     those of the prior's file, or of measured labels where it has none.
@@ -129,7 +133,7 @@ def known_prompts(prior: Prior, captions: Sequence[str], seed: int) -> list[str]
         raise MotionloomError("these weights know no other sentences than the captions; describe the clips otherwise")
     rest = rng.permutation(order[LIKE:])
     chosen = [*order[:LIKE], *rest.tolist()]
-    chosen = [chosen[i % len(chosen)] for i in range(DRAWS)]
+    chosen = [chosen[i % len(chosen)] for i in range(count)]
     return [f"a person {pool[i]}" for i in chosen]
 
 
@@ -150,6 +154,7 @@ class Teaching:
         prior: Prior,
         examples: Sequence[Example],
         drawn: Sequence[tuple[str, Tensor]],
+        others: Sequence[str] = (),
         *,
         keep: float,
     ) -> None:
@@ -162,9 +167,10 @@ class Teaching:
         self.begins = [_beginnings(e, shown.cpu().numpy()) for e, shown in zip(examples, self.shown)]
         self.drawn = torch.stack([(f.to(prior.mean) - prior.mean) / spread for _, f in drawn])
         texts = dict.fromkeys(text for e in examples for caption in e.captions for text in wordings(caption))
-        texts |= dict.fromkeys(prompt for prompt, _ in drawn)
+        texts |= dict.fromkeys([*(prompt for prompt, _ in drawn), *others])
         self.numbers = {text: number for number, text in enumerate(texts)}
         self.prompts = [self.numbers[prompt] for prompt, _ in drawn]
+        self.others = [self.numbers[prompt] for prompt in others]
         self.words = WordBank(prior.text, tuple(texts), progress=lambda line: None)
         scale = torch.ones(len(prior.mean))
         for name, block in LAYOUT.items():
@@ -181,6 +187,9 @@ class Teaching:
         even = torch.rand(rows, generator=generator, dtype=torch.float64)
         level = (self.schedule.steps * (1 - even**2)).ceil().long().clamp(1, self.schedule.steps)  # as samplers go
         noise = torch.randn(clean.shape, generator=generator).to(clean)
+        for row in range(rows - kept, rows if self.others else 0):
+            if level[row] > FAR * self.schedule.steps:
+                texts[row] = int(rng.choice(self.others))
         speaks = torch.ones(rows, dtype=torch.bool)
         speaks[rows - kept :] = torch.rand(kept, generator=generator) >= SILENT
         cond = self.words.condition(torch.tensor(texts), torch.tensor(lengths)).choose(speaks)
