@@ -42,6 +42,8 @@ from motionloom.weights.prior import Prior
 WORDS = ("walk forward", "walk backward", "walk sideways", "run", "jog", "turn left", "turn right", "walk in a circle")
 """The locomotion checks of the obedience suite; a circle has 4 of its 8 seconds and must be half as far round."""
 SECONDS = 4.0
+SETTLED = 0.5
+"""Seconds behind a word after which it is judged once more: what somebody who ran did before does not count there."""
 NEAR = 20
 """Frames behind a command that count as its change."""
 
@@ -59,6 +61,9 @@ def words(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
     for kind, sessions in found.items():
         result[kind] = {
             "obeyed": {name: sum(_obeyed(name, order, places) for order, places in sessions) for name in WORDS},
+            "obeyed_settled": {
+                name: sum(_obeyed(name, order, places, SETTLED) for order, places in sessions) for name in WORDS
+            },
             "slide_mm_per_frame": statistics.mean(slide(places) for _, places in sessions),
             "planted_slide_mm_per_frame": statistics.mean(_planted_slide(places) for _, places in sessions),
             "jerk_m_per_frame3": mean_jerk(np.stack([places for _, places in sessions])),
@@ -83,13 +88,14 @@ def _said(prior: Prior, order: list[str], seed: int) -> np.ndarray:
     return motion_of(frames, FPS).positions()
 
 
-def _obeyed(name: str, order: list[str], places: np.ndarray) -> bool:
-    count = round(SECONDS * FPS)
+def _obeyed(name: str, order: list[str], places: np.ndarray, settled: float = 0.0) -> bool:
+    """Whether a word is obeyed in its seconds but the first ``settled`` ones; a circle is judged by its pace."""
+    count, skipped = round(SECONDS * FPS), round(settled * FPS)
     begin = order.index(name) * count
     asked = check(name)
-    measured = asked.measured(places[begin : begin + count], FPS)
+    measured = asked.measured(places[begin + skipped : begin + count], FPS)
     if name == "walk in a circle":
-        measured = {**measured, "winding": measured["winding"] * asked.seconds / SECONDS}
+        measured = {**measured, "winding": measured["winding"] * asked.seconds / (SECONDS - settled)}
     return asked.obeyed(measured)
 
 

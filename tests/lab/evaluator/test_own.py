@@ -188,3 +188,12 @@ def test_the_shipped_evaluator_knows_made_up_people() -> None:
     texts, motions = evaluator.texts([Caption(text) for text in said]), evaluator.motions(shown)
     assert np.linalg.norm(texts[:, None] - motions[None], axis=-1).argmin(1).tolist() == [0, 1, 2]
     assert np.linalg.norm(motions, axis=1) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_turns_are_measured_and_not_named_by_captions() -> None:
+    """Actions that name a side have no wordings of their own."""
+    shown = features(people.walking(1.0, 5.0))
+    notes = (Note(0, 80, "action:walk turn right", ("she turns right",)), Note(0, 60, "turn left"), Note(0, 60, "walk"))
+    held = own.held_out([Clip("one", "cmu", "free", "val", "plain", notes, shown)])
+    assert len(held.turns) == 1
+    assert "left" in held.turns[0][1]

@@ -15,7 +15,7 @@ import numpy as np
 
 from motionloom.data.clips import Clip
 from motionloom.data.sets import read_clips
-from motionloom.data.words import mirror_text, phrases
+from motionloom.data.words import LABELS, mirror_text
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS
@@ -123,8 +123,8 @@ def held_out(clips: Sequence[Clip]) -> Held:
             if note.kind == "human" and len(shown) >= SHORTEST:
                 captioned.append(shown)
                 captions.append(note.texts)
-            elif re.search(r"left|right", note.kind) and "+" not in note.kind:
-                named = [said for said in phrases(note.kind) if mirror_text(said) != said]
+            elif note.kind in LABELS and re.search(r"left|right", note.kind):
+                named = [said for said in LABELS[note.kind] if mirror_text(said) != said]
                 turns.append((shown[: 2 * WINDOW], f"a person {named[len(turns) % len(named)]}"))
         for start in range(0, len(clip.features), WINDOW):
             if len(part := clip.features[start : start + WINDOW]) >= 2 * SHORTEST:
