@@ -88,7 +88,7 @@ pictures: $(VENV)/.runtime  ## draw the README's pictures anew, with the shipped
 measure: $(VENV)/.runtime  ## measure the shipped weights anew (DATA=built set); fills README, docs/results.md, benchmarks/
 	rm -rf benchmarks/obedience benchmarks/everyday benchmarks/realism benchmarks/realism_finished
 	$(BIN)/motionloom evaluate obedience --out benchmarks/obedience
-	$(BIN)/motionloom evaluate obedience --set everyday --out benchmarks/everyday
+	$(BIN)/motionloom evaluate obedience --set everyday --paraphrases --out benchmarks/everyday
 	$(BIN)/motionloom evaluate obedience --set everyday --seed 1 --seeds 1 --sheet docs/pictures/everyday.png --force
 	$(if $(DATA),$(BIN)/motionloom evaluate checks --data $(DATA) --out benchmarks/everyday_checks)
 	$(BIN)/motionloom evaluate realism $(if $(DATA),--data $(DATA)) --out benchmarks/realism

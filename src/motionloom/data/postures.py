@@ -95,7 +95,7 @@ def postures(body: Array, rng: np.random.Generator) -> Iterator[Posture]:
     yield Posture("crouch", (crouch,))
     squat = (replace(crouch, seconds=0.85 * pace, stay=some(0.0, 0.15)), Pose(0.8 * pace, stay=0.15))
     for times, name in enumerate(("one squat", "two squats", "three squats"), start=1):
-        yield Posture(name, (squat * times)[:-1] + (replace(squat[1], stay=LONG),))
+        yield Posture(name, (*(squat * times)[:-1], replace(squat[1], stay=LONG)))
     foot = ((0.0, some(0.2, 0.36), some(0.0, 0.15)), (0.0, 0.0, 0.0))
     lifted = Pose(0.8 * pace, (-0.07, 0.0, 0.0), foot, stay=LONG)
     yield Posture("balance with arms out", (lifted,), side="right", arms_out=True)

@@ -51,8 +51,8 @@ FAVOUR: dict[str, float] = {
             2.5: (
                 "climb ladder", "start running", "walk and pick up", "made clap", "made arms out", "made arms up twice",
                 "raise arm", "made arm up", "kneel and rise", "bend over", "stairs", "fall", "leg raise", "side lunge",
-                "dance", "jump forward", "jump up", "cartwheel", "start walking", "made point", "one squat", "two squats",
-                "three squats",
+                "dance", "jump forward", "jump up", "cartwheel", "start walking", "made point", "one squat",
+                "two squats", "three squats",
             ),
             0.5: ("sword", "basketball", "laugh", "wash", "arm back", "rotate arm", "soccer", "carry", "drink"),
         }.items()

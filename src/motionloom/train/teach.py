@@ -6,6 +6,7 @@ changed network's estimate differs from the unchanged one's (learning without fo
 preservation, Ruiz et al. 2023). Since nothing is taught without words, guidance strengthens what was taught.
 """
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from tempfile import TemporaryDirectory
@@ -37,6 +38,8 @@ DRAWS, DRAWN_FRAMES, DRAWN_STEPS = 96, 100, 12
 OTHERS, FAR = 2000, 0.9
 """Known sentences besides those of the drawn motions. Above this share of the levels, where hardly anything of a motion
 is left and it is decided what will be shown, one of these is kept instead of the motion's own."""
+UNLIKE = 0.6
+"""Cosine under which they must be to what is taught, so that other words for it may change as well."""
 KEEP = 0.5
 """Share of the rows that show what the prior drew."""
 KEEP_WEIGHT = 2.0
@@ -56,6 +59,8 @@ BEFORE = 16
 DISPLACEMENT = 0.5
 """Weight of `displacement_error`, which keeps planted feet in their places."""
 
+_WHOLE = re.compile(r"(an?|the|he|she|they|my|our|his|her|some\w*|[a-z]+ing)\b")
+"""How a known sentence begins that needs no subject before it."""
 Say = Callable[[str], None]
 
 
@@ -98,8 +103,7 @@ def teach(
     if not examples:
         raise MotionloomError("there is no clip; give at least one to learn from")
     captions = list(dict.fromkeys(text for example in examples for text in example.captions))
-    known = known_prompts(prior, captions, lesson.seed, DRAWS + OTHERS)
-    kept, others = known[:DRAWS], known[DRAWS:]
+    kept, others = known_prompts(prior, captions, lesson.seed)
     say(f"drawing {len(kept)} motions that are known already")
     drawn = sample_features(
         prior, kept, [DRAWN_FRAMES] * len(kept), seeds=[lesson.seed + i for i in range(len(kept))], steps=DRAWN_STEPS
@@ -117,11 +121,12 @@ def teach(
     return _adapter(prior, examples, captions, lesson, average)
 
 
-def known_prompts(prior: Prior, captions: Sequence[str], seed: int, count: int) -> list[str]:
-    """``count`` sentences that the prior knows and that do not say what ``captions`` say; again where it knows fewer.
+def known_prompts(prior: Prior, captions: Sequence[str], seed: int) -> tuple[list[str], list[str]]:
+    """`DRAWS` sentences that the prior knows and that do not say what ``captions`` say; up to `OTHERS` further ones.
 
-    Those that are likest to the captions come first: from them the new action must be told apart. The sentences are
-    those of the prior's file, or of measured labels where it has none.
+    Of the former those that are likest to the captions come first: from them the new action must be told apart. The
+    latter are unlike the captions. The sentences are those of the prior's file, or of measured labels where it has
+    none.
     """
     rng = np.random.default_rng((seed, 17))
     pool = list(prior.known.sentences) if prior.known else [phrase for said in LABELS.values() for phrase in said]
@@ -131,10 +136,12 @@ def known_prompts(prior: Prior, captions: Sequence[str], seed: int, count: int) 
     order = [int(i) for i in like.argsort(descending=True, stable=True) if like[i] < SAME]
     if not order:
         raise MotionloomError("these weights know no other sentences than the captions; describe the clips otherwise")
-    rest = rng.permutation(order[LIKE:])
-    chosen = [*order[:LIKE], *rest.tolist()]
-    chosen = [chosen[i % len(chosen)] for i in range(count)]
-    return [f"a person {pool[i]}" for i in chosen]
+    rest = rng.permutation(order[LIKE:]).tolist()
+    chosen = [*order[:LIKE], *rest]
+    chosen = [chosen[i % len(chosen)] for i in range(DRAWS)]
+    others = [i for i in rest if like[i] < UNLIKE][:OTHERS]
+    said = [text if _WHOLE.match(text) else f"a person {text}" for text in pool]
+    return [said[i] for i in chosen], [said[i] for i in others]
 
 
 def wordings(caption: str) -> tuple[str, ...]:
