@@ -101,7 +101,7 @@ def test_every_window_of_a_change_holds_the_change(tmp_path: Path) -> None:
     batches = Batches(load_set(described(tmp_path / "set", note)), windows=(48,), shares=(1.0,))
     item = batches.data.items[0]
     low, high = _starts(item, 48)
-    assert (low, high) == (90 - 18, 90 - 16 + 4 + 1)  # 16 frames before it, give or take four; 18 are free
+    assert (low, high) == (90 - 18, 90 - 16 + 2 + 1)  # 16 frames before it, give or take two; 18 are free
     marked = replace(batches.data, features=torch.arange(190.0)[:, None].expand(-1, 263))
     drawn = Batches(marked, windows=(48,), shares=(1.0,)).draw(0, 3, 400).features
     assert set(drawn[:, 0, 0].int().tolist()) == set(range(low, high))
