@@ -156,7 +156,8 @@ def test_what_is_unknown_is_remarked_on(knowing: str, capsys: pytest.CaptureFixt
     """The random encoder finds everything near, so what counts as near is set between two sentences."""
     from motionloom.nets.text import known
 
-    monkeypatch.setattr(known, "NEAR", 0.9999)
+    monkeypatch.setattr(known, "NEAR", 2.0)
+    monkeypatch.setattr(known, "SAME", 0.9999)
     line = ["--weights", knowing, "--steps", "1", "--seconds", "1", "--json"]
     assert main(["generate", "a person walks", *line]) == 0
     said = capsys.readouterr()

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
+from motionloom.lab.metrics.obedience import CHECKS as BASIC
 from motionloom.nets.text.known import (
     Known,
     bare,
@@ -19,6 +20,7 @@ from motionloom.nets.text.known import (
     with_sentences,
 )
 from motionloom.nets.text.protocol import TextEmbedding
+from motionloom.weights.prior import Prior
 
 
 class Letters:
@@ -82,12 +84,40 @@ def test_the_nearest_sentences_come_first_and_far_ones_get_a_remark() -> None:
     assert far.remark().startswith("these weights have seen nothing like 'hunkered'; nearest: '")
 
 
+def test_one_sentence_with_the_same_noun_makes_no_prompt_known() -> None:
+    """The mean over the nearest eight decides, unless one says nearly the same."""
+    said, asked = torch.eye(9)[1:], torch.zeros(1, 9)
+    asked[0, :2] = torch.tensor([0.7, 0.7])
+
+    class Fixed(Letters):
+        def encode(self, texts: Any) -> TextEmbedding:
+            return TextEmbedding(asked[:, None], torch.ones(1, 1, dtype=torch.bool), asked)
+
+    def found(known: Known) -> bool:
+        return nearest(known, ["plays golf"], Fixed())[0].near  # type: ignore[arg-type]
+
+    names = tuple(f"sentence {number}" for number in range(8))
+    assert not found(Known(names, said, {}))  # 0.7 to one, 0 to seven
+    assert found(Known(names, said[:1].expand(8, 9), {}))  # 0.7 to all
+    assert found(Known(names, torch.cat([asked / asked.norm(), said[1:]]), {}))  # the same as one
+
+
 def test_more_sentences_make_a_prompt_known() -> None:
     known = known_sentences(["walks"], {"walk": 3.0}, Letters())  # type: ignore[arg-type]
     more = with_sentences(known, ["a zombie hobbles"], Letters())  # type: ignore[arg-type]
     assert not nearest(known, ["a zombie hobbles"], Letters())[0].near  # type: ignore[arg-type]
     assert nearest(more, ["a zombie hobbles"], Letters())[0].similarity == pytest.approx(1, abs=1e-6)  # type: ignore[arg-type]
     assert more.seconds == {"walk": 3.0}
+
+
+def test_the_weights_that_ship_know_everyday_actions_and_no_golf() -> None:
+    """Of each kind most: docs/words.md has the shares."""
+    prior = Prior.load("default")
+    assert prior.known is not None
+    unknown = ["a man plays golf", "a woman rides a bicycle", "she brushes her teeth", "he drives a car"]
+    assert not any(found.near for found in nearest(prior.known, unknown, prior.text))
+    prompts = [check.prompt for check in BASIC]
+    assert sum(found.near for found in nearest(prior.known, prompts, prior.text)) >= 0.9 * len(prompts)
 
 
 def table() -> Known:

@@ -16,8 +16,9 @@ from motionloom.errors import MotionloomError
 from motionloom.nets.text.protocol import TextEncoder
 from motionloom.nets.text.quantise import dequantise, quantise
 
-NEAR = 0.6
-"""Cosine of two vectors from which on a sentence counts as near to another (figures: docs/words.md)."""
+SAME, NEAR, AROUND = 0.75, 0.46, 8
+"""A prompt is near to what was learned where the cosine to one sentence is at least `SAME`, or the mean over its
+nearest `AROUND` sentences at least `NEAR`: one alone may share no more than a noun with it (figures: docs/words.md)."""
 MOST_SENTENCES = 1500
 MAX_SENTENCES, MAX_CHARACTERS, MAX_ACTIONS = 8192, 1000, 8192
 """What is read from a file at most."""
@@ -52,11 +53,13 @@ class Nearest:
     sentences: tuple[str, ...]
     similarity: float
     """Cosine of the first of them."""
+    around: float
+    """Mean cosine of the nearest `AROUND` sentences, or of all where there are fewer."""
 
     @property
     def near(self) -> bool:
         """Whether anything like the prompt was learned."""
-        return self.similarity >= NEAR
+        return self.similarity >= SAME or self.around >= NEAR
 
     def remark(self) -> str:
         """One line for somebody whose prompt is not near to anything."""
@@ -99,10 +102,10 @@ def nearest(known: Known, prompts: Sequence[str], encoder: TextEncoder, *, count
     if not prompts:
         return []
     asked = torch.nn.functional.normalize(encoder.encode([bare(p) for p in prompts]).pooled.float().cpu(), dim=1)
-    similar, places = (asked @ known.vectors.T).topk(min(count, len(known.sentences)), dim=1)
+    similar, places = (asked @ known.vectors.T).sort(dim=1, descending=True)
     return [
-        Nearest(prompt, tuple(known.sentences[i] for i in row), float(values[0]))
-        for prompt, row, values in zip(prompts, places.tolist(), similar, strict=True)
+        Nearest(prompt, tuple(known.sentences[i] for i in row), float(values[0]), float(values[:AROUND].mean()))
+        for prompt, row, values in zip(prompts, places[:, :count].tolist(), similar, strict=True)
     ]
 
 

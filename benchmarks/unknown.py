@@ -1,0 +1,58 @@
+"""How often a prompt is called unknown: prompts of actions that are in the data, and of actions that are not.
+
+    python benchmarks/unknown.py SET [--weights default]
+
+SET is the built set whose held-out captions are asked too. The table is that of docs/words.md.
+"""
+
+import argparse
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+from motionloom.data.sets import read_clips
+from motionloom.goals.sequence import split_actions
+from motionloom.lab.metrics.everyday.sets import EVERYDAY, in_words
+from motionloom.nets.text.known import nearest
+from motionloom.weights.prior import Prior
+
+HERE = Path(__file__).parent
+
+
+def parts(prompts: Sequence[str]) -> list[str]:
+    """The prompts as they are drawn and looked up: one action after the other."""
+    return [part.text for prompt in prompts for part in split_actions(prompt)]
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("set")
+    parser.add_argument("--weights", default="default")
+    arguments = parser.parse_args()
+    prior = Prior.load(arguments.weights)
+    if prior.known is None:
+        raise SystemExit(f"{arguments.weights} has no table of what it knows")
+    unknown = tomllib.loads((HERE / "unknown.toml").read_text(encoding="utf-8"))
+    held = [
+        text for clip in read_clips(arguments.set, splits=("val", "test")) for note in clip.notes
+        if note.kind == "human" for text in note.texts
+    ]  # fmt: skip
+    asked = {
+        "captions of clips held out": list(dict.fromkeys(held)),
+        "everyday prompts": parts([check.prompt for check in EVERYDAY]),
+        "the same in other words": parts([check.paraphrases[0] for check in EVERYDAY]),
+        "the same in words nobody looked at": parts(
+            [check.prompt for check in in_words(EVERYDAY, HERE / "everyday_unseen.toml")]
+        ),
+        "actions that are not in the data": unknown["chosen"],
+        "others that are not": unknown["fresh"],
+    }
+    print("| sentences | called unknown |\n|---|---|")
+    for name, prompts in asked.items():
+        found = nearest(prior.known, prompts, prior.text)
+        print(f"| {len(prompts)} {name} | {sum(not one.near for one in found) / len(found):.1%} |")
+
+
+if __name__ == "__main__":
+    main()
