@@ -19,6 +19,7 @@ from motionloom.weights.prior import Prior, save_prior
 from tests.cli.said import complaint
 from tests.kinematics import people
 from tests.nets import tiny
+from tests.server.serving import running
 from tests.tasks.test_edit import person
 
 
@@ -126,6 +127,24 @@ def test_every_command_that_draws_takes_adapters(knowing: str, zombie: str) -> N
     half = drawn("compose", "t.yaml", "--weights", knowing)
     whole = drawn("compose", "a person walks", "--seconds", "2", "--weights", knowing, "--adapter", f"{zombie}:0.5")
     assert np.abs(half - whole).max() < 1e-3
+
+
+def test_the_server_draws_with_adapters_as_generate_does(knowing: str, zombie: str) -> None:
+    pytest.importorskip("uvicorn", reason="needs the extra 'studio': pip install 'motionloom[studio]'")
+    line = ["--weights", knowing, "--adapter", zombie]
+    with running(Path("project"), *line) as server:
+        job = server.draw(task="generate", prompt="a person walks", seconds=2.0, seed=0, steps=2)
+        Path("served.npz").write_bytes(server.ask("GET", f"/motions/{job['results'][0]['id']}.npz")[2])
+    changed = drawn("generate", "a person walks", "--seconds", "2", *line)
+    assert np.abs(io.load("served.npz").positions() - changed).max() < 1e-3
+    assert np.abs(changed - drawn("generate", "a person walks", "--seconds", "2", "--weights", knowing)).max() > 2e-3
+
+
+@pytest.mark.parametrize("command", ["serve", "studio", "mcp"])
+def test_servers_refuse_adapters_that_are_not_there(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--adapter", "none.safetensors:0.5"]) == 2
+    assert "no adapter none.safetensors" in complaint(capsys)
+    assert not Path("motionloom-project").exists()
 
 
 def test_wrong_adapters_are_one_sentence(knowing: str, weights: str, zombie: str, capsys) -> None:

@@ -4,7 +4,8 @@ import argparse
 import os
 from pathlib import Path
 
-from motionloom.cli.sampling import fail
+from motionloom.cli.sampling import add_adapters, fail
+from motionloom.goals.adapters import Applied, parse_adapter
 
 PROJECT = Path("motionloom-project")
 
@@ -57,6 +58,7 @@ def _project(parser: argparse.ArgumentParser) -> None:
 def _model(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="the prior (default: default)")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
+    add_adapters(parser)
 
 
 def _threads(parser: argparse.ArgumentParser, default: str) -> None:
@@ -68,6 +70,7 @@ def run_serve(arguments: argparse.Namespace) -> None:
     if not 0 <= arguments.port <= 65535:
         fail(f"--port must be 0 to 65535; got {arguments.port}")
     _check_threads(arguments)
+    adapters = _adapters(arguments)
     try:
         from motionloom.server.serving import Options, serve
     except ModuleNotFoundError as error:
@@ -78,7 +81,7 @@ def run_serve(arguments: argparse.Namespace) -> None:
     serve(
         Options(
             arguments.project, arguments.host, arguments.port, arguments.token, tuple(arguments.allow_host),
-            tuple(arguments.allow_origin), arguments.weights, arguments.device, arguments.show,
+            tuple(arguments.allow_origin), arguments.weights, arguments.device, adapters, arguments.show,
         )
     )  # fmt: skip
 
@@ -86,10 +89,20 @@ def run_serve(arguments: argparse.Namespace) -> None:
 def run_mcp(arguments: argparse.Namespace) -> None:
     """``motionloom mcp``."""
     _check_threads(arguments)
+    adapters = _adapters(arguments)
     from motionloom.server.assistant import run
 
     _set_threads(arguments)
-    run(arguments.project, weights=arguments.weights, device=arguments.device)
+    run(arguments.project, weights=arguments.weights, device=arguments.device, adapters=adapters)
+
+
+def _adapters(arguments: argparse.Namespace) -> tuple[Applied, ...]:
+    """Those of the line; a file that is not there is told before anything is started."""
+    adapters = tuple(parse_adapter(word) for word in arguments.adapter)
+    for path, _ in adapters:
+        if not path.is_file():
+            fail(f"there is no adapter {path}; 'motionloom teach ... --out FILE' makes one")
+    return adapters
 
 
 def _check_threads(arguments: argparse.Namespace) -> None:

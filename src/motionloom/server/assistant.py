@@ -4,12 +4,14 @@ Needs the extra ``mcp``. Nothing but the protocol may be written to standard out
 """
 
 import os
+from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from motionloom.errors import MotionloomError
+from motionloom.goals.adapters import Applied
 from motionloom.server.asking import read_request
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project
@@ -101,7 +103,7 @@ async def _said(call: Any) -> Any:
     raise import_module("mcp.server.mcpserver.exceptions").ToolError(sentence)
 
 
-def run(folder: Path, *, weights: str = "default", device: str = "cpu") -> None:
+def run(folder: Path, *, weights: str = "default", device: str = "cpu", adapters: Sequence[Applied] = ()) -> None:
     """Serve the tools until standard input ends; raises MotionloomError where the extra is not installed."""
     try:
         server = import_module("mcp.server.mcpserver").MCPServer(
@@ -110,7 +112,7 @@ def run(folder: Path, *, weights: str = "default", device: str = "cpu") -> None:
     except ModuleNotFoundError as error:
         raise MotionloomError(f"MCP needs {error.name}: install it with pip install 'motionloom[mcp]'") from None
     limits = Limits()
-    worker = Worker(Project(folder, limits), limits, weights=weights, device=device)
+    worker = Worker(Project(folder, limits), limits, weights=weights, device=device, adapters=adapters)
     tools = Assistant(worker.project, worker)
     for tool in (tools.generate_motion, tools.compose, tools.export):
         server.tool()(tool)

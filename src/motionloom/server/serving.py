@@ -16,6 +16,7 @@ from starlette.routing import WebSocketRoute
 from starlette.websockets import WebSocket
 
 from motionloom.errors import MotionloomError
+from motionloom.goals.adapters import Applied
 from motionloom.server import page
 from motionloom.server.app import build
 from motionloom.server.guard import door, is_loopback
@@ -43,6 +44,8 @@ class Options:
     origins: Sequence[str] = ()
     weights: str = "default"
     device: str = "cpu"
+    adapters: Sequence[Applied] = ()
+    """What was taught from clips, merged into the prior."""
     show: bool = False
     """Open the page in a browser."""
 
@@ -55,7 +58,9 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
     if token is not None and (len(token) < 8 or not token.isascii() or not token.isprintable()):
         raise MotionloomError("a token has at least 8 printable letters or digits; leave --token out to get one made")
     project = Project(options.project, limits or Limits())
-    worker = Worker(project, limits or Limits(), weights=options.weights, device=options.device)
+    worker = Worker(
+        project, limits or Limits(), weights=options.weights, device=options.device, adapters=options.adapters
+    )
     known = door(options.host, token, hosts=options.hosts, origins=options.origins, page=page.files())
     live = _Live(worker)
     app = build(project, worker, known, more=[WebSocketRoute("/live", live.answer)])

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from motionloom.errors import MotionloomError
+from motionloom.goals.adapters import Applied
 from motionloom.server.jobs import Job
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project
@@ -30,9 +31,17 @@ class _Cancelled(Exception):
 class Worker:
     """Jobs by their ids, and the thread that draws them."""
 
-    def __init__(self, project: Project, limits: Limits, *, weights: str = "default", device: str = "cpu") -> None:
+    def __init__(
+        self,
+        project: Project,
+        limits: Limits,
+        *,
+        weights: str = "default",
+        device: str = "cpu",
+        adapters: Sequence[Applied] = (),
+    ) -> None:
         self.project, self.limits, self.queue = project, limits, Queue(limits)
-        self.weights, self.device = weights, device
+        self.weights, self.device, self.adapters = weights, device, adapters
         self.models: Models | None = None
         self.problem: str | None = None
         """Why nothing can be drawn."""
@@ -121,10 +130,11 @@ class Worker:
 
     def _load(self) -> "Models":
         from motionloom.server.drawing import Models
+        from motionloom.tasks.adapting import adapt
         from motionloom.tasks.text import generate
         from motionloom.weights.prior import Prior
 
-        prior = Prior.load(self.weights, device=self.device)
+        prior = adapt(Prior.load(self.weights, device=self.device), self.adapters)
         generate(prior, "a person walks", seconds=1.0, steps=2)  # what the first call makes ready, no client waits for
         return Models(prior)
 
