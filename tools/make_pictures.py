@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 from PIL import Image, ImageDraw
 
 from motionloom.cli import main
@@ -71,19 +70,13 @@ def shrunk(sheet: Path, out: Path) -> Path:
 
 
 def controlled(folder: Path, work: Path) -> list[Path]:
-    """Motions of `motionloom control` with what was asked of them in yellow: a path from above, a letter in the air."""
-    eight, letter = (GOALS / f"{name}.json" for name in ("figure_eight", "letter"))
+    """A motion of `motionloom control` from above, with the path that was asked of it in yellow."""
+    eight = GOALS / "figure_eight.json"
     motion = control("a person walks", eight, 14.0, work)
     goal = read_goal(eight, frames=len(motion), folder=GOALS)
     middle = motion.root.mean(axis=0) * [1, 0, 1] + [0, 0.62, 0]
     above = draw.Camera(middle, (960, 430), 4.3, 0.0, 0.6)
-    path = strobe(motion, above, range(0, len(motion), 20), asked=goal, joint="pelvis", to=folder / "path.png")
-
-    motion = control("a person draws with the right hand", letter, 5.0, work)
-    goal = read_goal(letter, frames=len(motion), folder=GOALS)
-    front = draw.Camera(np.array([0.0, 0.95, 0.0]), (360, 430), 2.0, -0.2, 0.1)
-    written = strobe(motion, front, [60], asked=goal, joint="right_wrist", to=folder / "letter.png")
-    return [path, written]
+    return [strobe(motion, above, range(0, len(motion), 20), asked=goal, to=folder / "path.png")]
 
 
 def control(prompt: str, goal: Path, seconds: float, work: Path) -> Motion:
@@ -93,30 +86,19 @@ def control(prompt: str, goal: Path, seconds: float, work: Path) -> Motion:
     return load(out)
 
 
-def strobe(motion: Motion, camera: draw.Camera, frames: Sequence[int], *, asked: Goal, joint: str, to: Path) -> Path:
-    """One picture of a motion in several frames, and of a joint's way: asked in yellow, made on top of it."""
-    shape, index, ground = figure(motion), motion.skeleton.index(joint), joint == "pelvis"
-    flat = np.array([1.0, 0.0, 1.0]) if ground else np.ones(3)
-    wanted = asked.asked[:, index].any(axis=-1)
+def strobe(motion: Motion, camera: draw.Camera, frames: Sequence[int], *, asked: Goal, to: Path) -> Path:
+    """One picture of a motion in several frames on its way along the floor: asked in yellow, made on top of it."""
+    shape = figure(motion)
+    wanted = asked.asked[:, 0].any(axis=-1)
     picture = Image.new("RGB", (camera.size[0] * draw.SMOOTH, camera.size[1] * draw.SMOOTH), draw.PAPER)
     pen = ImageDraw.Draw(picture)
-
-    def way(places: np.ndarray, colour: draw.Colour, width: float) -> None:
-        draw.paint_path(pen, camera, places[wanted, index] * flat, colour, width)
-
-    def bodies() -> None:
-        for frame in sorted(frames, key=lambda frame: -float(camera.see(shape.path[frame])[1])):
-            draw.paint_body(pen, camera, shape, frame)
-
     draw.paint_floor(pen, camera, shape.floor)
     for frame in frames:
         draw.paint_shadow(picture, camera, shape, frame)
-    if not ground:  # what lies on the ground is under the feet, what is in the air before the body
-        bodies()
-    way(asked.positions, ASKED, 0.07 if ground else 0.045)
-    way(motion.positions(), draw.PATH, 0.018)
-    if ground:
-        bodies()
+    for places, colour, width in ((asked.positions, ASKED, 0.07), (motion.positions(), draw.PATH, 0.018)):
+        draw.paint_path(pen, camera, places[wanted, 0] * [1.0, 0.0, 1.0], colour, width)
+    for frame in sorted(frames, key=lambda frame: -float(camera.see(shape.path[frame])[1])):
+        draw.paint_body(pen, camera, shape, frame)
     with atomic_path(to) as temporary:
         picture.reduce(draw.SMOOTH).save(temporary, format="PNG")
     return to
