@@ -181,5 +181,12 @@ def test_a_seat_belongs_where_somebody_sits() -> None:
 
 
 def test_who_stands_walks_squats_or_sits_on_the_floor_needs_no_seat() -> None:
-    for p in (standing(), walking(1.2), sitting(0.5, ahead=0.0), sitting(0.12), sitting(0.54, seconds=0.3)):
+    for p in (
+        standing(),
+        walking(1.2),
+        sitting(0.5, ahead=0.0),
+        sitting(0.12),
+        sitting(0.33),
+        sitting(0.54, seconds=0.8),
+    ):
         assert gestures.seats(p, FPS) == []

@@ -138,17 +138,18 @@ FLESH = 0.09
 """Metres from a hip joint down to what one sits on."""
 
 
-def seats(positions: np.ndarray, fps: float, *, shortest: float = 0.5) -> list[Seat]:
+def seats(positions: np.ndarray, fps: float, *, shortest: float = 1.0) -> list[Seat]:
     """Where somebody sits for at least ``shortest`` seconds: still, upright, low, with the feet ahead and on the floor.
 
-    Who sits on the floor itself needs no seat and has none here; who squats, kneels or crouches has the feet below.
+    Who sits on the floor itself needs no seat and has none here; who kneels has the feet below. Who crouches or picks
+    something up goes lower, leans further forward, or comes up again sooner.
     """
     p = np.asarray(positions, dtype=np.float64)
     leg, hips = leg_length(p), p[:, [J["left_hip"], J["right_hip"]], 1].mean(axis=1)
     still = np.linalg.norm(smooth(velocity(p[:, 0], fps), odd(fps / 4)), axis=-1) < 0.25
     ahead = in_body(p)[:, ANKLES, 2].mean(axis=1) > 0.12 * leg
-    low = (hips - p[:, ANKLES, 1].min(axis=1) < 0.7 * leg) & (hips > FLESH + 0.15)
-    sits = still & ahead & low & (torso_inclination(p) < np.radians(50)) & (p[:, ANKLES, 1].max(axis=1) < 0.3 * leg)
+    low = (hips - p[:, ANKLES, 1].min(axis=1) < 0.7 * leg) & (hips > FLESH + 0.28)
+    sits = still & ahead & low & (torso_inclination(p) < np.radians(40)) & (p[:, ANKLES, 1].max(axis=1) < 0.3 * leg)
     return [
         Seat(a / fps, b / fps, float(np.median(hips[a:b])) - FLESH, *np.median(p[a:b, 0][:, [0, 2]], axis=0).tolist())
         for a, b in true_spans(sits)
