@@ -130,6 +130,22 @@ def test_actions_are_drawn_evenly_and_captures_more_often_than_keyed_clips(tmp_p
     assert abs(keyed - 0.4 / 9.4) < 0.03
 
 
+def test_windows_of_a_climb_begin_on_the_floor(tmp_path: Path) -> None:
+    """Half a metre a second for ten seconds, of which the end is shown: as a climb from the floor."""
+    body = people.standing(10.0)
+    body[..., 1] += np.linspace(0, 5, len(body))[:, None]
+    features = hml.encode(hml.canonical(body), heading="corrected")
+    for group, lowest in (("climb", 0.0), ("descend", 150 * 5 / 199)):
+        note = Note(150, 198, group)
+        folder = described(tmp_path / group, note)
+        write_clip(folder / "clips", Clip("one_capture", "cmu", "free", "train", "plain", (note,), features))
+        batches = Batches(load_set(folder), windows=(48,), shares=(1.0,))
+        shown = batches.draw(0, 0, 1).features * batches.data.std + batches.data.mean
+        places = hml.decode_positions(shown[0].numpy().astype(np.float64))
+        assert abs(places[0, :, 1].min() - lowest) < 0.05
+        np.testing.assert_allclose(places[-1, 0, 1] - places[0, 0, 1], 47 * 5 / 199, atol=0.02)
+
+
 def said_of(folder: Path, note: Note) -> tuple[str, ...]:
     """The sentences that the only item of a set is shown with."""
     data = load_set(described(folder, note))

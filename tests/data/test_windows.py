@@ -69,9 +69,16 @@ def test_a_clip_shorter_than_a_window_is_one_window_and_shorter_than_a_second_no
     assert label_clip(people.walking(1.2, 0.9), FPS, "") == []
 
 
-@pytest.mark.parametrize(("way", "label"), [(1, "climb"), (-1, "descend"), (0, None)])
+@pytest.mark.parametrize(("way", "label"), [(1, "climb"), (-1, "climb down"), (0, None)])
 def test_who_ends_up_higher_climbs_and_who_ends_up_lower_climbs_down(way: int, label: str | None) -> None:
     up = np.linspace(0, 1.2, 80)
     heights = {1: up, -1: up[::-1], 0: 0.3 - 0.3 * np.cos(up * np.pi / 0.3)}[way]
-    stairs = people.standing(4.0) + heights[:, None, None] * [0, 1, 0]
-    assert [name for name in label_window(stairs, 20, "climb stairs") if name != "stand"] == ([label] if label else [])
+    ladder = people.standing(4.0) + heights[:, None, None] * [0, 1, 0]
+    assert [name for name in label_window(ladder, 20, "climb stairs") if name != "stand"] == ([label] if label else [])
+
+
+@pytest.mark.parametrize(("way", "label"), [(1, "climb stairs"), (-1, "descend")])
+def test_who_goes_forward_meanwhile_takes_the_stairs(way: int, label: str) -> None:
+    heights = np.linspace(0, 1.2, 80)[::way]
+    stairs = people.walking(0.8, 4.0)[:80] + heights[:, None, None] * [0, 1, 0]
+    assert label in label_window(stairs, 20, "climb stairs")

@@ -20,7 +20,10 @@ from motionloom.kinematics.physics import Array
 
 LOOPED = 200
 """Frames that a cycle is repeated to."""
-POSTURES = ("sit down", "stand up", "sit down and stand up", "lie down", "get up", "kneel", "crouch", "bow", "fall")
+POSTURES = (
+    "sit down", "stand up", "sit down and stand up", "lie down", "get up", "crouch to lie", "lie to crouch", "kneel",
+    "crouch", "bow", "fall",
+)  # fmt: skip
 """Actions that end (and begin) in a posture which people keep, though many a recording is cut a moment before."""
 SEATED = ("sit down", "stand up", "sit down and stand up")
 
@@ -79,10 +82,10 @@ def laid_down(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip
             for n in c.notes
             if n.kind == PREFIX + name and c.way == "plain" and c.split == "train"
         ]
-        for name in ("crouch", "lie down")
+        for name in ("crouch", "crouch to lie")
     }
     rng, made = np.random.default_rng(seed), 0
-    pairs = [(a, b) for a in parts["crouch"] for b in parts["lie down"]]
+    pairs = [(a, b) for a in parts["crouch"] for b in parts["crouch to lie"]]
     for number in rng.permutation(len(pairs)):
         if made >= count:
             return

@@ -187,8 +187,10 @@ GESTURES = (
     Rule("jump forward", f"{_JUMPED}, advance > 0.8", (_JUMP,), choice="jump"),
     Rule("jump", _JUMPED, (_JUMP,), choice="jump"),
     Rule("wave", "wave_swings >= 4, hand_over_neck > -0.1, travel < 2", (r"wav|traffic|bye",)),
-    Rule("climb", "rise > 0.35", (_STAIRS,)),
-    Rule("descend", "rise < -0.35", (_STAIRS,)),
+    Rule("climb", "rise > 0.35, advance < 0.5", (_STAIRS,), choice="climb"),
+    Rule("climb stairs", "rise > 0.35", (_STAIRS,), choice="climb"),
+    Rule("climb down", "rise < -0.35, advance < 0.5", (_STAIRS,), choice="climb"),
+    Rule("descend", "rise < -0.35", (_STAIRS,), choice="climb"),
     Rule("dance", "mean_stir > 0.45", (r"danc|salsa|ballet|pirouette",)),
     Rule("balance", "one_leg > 1.5, travel < 1.0", (r"balance|one leg",)),
     # changes are seen whole: upright before sitting down, crouching and bending, upright behind standing up
