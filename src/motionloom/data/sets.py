@@ -34,9 +34,9 @@ FAVOUR: dict[str, float] = {
     **dict.fromkeys(("hop", "turn around", "turn around right"), 3.0),
     **dict.fromkeys(("circle left", "jump"), 2.5),
     **dict.fromkeys(("kick left", "kick right"), 4.0),
+    **dict.fromkeys(("punch left", "punch right"), 2.0),
     **dict.fromkeys(("sit down", "stand up", "jog", "turn left", "turn right"), 1.5),
-    # measured in windows of whatever else is done: made ones show one punch, one squat (benchmarks/everyday)
-    **dict.fromkeys(("punch left", "punch right", "squat once", "squat twice"), 0.02),
+    **dict.fromkeys(("squat once", "squat twice"), 0.02),  # windows of many squats; made ones show one and two
     **{
         f"action:{name}": weight
         for weight, names in {
