@@ -36,7 +36,8 @@ FAVOUR: dict[str, float] = {
     **dict.fromkeys(("kick left", "kick right"), 4.0),
     **dict.fromkeys(("punch left", "punch right"), 2.0),
     **dict.fromkeys(("sit down", "stand up", "jog", "turn left", "turn right"), 1.5),
-    **dict.fromkeys(("squat once", "squat twice"), 0.02),  # windows of many squats; made ones show one and two
+    # windows of many squats (made ones show one and two), and a body that lies knotted
+    **dict.fromkeys(("squat once", "squat twice", "action:lie with crossed legs"), 0.02),
     **{
         f"action:{name}": weight
         for weight, names in {
