@@ -3,9 +3,12 @@
 import argparse
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from motionloom.cli.sampling import add_adapters, fail
-from motionloom.goals.adapters import Applied, parse_adapter
+
+if TYPE_CHECKING:
+    from motionloom.goals.adapters import Applied
 
 PROJECT = Path("motionloom-project")
 
@@ -96,8 +99,10 @@ def run_mcp(arguments: argparse.Namespace) -> None:
     run(arguments.project, weights=arguments.weights, device=arguments.device, adapters=adapters)
 
 
-def _adapters(arguments: argparse.Namespace) -> tuple[Applied, ...]:
+def _adapters(arguments: argparse.Namespace) -> "tuple[Applied, ...]":
     """Those of the line; a file that is not there is told before anything is started."""
+    from motionloom.goals.adapters import parse_adapter
+
     adapters = tuple(parse_adapter(word) for word in arguments.adapter)
     for path, _ in adapters:
         if not path.is_file():
