@@ -177,6 +177,22 @@ def test_a_made_up_person_passes_its_own_check_and_hardly_any_other(name: str) -
     assert passed(PEOPLE[name]) - BOTH_RIGHT.get(name, set()) == {name}
 
 
+@pytest.mark.parametrize(("name", "steepness"), [("up the stairs", 1.0), ("climb a ladder", 5.0)])
+def test_climbs_are_refused_that_are_faster_than_people_climb(name: str, steepness: float) -> None:
+    """Two metres upwards with the hands in front: step by step, and as if thrown."""
+    check, reaching = BY_NAME[name], np.full(round(6 * FPS), 0.5)
+    hands = arm_up("left", reaching, arm_up("right", reaching))
+
+    def climber(pace: float) -> np.ndarray:
+        height = 2 * ramp(1, 1 + 2 / pace, 6)[:, None]
+        return moved(hands, height * [0.0, 1.0, 1 / steepness])
+
+    slow, fast = (check.measured(climber(pace), FPS) for pace in (0.6, 3.0))
+    assert not check.failed(slow), slow
+    assert slow["fastest"] == pytest.approx(0.6, abs=0.05)
+    assert [bound.measure for bound in check.failed(fast)] == ["fastest"]
+
+
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("what", ["sidestep", "kick", "wave with the {} hand", "punch", "walk and turn"])
 def test_a_sided_check_says_the_opposite_in_the_mirror(what: str, side: str) -> None:
