@@ -133,3 +133,22 @@ def test_bytes_that_are_no_text_do_not_break_it(weights: str) -> None:
     """What a shell hands over for a byte that is not UTF-8."""
     assert generate(weights, "walk \udcff", "--out", "a.npz") == 0
     assert written() == {"a.npz"}
+
+
+def test_the_best_of_several_is_kept_for_single_actions_and_the_rest_is_told(
+    weights: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    different = 0
+    for seed in ("1", "2", "3"):
+        for options, name in ((("--best-of", "4"), "a.npz"), (("--best-of", "4"), "b.npz"), ((), "c.npz")):
+            assert generate(weights, "a person walks", "--seed", seed, "--out", name, "--force", *options) == 0
+        a, b, c = io.load("a.npz"), io.load("b.npz"), io.load("c.npz")
+        assert largest_distance(a, b) == 0
+        different += largest_distance(a, c) > 1e-3
+    assert different
+    assert "--best-of" not in capsys.readouterr().err
+    assert main(["generate", "a person walks, then sits", "--weights", weights, "--steps", "2", "--best-of", "3"]) == 0
+    assert "--best-of is for one action; these are drawn as they come" in capsys.readouterr().err
+    assert generate(weights, "a person walks", "--out", "d.npz", "--best-of", "99") == 2
+    assert complaint(capsys).startswith("motionloom: the best is chosen of 1 to 16 motions; got 99")
+    assert not Path("d.npz").exists()

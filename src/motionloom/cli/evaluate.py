@@ -51,6 +51,9 @@ def _physical(commands) -> None:
         help="the twenty prompts of old, those of everyday life, or both (default basic)",
     )  # fmt: skip
     obedience.add_argument("--seeds", type=int, default=10, help="seeds per prompt (default 10)")
+    obedience.add_argument(
+        "--best-of", type=int, default=1, metavar="N", help="as of generate, where a prompt is one action"
+    )
     obedience.add_argument("--paraphrases", action="store_true", help="also try the same prompts in other words")
     obedience.add_argument(
         "--only", action="append", metavar="CHECK", help="only this check, such as 'walk forward' (repeatable)"
@@ -98,8 +101,9 @@ def _generator(arguments: argparse.Namespace):
 
     prior = Prior.load(arguments.weights, device=arguments.device)
     return generator(
-        prior, steps=arguments.steps, guidance=arguments.guidance, solver=arguments.solver, finished=arguments.finished
-    )
+        prior, steps=arguments.steps, guidance=arguments.guidance, solver=arguments.solver, finished=arguments.finished,
+        best_of=getattr(arguments, "best_of", 1),
+    )  # fmt: skip
 
 
 def _run(arguments: argparse.Namespace):
@@ -128,7 +132,7 @@ def _obedience(arguments: argparse.Namespace) -> None:
     if arguments.sheet:
         files.check_report(suffixed(arguments.sheet, (".png",)))
     seed = _first_seed(arguments)
-    settings = _settings(arguments)
+    settings = _settings(arguments) | ({"best_of": arguments.best_of} if arguments.best_of > 1 else {})
     generate = everyday.FirstDraws(_generator(arguments))
     results = obey.run(
         _run(arguments), checks, generate=generate, seeds=arguments.seeds, first_seed=seed,

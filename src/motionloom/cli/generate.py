@@ -54,6 +54,10 @@ def add(subparsers) -> None:
         "--seed", type=int, default=0, help="the first motion's seed, the next have the next (default 0)"
     )
     parser.add_argument("--count", type=int, default=1, help="motions per prompt (default 1)")
+    parser.add_argument(
+        "--best-of", type=int, default=1, metavar="N",
+        help="of each motion begin N and keep the one nearest to what the words usually look like (default 1)",
+    )  # fmt: skip
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
     parser.add_argument("--solver", help="ddim, ddpm (the default), dpm2m or dpm2m-sde")
     add_sampling(parser)
@@ -127,6 +131,8 @@ def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str) -> "Ti
             fail("--solver is for one action at a time; give --as-one to leave the sentence whole")
         listed = ", ".join(f"'{segment.text}' {segment.seconds:.1f} s" for segment in found.segments)
         print(f"motionloom: one after the other: {listed}; --as-one leaves the sentence whole", file=sys.stderr)
+        if arguments.best_of > 1:
+            print("motionloom: --best-of is for one action; these are drawn as they come", file=sys.stderr)
     return found
 
 
@@ -193,6 +199,7 @@ def _drawn(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timel
                         [one.text for (one,) in segments],
                         seconds=[one.seconds for (one,) in segments],
                         seed=seed,
+                        best_of=arguments.best_of,
                         progress=progress,
                         **options,
                     )

@@ -269,19 +269,22 @@ def sample(
     network: PairNet | None = None,
     edits: Sequence[Edit] = (),
     observed: Observed | None = None,
+    halfway: bool = False,
     progress: Progress | None = None,
     view: View | None = None,
 ) -> Iterator[tuple[int, State]]:
     """Standardised states (tokens, features) with their rows' numbers, each as soon as its batch is finished.
 
     A row depends on its own prompt, length and seed alone. network: the prior's own unless given. edits: of each
-    batch's guided denoiser, after what is observed was put in, the first one first. view: how each network call is seen
-    by who is `watching`; None: nobody can. Raises MotionloomError for more
-    steps than the weights have levels.
+    batch's guided denoiser, after what is observed was put in, the first one first. halfway: stop after half of the
+    calls and give the denoised estimates. view: how each network call is seen by who is `watching`; None: nobody can.
+    Raises MotionloomError for more steps than the weights have levels.
     """
     net = prior.net if network is None else network
     way = sampling.levels(prior.schedule, observed.strength if observed else 1.0)
     batches, done = rows.batches(sampling.batch()), 0
+    if halfway:
+        way = way[: len(way) // 2 + 1]
     for numbers in batches:
         batch = Batch(numbers, prior.condition([rows.prompts[i] for i in numbers]), [rows.seeds[i] for i in numbers])
         noise, constrain = rows.noise(batch.seeds), None
@@ -304,7 +307,7 @@ def sample(
             constrain=constrain,
         )  # fmt: skip
         for snapshot in view.reported(walk, len(way) - 1, numbers) if view else walk:
-            state, done = snapshot.state, done + 1
+            state, done = snapshot.clean if halfway else snapshot.state, done + 1
             if progress:
                 progress(done, len(batches) * (len(way) - 1))
         yield from zip(numbers, state, strict=True)

@@ -19,6 +19,7 @@ from motionloom.goals.segment import LONGEST
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
+from motionloom.tasks.best import check_best_of, with_best_seeds
 from motionloom.tasks.sampling import GUIDANCE as GUIDANCE
 from motionloom.tasks.sampling import LARGEST_SEED, Progress, Rows, Sampling, Settings, sample, to_features
 from motionloom.tasks.sampling import SOLVER as SOLVER
@@ -36,6 +37,7 @@ def sample_features(
     frames: Sequence[int],
     *,
     seeds: Sequence[int],
+    best_of: int = 1,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
     **settings: Unpack[Settings],
@@ -46,13 +48,14 @@ def sample_features(
         prompts: one per row; an empty one is refused.
         frames: length of each row.
         seeds: one per row; a row depends on its own prompt, length and seed alone.
+        best_of: as of `generate`.
         sampling: or single settings of it as keywords.
         progress: called after each network call.
 
     Raises:
         MotionloomError: for what cannot be asked.
     """
-    made = dict(_sampled(prior, prompts, frames, seeds, Sampling.of(sampling, settings), progress))
+    made = dict(_sampled(prior, prompts, frames, seeds, best_of, Sampling.of(sampling, settings), progress))
     return [made[row] for row in range(len(prompts))]
 
 
@@ -61,16 +64,35 @@ def _sampled(
     prompts: Sequence[str],
     frames: Sequence[int],
     seeds: Sequence[int],
+    best_of: int,
     sampling: Sampling,
     progress: Progress | None,
 ) -> Iterator[tuple[int, Tensor]]:
     """`sample_features` row by row, each as soon as it is finished: the row's number and its features."""
     check_prompts(prompts)
+    check_best_of(best_of)
     if not all(0 <= seed < 2 * LARGEST_SEED for seed in seeds):
         raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {min(seeds)}")
     rows = Rows(prompts, frames, seeds)
+    if best_of > 1:
+        choosing, progress = _in_turn(progress, of=len(rows.batches(sampling.batch())) * sampling.steps)
+        rows = with_best_seeds(prior, rows, best_of, sampling, progress=choosing)
     for row, state in sample(prior, rows, sampling, progress=progress, view=alone(prior)):
         yield row, to_features(prior, state).cpu()
+
+
+def _in_turn(progress: Progress | None, *, of: int) -> tuple[Progress | None, Progress | None]:
+    """What two parts of a job report to, the second of ``of`` calls, so that ``progress`` sees one job."""
+    if progress is None:
+        return None, None
+    before = 0
+
+    def first(done: int, calls: int) -> None:
+        nonlocal before
+        before = calls
+        progress(done, calls + of)
+
+    return first, lambda done, calls: progress(before + done, before + calls)
 
 
 @renamed({"clean": "foot_lock"})
@@ -80,6 +102,7 @@ def generate(
     *,
     seconds: float | Sequence[float] = 5.0,
     foot_lock: bool = True,
+    best_of: int = 1,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
     **settings: Unpack[Settings],
@@ -91,6 +114,8 @@ def generate(
         prompts: what the person does, one text or several.
         seconds: length, one for all or one per prompt; at the prior's frame rate (20 per second; BABEL's 30).
         foot_lock: keep planted feet still, and feet above the floor.
+        best_of: 1 to 16; so many seeds are sampled half way for each motion, and the one nearest to what the words
+            usually look like is kept (`tasks.best`): more often what was said, less varied, twice the time with 4.
         sampling: how it is sampled; single settings of it may be given as keywords: ``count=2, seed=3, steps=12``.
             Motion i of the answer is sampled from ``seed + i`` alone.
         progress: called after each network call with the calls done and the calls in all.
@@ -102,8 +127,8 @@ def generate(
         MotionloomError: for what cannot be asked.
     """
     made = generate_each(
-        prior, prompts, seconds=seconds, foot_lock=foot_lock, sampling=sampling, progress=progress,
-        **settings,
+        prior, prompts, seconds=seconds, foot_lock=foot_lock, best_of=best_of, sampling=sampling,
+        progress=progress, **settings,
     )  # fmt: skip
     return [motion for _, motion in sorted(made, key=lambda numbered: numbered[0])]
 
@@ -115,6 +140,7 @@ def generate_each(
     *,
     seconds: float | Sequence[float] = 5.0,
     foot_lock: bool = True,
+    best_of: int = 1,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
     **settings: Unpack[Settings],
@@ -136,7 +162,7 @@ def generate_each(
     count = chosen.number()
     said = [prompt for prompt in said for _ in range(count)]
     frames = [frames_in(length, prior.fps) for length in lengths for _ in range(count)]
-    for row, features in _sampled(prior, said, frames, chosen.seeds(len(said)), chosen, progress):
+    for row, features in _sampled(prior, said, frames, chosen.seeds(len(said)), best_of, chosen, progress):
         yield row, finish(prior, features, foot_lock=foot_lock)
 
 

@@ -23,12 +23,14 @@ def generator(
     guidance: float | None = None,
     solver: str | None = None,
     finished: bool = False,
+    best_of: int = 1,
 ) -> Generate:
     """Text to joint positions as `motionloom generate` makes them; what is None keeps the default of `generate`.
 
     Positions are measured as the network samples them, whose bones may breathe and whose feet may slide; ``finished``
     measures what is exported: constant bones, planted feet held still. A sentence of several actions that follow each
-    other is a long motion (`goals.sequence`), which is measured as exported and keeps the usual solver.
+    other is a long motion (`goals.sequence`), which is measured as exported and keeps the usual solver; ``best_of``
+    says nothing of it either.
     """
     said = {"steps": steps, "guidance": guidance, "solver": solver}
     how = {name: value for name, value in said.items() if value is not None}
@@ -38,7 +40,7 @@ def generator(
         frames = [round(seconds * prior.fps)] * len(prompts)
         if not frames:
             return []
-        drawn = sample_features(prior, prompts, frames, seeds=list(seeds), **how)  # type: ignore[arg-type]
+        drawn = sample_features(prior, prompts, frames, seeds=list(seeds), best_of=best_of, **how)  # type: ignore[arg-type]
         features = [one.numpy().astype(np.float64) for one in drawn]
         if finished:
             return [to_motion(one, prior.fps).positions() for one in features]

@@ -1,0 +1,76 @@
+"""Best of several seeds: which is kept, that it depends on its own motion alone, and what cannot be asked."""
+
+import numpy as np
+import pytest
+import torch
+
+from motionloom.diffusion.sampling import row_seed
+from motionloom.errors import MotionloomError
+from motionloom.tasks.best import with_best_seeds
+from motionloom.tasks.sampling import Rows, Sampling, sample
+from motionloom.tasks.text import finish, generate, sample_features
+from motionloom.weights.prior import Prior
+from tests.nets import tiny
+
+WALK, TURN = "a person walks", "a person turns left"
+SAMPLING = Sampling(steps=5)
+ROT6D = slice(67, 193)
+
+
+@pytest.fixture(scope="module")
+def prior() -> Prior:
+    return tiny.prior()
+
+
+def best(prior: Prior, prompts: list[str], seeds: list[int], count: int = 4) -> list[int]:
+    return list(with_best_seeds(prior, Rows(prompts, [12] * len(seeds), seeds), count, SAMPLING).seeds)
+
+
+def test_kept_is_the_seed_whose_rotations_are_nearest_to_the_mean_at_pure_noise() -> None:
+    """Of the weights that ship. The mean is estimated here from other noise, 24 rows of it."""
+    prior, tried = Prior.load(), [7, *(row_seed(7, number) for number in range(1, 5))]
+    noise = torch.randn(24, 40, 263, generator=torch.Generator().manual_seed(1))
+    with torch.inference_mode():
+        mean = prior.net(noise, 1000, prior.net.bind(prior.condition([TURN] * 24))).mean(0)
+        halfway = dict(sample(prior, Rows([TURN] * 5, [40] * 5, tried), SAMPLING, halfway=True))
+    away = [float((halfway[i] - mean)[:, ROT6D].square().mean()) for i in range(5)]
+    assert sorted(away)[1] - min(away) > 1e-3  # no tie
+    kept = with_best_seeds(prior, Rows([TURN], [40], [7]), 5, SAMPLING).seeds
+    assert kept == [tried[away.index(min(away))]]
+
+
+def test_halfway_gives_the_estimates_after_half_of_the_calls(prior: Prior) -> None:
+    calls: list[tuple[int, int]] = []
+    rows = Rows([WALK], [12], [3])
+    made = dict(sample(prior, rows, SAMPLING, halfway=True, progress=lambda *pair: calls.append(pair)))
+    assert calls == [(1, 3), (2, 3), (3, 3)]  # of five
+    assert not torch.allclose(made[0], dict(sample(prior, rows, SAMPLING))[0])
+
+
+def test_the_choice_for_a_motion_depends_on_that_motion_alone(prior: Prior) -> None:
+    together = best(prior, [WALK, TURN, WALK], [1, 2, 3])
+    assert together == [best(prior, [p], [s])[0] for p, s in ((WALK, 1), (TURN, 2), (WALK, 3))]
+    assert len({best(prior, [WALK], [seed])[0] == seed for seed in range(8)}) == 2  # sometimes its own, sometimes not
+
+
+def test_what_is_made_is_what_the_best_seed_makes(prior: Prior) -> None:
+    made = sample_features(prior, [WALK, TURN], [12, 12], seeds=[5, 6], steps=5, best_of=4)
+    chosen = best(prior, [WALK, TURN], [5, 6])
+    plain = sample_features(prior, [WALK, TURN], [12, 12], seeds=chosen, steps=5)
+    torch.testing.assert_close(made, plain, rtol=0, atol=1e-5)
+    (motion,) = generate(prior, TURN, seconds=0.6, seed=6, foot_lock=False, steps=5, best_of=4)
+    expected = finish(prior, plain[1], foot_lock=False).positions()
+    np.testing.assert_allclose(motion.positions(), expected, atol=1e-4)
+
+
+def test_progress_sees_one_job(prior: Prior) -> None:
+    said: list[tuple[int, int]] = []
+    generate(prior, WALK, seconds=0.6, steps=4, count=3, best_of=4, progress=lambda *pair: said.append(pair))
+    of = 2 * 2 + 4  # two batches of six and six candidates to half of the calls, and three motions
+    assert said == [(done, of) for done in range(1, of + 1)]
+
+
+@pytest.mark.parametrize("count", [0, -1, 17, 2.0, True])
+def test_numbers_that_cannot_be_tried_are_refused(prior: Prior, count) -> None:
+    with pytest.raises(MotionloomError, match="of 1 to 16 motions"):
+        generate(prior, WALK, best_of=count)
