@@ -33,7 +33,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--check", action="store_true", help="only say what is wrong with the clips")
     parser.add_argument("--name", help="name on the adapter's card (default: that of the file)")
     parser.add_argument("--licence", default="", help="what one may do with the adapter: the clips' owner says")
-    parser.add_argument("--steps", type=int, help="training steps (default 700; more clips may need more)")
+    parser.add_argument("--steps", type=int, help="training steps (default 1300; more clips may need more)")
     parser.add_argument("--rank", type=int, help="size of the change: 16 (default) makes a file of 1.5 MB")
     parser.add_argument(
         "--keep", type=float, metavar="SHARE",

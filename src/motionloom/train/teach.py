@@ -29,7 +29,7 @@ from motionloom.weights.adapter import TAUGHT, Adapter, AdapterNet, origin, tens
 from motionloom.weights.prior import Prior
 
 RANK = 16
-STEPS, BATCH = 700, 16
+STEPS, BATCH = 1300, 16
 RATE = 1e-3
 WINDOWS, SHARES = (60, 100, 160, 196), (0.2, 0.4, 0.25, 0.15)
 """Frames of the windows that a step sees, and how often."""
