@@ -115,7 +115,8 @@ def generate(
         seconds: length, one for all or one per prompt; at the prior's frame rate (20 per second; BABEL's 30).
         foot_lock: keep planted feet still, and feet above the floor.
         best_of: 1 to 16; so many seeds are sampled half way for each motion, and the one nearest to what the words
-            usually look like is kept (`tasks.best`): more often what was said, less varied, two to three times as long with 4.
+            usually look like is kept (`tasks.best`): more often what was said, less varied; 4 take two to three times
+            as long.
         sampling: how it is sampled; single settings of it may be given as keywords: ``count=2, seed=3, steps=12``.
             Motion i of the answer is sampled from ``seed + i`` alone.
         progress: called after each network call with the calls done and the calls in all.
