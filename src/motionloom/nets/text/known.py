@@ -16,7 +16,7 @@ from motionloom.errors import MotionloomError
 from motionloom.nets.text.protocol import TextEncoder
 from motionloom.nets.text.quantise import dequantise, quantise
 
-SAME, NEAR, AROUND = 0.75, 0.46, 8
+SAME, NEAR, AROUND = 0.75, 0.475, 8
 """A prompt is near to what was learned where the cosine to one sentence is at least `SAME`, or the mean over its
 nearest `AROUND` sentences at least `NEAR`: one alone may share no more than a noun with it (figures: docs/words.md)."""
 MOST_SENTENCES = 1500
