@@ -74,6 +74,9 @@ def _generate(arguments: argparse.Namespace) -> int:
     files = places(outs, len(captions), target=target)
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
+    from motionloom.tasks.best import check_best_of
+
+    check_best_of(arguments.best_of)
     timelines = {prompt: _timeline(arguments, prior, prompt) for prompt in prompts}
     remarks = remark_unknown(prior, [segment.text for found in timelines.values() for segment in found.segments])
     made = finished_motions(files, captions, target, unit=arguments.out_unit, rate=arguments.fps)
