@@ -26,7 +26,8 @@ from motionloom.io.asf import load_asf_amc
 from motionloom.io.bvh import load_bvh
 from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22, joints22, to_smpl22
-from motionloom.retarget.anatomy import CHILD, read_body
+from motionloom.retarget.anatomy import read_body
+from motionloom.retarget.axes import CHILD
 from motionloom.retarget.floor import level
 
 Array = NDArray[np.float64]

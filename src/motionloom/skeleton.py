@@ -19,6 +19,22 @@ LONGEST_NAME = 1000
 
 
 @dataclass(frozen=True, eq=False)
+class Poses:
+    """Poses of a person on a skeleton."""
+
+    root: NDArray[np.float64]
+    """(poses, 3) metres: where joint 0 is."""
+    rotations: NDArray[np.float64]
+    """(poses, joints, 4) quaternions (w, x, y, z) of each joint in its parent's frame."""
+    translations: NDArray[np.float64] | None = None
+    """(poses, joints, 3) metres: offsets that change; None where the skeleton's hold."""
+
+    def scaled(self, size: float) -> "Poses":
+        """The same poses of a skeleton ``size`` times as large."""
+        return Poses(self.root * size, self.rotations, None if self.translations is None else self.translations * size)
+
+
+@dataclass(frozen=True, eq=False)
 class Skeleton:
     """A tree of joints. Joint 0 is the root and parents come before their children."""
 
@@ -38,6 +54,8 @@ class Skeleton:
     """Whether the rest pose stands on the ground y = 0, as modelled characters do; a recording's skeleton need not."""
     soles: dict[int, NDArray[np.float64]] = field(default_factory=dict)
     """(points, 3) metres in the frames of joints of the feet: corners of the mesh that must not go into the floor."""
+    poses: Poses | None = None
+    """Some poses out of the file, which say what a person looks like on a skeleton whose rest pose is no pose."""
 
     def __post_init__(self) -> None:
         offsets = np.asarray(self.offsets, dtype=np.float64)
@@ -104,7 +122,8 @@ class Skeleton:
     def scaled(self, size: float) -> "Skeleton":
         """The same skeleton ``size`` times as large."""
         soles = {joint: points * size for joint, points in self.soles.items()}
-        return replace(self, offsets=self.offsets * size, soles=soles)
+        poses = None if self.poses is None else self.poses.scaled(size)
+        return replace(self, offsets=self.offsets * size, soles=soles, poses=poses)
 
     def rest_positions(self) -> NDArray[np.float64]:
         """(joints, 3) metres: joint positions in rest pose, the root at its own offset."""

@@ -12,7 +12,7 @@ from motionloom.io.character import load_character
 from motionloom.io.gltf import load_glb
 from motionloom.motion import Motion
 from motionloom.retarget import joint_map, retarget, to_smpl22
-from motionloom.retarget.anatomy import CHILD
+from motionloom.retarget.axes import CHILD
 from tests.io.gltf_skin import Scene
 
 LIMBS = (1, 2, 4, 5, 16, 17, 18, 19)

@@ -20,12 +20,14 @@ from motionloom.io import text
 from motionloom.io.bvh_tips import is_tip
 from motionloom.io.bvh_writer import SAME_PLACE, end_name, moving_offsets, save_bvh
 from motionloom.motion import Motion
-from motionloom.skeleton import Skeleton
+from motionloom.skeleton import Poses, Skeleton
 
 __all__ = ["Bvh", "guess_unit", "load_bvh", "read_bvh", "save_bvh"]
 
 Array = NDArray[np.float64]
 MAX_JOINTS = 10_000
+_POSES = 64
+"""How many poses of the clip its skeleton keeps at most (`Skeleton.poses`)."""
 _CHANNELS = {f"{axis}{kind}": (axis, kind) for axis in "XYZ" for kind in ("position", "rotation")}
 
 
@@ -298,10 +300,18 @@ def _assemble(joints: list[_Joint], values: Array, fps: float, unit: float | Non
             offsets[j] = place[0]
         if translations is not None:
             translations[:, j] = place * scale
-    skeleton = Skeleton(
-        tuple(j.name for j in joints), parents, offsets * scale, frozenset(i for i, j in enumerate(joints) if j.end)
-    )
     rotations, orders = _rotations(joints, values)
+    some = slice(None, None, -(-len(values) // _POSES))
+    poses = Poses(
+        root[some].copy(), rotations[some].copy(), None if translations is None else translations[some].copy()
+    )
+    skeleton = Skeleton(
+        tuple(j.name for j in joints),
+        parents,
+        offsets * scale,
+        frozenset(i for i, j in enumerate(joints) if j.end),
+        poses=poses,
+    )
     return Bvh(Motion(skeleton, fps, root, rotations, translations), scale, orders)
 
 

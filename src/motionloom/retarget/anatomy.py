@@ -15,51 +15,37 @@ keeps the bone from twisting:
 the same pose when these agree. In a sensible rest pose (T, A or arms down; upright) they can be read off it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
+from motionloom.motion import Motion
+from motionloom.retarget.axes import (
+    ARMS,
+    CHILD,
+    FEET,
+    HEAD,
+    LEGS,
+    SPINE,
+    TOES,
+    frame,
+    hips_line,
+    shoulder_line,
+    unit,
+)
 from motionloom.retarget.joint_map import JointMap, Override, joint_map
-from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.retarget.measured import measure_frames, measure_sole
+from motionloom.skeleton import SMPL22, Poses, Skeleton
 
 Array = NDArray[np.float64]
 
-CHILD: tuple[int | None, ...] = (
-    3,
-    4,
-    5,
-    6,
-    7,
-    8,
-    9,
-    10,
-    11,
-    12,
-    None,
-    None,
-    15,
-    16,
-    17,
-    None,
-    18,
-    19,
-    20,
-    21,
-    None,
-    None,
-)
-"""The SMPL joint each SMPL joint's bone runs to."""
 _STEPPING = np.radians(25)
 """Flat feet of one body differ by less in how far their bones point down."""
-BROADEST = 0.35
+BROADEST = 0.28
 """Human hip joints are at most so far apart, in lengths of the leg."""
-LEGS, FEET, TOES = (1, 2, 4, 5), (7, 8), (10, 11)
-ARMS = (13, 14, 16, 17, 18, 19, 20, 21)
-CHEST, COLLARS, SHOULDERS = 9, (13, 14), (16, 17)
-HEAD = 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +62,9 @@ class Body:
     frames: Array
     """(22, 4) joint_from_anatomy."""
     upright: bool
-    """Whether the frames are known; else the rest pose is no standing person and limbs have an arbitrary twist."""
+    """Whether the rest pose is a standing person; the frames are read off it then."""
+    measured: bool
+    """Whether the frames were measured from poses; where they are neither, limbs have an arbitrary twist."""
     up: Array
     """(3,) up in rest pose; +Y where the rest pose is no standing person."""
     toe_height: float
@@ -99,6 +87,11 @@ class Body:
         """Metres of thigh and shin, mean of both sides."""
         return float(np.mean([self.bone(1) + self.bone(4), self.bone(2) + self.bone(5)]))
 
+    @property
+    def arm(self) -> float:
+        """Metres of upper arm and forearm, mean of both sides."""
+        return sum(self.bone(j) for j in (16, 17, 18, 19)) / 2
+
     def places(self, positions: Array, world: Array) -> Array:
         """(frames, 22, 3): the SMPL joints, of the joints' positions and world rotations (frames, joints, 3 and 4)."""
         found = np.einsum("sj,fjc->fsc", self.points, positions)
@@ -114,8 +107,13 @@ class Body:
         return 0.0 if child is None else float(np.linalg.norm(self.rest[child] - self.rest[joint]))
 
 
-def read_body(skeleton: Skeleton, override: Override | None = None) -> Body:
-    """Find the person in a skeleton; errors as `joint_map`."""
+def read_body(skeleton: Skeleton, override: Override | None = None, *, poses: Poses | None = None) -> Body:
+    """Find the person in a skeleton.
+
+    poses: what is measured where the rest pose is no standing person; else the skeleton's own `Skeleton.poses`.
+    Errors as `joint_map`.
+    """
+    poses = poses or skeleton.poses
     found = joint_map(skeleton, override)
     points = found.matrix(skeleton)
     rest = points @ skeleton.rest_positions()
@@ -135,24 +133,51 @@ def read_body(skeleton: Skeleton, override: Override | None = None) -> Body:
         toes = rest[list(TOES), 1]
         planted = float(toes.mean() if _lifted_foot(rest, axes) is None else toes.min())
         height = planted if upright else _toe_height(skeleton, found, rest, axes[1])
-        return Body(skeleton, points, drivers, rest, _rest_frames(rest, axes), True, axes[1], height, tips)
-    known = _is_bandai(skeleton)
-    frames = _bandai_frames(rest) if known else _odd_frames(rest)
-    return Body(skeleton, points, drivers, rest, frames, known, np.eye(3)[1], 0.0, tips)
+        frames = _rest_frames(rest, axes)
+        body = Body(skeleton, points, drivers, rest, frames, True, False, axes[1], height, tips)
+        return body if poses is None or skeleton.on_floor else _on_measured_feet(body, poses)
+    body = Body(skeleton, points, drivers, rest, _odd_frames(rest), False, False, np.eye(3)[1], 0.0, tips)
+    return body if poses is None else _measured(body, poses)
+
+
+def _measured(body: Body, poses: Poses) -> Body:
+    """The body with all frames measured from poses."""
+    places, world = _posed(body, poses)
+    return replace(body, frames=measure_frames(places, world, body.drivers, body.frames), measured=True)
+
+
+def _on_measured_feet(body: Body, poses: Poses) -> Body:
+    """The body with the soles of those feet measured from poses that do not stand at rest, such as on the toes."""
+    places, world = _posed(body, poses)
+    if body.up[1] < 0.9:
+        return body
+    frames = body.frames.copy()
+    for foot, toe in zip(FEET, TOES):
+        sole = measure_sole(places, world, body.drivers[foot], rest=body.rest, foot=foot)
+        if sole is not None:
+            frames[[foot, toe]] = sole
+    return replace(body, frames=frames)
+
+
+def _posed(body: Body, poses: Poses) -> tuple[Array, Array]:
+    """Places (poses, 22, 3) of the SMPL joints and orientations (poses, joints, 4) of the skeleton's."""
+    motion = Motion(body.skeleton, 30.0, poses.root, poses.rotations, poses.translations)
+    world = motion.world_rotations()
+    return body.places(motion.positions(), world), world
 
 
 def _on_four_legs(rest: Array) -> bool:
     """Whether arms hang down beside the legs from a spine that is level."""
     legs, arms = (rest[[7, 8]] - rest[[1, 2]]).sum(axis=0), (rest[[20, 21]] - rest[[16, 17]]).sum(axis=0)
     spine = rest[12] - rest[0]
-    return float(_unit(legs) @ _unit(arms)) > 0.8 and abs(float(_unit(legs) @ _unit(spine))) < 0.5
+    return float(unit(legs) @ unit(arms)) > 0.8 and abs(float(unit(legs) @ unit(spine))) < 0.5
 
 
 def _missing_toes(rest: Array) -> Array:
     """(22, 3) from the ankle of a foot without toes to where they would be: ahead of it and a little lower."""
     tips = np.zeros((22, 3))
     up = _snap(rest[12] - rest[0])
-    ahead = _unit(np.cross(_snap(rest[1] - rest[2]), up))
+    ahead = unit(np.cross(_snap(rest[1] - rest[2]), up))
     leg = np.linalg.norm(rest[[4, 5]] - rest[[1, 2]], axis=-1) + np.linalg.norm(rest[[7, 8]] - rest[[4, 5]], axis=-1)
     for foot, toe in zip(FEET, TOES):
         if np.linalg.norm(rest[toe] - rest[foot]) < 1e-6:
@@ -178,20 +203,9 @@ def _fall(ankle: Array, leg: float) -> float:
     return min(0.05 * leg, 0.5 * float(ankle[1])) if 0 < ankle[1] < 0.5 * leg else 0.05 * leg
 
 
-def frame(first: Array, second: Array) -> Array:
-    """(..., 4) the frame whose first axis is ``first`` and whose second lies nearest to ``second``."""
-    x = _unit(first)
-    y = _unit(second - (second * x).sum(-1, keepdims=True) * x)
-    return rot.from_axes([x, y, np.cross(x, y)])
-
-
-def _unit(v: Array) -> Array:
-    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
-
-
 def _snap(v: Array) -> Array:
     """The coordinate axis next to a direction if it is within 30 degrees, else the direction."""
-    v = _unit(v)
+    v = unit(v)
     axis = np.zeros(3)
     axis[np.argmax(np.abs(v))] = np.sign(v[np.argmax(np.abs(v))])
     return axis if float(axis @ v) > np.cos(np.radians(30)) else v
@@ -200,16 +214,16 @@ def _snap(v: Array) -> Array:
 def _rest_axes(rest: Array) -> tuple[Array, Array, Array] | None:
     """Left, up and forward in rest pose; None if it is no upright person."""
     left, up = _snap(rest[1] - rest[2]), _snap(rest[12] - rest[0])
-    left = _unit(left - float(left @ up) * up)
+    left = unit(left - float(left @ up) * up)
     thighs, shins = rest[[4, 5]] - rest[[1, 2]], rest[[7, 8]] - rest[[4, 5]]
     toes = rest[[10, 11]] - rest[[7, 8]]
     forward = np.cross(left, up)
     sane = (
-        (_unit(thighs) @ up < -0.3).all()
-        and (_unit(shins) @ up < -0.3).all()
-        and (_unit(toes) @ forward > -0.3).all()
-        and float(_unit(rest[16] - rest[17]) @ left) > 0.7
-        and float(_unit(rest[15] - rest[0]) @ up) > 0.8
+        (unit(thighs) @ up < -0.3).all()
+        and (unit(shins) @ up < -0.3).all()
+        and (unit(toes) @ forward > -0.3).all()
+        and float(unit(rest[16] - rest[17]) @ left) > 0.7
+        and float(unit(rest[15] - rest[0]) @ up) > 0.8
     )
     return (left, up, forward) if sane else None
 
@@ -223,8 +237,7 @@ def _rest_frames(rest: Array, axes: tuple[Array, Array, Array]) -> Array:
         if np.linalg.norm(bone) < 1e-6:
             bone = up
         frames[j] = frame(bone, forward if j in ARMS else left)
-    frames[0] = frame(up, left)
-    frames[HEAD] = frame(up, left)
+    frames[[0, *SPINE, HEAD]] = frame(up, left)
     lifted = _lifted_foot(rest, axes)
     for side, (foot, toe) in enumerate(zip(FEET, TOES)):
         heading = rest[toe] - rest[foot]
@@ -274,55 +287,25 @@ def _hangs_on(skeleton: Skeleton, found: JointMap, joint: int, part: int) -> boo
 
 
 def _odd_frames(rest: Array) -> Array:
-    """What the offsets alone show: bones, hip line and shoulder line; the twist of limbs is arbitrary."""
-    hips, shoulders = rest[1] - rest[2], rest[16] - rest[17]
+    """What the offsets alone show where neither the rest pose nor any other is known; the twist of limbs is arbitrary.
+
+    Joints may be turned anyhow at rest, so that only what hangs on one joint says how that one is turned.
+    """
+    hips, shoulders = hips_line(rest), shoulder_line(rest)
     frames = np.tile(rot.IDENTITY, (22, 1))
     for j, child in enumerate(CHILD):
         bone = rest[child] - rest[j] if child is not None else np.zeros(3)
         if np.linalg.norm(bone) < 1e-6:
             frames[j] = frames[max(k for k, c in enumerate(CHILD) if c == j)]
             continue
-        second = {3: hips, 6: shoulders, 9: shoulders, 12: shoulders}.get(j, np.eye(3)[np.argmin(np.abs(bone))])
-        frames[j] = frame(bone, second)
-    person = SMPL22.rest_positions()  # how far a spine leans on a standing pelvis is taken from the uniform person
+        across = {3: hips, 6: shoulders, 9: shoulders, 12: shoulders}.get(j, np.eye(3)[np.argmin(np.abs(bone))])
+        frames[j] = frame(bone, across)
+    person = SMPL22.rest_positions()
     lean = rot.multiply(rot.inverse(_pelvis(person)), frame(np.eye(3)[1], np.eye(3)[0]))
     frames[0] = rot.multiply(_pelvis(rest), lean)
     return frames
 
 
 def _pelvis(rest: Array) -> Array:
-    """A frame of hip line and lower spine, whatever the pose."""
-    return frame(rest[1] - rest[2], rest[3] - rest[0])
-
-
-# Bandai Namco's skeleton has its bones along the local X axis (against it on the right) and a zero pose that is no
-# pose. The second axes were measured on its clips from the planes in which knees and elbows bend; they came out as
-# coordinate axes to within a degree. The sole slopes against the line from ankle to toe.
-BANDAI_LEFT_AXIS = {
-    0: (0, -1, 0),
-    **dict.fromkeys((1, 2, 4, 5, 7, 8, 10, 11), (0, 1, 0)),
-    **dict.fromkeys((3, 6, 9, 12, 15), (0, 0, 1)),
-}
-BANDAI_SOLE = (0.78, 0.0, 0.62)
-BANDAI_TOES = (0.92, 0.0, 0.40)
-
-
-def _is_bandai(skeleton: Skeleton) -> bool:
-    named = {"joint_Root", "Hips", "UpperLeg_L", "LowerArm_R", "Toes_L"} <= set(skeleton.names)
-    return named and abs(float(_unit(skeleton.offsets[skeleton.index("LowerLeg_L")])[0])) > 0.99
-
-
-def _bandai_frames(rest: Array) -> Array:
-    frames = np.tile(rot.IDENTITY, (22, 1))
-    for j, child in enumerate(CHILD):
-        out = -1.0 if SMPL22.names[j].startswith("right") else 1.0
-        bone = np.array([out, 0.0, 0.0])
-        if j in FEET:
-            bone = out * np.array(BANDAI_SOLE)
-        elif j in TOES:
-            bone = out * np.array(BANDAI_TOES)
-        elif child is not None and j != 0:
-            bone = rest[child] - rest[j]
-        second = np.array(BANDAI_LEFT_AXIS.get(j, (0.0, 0.0, out)), dtype=np.float64)
-        frames[j] = frame(bone, second)
-    return frames
+    """A frame of the hip line and the line from its middle to the spine, whatever the pose."""
+    return frame(hips_line(rest), rest[3] - rest[[1, 2]].mean(axis=0))

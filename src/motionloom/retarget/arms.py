@@ -8,27 +8,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom.retarget.anatomy import CHEST, SHOULDERS, Body
+from motionloom.retarget.anatomy import Body
+from motionloom.retarget.axes import CHEST, SHOULDERS
 from motionloom.retarget.limbs import aim, bend, placed
 
 Array = NDArray[np.float64]
 
 
-def shoulders_moved(positions: Array, world: Array, body: Body, *, chest_axes: Array | None = None) -> Array:
+def shoulders_moved(positions: Array, world: Array, body: Body) -> Array:
     """(frames, 2, 3) how far the shoulders are from their rest on the chest, in its frame and in lengths of the arm.
 
-    ``positions`` (frames, joints, 3) metres and ``world`` (frames, joints, 4) are of the body's joints;
-    ``chest_axes`` (4,) stands for the body's own joint_from_anatomy of the chest. Zero where no joint turns the chest
-    or arms have no length.
+    ``positions`` (frames, joints, 3) metres and ``world`` (frames, joints, 4) are of the body's joints. Zero
+    where no joint turns the chest or arms have no length.
     """
     chest = body.drivers[CHEST]
-    if chest is None or _arm(body) < 1e-6:
+    if chest is None or body.arm < 1e-6:
         return np.zeros((len(world), 2, 3))
-    axes = body.frames[CHEST] if chest_axes is None else chest_axes
     now = np.einsum("sj,fjc->fsc", body.points[list(SHOULDERS)], positions) - positions[:, chest, None]
     rest = body.rest[list(SHOULDERS)] - body.skeleton.rest_positions()[chest]
     moved = rot.rotate(rot.inverse(world[:, chest])[:, None], now) - rest
-    return np.asarray(rot.rotate(rot.inverse(axes), moved) / _arm(body), dtype=np.float64)
+    return np.asarray(rot.rotate(rot.inverse(body.frames[CHEST]), moved) / body.arm, dtype=np.float64)
 
 
 def reach(world: Array, moved: Array, body: Body) -> Array:
@@ -41,7 +40,7 @@ def reach(world: Array, moved: Array, body: Body) -> Array:
     if chest is None:
         return world
     positions = placed(body.skeleton, world)
-    lost = (moved - shoulders_moved(positions, world, body)) * _arm(body)
+    lost = (moved - shoulders_moved(positions, world, body)) * body.arm
     lost = rot.rotate(rot.multiply(world[:, chest], body.frames[CHEST])[:, None], lost)
     places = body.places(positions, world)
     for side, (shoulder, elbow, wrist) in enumerate(((16, 18, 20), (17, 19, 21))):
@@ -68,10 +67,5 @@ def _elbow_pole(world: Array, body: Body, shoulder: int, *, arm: Array, upper: A
     driver = body.drivers[shoulder]
     assert driver is not None
     behind = -rot.rotate(rot.multiply(world[:, driver], body.frames[shoulder]), np.eye(3)[1])
-    lack = (0.03 * _arm(body) - np.linalg.norm(out, axis=-1, keepdims=True)).clip(0)
+    lack = (0.03 * body.arm - np.linalg.norm(out, axis=-1, keepdims=True)).clip(0)
     return out + lack * behind
-
-
-def _arm(body: Body) -> float:
-    """Metres of upper arm and forearm, mean of both sides."""
-    return sum(body.bone(j) for j in (16, 17, 18, 19)) / 2

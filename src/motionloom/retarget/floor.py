@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.retarget.anatomy import FEET, TOES
+from motionloom.retarget.axes import FEET, TOES
 
 Array = NDArray[np.float64]
 

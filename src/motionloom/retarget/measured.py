@@ -1,63 +1,131 @@
-"""Anatomical frames measured from positions: bones and the planes in which knees and elbows bend."""
+"""Anatomical frames measured from a motion: bones, the trunk, and the planes in which knees and elbows bend.
+
+They are for skeletons whose rest pose is no pose: all bones along one axis, a person who lies or is folded.
+"""
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom.retarget.anatomy import ARMS, CHILD, FEET, HEAD, TOES, frame
+from motionloom.retarget.axes import (
+    ARMS,
+    CHILD,
+    FEET,
+    HEAD,
+    SPINE,
+    TOES,
+    frame,
+    hips_line,
+    shoulder_line,
+    trunk,
+    trunk_frame,
+    unit,
+)
 
 Array = NDArray[np.float64]
+_BENT = 0.15
+"""Sine of a knee's or an elbow's bend from which on the plane of the bend is known."""
+_SLOPES_DIFFER = np.radians(25)
+"""From here on a foot's bone points down by another angle at rest than where it stands."""
+_DOUBTFUL = 0.005
+"""The weight of a frame that says little, beside 1: it counts where no frame says more."""
 
 
-def frames_of_positions(places: Array) -> tuple[Array, Array]:
-    """World frames (frames, 22, 4) of the 22 joints (frames, 22, 3) and how sure each is (frames, 22), 0 to 1.
+def measure_frames(places: Array, world: Array, drivers: Sequence[int | None], otherwise: Array) -> Array:
+    """(22, 4) joint_from_anatomy, the mean over a motion.
 
-    A straight knee or elbow says nothing about the twist of its limb: its sureness is the sine of the bend.
+    places: (frames, 22, 3) metres, y up; world: (frames, joints, 4) the joints' orientations; drivers: per SMPL joint
+    the joint that turns it; otherwise: (22, 4) what stands for SMPL joints that nothing turns.
     """
-    hips, shoulders = places[:, 1] - places[:, 2], places[:, 16] - places[:, 17]
+    frames, weights = frames_of_places(places)
+    axes = otherwise.copy()
+    for j, driver in enumerate(drivers):
+        if driver is not None:
+            axes[j] = mean_rotation(rot.multiply(rot.inverse(world[:, driver]), frames[:, j]), weights[:, j])
+    return axes
+
+
+def frames_of_places(places: Array) -> tuple[Array, Array]:
+    """World frames (frames, 22, 4) of the 22 joints (frames, 22, 3) and how much each says (frames, 22), above 0 to 1.
+
+    A straight knee or elbow says nothing about the twist of its limb: its weight is the sine of the bend. Of the
+    pelvis, the spine and the head those frames count in which the trunk goes on where the thighs end, as in standing.
+    """
+    hips, shoulders, along = hips_line(places), shoulder_line(places), trunk(places)
+    ahead = np.cross(shoulders, along)
     result = np.empty((*places.shape[:2], 4))
-    sure = np.ones(places.shape[:2])
-    up = places[:, 12] - places[:, 9]
-    chest_forward = np.cross(shoulders, up)
+    weights = np.ones(places.shape[:2])
     for j, child in enumerate(CHILD):
-        bone = places[:, child] - places[:, j] if child is not None else up
-        across = {0: hips, 3: 2 * hips + shoulders, 6: hips + 2 * shoulders}.get(
-            j, chest_forward if j in ARMS else shoulders
-        )
-        result[:, j] = frame(bone, across)
-    result[:, 0] = rot.multiply(
-        frame(hips, places[:, 3] - places[:, 0]), rot.inverse(frame(np.eye(3)[1], np.eye(3)[0]))
-    )
-    result[:, HEAD] = result[:, 12]
+        bone = places[:, child] - places[:, j] if child is not None else along
+        result[:, j] = frame(np.where(_length(bone) > 1e-6, bone, along), ahead if j in ARMS else shoulders)
+    for j, share in ((0, 0.0), (3, 1 / 3), (6, 2 / 3), (9, 1.0), (HEAD, 1.0)):
+        result[:, j] = trunk_frame((1 - share) * unit(hips) + share * unit(shoulders), along)
+    weights[:, [0, *SPINE, 12, HEAD]] = _standing(places, along)[:, None]
     for upper, lower, end in ((1, 4, 7), (2, 5, 8)):
-        a, b = places[:, lower] - places[:, upper], places[:, end] - places[:, lower]
-        hinge = np.cross(a, b)
+        a, b = unit(places[:, lower] - places[:, upper]), unit(places[:, end] - places[:, lower])
+        bend = _bend(a, b)
+        hinge = np.where(bend[:, None] > _DOUBTFUL, np.cross(a, b), hips)
         result[:, upper], result[:, lower] = frame(a, hinge), frame(b, hinge)
-        sure[:, upper] = sure[:, lower] = _bend(a, b)
+        weights[:, [upper, lower]] = bend[:, None]
     for upper, lower, end in ((16, 18, 20), (17, 19, 21)):
-        a, b = places[:, lower] - places[:, upper], places[:, end] - places[:, lower]
-        result[:, upper], result[:, lower] = frame(a, b), frame(b, -a)
+        a, b = unit(places[:, lower] - places[:, upper]), unit(places[:, end] - places[:, lower])
+        bend = _bend(a, b)
+        known = bend[:, None] > _DOUBTFUL
+        result[:, upper], result[:, lower] = frame(a, np.where(known, b, ahead)), frame(b, np.where(known, -a, ahead))
         result[:, end] = result[:, lower]
-        sure[:, [upper, lower, end]] = _bend(a, b)[:, None]
+        weights[:, [upper, lower, end]] = bend[:, None]
     for foot, toe in zip(FEET, TOES):
         heading = (places[:, toe] - places[:, foot]) * np.array([1.0, 0.0, 1.0])
-        left = np.cross([0.0, 1.0, 0.0], heading)
-        result[:, foot] = result[:, toe] = frame(heading, left)
-        sure[:, foot] = sure[:, toe] = _flat(places, foot, toe)
-    return result, sure
+        result[:, foot] = result[:, toe] = frame(heading, np.cross([0.0, 1.0, 0.0], heading))
+        weights[:, [foot, toe]] = _flat(places, foot, toe)[:, None]
+    return result, weights
+
+
+def measure_sole(places: Array, world: Array, driver: int | None, *, rest: Array, foot: int) -> Array | None:
+    """(4,) joint_from_anatomy of a foot that stands flat in a motion, by another angle than it would at rest.
+
+    places: (frames, 22, 3) metres, y up; world: (frames, joints, 4) the joints' orientations; driver: the joint that
+    turns the foot; rest: (22, 3) metres, a rest pose that is upright along y; foot: SMPL's number of the ankle. None
+    where the rest pose stands as the motion does, or where the foot never stands.
+    """
+    knee, toe = foot - 3, foot + 3
+    shin, bone = places[:, knee] - places[:, foot], places[:, toe] - places[:, foot]
+    tall = float(np.linalg.norm(rest[knee] - rest[foot]))
+    stands = (_flat(places, foot, toe) == 1.0) & (unit(shin)[:, 1] > 0.8)
+    stands &= places[:, 0, 1] - places[:, foot, 1] > 1.2 * tall
+    if driver is None or stands.sum() < 3:
+        return None
+    falls = np.arcsin(-unit(bone[stands])[:, 1])
+    if abs(float(np.median(falls) - np.arcsin(-unit(rest[toe] - rest[foot])[1]))) < _SLOPES_DIFFER:
+        return None
+    heading = bone[stands] * np.array([1.0, 0.0, 1.0])
+    soles = frame(heading, np.cross([0.0, 1.0, 0.0], heading))
+    return mean_rotation(rot.multiply(rot.inverse(world[stands, driver]), soles), np.ones(len(soles)))
+
+
+def _length(vectors: Array) -> Array:
+    return np.asarray(np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def _standing(places: Array, along: Array) -> Array:
+    """(frames,) near 1 where the trunk goes on where the thighs end and both are upright."""
+    thighs = unit(places[:, [1, 2]].mean(axis=1) - places[:, [4, 5]].mean(axis=1))
+    straight = (unit(along) * thighs).sum(axis=-1).clip(0, 1) * unit(along)[:, 1].clip(0, 1)
+    return np.maximum(straight**8, _DOUBTFUL)
 
 
 def _bend(a: Array, b: Array) -> Array:
-    sine = np.linalg.norm(np.cross(a, b), axis=-1) / np.maximum(
-        np.linalg.norm(a, axis=-1) * np.linalg.norm(b, axis=-1), 1e-9
-    )
-    return np.where(sine > 0.15, sine, 0.0)
+    """(frames,) the sine between two directions where it is large enough to show their plane."""
+    sine = np.linalg.norm(np.cross(a, b), axis=-1)
+    return np.where(sine > _BENT, sine, _DOUBTFUL)
 
 
 def _flat(places: Array, foot: int, toe: int) -> Array:
     """1 in frames where ankle and toe are both as low as they get."""
     low = [places[:, j, 1] < np.percentile(places[:, j, 1], 20) + 0.01 for j in (foot, toe)]
-    return (low[0] & low[1]).astype(float)
+    return np.where(low[0] & low[1], 1.0, _DOUBTFUL)
 
 
 def mean_rotation(q: Array, weight: Array) -> Array:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
-from motionloom.retarget.anatomy import FEET, TOES, read_body
+from motionloom.retarget.anatomy import read_body
+from motionloom.retarget.axes import FEET, TOES
 from motionloom.retarget.measured import mean_rotation
 from motionloom.retarget.transfer import joints22, retarget, to_smpl22
 from motionloom.skeleton import Skeleton

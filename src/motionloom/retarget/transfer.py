@@ -14,19 +14,21 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.motion import Motion
-from motionloom.retarget.anatomy import CHEST, CHILD, COLLARS, FEET, HEAD, TOES, Body, read_body
+from motionloom.retarget.anatomy import Body, read_body
 from motionloom.retarget.arms import reach, shoulders_moved
+from motionloom.retarget.axes import CHEST, CHILD, COLLARS, FEET, HEAD, SPINE, TOES, trunk
 from motionloom.retarget.floor import Stance, read_stance
 from motionloom.retarget.joint_map import Override, joint_map
 from motionloom.retarget.limbs import aim, bend, placed
-from motionloom.retarget.measured import frames_of_positions, mean_rotation
 from motionloom.retarget.root import RootMode, place_root
 from motionloom.retarget.topology import ancestors
-from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.skeleton import SMPL22, Poses, Skeleton
 
 Array = NDArray[np.float64]
 _LEG = 0.82
 _DEEPEST = 0.08
+_ROUNDS = 4
+_ALIGNED = np.cos(np.radians(0.5))
 _LEGS = (0.2, 2.5)
 """Metres of thigh and shin: of the uniform person, and of bodies whose feet are looked at as they are."""
 
@@ -74,17 +76,18 @@ def retarget(
     or as ``root`` says (`place_root`), with places that change. Raises `MotionloomError` if either skeleton is no
     humanoid.
     """
-    source, body = read_body(motion.skeleton, source_map), read_body(target, target_map)
+    source, body = _read_source(motion, source_map), read_body(target, target_map)
     if not _LEGS[0] < source.leg < _LEGS[1]:  # of another unit, or a giant: what counts here is how it moves
         motion = motion.scaled(_LEG / source.leg)
-        source = read_body(motion.skeleton, source_map)
+        source = _read_source(motion, source_map)
     if not _LEGS[0] < body.leg < _LEGS[1]:
         size = _LEG / body.leg
         made = retarget(motion, target.scaled(size), source_map=source_map, target_map=target_map, root=root).scaled(
             1 / size
         )
         return replace(made, skeleton=target)
-    pose = _read_pose(_y_up(motion, source), source)
+    shrugs = not any(b.drivers[j] is None for b in (source, body) for j in COLLARS)
+    pose = _read_pose(_y_up(motion, source), source, shrugs=shrugs)
     stance = read_stance(pose.places, motion.fps)
     characters = [b for b in (source, body) if b.on_floor and b.skeleton != SMPL22]
     if source.on_floor and characters:  # a recording's skeleton knows no floor
@@ -94,10 +97,15 @@ def retarget(
         out = body.broad - source.broad * body.leg / source.leg
         goals = _spread(goals, out * _smooth_left(pose, motion.fps))
     world = _orient(pose, body)
-    if any(b.drivers[j] is None for b in (source, body) for j in COLLARS):
+    if not shrugs:
         world = reach(world, pose.shoulders, body)
     made = _place(world, goals, body, motion.fps)
     return made if root is None else place_root(made, body, root)
+
+
+def _read_source(motion: Motion, override: Override | None) -> Body:
+    """The body of a motion, measured from the motion itself where its rest pose is no pose."""
+    return read_body(motion.skeleton, override, poses=Poses(motion.root, motion.rotations, motion.translations))
 
 
 # 1. Read -------------------------------------------------------------------------------------------------------------
@@ -113,27 +121,33 @@ class _Pose:
     """(frames, 3) metres: the middle between the hip joints."""
     shoulders: Array
     """(frames, 2, 3) how far they are from their rest on the chest (`shoulders_moved`)."""
+    trunk: Array
+    """(frames, 3) from the middle of the hip joints to that of the shoulder joints; where one of the two bodies has no
+    collar bones, to where the shoulders belong on the chest."""
 
 
-def _read_pose(motion: Motion, source: Body) -> _Pose:
+def _read_pose(motion: Motion, source: Body, *, shrugs: bool) -> _Pose:
     world = motion.world_rotations()
     places = source.places(motion.positions(), world)
-    axes = source.frames if source.upright else _measured_axes(places, world, source)
     frames = np.empty((len(motion), 22, 4))
     for j, driver in enumerate(source.drivers):
         above = SMPL22.parents[j]
         if driver is not None:
-            frames[:, j] = rot.multiply(world[:, driver], axes[j])
+            frames[:, j] = rot.multiply(world[:, driver], source.frames[j])
         elif CHILD[j] is None:
             frames[:, j] = frames[:, above]
         else:  # no such bone, such as a collar bone: it moves with the one above as on the uniform person
             frames[:, j], bone = _borrowed(frames[:, above], j)
             places[:, j] = places[:, CHILD[j]] - bone
-        if CHILD[j] is not None and j not in (0, *FEET):  # the places have the last word on where a bone points
+        if CHILD[j] is not None and j not in (0, *SPINE, *FEET):  # the places say where a bone points
             bone = places[:, CHILD[j]] - places[:, j]
             frames[:, j] = rot.multiply(_turn(rot.rotate(frames[:, j], np.eye(3)[0]), bone), frames[:, j])
-    moved = shoulders_moved(motion.positions(), world, source, chest_axes=axes[CHEST])
-    return _Pose(places, frames, _hips(places, frames, source), moved)
+    moved = shoulders_moved(motion.positions(), world, source)
+    line = trunk(places)
+    if not shrugs and (chest := source.drivers[CHEST]) is not None:
+        lifted = rot.rotate(rot.multiply(world[:, chest], source.frames[CHEST])[:, None], moved) * source.arm
+        line = line - lifted.mean(axis=1)
+    return _Pose(places, frames, _hips(places, frames, source), moved, line)
 
 
 def _hips(places: Array, frames: Array, source: Body) -> Array:
@@ -171,16 +185,6 @@ def _turn(a: Array, b: Array) -> Array:
     """Smallest turn from a to b; none where b has no length."""
     turn = rot.shortest_arc(a, b)
     return np.where(np.linalg.norm(b, axis=-1, keepdims=True) > 1e-6, turn, rot.IDENTITY)
-
-
-def _measured_axes(places: Array, world: Array, source: Body) -> Array:
-    """joint_from_anatomy from the motion itself, for a skeleton whose rest pose is no pose."""
-    frames, sure = frames_of_positions(places)
-    axes = source.frames.copy()
-    for j, driver in enumerate(source.drivers):
-        if driver is not None and sure[:, j].sum() > 1.0:
-            axes[j] = mean_rotation(rot.multiply(rot.inverse(world[:, driver]), frames[:, j]), sure[:, j])
-    return axes
 
 
 # 2. Scale ------------------------------------------------------------------------------------------------------------
@@ -282,10 +286,28 @@ def _orient(pose: _Pose, body: Body) -> Array:
         j = first[k]
         world[:, k] = rot.multiply(pose.frames[:, j], rot.inverse(body.frames[j]))
         end = _bone_end(body, j)
-        by_sole = body.upright and j in FEET  # two flat feet agree in the sole, whatever their ankles' height
-        if end is not None and j not in (0, HEAD) and not by_sole:
+        known = body.upright or body.measured  # then flat feet agree in the sole, and spines in how they turn
+        if end is not None and j not in (0, HEAD) and not (known and j in (*SPINE, *FEET)):
             along = rot.rotate(world[:, k], body.rest[end] - body.rest[j])
             world[:, k] = rot.multiply(_turn(along, pose.places[:, end] - pose.places[:, j]), world[:, k])
+    return _straighten(world, body, pose.trunk)
+
+
+def _straighten(world: Array, body: Body, wanted: Array) -> Array:
+    """World rotations (frames, joints, 4) with the spine turned so that the trunk points along ``wanted`` (frames, 3).
+
+    The line from the hips to the shoulders says how a trunk leans; single joints of the spine lie elsewhere on every
+    skeleton. Pelvis, collar bones, neck and limbs keep their orientations.
+    """
+    turning = {body.drivers[j]: j for j in reversed(SPINE) if body.drivers[j] not in (None, body.drivers[0])}
+    wanted = wanted / np.maximum(np.linalg.norm(wanted, axis=-1, keepdims=True), 1e-9)
+    for _ in range(_ROUNDS if turning else 0):
+        now = trunk(body.places(placed(body.skeleton, world), world))
+        now = now / np.maximum(np.linalg.norm(now, axis=-1, keepdims=True), 1e-9)
+        if float((now * wanted).sum(axis=-1).min()) > _ALIGNED:
+            break
+        for joint in turning.values():
+            world = aim(world, body, joint, now, wanted)
     return world
 
 

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.motion import Motion
-from motionloom.retarget.anatomy import FEET, HEAD, TOES, read_body
+from motionloom.retarget.anatomy import read_body
+from motionloom.retarget.axes import FEET, HEAD, TOES
 from motionloom.retarget.joint_map import Override
 
 Array = NDArray[np.float64]
