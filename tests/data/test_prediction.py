@@ -15,7 +15,7 @@ from motionloom.data.prediction import (
     read_cmu,
     read_folder,
 )
-from motionloom.data.sources import Take, find_takes
+from motionloom.data.sources import Places, Take, find_takes
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import SMPL_LAYOUT
 from motionloom.skeleton import SMPL22
@@ -69,7 +69,7 @@ def test_nothing_long_enough_is_said() -> None:
 
 
 def take(name: str) -> Take:
-    return Take(name, "cmu", "", "train", (), lambda: (np.zeros((1, 22, 3)), 30.0))
+    return Take(name, "cmu", "", "train", (), lambda: Places(np.zeros((1, 22, 3)), np.zeros((1, 22, 3)), 30.0))
 
 
 def test_cmu_is_split_by_subject() -> None:

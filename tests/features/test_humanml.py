@@ -12,6 +12,7 @@ from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT
 from motionloom.skeleton import HUMANML_BONE_LENGTHS, SMPL22
 from tests.features.people import wander
+from tests.kinematics import people
 
 PAIRS = list(SMPL22.mirror_pairs())
 SEEDS = st.integers(0, 10_000)
@@ -39,6 +40,16 @@ def test_corrected_heading_loses_only_the_facing_of_frame_0(seed: int) -> None:
     decoded = humanml.decode_positions(humanml.encode(positions, heading="corrected"))
     q = humanml.heading_quaternions(positions, heading="corrected")[0]
     np.testing.assert_allclose(decoded, rot.rotate(q, positions)[:-1], atol=2e-5)
+
+
+@pytest.mark.parametrize("rounds", [1.5, -2.0])
+def test_corrected_heading_goes_on_when_somebody_turns_past_where_they_started(rounds: float) -> None:
+    """The published code turns the frame in which the facing passes -Z by the wrong sign, and all that follow."""
+    positions = humanml.uniform(people.circling(2.0, rounds))
+    q = humanml.heading_quaternions(positions, heading="corrected")[0]
+    there = rot.rotate(q, positions - positions[0, 0] * [1, 0, 1])[:-1]
+    decoded = humanml.decode_positions(humanml.encode(positions, heading="corrected"))
+    np.testing.assert_allclose(decoded, there, atol=1e-4)
 
 
 @pytest.mark.parametrize("heading", ["compatible", "corrected"])

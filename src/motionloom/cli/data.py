@@ -26,6 +26,11 @@ def add(subparsers) -> None:
         "--exclude", action="append", default=[], metavar="NAME",
         help="leave out the takes whose names begin so, and all that would be made of them; may be given again",
     )  # fmt: skip
+    build.add_argument(
+        "--allow", action="append", default=[], metavar="NAME[=REASON]",
+        help="let in the takes whose names begin so though their bodies do not do what was recorded; the reason stands "
+        "in set.json; may be given again",
+    )  # fmt: skip
     build.set_defaults(run=_build)
 
 
@@ -35,5 +40,10 @@ def _build(arguments: argparse.Namespace) -> None:
 
     build(
         arguments.folders, arguments.out, captions=arguments.captions, workers=arguments.workers, mixed=arguments.mixed,
-        exclude=arguments.exclude, find=find_takes,
+        exclude=arguments.exclude, allow=_reasons(arguments.allow), find=find_takes,
     )  # fmt: skip
+
+
+def _reasons(said: list[str]) -> dict[str, str]:
+    """``NAME=REASON`` by name."""
+    return {name: reason for name, _, reason in (text.partition("=") for text in said)}

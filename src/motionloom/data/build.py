@@ -1,7 +1,8 @@
 """`motionloom data build`: folders of recordings to one training set of features, captions and splits.
 
 A built set is a folder: ``clips/NAME.safetensors`` (features (frames, 263) float32; the metadata holds captions, split,
-source and licence as JSON) and ``set.json`` (counts, mean, std, what was dropped and why). Every clip is written whole
+source and licence as JSON), ``fidelity/NAME`` (how true the body is, `data.gate`) and ``set.json`` (counts, mean, std,
+what was dropped and why). Every clip is written whole
 or not at all, so a build that was stopped goes on where it was.
 """
 
@@ -13,16 +14,17 @@ import re
 import signal
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from motionloom.data import augment
+from motionloom.data import augment, gate
 from motionloom.data.actions import ACTIONS, PREFIX, action_of, core, sentences, side_of, strike, turned_to
 from motionloom.data.clips import SHORTEST, STATES, Clip, Note, read_clip, write_clip
 from motionloom.data.derived import (
@@ -38,7 +40,7 @@ from motionloom.data.derived import (
 )
 from motionloom.data.made import hands_up
 from motionloom.data.person import uniform_person
-from motionloom.data.sources import Span, Take, find_takes
+from motionloom.data.sources import Places, Span, Take, find_takes
 from motionloom.data.windows import label_clip
 from motionloom.data.words import mirror_text
 from motionloom.errors import MotionloomError
@@ -57,17 +59,21 @@ LONG = 60
 """Frames from which on the part of a described change that matters is looked for."""
 
 
-def clips_of(take: Take) -> Iterator[Clip]:
-    """A take as clips: itself, its mirror image, and in training loops and curves of gaits and walks run backwards."""
+def clips_of(take: Take, *, check: Callable[[Places, Clip], None] | None = None) -> Iterator[Clip]:
+    """A take as clips: itself, its mirror image, and in training loops and curves of gaits and walks run backwards.
+
+    check: called with what was recorded and the first clip, before any is yielded; what it raises ends the take.
+    """
     read = take.read()
-    if not isinstance(read, tuple):  # finished HumanML3D features
+    if isinstance(read, np.ndarray):  # finished HumanML3D features
         yield from _with_mirror(_clip(take, np.asarray(read, dtype=np.float32), "plain"))
         return
-    positions, fps = read
-    positions = uniform_person(positions, fps)
+    positions = uniform_person(read.positions, read.fps)
     if len(positions) <= SHORTEST:
         raise MotionloomError(f"only {len(positions) / FPS:.2f} s long; at least {SHORTEST / FPS:.0f} s are needed")
     clip = _clip(take, hml.encode(positions, heading="corrected"), "plain")
+    if check is not None:
+        check(read, clip)
     yield from _with_mirror(clip)
     if take.split == "train":
         yield from _more(take, clip, positions)
@@ -180,27 +186,42 @@ def _with_mirror(clip: Clip) -> Iterator[Clip]:
 
 Finder = Callable[..., list[Take]]
 """As `data.sources.find_takes`; a function of a module, so that worker processes find it too."""
-Job = tuple[str, str, str, str, Finder]
-"""Folder, captions, name of the take, folder of the built set, what finds the takes of the folder."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One take to be made into clips."""
+
+    folder: str
+    captions: str
+    name: str
+    out: str
+    """Folder of the built set."""
+    find: Finder
+    allowed: str = ""
+    """Why the take may come in though its body is not that of the recording."""
+
 
 _takes: dict[tuple[str, str], dict[str, Take]] = {}
 
 
 def _prepare(job: Job) -> tuple[str, str]:
     """In a worker: write the clips of one take. Returns its name and why it was dropped ('' if it was not)."""
-    folder, captions, name, out, find = job
-    key = (folder, captions)
+    key, out, reason = (job.folder, job.captions), Path(job.out), ""
     if key not in _takes:
-        _takes[key] = {take.name: take for take in reversed(find(folder, captions=captions or None))}
-    reason = ""
+        _takes[key] = {take.name: take for take in reversed(job.find(job.folder, captions=job.captions or None))}
+
+    def check(places: Places, clip: Clip) -> None:
+        gate.admit(out, job.name, places, clip, allowed=job.allowed)
+
     try:
-        for clip in clips_of(_takes[key][name]):
-            write_clip(Path(out) / "clips", clip)
+        for clip in clips_of(_takes[key][job.name], check=check):
+            write_clip(out / "clips", clip)
     except MotionloomError as error:
         reason = str(error)
-    with atomic_path(Path(out) / "done" / name) as temp:
+    with atomic_path(out / "done" / job.name) as temp:
         temp.write_text(reason, encoding="utf-8")
-    return name, reason
+    return job.name, reason
 
 
 def build(
@@ -211,23 +232,29 @@ def build(
     workers: int = 2,
     mixed: int = 700,
     exclude: Sequence[str] = (),
+    allow: Mapping[str, str] = MappingProxyType({}),
     find: Finder = find_takes,
     progress: Callable[[str], None] = print,
 ) -> Path:
     """Build a training set from folders of recordings; returns ``set.json``. Takes already done are kept.
 
+    A take whose clip does not show its recording (`data.gate`) is dropped.
+
     exclude: takes whose names begin with one of these are left out, and so is all that would be made of them.
+    allow: beginnings of names of takes that come in all the same, and why.
     find: what finds the takes of a folder.
     """
     out = Path(out)
     if workers < 1 or mixed < 0:
         raise MotionloomError(f"at least 1 worker and 0 mixed clips are needed; got {workers} and {mixed}")
     jobs = list(_jobs(folders, captions, out, find=find, progress=progress))
-    jobs = _without(jobs, exclude)
-    for part in ("clips", "done"):
+    jobs = _allowing(_without(jobs, exclude), allow)
+    if (out / "done").exists() and not (out / gate.FOLDER).exists():
+        raise MotionloomError(f"{out} is of a version that did not look at bodies; build into another folder")
+    for part in ("clips", gate.FOLDER, "done"):
         (out / part).mkdir(parents=True, exist_ok=True)
         sweep(out / part)
-    left = [job for job in jobs if not (out / "done" / job[2]).exists()]
+    left = [job for job in jobs if not _is_done(job)]
     progress(f"{len(left)} takes to do, {len(jobs) - len(left)} already done")
     for number, (name, reason) in enumerate(_run(left, workers), start=1):
         if reason:
@@ -237,16 +264,34 @@ def build(
     return _finish(out, mixed, progress)
 
 
+def _is_done(job: Job) -> bool:
+    """Whether an earlier build finished the take; what it refused and is allowed now is done again."""
+    done = (Path(job.out) / "done" / job.name).exists()
+    return done and not (job.allowed and gate.refused(Path(job.out), job.name))
+
+
 def _without(jobs: list[Job], exclude: Sequence[str]) -> list[Job]:
     """The jobs whose takes' names begin with none of ``exclude``."""
     for prefix in exclude:
-        left_out = [job for job in jobs if prefix and job[2].startswith(prefix)]
+        left_out = [job for job in jobs if prefix and job.name.startswith(prefix)]
         if not left_out:
             raise MotionloomError(f"no take's name begins with {prefix!r}, which was to be left out; see the manifests")
-        for _, _, name, out, _ in left_out:
-            if (Path(out) / "done" / name).exists():
-                raise MotionloomError(f"{out} already holds {name}, which is to be left out; build into another folder")
-    return [job for job in jobs if not job[2].startswith(tuple(exclude))]
+        for job in left_out:
+            if (Path(job.out) / "done" / job.name).exists():
+                raise MotionloomError(
+                    f"{job.out} already holds {job.name}, which is to be left out; build into another folder"
+                )
+    return [job for job in jobs if not job.name.startswith(tuple(exclude))]
+
+
+def _allowing(jobs: list[Job], allow: Mapping[str, str]) -> list[Job]:
+    """The jobs, with the reason of those whose takes' names begin as one of ``allow`` does."""
+    for prefix in allow:
+        if not prefix or not any(job.name.startswith(prefix) for job in jobs):
+            raise MotionloomError(f"no take's name begins with {prefix!r}, which was to be allowed; see the manifests")
+    reasons = {prefix: reason.strip() or gate.NO_REASON for prefix, reason in allow.items()}
+    why = (next((r for prefix, r in reasons.items() if job.name.startswith(prefix)), "") for job in jobs)
+    return [replace(job, allowed=reason) for job, reason in zip(jobs, why, strict=True)]
 
 
 def _jobs(
@@ -268,7 +313,7 @@ def _jobs(
                 progress(f"dropped a second {take.name} in {folder}: the one in {seen[take.name]} is used")
                 continue
             seen[take.name] = str(folder)
-            yield str(folder), str(captions or ""), take.name, str(out), find
+            yield Job(str(folder), str(captions or ""), take.name, str(out), find)
 
 
 def _begin_worker() -> None:
@@ -312,9 +357,12 @@ def _finish(out: Path, mixed: int, progress: Callable[[str], None]) -> Path:
     if not clips:
         raise MotionloomError(f"no take could be used; the reasons stand in {out / 'done'}")
     dropped = {p.name: text for p in finished(out / "done", "*") if (text := p.read_text(encoding="utf-8"))}
-    about = _summary(clips, dropped)
+    compared = gate.read_compared(out)
+    about = _summary(clips, dropped, compared)
     with atomic_path(out / "set.json") as temp:
         Path(temp).write_text(json.dumps(about, indent=1), encoding="utf-8")
+    for line in gate.lines_of(about["fidelity"]):
+        progress(line)
     progress(f"{len(clips)} clips, {about['minutes']} minutes, {len(dropped)} takes dropped: {out / 'set.json'}")
     return out / "set.json"
 
@@ -330,8 +378,8 @@ def _derived(clips: Sequence[Clip], mixed: int) -> Iterator[Clip]:
                 yield from (clip,) if derive is mixed_clips else _with_mirror(clip)
 
 
-def _summary(clips: Sequence[Clip], dropped: dict[str, str]) -> dict[str, Any]:
-    """What a set holds: counts, minutes, licences, and the statistics of its training clips."""
+def _summary(clips: Sequence[Clip], dropped: dict[str, str], compared: Mapping[str, gate.Compared]) -> dict[str, Any]:
+    """What a set holds: counts, minutes, licences, how true its bodies are, and statistics of its training clips."""
     frames = np.concatenate([c.features for c in clips if c.split == "train"] or [np.zeros((1, 263), np.float32)])
     counts = Counter(f"{c.source}/{c.split}/{c.way}" for c in clips)
     labels = Counter(n.kind for c in clips for n in c.notes if c.split == "train")
@@ -341,6 +389,10 @@ def _summary(clips: Sequence[Clip], dropped: dict[str, str]) -> dict[str, Any]:
         "notes": dict(labels.most_common()),
         "licences": sorted({c.licence for c in clips}),
         "dropped": dropped,
+        "allowed": {
+            name: {"reason": one.allowed, "faults": list(one.faults)} for name, one in compared.items() if one.allowed
+        },
+        "fidelity": gate.summary(compared),
         "mean": [round(float(v), 6) for v in frames.mean(0, dtype=np.float64)],
         "std": [round(float(v), 6) for v in frames.std(0, dtype=np.float64)],
     }

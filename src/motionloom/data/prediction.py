@@ -136,9 +136,9 @@ def _read(
         except MotionloomError as error:
             say(f"left out {take.name}: {error}")
             continue
-        if not isinstance(read, tuple):
+        if isinstance(read, np.ndarray):
             raise MotionloomError(f"{take.name} is kept as features; prediction needs recordings of joints")
-        positions = resample_positions(read[0], read[1], target=fps)
+        positions = resample_positions(read.positions, read.fps, target=fps)
         if not np.isfinite(positions).all():
             say(f"left out {take.name}: its positions are not finite")
             continue

@@ -18,7 +18,8 @@ from motionloom.io import load, text
 from motionloom.io.atomic import finished
 from motionloom.io.npz import read_array
 from motionloom.kinematics.physics import Array
-from motionloom.retarget import to_smpl22
+from motionloom.motion import Motion
+from motionloom.retarget import joints22, to_smpl22
 
 CMU_LICENCE = "CMU mocap: free for research and commercial use; acknowledge mocap.cs.cmu.edu, NSF EIA-0196217"
 BANDAI_LICENCE = "Bandai-Namco-Research-Motiondataset, CC BY-NC 4.0: non-commercial use only"
@@ -50,6 +51,17 @@ class Span:
             check_caption(said)
 
 
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where the 22 joints of a recording are, on two bodies: (frames, 22, 3) metres each."""
+
+    positions: Array
+    """Of the uniform person, the floor at y = 0."""
+    own: Array
+    """Of the recording's own skeleton, in its own world (`joints22`)."""
+    fps: float
+
+
 @dataclass(frozen=True)
 class Take:
     """One recorded clip before it is turned into features."""
@@ -59,9 +71,8 @@ class Take:
     licence: str
     split: str
     spans: tuple[Span, ...]
-    read: Callable[[], tuple[Array, float] | np.ndarray]
-    """Joints of the uniform person (frames, 22, 3) in metres, the floor at y = 0, with their frame rate; or finished
-    features (frames, 263)."""
+    read: Callable[[], Places | np.ndarray]
+    """What was recorded, or finished features (frames, 263)."""
     kind: str = "capture"
     """``capture`` or ``keyed``: animated by hand, which shows what is done but not how people move."""
 
@@ -204,12 +215,13 @@ def _texts(path: Path) -> Iterator[Span]:
         yield span
 
 
-def _reader(path: Path, *, fps: float | None, unit: float | None) -> Callable[[], tuple[Array, float]]:
-    def read() -> tuple[Array, float]:
-        motion = to_smpl22(load(path, fps=fps, unit=unit))
-        return motion.positions(), motion.fps
+def places_of(motion: Motion) -> Places:
+    """A motion on any humanoid skeleton on both bodies; raises `MotionloomError` if it is no humanoid."""
+    return Places(to_smpl22(motion).positions(), joints22(motion), motion.fps)
 
-    return read
+
+def _reader(path: Path, *, fps: float | None, unit: float | None) -> Callable[[], Places]:
+    return lambda: places_of(load(path, fps=fps, unit=unit))
 
 
 def _features(path: Path) -> Callable[[], np.ndarray]:

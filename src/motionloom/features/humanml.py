@@ -3,10 +3,12 @@
 Guo et al., "Generating Diverse and Natural 3D Human Motions From Text", CVPR 2022, as its published code behaves.
 Metres, +Y up, a person faces +Z and has the left side at +X. Arithmetic is float64; features are float32.
 
-The numbers carry three habits of the published code, kept under ``heading="compatible"`` (weights and statistics out
-there expect them) and absent under ``heading="corrected"``: the hip labels are swapped, so hips partly cancel the
-shoulders in the heading; the heading of frame 0 is forced to +Z; see `heading_quaternions`. Rotations are shortest arcs
-from the rest directions, without twist, and not those of a body model; `motionloom.kinematics.ik` makes real ones.
+The numbers carry habits of the published code, kept under ``heading="compatible"`` (weights and statistics out there
+expect them) and absent under ``heading="corrected"``: the hip labels are swapped, so hips partly cancel the shoulders
+in the heading; the heading of frame 0 is forced to +Z (see `heading_quaternions`); and the turn of the one frame in
+which somebody comes to face away from the start, -Z, has the wrong sign, so that the rest is decoded turned by twice
+that. Rotations are shortest arcs from the rest directions, without twist, and not those of a body model;
+`motionloom.kinematics.ik` makes real ones.
 """
 
 from itertools import pairwise
@@ -145,6 +147,8 @@ def encode(positions: np.ndarray, *, heading: Heading = "compatible") -> NDArray
         raise MotionloomError("features need at least 2 frames of positions; got 1")
     turn = heading_quaternions(positions, heading=heading)
     step = rot.multiply(turn[1:], rot.inverse(turn[:-1]))
+    if heading == "corrected":
+        step = np.where(step[:, :1] < 0, -step, step)
     moved = np.diff(positions, axis=0)
     places = rot.rotate(turn[:-1, None], positions[:-1, 1:] - positions[:-1, :1] * [1, 0, 1])
     frames = len(moved)

@@ -5,10 +5,8 @@ from pathlib import Path
 
 from motionloom.data import pairs, sources
 from motionloom.data.pairs import Pair
-from motionloom.data.sources import Span, Take
-from motionloom.kinematics.physics import Array
+from motionloom.data.sources import Places, Span, Take, places_of
 from motionloom.lab.papers import babel, threedpw
-from motionloom.retarget import to_smpl22
 
 BABEL_LICENCE = "BABEL / AMASS: non-commercial research under the licences of BABEL, AMASS and its subsets"
 
@@ -42,9 +40,5 @@ def _babel(folder: Path) -> Iterator[Take]:
         )
 
 
-def _babel_reader(folder: Path, recording: babel.Recording) -> Callable[[], tuple[Array, float]]:
-    def read() -> tuple[Array, float]:
-        motion = to_smpl22(babel.read_amass(babel.find_motion(folder, recording)))
-        return motion.positions(), motion.fps
-
-    return read
+def _babel_reader(folder: Path, recording: babel.Recording) -> Callable[[], Places]:
+    return lambda: places_of(babel.read_amass(babel.find_motion(folder, recording)))
