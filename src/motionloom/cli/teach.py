@@ -44,6 +44,10 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="what is taught (default: default)")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--threads", type=int, help="CPU threads")
+    parser.add_argument(
+        "--amp", choices=("auto", "bf16", "float32"), default="auto",
+        help="what is multiplied in; auto takes what is quicker on this machine (default)",
+    )  # fmt: skip
     parser.add_argument("--unit", type=as_unit, metavar="UNIT", help="unit of a BVH or ASF: m, cm, inch, or metres")
     parser.add_argument("--up", choices=("y", "z"), default="y", help="the axis that is up in the files (default y)")
     parser.add_argument("--source-fps", type=as_rate, metavar="N", help="take this rate for the files' (AMC: 120)")
@@ -159,7 +163,9 @@ def _teach(
     given = {key: getattr(arguments, key) for key in ("steps", "rank", "keep") if getattr(arguments, key) is not None}
     if not 0 <= arguments.seed < 2**31:
         fail(f"--seed must be 0 or more and below 2**31; got {arguments.seed}")
-    lesson = Lesson(name=arguments.name or out.stem, licence=arguments.licence, seed=arguments.seed, **given)
+    lesson = Lesson(
+        name=arguments.name or out.stem, licence=arguments.licence, seed=arguments.seed, amp=arguments.amp, **given
+    )  # fmt: skip
     prior = Prior.load(arguments.weights, device=arguments.device)
     began = time.perf_counter()
     adapter = teach(prior, examples, lesson, say=lambda line: print(line, file=sys.stderr))

@@ -153,7 +153,7 @@ def train_control(
             say(f"step {step}: {_report(held, now, prior.net)}")
 
     log = Log(folder, recipe, say=say) if world.rank == 0 else None
-    train(objective, recipe, folder, world=world, wrap=_wrap, on_save=export, on_step=log, stop=stop)
+    train(objective, recipe, folder, world=world, wrap=_wrap, on_save=export, on_step=log, stop=stop, say=say)
     return place
 
 

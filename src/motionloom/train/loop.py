@@ -12,7 +12,7 @@ import time
 import warnings
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from motionloom.errors import MotionloomError
 from motionloom.io.tensors import save_tensors
 from motionloom.io.text import plain_json
 from motionloom.train.objectives import Objective
+from motionloom.train.precision import choose
 from motionloom.train.recipe import Recipe
 from motionloom.weights.prior import read_tensors
 
@@ -182,6 +183,8 @@ def changed(folder: Path, recipe: Recipe) -> list[str]:
     try:
         before = plain_json(read_tensors(folder / STATE)[1]["recipe"])
         now = asdict(recipe)
+        if recipe.amp == "auto":
+            del now["amp"]  # goes on as it was
         return [f"{key} is now {now[key]!r} and was {before.get(key)!r}" for key in now if before.get(key) != now[key]]
     except (KeyError, ValueError, AttributeError, RecursionError):
         return []
@@ -197,11 +200,14 @@ def train(
     on_save: Callable[[nn.Module, Average, int], None] | None = None,
     on_step: Callable[[int, float, float], None] | None = None,
     stop: int | None = None,
+    say: Callable[[str], None] = lambda line: None,
 ) -> Average:
     """Run a recipe in ``folder``, going on from the state found there; returns the averaged weights.
 
     ``wrap`` turns the trained module into what is called in a step (binding, compiling). ``on_save(net, average,
     step)`` and ``on_step(step, loss, seconds)`` run in the first process. ``stop``: end early after so many steps.
+    ``say`` hears what is multiplied in where the recipe leaves that open, and after the first steps how long the run
+    will take. A run that goes on multiplies in what it did, unless the recipe says otherwise.
     """
     world, folder = world or World(), Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -209,6 +215,7 @@ def train(
     average = Average(net, recipe.ema)
     optimizer = make_optimizer(net, recipe)
     done = load_state(folder / STATE, net, average, optimizer) if (folder / STATE).is_file() else 0
+    recipe = replace(recipe, amp=_precision(recipe, folder, net, world, say=say))
     called = wrap(net)
     if world.size > 1:
         places = [world.device] if world.device.startswith("cuda") else None
@@ -217,18 +224,70 @@ def train(
     last = min(recipe.steps, stop or recipe.steps)
     if done >= last and world.rank == 0 and on_save:  # stopped between the last state and its weights
         on_save(net, average, done)
+    pace = Pace(done, last, say)
     for step in range(done, last):
         began = time.perf_counter()
         loss = _step(objective, called, optimizer, recipe, step=step, world=world)
         average.update(net, step)
         if world.rank == 0:
+            seconds = time.perf_counter() - began
+            pace(seconds)
             if on_step:
-                on_step(step, loss, time.perf_counter() - began)
+                on_step(step, loss, seconds)
             if (step + 1) % recipe.save_every == 0 or step + 1 == last:
                 save_state(folder, net, average, optimizer, step=step + 1, recipe=recipe)
                 if on_save:
                     on_save(net, average, step + 1)
     return average
+
+
+def _precision(recipe: Recipe, folder: Path, net: nn.Module, world: World, *, say: Callable[[str], None]) -> str:
+    """What the run multiplies in, ``bf16`` or ``float32``, the same in all processes."""
+    said = recipe.amp
+    if said == "auto" and (folder / STATE).is_file():
+        said = str(plain_json(read_tensors(folder / STATE)[1]["recipe"])["amp"])
+    if said != "auto":
+        return "bf16" if said == "bf16" else "float32"
+    chosen = "float32"
+    if world.rank == 0:
+        chosen, why = choose(net, world.device)
+        say(why)
+    if world.size > 1:
+        half = torch.tensor(chosen == "bf16", dtype=torch.uint8, device=world.device)
+        dist.broadcast(half, 0)
+        chosen = "bf16" if half else "float32"
+    return chosen
+
+
+class Pace:
+    """Says once, after the first steps, how long the rest will take."""
+
+    STEPS, SECONDS = 10, 20.0
+    """It is said after so many steps, or earlier once these seconds have gone by."""
+
+    def __init__(self, done: int, last: int, say: Callable[[str], None]) -> None:
+        self.left, self.say, self.told = last - done, say, False
+        self.seen: list[float] = []
+
+    def __call__(self, seconds: float) -> None:
+        """Take in how long a step took. The first one counts only while there is no other: much is set up in it."""
+        self.left -= 1
+        if self.told:
+            return
+        self.seen.append(seconds)
+        if len(self.seen) == self.STEPS or sum(self.seen) >= self.SECONDS:
+            self.told = True
+            usual = self.seen[1:] or self.seen
+            mean = sum(usual) / len(usual)
+            self.say(f"{self.left:,} more steps of about {mean:.2g} s: {_span(mean * self.left)}")
+
+
+def _span(seconds: float) -> str:
+    """A length of time in words."""
+    minutes = round(seconds / 60)
+    if minutes < 2:
+        return f"about {max(round(seconds), 1)} s"
+    return f"about {minutes} minutes" if minutes < 100 else f"about {minutes // 60} h {minutes % 60} min"
 
 
 def _step(

@@ -299,7 +299,7 @@ def train_pair(
         say(f"going on with another recipe than before: {line}")
     export = _Export(recipe, prior, config, held_out(objective, pairs), seen, folder=folder, say=say)
     log = Log(folder, recipe, say=say) if world.rank == 0 else None
-    train(objective, recipe, folder, world=world, wrap=_wrap(recipe), on_save=export, on_step=log, stop=stop)
+    train(objective, recipe, folder, world=world, wrap=_wrap(recipe), on_save=export, on_step=log, stop=stop, say=say)
     return export.place
 
 

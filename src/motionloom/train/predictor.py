@@ -302,7 +302,7 @@ def train_predictor(
             say(f"step {step}: held-out loss {_held_loss(made, held, settings):.4f}")
 
     log = Log(folder, recipe, say=say) if world.rank == 0 else None
-    train(objective, recipe, folder, world=world, wrap=_wrap(recipe), on_save=export, on_step=log, stop=stop)
+    train(objective, recipe, folder, world=world, wrap=_wrap(recipe), on_save=export, on_step=log, stop=stop, say=say)
     return place
 
 

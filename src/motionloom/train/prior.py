@@ -79,7 +79,7 @@ def train_prior(
         return torch.compile(called, dynamic=True) if recipe.compile else called  # type: ignore[return-value]
 
     log = Log(folder, recipe, say=say) if world.rank == 0 else None
-    train(objective, recipe, folder, world=world, wrap=wrap, on_save=export, on_step=log, stop=stop)
+    train(objective, recipe, folder, world=world, wrap=wrap, on_save=export, on_step=log, stop=stop, say=say)
     return place
 
 

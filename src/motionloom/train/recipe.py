@@ -11,6 +11,7 @@ from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
 from motionloom.io.text import read_utf8
 from motionloom.nets.prior import NetConfig
+from motionloom.train.precision import CHOICES
 
 MAX_BYTES = 1 << 16
 MAX_DOTS = 200
@@ -47,8 +48,8 @@ class Recipe:
     """Largest norm of the gradient."""
     ema: float = 0.999
     """Decay of the averaged weights that are sampled from."""
-    amp: str = "bf16"
-    """``bf16`` or ``none``."""
+    amp: str = "auto"
+    """What is multiplied in: ``bf16``, ``float32``, or whichever is quicker here; see `motionloom.train.precision`."""
     compile: bool = False
     """Compile the network with torch.compile: pays on a GPU and on long runs."""
     displacement: float = 0.0
@@ -167,7 +168,7 @@ def _in_range(recipe: Recipe) -> Iterator[bool]:
     yield 0 <= recipe.warmup <= 10**9
     yield recipe.clip <= 1e6
     yield recipe.levels > 1
-    yield recipe.amp in ("bf16", "none")
+    yield recipe.amp in CHOICES
     yield recipe.schedule in SCHEDULES
     yield recipe.spacing in ("index", "early")
 

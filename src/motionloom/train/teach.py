@@ -8,7 +8,7 @@ preservation, Ruiz et al. 2023). Since nothing is taught without words, guidance
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from tempfile import TemporaryDirectory
 
 import numpy as np
@@ -24,6 +24,7 @@ from motionloom.nets.text.known import bare
 from motionloom.tasks.text import sample_features
 from motionloom.train.loop import Average, World, train
 from motionloom.train.objectives import WEIGHTS, Conditioned, WordBank, displacement_error, masked_error
+from motionloom.train.precision import CHOICES, choose
 from motionloom.train.recipe import Recipe
 from motionloom.weights.adapter import TAUGHT, Adapter, AdapterNet, origin, tensors_of
 from motionloom.weights.prior import Prior
@@ -78,12 +79,16 @@ class Lesson:
     keep: float = KEEP
     """Share of the rows, 0 to 0.9, on what the prior knows already."""
     seed: int = 0
+    amp: str = "auto"
+    """What is multiplied in; see `motionloom.train.precision`."""
 
     def __post_init__(self) -> None:
         limits = (("steps", 1, 100_000), ("batch", 2, 1024), ("rank", 1, 128), ("rate", 1e-6, 0.1), ("keep", 0, 0.9))
         for key, low, high in limits:
             if not low <= getattr(self, key) <= high:
                 raise MotionloomError(f"{key} must be {low:g} to {high:g}; got {getattr(self, key)!r}")
+        if self.amp not in CHOICES:
+            raise MotionloomError(f"amp must be one of {', '.join(CHOICES)}; got {self.amp!r}")
 
 
 def teach(
@@ -91,8 +96,9 @@ def teach(
 ) -> Adapter:
     """An adapter that makes ``prior`` show what the examples show where their captions are asked for.
 
-    The same seed teaches the same on the same machine with as many threads. Raises `MotionloomError` where there is
-    nothing to learn from, and for a prior that does not draw 263 numbers a frame at 20 per second.
+    The same seed teaches the same on the same machine with as many threads and the same `Lesson.amp`, which the
+    adapter's notes tell. Raises `MotionloomError` where there is nothing to learn from, and for a prior that does not
+    draw 263 numbers a frame at 20 per second.
     """
     lesson = lesson or Lesson()
     if len(prior.mean) != WIDTH or prior.fps != FPS:
@@ -110,15 +116,21 @@ def teach(
     )  # fmt: skip
     torch.manual_seed(lesson.seed)
     net = AdapterNet(prior.net, lesson.rank, given_rank=0, taught=True)
+    device, amp = str(prior.mean.device), lesson.amp
+    if amp == "auto":
+        amp, why = choose(net, device)
+        say(why)
     objective = Teaching(net, prior, examples, list(zip(kept, drawn, strict=True)), others, keep=lesson.keep)
     recipe = Recipe(
         name=lesson.name, steps=lesson.steps, batch=lesson.batch, rate=lesson.rate, seed=lesson.seed, warmup=40,
-        cooldown=0.5, ema=0.99, decay=0.0, save_every=lesson.steps,
+        cooldown=0.5, ema=0.99, decay=0.0, save_every=lesson.steps, amp=amp,
     )  # fmt: skip
     with TemporaryDirectory(prefix="motionloom-teach-") as folder:
-        world = World(device=str(prior.mean.device))
-        average = train(objective, recipe, folder, world=world, wrap=_wrap, on_step=_progress(lesson, say))
-    return _adapter(prior, examples, captions, lesson, average)
+        progress = _progress(lesson, say)
+        average = train(
+            objective, recipe, folder, world=World(device=device), wrap=_wrap, on_step=progress, say=say
+        )  # fmt: skip
+    return _adapter(prior, examples, captions, replace(lesson, amp=amp), average)
 
 
 def known_prompts(prior: Prior, captions: Sequence[str], seed: int) -> tuple[list[str], list[str]]:
@@ -294,7 +306,7 @@ def _adapter(
     seconds = sum(e.shown[1] - e.shown[0] for e in recorded if not e.looped) / FPS
     notes = {
         "captions": captions[:64], "clips": len(recorded), "seconds": round(seconds, 1), "steps": lesson.steps,
-        "batch": lesson.batch, "rate": lesson.rate, "keep": lesson.keep, "seed": lesson.seed,
+        "batch": lesson.batch, "rate": lesson.rate, "keep": lesson.keep, "seed": lesson.seed, "amp": lesson.amp,
     }  # fmt: skip
     licence = lesson.licence or f"as the owner of the clips allows, and as the prior's: {prior.card.licence}"
     data = f"{len(recorded)} clips of the user's own: {'; '.join(captions)[:500]}"

@@ -312,6 +312,11 @@ class AdapterNet(nn.Module):
     def _pair(self, name: str) -> tuple[nn.Parameter, nn.Parameter]:
         return self.factors[_plain(f"{name}.down")], self.factors[_plain(f"{name}.up")]  # type: ignore[return-value]
 
+    @property
+    def whole(self) -> AdaptedNet:
+        """The frozen network and the adapter's changes of it."""
+        return self._net[0]
+
     def bind(self, cond: Condition) -> Bound:
         """See `PriorNet.bind`."""
         return self._net[0].bind(cond)

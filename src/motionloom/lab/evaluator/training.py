@@ -134,7 +134,7 @@ def train_evaluator(
         save_embedder(Embedder(made.eval(), mean, std, text, card), place)
 
     log = Log(folder, recipe, say=say) if world.rank == 0 else None
-    train(objective, recipe, folder, world=world, on_save=export, on_step=log, stop=stop)
+    train(objective, recipe, folder, world=world, on_save=export, on_step=log, stop=stop, say=say)
     return place
 
 
