@@ -4,11 +4,15 @@ import numpy as np
 
 from motionloom import rotations as rot
 from motionloom.blending import crossfade, shares, smootherstep
+from motionloom.data.idle import Idle, extended
 from motionloom.features import humanml as hml
 from motionloom.features.layout import LAYOUT
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 
+NO_IDLE = Idle(())
+STANDING = 0.12
+"""Metres rms from a recorded standing pose that a pose may be for that recording to go on from it."""
 UPPER = (12, 13, 14, 15, 16, 17, 18, 19, 20, 21)
 """Neck, head and arms."""
 
@@ -84,31 +88,52 @@ def can_hold(positions: Array, fps: float, *, end: bool, fastest: float = 0.45) 
     return bool(moved.mean() < fastest and moved[:, 0].mean() < 0.75 * fastest and few[..., 1].min() < lowest + 0.12)
 
 
-def held(positions: Array, before: int, after: int, *, fps: float, seed: int) -> Array:
-    """The first pose held for ``before`` frames and the last for ``after``, alive: (frames, 22, 3) to a longer one.
+def held(positions: Array, before: int, after: int, *, fps: float, seed: int, idle: Idle = NO_IDLE) -> Array:
+    """What was before and after a stretch (frames, 22, 3): ``before`` and ``after`` more frames of somebody alive.
 
-    People who stand sway by about a centimetre at the head and hardly at the feet (Winter 1995, quiet stance); what is
-    on the floor stays. The speed at the ends runs out within a third of a second instead of stopping dead.
+    Where an end stands as people in ``idle`` do, one of those recordings leads to it or goes on from it. Any other pose
+    is held, swaying as a recorded person does, or, with nothing recorded, by about a centimetre at the head and hardly
+    at the feet (Winter 1995, quiet stance). The speed at the ends runs out within a third of a second.
     """
     rng = np.random.default_rng(seed)
-    tail = _pause(positions[-1], positions[-1] - positions[-2], after, fps, rng)
-    head = _pause(positions[0], positions[0] - positions[1], before, fps, rng)[::-1]
-    return np.concatenate([head, positions, tail])
+    longer = _continued(positions, after, fps, rng, idle)
+    return _continued(longer[::-1], before, fps, rng, idle)[::-1]
 
 
-def _pause(pose: Array, step: Array, frames: int, fps: float, rng: np.random.Generator) -> Array:
+def stands_on(pose: Array, idle: Idle) -> bool:
+    """Whether a pose (22, 3) is one from which recorded people go on standing."""
+    return idle.nearest(pose, np.random.default_rng(0), limit=STANDING) is not None
+
+
+def _continued(positions: Array, frames: int, fps: float, rng: np.random.Generator, idle: Idle) -> Array:
+    """``positions`` and ``frames`` more."""
+    if frames <= 0:
+        return positions
+    stretch = idle.nearest(positions[-1], rng, limit=STANDING)
+    whole = None if stretch is None else joined(positions, extended(stretch, frames + 1)[1:], blend=16, limit=0.25)
+    if whole is not None:
+        return whole
+    return np.concatenate([positions, _pause(positions[-1], positions[-1] - positions[-2], frames, fps, rng, idle)])
+
+
+def _pause(pose: Array, step: Array, frames: int, fps: float, rng: np.random.Generator, idle: Idle) -> Array:
     """A pose (22, 3) that is held for some frames: it runs out of its last ``step`` (22, 3) and sways."""
     time = np.arange(1, frames + 1) / fps
     high = np.clip((pose[:, 1] - 0.08) / 1.4, 0, 1)
     run_out = 0.1 * (1 - np.exp(-time / 0.1))[:, None, None] * (step * fps)[None] * (high > 0)[:, None]
+    sway = idle.sway(frames + 1, rng)
+    if sway is not None:
+        recorded = np.clip((pose[:, 1] - 0.08) / 0.6, 0, 1)
+        turn = -float(ph.heading(pose[None])[0])
+        return pose + run_out + recorded[:, None] * ph.turned(sway[1:], np.full((frames, 1), turn))
     starts = np.minimum(time / 1.0, 1.0)[:, None]
     periods, phases = rng.uniform(1.8, 6.0, (2, 5, 3)), rng.uniform(0, 2 * np.pi, (2, 5, 3))
     waves = np.sin(2 * np.pi * time[:, None, None, None] / periods + phases) - np.sin(phases)
     body, arms = (waves[:, i].mean(1) * [1, 0.2, 1] * starts for i in (0, 1))
     loose = np.zeros(len(pose))
     loose[[18, 19]], loose[[20, 21]] = 0.4, 1.0
-    sway = 0.014 * high[:, None] * body[:, None] + 0.012 * (loose * (high > 0.2))[:, None] * arms[:, None]
-    return pose + run_out + sway
+    drift = 0.014 * high[:, None] * body[:, None] + 0.012 * (loose * (high > 0.2))[:, None] * arms[:, None]
+    return pose + run_out + drift
 
 
 def joined(first: Array, second: Array, *, blend: int = 10, limit: float = 0.16) -> Array | None:

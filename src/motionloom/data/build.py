@@ -30,14 +30,16 @@ from motionloom.data.clips import SHORTEST, STATES, Clip, Note, read_clip, write
 from motionloom.data.derived import (
     LOOPED,
     SEATED,
+    held_clips,
     joined_clips,
     laid_down,
-    lengthened,
+    looped,
     made_clips,
     mixed_clips,
     posture_clips,
     there_and_back,
 )
+from motionloom.data.idle import find_idle
 from motionloom.data.made import hands_up
 from motionloom.data.person import uniform_person
 from motionloom.data.sources import Places, Span, Take, find_takes
@@ -50,7 +52,7 @@ from motionloom.io.atomic import atomic_path, finished, sweep
 from motionloom.kinematics.physics import Array
 from motionloom.skeleton import SMPL22
 
-_DERIVED = re.compile(r"M?(mixed|joined|made|posture|there)_\d")
+_DERIVED = re.compile(r"M?(held|mixed|joined|made|posture|there)_\d")
 _NAME = re.compile(r"\w[\w.+ -]{0,120}")
 BENDS = (0.35, 0.75, 1.0)
 """Radians per second: a wide turn, and circles in 8.4 and 6.3 seconds."""
@@ -77,7 +79,7 @@ def clips_of(take: Take, *, check: Callable[[Places, Clip], None] | None = None)
     yield from _with_mirror(clip)
     if take.split == "train":
         yield from _more(take, clip, positions)
-        for number, longer in enumerate(lengthened(take, clip, positions)):
+        for number, longer in enumerate(looped(clip)):
             yield from _with_mirror(replace(longer, name=f"{longer.name}{number}"))
 
 
@@ -136,7 +138,7 @@ def _action_notes(span: Span, features: np.ndarray, first: int, *, name: str) ->
             kept = (first + begin, first + end)
     written = span.texts if span.kind == "human" and not by_name and not action.turns else ()
     if action.name in SEATED and written and hands_up(positions):
-        texts = ()  # people take a seat with their hands down: `lengthened` makes that
+        texts = ()  # people take a seat with their hands down: `held_clips` makes that
     return [Note(first, last, PREFIX + action.name, (*written, *texts), kept)]
 
 
@@ -372,9 +374,12 @@ def _derived(clips: Sequence[Clip], mixed: int) -> Iterator[Clip]:
     frames = sum(len(clip.features) for clip in clips)
     for seed, licence in enumerate(sorted({clip.licence for clip in clips})):
         same = [clip for clip in clips if clip.licence == licence]
-        share = sum(len(clip.features) for clip in same) / frames
+        share, idle = sum(len(clip.features) for clip in same) / frames, find_idle(same)
+        longer = [held for clip in held_clips(same, idle) for held in _with_mirror(clip)]
+        yield from longer
+        same += longer
         for derive in (mixed_clips, laid_down, joined_clips, made_clips, posture_clips, there_and_back):
-            for clip in derive(same, round(mixed * share), seed):
+            for clip in derive(same, round(mixed * share), seed, idle):
                 yield from (clip,) if derive is mixed_clips else _with_mirror(clip)
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from motionloom.data import augment
 from motionloom.data.actions import ACTIONS, PREFIX, Action, sentences, side_of, turned_to
 from motionloom.data.clips import MADE, SHORTEST, THEN, Clip, Note
+from motionloom.data.idle import Idle
 from motionloom.data.made import GESTURES, hands_up, lower_arms, perform, words_for
 from motionloom.data.person import at_origin
 from motionloom.data.postures import Posture, assume, postures
-from motionloom.data.sources import Take
 from motionloom.data.words import sentence
 from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS, LAYOUT
@@ -25,35 +25,64 @@ POSTURES = (
     "crouch", "bow", "fall",
 )  # fmt: skip
 """Actions that end (and begin) in a posture which people keep, though many a recording is cut a moment before."""
+BRIEFLY = 20
+"""Frames for which a pose is held in which nobody stays."""
 SEATED = ("sit down", "stand up", "sit down and stand up")
 
 
-def lengthened(take: Take, clip: Clip, positions: Array) -> Iterator[Clip]:
-    """Short examples of an action at the lengths that are asked for: cycles go on, ends that can be held are held."""
-    seed = int.from_bytes(take.name.encode(), "little") % 2**32
-    for number, note in enumerate(n for n in clip.notes if n.kind.startswith(PREFIX)):
-        action, frames = ACTIONS[note.kind.removeprefix(PREFIX)], note.last - note.first
-        if frames > LOOPED - 40:
-            continue
-        if action.kind in ("cycle", "repeats") and frames < 160:
+def looped(clip: Clip) -> Iterator[Clip]:
+    """Short cycles and exercises of a recorded clip that go on."""
+    for note in _actions(clip):
+        if _is_cycle(note):
             longer = augment.loop(clip.features[note.first : note.last], LOOPED, limit=0.12)
             if longer is not None:
                 yield _derived(clip, longer, "looped", (replace(note, first=0, last=len(longer), core=None),))
-                continue
-        first, last = note.core or (note.first, note.last)
-        cut = positions[first : last + 1]
-        for reverse in (False, True)[: 1 + bool(action.reverse)]:
-            shown = augment.reversed_in_time(cut) if reverse else cut
-            texts = sentences(ACTIONS[action.reverse]) if reverse else note.texts
-            name = action.reverse if reverse else action.name
-            if name in SEATED and hands_up(shown):
-                lowered, said = lower_arms(shown), sentences(ACTIONS[name])
-                yield from _held(clip, lowered, PREFIX + name, said, seed=seed + 2 * number + reverse + 7)
-                continue
-            yield from _held(clip, shown, PREFIX + name, texts, seed=seed + 2 * number + reverse)
 
 
-def _held(clip: Clip, shown: Array, kind: str, texts: tuple[str, ...], *, seed: int) -> Iterator[Clip]:
+def held_clips(clips: Sequence[Clip], idle: Idle) -> Iterator[Clip]:
+    """Short examples of an action at the lengths that are asked for: somebody stands, or stays, before and after.
+
+    clips: of one licence; of the recorded ones for training. What runs backwards as another action (sitting down as
+    standing up) does so too.
+    """
+    for clip in clips:
+        if clip.way != "plain" or clip.split != "train" or clip.name.startswith("M"):
+            continue
+        positions = hml.decode_positions(clip.features.astype(np.float64))
+        seed = int.from_bytes(clip.name.encode(), "little") % 2**32
+        made = 0
+        for number, note in enumerate(_actions(clip)):
+            for longer in _held_ways(clip, note, positions, seed=seed + 2 * number, idle=idle):
+                yield replace(longer, name=f"held_{made}_{clip.name}")
+                made += 1
+
+
+def _actions(clip: Clip) -> list[Note]:
+    return [n for n in clip.notes if n.kind.startswith(PREFIX) and n.last - n.first <= LOOPED - 40]
+
+
+def _is_cycle(note: Note) -> bool:
+    return ACTIONS[note.kind.removeprefix(PREFIX)].kind in ("cycle", "repeats") and note.last - note.first < 160
+
+
+def _held_ways(clip: Clip, note: Note, positions: Array, *, seed: int, idle: Idle) -> Iterator[Clip]:
+    if _is_cycle(note) and augment.loop(clip.features[note.first : note.last], LOOPED, limit=0.12) is not None:
+        return
+    action = ACTIONS[note.kind.removeprefix(PREFIX)]
+    first, last = note.core or (note.first, note.last)
+    cut = positions[first : last + 1]
+    for reverse in (False, True)[: 1 + bool(action.reverse)]:
+        shown = augment.reversed_in_time(cut) if reverse else cut
+        texts = sentences(ACTIONS[action.reverse]) if reverse else note.texts
+        name = action.reverse if reverse else action.name
+        if name in SEATED and hands_up(shown):
+            shown, texts = lower_arms(shown), sentences(ACTIONS[name])
+        yield from _held(clip, shown, PREFIX + name, texts, seed=seed + reverse, idle=idle)
+
+
+def _held(
+    clip: Clip, shown: Array, kind: str, texts: tuple[str, ...], *, seed: int, idle: Idle = augment.NO_IDLE
+) -> Iterator[Clip]:
     posture = kind.removeprefix(PREFIX) in POSTURES
     fastest = 1.2 if posture else 0.45
     start, end = (augment.can_hold(shown, FPS, end=at_end, fastest=fastest) for at_end in (False, True))
@@ -63,7 +92,10 @@ def _held(clip: Clip, shown: Array, kind: str, texts: tuple[str, ...], *, seed: 
     room = max(150 - len(shown), 30)
     before = int(rng.integers(8, min(55, room))) if start else 0
     after = max(room - before, 25) if end else 0
-    longer = augment.held(shown, before, after, fps=FPS, seed=seed)
+    if not posture:  # nobody stays in the middle of a movement
+        before = before if augment.stands_on(shown[0], idle) else min(before, BRIEFLY)
+        after = after if augment.stands_on(shown[-1], idle) else min(after, BRIEFLY)
+    longer = augment.held(shown, before, after, fps=FPS, seed=seed, idle=idle)
     features = hml.encode(at_origin(hml.uniform(longer)), heading="corrected")
     whole = (max(before - 3, 0), min(before + len(shown) + 2, len(features)))
     yield _derived(clip, features, "held", (Note(0, len(features), kind, texts, whole),))
@@ -73,7 +105,7 @@ def _derived(clip: Clip, features: np.ndarray, way: str, notes: tuple[Note, ...]
     return replace(clip, name=f"{clip.name}_{way}", way=way, notes=notes, features=features.astype(np.float32))
 
 
-def laid_down(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
+def laid_down(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
     """From standing to lying, out of a crouch and of lying down from one, and the same film backwards: getting up."""
     parts = {
         name: [
@@ -97,12 +129,12 @@ def laid_down(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip
         clip = pairs[number][1][0]
         for name, shown in (("lie down", both), ("get up", augment.reversed_in_time(both))):
             texts = sentences(ACTIONS[name])
-            for longer in _held(clip, shown, PREFIX + name, texts, seed=seed * 100_003 + int(number)):
+            for longer in _held(clip, shown, PREFIX + name, texts, seed=seed * 100_003 + int(number), idle=idle):
                 yield replace(longer, name=f"joined_{seed}_{name.replace(' ', '_')}{made}", way="joined")
         made += 1
 
 
-def joined_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
+def joined_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
     """One action and then another, where the poses in between agree; training clips of one licence."""
     rng = np.random.default_rng(seed)
     pool = _by_action(clips)
@@ -125,7 +157,7 @@ def joined_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[C
         base = Clip(
             name, picked[0][0].source, picked[0][0].licence, "train", "joined", (), picked[0][0].features, keyed
         )
-        for clip in _held(base, both, PREFIX + THEN, texts, seed=seed * 100_003 + number):
+        for clip in _held(base, both, PREFIX + THEN, texts, seed=seed * 100_003 + number, idle=idle):
             made += 1
             yield replace(clip, name=name, way="joined")
 
@@ -162,7 +194,7 @@ def _core_positions(clip: Clip, note: Note, rng: np.random.Generator) -> Array:
     return hml.decode_positions(clip.features[first:last].astype(np.float64))
 
 
-def made_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
+def made_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
     """Gestures of the arms (`data.made`) on people who stand, sit or walk; training clips of one licence."""
     rng = np.random.default_rng(seed)
     bodies = _labelled(clips, ("stand", "walk", "sit"))
@@ -181,7 +213,7 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Cli
         begin = float(rng.uniform(0.8, 1.0))
         needed = round(FPS * (begin + 1.5 * gesture.times))
         if needed > len(body):
-            body = augment.held(body, 0, needed - len(body), fps=FPS, seed=seed * 100_003 + number)
+            body = augment.held(body, 0, needed - len(body), fps=FPS, seed=seed * 100_003 + number, idle=idle)
         positions = perform(body, gesture, side, fps=FPS, begin=begin, rng=rng)
         features = hml.encode(positions, heading="corrected")
         texts = words_for(gesture, side, leads[where], rng)
@@ -195,7 +227,7 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Cli
             )
 
 
-def mixed_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
+def mixed_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
     """Arms of a gesture on the body of a gait, both from training clips of one licence."""
     rng = np.random.default_rng(seed)
     bodies = _labelled(
@@ -233,7 +265,7 @@ def _positions(clip: Clip, note: Note) -> Array:
     return hml.decode_positions(clip.features[note.first : note.last].astype(np.float64))
 
 
-def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
+def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
     """Changes of the whole body (`data.postures`) on people who stand with hanging arms; training clips of one licence.
 
     A tenth of ``count`` of each posture.
@@ -245,7 +277,7 @@ def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[
         body = hml.decode_positions(below.features[note.first : note.first + 60].astype(np.float64))
         if rng.random() < 0.7:
             body = lower_arms(body)
-        body = augment.held(body, 0, max(0, LOOPED - len(body)), fps=FPS, seed=seed * 100_003 + number)
+        body = augment.held(body, 0, max(0, LOOPED - len(body)), fps=FPS, seed=seed * 100_003 + number, idle=idle)
         for kind, posture in enumerate(postures(body, rng)):
             begin = float(rng.uniform(0.8, 1.0))
             frames = min(len(body), round(FPS * (begin + posture.seconds(kept=float(rng.uniform(1.5, 4.0))))))
@@ -276,7 +308,7 @@ def _stands_plainly(clip: Clip, note: Note) -> bool:
     return bool(step < 0.12 and p[:, [20, 21], 1].max() < p[:, 6, 1].min() and p[..., 1].min() > -0.02)
 
 
-def there_and_back(clips: Sequence[Clip], count: int, seed: int = 0) -> Iterator[Clip]:
+def there_and_back(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
     """Walks that turn right round and come back: a walk, somebody's turn, another walk; training clips of one licence.
 
     Recordings hold only a few. A tenth of ``count``.

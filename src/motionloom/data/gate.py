@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 
 from motionloom.data.clips import Clip
-from motionloom.data.person import levelled_feet
 from motionloom.data.sources import Places
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from motionloom.io.atomic import atomic_path, finished
 from motionloom.io.text import plain_json
-from motionloom.retarget.fidelity import LEG, Fidelity, Spread, compare
+from motionloom.retarget.fidelity import Fidelity, Spread, compare
 
 FOLDER = "fidelity"
 NO_REASON = "no reason stated"
@@ -47,14 +46,10 @@ class Compared:
 
 
 def fidelity_of(places: Places, clip: Clip) -> Fidelity:
-    """How truly a built clip, whole and not mirrored, shows its recording.
-
-    Feet that a recording's skeleton has turned up are levelled in the recording as they were in the clip.
-    """
+    """How truly a built clip, whole and not mirrored, shows its recording."""
     built = hml.decode_positions(clip.features.astype(np.float64))
     own = hml.resample_positions(places.own, places.fps)[: len(built)]
-    leg = float(np.linalg.norm(own[0, [4, 7]] - own[0, [1, 4]], axis=-1).sum())
-    return compare(levelled_feet(own * (LEG / leg)) if leg > 0 else own, built)
+    return compare(own, built)
 
 
 def admit(out: Path, take: str, places: Places, clip: Clip, *, allowed: str = "") -> None:

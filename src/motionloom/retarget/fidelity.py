@@ -30,7 +30,7 @@ stand where the recording's do, and on hips of another breadth the thighs then l
 """
 PELVIS = (35.0, 60.0)
 """The same of the short line from the hips up to the pelvis, whose slope is 26 degrees on one sound skeleton."""
-PLACES_CM, PLACE_CM = 4.0, 8.0
+PLACES_CM, PLACE_CM = 4.0, 10.0
 """Centimetres that the median stays under: of all places together, and of each."""
 LEG = 0.82
 """Metres of thigh and shin of the person on whom places are compared: the uniform one."""

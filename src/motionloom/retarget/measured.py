@@ -23,12 +23,13 @@ from motionloom.retarget.axes import (
     trunk_frame,
     unit,
 )
+from motionloom.skeleton import SMPL22
 
 Array = NDArray[np.float64]
 _BENT = 0.15
 """Sine of a knee's or an elbow's bend from which on the plane of the bend is known."""
-_SLOPES_DIFFER = np.radians(25)
-"""From here on a foot's bone points down by another angle at rest than where it stands."""
+_SLOPES = np.radians((-10, 45))
+"""By how much the bone to the toes points down on feet that are flat; a rest pose with others is on its toes."""
 _DOUBTFUL = 0.005
 """The weight of a frame that says little, beside 1: it counts where no frame says more."""
 
@@ -77,32 +78,49 @@ def frames_of_places(places: Array) -> tuple[Array, Array]:
         result[:, end] = result[:, lower]
         weights[:, [upper, lower, end]] = bend[:, None]
     for foot, toe in zip(FEET, TOES):
-        heading = (places[:, toe] - places[:, foot]) * np.array([1.0, 0.0, 1.0])
-        result[:, foot] = result[:, toe] = frame(heading, np.cross([0.0, 1.0, 0.0], heading))
-        weights[:, [foot, toe]] = _flat(places, foot, toe)[:, None]
+        stands = _stands(places, foot)
+        result[:, foot] = result[:, toe] = np.where(stands[:, None], _level_sole(places, foot), _sole(places, foot))
+        weights[:, [foot, toe]] = np.where(stands, 1.0, _DOUBTFUL)[:, None]
     return result, weights
 
 
 def measure_sole(places: Array, world: Array, driver: int | None, *, rest: Array, foot: int) -> Array | None:
-    """(4,) joint_from_anatomy of a foot that stands flat in a motion, by another angle than it would at rest.
+    """(4,) joint_from_anatomy of a foot that stands flat in a motion and not in the rest pose.
 
     places: (frames, 22, 3) metres, y up; world: (frames, joints, 4) the joints' orientations; driver: the joint that
     turns the foot; rest: (22, 3) metres, a rest pose that is upright along y; foot: SMPL's number of the ankle. None
-    where the rest pose stands as the motion does, or where the foot never stands.
+    where the rest pose has flat feet, or where the foot never stands.
     """
-    knee, toe = foot - 3, foot + 3
-    shin, bone = places[:, knee] - places[:, foot], places[:, toe] - places[:, foot]
-    tall = float(np.linalg.norm(rest[knee] - rest[foot]))
-    stands = (_flat(places, foot, toe) == 1.0) & (unit(shin)[:, 1] > 0.8)
-    stands &= places[:, 0, 1] - places[:, foot, 1] > 1.2 * tall
-    if driver is None or stands.sum() < 3:
+    slope = float(np.arcsin(-unit(rest[foot + 3] - rest[foot])[1]))
+    stands = _stands(places, foot)
+    if driver is None or stands.sum() < 3 or _SLOPES[0] < slope < _SLOPES[1]:
         return None
-    falls = np.arcsin(-unit(bone[stands])[:, 1])
-    if abs(float(np.median(falls) - np.arcsin(-unit(rest[toe] - rest[foot])[1]))) < _SLOPES_DIFFER:
-        return None
-    heading = bone[stands] * np.array([1.0, 0.0, 1.0])
-    soles = frame(heading, np.cross([0.0, 1.0, 0.0], heading))
-    return mean_rotation(rot.multiply(rot.inverse(world[stands, driver]), soles), np.ones(len(soles)))
+    soles = rot.multiply(rot.inverse(world[stands, driver]), _level_sole(places, foot)[stands])
+    return mean_rotation(soles, np.ones(len(soles)))
+
+
+def _stands(places: Array, foot: int) -> Array:
+    """(frames,) bool: ankle and toe are as low as they get, below an upright shin and a body that is up."""
+    shin, bone = places[:, foot - 3] - places[:, foot], places[:, foot + 3] - places[:, foot]
+    low = [places[:, j, 1] < np.percentile(places[:, j, 1], 20) + 0.01 for j in (foot, foot + 3)]
+    upright = (unit(shin)[:, 1] > 0.8) & (unit(bone)[:, 1] > -0.9)
+    return low[0] & low[1] & upright & (places[:, 0, 1] - places[:, foot, 1] > 1.2 * _length(shin)[:, 0])
+
+
+def _level_sole(places: Array, foot: int) -> Array:
+    """(frames, 4) the frame of a sole that is level and points where the toes are."""
+    heading = (places[:, foot + 3] - places[:, foot]) * np.array([1.0, 0.0, 1.0])
+    return frame(heading, np.cross([0.0, 1.0, 0.0], heading))
+
+
+def _sole(places: Array, foot: int) -> Array:
+    """(frames, 4) the frame of a sole against which the bone to the toes slopes as on the uniform person."""
+    shin, bone = places[:, foot] - places[:, foot - 3], places[:, foot + 3] - places[:, foot]
+    left = np.cross(unit(bone), unit(shin))
+    left = np.where(_length(left) > _BENT, left, hips_line(places))
+    person = SMPL22.rest_positions()
+    fall = np.arcsin(-unit(person[foot + 3] - person[foot])[1])
+    return rot.multiply(frame(bone, left), rot.inverse(rot.rotvec_to_quat(np.array([0.0, fall, 0.0]))))
 
 
 def _length(vectors: Array) -> Array:
@@ -120,12 +138,6 @@ def _bend(a: Array, b: Array) -> Array:
     """(frames,) the sine between two directions where it is large enough to show their plane."""
     sine = np.linalg.norm(np.cross(a, b), axis=-1)
     return np.where(sine > _BENT, sine, _DOUBTFUL)
-
-
-def _flat(places: Array, foot: int, toe: int) -> Array:
-    """1 in frames where ankle and toe are both as low as they get."""
-    low = [places[:, j, 1] < np.percentile(places[:, j, 1], 20) + 0.01 for j in (foot, toe)]
-    return np.where(low[0] & low[1], 1.0, _DOUBTFUL)
 
 
 def mean_rotation(q: Array, weight: Array) -> Array:
