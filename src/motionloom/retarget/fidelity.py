@@ -212,7 +212,8 @@ def _bent_alike(theirs: Array, ours: Array) -> Array:
 def _chains(places: Array, sizes: Array) -> Array:
     """(frames, 22, 3) the joints of `PLACES` from the middle of the hips, with parts as long as those of ``sizes``.
 
-    Parts are thighs, shins, half the hips, trunk, half the shoulders, upper arms, forearms, and shoulders to head.
+    Parts are thighs, shins, half the hips, trunk, half the shoulders, upper arms, forearms, and from the shoulders to
+    the head: where on that way a skeleton has its neck is its own affair.
     """
     result = np.zeros_like(places)
 
