@@ -15,7 +15,6 @@ takes longer.
 """
 
 import argparse
-import json
 import multiprocessing
 import resource
 import shutil
@@ -61,8 +60,7 @@ def fill(jobs: Path, out: Path, size: int, whole: int) -> None:
         store.data(shard).write_bytes(b"a shard")
         head = Head(digest(rows), False, {"files": 1, "bytes": 7}, {"made": len(rows)})
         lines = (entry(shard * size + i) for i in range(len(rows))) if shard < whole else ()
-        text = "".join(json.dumps(line) + "\n" for line in (vars(head), *lines))
-        store.record(shard).write_text(text)
+        store.write_record(shard, list(lines), head)
 
 
 def drive(jobs: Path, out: Path) -> str:

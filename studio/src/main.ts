@@ -42,9 +42,9 @@ function setTheme(name: string): void {
 
 async function start(): Promise<void> {
   setTheme(localStorage.getItem(THEME) ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
-  const { project, isNew } = await restored();
+  const begin = await restored();
   const app: App = {
-    project: new History(project),
+    project: new History(begin.project),
     session: newSession(),
     denoising: new Signal<readonly MotionClip[]>([]),
     live: new Signal<LiveState | null>(null),
@@ -55,7 +55,7 @@ async function start(): Promise<void> {
   const files = new Files(app, deeds);
   const live = new Live(app, drawer, deeds, stage.scene);
   stage.sentTo = (place) => live.go(place);
-  new Saver(app, () => {
+  const saver = new Saver(app, begin, () => {
     drawer.loadTakes();
     drawer.schedule();
   });
@@ -79,23 +79,28 @@ async function start(): Promise<void> {
       stage.look(isDark());
     },
   };
-  show(parts, timeline);
+  show(parts, timeline, saver);
   drawer.loadTakes();
   drawer.schedule();
-  app.session.update({ playing: isNew || app.project.value.takes.length > 0 });
+  app.session.update({ playing: begin.isNew || app.project.value.takes.length > 0 });
   document.body.dataset.ready = "true";
   performance.mark("ready");
 }
 
 /** The panels, each in its place of the page. */
-function show(parts: Parts, timeline: TimelineView): void {
+function show(parts: Parts, timeline: TimelineView, saver: Saver): void {
   const { app, drawer, deeds, files, live } = parts;
   const all = actions(parts);
   topBar(app, all, files, part("top"));
   stageBar(app, all, part("tools"), part("views"));
   transport(app, all, part("transport"));
   inspector(app, all, deeds, part("inspector"));
-  notices(app, () => drawer.schedule(), part("notices"));
+  notices(
+    app,
+    () => drawer.schedule(),
+    (choice) => void saver.settle(choice),
+    part("notices"),
+  );
   takeNames(app, part("names"));
   livePanel(app, live, part("live"));
   help(app, all, part<HTMLDialogElement>("help"));

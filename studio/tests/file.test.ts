@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { putTarget } from "../src/project/asks";
-import { ProjectError, read, written } from "../src/project/file";
+import { ProjectError, read, stampOf, written } from "../src/project/file";
 import { exampleProject } from "../src/project/model";
 import { halfSeconds, snap } from "../src/project/snap";
 import { events } from "../src/server/events";
@@ -12,13 +12,28 @@ describe("a project file", () => {
       frozen: [[0, 1]] as const,
       name: "Ångström 走",
     };
-    expect(read(written(project))).toEqual(project);
+    const file = written(project, { id: "film", revision: 7 });
+    expect(read(file)).toEqual(project);
+    expect(JSON.parse(file)).toMatchObject({ version: 2, id: "film", revision: 7 });
+    expect(stampOf(JSON.parse(file))).toEqual({ id: "film", revision: 7 });
   });
+
+  it("of version 1 is read as one of today, and says no id", () => {
+    const { version: _, ...old } = exampleProject();
+    const file = JSON.stringify({ format: "motionloom studio", version: 1, ...old });
+    expect(read(file)).toEqual({ ...old, version: 2 });
+    expect(stampOf(JSON.parse(file))).toBeNull();
+  });
+
+  it.each([null, 5, [], { id: "a" }, { id: "a/b", revision: 1 }, { id: 5, revision: 1 }, { id: "a", revision: 1e300 }])(
+    "says no state where it cannot be one: %j",
+    (found) => expect(stampOf(found)).toBeNull(),
+  );
 
   it.each([
     ["{", "it is not JSON"],
     ["[]", "must be a mapping"],
-    ['{"version": 2}', "has version 2"],
+    ['{"version": 3}', "has version 3"],
     ['{"version": 1, "segments": []}', "has no segments"],
     ['{"version": 1, "segments": [{"id": "a", "text": "b", "seconds": 1e9}]}', "segments[0].seconds must be 0.2 to 60"],
     [

@@ -46,6 +46,22 @@ describe("history", () => {
     expect(history.value).toEqual({ words: "b", takes: 2 });
   });
 
+  it("takes over what was done elsewhere as one step, until something is done here", () => {
+    const history = new History(0);
+    const listener = vi.fn();
+    history.change("add", add(1));
+    history.subscribe(listener);
+    for (const value of [10, 20, 30]) history.follow(value, "elsewhere");
+    expect(listener.mock.calls.map(([value, change]) => [value, change])).toEqual(
+      [10, 20, 30].map((value) => [value, { label: "", draft: false, typed: false, elsewhere: true }]),
+    );
+    history.change("add", add(1));
+    history.follow(40, "elsewhere");
+    const seen = [];
+    while (history.undo()) seen.push(history.value);
+    expect(seen).toEqual([31, 30, 1, 0]);
+  });
+
   it("tells of every change, drafts as drafts, and of a release that changed nothing more", () => {
     const history = new History(0);
     const listener = vi.fn();

@@ -12,11 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from motionloom.bulk import maker as maker_module
+from motionloom.bulk import row as row_module
 from motionloom.bulk import shard as shard_module
+from motionloom.bulk import writers as writers_module
 from motionloom.bulk.batch import _items
 from motionloom.bulk.folder import Store, open_folder
 from motionloom.bulk.jobs import Jobs
-from motionloom.bulk.maker import Maker, Options
+from motionloom.bulk.maker import Made, Maker, Options
 from motionloom.bulk.metadata import Result, read_batch
 from motionloom.bulk.shard import CAREFUL, FATAL, Batch, Report, Task, make_shard
 from motionloom.errors import MotionloomError
@@ -151,6 +154,58 @@ def test_a_row_that_breaks_the_program_breaks_itself_alone(ready: Maker, monkeyp
     assert all(after[name] == data for name, data in before.items() if name.endswith(".npz"))
 
 
+@pytest.mark.parametrize("seconds", ["1" + "0" * 400, "-1" + "0" * 400, "1e999", "1" + "0" * 4400])
+def test_a_number_of_very_many_digits_is_the_error_of_its_row(ready: Maker, seconds: str) -> None:
+    found = [json.dumps(row).encode() for row in rows(3)]
+    found[1] = b'{"prompt": "a person walks", "seconds": %s}' % seconds.encode()
+    open_folder(OUT, ready.options, rows=3, shard_rows=3)
+    made = make_shard(Task(0, 0, found), Batch(str(OUT), ".", "", {}, ready.options), ready)
+    assert made.counts == {"made": 2, "failed": 1}
+    assert results()[1].state == "failed"
+    assert "OverflowError" not in results()[1].why
+
+
+@pytest.mark.parametrize("at", ["parse", "ask", "passes", "add", "groups"])
+def test_whatever_goes_wrong_with_a_row_is_its_error_once(
+    ready: Maker, at: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Wherever it happens, the others are made; where it is not known whose fault it was, each is made by itself."""
+    times: Counter[bool] = Counter()
+
+    def poisoned(value: Any) -> None:
+        if "99" in str(value):
+            times[True] += 1
+            raise ZeroDivisionError("poison")
+
+    def before(place: Any, name: str, what: Any) -> None:
+        old = getattr(place, name)
+        monkeypatch.setattr(place, name, lambda *given, **more: (poisoned(what(*given)), old(*given, **more))[1])
+
+    before(*{
+        "parse": (row_module, "_columns", lambda raw: raw),
+        "ask": (row_module.Sources, "_ask", lambda self, row: row.seed),
+        "passes": (Made, "passes", lambda self, _: "99" if len(self.motion) == 19 else ""),
+        "add": (writers_module.Files, "add", lambda self, people, about: about["seed"]),
+        "groups": (maker_module, "groups", lambda prior, frames, most: "99" if 19 in frames else ""),
+    }[at])  # fmt: skip
+    found = [*rows(2), {"prompt": "a person walks", "seconds": 0.95, "seed": 99}, *rows(5)[3:]]
+    assert make(ready, found).counts == {"made": 4, "failed": 1}
+    assert [(one.row, "ZeroDivisionError: poison" in one.why) for one in results() if one.state == "failed"] == [
+        (2, True)
+    ]
+    assert times[True] == (2 if at == "groups" else 1)
+    assert not list((OUT / ".work").iterdir())
+
+
+def test_a_shard_that_cannot_be_put_together_says_so_once(ready: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No process dies of it, and nobody asks for more memory."""
+    monkeypatch.setattr(Store, "commit", lambda *_, **__: {}["nothing"])
+    with pytest.raises(MotionloomError, match=r"shard 0 cannot be put together.*KeyError") as said:
+        make(ready, rows(3))
+    assert "memory" not in str(said.value)
+    assert not list((OUT / ".work").iterdir())
+
+
 def test_a_row_that_ends_its_process_every_time_is_found_out(ready: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
     """A process that dies leaves notes behind; here it dies by an exception that nobody catches."""
 
@@ -264,23 +319,55 @@ def test_a_full_disk_leaves_the_folder_as_it_was(ready: Maker, monkeypatch: pyte
     assert make(ready, rows(5)).made == 2
 
 
-@pytest.mark.parametrize("damage", ["cut", "gone", "no record", "no head"])
+def flipped(data: bytes) -> bytes:
+    """The same but for one bit in the middle."""
+    at = len(data) // 2
+    return data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
+
+
+DAMAGES = {
+    "cut": lambda data: data[:-10],
+    "flipped": flipped,
+    "gone": lambda data: None,
+    "record gone": lambda data: None,
+    "record empty": lambda data: b"{}\n",
+    "record flipped": flipped,
+    "record cut after its first line": lambda data: data[: data.index(b"\n") + 1],
+    "record cut after its last line": lambda data: data[: data.rindex(b"\n", 0, -1) + 1],
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
 @pytest.mark.parametrize("kind", ["npz", "webdataset"])
-def test_a_damaged_shard_is_made_anew(ready: Maker, kind: str, damage: str) -> None:
-    asked = replace(ready.options, format=kind)
-    make(ready, rows(3), asked)
+def test_what_is_damaged_is_found_and_made_anew(ready: Maker, kind: str, damage: str, folder: Path) -> None:
+    """Of a folder of single files the one motion, of one large file, or where the record is at fault, all of them."""
+    asked, found = replace(ready.options, format=kind), rows(3)
+    make(ready, found, asked)
     before = everything()
-    data = Store(OUT, kind).data(0)
-    file = data if data.is_file() else next(data.iterdir())
-    if damage == "cut":
-        file.write_bytes(file.read_bytes()[:-10])
-    elif damage == "gone":
-        file.unlink()
-    else:
-        record = OUT / "records/000000.jsonl"
-        record.unlink() if damage == "no record" else record.write_text("{}\n")
-    assert make(ready, rows(3), asked).made == 3
+    data, record = Store(OUT, kind).data(0), OUT / "records/000000.jsonl"
+    file = record if damage.startswith("record") else data if data.is_file() else next(data.iterdir())
+    left = DAMAGES[damage](file.read_bytes())
+    file.unlink() if left is None else file.write_bytes(left)
+
+    jobs = Jobs.of(written(folder / "jobs.jsonl", found))
+    assert [type(item) for item in _items(jobs, 3, Store(OUT, kind), (0, 1))] == [Task]
+    assert Store(OUT, kind).damage(0) == [file]
+    assert make(ready, found, asked).made == (1 if file.parent == data else 3)
     assert everything() == before
+    assert [type(item) for item in _items(jobs, 3, Store(OUT, kind), (0, 1))] == [Report]
+
+
+def test_a_folder_of_before_there_were_hashes_goes_on(ready: Maker, folder: Path) -> None:
+    make(ready, rows(3))
+    record = OUT / "records/000000.jsonl"
+    head, *lines = record.read_text().splitlines(keepends=True)
+    old = {key: value for key, value in json.loads(head).items() if key not in ("sha256", "record")}
+    record.write_text("".join([json.dumps(old) + "\n", *lines]))
+    jobs = Jobs.of(written(folder / "jobs.jsonl", rows(3)))
+    assert [type(item) for item in _items(jobs, 3, Store(OUT, "npz"), (0, 1))] == [Report]
+    next(Store(OUT, "npz").data(0).iterdir()).unlink()
+    assert [type(item) for item in _items(jobs, 3, Store(OUT, "npz"), (0, 1))] == [Task]
+    assert make(ready, rows(3)).made == 3
 
 
 def test_goals_timelines_and_skeletons_are_made_and_measured(ready: Maker, folder: Path) -> None:

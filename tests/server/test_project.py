@@ -1,10 +1,14 @@
 """The project and its timeline, bodies that are too large, doors that are closed, a server that is killed."""
 
 import http.client
+import json
+import resource
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +16,7 @@ import pytest
 from motionloom import load
 from tests.server.serving import Server, running
 
+NO_LIMIT = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
 TIMELINE = {
     "segments": [{"text": "a person walks", "seconds": 2.0}, {"text": "a person jumps", "seconds": 1.5}],
     "seed": 3,
@@ -22,6 +27,169 @@ def test_what_was_saved_is_given_back(server: Server) -> None:
     said = {"timeline": TIMELINE, "name": "ein Gang – été", "takes": [1, 2.5, None, True]}
     assert server.json("PUT", "/project", said)[0] == 200
     assert server.json("GET", "/project") == (200, said)
+
+
+def segments(name: str, **more: Any) -> dict[str, Any]:
+    return {"version": 2, "name": name, "segments": [{"text": "a person walks"}], **more}
+
+
+@pytest.fixture
+def folder(server: Server) -> Iterator[Path]:
+    """The server's folder without a project, before the test and behind it."""
+    for old in server.project.glob("project.*"):
+        old.unlink()
+    yield server.project
+    for old in server.project.glob("project.*"):
+        old.unlink()
+
+
+def put(server: Server, project: Any, client: str = "", over: dict[str, Any] | None = None) -> tuple[int, Any]:
+    query = f"?over={over['id']}.{over['revision']}" if over else ""
+    return server.json("PUT", f"/project{query}", project, headers={"X-Client": client} if client else {})
+
+
+def test_a_save_that_has_not_seen_another_one_is_refused(server: Server, folder: Path) -> None:
+    """Two pages load the same state; the second to save is told, and nothing of the first is lost."""
+    status, answer = put(server, segments("first", id="film", revision=0), "a")
+    assert (status, answer["id"], answer["revision"]) == (200, "film", 1)
+    assert put(server, segments("second", id="film", revision=1), "a")[1]["revision"] == 2
+    before = (folder / "project.json").read_bytes()
+    status, answer = put(server, segments("stale", id="film", revision=1), "b")
+    assert (status, answer["id"], answer["revision"]) == (409, "film", 2)
+    assert "by somebody else meanwhile" in answer["error"]
+    for other in (segments("other", id="film2", revision=2), segments("no id"), {"kept": 1}, [], None):
+        assert put(server, b"null" if other is None else other, "b")[0] == 409
+    assert (folder / "project.json").read_bytes() == before
+    assert server.json("GET", "/project/stamp") == (200, {"id": "film", "revision": 2})
+    assert put(server, segments("seen", id="film", revision=2), "b")[1]["revision"] == 3
+    assert server.json("GET", "/project")[1]["name"] == "seen"
+
+
+def test_a_client_whose_answer_was_lost_is_not_taken_for_somebody_else(server: Server, folder: Path) -> None:
+    put(server, segments("a", id="film", revision=0), "a")
+    assert put(server, segments("b", id="film", revision=1), "b")[1]["revision"] == 2
+    assert put(server, segments("b again", id="film", revision=1), "b")[1]["revision"] == 3
+    assert put(server, segments("a", id="film", revision=1), "a")[0] == 409
+    assert put(server, segments("from before b", id="film", revision=0), "b")[0] == 409
+    assert put(server, segments("nobody", id="film", revision=1))[0] == 409
+
+
+def test_what_is_there_is_replaced_where_the_client_names_it(server: Server, folder: Path) -> None:
+    """And what was saved after that is not; another project then stays under another name."""
+    put(server, segments("one", id="film", revision=0))
+    seen = server.json("GET", "/project/stamp")[1]
+    put(server, segments("two", id="film", revision=1))
+    assert put(server, segments("mine", id="film", revision=0), over=seen)[0] == 409
+    seen = server.json("GET", "/project/stamp")[1]
+    assert put(server, segments("mine", id="film", revision=0), over=seen)[1]["revision"] == 3
+    assert not list(folder.glob("project.2*"))
+    seen = server.json("GET", "/project/stamp")[1]
+    status, answer = put(server, segments("another film", id="other", revision=5), over=seen)
+    assert (status, answer["id"], answer["revision"]) == (200, "other", 6)
+    (kept,) = folder.glob("project.2*")
+    assert json.loads(kept.read_bytes())["name"] == "mine"
+
+
+def test_a_project_of_before_there_were_ids_gets_one_that_stays(server: Server, folder: Path) -> None:
+    (folder / "project.json").write_text(json.dumps(segments("old") | {"version": 1}))
+    first = server.json("GET", "/project")[1]
+    assert (first["name"], first["revision"], len(first["id"])) == ("old", 0, 16)
+    assert server.json("GET", "/project")[1] == first
+    assert put(server, first | {"name": "new"}, "a")[1]["revision"] == 1
+    assert put(server, first | {"name": "stale"}, "b")[0] == 409
+
+
+@pytest.mark.parametrize("damage", [b"", b"{", b"\xff\xfe", b'{"id": 1e999}', b"[" * 100_000], ids=range(5))
+def test_a_project_that_cannot_be_read_is_told_and_put_aside_never_replaced(
+    server: Server, folder: Path, damage: bytes
+) -> None:
+    (folder / "project.json").write_bytes(damage)
+    project = segments("a", id="b")
+    for method, path, body in (("GET", "", None), ("GET", "/stamp", None), ("PUT", "", project)):
+        status, answer = server.json(method, f"/project{path}", body)
+        assert (status, "project.json in the project folder is not JSON" in answer["error"]) == (422, True), path
+    assert (folder / "project.json").read_bytes() == damage
+    status, answer = server.json("POST", "/project/aside")
+    assert status == 200
+    assert (folder / answer["kept"]).read_bytes() == damage
+    assert server.json("GET", "/project") == (200, None)
+    assert server.json("POST", "/project/aside")[0] == 404
+    (folder / "project.json").write_bytes(damage)
+    assert server.json("POST", "/project/aside")[1]["kept"] != answer["kept"]
+
+
+@pytest.mark.parametrize("stamp", [{"id": 5}, {"id": "a/b"}, {"id": "a", "revision": -1}, {"id": "a", "revision": 1.5}])
+def test_a_stamp_that_cannot_be_is_refused(server: Server, folder: Path, stamp: dict[str, Any]) -> None:
+    status, answer = put(server, segments("a", **stamp))
+    assert (status, "the project's '" in answer["error"]) == (400, True)
+    assert not (folder / "project.json").exists()
+
+
+JUNK = {
+    "empty": b"",
+    "cut": b"{",
+    "a list": b"[]",
+    "a number": b"5",
+    "nothing": b"null",
+    "less than nobody": b'{"people": -1}',
+    "a word": b'{"people": "x"}',
+    "endless": b'{"people": 1e999}',
+    "many digits": b'{"people": 1' + b"0" * 5000 + b"}",
+    "many people": b'{"people": 1' + b"0" * 400 + b"}",
+    "deep": b'{"people": 1, "a": ' + b"[" * 5000,
+    "no name": b'{"name": 5, "suffix": []}',
+    "no file": b'{"name": "a", "suffix": ".glb", "people": 1}',
+}
+
+
+@pytest.mark.parametrize("junk", JUNK)
+def test_damaged_json_in_the_folder_is_a_sentence(server: Server, junk: str) -> None:
+    name = "0123456789abcdef"
+    for place, kinds in (("motions", ("", ".bvh")), ("characters", ("",))):
+        (server.project / place / f"{name}.json").write_bytes(JUNK[junk])
+        for kind in kinds:
+            status, answer = server.json("GET", f"/{place}/{name}{kind}")
+            assert (status, name in answer["error"] or "no such character" in answer["error"]) == (404, True)
+        assert server.json("POST", "/jobs", {"task": "predict", "motion": name, "seconds": 1})[0] == 404
+        (server.project / place / f"{name}.json").unlink()
+
+
+@pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="limits another process's files as Linux does")
+@pytest.mark.parametrize("path", ["/motions?name=a.bvh", "/motions?name=a.npz", "/characters?name=a.bvh", "/project"])
+def test_a_full_disk_is_told_and_nothing_stays_half_written(server: Server, folder: Path, walk: str, path: str) -> None:
+    """Of a server whose files may have so many bytes and no more: at whichever of them a write ends."""
+    put(server, segments("before", id="film"))
+    body: Any = segments("after", id="film", revision=1, clips=["x" * 20_000])
+    if path != "/project":
+        kind = path[-4:]
+        body = server.ask("GET", f"/motions/{walk}{kind}")[2]
+    before = {place: place.read_bytes() for place in folder.rglob("*") if place.is_file()}
+    said = []
+    for room in (100, 3_000, 10_000, 20_000, 40_000, 1 << 40):
+        resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
+        try:
+            status, answer = server.json("PUT" if path == "/project" else "POST", path, body)
+        finally:
+            resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, NO_LIMIT)
+        said.append(status)
+        if status < 300:
+            break
+        assert (status, "the disk of the project folder is full" in answer["error"]) == (507, True)
+        assert {place: place.read_bytes() for place in folder.rglob("*") if place.is_file()} == before
+    assert len(said) > 2
+
+
+@pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="limits another process's files as Linux does")
+def test_a_motion_that_finds_no_room_is_told(server: Server) -> None:
+    before = sorted(place.name for place in (server.project / "motions").iterdir())
+    resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))
+    try:
+        ended = server.wait(server.submit(task="generate", prompt="a person walks", seconds=1.0, steps=2))
+    finally:
+        resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, NO_LIMIT)
+    assert ended["state"] == "failed"
+    assert "the disk of the project folder is full" in ended["error"]
+    assert sorted(place.name for place in (server.project / "motions").iterdir()) == before
 
 
 @pytest.mark.parametrize("body", [b"", b"{", b'{"a": NaN}', b"\xff", b"[" * 100_000])

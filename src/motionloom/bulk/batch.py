@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from motionloom.bulk.claim import claim
 from motionloom.bulk.crew import alone, cores, gpus
-from motionloom.bulk.folder import Head, Store, digest, open_folder, read_manifest
+from motionloom.bulk.folder import Head, Store, check_settings, digest, open_folder, read_manifest
 from motionloom.bulk.jobs import MOST, Jobs, parquet, shard_size
 from motionloom.bulk.maker import FORMATS, Made, Maker, Options
 from motionloom.bulk.measures import Filter
-from motionloom.bulk.metadata import Result, read_batch, result, write_table
+from motionloom.bulk.metadata import Result, damaged_table, read_batch, result, write_table
 from motionloom.bulk.row import parse
 from motionloom.bulk.shard import Batch, Report, Task, problems
 from motionloom.errors import MotionloomError
@@ -79,32 +80,40 @@ def run(
     check_options(options)
     count = jobs.count() if rows is None else rows
     check_jobs(jobs, count)
-    if not force:
-        _check_same_job(jobs, out, options)
-    manifest = open_folder(out, options, rows=count, shard_rows=options.shard_rows or shard_size(count))
-    size = int(manifest["shard_rows"])
-    store, shards = Store(out, options.format), -(-count // size)
-    _check_left_over(store, shards)
-    work = Batch(
-        str(out.resolve()),
-        str(jobs.folder.resolve()),
-        manifest["weights"]["sha256"],
-        manifest["duets"],
-        _found(options),
-    )
-    items = _items(jobs, size, store, where.shard or (0, 1))
-    if where.ray is not None:
-        from motionloom.bulk.on_ray import on_ray
+    shard_rows = options.shard_rows or shard_size(count)
+    check_settings(out, options, rows=count, shard_rows=shard_rows, force=force)  # before anything is made
+    with claim(out, where.shard or (0, 1)) as claimed:
+        if not force:
+            _check_same_job(jobs, out, options)
+        manifest = open_folder(out, options, rows=count, shard_rows=shard_rows, force=force)
+        size = int(manifest["shard_rows"])
+        store, shards = Store(out, options.format), -(-count // size)
+        _check_left_over(store, shards)
+        work = Batch(
+            str(out.resolve()),
+            str(jobs.folder.resolve()),
+            manifest["weights"]["sha256"],
+            manifest["duets"],
+            _found(options),
+            claimed.driver.name,
+        )
+        made = 0
+        for report in _reports(_items(jobs, size, store, where.shard or (0, 1)), work, where, moved):
+            claimed.check()
+            made += report.made
+            yield report
+        _finish(store, shards, changed=made > 0)
 
-        address = None if where.ray == LOCAL else where.ray
-        reports = on_ray(items, work, address=address, workers=where.workers, moved=moved)
-    else:
-        reports = alone(items, work, workers=where.workers or processes(options), moved=moved)
-    made = 0
-    for report in reports:
-        made += report.made
-        yield report
-    _finish(store, shards, changed=made > 0)
+
+def _reports(
+    items: Iterator[Task | Report], work: Batch, where: Where, moved: Callable[[int], None]
+) -> Iterator[Report]:
+    if where.ray is None:
+        return alone(items, work, workers=where.workers or processes(work.options), moved=moved)
+    from motionloom.bulk.on_ray import on_ray
+
+    address = None if where.ray == LOCAL else where.ray
+    return on_ray(items, work, address=address, workers=where.workers, moved=moved)
 
 
 def check_options(options: Options) -> None:
@@ -192,7 +201,7 @@ def _items(jobs: Jobs, size: int, store: Store, share: tuple[int, int]) -> Itera
         if shard % of != number:
             continue
         head = store.head(shard)
-        if head is not None and _is_done(head, rows):
+        if head is not None and _is_done(head, rows) and not store.damage(shard):
             listed = problems(store.entries(shard)) if "failed" in head.counts else []
             yield Report(shard, len(rows), head.counts, 0, listed)
         else:
@@ -263,7 +272,5 @@ def _finish(store: Store, shards: int, *, changed: bool) -> None:
     """When every shard is there, whoever made it: the table of all rows, and no traces of the work."""
     if not all(store.record(shard).exists() for shard in range(shards)):
         return
-    if changed or not any((store.out / f"metadata.{kind}").exists() for kind in ("parquet", "jsonl")):
+    if changed or damaged_table(store) is not None:
         write_table(store, shards)
-    if store.work.is_dir() and not any(store.work.iterdir()):
-        store.work.rmdir()

@@ -16,7 +16,7 @@ from typing import Any
 
 import motionloom
 from motionloom.bulk.folder import Store
-from motionloom.bulk.shard import Batch, Report, Task
+from motionloom.bulk.shard import Batch, Report, Task, clear_work
 from motionloom.errors import MotionloomError
 
 STILLBORN = 3
@@ -58,6 +58,13 @@ def too_many_deaths(deaths: int, rows: int) -> bool:
     return deaths > 3 * rows + 10
 
 
+def _cause(code: int | None) -> str:
+    """What can be said of how a process ended: one that was killed may have wanted too much memory."""
+    if code is not None and code < 0:
+        return f"signal {-code}: is there enough memory?"
+    return f"exit code {code}: what they printed says more"
+
+
 @dataclass(eq=False)
 class _Process:
     """A worker and what it is at."""
@@ -95,7 +102,7 @@ class _Process:
                 stream.close()  # type: ignore[union-attr]
         if self.task is not None:
             store = Store(Path(self.batch.out), self.batch.options.format)
-            store.clear_work(self.task.shard)
+            clear_work(store, self.task.shard, self.batch.driver)
             store.attempts(self.task.shard).unlink(missing_ok=True)
 
     def _say(self, line: str) -> None:
@@ -188,11 +195,12 @@ class _Crew:
         self.stillborn += not process.ready
         if self.stillborn >= STILLBORN:
             raise MotionloomError(
-                f"the processes that make motions end before they begin (exit code {process.popen.returncode}); "
-                "is there enough memory?"
+                f"the processes that make motions end before they begin, by {_cause(process.popen.returncode)}"
             )
         if task is not None:
             self.deaths[task.shard] = self.deaths.get(task.shard, 0) + 1
             if too_many_deaths(self.deaths[task.shard], len(task.rows)):
-                raise MotionloomError(f"shard {task.shard} ends every process that makes it; is there enough memory?")
+                raise MotionloomError(
+                    f"shard {task.shard} ends every process that makes it, by {_cause(process.popen.returncode)}"
+                )
             self.again.append(task)

@@ -1,20 +1,22 @@
 """The folder of a batch: what it is (``manifest.json``), its shards, and one record of each shard's rows.
 
-    manifest.json            version, weights, settings; under 2 kB however many rows there are
+    manifest.json            version, weights, settings, its own hash; under 2 kB however many rows there are
     shard-000000.tar         or .parquet, or a folder of single files
     records/000000.jsonl     a line about the shard, then one per row: made, dropped, failed or repeated, and why
+    records/table.json       hash of the table, and of how many shards it is
     metadata.parquet         all rows of all records, at the end; .jsonl without pyarrow
 
 A shard is in the folder when its record is: its data comes first, under its own name in one step, then the record,
-in one step too, which says how large the data are. So a shard is whole or it is not there, whoever is killed when.
+in one step too, which has the hash of every file and of itself. So a shard is whole or it is not there, whoever is
+killed when; and what was damaged since is found.
 """
 
 import hashlib
 import json
 import os
 import shutil
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -22,7 +24,7 @@ from typing import Any
 from motionloom.bulk.maker import Options, hash_weights
 from motionloom.bulk.measures import MEANING
 from motionloom.bulk.row import FORMAT, hash_file
-from motionloom.bulk.writers import sizes, suffix, sync
+from motionloom.bulk.writers import hashes, json_line, sizes, suffix, sync
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.io.folder import check_folder
@@ -30,6 +32,8 @@ from motionloom.weights.prior import find_weights, read_card
 
 MANIFEST, RECORDS, WORK = "manifest.json", "records", ".work"
 KIND = "motionloom batch"
+CHECK = "sha256"
+"""Of all other keys of the manifest."""
 STATES = ("made", "dropped", "failed", "repeated")
 
 Entry = dict[str, Any]
@@ -50,6 +54,10 @@ class Head:
     """Rows by what became of them, one of `STATES`."""
     refused: int = 0
     """How many of the failed ones cannot be made as they are written, whoever tries."""
+    sha256: dict[str, str] = field(default_factory=dict)
+    """Of every file of the shard's data, by its name; nothing in a folder of before there were hashes."""
+    record: str = ""
+    """Hash of the record itself: of all lines but for this one value."""
 
 
 @dataclass(frozen=True)
@@ -78,37 +86,67 @@ class Store:
         """Where shards are made; nobody reads there."""
         return self.out / WORK
 
-    def new_work(self, shard: int) -> Path:
+    def new_work(self, shard: int, driver: str) -> Path:
         """A folder to make a shard in, of its own for whoever calls: two who make the same shard keep apart."""
-        place = self.work / f"{shard:06d}.{os.urandom(4).hex()}"
+        place = self.work / f"{shard:06d}.{driver or 'nobody'}.{os.urandom(4).hex()}"
         place.mkdir(parents=True)
         return place
 
-    def clear_work(self, shard: int) -> None:
-        """Remove what others made of a shard, who were killed. One who lives after all fails, and harms nobody."""
+    def clear_work(self, shard: int, *, but: Collection[str] = ()) -> None:
+        """Remove what others made of a shard, who were killed; ``but``: drivers whose work stays, since they live."""
         for place in self.work.glob(f"{shard:06d}.*/"):
-            shutil.rmtree(place, ignore_errors=True)
+            if place.name.split(".")[1] not in but:
+                shutil.rmtree(place, ignore_errors=True)
 
     def attempts(self, shard: int) -> Path:
         """Where it is noted what was begun and not ended: of a shard that was made, nothing."""
         return self.work / f"{shard:06d}.attempts"
 
     def head(self, shard: int) -> Head | None:
-        """What the record says of its shard, if both are whole."""
-        try:
-            with self.record(shard).open(encoding="utf-8") as file:
-                head = Head(**json.loads(file.readline()))
-            whole = sizes(self.data(shard)) == head.data if head.data["files"] else True
-            return head if whole else None
-        except (OSError, ValueError, TypeError, KeyError):
+        """What the record says of its shard, if it is whole, and the data are as many and as large as it says."""
+        found = self._record(shard)
+        if found is None or (found[0].data["files"] and sizes(self.data(shard)) != found[0].data):
             return None
+        return found[0]
 
     def entries(self, shard: int) -> Iterator[Entry]:
-        """What became of each row of a shard, in their order."""
-        with self.record(shard).open(encoding="utf-8") as file:
-            next(file)
-            for line in file:
-                yield json.loads(line)
+        """What became of each row of a shard, in their order; nothing where its record is damaged or not there."""
+        found = self._record(shard)
+        yield from found[1] if found is not None else ()
+
+    def damage(self, shard: int) -> list[Path]:
+        """Files of a shard that are not as they were written, missing ones and foreign ones too; the record first."""
+        found = self._record(shard)
+        if found is None:
+            return [self.record(shard)]
+        head, data = found[0], self.data(shard)
+        if not head.data["files"]:
+            return []
+        if not data.exists():
+            return [data]
+        if not head.sha256:  # of before there were hashes
+            return [] if sizes(data) == head.data else [data]
+        there = hashes(data)
+        wrong = sorted(name for name in head.sha256.keys() | there.keys() if head.sha256.get(name) != there.get(name))
+        return [data / name if data.is_dir() else data for name in wrong]
+
+    def says(self, shard: int, entries: Sequence[Entry], head: Head) -> bool:
+        """Whether the record of a shard is this one already."""
+        found = self._record(shard)
+        return found is not None and found == (replace(head, record=found[0].record), list(entries))
+
+    def _record(self, shard: int) -> tuple[Head, list[Entry]] | None:
+        """The record of a shard, if it is whole."""
+        try:
+            first, *lines = self.record(shard).read_bytes().splitlines()
+            head, entries = Head(**json.loads(first)), [json.loads(line) for line in lines]
+            if head.record:
+                whole = head.record == _hash_record(head, lines)
+            else:  # of before there were hashes
+                whole = sum(head.counts.values()) == len(entries) and head.data.keys() == {"files", "bytes"}
+            return (head, entries) if whole else None
+        except (OSError, ValueError, TypeError, AttributeError, RecursionError):
+            return None
 
     def commit(self, shard: int, data: Path | None, entries: Sequence[Entry], head: Head, *, old: Path) -> None:
         """Put a shard into the folder: ``data`` (None: nothing was kept) and the record of all of its rows.
@@ -127,12 +165,18 @@ class Store:
         self.write_record(shard, entries, head)
 
     def write_record(self, shard: int, entries: Sequence[Entry], head: Head) -> None:
-        """Write the record, whole or not at all."""
-        with atomic_path(self.record(shard)) as temporary, temporary.open("w", encoding="utf-8") as file:
-            for line in (vars(head), *entries):
-                file.write(json.dumps(line, ensure_ascii=False) + "\n")
+        """Write the record with its own hash, whole or not at all."""
+        lines = [json_line(entry) for entry in entries]
+        first = json_line(asdict(head) | {"record": _hash_record(head, lines)})
+        with atomic_path(self.record(shard)) as temporary, temporary.open("wb") as file:
+            file.writelines(line + b"\n" for line in (first, *lines))
             file.flush()
             os.fsync(file.fileno())
+
+
+def _hash_record(head: Head, lines: Sequence[bytes]) -> str:
+    first = json_line(dict(sorted((asdict(head) | {"record": ""}).items())))
+    return hashlib.sha256(b"\n".join((first, *lines))).hexdigest()
 
 
 def digest(rows: Sequence[bytes]) -> str:
@@ -147,7 +191,7 @@ def digest(rows: Sequence[bytes]) -> str:
 def about(options: Options, *, rows: int, shard_rows: int) -> dict[str, Any]:
     """The manifest of a batch."""
     card, weights = read_card(find_weights(options.weights)), hash_weights(options)
-    return {
+    found = {
         "kind": KIND,
         "format": FORMAT,
         "version": version("motionloom"),
@@ -162,6 +206,12 @@ def about(options: Options, *, rows: int, shard_rows: int) -> dict[str, Any]:
         "shard_rows": shard_rows,
         "measures": MEANING,
     }
+    return found | {CHECK: _hash_manifest(found)}
+
+
+def _hash_manifest(found: dict[str, Any]) -> str:
+    others = {key: value for key, value in found.items() if key != CHECK}
+    return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
 
 
 def _skeleton(options: Options) -> str | None:
@@ -170,18 +220,33 @@ def _skeleton(options: Options) -> str | None:
     )
 
 
-def read_manifest(out: Path) -> dict[str, Any] | None:
-    """What the folder says it is; None where it says nothing. Raises `MotionloomError` if that is no batch."""
+def read_manifest(out: Path, *, anew: bool = False) -> dict[str, Any] | None:
+    """What the folder says it is; None where it says nothing.
+
+    anew: also where its manifest is lost or damaged, and is to be written again. Raises `MotionloomError` if that is no
+    batch.
+    """
     place = out / MANIFEST
+    batch = (out / RECORDS).is_dir()
     if not place.exists():
-        if out.is_dir() and any(one.name != WORK for one in out.iterdir()):
-            raise MotionloomError(f"{out} holds other files and no {MANIFEST}; name a folder of its own for the batch")
-        return None
+        if not out.is_dir() or (batch and anew) or not any(one.name != WORK for one in out.iterdir()):
+            return None
+        if batch:
+            raise _damaged(f"{place} is lost")
+        raise MotionloomError(f"{out} holds other files and no {MANIFEST}; name a folder of its own for the batch")
     try:
         found = json.loads(place.read_text(encoding="utf-8"))
-        good = found["kind"] == KIND and int(found["shard_rows"]) >= 1 and found["files"]
-    except (OSError, ValueError, KeyError, TypeError):
-        good, found = False, {}
+        whole = CHECK not in found or found[CHECK] == _hash_manifest(found)
+    except (OSError, ValueError, TypeError, RecursionError):
+        found, whole = {}, False
+    if batch and not whole:
+        if anew:
+            return None
+        raise _damaged(f"{place} is damaged")
+    try:
+        good = found["kind"] == KIND and int(found["shard_rows"]) >= 1 and found["files"] and int(found["rows"]) >= 1
+    except (ValueError, KeyError, TypeError, OverflowError):
+        good = False
     if not good:
         raise MotionloomError(f"{place} does not describe a batch; name another folder or delete it")
     if found.get("format") != FORMAT:
@@ -191,24 +256,41 @@ def read_manifest(out: Path) -> dict[str, Any] | None:
     return found
 
 
-def open_folder(out: Path, options: Options, *, rows: int, shard_rows: int) -> dict[str, Any]:
+def _damaged(what: str) -> MotionloomError:
+    return MotionloomError(
+        f"{what}: run the command that made the batch with --force, which writes it anew and keeps the motions that "
+        "are asked for"
+    )
+
+
+def check_settings(
+    out: Path, options: Options, *, rows: int, shard_rows: int, force: bool = False
+) -> tuple[dict[str, Any] | None, dict[str, Any]]:
+    """The manifest that is there, and the one that is to be; nothing is written.
+
+    force: write a damaged one anew. Raises `MotionloomError` for a folder of something else or of other settings.
+    """
+    found = read_manifest(check_folder(out), anew=force)
+    wanted = about(options, rows=rows, shard_rows=shard_rows if found is None else int(found["shard_rows"]))
+    if found is None:
+        return None, wanted
+    for part in ("weights", "motions", "duets", "defaults", "files", "filter", "judge"):
+        if found.get(part) != wanted[part]:
+            was, now = _difference(found.get(part), wanted[part])
+            raise MotionloomError(f"{out} was made with other settings: {part} {was}, not {now}; name another folder")
+    if options.shard_rows not in (None, wanted["shard_rows"]):
+        raise MotionloomError(
+            f"{out} has shards of {wanted['shard_rows']:,} rows, not {options.shard_rows:,}; name another folder"
+        )
+    return found, wanted
+
+
+def open_folder(out: Path, options: Options, *, rows: int, shard_rows: int, force: bool = False) -> dict[str, Any]:
     """Make the folder, or check that it was made the same way; its manifest, whose ``shard_rows`` counts.
 
-    Raises `MotionloomError` for a folder of something else or of other settings.
+    Raises `MotionloomError` as `check_settings` does.
     """
-    found = read_manifest(check_folder(out))
-    wanted = about(options, rows=rows, shard_rows=shard_rows if found is None else int(found["shard_rows"]))
-    if found is not None:
-        for part in ("weights", "motions", "duets", "defaults", "files", "filter", "judge"):
-            if found.get(part) != wanted[part]:
-                was, now = _difference(found.get(part), wanted[part])
-                raise MotionloomError(
-                    f"{out} was made with other settings: {part} {was}, not {now}; name another folder"
-                )
-        if options.shard_rows not in (None, wanted["shard_rows"]):
-            raise MotionloomError(
-                f"{out} has shards of {wanted['shard_rows']:,} rows, not {options.shard_rows:,}; name another folder"
-            )
+    found, wanted = check_settings(out, options, rows=rows, shard_rows=shard_rows, force=force)
     try:
         for place in (out, out / RECORDS, out / WORK):
             place.mkdir(exist_ok=True)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from motionloom.bulk.measures import Filter, Judge, Values, find_judge, in_one, measure, measure_two
-from motionloom.bulk.row import Asked, Sources, hash_adapters, hash_file
+from motionloom.bulk.row import Asked, Sources, hash_adapters, hash_file, unexpected
 from motionloom.bulk.sampling import LEAST, draw_group, groups
 from motionloom.edits.fitting import fit
 from motionloom.errors import MotionloomError
@@ -185,7 +185,7 @@ class Maker:
         except MotionloomError as error:
             found = [(rows[0], str(error))]
         except Exception as error:  # a row that breaks the program breaks itself alone
-            found = [(rows[0], f"it could not be made ({type(error).__name__}: {' '.join(str(error).split())[:200]})")]
+            found = [(rows[0], str(unexpected(error, "it could not be made")))]
         if len(found) == len(rows):
             yield from found
             return

@@ -11,15 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.bulk.folder import Entry, Store, read_manifest
+from motionloom.bulk.folder import RECORDS, Entry, Store, read_manifest
 from motionloom.bulk.jobs import arrow, parquet
-from motionloom.bulk.writers import file_names, parquet_schema
+from motionloom.bulk.row import hash_file
+from motionloom.bulk.writers import file_names, json_line, parquet_schema
 from motionloom.errors import MotionloomError
 from motionloom.io import load, load_scene
+from motionloom.io.atomic import atomic_path
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
 
-TABLE = "metadata"
+TABLE, ABOUT_TABLE = "metadata", "table.json"
 _BLOCK = 10_000
 """Rows of the table in memory at once."""
 _ABOUT = {"row": "int64", "state": "string", "shard": "int32", "error_text": "string"}
@@ -30,20 +32,50 @@ def write_table(store: Store, shards: int) -> Path:
 
     A row for each row of the job, in its order: where it went, what is known of it, or why it is not there.
     """
-    from motionloom.io.atomic import atomic_path
+    place = store.out / f"{TABLE}.{'parquet' if _has_parquet() else 'jsonl'}"
+    with atomic_path(place) as temporary:
+        if place.suffix == ".parquet":
+            _write_parquet(temporary, _all(store, shards))
+        else:
+            with temporary.open("wb") as file:
+                file.writelines(json_line(entry) + b"\n" for entry in _all(store, shards))
+    about = {"file": place.name, "sha256": hash_file(place), "shards": shards}
+    with atomic_path(store.out / RECORDS / ABOUT_TABLE) as temporary:
+        temporary.write_text(json.dumps(about) + "\n", encoding="utf-8")
+    return place
 
+
+def _has_parquet() -> bool:
     try:
         parquet()
     except MotionloomError:
-        place = store.out / f"{TABLE}.jsonl"
-        with atomic_path(place) as temporary, temporary.open("w", encoding="utf-8") as file:
-            for entry in _all(store, shards):
-                file.write(json.dumps(entry, ensure_ascii=False) + "\n")
+        return False
+    return True
+
+
+def damaged_table(store: Store) -> Path | None:
+    """The table where it is lost or not as it was written; None: it is well, as far as is known."""
+    places = [store.out / f"{TABLE}.{kind}" for kind in ("parquet", "jsonl")]
+    place = next((one for one in places if one.exists()), places[0])
+    try:
+        known = _about_table(store).get(place.name, hash_file(place))
+        return None if hash_file(place) == known else place
+    except OSError:
         return place
-    place = store.out / f"{TABLE}.parquet"
-    with atomic_path(place) as temporary:
-        _write_parquet(temporary, _all(store, shards))
-    return place
+
+
+def table_shards(store: Store) -> int:
+    """Of how many shards the table is; 0 where there was none."""
+    return _about_table(store).get("shards", 0)
+
+
+def _about_table(store: Store) -> dict[str, Any]:
+    """The table's hash by its name, and of how many shards it is; what is not known is left out."""
+    try:
+        found = json.loads((store.out / RECORDS / ABOUT_TABLE).read_bytes())
+        return {str(found["file"]): str(found["sha256"]), "shards": int(found["shards"])}
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
+        return {}
 
 
 def _write_parquet(path: Path, entries: Iterator[Entry]) -> None:
@@ -98,7 +130,8 @@ def result(entry: Entry, people: tuple[Motion, ...] = ()) -> Result:
 def read_batch(out: Path | str, *, motions: bool = True) -> Iterator[Result]:
     """Every row of a batch that is in its folder, in the job's order, with its motion unless ``motions`` is False.
 
-    Memory holds one shard. Raises `MotionloomError` for a folder that is no batch.
+    Memory holds one shard. Raises `MotionloomError` for a folder that is no batch, and at a shard that is damaged as
+    far as its record and the sizes of its files show; `motionloom.bulk.verify` looks at every byte.
     """
     folder = Path(out)
     manifest = read_manifest(folder)
@@ -107,6 +140,11 @@ def read_batch(out: Path | str, *, motions: bool = True) -> Iterator[Result]:
     store = Store(folder, manifest["files"])
     shards = -(-int(manifest["rows"]) // int(manifest["shard_rows"]))
     for shard in range(shards):
+        if store.head(shard) is None and store.record(shard).exists():
+            raise MotionloomError(
+                f"shard {shard} of {folder} is damaged; 'motionloom batch --verify {folder}' says what, and the "
+                "command that made the batch makes it anew"
+            )
         if store.head(shard) is not None:
             entries = list(store.entries(shard))
             made = {entry["id"]: entry.get("people", 1) for entry in entries if entry["state"] == "made"}

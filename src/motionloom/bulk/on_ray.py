@@ -47,6 +47,8 @@ class Hand:
             )
         except MotionloomError as error:
             self.problem = str(error)
+        except Exception as error:  # another actor would end alike
+            self.problem = f"a worker failed ({type(error).__name__}: {error})"
 
     def ready(self) -> dict[str, Any]:
         """Nothing, or what keeps it from making anything."""

@@ -15,6 +15,7 @@ from motionloom.errors import MotionloomError
 from motionloom.goals.fields import Field
 from motionloom.goals.goal import FPS, Goal
 from motionloom.goals.goal_file import read_goal
+from motionloom.goals.segment import LONGEST
 from motionloom.goals.timeline import Timeline, read_timeline
 from motionloom.io import load
 from motionloom.motion import Motion
@@ -88,8 +89,26 @@ class Asked:
         return "; ".join(" ".join(segment.text.split()) for segment in self.timeline.segments)[:MAX_CHARACTERS]
 
 
+class Unexpected(MotionloomError):
+    """A row that the program fails at, where a sentence should say what is wrong with the row."""
+
+
+def unexpected(error: Exception, what: str = "it cannot be read") -> Unexpected:
+    """Any exception as the error of the row that it came of."""
+    return Unexpected(f"{what} ({type(error).__name__}: {' '.join(str(error).split())[:200]})")
+
+
 def parse(raw: bytes) -> Row:
     """The row that the bytes of a JSON object ask for; raises `MotionloomError` for what cannot be."""
+    try:
+        return _parsed(raw)
+    except MotionloomError:
+        raise
+    except Exception as error:
+        raise unexpected(error) from error
+
+
+def _parsed(raw: bytes) -> Row:
     row = _columns(raw)
     prompt, timeline, skeleton, name = (_text(row, key) for key in ("prompt", "timeline", "skeleton", "id"))
     goal = _goal(row.get("goal"))
@@ -188,7 +207,11 @@ def _seconds(row: dict[str, Any]) -> float | None:
         return None
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise MotionloomError(f"'seconds' must be a number; got {str(value)[:40]!r}")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        digits = len(str(abs(value)))
+        raise MotionloomError(f"'seconds' is a number of {digits:,} digits; ask for at most {LONGEST:g}") from None
 
 
 def _seed(row: dict[str, Any]) -> int | None:
@@ -227,6 +250,14 @@ class Sources:
 
     def ask(self, row: Row) -> Asked:
         """The row with the files it names; raises `MotionloomError` for what is wrong in them."""
+        try:
+            return self._ask(row)
+        except MotionloomError:
+            raise
+        except Exception as error:
+            raise unexpected(error) from error
+
+    def _ask(self, row: Row) -> Asked:
         timeline = start = goal = None
         seed = self.seed if row.seed is None else row.seed
         if row.timeline is not None:

@@ -9,11 +9,12 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from motionloom.bulk import claim
 from motionloom.bulk.folder import STATES, Entry, Head, Store, digest
 from motionloom.bulk.maker import Made, Maker, Options
 from motionloom.bulk.measures import Filter
-from motionloom.bulk.row import Asked, parse
-from motionloom.bulk.writers import Writer, sizes, writer
+from motionloom.bulk.row import Asked, Unexpected, parse, unexpected
+from motionloom.bulk.writers import Writer, hashes, sizes, writer
 from motionloom.errors import MotionloomError
 
 CAREFUL = 2
@@ -34,6 +35,8 @@ class Batch:
     pair: dict[str, Any]
     """`Options.of_duets`."""
     options: Options
+    driver: str = ""
+    """Name of the driver that shares the work out; see `motionloom.bulk.claim`."""
 
     def to_json(self) -> str:
         """As one line."""
@@ -93,25 +96,44 @@ class _Attempts:
 
 
 def make_shard(task: Task, batch: Batch, maker: Maker, moved: Callable[[int], None] = lambda rows: None) -> Report:
-    """Make what is missing of a shard and put it into the folder.
+    """Make what is missing of a shard, rows of it that were damaged too, and put it into the folder.
 
-    moved: called with how many more rows were made. Raises `MotionloomError` where the folder cannot be written (a full
-    disk), and then leaves the folder as it was.
+    moved: called with how many more rows were made. What goes wrong with a row is in its entry, whatever it is. Raises
+    `MotionloomError` where the folder cannot be written (a full disk), or the shard cannot be put together even with
+    its rows one by one; the folder stays as it was.
     """
-    store = Store(Path(batch.out), batch.options.format)
     try:
-        store.clear_work(task.shard)
-        work, notes = store.new_work(task.shard), _Attempts(store.attempts(task.shard))
-        notes.note("begin")
         try:
-            return _Shard(task, batch, maker, store, work, notes, moved).make()
-        except (Exception, KeyboardInterrupt):
-            notes.place.unlink(missing_ok=True)  # it ended, if not well
+            return _attempt(task, batch, maker, moved)
+        except (OSError, MotionloomError):
             raise
-        finally:
-            shutil.rmtree(work, ignore_errors=True)
+        except Exception:  # of no row that is known: each is made by itself, so that only the one at fault fails
+            return _attempt(task, batch, maker, moved, careful=True)
     except OSError as error:
         raise MotionloomError(f"cannot write to {batch.out}: {error.strerror or error}") from error
+    except MotionloomError:
+        raise
+    except Exception as error:
+        raise unexpected(error, f"shard {task.shard} cannot be put together, a fault of the program") from error
+
+
+def _attempt(task: Task, batch: Batch, maker: Maker, moved: Callable[[int], None], *, careful: bool = False) -> Report:
+    store = Store(Path(batch.out), batch.options.format)
+    clear_work(store, task.shard, batch.driver)
+    work, notes = store.new_work(task.shard, batch.driver), _Attempts(store.attempts(task.shard))
+    notes.note("begin")
+    try:
+        return _Shard(task, batch, maker, store, work, notes, moved, careful=careful or notes.careful).make()
+    except (Exception, KeyboardInterrupt):
+        notes.place.unlink(missing_ok=True)  # it ended, if not well
+        raise
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def clear_work(store: Store, shard: int, driver: str) -> None:
+    """Remove what processes left of a shard that were killed; what another driver has, who lives, stays."""
+    store.clear_work(shard, but=claim.names(store.work) - {driver})
 
 
 @dataclass
@@ -124,13 +146,15 @@ class _Shard:
     """A folder of its own."""
     notes: _Attempts
     moved: Callable[[int], None]
+    careful: bool
+    """Rows are made one by one."""
     entries: dict[int, Entry] = field(default_factory=dict)
     """By the row's number within the shard."""
     names_files: bool = False
     refused: int = 0
 
     def make(self) -> Report:
-        old = self._old()
+        old, whole = self._old()
         asked = dict(self._asked())
         kept, todo = {}, {}
         for number, one in asked.items():
@@ -141,17 +165,21 @@ class _Shard:
                 todo[number] = one
         self.entries |= kept
         carried = [entry["id"] for entry in kept.values() if entry["state"] == "made"]
-        same = not todo and len(carried) == sum(entry["state"] == "made" for entry in old.values())
+        same = whole and not todo and len(carried) == sum(entry["state"] == "made" for entry in old.values())
         data = self.store.data(self.task.shard) if same and carried else self._write(todo, carried)
         if len(self.entries) != len(self.task.rows):
             raise AssertionError("a row was lost")  # rather stop than have a hole in the folder
         return self._commit(data, same=same, made=len(todo))
 
-    def _old(self) -> dict[str, Entry]:
-        """By id, what is already in the folder."""
-        if self.store.head(self.task.shard) is None:
-            return {}
-        return {e["id"]: e for e in self.store.entries(self.task.shard) if e["state"] in ("made", "dropped")}
+    def _old(self) -> tuple[dict[str, Entry], bool]:
+        """By id, what is already in the folder as it was written; and whether that is all that was written there."""
+        shard, data = self.task.shard, self.store.data(self.task.shard)
+        damaged = self.store.damage(shard)
+        if damaged and (data in damaged or self.store.record(shard) in damaged):  # nothing of it is sure
+            return {}, False
+        lost = {place.name.partition(".")[0] for place in damaged}
+        known = (e for e in self.store.entries(shard) if e["state"] in ("made", "dropped"))
+        return {e["id"]: e for e in known if e["state"] == "dropped" or e["id"] not in lost}, not damaged
 
     def _asked(self) -> Iterator[tuple[int, Asked]]:
         """The rows that can be made; for the others an entry that says why not."""
@@ -163,11 +191,9 @@ class _Shard:
                 self.names_files |= row.names_files
                 one = self.maker.sources.ask(row)
             except MotionloomError as error:
-                self.refused += row is None or not row.names_files
+                again = isinstance(error, Unexpected) or (row is not None and row.names_files)
+                self.refused += not again
                 self.entries[number] = self._entry(number, "failed", id=None, error=str(error))
-                continue
-            except (OSError, RecursionError, MemoryError) as error:
-                self.entries[number] = self._entry(number, "failed", id=None, error=f"it cannot be read ({error})")
                 continue
             if one.id in seen:
                 before = self.task.first + seen[one.id]
@@ -192,22 +218,26 @@ class _Shard:
             if carried:
                 file = self._writer(place)
                 file.carry(self.store.data(self.task.shard), set(carried))
-            begin = self._begin if self.notes.careful else None
-            for one, made in self.maker.make(list(todo.values()), begin=begin):
+            for one, made in self._made(list(todo.values())):
                 number = numbers[id(one)]
                 self.moved(1)
-                if begin is not None:
+                if self.careful:
                     self.notes.note(f"end {one.key}")
                 if isinstance(made, str):
                     self.entries[number] = self._entry(number, "failed", one, error=made)
                     continue
-                about = entry_of(one, made)
-                if not made.passes(passes):
-                    self.entries[number] = self._entry(number, "dropped", one, **about)
-                    continue
-                file = file or self._writer(place)
-                file.add(made.people, about)
-                self.entries[number] = self._entry(number, "made", one, **about)
+                try:
+                    about = entry_of(one, made)
+                    passed = made.passes(passes)
+                    if passed:
+                        file = file or self._writer(place)
+                        file.add(made.people, about)
+                    self.entries[number] = self._entry(number, "made" if passed else "dropped", one, **about)
+                except Exception as error:
+                    if _of_disk(error):
+                        raise
+                    why = unexpected(error, "it could not be kept")
+                    self.entries[number] = self._entry(number, "failed", one, error=str(why))
         finally:
             if file is not None:
                 file.close()
@@ -215,6 +245,20 @@ class _Shard:
 
     def _writer(self, place: Path) -> Writer:
         return writer(self.batch.options.format, place, unit=self.batch.options.unit)
+
+    def _made(self, asked: list[Asked]) -> Iterator[tuple[Asked, Made | str]]:
+        """What comes of each row; of careful work each row by itself, with whatever goes wrong as its error."""
+        if not self.careful:
+            yield from self.maker.make(asked)
+            return
+        for one in asked:
+            try:
+                found = list(self.maker.make([one], begin=self._begin))
+            except Exception as error:
+                if _of_disk(error):
+                    raise
+                found = [(one, str(unexpected(error, "it could not be made")))]
+            yield from found
 
     def _begin(self, one: Asked) -> None:
         self.notes.note(f"row {one.key}")
@@ -225,10 +269,10 @@ class _Shard:
         found = Counter(entry["state"] for entry in entries)
         counts = {state: found[state] for state in STATES if found[state]}
         size = sizes(data) if data is not None else {"files": 0, "bytes": 0}
-        head = Head(digest(rows), self.names_files, size, counts, self.refused)
+        head = Head(digest(rows), self.names_files, size, counts, self.refused, hashes(data) if data else {})
         if not same:
             self.store.commit(shard, data, entries, head, old=self.work / "old")
-        elif self.store.head(shard) != head or list(self.store.entries(shard)) != entries:
+        elif not self.store.says(shard, entries, head):
             self.store.write_record(shard, entries, head)
         self.notes.place.unlink(missing_ok=True)
         return Report(shard, len(rows), counts, made, problems(entries))
@@ -236,6 +280,11 @@ class _Shard:
     def _entry(self, number: int, state: str, one: Asked | None = None, **more: Any) -> Entry:
         known = {} if one is None else {"id": one.id, "key": one.key, "task": one.row.task, "text": one.text}
         return {"row": self.task.first + number, "state": state, **known, **more}
+
+
+def _of_disk(error: BaseException | None) -> bool:
+    """Whether an error, or what it came of, is one of the system's: a full disk is no fault of a row."""
+    return error is not None and (isinstance(error, OSError) or _of_disk(error.__cause__))
 
 
 def problems(entries: Iterable[Entry]) -> list[str]:

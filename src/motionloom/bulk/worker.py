@@ -34,6 +34,11 @@ def main() -> int:
         _work(lines, say)
     except MotionloomError as error:
         say({"fatal": str(error)})
+    except Exception as error:  # of no row: whoever comes after this process would end alike
+        import traceback
+
+        traceback.print_exc()
+        say({"fatal": f"a process that makes motions failed ({type(error).__name__}: {error})"})
     return 0
 
 

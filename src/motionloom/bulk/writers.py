@@ -17,6 +17,7 @@ import numpy as np
 
 from motionloom.bulk.jobs import arrow, parquet
 from motionloom.bulk.measures import MEANING, SECOND, SHARED
+from motionloom.bulk.row import hash_file
 from motionloom.io import save, save_scene
 from motionloom.io.bvh_writer import save_bvh
 from motionloom.io.npz import save_npz
@@ -58,15 +59,23 @@ class Files(Writer):
         path.mkdir()
 
     def add(self, people: Sequence[Motion], about: dict[str, Any]) -> None:
-        names = file_names(about["id"], self.kind, len(people))
-        if len(names) < len(people):
-            save_scene(people, self.path / names[0], names=PEOPLE)
+        places = [self.path / name for name in file_names(about["id"], self.kind, len(people))]
+        try:
+            self._save(people, places)
+        except BaseException:
+            for place in places:  # all that there is of a motion, or none
+                place.unlink(missing_ok=True)
+            raise
+
+    def _save(self, people: Sequence[Motion], places: Sequence[Path]) -> None:
+        if len(places) < len(people):
+            save_scene(people, places[0], names=PEOPLE)
             return
-        for motion, name in zip(people, names, strict=True):
+        for motion, place in zip(people, places, strict=True):
             if self.kind == ".bvh":
-                save_bvh(motion, self.path / name, unit=self.unit)
+                save_bvh(motion, place, unit=self.unit)
             else:
-                save(motion, self.path / name)
+                save(motion, place)
 
     def carry(self, old: Path, ids: Collection[str]) -> None:
         for place in old.iterdir():
@@ -89,10 +98,13 @@ class Tar(Writer):
         self._part = path.with_name(f"{path.name}.npz")
 
     def add(self, people: Sequence[Motion], about: dict[str, Any]) -> None:
+        found = {}
         for motion, name in zip(people, file_names(about["id"], ".npz", len(people)), strict=True):
             save_npz(motion, self._part)
-            self._put(name, self._part.read_bytes())
-        self._put(f"{about['id']}.json", json.dumps(about, ensure_ascii=False, sort_keys=True).encode())
+            found[name] = self._part.read_bytes()
+        found[f"{about['id']}.json"] = json_line(dict(sorted(about.items())))
+        for name, data in found.items():  # all that there is of a motion, or none
+            self._put(name, data)
 
     def carry(self, old: Path, ids: Collection[str]) -> None:
         with tarfile.open(old) as tar:
@@ -172,10 +184,16 @@ def parquet_row(people: Sequence[Motion], about: dict[str, Any]) -> dict[str, An
     skeleton = people[0].skeleton  # both are on the same one
     return {
         **about,
+        "text": about["text"].encode("utf-8", "replace").decode(),
         "joints": len(skeleton), "positions": flat(*(motion.positions() for motion in people)),
         "rotations": flat(*(motion.rotations for motion in people)), "root": flat(*(motion.root for motion in people)),
         "names": list(skeleton.names), "parents": list(skeleton.parents), "offsets": flat(skeleton.offsets),
     }  # fmt: skip
+
+
+def json_line(value: dict[str, Any]) -> bytes:
+    """A mapping as JSON in UTF-8; half of a surrogate pair, which has no UTF-8, stays written out."""
+    return json.dumps(value, ensure_ascii=False).encode("utf-8", "backslashreplace")
 
 
 def file_names(name: str, kind: str, people: int) -> list[str]:
@@ -201,6 +219,19 @@ def sizes(path: Path) -> dict[str, int]:
     """What a shard's data must look like to be whole: files and bytes."""
     places = [path] if path.is_file() else list(_inside(path))
     return {"files": len(places), "bytes": sum(place.stat().st_size for place in places)}
+
+
+def hashes(path: Path) -> dict[str, str]:
+    """SHA-256 of a shard's files by their names; of a shard that is one file, that one's. Empty: it cannot be read."""
+    places = [path] if path.is_file() else list(_inside(path))
+    return {place.name if place != path else "": _hash(place) for place in sorted(places)}
+
+
+def _hash(place: Path) -> str:
+    try:
+        return hash_file(place)
+    except OSError:
+        return ""
 
 
 def sync(path: Path) -> None:

@@ -39,7 +39,10 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "--prompts", type=Path, metavar="FILE", help="a text file with a prompt per line, instead of JOBS"
     )
     parser.add_argument("--variants", type=int, metavar="N", help="motions per line of --prompts, of seeds 0 to N - 1")
-    parser.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="the folder of the batch")
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="the folder of the batch")
+    parser.add_argument(
+        "--verify", type=Path, metavar="FOLDER", help="only say whether a batch's files are still as they were written"
+    )
     parser.add_argument(
         "--format", default="npz", choices=("npz", "bvh", "glb", "webdataset", "parquet"),
         help="single files, or shards that hold many (default npz)",
@@ -89,9 +92,16 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
 
 
 def run_batch(arguments: argparse.Namespace) -> int:
-    """``motionloom batch JOBS --out FOLDER``; exit code 0 where every row was made or dropped, else 1."""
+    """``motionloom batch JOBS --out FOLDER``; exit code 0 where every row was made or dropped, else 1.
+
+    ``--verify FOLDER``: 2 where something is damaged.
+    """
     from motionloom.bulk.batch import check_jobs, check_options
 
+    if arguments.verify is not None:
+        return _verify(arguments)
+    if arguments.out is None:
+        fail("name the folder of the batch with --out")
     options, where, jobs = _options(arguments), _where(arguments), _jobs(arguments)
     check_options(options)
     rows = jobs.count()
@@ -100,6 +110,32 @@ def run_batch(arguments: argparse.Namespace) -> int:
         _estimate(arguments, jobs, options, where)
         return 0
     return _make(arguments, jobs, options, where=where, rows=rows)
+
+
+def _verify(arguments: argparse.Namespace) -> int:
+    from motionloom.bulk.verify import verify
+
+    if arguments.jobs is not None or arguments.prompts is not None or arguments.out is not None:
+        fail("--verify FOLDER looks at a batch and makes nothing; give it without jobs and --out")
+    found = verify(arguments.verify)
+    if arguments.json:
+        import json
+
+        print(json.dumps(vars(found) | {"damaged": [str(path) for path in found.damaged]}, indent=1))
+    else:
+        for path in found.damaged:
+            print(f"{path} is {'not as it was written' if path.exists() else 'lost'}")
+        if not found.damaged:
+            print(f"{arguments.verify} is as it was written: {found.shards:,} of {found.of:,} shards")
+        if found.sizes_only:
+            print(f"of {found.sizes_only:,} older shards there are no hashes, and only sizes were compared")
+    if found.damaged:
+        count = len(found.damaged)
+        fail(
+            f"{count:,} {'file' if count == 1 else 'files'} of {arguments.verify} {'is' if count == 1 else 'are'} "
+            "damaged; run the command that made the batch again: it makes anew what was damaged, and nothing else"
+        )
+    return 0
 
 
 def _jobs(arguments: argparse.Namespace) -> "Jobs":

@@ -30,7 +30,9 @@ from motionloom.server.mmcp.routes import routes as mmcp_routes
 from motionloom.server.openapi import as_page, document
 from motionloom.server.outgoing import file_once
 from motionloom.server.project import Project, Stored
-from motionloom.server.refusal import Refusal
+from motionloom.server.refusal import Refusal, full_disk
+from motionloom.server.saved import Saved
+from motionloom.server.saved import routes as project_routes
 from motionloom.server.streaming import events
 from motionloom.server.worker import Worker
 from motionloom.skeleton import SMPL22
@@ -47,10 +49,13 @@ class Studio:
     limits: Limits
     streams: int = 0
     """Event streams that are open."""
+    saved: Saved = field(init=False)
+    """The project's JSON."""
     files: asyncio.Semaphore = field(init=False)
     """Held while a file is read or made: few at a time, and nobody else's answers wait for a thread."""
 
     def __post_init__(self) -> None:
+        self.saved = Saved(self.project)
         self.files = asyncio.Semaphore(self.limits.exports)
 
 
@@ -67,7 +72,8 @@ def build(project: Project, worker: Worker, door: Door, *, more: Sequence[BaseRo
     app = Starlette(
         routes=[*more, *routes()], lifespan=lifespan, middleware=[Middleware(Guard, door=door)],
         exception_handlers={
-            Refusal: _refused, MotionloomError: _mistaken, HTTPException: _no_route, Exception: _failed,
+            Refusal: _refused, MotionloomError: _mistaken, OSError: _unwritten, HTTPException: _no_route,
+            Exception: _failed,
         },
     )  # fmt: skip
     app.state.studio = studio
@@ -86,7 +92,7 @@ def routes(*, page: bool = True) -> list[BaseRoute]:
         Route("/motions/{name}", motion),
         Route("/characters", upload_character, methods=["POST"]),
         Route("/characters/{id}", character),
-        Route("/project", saved_project, methods=["GET", "PUT"]),
+        *project_routes(),
         Route("/timeline.yaml", timeline_to_yaml, methods=["POST"]),
         Route("/timeline.json", timeline_to_json, methods=["POST"]),
         *mmcp_routes(),
@@ -253,18 +259,7 @@ async def _with_file(studio: Studio, call: Callable[[], Any], part: Path | None 
             raise MotionloomError(str(error).replace(str(part), name) if part else str(error)) from None
 
 
-# The project and its timeline
-
-
-async def saved_project(request: Request) -> Response:
-    studio = studio_of(request)
-    if request.method == "GET":
-        data = await run_in_threadpool(studio.project.read_project)
-        return Response(data or b"null", media_type="application/json", headers={"Cache-Control": "no-store"})
-    data = await body_of(request, studio.limits.project_bytes)
-    parse_json(data, "the project")
-    await run_in_threadpool(studio.project.save_project, data)
-    return JSONResponse({"saved": len(data)})
+# Timelines
 
 
 async def timeline_to_yaml(request: Request) -> Response:
@@ -288,18 +283,30 @@ async def timeline_to_json(request: Request) -> Response:
 # What goes wrong
 
 
-def _answer(status: int, sentence: str, headers: Mapping[str, str] | None = None, *, where: str = "") -> Response:
-    return JSONResponse({"error": sentence} | ({"where": where} if where else {}), status_code=status, headers=headers)
+def _answer(
+    status: int, sentence: str, headers: Mapping[str, str] | None = None, *, more: Mapping[str, Any] | None = None
+) -> Response:
+    return JSONResponse({"error": sentence, **(more or {})}, status_code=status, headers=headers)
 
 
 async def _refused(request: Request, error: Exception) -> Response:
     assert isinstance(error, Refusal)
-    return _answer(error.status, error.sentence, error.headers)
+    return _answer(error.status, error.sentence, error.headers, more=error.more)
+
+
+async def _unwritten(request: Request, error: Exception) -> Response:
+    """A full disk is told; any other error of the system is one of the program."""
+    if (refusal := full_disk(error)) is None:
+        raise error
+    return await _refused(request, refusal)
 
 
 async def _mistaken(request: Request, error: Exception) -> Response:
+    if (refusal := full_disk(error)) is not None:
+        return await _refused(request, refusal)
     sentence = studio_of(request).project.without_paths(str(error))
-    return _answer(400, sentence, where=getattr(error, "where", ""))
+    where = getattr(error, "where", "")
+    return _answer(400, sentence, more={"where": where} if where else {})
 
 
 async def _no_route(request: Request, error: Exception) -> Response:

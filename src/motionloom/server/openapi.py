@@ -140,8 +140,12 @@ def _paths() -> dict[str, Any]:
                                _asked(_OBJECT) | _answered("glTF", _OBJECT, kind="model/gltf+json"))},
         "/project": {
             "get": ("The project as it was saved last", _answered("any JSON; null before the first", {})),
-            "put": ("Save the project", _asked({}) | _answered("saved", _OBJECT)),
+            "put": ("Save the project; 409 where its id and revision are not those of what is there",
+                    {"parameters": [_query("over", "ID.REVISION of what it may replace all the same")]}
+                    | _asked({}) | _answered("saved, id, revision", _OBJECT)),
         },
+        "/project/stamp": {"get": ("Id and revision of what was saved last", _answered("null before the first", {}))},
+        "/project/aside": {"post": ("Give what was saved another name in the folder", _answered("kept", _OBJECT))},
         "/timeline.yaml": {"post": ("A timeline's JSON to its YAML",
                                     timeline | _answered("YAML", _TEXT, kind="application/yaml"))},
         "/timeline.json": {"post": ("A timeline's YAML to its JSON",

@@ -1,6 +1,7 @@
 """The project folder: motions, characters and the project's JSON, the only place that the server reads and writes.
 
     project.json            what the page saves
+    project.DAY-TIME.json   what was there before and was put aside, since the page could not read it
     motions/ID.npz          a motion; ID.2.npz, ID.3.npz, ... are the other people in its world
     motions/ID.json         what is known of it; written last, so that a motion without it is not there
     characters/ID.glb       a character (.glb, .gltf, .vrm, .bvh) or the skeleton of AMC files (.asf)
@@ -28,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
+from motionloom.io.text import parse_json
 from motionloom.server.limits import Limits
 from motionloom.server.refusal import Refusal
 
@@ -118,9 +120,15 @@ class Project:
 
         stored = Stored(secrets.token_hex(8), tuple(people), about)
         about = {**about, "people": len(stored.people)}
-        for number, person in enumerate(stored.people):
-            save_npz(person, self.motions / _file(stored.id, number))
-        self._write(self.motions / f"{stored.id}.json", json.dumps(about).encode())
+        places = [self.motions / _file(stored.id, number) for number in range(len(stored.people))]
+        try:
+            for person, place in zip(stored.people, places, strict=True):
+                save_npz(person, place)
+            self._write(self.motions / f"{stored.id}.json", json.dumps(about).encode())
+        except BaseException:
+            for place in places:  # all of it or nothing
+                place.unlink(missing_ok=True)
+            raise
         with self._lock:
             for number in range(len(stored.people)):
                 name = _file(stored.id, number)
@@ -141,15 +149,29 @@ class Project:
             if name in self._cache:
                 self._cache.move_to_end(name)
                 return self._cache[name]
+        about, count = self._about(name)
         try:
-            about = json.loads((self.motions / f"{name}.json").read_bytes())
-            people = tuple(load_npz(self.motions / _file(name, number)) for number in range(about.pop("people")))
-        except (OSError, ValueError, KeyError):
-            raise Refusal(404, f"there is no motion {name}; it was never made, or made room for newer ones") from None
+            people = tuple(load_npz(self.motions / _file(name, number)) for number in range(count))
+        except (OSError, ValueError):
+            raise Refusal(404, f"the files of motion {name} are damaged; make it anew") from None
         stored = Stored(name, people, about)
         with self._lock:
             self._remember(stored)
         return stored
+
+    def _about(self, name: str) -> tuple[dict[str, Any], int]:
+        """What is known of a motion, and how many people are in it."""
+        try:
+            about = parse_json((self.motions / f"{name}.json").read_bytes(), name)
+        except OSError:
+            raise Refusal(404, f"there is no motion {name}; it was never made, or made room for newer ones") from None
+        except MotionloomError:
+            about = {}
+        about = about if isinstance(about, dict) else {}
+        count = about.pop("people", None)
+        if not isinstance(count, int) or not 1 <= count <= self.limits.people:
+            raise Refusal(404, f"what is known of motion {name} is damaged; make it anew")
+        return about, count
 
     def _remember(self, stored: Stored) -> None:
         self._cache[stored.id] = stored
@@ -177,19 +199,26 @@ class Project:
             if sum(1 for _ in self.characters.glob("*.json")) >= self.limits.uploads:
                 raise Refusal(507, f"the project holds {self.limits.uploads} characters already; begin another project")
             found = secrets.token_hex(8)
-            os.replace(part, self.characters / f"{found}{suffix}")
-            self._write(self.characters / f"{found}.json", json.dumps({"name": name, "suffix": suffix}).encode())
+            place = self.characters / f"{found}{suffix}"
+            os.replace(part, place)
+            try:
+                self._write(self.characters / f"{found}.json", json.dumps({"name": name, "suffix": suffix}).encode())
+            except BaseException:
+                place.unlink(missing_ok=True)
+                raise
         return found
 
     def character(self, name: Any) -> tuple[Path, str]:
         """The file of that id and its name; raises `Refusal` 404 where there is none."""
         if isinstance(name, str) and ID.fullmatch(name):
             try:
-                about = json.loads((self.characters / f"{name}.json").read_bytes())
-                if about["suffix"] in CHARACTERS:
-                    return self.characters / f"{name}{about['suffix']}", about["name"]
-            except (OSError, ValueError, KeyError):
-                pass
+                about = parse_json((self.characters / f"{name}.json").read_bytes(), name)
+            except (OSError, MotionloomError):
+                about = None
+            if isinstance(about, dict) and about.get("suffix") in CHARACTERS and isinstance(about.get("name"), str):
+                place = self.characters / f"{name}{about['suffix']}"
+                if place.is_file():
+                    return place, about["name"]
         raise Refusal(404, "there is no such character; send it first with POST /characters?name=hero.glb")
 
     # -- the project's JSON
@@ -200,6 +229,28 @@ class Project:
             return (self.folder / "project.json").read_bytes()
         except FileNotFoundError:
             return None
+
+    def seen(self) -> object:
+        """Something that is another when the saved JSON is; None where nothing was saved."""
+        try:
+            about = (self.folder / "project.json").stat()
+        except FileNotFoundError:
+            return None
+        return about.st_ino, about.st_size, about.st_mtime_ns
+
+    def put_aside(self, stem: str) -> str | None:
+        """Give the saved JSON another name that begins so; returns it, None where nothing was saved."""
+        with self._lock:
+            for number in range(1, 1000):
+                name = f"{stem}.json" if number == 1 else f"{stem}-{number}.json"
+                if (self.folder / name).exists():
+                    continue
+                try:
+                    os.rename(self.folder / "project.json", self.folder / name)
+                except FileNotFoundError:
+                    return None
+                return name
+        raise Refusal(409, "the folder is full of projects that were put aside; move some away")
 
     def save_project(self, data: bytes) -> None:
         """Save the JSON: after a crash the folder holds the old or the new one, whole."""

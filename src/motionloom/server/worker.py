@@ -12,7 +12,7 @@ from motionloom.server.jobs import Job
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project
 from motionloom.server.queue import Queue
-from motionloom.server.refusal import Refusal
+from motionloom.server.refusal import Refusal, full_disk
 
 if TYPE_CHECKING:
     from motionloom.server.drawing import Models, Result
@@ -150,12 +150,18 @@ class Worker:
         except _Cancelled:
             return
         except (MotionloomError, Refusal) as error:
-            problem = self.project.without_paths(getattr(error, "sentence", None) or str(error))
+            told = full_disk(error) or error
+            problem = self.project.without_paths(getattr(told, "sentence", None) or str(told))
         except MemoryError:
             problem = "this takes more memory than there is; ask for less at once"
         except Exception as error:
-            log.exception("a job failed")
-            problem = f"the server failed ({type(error).__name__}: {str(error)[:200]}); this is a fault of the program"
+            if (full := full_disk(error)) is not None:
+                problem = full.sentence
+            else:
+                log.exception("a job failed")
+                problem = (
+                    f"the server failed ({type(error).__name__}: {str(error)[:200]}); this is a fault of the program"
+                )
         else:
             return
         for job in jobs:

@@ -4,7 +4,7 @@ import type { MotionClip } from "../body/clip";
 import type { History } from "../project/history";
 import { type Project, length } from "../project/model";
 import { type Problem, placeOf, withoutLine } from "../project/places";
-import { Refused } from "../server/http";
+import { FULL, Refused, Unreachable } from "../server/http";
 import type { LiveState } from "./live";
 import type { Session } from "./session";
 import type { Signal } from "./signal";
@@ -42,6 +42,15 @@ export function problemOf(app: App, error: unknown): Problem {
   const { message } = error as Error;
   if (!(error instanceof Refused)) return { message, at: null };
   return { message: withoutLine(message), at: placeOf(app.project.value, message, error.where) };
+}
+
+/** Show what went wrong: nobody answers, there is no room, or a sentence at its place; `what` begins it. */
+export function fail(app: App, error: unknown, what = ""): void {
+  if (error instanceof Unreachable) return app.session.update({ connected: false });
+  const problem = problemOf(app, error);
+  const message = !what || problem.message.startsWith(what) ? problem.message : `${what}: ${problem.message}`;
+  const isFull = error instanceof Refused && error.status === FULL;
+  app.session.update({ error: { ...problem, message }, ...(isFull ? { saved: "full" as const } : {}) });
 }
 
 /** Seconds that the playhead may go to. */

@@ -18,8 +18,7 @@ import { isDrawn } from "../project/plan";
 import { continued, pieces, settled, withMotion } from "../project/settled";
 import { freeze, freezeRest, unfrozen, write } from "../project/timeline";
 import { type Result, motion, takeOf } from "../server/api";
-import { isAway } from "../server/jobs";
-import { type App, problemOf, shownClip } from "./app";
+import { type App, fail, shownClip } from "./app";
 import type { Drawer } from "./drawing";
 import { NOTHING } from "./session";
 
@@ -194,8 +193,7 @@ export class Deeds {
   }
 
   fail(error: unknown): void {
-    if (isAway(error)) this.app.session.update({ connected: false });
-    else this.app.session.update({ error: problemOf(this.app, error) });
+    fail(this.app, error);
   }
 
   say(message: string): void {

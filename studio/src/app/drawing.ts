@@ -3,11 +3,11 @@
 import { keepWay, needsWay } from "../project/asks";
 import { overlaid } from "../body/clip";
 import { type Project, keptTake } from "../project/model";
-import { type Job, type Plan, plan, planKey } from "../project/plan";
+import { type Job, type Plan, isDrawn, plan, planKey } from "../project/plan";
 import { type JobRequest, type Result, motion, takeOf } from "../server/api";
 import { Refused } from "../server/http";
-import { type Level, isAway, runJob } from "../server/jobs";
-import { type App, denoised, problemOf, shownClip } from "./app";
+import { type Level, runJob } from "../server/jobs";
+import { type App, denoised, fail, shownClip } from "./app";
 
 /**
  * Where a motion is there already, what is predicted for the new one is shown after every so many network calls: from
@@ -38,6 +38,7 @@ export class Drawer {
   constructor(private readonly app: App) {
     app.project.subscribe((_, change) => {
       if (change.draft) return;
+      if (change.elsewhere && isDrawn(this.app.project.value)) this.stop();
       this.loadTakes();
       if (change.label) this.schedule(change.typed ? TYPING : 0);
     });
@@ -151,9 +152,11 @@ export class Drawer {
     this.app.denoising.value = [];
     this.app.project.amend((now) => {
       const kept = now.kept < takes.length ? now.kept : 0;
-      return planKey(now) === key ? { ...now, takes, kept, drawn: key } : now;
+      // What another page has drawn meanwhile is the same.
+      return planKey(now) === key && now.drawn !== key ? { ...now, takes, kept, drawn: key } : now;
     });
-    this.app.session.update({ clips });
+    const { value } = this.app.project;
+    if (value.takes === takes || value.drawn !== key) this.app.session.update({ clips });
   }
 
   /** Run one job and show how it comes along: the first `takes` of its motions. */
@@ -192,8 +195,7 @@ export class Drawer {
   private say(error: unknown, running: AbortController): void {
     if (running.signal.aborted && this.running !== running) return;
     if (error instanceof DOMException && error.name === "AbortError") return;
-    if (isAway(error)) this.app.session.update({ connected: false });
-    else this.app.session.update({ error: problemOf(this.app, error) });
+    fail(this.app, error);
   }
 
   /** The clips of the project's takes, after undo for instance. */
@@ -213,9 +215,7 @@ export class Drawer {
 
   /** Motions that the server no longer has are drawn anew. */
   private lost(error: unknown, ids: string): void {
-    if (isAway(error)) return this.app.session.update({ connected: false });
-    if (!(error instanceof Refused) || error.status !== 404)
-      return this.app.session.update({ error: problemOf(this.app, error) });
+    if (!(error instanceof Refused) || error.status !== 404) return fail(this.app, error);
     const { value } = this.app.project;
     if (value.takes.map((take) => take.motion).join() !== ids) return;
     const isBased = keptTake(value)?.motion === value.base?.motion;

@@ -2,7 +2,7 @@
 
 import { SUFFIX, checked, read, written } from "../project/file";
 import { asked, timelineOf } from "../project/goals";
-import { type Project, keptTake } from "../project/model";
+import { type Project, type Stamp, keptTake } from "../project/model";
 import { opened } from "../project/opened";
 import {
   type Format,
@@ -13,8 +13,7 @@ import {
   uploadCharacter,
   uploadMotion,
 } from "../server/api";
-import { isAway } from "../server/jobs";
-import type { App } from "./app";
+import { type App, fail } from "./app";
 import type { Deeds } from "./deeds";
 
 const MOTIONS = [".bvh", ".amc", ".npz", ".glb", ".asf"];
@@ -41,8 +40,7 @@ export class Files {
     const { value } = this.app.project;
     const name = fileName(value.name);
     await this.said("Export", async () => {
-      if (format === "project")
-        return download(new Blob([written(value)], { type: "application/json" }), name + SUFFIX);
+      if (format === "project") return saveFile(value, this.app.session.value.stamp);
       if (format === "yaml") return this.exportYaml(value, name);
       const take = keptTake(value);
       if (!take) throw new Error("there is no motion yet; write what the person does and wait for it to be drawn.");
@@ -104,11 +102,7 @@ export class Files {
       this.app.session.update({ error: null });
       await deed();
     } catch (error) {
-      if (isAway(error)) this.app.session.update({ connected: false });
-      const { message } = error as Error;
-      this.app.session.update({
-        error: { message: message.startsWith(what) ? message : `${what}: ${message}`, at: null },
-      });
+      fail(this.app, error, what);
     }
   }
 }
@@ -129,6 +123,12 @@ export function download(blob: Blob, name: string): void {
   link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 30_000);
+}
+
+/** The project as a file of its user; `more` goes behind its name. */
+export function saveFile(project: Project, stamp: Stamp, more = ""): void {
+  const data = new Blob([written(project, stamp)], { type: "application/json" });
+  download(data, `${fileName(project.name)}${more}${SUFFIX}`);
 }
 
 /** Whether a GLB moves, and whether it has a skin. */

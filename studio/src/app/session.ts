@@ -1,7 +1,7 @@
 /** What the page shows at the moment: nothing of it is undone, and nothing of it is in the project file. */
 
 import type { MotionClip } from "../body/clip";
-import type { Range } from "../project/model";
+import { type Project, type Range, type Stamp, newId } from "../project/model";
 import type { Problem } from "../project/places";
 import { Signal } from "./signal";
 
@@ -54,7 +54,19 @@ export interface Session {
   /** What went wrong last. */
   readonly error: Problem | null;
   readonly connected: boolean;
-  readonly saved: "saved" | "saving" | "here";
+  /** `here`: only in this browser; `full`: the server has no room for anything. */
+  readonly saved: "saved" | "saving" | "here" | "full";
+  readonly stamp: Stamp;
+  /** Something else is on the server than what was changed here; nothing is saved until somebody says what is to be. */
+  readonly conflict: Conflict | null;
+  /** What the page did by itself and somebody should know. */
+  readonly told: string | null;
+}
+
+/** What the server has; `stamp` null: nothing, `project` null: nothing that this page can read. */
+export interface Conflict {
+  readonly stamp: Stamp | null;
+  readonly project: Project | null;
 }
 
 export const NOTHING: Selection = { kind: "none" };
@@ -83,5 +95,8 @@ export function newSession(): Signal<Session> {
     error: null,
     connected: true,
     saved: "saved",
+    stamp: { id: newId(), revision: 0 },
+    conflict: null,
+    told: null,
   });
 }

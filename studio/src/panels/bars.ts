@@ -11,12 +11,10 @@ import { iconButton, textButton } from "./parts";
 export function topBar(app: App, actions: Actions, files: Files, root: HTMLElement): void {
   const render = () => {
     const { value, undoLabel, redoLabel } = app.project;
-    const { connected, saved, drawing } = app.session.value;
-    const state = !connected
-      ? "server away"
-      : drawing
-        ? "drawing"
-        : { saved: "saved", saving: "saving", here: "kept in this browser" }[saved];
+    const { connected, saved, drawing, conflict } = app.session.value;
+    const words = { saved: "saved", saving: "saving", here: "kept in this browser", full: "the disk is full" };
+    const state = !connected ? "server away" : conflict ? "not saved" : drawing ? "drawing" : words[saved];
+    const isWrong = !connected || conflict !== null || saved === "full";
     morph(root, [
       h("strong", { class: "brand" }, "motionloom"),
       h("input", {
@@ -40,7 +38,7 @@ export function topBar(app: App, actions: Actions, files: Files, root: HTMLEleme
         title: redoLabel === null ? "Redo" : `Redo: ${redoLabel}`,
       }),
       h("span", { class: "grow" }),
-      h("span", { class: `state${connected ? "" : " away"}`, role: "status" }, state),
+      h("span", { class: `state${isWrong ? " away" : ""}`, role: "status" }, state),
       h("progress", {
         class: drawing ? "" : "idle",
         max: String(drawing?.of ?? 1),
@@ -57,7 +55,7 @@ export function topBar(app: App, actions: Actions, files: Files, root: HTMLEleme
   menuHabits(root);
   app.project.subscribe(render);
   app.session.subscribe((now, before) => {
-    if (now.connected !== before.connected || now.saved !== before.saved || now.drawing !== before.drawing) render();
+    if ((["connected", "saved", "drawing", "conflict"] as const).some((key) => now[key] !== before[key])) render();
   });
   render();
 }

@@ -7,9 +7,12 @@ import type { Files } from "../app/files";
 import { icon } from "./icons";
 import { shownKey } from "./parts";
 
-export function notices(app: App, retry: () => void, root: HTMLElement): void {
+type Choice = "copy" | "theirs" | "mine";
+
+/** `settle`: what is to become of changes that meet somebody else's. */
+export function notices(app: App, retry: () => void, settle: (choice: Choice) => void, root: HTMLElement): void {
   const render = () => {
-    const { error, connected, drawing, person } = app.session.value;
+    const { error, connected, drawing, person, conflict, told } = app.session.value;
     const isElsewhere = !error?.at || (error.at.kind !== "segment" && error.at.who !== person);
     const waiting = !shownClip(app) && drawing;
     morph(root, [
@@ -22,6 +25,21 @@ export function notices(app: App, retry: () => void, root: HTMLElement): void {
               "The server does not answer. Your work is kept in this browser and goes on as soon as the server is back.",
             ),
           ]),
+      ...(conflict ? [question(app, settle)] : []),
+      ...(told
+        ? [
+            h(
+              "p",
+              { class: "notice told", role: "alert" },
+              h("span", {}, told),
+              h(
+                "button",
+                { class: "cross", "aria-label": "Close", onclick: () => app.session.update({ told: null }) },
+                "×",
+              ),
+            ),
+          ]
+        : []),
       // What belongs to a block, a path or a target is said there.
       ...(error && isElsewhere
         ? [
@@ -45,6 +63,8 @@ export function notices(app: App, retry: () => void, root: HTMLElement): void {
     if (
       now.error !== before.error ||
       now.person !== before.person ||
+      now.conflict !== before.conflict ||
+      now.told !== before.told ||
       now.connected !== before.connected ||
       !now.drawing !== !before.drawing ||
       now.clips !== before.clips
@@ -52,6 +72,33 @@ export function notices(app: App, retry: () => void, root: HTMLElement): void {
       render();
   });
   render();
+}
+
+/** What is asked where the server has something else than what was changed here. */
+function question(app: App, settle: (choice: Choice) => void): HTMLElement {
+  const { conflict, stamp } = app.session.value;
+  const theirs = conflict!.project?.name;
+  const [sentence, load, over] = !conflict!.stamp
+    ? ["This browser has changes that no server has, and the project folder is empty.", "Begin anew", "Go on with mine"]
+    : conflict!.stamp.id !== stamp.id
+      ? [
+          `The server has another project now${theirs ? `, “${theirs}”` : ""}. Your changes are not saved.`,
+          "Load the other",
+          "Overwrite it with mine",
+        ]
+      : [
+          "Somebody has saved this project on another page meanwhile. Your changes are not saved.",
+          "Load the other",
+          "Overwrite it with mine",
+        ];
+  return h(
+    "div",
+    { class: "notice conflict", role: "alertdialog", "aria-label": "Your changes are not saved" },
+    h("span", {}, sentence),
+    h("button", { class: "text", onclick: () => settle("copy") }, "Keep mine as a copy"),
+    h("button", { class: "text", onclick: () => settle("theirs") }, load),
+    h("button", { class: "text", onclick: () => settle("mine") }, over),
+  );
 }
 
 /** The number of each take on its part of the picture. */

@@ -1,7 +1,7 @@
 /** A project as one file, and back. A file may come from anybody: it is checked before anything is made of it. */
 
 import { JOINTS } from "../body/skeleton";
-import { type Given, type Project, FPS, LONGEST, SHORTEST, exampleProject } from "./model";
+import { type Given, type Project, type Stamp, FPS, LONGEST, SHORTEST, VERSION, exampleProject } from "./model";
 
 export const SUFFIX = ".loom.json";
 const MOST_SEGMENTS = 500;
@@ -10,8 +10,20 @@ const MOST_GIVEN = 2e6;
 
 export class ProjectError extends Error {}
 
-export function written(project: Project): string {
-  return JSON.stringify({ format: "motionloom studio", ...project }, null, 1);
+export function written(project: Project, stamp: Stamp): string {
+  return JSON.stringify(filed(project, stamp), null, 1);
+}
+
+/** What a project file holds. */
+export function filed(project: Project, { id, revision }: Stamp): Record<string, unknown> {
+  return { format: "motionloom studio", ...project, id, revision };
+}
+
+/** Which project a file is of; null: it does not say, as files of version 1. */
+export function stampOf(found: unknown): Stamp | null {
+  const { id, revision } = (found ?? {}) as Mapping;
+  const isStamp = typeof id === "string" && /^[\w-]{1,80}$/.test(id) && Number.isSafeInteger(revision);
+  return isStamp ? { id, revision: revision as number } : null;
 }
 
 /** Read what `written` wrote; raises `ProjectError` with a sentence. */
@@ -28,8 +40,8 @@ export function read(text: string): Project {
 /** The project in a parsed value, with what is missing as in an empty one. */
 export function checked(found: unknown): Project {
   const top = mapping(found, "the project");
-  if (top.version !== 1)
-    throw new ProjectError(`The project has version ${shown(top.version)}; this page reads version 1.`);
+  if (top.version !== 1 && top.version !== VERSION)
+    throw new ProjectError(`The project has version ${shown(top.version)}; this page reads versions 1 to ${VERSION}.`);
   const empty = exampleProject();
   const people = list(top.people ?? empty.people, "people", 2).map((one, index) => person(one, `people[${index}]`));
   if (!people.length) throw new ProjectError("The project has no people; it needs one or two.");
@@ -39,7 +51,7 @@ export function checked(found: unknown): Project {
   if (!segments.length) throw new ProjectError("The project has no segments; it needs at least one.");
   const takes = list(top.takes ?? [], "takes", 16).map((one, index) => take(one, `takes[${index}]`));
   return {
-    version: 1,
+    version: VERSION,
     name: word(top.name ?? empty.name, "name"),
     seed: number(top.seed ?? 1, "seed", 0, 2 ** 31),
     count: number(top.count ?? 1, "count", 1, 8),

@@ -12,6 +12,8 @@ export interface Change {
   readonly draft: boolean;
   /** Words are being typed. */
   readonly typed: boolean;
+  /** It was done on another page and is shown here; nobody did anything on this one. */
+  readonly elsewhere?: boolean;
 }
 
 export interface ChangeOptions {
@@ -20,6 +22,9 @@ export interface ChangeOptions {
   readonly draft?: boolean;
   readonly typed?: boolean;
 }
+
+/** What another page did is one step of undo, as long as nothing is done here. */
+const FOLLOWED = "another page";
 
 export class History<T> {
   private past: Entry<T>[] = [];
@@ -68,6 +73,15 @@ export class History<T> {
     if (next === this.present) return;
     this.present = next;
     this.tell({ label: "", draft: false, typed: false });
+  }
+
+  /** Take over what was done on another page; undo brings back what was here, however often that page did something. */
+  follow(next: T, label: string): void {
+    if (this.merge !== FOLLOWED) this.past.push({ label, value: this.present });
+    this.merge = FOLLOWED;
+    this.future = [];
+    this.present = next;
+    this.tell({ label: "", draft: false, typed: false, elsewhere: true });
   }
 
   undo(): boolean {

@@ -90,8 +90,17 @@ export interface Clip {
   readonly seconds: number;
 }
 
+/** Version of the project file: 1 had no id and no revision. */
+export const VERSION = 2;
+
+/** Which project of a server, and which state of it; the server counts the revisions. */
+export interface Stamp {
+  readonly id: string;
+  readonly revision: number;
+}
+
 export interface Project {
-  readonly version: 1;
+  readonly version: typeof VERSION;
   readonly name: string;
   readonly seed: number;
   /** How many takes a draw gives: 1 or 4. */
@@ -134,7 +143,7 @@ export function segment(text: string, seconds: number): Segment {
 /** What somebody sees who opens the page for the first time. */
 export function exampleProject(): Project {
   return {
-    version: 1,
+    version: VERSION,
     name: "Untitled",
     seed: 1,
     count: 1,

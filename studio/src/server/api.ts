@@ -1,8 +1,9 @@
 /** What the server can be asked, with its answers as values of the page. */
 
 import { type MotionClip, motionClip } from "../body/clip";
+import { filed, stampOf } from "../project/file";
 import type { TimelineJson } from "../project/goals";
-import type { Project, Take } from "../project/model";
+import type { Project, Stamp, Take } from "../project/model";
 import { getJson, json, request } from "./http";
 
 export interface Result {
@@ -96,10 +97,27 @@ export async function savedProject(): Promise<unknown> {
   return getJson("project");
 }
 
-export async function saveProject(project: Project): Promise<void> {
-  const init = json("PUT", project);
+/**
+ * Save a project as the state after `stamp`; gives the new one. `over`: what may be replaced although it is another.
+ *
+ * Raises `Refused` 409 where the server has something that this does not follow from.
+ */
+export async function saveProject(project: Project, stamp: Stamp, over: Stamp | null = null): Promise<Stamp> {
+  const init = json("PUT", filed(project, stamp));
+  const query = over ? `?${new URLSearchParams({ over: `${over.id}.${over.revision}` })}` : "";
   // Small ones arrive though the tab is closed meanwhile; browsers send no more than 64 KB so.
-  await request("project", { ...init, keepalive: String(init.body).length < 60_000 });
+  const answer = await request(`project${query}`, { ...init, keepalive: String(init.body).length < 60_000 });
+  return stampOf(await answer.json()) ?? stamp;
+}
+
+/** Which project the server has, and which state of it; null: none. */
+export async function savedStamp(): Promise<Stamp | null> {
+  return stampOf(await getJson("project/stamp"));
+}
+
+/** Let the server keep what it has under another name, which is given. */
+export async function putAside(): Promise<string> {
+  return (await getJson<{ kept: string }>("project/aside", { method: "POST" })).kept;
 }
 
 /** The timeline as the YAML file that the command line reads. */

@@ -3,8 +3,11 @@
 import { newId } from "../project/model";
 
 /** `crypto.randomUUID` is for pages from this machine or over https alone. */
-const CLIENT = newId();
+export const CLIENT = newId();
 const TOKEN = new URLSearchParams(globalThis.location?.search).get("token");
+
+/** Status of what finds no room on the server's disk. */
+export const FULL = 507;
 
 /** What the server refused; `message` is its sentence. */
 export class Refused extends Error {

@@ -1,0 +1,113 @@
+"""Damage in a batch's folder, found and mended."""
+
+import json
+import os
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+
+from motionloom.bulk.batch import Where, batch
+from motionloom.bulk.claim import Driver
+from motionloom.bulk.verify import Verified, verify
+from motionloom.cli import main
+from motionloom.errors import MotionloomError
+from tests.bulk.rows import options, rows
+from tests.bulk.test_shard import flipped
+
+OUT = Path("out")
+
+
+def make(weights: str, kind: str = "npz", *, count: int = 5, force: bool = False) -> None:
+    asked = options(weights, shard_rows=2, format=kind)
+    list(batch(rows(count), OUT, options=asked, where=Where(workers=1), force=force))
+
+
+def everything() -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in OUT.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("kind", ["npz", "bvh", "webdataset"])
+def test_a_bit_that_flips_in_any_file_is_found_told_and_mended(
+    weights: str, kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make(weights, kind)
+    before = everything()
+    assert len(before) >= 3 + 3 + 2 + 1  # shards, records, table and its hash, manifest
+    assert main(["batch", "--verify", "out"]) == 0
+    assert "out is as it was written: 3 of 3 shards" in capsys.readouterr().out
+    for path, data in before.items():
+        if path.name == "table.json":
+            continue
+        path.write_bytes(flipped(data))
+        assert main(["batch", "--verify", "out"]) == 2
+        out, err = capsys.readouterr()
+        if path.name == "manifest.json":
+            assert "out/manifest.json is damaged" in err
+        else:
+            assert (out, "1 file of out is damaged" in err) == (f"{path} is not as it was written\n", True)
+        path.write_bytes(data)
+    for path, data in before.items():
+        if path.name != "table.json":
+            path.write_bytes(flipped(data))
+    with pytest.raises(MotionloomError, match="--force"):
+        make(weights, kind)
+    make(weights, kind, force=True)
+    assert everything() == before
+
+
+def test_what_is_lost_or_foreign_is_damage_and_what_was_never_made_is_not(weights: str) -> None:
+    make(weights)
+    assert verify(OUT) == Verified(3, 3, 5 + 3, 0, ())
+    lost, foreign = next((OUT / "shard-000000").iterdir()), OUT / "shard-000001" / "mine.npz"
+    before = everything()
+    lost.unlink()
+    foreign.write_bytes(b"")
+    record = OUT / "records" / "000002.jsonl"
+    record.unlink()
+    assert verify(OUT).damaged == (lost, foreign, record)
+    make(weights)
+    assert everything() == before
+    record.unlink()
+    (OUT / "records" / "table.json").unlink()
+    (OUT / "metadata.jsonl").unlink(missing_ok=True)
+    (OUT / "metadata.parquet").unlink(missing_ok=True)
+    assert verify(OUT) == Verified(2, 3, 4 + 2, 0, ())  # as of a batch that is under way
+
+
+def test_a_manifest_that_is_lost_is_written_anew_where_that_is_asked_for(weights: str) -> None:
+    make(weights)
+    before = everything()
+    (OUT / "manifest.json").unlink()
+    with pytest.raises(MotionloomError, match=r"manifest.json is lost: .*--force"):
+        make(weights)
+    with pytest.raises(MotionloomError, match=r"manifest.json is lost"):
+        verify(OUT)
+    stamps = {path: path.stat().st_mtime_ns for path in OUT.rglob("*.npz")}
+    make(weights, force=True)
+    assert everything() == before
+    assert {path: path.stat().st_mtime_ns for path in OUT.rglob("*.npz")} == stamps
+
+
+def test_the_answer_can_be_json(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+    make(weights)
+    record = OUT / "records" / "000001.jsonl"
+    record.write_bytes(record.read_bytes().split(b"\n")[0])
+    assert main(["batch", "--verify", "out", "--json"]) == 2
+    assert json.loads(capsys.readouterr().out)["damaged"] == [str(record)]
+
+
+@pytest.mark.parametrize("more", [["jobs.jsonl"], ["--out", "out"]])
+def test_verify_goes_with_nothing_that_makes(more: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["batch", "--verify", "out", *more]) == 2
+    assert "makes nothing" in capsys.readouterr().err
+
+
+def test_a_folder_that_is_no_batch_or_that_somebody_works_in_is_not_verified(weights: str, folder: Path) -> None:
+    with pytest.raises(MotionloomError, match="holds no batch"):
+        verify(OUT)
+    make(weights)
+    (OUT / ".work").mkdir()
+    (OUT / ".work" / "driver-0-of-1.json").write_text(json.dumps(asdict(Driver.here())))
+    with pytest.raises(MotionloomError, match=f"is being made by process {os.getpid()}"):
+        verify(OUT)
