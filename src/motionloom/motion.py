@@ -90,6 +90,14 @@ class Motion:
             translations=None if self.translations is None else self.translations[start:stop],
         )
 
+    def thinned(self, most: int) -> "Motion":
+        """Every so many-th frame, at the rate that goes with it, so that there are at most ``most``."""
+        step = -(-len(self) // most)
+        moved = None if self.translations is None else self.translations[::step]
+        return replace(
+            self, fps=self.fps / step, root=self.root[::step], rotations=self.rotations[::step], translations=moved
+        )
+
     def crop(self, start_s: float, end_s: float) -> "Motion":
         """The part from ``start_s`` to ``end_s`` seconds; raises `MotionloomError` where that is no frame."""
         start, stop = round(start_s * self.fps), round(end_s * self.fps)

@@ -2,23 +2,28 @@
 
 import base64
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from motionloom import io
-from motionloom.cli import main
+from motionloom.cli import main, skeletons
+from motionloom.ground import turned
 from motionloom.io.bvh_writer import save_bvh
+from motionloom.io.character import load_character
 from motionloom.io.gltf import load_glb
 from motionloom.io.gltf_read import open_glb
 from motionloom.kinematics.gestures import Seat
-from motionloom.motion import Motion
+from motionloom.motion import Motion, ground_pose
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22, Skeleton
 from tests.cli.predict.clips import tiny_predictor
 from tests.cli.said import complaint
+from tests.io.gltf_skin import Scene
 from tests.io.rigged import Hero, wave
+from tests.io.test_bind_pose import place
 from tests.io.test_character import check_only_one_animation_is_new
 from tests.tasks.test_edit import person
 
@@ -44,6 +49,13 @@ def test_export_puts_a_walk_on_a_character() -> None:
     check("moving.glb", "walk")
     assert main(["export", "walk.bvh", "moving.glb", "--skeleton", "hero.glb", "--clip-name", "go", "--replace"]) == 0
     assert open_glb("moving.glb").clips == ["go"]
+
+
+def test_export_writes_the_characters_own_mesh_into_a_usda() -> None:
+    assert main(["export", "walk.bvh", "moving.usda", "--skeleton", "hero.glb"]) == 0
+    found = Path("moving.usda").read_text()
+    assert 'def Mesh "body_0"' in found
+    assert found.count("def Mesh") == 1
 
 
 def test_a_character_that_lies_at_rest_is_said(capsys: pytest.CaptureFixture[str]) -> None:
@@ -97,6 +109,8 @@ def test_the_character_itself_is_not_written_over(capsys: pytest.CaptureFixture[
     [
         (("--root", "hips"), "--root goes with a --skeleton"),
         (("--replace",), "--replace goes with a --skeleton"),
+        (("--at", "origin"), "--at goes with a --skeleton"),
+        (("--skeleton", "walk.bvh", "--at", "origin"), "for .glb, .gltf and .vrm characters"),
         (("--skeleton", "walk.bvh", "--replace"), "for .glb, .gltf and .vrm characters"),
         (("--skeleton", "hero.txt"), "--skeleton needs"),
     ],
@@ -167,6 +181,65 @@ def test_the_same_three_in_a_bvh() -> None:
     np.testing.assert_allclose(np.ptp(found["hips"][:, 0], axis=0), 0, atol=1e-5)
     assert np.ptp(found["motion"][:, 0, 2]) > 0.5
     assert np.ptp(found["in-place"][:, 1, 2]) < 1e-5
+
+
+# Where it stands -----------------------------------------------------------------------------------------------------
+
+
+def begins(path: str, clip: str) -> np.ndarray:
+    """(3,) where the hips of a clip of a character begin, x and z, and its facing in degrees from +Z to the left."""
+    scene = Scene(Path(path))
+    worlds = scene.worlds(scene.clip(clip), np.zeros(1))[0, :, :3, 3]
+    names = [node.get("name") for node in scene.nodes]
+    left, right, hips = (worlds[names.index(name)] for name in ("left_hip", "right_hip", "pelvis"))
+    return np.array([hips[0], hips[2], np.degrees(np.arctan2(right[2] - left[2], left[0] - right[0]))])
+
+
+def test_clips_start_where_the_character_stands_and_faces(capsys: pytest.CaptureFixture[str]) -> None:
+    place(Hero()).clip("wave", 0.5 * wave(20)).write(Path("there.glb"))
+    save_bvh(replace(person(2.0, 30.0), root=np.array([4.0, 0.0, -2.0]) + person(2.0, 30.0).root), "far.bvh")
+    for source in ("walk.bvh", "far.bvh"):
+        assert main(["export", source, "out.glb", "--skeleton", "there.glb", "--clip-name", "new"]) == 0
+        assert "stands at x 3.00, z 1.00 m and faces 90 degrees" in capsys.readouterr().err
+        np.testing.assert_allclose(begins("out.glb", "new"), [3.0, 1.0, 90.0], atol=0.5)
+        np.testing.assert_allclose(begins("out.glb", "new")[:2], [3.0, 1.0], atol=1e-3)
+        line = ["export", source, "out.glb", "--skeleton", "there.glb", "--clip-name", "new"]
+        assert main([*line, "--at", "origin"]) == 0
+        np.testing.assert_allclose(begins("out.glb", "new"), [0.0, 0.0, 0.0], atol=0.5)
+        assert "stands at" not in capsys.readouterr().err
+        assert main(["export", source, "out.glb", "--skeleton", "hero.glb", "--clip-name", "new"]) == 0
+        np.testing.assert_allclose(
+            begins("out.glb", "new")[:2], to_smpl22(io.load(source)).root[0, [0, 2]], atol=1e-3
+        )  # one at the origin keeps the place of the motion
+
+
+def test_a_characters_own_clip_stays_where_it_is() -> None:
+    place(Hero()).clip("wave", 0.5 * wave(20)).write(Path("there.glb"))
+    assert main(["export", "there.glb", "out.glb", "--skeleton", "there.glb", "--clip-name", "new"]) == 0
+    np.testing.assert_allclose(begins("out.glb", "new"), begins("there.glb", "wave"), atol=1e-2)
+
+
+def test_one_that_faces_away_does_so_in_its_clips() -> None:
+    """As avatars of VRM 0 do."""
+    hero = Hero()
+    hero.json["nodes"][22]["rotation"] = [0.0, 1.0, 0.0, 0.0]
+    hero.write(Path("away.glb"))
+    assert main(["export", "walk.bvh", "out.glb", "--skeleton", "away.glb", "--clip-name", "new"]) == 0
+    x, z, facing = begins("out.glb", "new")
+    assert abs(facing) == pytest.approx(180.0, abs=0.5)
+    ends = load_glb("out.glb", clip="new").root[-1]
+    walk = to_smpl22(io.load("walk.bvh"))
+    way = turned(walk.root[-1] - walk.root[0], np.pi - ground_pose(walk.positions()[0]).facing)
+    np.testing.assert_allclose(ends[[0, 2]] - [x, z], way[[0, 2]], atol=0.02)
+
+
+def test_two_people_keep_their_places_to_each_other() -> None:
+    place(Hero()).write(Path("there.glb"))
+    target = skeletons.Target("there.glb", load_character("there.glb").skeleton, character=load_character("there.glb"))
+    one = person(2.0, 30.0)
+    other = replace(one, root=np.array([0.0, 0.0, 1.5]) + one.root)
+    first, second = target.put_together([one, other])
+    np.testing.assert_allclose((second.root - first.root)[:, [0, 2]], np.tile([1.5, 0.0], (len(one), 1)), atol=1e-6)
 
 
 def test_without_a_name_the_character_itself_is_written(weights: str) -> None:

@@ -1,6 +1,7 @@
 """BVH: against forward kinematics by hand, odd but valid spellings, round trips, and what must be refused."""
 
 import itertools
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -131,6 +132,36 @@ def test_position_channels_replace_the_offset_and_constant_ones_become_it(tmp_pa
     moves = load_bvh(write(tmp_path, text.partition("0.0333333\n")[0] + "0.0333333\n" + rows.format(3)), unit=1)
     np.testing.assert_allclose(moves.positions()[:, 1], [(3, 5, 6), (4, 5, 6)])
     np.testing.assert_array_equal(moves.skeleton.offsets[1], (1, 0, 0))
+
+
+def test_a_long_file_is_read_in_pieces_that_need_not_end_with_a_row(tmp_path, monkeypatch):
+    """In some three times its size, the motion itself included; and the same as in one piece."""
+    turning = Motion(
+        SMPL22, 30.0, np.zeros((3000, 3)), rotvec_to_quat(0.3 * np.sin(np.arange(3000 * 66.0)).reshape(3000, 22, 3))
+    )
+    path = save_bvh(turning, tmp_path / "long.bvh")
+    whole = load_bvh(path, unit=1)
+    monkeypatch.setattr("motionloom.io.text._CHUNK", 50_000)
+    tracemalloc.start()
+    pieces = load_bvh(path, unit=1)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 3.5 * path.stat().st_size
+    np.testing.assert_array_equal(pieces.rotations, whole.rotations)
+    head, _, rows = path.read_text().partition("Frame Time: 0.03333333\n")
+    path.write_text(head + "Frame Time: 0.03333333\n" + rows.replace(" ", "\n", 70_000))
+    np.testing.assert_array_equal(load_bvh(path, unit=1).rotations, whole.rotations)
+
+
+def test_position_channels_that_are_zero_throughout_leave_the_offset(tmp_path):
+    """As MakeHuman writes them: the joints of a file whose bones had no length otherwise."""
+    six = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
+    text = ARM.replace("CHANNELS 3 Zrotation Xrotation Yrotation", six).partition("0.0333333\n")[0]
+    still = load_bvh(write(tmp_path, text + "0.0333333\n" + "0 0 0 0 0 0 0 0 0 0 0 0\n" * 2), unit=1)
+    np.testing.assert_array_equal(still.positions()[:, 1], [(1, 0, 0)] * 2)
+    assert still.translations is None
+    root = load_bvh(write(tmp_path, ARM.replace("1 2 3 90", "0 0 0 90")), unit=1)
+    np.testing.assert_array_equal(root.root, np.zeros((2, 3)))
 
 
 def test_some_channels_only_leave_the_rest_at_offset_and_zero(tmp_path):

@@ -205,6 +205,20 @@ def test_clips_are_chosen_by_name_or_number_and_never_silently(tmp_path: Path) -
             load_glb(path, clip=wrong)
 
 
+def test_the_newest_of_ours_is_read_where_none_is_chosen(tmp_path: Path) -> None:
+    """At its own rate, whatever the clips before it have."""
+    path = Hero().clip("wave", wave()).write(tmp_path / "hero.glb")
+    for name, frames, fps in (("one", 25, 24.0), ("two", 33, 60.0)):
+        character = load_character(path)
+        turns = np.tile(rot.IDENTITY, (frames, len(character.skeleton), 1))
+        still = Motion(character.skeleton, fps, np.tile(character.skeleton.offsets[0], (frames, 1)), turns)
+        path = character.save(still, tmp_path / f"{name}.glb", name=name)
+    with pytest.warns(UserWarning, match=r"3 clips .* number 3, 'two', the newest of this program's, is read"):
+        found = load_glb(path)
+    assert (len(found), found.fps) == (33, 60.0)
+    assert load_glb(path, clip="one").fps == 24.0
+
+
 def test_a_humanoid_map_is_read_and_not_guessed(tmp_path: Path) -> None:
     hero = Hero()
     for node in hero.json["nodes"][:22]:

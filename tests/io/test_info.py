@@ -35,3 +35,10 @@ def test_skeletons_of_programs_are_named() -> None:
     names = {name: family(named_skeleton(name)) for name in ("mixamo", "unreal", "rigify", "smpl22")}
     assert names == {"mixamo": "Mixamo", "unreal": "Unreal", "rigify": "Rigify", "smpl22": "SMPL-22"}
     assert family(SMPL22) == "SMPL-22"
+
+
+def test_what_is_measured_in_pieces_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    long = with_controls(stroll())
+    whole = describe(long)
+    monkeypatch.setattr("motionloom.io.info._BLOCK", 7)
+    assert describe(long) == whole

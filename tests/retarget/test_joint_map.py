@@ -10,9 +10,11 @@ import pytest
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.retarget import joint_map, joints22
+from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.named import named_skeleton
 from motionloom.skeleton import SMPL22, Skeleton
 from tests.shared import shared
+from tests.work import work
 
 # Pelvis, spine, neck, head; then collar, shoulder, elbow, wrist; then hip, knee, ankle, toe.
 RIGS: dict[str, tuple[str, str, str]] = {
@@ -173,6 +175,15 @@ def test_a_file_that_is_no_map_is_refused(tmp_path: Path, text: str) -> None:
         joint_map(SMPL22, path)
 
 
+@pytest.mark.parametrize(
+    ("part", "other"), [("left_knee", "left_hip"), ("right_wrist", "left_wrist"), ("pelvis", "head")]
+)
+def test_one_bone_for_two_parts_is_said(part: str, other: str) -> None:
+    joints = {name: name for name in SMPL22.names} | {part: other}
+    with pytest.raises(MotionloomError, match=f"both .* as '{other}'; name another joint"):
+        joint_map(SMPL22, joints)
+
+
 def test_the_map_as_data_is_its_own_override() -> None:
     skeleton = renamed(rig(*RIGS["mixamo"]))
     once = joint_map(skeleton)
@@ -260,3 +271,27 @@ def test_a_generated_rigify_rig_in_pieces_is_refused_with_the_way_to_join_it() -
     offsets = rest - np.vstack([np.zeros(3), rest[parents]])
     with pytest.raises(MotionloomError, match="examples/blender_rigify"):
         joint_map(Skeleton(names, (-1, *parents), offsets))
+
+
+def _with_tail(joints: int) -> Skeleton:
+    """The uniform person without names, a chain of so many joints on its head."""
+    names = tuple(f"b{k}" for k in range(22 + joints))
+    parents = (*SMPL22.parents, 15, *range(22, 21 + joints))
+    offsets = np.concatenate([SMPL22.offsets, np.tile([0.0, 1e-4, 0.0], (joints, 1))])
+    return Skeleton(names, parents, offsets)
+
+
+def test_deep_skeletons_cost_no_more_than_their_joints() -> None:
+    """Read by shape, and refused by shape."""
+    few, many = (work(lambda n=n: read_body(_with_tail(n))) for n in (100, 800))
+    assert many < 9 * few
+
+    def refused(joints: int) -> None:
+        line = Skeleton(
+            tuple(map(str, range(joints))), tuple(range(-1, joints - 1)), np.tile([0, 0.01, 0], (joints, 1))
+        )
+        with pytest.raises(MotionloomError, match="not a humanoid"):
+            joint_map(line)
+
+    few, many = (work(lambda n=n: refused(n)) for n in (100, 800))
+    assert many < 9 * few

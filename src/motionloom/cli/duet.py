@@ -19,7 +19,7 @@ from motionloom.cli.sampling import (
     sampling_of,
     take_text_anywhere,
 )
-from motionloom.cli.skeletons import CHARACTERS, Target, add_skeleton, own_outs, put_all, read_target
+from motionloom.cli.skeletons import CHARACTERS, Target, add_skeleton, own_outs, read_target
 from motionloom.cli.writing import add_writing, at_rate, check_overwriting, check_rate, check_unit
 
 if TYPE_CHECKING:
@@ -113,7 +113,8 @@ def run_duet(arguments: argparse.Namespace) -> int:
         write_pairs(duets, places, manners, caption, skin)
 
     def put(duets: "Sequence[list[Motion]]") -> "list[list[Motion]]":
-        return [put_all(skin, at_rate(duet, arguments.fps)) for duet in duets]
+        rated = [at_rate(duet, arguments.fps) for duet in duets]
+        return rated if skin is None else [skin.put_together(duet) for duet in rated]
 
     made = Finished(files, arguments.count, write, put, what="duets")
     seconds = 0.0

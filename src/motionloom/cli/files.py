@@ -95,7 +95,7 @@ def run_export(arguments: argparse.Namespace) -> None:
         save_bvh(motion, target, order=arguments.order or orders, unit=chosen)
     else:
         _only_bvh(arguments, target)
-        io.save(motion, target)
+        (io.save if skin is None else skin.save)(motion, target)
     print(f"wrote {target}: {_summary(motion)}")
     note_rate(arguments, [arguments.input])
 

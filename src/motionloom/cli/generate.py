@@ -25,6 +25,7 @@ from motionloom.cli.sampling import (
 from motionloom.cli.writing import check_overwriting
 
 if TYPE_CHECKING:
+    from motionloom.cli.skeletons import Target
     from motionloom.goals.timeline import Timeline
     from motionloom.kinematics.gestures import Seat
     from motionloom.motion import Motion
@@ -82,7 +83,7 @@ def _generate(arguments: argparse.Namespace) -> int:
     made = finished_motions(files, captions, target, unit=arguments.out_unit, rate=arguments.fps)
     drawn = _drawn(arguments, prior, [timelines[caption] for caption in captions])
     seated: list[list[Seat]] = []
-    interrupted = made.take([motion] for motion in _noting(seated, drawn, 1.0 if target is None else target.size))
+    interrupted = made.take([motion] for motion in _noting(seated, drawn, target))
     motions = [
         {"prompt": caption, "seed": arguments.seed + i, "segments": _segments(timelines[caption]),
          "seats": [asdict(seat) for seat in seats]}
@@ -95,14 +96,21 @@ def _generate(arguments: argparse.Namespace) -> int:
     return made.ended(interrupted)
 
 
-def _noting(seated: "list[list[Seat]]", motions: "Iterator[Motion]", size: float) -> "Iterator[Motion]":
-    """The motions as they come; the seats of each, for a body ``size`` times theirs, are put into ``seated``."""
+def _noting(seated: "list[list[Seat]]", motions: "Iterator[Motion]", target: "Target | None") -> "Iterator[Motion]":
+    """The motions as they come; the seats of each, as a character of that size needs them, are put into ``seated``."""
     from motionloom.kinematics.gestures import seats
 
     for motion in motions:
         found = seats(motion.positions(), motion.fps)
-        seated.append([replace(s, height=s.height * size, x=s.x * size, z=s.z * size) for s in found])
+        seated.append(found if target is None else [_moved(seat, target, motion) for seat in found])
         yield motion
+
+
+def _moved(seat: "Seat", target: "Target", motion: "Motion") -> "Seat":
+    import numpy as np
+
+    x, height, z = target.from_motion(motion).to_world(np.array([seat.x, seat.height, seat.z]) * target.size)
+    return replace(seat, height=float(height), x=float(x), z=float(z))
 
 
 def _remark_seats(seated: "list[list[Seat]]") -> None:

@@ -140,7 +140,7 @@ def _written_pair(
     from motionloom.live.live import motion_of
 
     people = [motion_of([both[i] for both in frames], fps) for i in (0, 1)]
-    duet = people if target is None else [target.put(motion) for motion in people]
+    duet = people if target is None else target.put_together(people)
     said = dict.fromkeys(" :: ".join(one.words for one in both) for both in frames)
     return write_pairs([duet], [[out] for out in outs], [(unit or 1.0, {})] * 2, "; ".join([*said][:20]), target)
 

@@ -22,7 +22,7 @@ def add_reading(command: argparse.ArgumentParser) -> None:
         "--clip",
         dest="animation",
         metavar="NAME|NUMBER",
-        help="animation of a .glb, .gltf, .vrm or .fbx (default: the first)",
+        help="animation of a .glb, .gltf, .vrm or .fbx (default: the newest that was added here, else the first)",
     )
     add_blender(command)
     command.add_argument(

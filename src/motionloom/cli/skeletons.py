@@ -3,22 +3,25 @@
 import argparse
 import sys
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from motionloom.ground import GroundPose
     from motionloom.io.character import Character
     from motionloom.io.stream import Stream
     from motionloom.motion import Motion
     from motionloom.retarget import RootMode
+    from motionloom.retarget.anatomy import Body
     from motionloom.retarget.hands import HandPose
     from motionloom.skeleton import Skeleton
 
 CHARACTERS = (".glb", ".vrm", ".gltf", ".fbx")
 """Files with a mesh, which is written with its motion."""
 ROOTS = ("motion", "hips", "in-place")
+PLACES = ("character", "origin")
 HANDS = ("relaxed", "fist", "flat", "as-is")
 
 
@@ -37,6 +40,11 @@ def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform per
     parser.add_argument(
         "--hands", choices=HANDS, help="pose of the hands on a skeleton with fingers (default as-is: its rest pose)"
     )
+    parser.add_argument(
+        "--at", choices=PLACES,
+        help="where motions of a .glb, .gltf or .vrm character start: where it stands and faces (character, the "
+        "default of one that stands elsewhere), or at the origin, facing +Z",
+    )  # fmt: skip
     parser.add_argument("--clip-name", metavar="NAME", help="name of the animation in the character's file")
     parser.add_argument("--replace", action="store_true", help="leave only this animation in the character's file")
     parser.add_argument("--target-map", type=Path, metavar="JSON", help="which joints are which, of the --skeleton")
@@ -51,6 +59,8 @@ class Target:
     unit: float = 1.0
     orders: dict[str, str] = field(default_factory=dict)
     character: "Character | None" = None
+    at: str | None = None
+    """Where motions start: one of `PLACES`; None: where the character stands, if that is elsewhere than the origin."""
     root: "RootMode" = "motion"
     hands: "HandPose" = "as-is"
     joint_map: Path | None = None
@@ -60,17 +70,64 @@ class Target:
     """What must stay as long as the character does: a folder with what an FBX became."""
 
     def put(self, motion: "Motion", *, source: str = "the motion", source_map: Path | None = None) -> "Motion":
-        """The motion on this skeleton; ``source`` names it in an error."""
+        """The motion on this skeleton, where the character stands; ``source`` names it in an error."""
+        from motionloom.retarget.stand import shares_world, started
+
+        place = self.place
+        if place is None or (self.at is None and shares_world(motion, self.skeleton)):
+            return self._put(motion, lambda made, body: made, source, source_map)
+        return self._put(motion, lambda made, body: started(made, body, place), source, source_map)
+
+    def put_together(self, motions: "Sequence[Motion]") -> "list[Motion]":
+        """Motions of one world, each on this skeleton, the world's origin where the character stands."""
+        from motionloom.retarget.stand import HERE, moved
+
+        world = self.place or HERE
+        return [
+            self._put(motion, lambda made, body: made if world == HERE else moved(made, body, world))
+            for motion in motions
+        ]
+
+    def _put(
+        self,
+        motion: "Motion",
+        move: "Callable[[Motion, Body], Motion]",
+        source: str = "the motion",
+        source_map: Path | None = None,
+    ) -> "Motion":
         from motionloom.errors import MotionloomError
         from motionloom.retarget import retarget
+        from motionloom.retarget.anatomy import read_body
         from motionloom.retarget.hands import pose_hands
+        from motionloom.retarget.root import place_root
 
         try:
-            made = retarget(motion, self.skeleton, source_map=source_map, target_map=self.joint_map, root=self.root)
+            made = retarget(motion, self.skeleton, source_map=source_map, target_map=self.joint_map)
         except MotionloomError as error:
             hint = "--source-map or --target-map"
             raise MotionloomError(f"{source} onto {self.name}: {error} ({hint})") from None
-        return pose_hands(made, self.hands, self.joint_map)
+        body = read_body(self.skeleton, self.joint_map)
+        return pose_hands(place_root(move(made, body), body, self.root), self.hands, self.joint_map)
+
+    @property
+    def place(self) -> "GroundPose | None":
+        """Where motions are to start; None: where they do."""
+        from motionloom.retarget.stand import HERE
+
+        if self.character is None:
+            return None
+        if self.at == "origin":
+            return HERE
+        own = self.character.stand
+        return own if self.at == "character" or own != HERE else None
+
+    def from_motion(self, motion: "Motion") -> "GroundPose":
+        """Where the world of a uniform person's motion, at this size, is in the world of what `put` makes of it."""
+        from motionloom.motion import ground_pose
+        from motionloom.retarget.stand import HERE, world_of
+
+        place = self.place
+        return HERE if place is None else world_of(ground_pose(motion.thinned(1).positions()[0] * self.size), place)
 
     @property
     def size(self) -> float:
@@ -140,7 +197,7 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
     from motionloom.errors import MotionloomError
 
     if arguments.skeleton is None:
-        for name in ("root", "hands", "clip_name", "replace", "target_map"):
+        for name in ("root", "hands", "at", "clip_name", "replace", "target_map"):
             if getattr(arguments, name):
                 raise MotionloomError(f"--{name.replace('_', '-')} goes with a --skeleton; name one")
         _note_mannequin(arguments, outs)
@@ -157,9 +214,25 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
                 raise MotionloomError(f"{out} would not hold the character; it is written as a {path.suffix}")
             if out.exists() and out.resolve() == path.resolve():
                 raise MotionloomError(f"{out} is the character itself; give the moving one another name with --out")
-    elif arguments.clip_name or arguments.replace:
-        raise MotionloomError(f"--clip-name and --replace are for .glb, .gltf and .vrm characters; got {found.name}")
+        _note_place(found)
+    elif arguments.clip_name or arguments.replace or arguments.at:
+        raise MotionloomError(
+            f"--clip-name, --replace and --at are for .glb, .gltf and .vrm characters; got {found.name}"
+        )
     return found
+
+
+def _note_place(target: Target) -> None:
+    """Say where motions start, where the line does not and it is not the origin."""
+    if target.at is None and target.place is not None:
+        from math import degrees
+
+        place = target.place
+        print(
+            f"note: {target.name} stands at x {place.x:.2f}, z {place.z:.2f} m and faces {degrees(place.facing):.0f} "
+            "degrees to the left of +Z; its motions start there (--at origin: at the origin, facing +Z)",
+            file=sys.stderr,
+        )
 
 
 def _note_mannequin(arguments: argparse.Namespace, outs: Sequence[Path]) -> None:
@@ -206,7 +279,8 @@ def _find(arguments: argparse.Namespace) -> Target:
     name, path = arguments.skeleton, Path(arguments.skeleton)
     suffix = path.suffix.lower()
     options = {
-        "root": arguments.root or "motion", "hands": arguments.hands or "as-is", "joint_map": arguments.target_map,
+        "root": arguments.root or "motion", "at": arguments.at, "hands": arguments.hands or "as-is",
+        "joint_map": arguments.target_map,
         "clip_name": arguments.clip_name, "replace": arguments.replace,
     }  # fmt: skip
     if name.lower() in NAMED and not path.exists():

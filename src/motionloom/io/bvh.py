@@ -1,8 +1,9 @@
 """Biovision hierarchy files (BVH), in and out.
 
 A BVH file is a tree of joints with offsets, then one row of channels per frame. It says neither its unit nor
-which way is up; see `guess_unit`. Position channels *replace* the OFFSET of their joint. End Sites become joints
-named ``"<parent> End Site"`` and are listed in ``Skeleton.ends``.
+which way is up; see `guess_unit`. Position channels *replace* the OFFSET of their joint, but for those of a joint below
+the root that are zero throughout, since bones have a length. End Sites become joints named ``"<parent> End Site"`` and
+are listed in ``Skeleton.ends``.
 """
 
 import re
@@ -70,9 +71,9 @@ def read_bvh(path: Path | str, *, fps: float | None = None, unit: float | None =
     if split is None:
         raise MotionloomError(f"{path} has no MOTION part; the file is cut off or not a BVH file")
     joints = _hierarchy(data[: split.start()], path)
-    rate, values = _frames(data, split.end(), sum(len(j.channels) for j in joints), path)
-    text.check_poses(len(values), len(joints), path, numbers=values.size)
-    return _assemble(joints, values, rate if fps is None else fps, unit)
+    frames = _frames(data, split.end(), joints, path)
+    del data, split  # a long file's text and its numbers are not both held from here on
+    return _assemble(joints, frames, fps, unit)
 
 
 # Hierarchy -----------------------------------------------------------------------------------------------------------
@@ -233,9 +234,20 @@ _RATES = (10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 200, 240)
 _BROADCAST = (12.5, 24000 / 1001, 30000 / 1001, 60000 / 1001)
 
 
-def _frames(data: bytes, start: int, columns: int, path: Path | str) -> tuple[float, Array]:
-    """Frames per second and the (frames, columns) numbers."""
-    line = data.count(b"\n", 0, start) + 1
+@dataclass(frozen=True, eq=False)
+class _Frames:
+    fps: float
+    rotations: Array
+    """(frames, joints, 4)."""
+    moved: dict[int, int]
+    """For each joint with position channels its column in ``places``."""
+    places: Array
+    """(frames, joints with position channels, 3) in the file's unit."""
+
+
+def _frames(data: bytes, start: int, joints: list[_Joint], path: Path | str) -> _Frames:
+    """The frames, read some at a time: of a long file neither all text nor all numbers are held twice."""
+    line, columns = data.count(b"\n", 0, start) + 1, sum(len(j.channels) for j in joints)
     head = _HEAD.match(data, start)
     if head is None:
         raise MotionloomError(f"{path}, line {line}: MOTION must be followed by 'Frames: N' and 'Frame Time: SECONDS'")
@@ -249,10 +261,49 @@ def _frames(data: bytes, start: int, columns: int, path: Path | str) -> tuple[fl
     if columns == 0:
         raise MotionloomError(f"{path} has no channels, so nothing moves in it")
     first = line + data.count(b"\n", start, head.end())
-    values = text.numbers(data[head.end() :], path=path, first_line=first)
-    if len(values) != int(count) * columns:
-        _complain(data[head.end() :], int(count), columns, path=path, first=first)
-    return rate, values.reshape(-1, columns)
+    total, most = int(count) * columns, (len(data) - head.end() + 1) // 2  # a number takes two characters
+    if total <= most:
+        text.check_poses(int(count), len(joints), path, numbers=total)
+    reader = _Reader(joints, int(count) if total <= most else 0)
+    for block in text.number_blocks(data, head.end(), path=path, first_line=first):
+        reader.take(block)
+    if reader.numbers != total:
+        _complain(data, head.end(), int(count), columns, path=path, first=first)
+    return _Frames(rate, reader.rotations, reader.moved, reader.places)
+
+
+class _Reader:
+    """Turns rows of numbers into rotations and places, into arrays for so many frames; more are only counted."""
+
+    def __init__(self, joints: list[_Joint], frames: int) -> None:
+        self.joints, self.frames, self.numbers = joints, frames, 0
+        self.columns = _columns(joints)
+        self.width = sum(len(joint.channels) for joint in joints)
+        placed = [j for j, joint in enumerate(joints) if any(c.endswith("position") for c in joint.channels)]
+        self.moved = {j: k for k, j in enumerate(placed)}
+        self.places = np.empty((frames, len(placed), 3))
+        self.rotations = np.empty((frames, len(joints), 4))
+        self.orders = _orders(joints)
+        self._rest = np.empty(0)
+
+    def take(self, numbers: Array) -> None:
+        """Add what comes next, which need not end with a row."""
+        row, self.numbers = self.numbers // self.width, self.numbers + len(numbers)
+        numbers = np.concatenate([self._rest, numbers])
+        rows = len(numbers) // self.width
+        self._rest = numbers[rows * self.width :].copy()
+        values = numbers[: rows * self.width].reshape(rows, self.width)[: max(self.frames - row, 0)]
+        here = slice(row, row + len(values))
+        for j, k in self.moved.items():
+            self.places[here, k] = self.joints[j].offset
+            for at, channel in enumerate(self.joints[j].channels):
+                axis, kind = _CHANNELS[channel]
+                if kind == "position":
+                    self.places[here, k, "XYZ".index(axis)] = values[:, self.columns[j] + at]
+        self.rotations[here] = rot.IDENTITY
+        for order, members in self.orders.items():
+            angles = np.radians(values[:, [columns for _, columns in members]])
+            self.rotations[here, [j for j, _ in members]] = rot.euler_to_quat(order, angles)
 
 
 def frame_rate(seconds: str) -> float | None:
@@ -273,37 +324,42 @@ def frame_rate(seconds: str) -> float | None:
     return 1 / value
 
 
-def _complain(data: bytes, count: int, columns: int, *, path: Path | str, first: int) -> None:
-    rows = 0
-    for line, row in enumerate(data.split(b"\n"), start=first):
-        found = len(row.split())
+def _complain(data: bytes, start: int, count: int, columns: int, *, path: Path | str, first: int) -> None:
+    rows, line = 0, first
+    while start < len(data):
+        stop = data.find(b"\n", start)
+        stop = len(data) if stop < 0 else stop
+        found = len(data[start:stop].split())
         rows += found > 0
         if found not in (0, columns):
             raise MotionloomError(f"{path}, line {line}: {found} numbers where the hierarchy has {columns} channels")
+        start, line = stop + 1, line + 1
     raise MotionloomError(f"{path} says {count} frames but holds {rows}; it was cut off or its Frames line is wrong")
 
 
 # Assembly ------------------------------------------------------------------------------------------------------------
 
 
-def _assemble(joints: list[_Joint], values: Array, fps: float, unit: float | None) -> Bvh:
+def _assemble(joints: list[_Joint], frames: _Frames, fps: float | None, unit: float | None) -> Bvh:
     offsets = np.array([j.offset or (0.0, 0.0, 0.0) for j in joints])
     parents = tuple(j.parent for j in joints)
-    places, moving = _places(joints, values, offsets)
+    places = {j: frames.places[:, k] for j, k in frames.moved.items() if j == 0 or frames.places[:, k].any()}
+    moving = np.array([j > 0 and j in places and bool(np.ptp(places[j], axis=0).any()) for j in range(len(joints))])
     scale = guess_unit(parents, np.where(moving[:, None], 0.0, offsets)) if unit is None else unit
-    root = places.pop(0, np.broadcast_to(offsets[0], (len(values), 3))) * scale
+    count = len(frames.rotations)
+    root = places.pop(0, np.broadcast_to(offsets[0], (count, 3))) * scale
     translations = None
     if any(np.ptp(p, axis=0).max() * scale > SAME_PLACE for p in places.values()):
-        translations = np.broadcast_to(offsets, (len(values), *offsets.shape)) * scale
+        translations = np.empty((count, *offsets.shape))
+        translations[:] = offsets * scale
     for j, place in places.items():
         if np.ptp(place, axis=0).max() * scale <= SAME_PLACE:
             offsets[j] = place[0]
         if translations is not None:
-            translations[:, j] = place * scale
-    rotations, orders = _rotations(joints, values)
-    some = slice(None, None, -(-len(values) // _POSES))
+            np.multiply(place, scale, out=translations[:, j])
+    some = slice(None, None, -(-len(root) // _POSES))
     poses = Poses(
-        root[some].copy(), rotations[some].copy(), None if translations is None else translations[some].copy()
+        root[some].copy(), frames.rotations[some].copy(), None if translations is None else translations[some].copy()
     )
     skeleton = Skeleton(
         tuple(j.name for j in joints),
@@ -312,7 +368,10 @@ def _assemble(joints: list[_Joint], values: Array, fps: float, unit: float | Non
         frozenset(i for i, j in enumerate(joints) if j.end),
         poses=poses,
     )
-    return Bvh(Motion(skeleton, fps, root, rotations, translations), scale, orders)
+    orders = {joints[j].name: order for order, members in _orders(joints).items() for j, _ in members}
+    return Bvh(
+        Motion(skeleton, frames.fps if fps is None else fps, root, frames.rotations, translations), scale, orders
+    )
 
 
 def _columns(joints: list[_Joint]) -> list[int]:
@@ -320,32 +379,14 @@ def _columns(joints: list[_Joint]) -> list[int]:
     return list(np.cumsum([0, *(len(j.channels) for j in joints[:-1])]))
 
 
-def _places(joints: list[_Joint], values: Array, offsets: Array) -> tuple[dict[int, Array], NDArray[np.bool_]]:
-    """(frames, 3) places of the joints that have position channels, and which joints but the root do move."""
-    places: dict[int, Array] = {}
-    moving = np.zeros(len(joints), dtype=bool)
-    for j, (joint, column) in enumerate(zip(joints, _columns(joints))):
-        for at, channel in enumerate(joint.channels):
-            axis, kind = _CHANNELS[channel]
-            if kind == "position":
-                place = places.setdefault(j, np.tile(offsets[j], (len(values), 1)))
-                place[:, "XYZ".index(axis)] = values[:, column + at]
-        moving[j] = j in places and bool((np.ptp(places[j], axis=0) > 0).any())
-    return places, moving
-
-
-def _rotations(joints: list[_Joint], values: Array) -> tuple[Array, dict[str, str]]:
-    """(frames, joints, 4) quaternions, computed together for all joints of one channel order."""
-    rotations = np.tile(rot.IDENTITY, (len(values), len(joints), 1))
+def _orders(joints: list[_Joint]) -> dict[str, list[tuple[int, list[int]]]]:
+    """For each order of rotation channels the joints that have it, and the columns of their angles."""
     groups: dict[str, list[tuple[int, list[int]]]] = {}
     for j, (joint, column) in enumerate(zip(joints, _columns(joints))):
         turns = [(c[0], column + at) for at, c in enumerate(joint.channels) if c.endswith("rotation")]
         if turns:
             groups.setdefault("".join(axis for axis, _ in turns), []).append((j, [at for _, at in turns]))
-    for order, members in groups.items():
-        angles = np.radians(values[:, [columns for _, columns in members]])
-        rotations[:, [j for j, _ in members]] = rot.euler_to_quat(order, angles)
-    return rotations, {joints[j].name: order for order, members in groups.items() for j, _ in members}
+    return groups
 
 
 def unit_that_reads_back(motion: Motion, unit: float) -> float:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
+from motionloom.ground import GroundPose
 from motionloom.io.atomic import atomic_path
 from motionloom.io.glb import Document, pack_glb, read_document_chunks
 from motionloom.io.gltf_mesh import Surface, read_surfaces
@@ -23,9 +24,11 @@ from motionloom.io.gltf_nodes import Node, upwards
 from motionloom.io.gltf_read import OpenedGlb, open_glb, settled
 from motionloom.io.gltf_rig import Rig, Worlds, parents_first, read_rig, worlds
 from motionloom.motion import Motion
+from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.joint_map import JointMap, Override
 from motionloom.retarget.joint_map import joint_map as find_joints
-from motionloom.retarget.topology import ancestors
+from motionloom.retarget.stand import stand
+from motionloom.retarget.topology import ancestors, below
 from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
@@ -54,6 +57,17 @@ class Character:
         """How the character's own file may end; a .vrm is a .glb of a special kind."""
         own = self.path.suffix.lower()
         return (own, ".glb") if own == ".vrm" else (own,)
+
+    @property
+    def stand(self) -> GroundPose:
+        """Where the character stands and faces; without a mesh, whose nodes may be in the middle of a walk, where what
+        is above its skeleton stands."""
+        found = stand(read_body(self.skeleton, self.joints.names()))
+        if self.file.document.items("skins"):
+            return found
+        above = upwards(self.rig.nodes[0], self.file.parents)[:0:-1]
+        x, _, z = worlds(self.nodes, self.file.parents, above, {}).places[above[-1]][0] if above else np.zeros(3)
+        return GroundPose(float(x), float(z), found.facing)
 
     def surfaces(self, *, remark: bool = False) -> list[Surface]:
         """The meshes of the file at rest, on `skeleton`; what is left out (compressed) is said with ``remark``."""
@@ -107,7 +121,7 @@ class Character:
         slots = {n: k for k, n in enumerate(rig.nodes)}
         above = upwards(rig.nodes[0], parents)[:0:-1]
         wanted = rot.multiply(motion.world_rotations(), rig.turns)
-        places, free = motion.positions(), self._free(motion)
+        places, free = motion.positions(), self._free(motion, driven | above_driven)
         now = worlds(self.nodes, parents, above, {})
         keys: list[tuple[int, str, Array]] = []
         for n in parents_first(frozenset(rig.nodes), parents):
@@ -143,11 +157,12 @@ class Character:
         }  # fmt: skip
         return [(n, path, value[None]) for (n, path), value in sorted(rest.items(), key=lambda item: item[0])]
 
-    def _free(self, motion: Motion) -> set[int]:
-        """The joints whose places are not what the bones above them say: the root, and those that a control holds."""
+    def _free(self, motion: Motion, body: set[int]) -> set[int]:
+        """Joints whose places their nodes do not say: the root, those on a control, those of the ``body`` in a pose."""
         rig, parents = self.rig, self.file.parents
         slots = {n: k for k, n in enumerate(rig.nodes)}
-        free = {0} | {k for k, n in enumerate(rig.nodes) if k and slots[parents[n]] != self.skeleton.parents[k]}
+        free = {0, *(rig.shifted & body)}
+        free |= {k for k, n in enumerate(rig.nodes) if k and slots[parents[n]] != self.skeleton.parents[k]}
         if motion.translations is not None:
             apart = np.abs(motion.translations - self.skeleton.offsets).max(axis=(0, 2)) > 1e-5
             free |= set(np.flatnonzero(apart).tolist())
@@ -185,7 +200,7 @@ def _with_soles(character: Character) -> Character:
     if not skeleton.on_floor:
         return character
     feet = {skeleton.index(name) for j in (7, 8, 10, 11) for name, weight in character.joints.points[j] if weight}
-    feet |= {k for k in range(len(skeleton)) if feet & set(ancestors(skeleton, k))}
+    feet = below(skeleton, feet)
     rest, found = skeleton.rest_positions(), {}
     points = [(s.points, s.joints[np.arange(len(s.points)), s.weights.argmax(axis=1)]) for s in character.surfaces()]
     for j in sorted(feet):

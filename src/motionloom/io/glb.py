@@ -86,7 +86,7 @@ class Document:
         return values
 
     def matrices(self, number: Any, what: str) -> Array | None:
-        """(count, 3, 3) the linear parts of an accessor of 4 x 4 matrices; None where none can be read."""
+        """(count, 4, 4) an accessor of matrices; None where none can be read."""
         if number is None:
             return None
         accessors = self.items("accessors")
@@ -94,7 +94,7 @@ class Document:
         views = self.items("bufferViews")
         if isinstance(view, int) and 0 <= view < len(views) and compressed(views[view]):
             return None
-        return self.accessor(number, "MAT4", what).reshape(-1, 4, 4).transpose(0, 2, 1)[:, :3, :3]
+        return self.accessor(number, "MAT4", what).reshape(-1, 4, 4).transpose(0, 2, 1)
 
     def _view(self, accessor: dict[str, Any], dtype: np.dtype, shape: tuple[int, int], what: str) -> np.ndarray:
         """The raw entries of an accessor, checked against the bytes that are really there."""

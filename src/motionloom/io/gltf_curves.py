@@ -103,26 +103,25 @@ def _curve(document: Document, sampler: dict[str, Any], times: Array, what: str)
     return Curve(times, values, mode, arriving, leaving)
 
 
-def clock(document: Document, curves: Curves, joints: int) -> tuple[float, Array]:
-    """Frame rate and times (frames,) of the samples, from the channel with the most keys."""
+def clock(document: Document, curves: Curves, joints: int, declared: float | None) -> tuple[float, Array]:
+    """Frame rate and times (frames,) of the samples, from the channel with the most keys and what is `declared_fps`."""
     if not curves:
         return FALLBACK_FPS, np.zeros(1)
     start = min(float(c.times[0]) for c in curves.values())
     end = max(float(c.times[-1]) for c in curves.values())
-    fps = _rate(max((c.times for c in curves.values()), key=len), _declared_fps(document))
+    fps = _rate(max((c.times for c in curves.values()), key=len), declared)
     frames = (end - start) * fps
     if frames * joints > FREE_POSES + 4 * sum(c.values.size for c in curves.values()):
         raise document.bad(f"its animation of {end - start:.6g} s with {joints} joints at {fps:.6g} fps is too large")
     return fps, start + np.arange(int(np.floor(frames + 0.1)) + 1) / fps
 
 
-def _declared_fps(document: Document) -> float | None:
-    """The frame rate that our own files state."""
-    for animation in document.items("animations"):
-        extras = animation.get("extras")
-        fps = extras.get("fps") if isinstance(extras, dict) else None
-        if isinstance(fps, int | float) and not isinstance(fps, bool) and 0 < fps <= 1e5:
-            return float(fps)
+def declared_fps(animation: dict[str, Any]) -> float | None:
+    """The frame rate that an animation of our own states; None for others'."""
+    extras = animation.get("extras")
+    fps = extras.get("fps") if isinstance(extras, dict) else None
+    if isinstance(fps, int | float) and not isinstance(fps, bool) and 0 < fps <= 1e5:
+        return float(fps)
     return None
 
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.glb import Document
+from motionloom.io.gltf_bind import transform
 from motionloom.io.gltf_nodes import Node, printable, upwards
 from motionloom.io.gltf_rig import Rig, worlds
 
@@ -90,27 +90,25 @@ class _Rest:
         for k, (n, place) in enumerate(zip(rig.nodes, rig.skeleton.rest_positions())):
             whole = linear[n]
             size = 1.0 if whole is None else float(np.cbrt(np.linalg.det(whole[0])))
-            self._known[n] = _matrix(place, rig.turns[k], np.full(3, size))
+            self._known[n] = transform(place, rig.turns[k], np.full(3, size))
 
     def matrix(self, node: int) -> Array:
         """(4, 4) world_from_node."""
-        for n in reversed(upwards(node, self.parents)):
-            if n not in self._known:
-                own, above = self.nodes[n], self.parents[n]
-                local = _matrix(own.place, own.turn, own.scale)
-                self._known[n] = local if above < 0 else self._known[above] @ local
-        return self._known[node]
+        line = []
+        while node >= 0 and node not in self._known:
+            line.append(node)
+            node = self.parents[node]
+        found = self._known.get(node, np.eye(4))
+        for n in reversed(line):
+            own = self.nodes[n]
+            found = self._known[n] = found @ transform(own.place, own.turn, own.scale)
+        return found
 
     def joint(self, node: int) -> int | None:
         """The skeleton's joint that carries a node; None for what does not hang on the skeleton."""
-        return next((self.slots[n] for n in upwards(node, self.parents) if n in self.slots), None)
-
-
-def _matrix(place: Array, turn: Array, scale: Array) -> Array:
-    found = np.eye(4)
-    found[:3, :3] = rot.quat_to_matrix(turn) * scale
-    found[:3, 3] = place
-    return found
+        while node >= 0 and node not in self.slots:
+            node = self.parents[node]
+        return self.slots.get(node)
 
 
 def _surface(

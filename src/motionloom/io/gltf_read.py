@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.glb import Document, read_document
-from motionloom.io.gltf_curves import Curve, Curves, channels_of, clock, read_curves
+from motionloom.io.gltf_curves import Curve, Curves, channels_of, clock, declared_fps, read_curves
 from motionloom.io.gltf_nodes import Node, downwards, printable, read_nodes, read_parents, upwards
 from motionloom.io.gltf_rig import humanoid_nodes, posed, read_rig
 from motionloom.motion import Motion
@@ -26,10 +26,11 @@ def load_glb(path: str | Path, *, person: int = 0, clip: int | str | None = None
     """Read the skeleton and animation of one person from a .glb or .vrm, or a .gltf with embedded buffers.
 
     A person is a skin's joints with everything animated above and below, or, in a file without skins, an animated
-    tree of nodes. ``clip`` is the number, from 1, or the name of the animation to read; without it the first that moves
-    the person is read, with a warning where there are several. It is sampled at the frame rate of its keys; nodes that
-    it leaves alone keep their rest; without animation the motion is one frame at rest. The skeleton's rest pose is the
-    file's (`gltf_rig`). Transforms above the person's topmost joint are folded into the root, scales into the bones.
+    tree of nodes. ``clip`` is the number, from 1, or the name of the animation to read; without it the newest that
+    this program wrote is read, else the first that moves the person, with a warning where there are several. It is
+    sampled at the frame rate of its keys; nodes that it leaves alone keep their rest; without animation the motion is
+    one frame at rest. The skeleton's rest pose is the file's (`gltf_rig`). Transforms above the person's topmost joint
+    are folded into the root, scales into the bones.
     Bone tips are leaves that nothing turns. Errors: `MotionloomError` for everything that is wrong with the file.
     """
     file = open_glb(path)
@@ -80,14 +81,17 @@ class OpenedGlb:
         clips = self.clips
         if clip is None:
             moving = [k for k, a in enumerate(self.channels) if any(node in self.people[person] for node, _ in a)]
+            ours = [k for k in moving if declared_fps(self.document.items("animations")[k]) is not None]
+            chosen = ours[-1:] or moving[:1]  # a character comes back with what was made last for it
             if len(moving) > 1:
-                first = f"number {moving[0] + 1}" + (f", {clips[moving[0]]!r}" if clips[moving[0]] else "")
+                name = f"number {chosen[0] + 1}" + (f", {clips[chosen[0]]!r}" if clips[chosen[0]] else "")
+                newest = ", the newest of this program's," if ours else ","
                 warnings.warn(
-                    f"{self.document.name} has {len(moving)} clips and none was chosen; {first}, is read (--clip picks "
-                    "another by its name or number, info lists them)",
+                    f"{self.document.name} has {len(moving)} clips and none was chosen; {name}{newest} is read (--clip "
+                    "picks another by its name or number, info lists them)",
                     stacklevel=3,
                 )
-            return moving[0] if moving else None
+            return chosen[0] if chosen else None
         if str(clip) in clips:
             return clips.index(str(clip))
         number = int(clip) if isinstance(clip, int) or (clip.isdecimal() and len(clip) < 9) else 0
@@ -115,7 +119,8 @@ def _motion(file: OpenedGlb, person: int, clip: int | None) -> Motion:
     joints = file.people[person]
     curves = read_curves(document, {key: sampler for key, sampler in moved.items() if key[0] in joints})
     nodes, joints, curves = settled(file, person, curves)
-    fps, times = clock(document, curves, len(joints))
+    declared = None if clip is None else declared_fps(document.items("animations")[clip])
+    fps, times = clock(document, curves, len(joints), declared)
     turned = {node for node, path in curves if path == "rotation"}
     tips = frozenset(n for n in joints if curves and not joints.intersection(nodes[n].children) and n not in turned)
     rig = read_rig(document, nodes, parents, joints=joints, tips=tips)

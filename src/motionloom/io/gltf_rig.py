@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.io.glb import Document
+from motionloom.io.gltf_bind import SAME_PLACE, SAME_TURN, angle, bind_pose, on_floor, turn_of
 from motionloom.io.gltf_curves import Curves, sample
 from motionloom.io.gltf_nodes import Node, upwards
 from motionloom.motion import Motion
@@ -25,7 +26,6 @@ from motionloom.skeleton import Skeleton
 Array = NDArray[np.float64]
 FAR = 1e6
 """Metres; nobody is further away."""
-_SAME_TURN = np.radians(0.5)
 _LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
 
 
@@ -38,6 +38,8 @@ class Rig:
     """For each joint the number of its node."""
     turns: Array
     """(joints, 4) at rest: world_from_node."""
+    shifted: frozenset[int] = frozenset()
+    """Joints whose nodes are not where the mesh was bound, on what they hang on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +100,12 @@ def read_rig(
     inner = {parents[n] for n in order}
     _check_scales(document, nodes, [*above, *(n for n in order if n in inner)])  # of a last bone nothing else depends
     rest = worlds(nodes, parents, [*above, *order], {})
-    turns, places = _bound(document, nodes, parents, order, rest)
-    known = humanoid_nodes(document, len(nodes))
     names = dict(zip(order, unique_names([nodes[n].name for n in order])))
-    hung = _hung(order, parents, names, places, known)
+    known = humanoid_nodes(document, len(nodes))
+    parts = _parts(order, parents, names, {n: rest.places[n][0] for n in order}, known)
+    body = {n for part in parts.values() for n in upwards(part, parents)} or inner
+    turns, places, shifted = _bound(document, nodes, parents, order, rest, body=body)
+    hung = _hung(parents, parts)
     order = parents_first(joints, hung)
     slots = {n: k for k, n in enumerate(order)}
     offsets = [places[n] - (places[hung[n]] if k else 0.0) for k, n in enumerate(order)]
@@ -111,9 +115,10 @@ def read_rig(
         np.array(offsets),
         frozenset(slots[n] for n in tips if slots[n] > 0),
         humanoid={part: names[n] for part, n in known.items() if n in names},
-        on_floor=_on_floor(np.array([places[n] for n in order])),
+        on_floor=on_floor(np.array([places[n] for n in order])),
     )
-    return Rig(skeleton, tuple(order), np.array([turns[n] for n in order]))
+    moved = frozenset(slots[n] for n in shifted)
+    return Rig(skeleton, tuple(order), np.array([turns[n] for n in order]), moved)
 
 
 def posed(
@@ -157,66 +162,35 @@ def _check_scales(document: Document, nodes: list[Node], line: list[int]) -> Non
             raise document.bad("its scales are absurdly large or small")
 
 
-def _on_floor(places: Array) -> bool:
-    """Whether somebody whose joints are there at rest (joints, 3) stands with the soles at y = 0."""
-    low, high = float(places[:, 1].min()), float(places[:, 1].max())
-    return high > 0 and abs(low) < 0.1 * (high - low)
-
-
 def _bound(
-    document: Document, nodes: list[Node], parents: list[int], order: list[int], rest: Worlds
-) -> tuple[dict[int, Array], dict[int, Array]]:
-    """World turns (4,) and places (3,) as the mesh was bound; as the nodes are where no skin says otherwise."""
+    document: Document, nodes: list[Node], parents: list[int], order: list[int], rest: Worlds, *, body: set[int]
+) -> tuple[dict[int, Array], dict[int, Array], frozenset[int]]:
+    """World turns (4,) and places (3,) as the mesh was bound, and the nodes that are elsewhere on what they hang on.
+
+    Where no skin says otherwise they are as the nodes are; so are places of what is not the ``body``, such as fingers
+    and tips, whose matrices are often mere dummies.
+    """
     turns = {n: rest.turns[n][0] for n in order}
     places = {n: rest.places[n][0] for n in order}
-    bound = _bind_turns(document, rest, set(order), len(nodes))
-    if any(_angle(bound[n], turns[n]) > _SAME_TURN for n in bound):
-        for n in order[1:]:
+    shifted: set[int] = set()
+    bound = bind_pose(document, nodes, parents, list(rest.turns), set(order))
+    near = SAME_PLACE * float(np.ptp([m[:3, 3] for m in bound.values()], axis=0).max()) if bound else 0.0
+    known = {n: turn for n, m in bound.items() if (turn := turn_of(m)) is not None}
+    if any(angle(known[n], turns[n]) > SAME_TURN or np.linalg.norm(bound[n][:3, 3] - places[n]) > near for n in known):
+        turns[order[0]] = known.get(order[0], turns[order[0]])
+        for n in order:
             p = parents[n]
-            linear = rest.linear[p]
-            size = 1.0 if linear is None else float(np.cbrt(np.linalg.det(linear[0])))
-            places[n] = places[p] + rot.rotate(turns[p], nodes[n].place * size)
-            turns[n] = bound.get(n, rot.multiply(turns[p], nodes[n].turn))
+            if n != order[0]:
+                linear = rest.linear[p]
+                size = 1.0 if linear is None else float(np.cbrt(np.linalg.det(linear[0])))
+                places[n] = places[p] + rot.rotate(turns[p], nodes[n].place * size)
+                turns[n] = known.get(n, rot.multiply(turns[p], nodes[n].turn))
+            if n in known and n in body and np.linalg.norm(bound[n][:3, 3] - places[n]) > near:
+                places[n] = bound[n][:3, 3]
+                shifted.add(n)
     if not all(np.isfinite(p).all() and np.abs(p).max() < FAR for p in places.values()):
         raise document.bad(f"a joint is more than {FAR:g} m away; check the units")
-    return turns, places
-
-
-def _bind_turns(document: Document, rest: Worlds, joints: set[int], count: int) -> dict[int, Array]:
-    """World turns of the joints of skins when their meshes were bound, with the topmost joint as it is at rest."""
-    found: dict[int, Array] = {}
-    for skin in document.items("skins"):
-        numbers = [document.index(j, count, "nodes") for j in skin.get("joints", [])]
-        inverse = document.matrices(skin.get("inverseBindMatrices"), "inverse bind matrices")
-        if inverse is None or len(inverse) < len(numbers) or not numbers:
-            continue
-        binds = dict(zip(numbers, inverse))
-        tops = [n for n in rest.turns if n in binds and n in joints]
-        if not tops:
-            continue
-        whole = rest.linear[tops[0]]
-        linear = rot.quat_to_matrix(rest.turns[tops[0]]) if whole is None else whole
-        shape = _turn_of(linear[0] @ binds[tops[0]])
-        for n in tops:
-            turn = _turn_of(binds[n])
-            if shape is not None and turn is not None:
-                found.setdefault(n, rot.multiply(shape, rot.inverse(turn)))
-    return found
-
-
-def _turn_of(linear: Array) -> Array | None:
-    """(4,) the rotation in a 3 x 3 matrix that scales alike in all directions; None if it does more."""
-    size = np.linalg.norm(linear, axis=0)
-    if not (size > 1e-12).all():
-        return None
-    turn = linear / size
-    if np.abs(turn.T @ turn - np.eye(3)).max() > 0.02 or np.linalg.det(turn) < 0:
-        return None
-    return rot.normalize(rot.matrix_to_quat(turn))
-
-
-def _angle(a: Array, b: Array) -> float:
-    return float(2 * np.arccos(np.clip(abs(float(a @ b)), 0.0, 1.0)))
+    return turns, places, frozenset(shifted)
 
 
 # --- who hangs on whom --------------------------------------------------------------------------------------------
@@ -237,24 +211,27 @@ def parents_first(joints: frozenset[int], parents: list[int]) -> list[int]:
     return order
 
 
-def _hung(
+def _parts(
     order: list[int], parents: list[int], names: dict[int, str], places: dict[int, Array], known: dict[str, int]
-) -> list[int]:
-    """The parents, with feet and hands on their limbs that the file hangs on a control instead."""
+) -> dict[str, int]:
+    """The nodes of body parts, by what the file says of them and by their names."""
     slots = {n: k for k, n in enumerate(order)}
     plain = Skeleton(
         tuple(names[n] for n in order),
         tuple(-1 if k == 0 else slots[parents[n]] for k, n in enumerate(order)),
         np.array([places[n] for n in order]),
     )
-    found = {part: order[k] for part, k in parts_by_name(plain).items()} | {
-        p: n for p, n in known.items() if n in slots
-    }
+    named = {part: order[k] for part, k in parts_by_name(plain).items()}
+    return named | {part: n for part, n in known.items() if n in slots}
+
+
+def _hung(parents: list[int], parts: dict[str, int]) -> list[int]:
+    """The parents, with feet and hands on their limbs that the file hangs on a control instead."""
     hung = list(parents)
     for side in ("left", "right"):
         for limb in _LIMBS:
             for upper, lower in pairwise(limb):
-                a, b = found.get(f"{side}_{upper}"), found.get(f"{side}_{lower}")
+                a, b = parts.get(f"{side}_{upper}"), parts.get(f"{side}_{lower}")
                 if a is not None and b is not None and a not in upwards(b, hung) and b not in upwards(a, hung):
                     hung[b] = a
     return hung

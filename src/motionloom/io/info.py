@@ -25,6 +25,10 @@ _FAMILIES = (
     ("Rigify", {"DEF-spine", "DEF-thigh.L", "DEF-shin.L", "DEF-forearm.R"}),
     ("MotionBuilder", {"Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "RightForeArm"}),
 )
+_ENOUGH = 20_000
+"""Frames, from all over the motion, by which a body's build is measured."""
+_BLOCK = 4096
+"""Frames that are looked at together."""
 
 
 @dataclass(frozen=True)
@@ -57,18 +61,19 @@ class Info:
 
 
 def describe(motion: Motion) -> Info:
-    """Measure a motion and look for common faults."""
-    places = motion.positions()
+    """Measure a motion and look for common faults, in memory that hardly grows with its length."""
+    few = motion.thinned(_ENOUGH)
+    places = few.positions()
     start = body_start(motion.skeleton, places)
-    body, person = places[:, start:], _person(motion, start)
-    way = body[:, 0] if person is None else person[:, 0]
-    ground = way[:, [0, 2]]
+    person = _person(few, start)
     if person is not None:
         height = body_height(SMPL22, person)
     else:
-        height = body_height(motion.skeleton, places) if body.shape[1] > 1 else 0.0
-    floor = float(np.percentile(body[..., 1].min(axis=1), 2))
-    low, high = (tuple(float(v) for v in f(body, axis=(0, 1))) for f in (np.min, np.max))
+        height = body_height(motion.skeleton, places) if len(motion.skeleton) - start > 1 else 0.0
+    tracks = [_track(motion.frames(k, k + _BLOCK), start, person is not None) for k in range(0, len(motion), _BLOCK)]
+    way, lowest, spans = (np.concatenate([getattr(t, name) for t in tracks]) for name in ("way", "lowest", "spans"))
+    ground, floor = way[:, [0, 2]], float(np.percentile(lowest, 2))
+    low, high = np.min([t.low for t in tracks], axis=0), np.max([t.high for t in tracks], axis=0)
     return Info(
         skeleton=family(motion.skeleton),
         joints=len(motion.skeleton),
@@ -80,11 +85,33 @@ def describe(motion: Motion) -> Info:
         height=height,
         path=float(np.linalg.norm(np.diff(ground, axis=0), axis=-1).sum()),
         travel=float(np.linalg.norm(ground[-1] - ground[0])),
-        lowest=low,  # type: ignore[arg-type]
-        highest=high,  # type: ignore[arg-type]
+        lowest=tuple(low.tolist()),
+        highest=tuple(high.tolist()),
         floor=floor,
-        problems=tuple(_problems(motion, body, way, height, floor)),
+        problems=tuple(_problems(motion, spans, way, height, floor)),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Track:
+    """Where some frames of a body are."""
+
+    way: Array
+    """(frames, 3) metres: the pelvis, or the joint where the body begins."""
+    lowest: Array
+    """(frames,) metres: its lowest joint."""
+    spans: Array
+    """(frames, 3) metres from one end to the other."""
+    low: Array
+    """(3,) metres."""
+    high: Array
+
+
+def _track(motion: Motion, start: int, is_person: bool) -> _Track:
+    body = motion.positions()[:, start:]
+    way = joints22(motion)[:, 0] if is_person else body[:, 0].copy()
+    low, high = body.min(axis=(0, 1)), body.max(axis=(0, 1))
+    return _Track(way, body[..., 1].min(axis=1), np.ptp(body, axis=1), low, high)
 
 
 def _person(motion: Motion, start: int) -> Array | None:
@@ -101,9 +128,9 @@ def family(skeleton: Skeleton) -> str:
     return next((name for name, some in _FAMILIES if some <= set(skeleton.names)), "unknown")
 
 
-def _problems(motion: Motion, body: Array, way: Array, height: float, floor: float) -> list[str]:
+def _problems(motion: Motion, spans: Array, way: Array, height: float, floor: float) -> list[str]:
     found = []
-    spans = np.median(np.ptp(body, axis=1), axis=0)
+    spans = np.median(spans, axis=0)
     if spans[2] > 2 * spans[1] and height > 0.5:
         found.append("the body lies or Z is up in the file (a person who stands is long in Y); --up z turns it")
     elif not 0.6 <= height <= 2.6:
@@ -128,17 +155,23 @@ def _problems(motion: Motion, body: Array, way: Array, height: float, floor: flo
 
 def _largest_turn(motion: Motion) -> tuple[float, int, int]:
     """Largest change of one joint's rotation between neighbouring frames: radians, frame, joint."""
-    if len(motion) < 2:
-        return 0.0, 0, 0
-    change = rot.multiply(rot.inverse(motion.rotations[:-1]), motion.rotations[1:])
-    angle = 2 * np.arccos(np.clip(np.abs(change[..., 0]), 0, 1))
-    frame, joint = np.unravel_index(int(angle.argmax()), angle.shape)
-    return float(angle[frame, joint]), int(frame), int(joint)
+    largest = 0.0, 0, 0
+    for begin in range(0, len(motion) - 1, _BLOCK):
+        turns = motion.rotations[begin : begin + _BLOCK + 1]
+        change = rot.multiply(rot.inverse(turns[:-1]), turns[1:])
+        angle = 2 * np.arccos(np.clip(np.abs(change[..., 0]), 0, 1))
+        frame, joint = np.unravel_index(int(angle.argmax()), angle.shape)
+        if angle[frame, joint] > largest[0]:
+            largest = float(angle[frame, joint]), begin + int(frame), int(joint)
+    return largest
 
 
 def _stretch(motion: Motion) -> float:
     """Metres by which bones change, leaving out the travelling child of a still root."""
     assert motion.translations is not None
-    lengths = np.linalg.norm(motion.translations, axis=-1)[:, 1:]
+    shortest, longest = np.full(len(motion.skeleton) - 1, np.inf), np.zeros(len(motion.skeleton) - 1)
+    for begin in range(0, len(motion), _BLOCK):
+        lengths = np.linalg.norm(motion.translations[begin : begin + _BLOCK, 1:], axis=-1)
+        shortest, longest = np.minimum(shortest, lengths.min(axis=0)), np.maximum(longest, lengths.max(axis=0))
     parents = np.array(motion.skeleton.parents[1:])
-    return float(np.ptp(lengths[:, parents != 0], axis=0).max(initial=0.0))
+    return float((longest - shortest)[parents != 0].max(initial=0.0))

@@ -3,7 +3,7 @@
 import json
 import math
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ FREE_POSES = 2_000_000
 """Frames times joints of which a file need not say anything."""
 MAX_DEPTH = 64
 """Lists and mappings within each other."""
-_CHUNK = 16 * 1024**2
+_CHUNK = 4 * 1024**2
 
 
 def read_bytes(path: Path | str, *, max_bytes: int = MAX_BYTES) -> bytes:
@@ -38,7 +38,7 @@ def read_bytes(path: Path | str, *, max_bytes: int = MAX_BYTES) -> bytes:
         if isinstance(error, MotionloomError):
             raise
         raise MotionloomError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from None
-    if not data.strip():
+    if not data or data.isspace():
         raise MotionloomError(f"{path} is empty")
     return data
 
@@ -164,19 +164,23 @@ def numbers(data: bytes, *, path: Path | str, first_line: int) -> NDArray[np.flo
 
     ``first_line`` is the line of the file on which the block begins, for messages.
     """
-    parts: list[NDArray[np.float64]] = []
-    start = 0
+    parts = list(number_blocks(data, 0, path=path, first_line=first_line))
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def number_blocks(data: bytes, start: int, *, path: Path | str, first_line: int) -> Iterator[NDArray[np.float64]]:
+    """The numbers of the text from ``start`` on, flat and some at a time, so that they need not all be held at once."""
+    line = first_line
     while start < len(data):
         stop = len(data) if len(data) - start <= _CHUNK else data.rfind(b"\n", start, start + _CHUNK) + 1
         stop = stop if stop > start else len(data)
         chunk = data[start:stop]
         values = _parse(chunk)
         if values is None:
-            _complain(chunk, path, first_line + data.count(b"\n", 0, start))
+            _complain(chunk, path, line)
         else:
-            parts.append(values)
-        start = stop
-    return np.concatenate(parts) if parts else np.empty(0)
+            yield values
+        start, line = stop, line + chunk.count(b"\n")
 
 
 def _parse(chunk: bytes) -> NDArray[np.float64] | None:

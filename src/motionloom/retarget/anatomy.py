@@ -37,7 +37,8 @@ from motionloom.retarget.axes import (
     unit,
 )
 from motionloom.retarget.joint_map import JointMap, Override, joint_map
-from motionloom.retarget.measured import measure_frames, measure_sole
+from motionloom.retarget.measured import measure_frames, measure_sole, stands_on_flat_feet
+from motionloom.retarget.topology import below
 from motionloom.skeleton import SMPL22, Poses, Skeleton
 
 Array = NDArray[np.float64]
@@ -148,9 +149,9 @@ def _measured(body: Body, poses: Poses) -> Body:
 
 def _on_measured_feet(body: Body, poses: Poses) -> Body:
     """The body with the soles of those feet measured from poses that do not stand at rest, such as on the toes."""
-    places, world = _posed(body, poses)
-    if body.up[1] < 0.9:
+    if body.up[1] < 0.9 or all(stands_on_flat_feet(body.rest, foot) for foot in FEET):
         return body
+    places, world = _posed(body, poses)
     frames = body.frames.copy()
     for foot, toe in zip(FEET, TOES):
         sole = measure_sole(places, world, body.drivers[foot], rest=body.rest, foot=foot)
@@ -274,16 +275,9 @@ def _toe_height(skeleton: Skeleton, found: JointMap, rest: Array, up: Array) -> 
     heights = skeleton.rest_positions() @ up
     depths = []
     for foot, toe in zip(FEET, TOES):
-        tips = [heights[j] for j in range(len(skeleton)) if _hangs_on(skeleton, found, j, foot)]
-        depths.append(max(float(rest[toe] @ up) - min(tips), 0.0))
+        own = below(skeleton, {skeleton.index(name) for name, _ in found.points[foot]})
+        depths.append(max(float(rest[toe] @ up) - float(heights[sorted(own)].min()), 0.0))
     return min(float(np.mean(depths)), 0.06)
-
-
-def _hangs_on(skeleton: Skeleton, found: JointMap, joint: int, part: int) -> bool:
-    names = {name for name, _ in found.points[part]}
-    while joint > 0 and skeleton.names[joint] not in names:
-        joint = skeleton.parents[joint]
-    return skeleton.names[joint] in names
 
 
 def _odd_frames(rest: Array) -> Array:

@@ -73,6 +73,8 @@ def joint_map(skeleton: Skeleton, override: Override | None = None) -> JointMap:
     else:
         found = _family(skeleton) or _humanoid(skeleton, given)
     points = found | given
+    if given:
+        _check_apart(points)
     return JointMap(tuple(tuple(points[name].items()) for name in SMPL22.names))
 
 
@@ -275,6 +277,19 @@ def _load_json(path: Path) -> object:
         if isinstance(error, MotionloomError):
             raise
         raise MotionloomError(f"{path} cannot be read as a joint map in JSON: {error}") from None
+
+
+def _check_apart(points: Mapping[str, Mapping[str, float]]) -> None:
+    """Refuse one joint for two parts that have a bone between them."""
+    taken: dict[str, str] = {}
+    for part in ("pelvis", *_NEEDED, "head"):
+        if len(points[part]) == 1:
+            name = next(iter(points[part]))
+            if name in taken:
+                raise MotionloomError(
+                    f"the joint map gives both {taken[name]} and {part} as {name!r}; name another joint for one of them"
+                )
+            taken[name] = part
 
 
 def _check_point(skeleton: Skeleton, part: str, value: object) -> dict[str, float]:

@@ -91,12 +91,17 @@ def measure_sole(places: Array, world: Array, driver: int | None, *, rest: Array
     turns the foot; rest: (22, 3) metres, a rest pose that is upright along y; foot: SMPL's number of the ankle. None
     where the rest pose has flat feet, or where the foot never stands.
     """
-    slope = float(np.arcsin(-unit(rest[foot + 3] - rest[foot])[1]))
     stands = _stands(places, foot)
-    if driver is None or stands.sum() < 3 or _SLOPES[0] < slope < _SLOPES[1]:
+    if driver is None or stands.sum() < 3 or stands_on_flat_feet(rest, foot):
         return None
     soles = rot.multiply(rot.inverse(world[stands, driver]), _level_sole(places, foot)[stands])
     return mean_rotation(soles, np.ones(len(soles)))
+
+
+def stands_on_flat_feet(rest: Array, foot: int) -> bool:
+    """Whether a foot's bone slopes in a rest pose (22, 3) that is upright along y as it does on a flat foot."""
+    slope = float(np.arcsin(-unit(rest[foot + 3] - rest[foot])[1]))
+    return bool(_SLOPES[0] < slope < _SLOPES[1])
 
 
 def _stands(places: Array, foot: int) -> Array:

@@ -1,5 +1,6 @@
 """Finding a body in a tree of joints by its shape: two legs go down, a spine goes up, arms branch off."""
 
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -9,6 +10,8 @@ from motionloom.retarget.names import Parts
 from motionloom.skeleton import Skeleton
 
 Array = NDArray[np.float64]
+_MOST_LIMBS = 32
+"""On one joint; of more the longest are looked at."""
 
 
 def ancestors(skeleton: Skeleton, joint: int) -> list[int]:
@@ -37,63 +40,77 @@ def path_down(skeleton: Skeleton, upper: int, lower: int) -> list[int]:
 
 def parts_by_shape(skeleton: Skeleton) -> Parts | None:
     """Body parts of a skeleton in an upright rest pose with the left side at +X (or where the toes say), else None."""
-    rest = skeleton.rest_positions()
-    chains = [_longest_chain(skeleton, j) for j in range(len(skeleton))]
-    for pelvis in range(len(skeleton)):
-        legs = _pair(skeleton, pelvis, chains, rest, down=True)
-        if legs is None:
+    rest, ways = skeleton.rest_positions(), _ways(skeleton)
+    branching = [j for j in range(len(skeleton)) if len(skeleton.children(j)) >= 3]
+    arms = {j: found for j in branching if (found := _pair(skeleton, j, ways, rest, down=False))}
+    for pelvis in branching:
+        legs = _pair(skeleton, pelvis, ways, rest, down=True)
+        if legs is None or not arms:
             continue
-        below = (j for j in range(pelvis, len(skeleton)) if is_above(skeleton, pelvis, j))
-        for chest in (j for j in below if not any(is_above(skeleton, leg[0], j) for leg in legs)):
-            arms = _pair(skeleton, chest, chains, rest, down=False)
-            if arms is not None and not set(arms[0]) & {*legs[0], *legs[1]}:
-                return _name_parts(skeleton, rest, pelvis, legs, chest=chest, arms=arms)
+        inside = below(skeleton, {pelvis}) - below(skeleton, {leg[0] for leg in legs})
+        for chest in sorted(inside & arms.keys()):
+            if not set(arms[chest][0]) & {*legs[0], *legs[1]}:
+                return _name_parts(skeleton, ways, rest, pelvis, legs, chest=chest, arms=arms[chest])
     return None
 
 
-def _longest_chain(skeleton: Skeleton, joint: int) -> list[int]:
-    """The way down from a joint to the tip that lies farthest along the bones."""
-    reach = np.zeros(len(skeleton))
-    below = [-1] * len(skeleton)
-    for j in range(len(skeleton) - 1, joint, -1):
-        parent, length = skeleton.parents[j], reach[j] + float(np.linalg.norm(skeleton.offsets[j]))
-        if length > reach[parent] or below[parent] < 0:
-            reach[parent], below[parent] = length, j
-    line = [joint]
-    while below[line[-1]] >= 0:
-        line.append(below[line[-1]])
-    return line
+def below(skeleton: Skeleton, joints: set[int]) -> set[int]:
+    """The given joints and all that hangs on them."""
+    found = set(joints)
+    for j, parent in enumerate(skeleton.parents):
+        if parent in found:
+            found.add(j)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Ways:
+    """The way down from each joint to the tip that lies farthest along the bones."""
+
+    next: list[int]
+    """The joint below; -1 at a tip."""
+    length: list[float]
+    """Metres from the joint above down to that tip."""
+
+    def down(self, joint: int) -> list[int]:
+        """The joints of the way, the given one first."""
+        line = [joint]
+        while self.next[line[-1]] >= 0:
+            line.append(self.next[line[-1]])
+        return line
+
+
+def _ways(skeleton: Skeleton) -> _Ways:
+    length, following = np.linalg.norm(skeleton.offsets, axis=-1).tolist(), [-1] * len(skeleton)
+    reach = [0.0] * len(skeleton)
+    for j in range(len(skeleton) - 1, 0, -1):
+        parent, length[j] = skeleton.parents[j], length[j] + reach[j]
+        if length[j] > reach[parent] or following[parent] < 0:
+            reach[parent], following[parent] = length[j], j
+    return _Ways(following, length)
 
 
 def _pair(
-    skeleton: Skeleton, joint: int, chains: list[list[int]], rest: Array, *, down: bool
+    skeleton: Skeleton, joint: int, ways: _Ways, rest: Array, *, down: bool
 ) -> tuple[list[int], list[int]] | None:
     """Two mirror-like limbs that hang on a joint beside a third branch: legs reach far below it, arms do not."""
-    children = skeleton.children(joint)
-    height = np.ptp(rest[:, 1])
+    height = float(np.ptp(rest[:, 1]))
+    long = sorted((j for j in skeleton.children(joint) if ways.length[j] > 0.2 * height), key=lambda j: -ways.length[j])
+    limbs = [line for j in sorted(long[:_MOST_LIMBS]) if len(line := ways.down(j)) >= 3]
     best: tuple[float, tuple[list[int], list[int]]] | None = None
-    if len(children) < 3:
-        return None
-    for a, b in combinations(children, 2):
-        limbs = (chains[a], chains[b])
-        if min(map(len, limbs)) < 3:
-            continue
-        lengths = [_length(skeleton, limb) for limb in limbs]
-        drops = [float(rest[joint, 1] - rest[limb[-1], 1]) for limb in limbs]
-        apart = float(np.linalg.norm(rest[limbs[0][-1]] - rest[limbs[1][-1]]))
+    for pair in combinations(limbs, 2):
+        lengths = [ways.length[limb[0]] for limb in pair]
+        drops = [float(rest[joint, 1] - rest[limb[-1], 1]) for limb in pair]
+        apart = float(np.linalg.norm(rest[pair[0][-1]] - rest[pair[1][-1]]))
         alike = abs(lengths[0] - lengths[1]) < 0.25 * max(lengths) and abs(drops[0] - drops[1]) < 0.15 * height
-        if alike and apart > 0.05 * height and (min(drops) > 0.3 * height) == down and min(lengths) > 0.2 * height:
-            score = sum(lengths)
-            best = max(best, (score, limbs), key=lambda x: x[0]) if best else (score, limbs)
+        if alike and apart > 0.05 * height and (min(drops) > 0.3 * height) == down:
+            best = max(best, (sum(lengths), pair), key=lambda x: x[0]) if best else (sum(lengths), pair)
     return best[1] if best else None
-
-
-def _length(skeleton: Skeleton, line: list[int]) -> float:
-    return float(np.linalg.norm(skeleton.offsets[line], axis=-1).sum())
 
 
 def _name_parts(
     skeleton: Skeleton,
+    ways: _Ways,
     rest: Array,
     pelvis: int,
     legs: tuple[list[int], list[int]],
@@ -112,8 +129,8 @@ def _name_parts(
         above = skeleton.parents[parts[f"{side}_shoulder"]]
         if above != chest:
             parts[f"{side}_collar"] = above
-    top = max(tops, key=lambda j: float(rest[_longest_chain(skeleton, j)[-1], 1]))
-    line = [j for j in _longest_chain(skeleton, top) if j not in skeleton.ends]
+    top = max(tops, key=lambda j: float(rest[ways.down(j)[-1], 1]))
+    line = [j for j in ways.down(top) if j not in skeleton.ends]
     if not line:
         return None
     parts["neck"] = line[0]

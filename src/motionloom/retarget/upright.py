@@ -16,6 +16,8 @@ TALL = 0.8
 """Cosine between a person and the axis along which they are upright."""
 OFTEN = 0.7
 """Share of the frames in which they must be."""
+_ENOUGH = 20_000
+"""Frames, from all over the recording, that are looked at."""
 
 
 def up_axis(motion: Motion, override: Override | None = None) -> str:
@@ -24,7 +26,7 @@ def up_axis(motion: Motion, override: Override | None = None) -> str:
     People are mostly upright, stand on feet that stay at one height, and lie near the ground. Raises
     `MotionloomError` if the skeleton is no humanoid.
     """
-    body = read_body(motion.skeleton, override)
+    body, motion = read_body(motion.skeleton, override), motion.thinned(_ENOUGH)
     places = body.places(motion.positions(), motion.world_rotations())
     tall = places[:, HEAD] - places[:, FEET].mean(axis=1)
     tall = tall / np.maximum(np.linalg.norm(tall, axis=-1, keepdims=True), 1e-9)

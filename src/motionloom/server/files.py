@@ -14,7 +14,9 @@ from motionloom.io.character import load_character
 from motionloom.io.text import parse_json
 from motionloom.motion import Motion
 from motionloom.retarget import joint_map, retarget, to_smpl22
+from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.named import NAMED, named_skeleton
+from motionloom.retarget.stand import HERE, started
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project, Stored
 from motionloom.server.refusal import Refusal
@@ -115,6 +117,8 @@ def _on_character(project: Project, people: Sequence[Motion], kind: str, skeleto
             if len(people) > 1:
                 raise MotionloomError("a character's file holds one person; name one with person=0 or person=1")
             moved = retarget(people[0], character.skeleton)
+            if character.stand != HERE:
+                moved = started(moved, read_body(character.skeleton), character.stand)
             return character.save(moved, project.part(suffix), name=caption[:80] or None)
         target = character.skeleton
     moved = [retarget(one, target) for one in people]
