@@ -296,7 +296,7 @@ def test_commands_survive_json(command: Any) -> None:
 
 
 JUNK = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20),
+    st.none() | st.booleans() | st.integers() | st.just(10**400) | st.floats() | st.text(max_size=20),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
     max_leaves=12,
 )
@@ -336,6 +336,8 @@ def test_whatever_a_client_says_is_a_command_or_one_sentence(kind: str, fields: 
     "wrong",
     [
         {"names": ["a"], "parents": [-1], "offsets": [[0, 0]]},
+        {"names": ["a"], "parents": [-1], "offsets": [[10**400, 0, 0]]},
+        {"names": ["a"], "parents": [10**400], "offsets": [[0, 0, 0]]},
         {"names": ["a"] * 400, "parents": [-1] * 400, "offsets": [[0, 0, 0]] * 400},
         {"names": ["a", "a"], "parents": [-1, 0], "offsets": [[0, 0, 0]] * 2},
         {"names": ["a", "b"], "parents": [-1, 5], "offsets": [[0, 0, 0]] * 2},

@@ -97,10 +97,23 @@ class Server:
         self.process.wait()
 
 
+LIMITED = """
+import json, sys
+from functools import partial
+from motionloom.cli import main
+from motionloom.server import serving
+from motionloom.server.limits import Limits
+serving.serve = partial(serving.serve, limits=Limits(**json.loads(sys.argv.pop(1))))
+main()
+"""
+"""The command with other limits than the usual ones."""
+
+
 @contextmanager
-def running(project: Path, *options: str) -> Iterator[Server]:
-    """A server on a free port, ended behind the block."""
-    command = [sys.executable, "-m", "motionloom", "serve", "--port", "0", "--project", str(project), "--threads", "1"]
+def running(project: Path, *options: str, **limits: float) -> Iterator[Server]:
+    """A server on a free port, ended behind the block; ``limits``: of `Limits`, where they are not the usual ones."""
+    program = ["-c", LIMITED, json.dumps(limits)] if limits else ["-m", "motionloom"]
+    command = [sys.executable, *program, "serve", "--port", "0", "--project", str(project), "--threads", "1"]
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     process = subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True, env=environment)
     try:

@@ -1,6 +1,8 @@
 """The OpenAPI document: it tells of every route, of every key of a job, and of nothing else."""
 
 import re
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -9,7 +11,8 @@ pytest.importorskip("starlette", reason="needs the extra 'studio'")
 from starlette.routing import Route
 
 from motionloom.server.app import routes
-from motionloom.server.asking import KEYS
+from motionloom.server.asking import COMMON, KEYS
+from motionloom.server.components import request_of
 from motionloom.server.limits import Limits
 from motionloom.server.openapi import as_page, document
 
@@ -28,16 +31,56 @@ def test_every_route_is_told_of_and_nothing_else() -> None:
 
 
 def test_every_task_has_its_keys() -> None:
-    variants = document(Limits())["components"]["schemas"]["request"]["oneOf"]
-    assert {variant["title"] for variant in variants} == set(KEYS)
-    for variant in variants:
-        assert set(KEYS[variant["title"]]) <= set(variant["properties"])
+    schemas = document(Limits())["components"]["schemas"]
+    assert set(schemas["JobRequest"]["discriminator"]["mapping"]) == set(KEYS)
+    for task, keys in KEYS.items():
+        variant = schemas[request_of(task)]
+        assert variant["properties"]["task"] == {"const": task}
+        assert set(variant["properties"]) == {*COMMON, *keys}
 
 
 def test_references_lead_somewhere() -> None:
     found = document(Limits())
     names = re.findall(r"#/components/schemas/(\w+)", str(found))
     assert set(names) == set(found["components"]["schemas"])
+
+
+def _inside(schema: Any) -> Iterator[dict[str, Any]]:
+    """The schemas that stand inside of another one."""
+    if isinstance(schema, dict):
+        for key, value in schema.items():
+            parts = value.values() if key == "properties" else [value]
+            for part in parts:
+                if isinstance(part, dict):
+                    yield part
+                yield from _inside(part)
+    elif isinstance(schema, list):
+        for part in schema:
+            if isinstance(part, dict):
+                yield part
+            yield from _inside(part)
+
+
+def test_every_object_and_every_choice_has_a_name_of_its_own() -> None:
+    """Programs that make clients call classes by these names; what has none gets one that may be another's."""
+    found = document(Limits())
+    assert all(re.fullmatch(r"[A-Z][A-Za-z]+", name) for name in found["components"]["schemas"])
+    for schema in found["components"]["schemas"].values():
+        assert not [part for part in _inside(schema) if part.get("type") == "object" or "enum" in part]
+    operations = [one for methods in found["paths"].values() for one in methods.values()]
+    assert not [part for one in operations for part in _inside(one) if part.get("type") == "object" or "enum" in part]
+    names = [one["operationId"] for one in operations]
+    assert len(names) == len(set(names))
+
+
+def test_files_go_as_bytes() -> None:
+    operations = {
+        one["operationId"]: one for methods in document(Limits())["paths"].values() for one in methods.values()
+    }
+    for name in ("export_motion", "get_character"):
+        assert list(operations[name]["responses"]["200"]["content"]) == ["application/octet-stream"]
+    for name in ("upload_motion", "upload_character"):
+        assert list(operations[name]["requestBody"]["content"]) == ["application/octet-stream"]
 
 
 def test_the_page_shows_every_path_and_loads_nothing() -> None:

@@ -70,6 +70,12 @@ def test_it_is_found_at_the_root_and_under_its_prefix(server: Server, model: dic
     assert server.json("GET", "/capabilities")[1]["tasks"]
 
 
+def test_its_document_is_given_and_no_page_that_loads_scripts_from_elsewhere(server: Server) -> None:
+    status, found = server.json("GET", "/mmcp/openapi.json")
+    assert (status, "/generate" in found["paths"]) == (200, True)
+    assert [server.ask("GET", f"/mmcp/{page}")[0] for page in ("docs", "redoc")] == [404, 404]
+
+
 def test_a_seed_makes_the_same_samples_again_and_each_is_another(server: Server, model: dict[str, Any]) -> None:
     first, second = draw(server, model, segments=[text()], options={**QUICK, "num_samples": 2})
     (again,) = draw(server, model, segments=[text()])

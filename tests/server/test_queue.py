@@ -1,11 +1,15 @@
 """The queue's rules, without drawing: turns, bounds, batches."""
 
+import json
+from typing import Any
+
+import numpy as np
 import pytest
 
 pytest.importorskip("starlette", reason="needs the extra 'studio'")
 
 from motionloom.server.asking import Request
-from motionloom.server.jobs import Job
+from motionloom.server.jobs import Event, Job
 from motionloom.server.limits import Limits
 from motionloom.server.queue import Queue
 from motionloom.server.refusal import Refusal
@@ -84,15 +88,51 @@ def test_a_removed_job_is_not_taken() -> None:
     assert len(queue) == 0
 
 
-def test_the_log_of_a_job_stays_small_and_keeps_the_newest() -> None:
-    import numpy as np
+def log(one: Job) -> list[Event]:
+    """All that a stream sends of a job's log as it is now."""
+    found: list[Event] = []
+    while (event := one.event_after(found[-1].number if found else 0)) is not None:
+        found.append(event)
+    return found
 
-    one = Job(Request("generate", 0, 1, None, None, True, {}), "a", 10 * 100 * 22 * 12)
+
+def data(event: Event) -> dict[str, Any]:
+    return json.loads(event.text.decode().split("data: ")[1])
+
+
+def test_the_log_of_a_job_stays_small_and_keeps_the_newest() -> None:
+    one = Job(Request("generate", 0, 1, None, None, True, {}), "a", 400_000)
     for level in range(1, 51):
         one.level(level, 50, 0, np.zeros((1, 100, 22, 3)))
-    kept = [event.data["level"] for event in one.events_after(0)]
-    assert kept == list(range(41, 51))
+    kept = [data(event)["level"] for event in log(one)]
+    assert kept == list(range(51 - len(kept), 51))
+    assert len(kept) == 400_000 // len(log(one)[-1].text)
     assert one.log_bytes <= one.most_bytes
+
+
+def test_an_event_is_written_out_once_however_many_read_it() -> None:
+    one = job("a")
+    one.level(1, 2, 0, np.zeros((1, 40, 22, 3)))
+    one.progress(1, 2)
+    assert all(first.text is second.text for first, second in zip(log(one), log(one), strict=True))
+    assert [event.kind for event in log(one)] == ["level", "progress"]
+
+
+def test_a_stream_that_is_slow_goes_on_with_what_is_still_in_the_log() -> None:
+    one = Job(Request("generate", 0, 1, None, None, True, {}), "a", 100_000)
+    one.level(1, 99, 0, np.zeros((1, 40, 22, 3)))
+    seen = one.event_after(0)
+    assert seen is not None
+    for level in range(2, 100):
+        one.level(level, 99, 0, np.zeros((1, 40, 22, 3)))
+        one.progress(level, 99)
+    one.end("done")
+    rest = []
+    while (event := one.event_after(rest[-1].number if rest else seen.number)) is not None:
+        rest.append(event)
+    assert data(rest[0])["level"] > 2
+    assert [event.number for event in rest] == sorted({event.number for event in rest})
+    assert [event.kind for event in rest[-2:]] == ["progress", "done"]
 
 
 def test_what_ended_stays_as_it_ended() -> None:

@@ -62,7 +62,7 @@ def told(found: dict[str, float], path: Path | None) -> None:
 def first_motion(page: Studio) -> float:
     """Seconds from the page's address until somebody moves, in a project that is new."""
     page.page.goto(page.server.page)
-    page.page.wait_for_function("performance.getEntriesByName('draw-preview').length > 0")
+    page.until("performance.getEntriesByName('draw-preview').length > 0")
     seconds = page.page.evaluate("performance.getEntriesByName('draw-preview')[0].startTime") / 1000
     page.drawn()
     return seconds

@@ -12,6 +12,8 @@ from tests.studio.started import Server
 
 SLOW = 240_000
 """Milliseconds that a draw may take on a busy machine."""
+LOOK = 20
+"""Milliseconds between two looks at the page."""
 PROJECT = {
     "version": 1, "name": "Test", "seed": 3, "count": 1, "kept": 0, "drawn": "", "takes": [], "clips": [],
     "frozen": [], "base": None, "reactTo": None, "character": None,
@@ -30,7 +32,12 @@ class Studio:
         self._drawn: dict[str, dict[str, Any]] = {}
         page.set_default_timeout(SLOW)
         page.on("pageerror", lambda error: self.faults.append(str(error)))
+        page.on("console", self._heard)
         page.add_init_script(FORGET)
+
+    def _heard(self, message: Any) -> None:
+        if "Content Security Policy" in message.text:
+            self.faults.append(message.text)
 
     # -- beginnings
 
@@ -64,6 +71,14 @@ class Studio:
     def says(self, place, text: str) -> None:
         """Wait until a place of the page, a locator, has the text."""
         place.filter(has_text=text).first.wait_for()
+
+    def until(self, expression: str) -> None:
+        """Wait until an expression is true in the page; the driver's own way evaluates text, which the page forbids."""
+        for _ in range(SLOW // LOOK):
+            if self.page.evaluate(expression):
+                return
+            self.page.wait_for_timeout(LOOK)
+        raise AssertionError(f"it never was so that {expression}")
 
     # -- deeds
 
@@ -121,7 +136,7 @@ class Studio:
         """Wait until nothing is being drawn and the project is saved."""
         self.page.wait_for_selector("#stage[aria-busy=false]", state="attached")
         self.page.evaluate("dispatchEvent(new Event('pagehide'))")  # saves now, not half a second later
-        self.page.wait_for_function("document.querySelector('.state').textContent === 'saved'")
+        self.until("document.querySelector('.state').textContent === 'saved'")
 
     def project(self) -> dict[str, Any]:
         """The project as it was saved, after all draws."""

@@ -2,7 +2,10 @@
 
 import json
 import struct
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -75,6 +78,44 @@ def test_own_characters_are_on_the_stage_and_in_the_exports(studio: Studio, tmp_
         assert abs(load(moving).seconds - 2.0) < 0.11
         studio.key("Control+z")
     assert studio.project()["character"] is None
+    assert not studio.faults
+
+
+class Listener(BaseHTTPRequestHandler):
+    """Somebody else's server, who wants to know when a character is looked at."""
+
+    asked: ClassVar[list[str]] = []
+
+    def do_GET(self) -> None:
+        self.asked.append(self.path)
+        self.send_error(404)
+
+    def log_message(self, *_: object) -> None:
+        """Nothing is printed."""
+
+
+def test_a_picture_that_a_character_names_elsewhere_is_asked_for_by_nobody(studio: Studio, tmp_path: Path):
+    listener = ThreadingHTTPServer(("127.0.0.1", 0), Listener)
+    threading.Thread(target=listener.serve_forever, daemon=True).start()
+    hero = Hero(seed=5)
+    hero.json["images"] = [{"uri": f"http://127.0.0.1:{listener.server_port}/seen.png"}]
+    hero.json["textures"] = [{"source": 0}]
+    hero.json["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    (primitive,) = hero.json["meshes"][0]["primitives"]
+    corners = hero.json["accessors"][primitive["attributes"]["POSITION"]]["count"]
+    primitive["attributes"]["TEXCOORD_0"] = hero.add(np.zeros((corners, 2)), 5126, "VEC2")
+    primitive["material"] = 0
+    try:
+        studio.drop(hero.write(tmp_path / "spy.glb"))
+        studio.page.wait_for_selector("#canvas[data-character]")
+        exported = studio.export("GLB")
+        studio.picture()
+    finally:
+        listener.shutdown()
+        listener.server_close()
+    assert b"/seen.png" in exported, "the character's own file comes back as it was"
+    assert not Listener.asked
+    studio.key("Control+z")
     assert not studio.faults
 
 

@@ -12,7 +12,7 @@ def test_a_killed_server_comes_back_and_nothing_is_lost(studio: Studio):
     studio.open(("a person walks", 2), ("a person waves", 4), ("a person runs", 4))
     before = studio.project()
     studio.key("g")
-    page.wait_for_function("document.querySelector('progress').value > 0")
+    studio.until("document.querySelector('progress').value > 0")
     studio.server.kill()
     page.wait_for_selector(".notice.away")
     studio.key("Control+z", "End")  # what is here can be worked on

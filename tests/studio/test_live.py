@@ -9,9 +9,9 @@ from tests.studio.studio import Studio
 def done(studio: Studio, words: str) -> None:
     """Wait until this has been done for a second."""
     at = "Number.parseFloat(document.querySelector('#live small').textContent)"
-    studio.page.wait_for_function(f"/{words}/.test(document.querySelector('#live b').textContent)")
+    studio.until(f"/{words}/.test(document.querySelector('#live b').textContent)")
     begun = studio.page.evaluate(at)
-    studio.page.wait_for_function(f"{at} > {begun + 1.0}")
+    studio.until(f"{at} > {begun + 1.0}")
 
 
 @pytest.mark.slow
@@ -19,7 +19,7 @@ def test_somebody_is_steered_live_and_all_of_it_is_kept(studio: Studio):
     page = studio.page
     before = studio.project()
     studio.key("j")
-    page.wait_for_function("document.querySelector('#live small')?.textContent > '0.3'")
+    studio.until("document.querySelector('#live small')?.textContent > '0.3'")
     page.keyboard.down("w")
     done(studio, "walk")
     page.keyboard.up("w")
@@ -31,7 +31,7 @@ def test_somebody_is_steered_live_and_all_of_it_is_kept(studio: Studio):
     done(studio, "jumps")
     studio.key("r")
     page.wait_for_selector("#live", state="hidden")
-    page.wait_for_function("document.querySelector('#inspector .take small')?.textContent === 'live'")
+    studio.until("document.querySelector('#inspector .take small')?.textContent === 'live'")
     project = studio.project()
     words = [one["text"] for one in project["segments"]]
     assert any("walk" in one for one in words)
@@ -54,7 +54,7 @@ AWAY, RIGHT = np.array([-2.5, -3.5]) / np.hypot(2.5, 3.5), np.array([3.5, -2.5])
 def shown(studio: Studio, seconds: float) -> None:
     """Wait until so many seconds more were shown."""
     at = "Number.parseFloat(document.querySelector('#live small').textContent)"
-    studio.page.wait_for_function(f"{at} > {studio.page.evaluate(at) + seconds}")
+    studio.until(f"{at} > {studio.page.evaluate(at) + seconds}")
 
 
 @pytest.mark.slow
@@ -63,7 +63,7 @@ def test_the_stick_of_a_gamepad_steers(studio: Studio):
     studio.load()  # the camera is where it begins
     page.evaluate(PAD)
     studio.key("j")
-    page.wait_for_function("document.querySelector('#live small')?.textContent > '0.3'")
+    studio.until("document.querySelector('#live small')?.textContent > '0.3'")
     shown(studio, 1.5)
     page.evaluate("PAD.axes = [0, -0.8]")
     done(studio, "walk")
@@ -72,7 +72,7 @@ def test_the_stick_of_a_gamepad_steers(studio: Studio):
     shown(studio, 4.0)
     page.evaluate("PAD.axes = [0, 0]")
     studio.key("r")
-    page.wait_for_function("document.querySelector('#inspector .take small')?.textContent === 'live'")
+    studio.until("document.querySelector('#inspector .take small')?.textContent === 'live'")
     pelvis = studio.motion()[0][:, 0, [0, 2]]
     way = np.diff(pelvis, axis=0) * 20  # metres per second
     assert np.linalg.norm(way[:20], axis=-1).mean() < 0.4, "a stick that nobody holds steers nobody"

@@ -85,7 +85,7 @@ def test_the_ruler_scrubs_and_space_plays(studio: Studio):
     studio.page.mouse.click(box["x"] + 84, box["y"] + 10)
     assert studio.page.locator(".clock").inner_text().startswith("1.00")
     studio.key("Space")
-    studio.page.wait_for_function("!document.querySelector('.clock').textContent.startsWith('1.00')")
+    studio.until("!document.querySelector('.clock').textContent.startsWith('1.00')")
 
 
 @pytest.mark.parametrize("scheme", ["dark", "light"])

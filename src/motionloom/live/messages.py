@@ -76,7 +76,7 @@ def skeleton(said: Any) -> Skeleton:
         raise MotionloomError("the names of a skeleton are words and its parents whole numbers, -1 for the root")
     try:
         places = np.array(offsets, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):  # whole numbers may have any number of digits
         places = np.empty(0)
     if places.shape != (len(names), 3) or not (np.isfinite(places).all() and np.abs(places).max(initial=0) < 1e4):
         raise MotionloomError(f"the offsets of a skeleton of {len(names)} joints are as many lists of 3 numbers")

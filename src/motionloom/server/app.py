@@ -14,7 +14,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.requests import Request
-from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route
 
 from motionloom.errors import MotionloomError
@@ -23,6 +23,7 @@ from motionloom.retarget.named import NAMED
 from motionloom.server import asking
 from motionloom.server import page as built
 from motionloom.server.bodies import body_of, file_of
+from motionloom.server.components import FORMATS
 from motionloom.server.guard import Door, Guard
 from motionloom.server.limits import Limits
 from motionloom.server.mmcp.routes import capabilities_of
@@ -33,11 +34,9 @@ from motionloom.server.project import Project, Stored
 from motionloom.server.refusal import Refusal, full_disk
 from motionloom.server.saved import Saved
 from motionloom.server.saved import routes as project_routes
-from motionloom.server.streaming import events
+from motionloom.server.streaming import EventStream, Streams
 from motionloom.server.worker import Worker
 from motionloom.skeleton import SMPL22
-
-FORMATS = ("bvh", "glb", "npz", "mp4", "png")
 
 
 @dataclass(eq=False)
@@ -47,15 +46,15 @@ class Studio:
     project: Project
     worker: Worker
     limits: Limits
-    streams: int = 0
-    """Event streams that are open."""
     saved: Saved = field(init=False)
     """The project's JSON."""
+    streams: Streams = field(init=False)
     files: asyncio.Semaphore = field(init=False)
     """Held while a file is read or made: few at a time, and nobody else's answers wait for a thread."""
 
     def __post_init__(self) -> None:
         self.saved = Saved(self.project)
+        self.streams = Streams(self.limits.streams)
         self.files = asyncio.Semaphore(self.limits.exports)
 
 
@@ -70,7 +69,7 @@ def build(project: Project, worker: Worker, door: Door, *, more: Sequence[BaseRo
         worker.stop()
 
     app = Starlette(
-        routes=[*more, *routes()], lifespan=lifespan, middleware=[Middleware(Guard, door=door)],
+        routes=[*more, *routes()], lifespan=lifespan, middleware=[Middleware(Guard, door=door, limits=studio.limits)],
         exception_handlers={
             Refusal: _refused, MotionloomError: _mistaken, OSError: _unwritten, HTTPException: _no_route,
             Exception: _failed,
@@ -169,19 +168,7 @@ async def job_events(request: Request) -> Response:
     last = request.headers.get("last-event-id") or request.query_params.get("after") or "0"
     if not (last.isascii() and last.isdecimal() and len(last) < 12):
         raise Refusal(400, "Last-Event-ID is the number of an event of this job")
-    if studio.streams >= studio.limits.streams:
-        raise Refusal(503, f"{studio.limits.streams} event streams are open already; close some")
-
-    async def counted() -> AsyncIterator[bytes]:
-        studio.streams += 1
-        try:
-            async for one in events(found, int(last)):
-                yield one
-        finally:
-            studio.streams -= 1
-
-    headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
-    return StreamingResponse(counted(), media_type="text/event-stream", headers=headers)
+    return EventStream(found, int(last), studio.streams)
 
 
 # Motions and characters
@@ -267,7 +254,7 @@ async def timeline_to_yaml(request: Request) -> Response:
     value = parse_json(await body_of(request, studio.limits.body_bytes), "the body")
     text = asking.timeline_yaml(value)
     await run_in_threadpool(asking.read_timeline_text, text, studio.project, studio.limits)
-    return PlainTextResponse(text, media_type="application/yaml")
+    return PlainTextResponse(text, media_type="text/yaml")
 
 
 async def timeline_to_json(request: Request) -> Response:

@@ -97,7 +97,7 @@ class _Reader:
 
     def request(self, task: str) -> Request:
         options = {
-            "prompt": self.prompt(), "seconds": self.number("seconds", 0.0, self.limits.total_seconds),
+            "prompt": self.prompt(), "seconds": self.seconds(task),
             "as_one": self.flag("as_one"), "keep": self.words("keep"), "redraw": self.spans(),
             "loop": self.flag("loop"), "blend": self.number("blend", 0.0, 60.0),
             "extend": self.number("extend", 0.0, self.limits.seconds), "strength": self.number("strength", 0.0, 1.0),
@@ -119,7 +119,7 @@ class _Reader:
         self.needs("prompt")
         timeline = None
         seconds = options["seconds"]
-        options["seconds"] = self.length(SECONDS if seconds is None else seconds)
+        options["seconds"] = SECONDS if seconds is None else seconds
         if not options["as_one"] and options["seconds"] >= 0.2:
             found = timeline_of(options["prompt"], seconds)
             timeline = found if len(found.segments) > 1 else None
@@ -147,7 +147,7 @@ class _Reader:
             frames = request.timeline.frames if request.timeline else 0
             return Request(**common, timeline=request.timeline, goal=request.goal, parts=self.parts(frames))
         self.needs("prompt", "goals")
-        options["seconds"] = self.length(SECONDS if options["seconds"] is None else options["seconds"])
+        options["seconds"] = SECONDS if options["seconds"] is None else options["seconds"]
         frames = max(round(options["seconds"] * 20), FEWEST)
         return Request(**common, goal=self.goal(frames), parts=self.parts(frames))
 
@@ -182,7 +182,7 @@ class _Reader:
         if kinds:
             return Request(**common, motion=self.given_people(options))
         self.needs("prompt")
-        options["seconds"] = self.length(DUET_SECONDS if options["seconds"] is None else options["seconds"])
+        options["seconds"] = DUET_SECONDS if options["seconds"] is None else options["seconds"]
         if "goals" not in self.given:
             return Request(**common)
         frames = max(round(options["seconds"] * 20), FEWEST)
@@ -198,7 +198,7 @@ class _Reader:
         elif len(motion.people) != 2:
             raise MotionloomError(f"two people go on from a motion of two; this one has {len(motion.people)}")
         else:
-            options["seconds"] = self.length(ADDED_SECONDS if options["seconds"] is None else options["seconds"])
+            options["seconds"] = ADDED_SECONDS if options["seconds"] is None else options["seconds"]
         return motion
 
     # -- values
@@ -219,6 +219,14 @@ class _Reader:
             self.given[key].fail(f"must be a whole number from {low} to {high}; got {str(value)[:40]}")
         return value
 
+    def seconds(self, task: str) -> float | None:
+        """The length that is asked for; what the network draws at once is shorter than futures and gaps together."""
+        longest = self.limits.total_seconds if task in ("predict", "switch") else self.limits.seconds
+        found = self.number("seconds", 0.0, longest)
+        if found == 0:
+            self.given["seconds"].fail(f"must be more than 0 and at most {longest:g}; got 0")
+        return found
+
     def flag(self, key: str, *, missing: bool = False) -> bool:
         return self.given[key].flag() if key in self.given else missing
 
@@ -232,7 +240,9 @@ class _Reader:
         if "prompt" not in self.given:
             return None
         found = self.given["prompt"].value
-        if not isinstance(found, str) or not found.strip():
+        if not isinstance(found, str):
+            self.given["prompt"].wrong("text")
+        if not found.strip():
             raise MotionloomError("a prompt is empty; say in words what the person does")
         if len(found) > self.limits.prompt:
             raise MotionloomError(f"a prompt has {len(found):,} characters; say it in at most {self.limits.prompt:,}")
@@ -255,11 +265,6 @@ class _Reader:
 
     def facing(self) -> str:
         return self.given["facing"].word(("turned", "kept")) if "facing" in self.given else "turned"
-
-    def length(self, seconds: float) -> float:
-        if not 0 < seconds <= self.limits.seconds:
-            raise MotionloomError(f"a motion takes more than 0 and at most {self.limits.seconds:g} s; got {seconds:g}")
-        return seconds
 
     def together(self, seconds: float, count: int) -> None:
         if not 0 < seconds * count <= self.limits.total_seconds:

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+from motionloom.server.limits import Limits
+
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 OPEN = ("/health",)
 """Paths that need no token, beside those of the page's own files."""
@@ -34,7 +36,7 @@ class Door:
 
     def problem(self, scope: dict[str, Any]) -> tuple[int, str] | None:
         """Status and sentence for a request that is not let in."""
-        headers = {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]}
+        headers = _headers(scope)
         host = headers.get("host", "")
         if not self._known(host):
             return 403, (
@@ -46,7 +48,7 @@ class Door:
             return 403, f"pages of {origin[:80]!r} may not ask this server; start it with --allow-origin to let them"
         if origin is None and headers.get("sec-fetch-site") == "cross-site" and scope["path"] not in ("/", "/docs"):
             return 403, "a page of another site asked for this, and is not answered"
-        if self.token is not None and not self._open(scope) and not self._right(headers, scope):
+        if not self._open(scope) and not self.holds_token(scope):
             return 401, "this server wants its token: 'Authorization: Bearer TOKEN', or ?token=TOKEN"
         return None
 
@@ -63,39 +65,62 @@ class Door:
         path, method = scope["path"], scope.get("method", "")
         return method in ("GET", "HEAD") and (path in OPEN or path in self.page)
 
-    def _right(self, headers: dict[str, str], scope: dict[str, Any]) -> bool:
-        given = headers.get("authorization", "").removeprefix("Bearer ").strip()
+    def holds_token(self, scope: dict[str, Any]) -> bool:
+        """Whether a request comes with the token; where there is none, everybody has it."""
+        if self.token is None:
+            return True
+        given = _headers(scope).get("authorization", "").removeprefix("Bearer ").strip()
         if not given:
             given = parse_qs(scope.get("query_string", b"").decode("latin-1")).get("token", [""])[0]
-        return hmac.compare_digest(given.encode(), (self.token or "").encode())
+        return hmac.compare_digest(given.encode(), self.token.encode())
+
+
+def _headers(scope: dict[str, Any]) -> dict[str, str]:
+    return {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]}
 
 
 class Guard:
-    """Answers for the application where `Door` finds a problem."""
+    """Answers for the application where `Door` finds a problem, and where too much is being answered already."""
 
-    def __init__(self, app: Any, door: Door) -> None:
-        self.app, self.door = app, door
+    def __init__(self, app: Any, door: Door, limits: Limits) -> None:
+        self.app, self.door, self.limits = app, door, limits
+        self._answering = {True: 0, False: 0}
+        """Requests that are being answered, of who holds the token and of who does not."""
 
     async def __call__(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
         if scope["type"] not in ("http", "websocket"):
             return await self.app(scope, receive, send)
-        problem = self.door.problem(scope)
+        holds = self.door.holds_token(scope)
+        problem = self.door.problem(scope) or self._full(holds)
         if problem is None:
-            return await self.app(scope, receive, send)
+            self._answering[holds] += 1
+            try:
+                return await self.app(scope, receive, send)
+            finally:
+                self._answering[holds] -= 1
         if scope["type"] == "websocket":
             await receive()
             return await send({"type": "websocket.close", "code": 1008, "reason": problem[1][:120]})
         body = json.dumps({"error": _in_envelope(scope["path"], *problem)}).encode()
         headers = [(b"content-type", b"application/json"), (b"connection", b"close")]
+        if problem[0] == 503:
+            headers.append((b"retry-after", b"2"))
         await send({"type": "http.response.start", "status": problem[0], "headers": headers})
         await send({"type": "http.response.body", "body": body})
+
+    def _full(self, holds: bool) -> tuple[int, str] | None:
+        most = self.limits.connections
+        if sum(self._answering.values()) < most and (holds or self._answering[False] < most - self.limits.reserve):
+            return None
+        return 503, "this server answers as many requests as it can already; try again in a moment"
 
 
 def _in_envelope(path: str, status: int, sentence: str) -> Any:
     """The sentence, or MMCP's envelope of it where MMCP was asked."""
     if path != "/generate" and not path.startswith("/mmcp"):
         return sentence
-    return {"code": "unauthorized" if status == 401 else "forbidden", "message": sentence, "details": {}}
+    code = {401: "unauthorized", 503: "resource_exhausted"}.get(status, "forbidden")
+    return {"code": code, "message": sentence, "details": {}}
 
 
 def is_loopback(host: str) -> bool:

@@ -1,11 +1,15 @@
 """Jobs: what was asked, how far it is, what came of it, and the log that event streams are read from.
 
-A `Job` is written by the worker's thread and read by the server's; what changes lies behind its lock. Nobody waits for
-readers: a stream that is slow finds fewer levels in the log, never a longer one.
+A `Job` is written by the worker's thread and read by the server's; what changes lies behind its lock. An event is
+written out once, by the thread in which it happens, and every stream sends the same bytes. Nobody waits for readers: a
+stream that is slow finds fewer levels in the log, never a longer one, and holds one event at a time.
 """
 
+import base64
+import json
 import secrets
 import threading
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -26,9 +30,8 @@ class Event:
     """Rises within a job; the ``id`` of server-sent events."""
     kind: str
     """``progress``, ``level``, or one of `FINAL`."""
-    data: dict[str, Any]
-    poses: np.ndarray | None = None
-    """Of a level: (people, frames, 22, 3) float32 metres."""
+    text: bytes
+    """As it is sent."""
 
 
 @dataclass(eq=False)
@@ -38,7 +41,7 @@ class Job:
     request: Request
     client: str
     most_bytes: int
-    """Of poses in the log."""
+    """Of levels in the log."""
     id: str = field(default_factory=lambda: secrets.token_hex(8))
     state: str = "queued"
     done: int = 0
@@ -81,16 +84,19 @@ class Job:
         """So many network calls of so many are made."""
         with self._lock:
             self.done, self.of = done, of
-            self._progress = self._event("progress", {"done": done, "of": of})
+            self._progress = self._event("progress", json.dumps({"done": done, "of": of}))
         self._tell()
 
     def level(self, level: int, of: int, row: int, poses: np.ndarray, begin: float = 0.0) -> None:
         """What the network predicts for a motion: poses (people, frames, 22, 3) from its second ``begin`` on."""
         people, frames = poses.shape[:2]
         about = {"level": level, "of": of, "row": row, "people": people, "frames": frames, "begin": round(begin, 4)}
+        about["positions"] = base64.b64encode(poses.astype("<f4").tobytes()).decode()
+        data = json.dumps(about)  # before the lock: streams wait for that
         with self._lock:
-            self._levels.append(self._event("level", about, poses.astype("<f4")))
-            self.log_bytes += people * frames * 22 * 12
+            event = self._event("level", data)
+            self._levels.append(event)
+            self.log_bytes += len(event.text)
             while self.log_bytes > self.most_bytes and self._levels:
                 self._drop()
         self._tell()
@@ -107,22 +113,19 @@ class Job:
             if self.finished:
                 return False
             self.state, self.error = state, error
-            self._final = self._event(state, {})
+            self._final = self._event(state, json.dumps(self.public()))
         self._tell()
         return True
 
     # -- what streams read
 
-    def events_after(self, number: int) -> list[Event]:
-        """What is in the log behind an event's number: levels, the latest progress, the end."""
+    def event_after(self, number: int) -> Event | None:
+        """The first event in the log behind an event's number: a level, the latest progress, or the end."""
         with self._lock:
-            kept = [*self._levels, *(event for event in (self._progress, self._final) if event is not None)]
-            return sorted((event for event in kept if event.number > number), key=lambda event: event.number)
-
-    def holds(self, event: Event) -> bool:
-        """Whether a level is still in the log."""
-        with self._lock:
-            return bool(self._levels) and self._levels[0].number <= event.number
+            at = bisect_right(self._levels, number, key=lambda event: event.number)
+            level = self._levels[at] if at < len(self._levels) else None
+            found = (event for event in (level, self._progress, self._final) if event and event.number > number)
+            return min(found, key=lambda event: event.number, default=None)
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Call ``listener``, in any thread, whenever something happens; gives what ends that."""
@@ -140,18 +143,18 @@ class Job:
         stop()
 
     def forget_levels(self) -> None:
-        """Drop the poses of the log."""
+        """Drop the levels of the log."""
         with self._lock:
             self._levels.clear()
             self.log_bytes = 0
 
     def _drop(self) -> None:
-        event = self._levels.popleft()
-        self.log_bytes -= event.poses.nbytes if event.poses is not None else 0
+        self.log_bytes -= len(self._levels.popleft().text)
 
-    def _event(self, kind: str, data: dict[str, Any], poses: np.ndarray | None = None) -> Event:
+    def _event(self, kind: str, data: str) -> Event:
         self._number += 1
-        return Event(self._number, kind, data, poses)
+        text = f"id: {self._number}\nevent: {kind}\ndata: {data}\n\n"
+        return Event(self._number, kind, text.encode())
 
     def _tell(self) -> None:
         with self._lock:

@@ -45,6 +45,14 @@ class Limits:
     """People of one file that is sent."""
     body_seconds: float = 60.0
     """In which a body must have arrived."""
+    connections: int = 512
+    """Requests that are answered at the same time, and connections beyond which those go that have waited longest."""
+    reserve: int = 128
+    """Of these requests, those left for who holds the token."""
+    header_seconds: float = 10.0
+    """In which the headers of a request must have arrived."""
+    stuck_seconds: float = 60.0
+    """After which a client that takes nothing of its answer is gone."""
     exports: int = 2
     """Files that are made at the same time."""
 

@@ -1,6 +1,7 @@
 """What the server answers, as an OpenAPI document and as a plain page made from it; both work without a network.
 
-`tests/server/test_documents.py` holds it to the routes that there are.
+`tests/server/test_documents.py` holds it to the routes that there are, `tests/server/test_client.py` makes a client of
+it.
 """
 
 import html
@@ -8,169 +9,157 @@ import json
 from importlib.metadata import version
 from typing import Any
 
-from motionloom.server.asking import COMMON, KEYS, TASKS
+from motionloom.server.components import ANYTHING, FILE, ID, TEXT, WHOLE, components, ref
 from motionloom.server.limits import Limits
 
-_TEXT, _FLAG = {"type": "string"}, {"type": "boolean"}
-_ID = {"type": "string", "pattern": "^[0-9a-f]{16}$"}
+STYLE = "body{font:16px sans-serif;max-width:50em;margin:2em auto;padding:0 1em}pre{overflow:auto}h2{font-size:1em}"
+"""Of the plain page; `policy` lets it in by its hash."""
+BYTES, JSON = "application/octet-stream", "application/json"
 
 
-def _number(**more: Any) -> dict[str, Any]:
-    return {"type": "number", **more}
-
-
-def _list(items: dict[str, Any], **more: Any) -> dict[str, Any]:
-    return {"type": "array", "items": items, **more}
-
-
-def _properties(limits: Limits) -> dict[str, dict[str, Any]]:
-    """Every key that a job may have."""
-    whole = {"type": "integer", "minimum": 0}
-    return {
-        "task": {"enum": list(TASKS)},
-        "seed": whole | {"default": 0, "description": "motion i is drawn from seed + i (predict, duet: from both)"},
-        "count": {"type": "integer", "minimum": 1, "maximum": limits.count, "default": 1},
-        "steps": {"type": "integer", "minimum": 1, "maximum": limits.steps, "description": "network calls a motion"},
-        "guidance": _number(minimum=-100, maximum=100, description="strength of the text"),
-        "levels": {
-            "oneOf": [_FLAG, {"type": "integer", "minimum": 1, "maximum": limits.steps}], "default": True,
-            "description": "send the poses as events after every network call, or after every so many",
-        },
-        "prompt": _TEXT | {"maxLength": limits.prompt, "description": "what the person does; two people: 'A :: B'"},
-        "seconds": _number(exclusiveMinimum=0, description="length; of predict and switch what is drawn"),
-        "as_one": _FLAG | {"description": "do not part 'A, then B' into actions that follow each other"},
-        "timeline": {"type": "object", "description": "what a timeline's YAML file holds (docs/compose.md)"},
-        "goals": {"type": "object", "description": "what a goal file holds (docs/control.md)"},
-        "motion": _ID, "to": _ID | {"description": "the motion that is switched to"},
-        "person": whole | {"maximum": limits.people - 1, "description": "who is edited, or has the goals"},
-        "redraw": _list(_list(_number(), minItems=2, maxItems=2), description="stretches, in seconds, drawn anew"),
-        "keep": _list(_TEXT, description="joints and groups that stay"),
-        "loop": _FLAG, "blend": _number(), "extend": _number(),
-        "strength": _number(exclusiveMinimum=0, maximum=1),
-        "start": _number(description="use the motion from this second on"), "end": _number(),
-        "temperature": _number(minimum=0, maximum=2), "facing": {"enum": ["turned", "kept"]},
-        "past": _ID | {"description": "a motion of two people that both go on from"},
-        "react_to": _ID | {"description": "a motion of the first person, whom the second answers"},
-        "together": _number(minimum=0, maximum=1),
-    }  # fmt: skip
-
-
-def _job_schema(limits: Limits) -> dict[str, Any]:
-    known = _properties(limits)
-    return {
-        "oneOf": [
-            {
-                "title": task, "type": "object", "required": ["task"], "additionalProperties": False,
-                "properties": {key: known[key] for key in (*COMMON, *keys)} | {"task": {"const": task}},
-            }
-            for task, keys in KEYS.items()
-        ]
-    }  # fmt: skip
-
-
-_RESULT = {
-    "type": "object",
-    "properties": {
-        "id": _ID, "number": {"type": "integer"}, "seed": {"type": "integer"}, "seconds": _number(),
-        "frames": {"type": "integer"}, "people": {"type": "integer"}, "measures": {"type": "object"},
-    },
-}  # fmt: skip
-_JOB = {
-    "type": "object",
-    "properties": {
-        "id": _ID, "task": {"enum": list(TASKS)}, "error": {"type": ["string", "null"]},
-        "state": {"enum": ["queued", "running", "done", "failed", "cancelled"]},
-        "progress": _number(minimum=0, maximum=1), "results": _list(_RESULT),
-    },
-}  # fmt: skip
-_OBJECT: dict[str, Any] = {"type": "object"}
-_FILE = {"type": "string", "format": "binary"}
-
-
-def _asked(schema: dict[str, Any], kind: str = "application/json") -> dict[str, Any]:
+def _asked(schema: dict[str, Any], kind: str = JSON) -> dict[str, Any]:
     return {"requestBody": {"required": True, "content": {kind: {"schema": schema}}}}
 
 
-def _answered(
-    text: str, schema: dict[str, Any], *, status: int = 200, kind: str = "application/json"
+def _answered(text: str, schema: dict[str, Any], *, status: int = 200, kind: str = JSON) -> dict[str, Any]:
+    right = {"description": text, "content": {kind: {"schema": schema}}}
+    wrong = {"description": "one sentence", "content": {JSON: {"schema": ref("Error")}}}
+    return {"responses": {str(status): right, "default": wrong}}
+
+
+def _with(name: str, text: str, schema: dict[str, Any] = TEXT, *, place: str = "query") -> dict[str, Any]:
+    return {"name": name, "in": place, "required": place == "path", "description": text, "schema": schema}
+
+
+def _paths() -> dict[str, dict[str, dict[str, Any]]]:
+    """Path to method to operation; its operationId is what a client calls it."""
+    return _about_jobs() | _about_motions() | _about_the_rest()
+
+
+def _operation(
+    name: str, summary: str, *parts: dict[str, Any], parameters: tuple[dict[str, Any], ...] = ()
 ) -> dict[str, Any]:
-    wrong = {
-        "description": "one sentence",
-        "content": {"application/json": {"schema": {"$ref": "#/components/schemas/error"}}},
-    }
-    return {"responses": {str(status): {"description": text, "content": {kind: {"schema": schema}}}, "default": wrong}}
+    found: dict[str, Any] = {"operationId": name, "summary": summary, "parameters": list(parameters)}
+    for part in parts:
+        found |= part
+    return found
 
 
-def _query(name: str, text: str) -> dict[str, Any]:
-    return {"name": name, "in": "query", "description": text, "schema": _TEXT}
-
-
-def _paths() -> dict[str, Any]:
-    """Path to method to operation: (summary, what more)."""
-    name, asf = _query("name", "the file's name; only its ending counts"), _query("asf", "id of the ASF of an AMC")
-    upload = _asked(_FILE, "application/octet-stream")
-    options = [
-        _query("skeleton", "smpl22, mixamo, unreal, vrm, rigify or a character's id"),
-        _query("person", "0, 1, ..."),
-    ]
-    after = {"name": "Last-Event-ID", "in": "header", "schema": _TEXT, "description": "go on behind this event"}
-    events = _answered("progress, level, then done, failed or cancelled", _TEXT, kind="text/event-stream")
-    timeline = _asked({"type": "object"})
-    found: dict[str, dict[str, tuple[str, dict[str, Any]]]] = {
-        "/health": {"get": ("Whether the server is there, and warm", _answered("ok, version, warm", _OBJECT))},
-        "/capabilities": {"get": ("Joints, tasks, limits, formats", _answered("what there is", _OBJECT))},
-        "/jobs": {"post": ("Ask for motion", _asked({"$ref": "#/components/schemas/request"})
-                           | _answered("the job's id", {"type": "object", "properties": {"id": _ID}}, status=202))},
-        "/jobs/{id}": {
-            "get": ("How far a job is", _answered("the job", {"$ref": "#/components/schemas/job"})),
-            "delete": ("Cancel a job", _answered("the job", {"$ref": "#/components/schemas/job"})),
-        },
-        "/jobs/{id}/events": {"get": ("What happens to a job, and every pose on the way",
-                                      {"parameters": [after, _query("after", "the same")]} | events)},
-        "/motions": {"post": ("Send a BVH, AMC, ASF, GLB, VRM or NPZ file",
-                              {"parameters": [name, asf]} | upload | _answered("its id", _OBJECT, status=201))},
-        "/motions/{id}": {"get": ("Places, rotations and root, as base64 of little-endian float32",
-                                  _answered("the motion", _OBJECT))},
-        "/motions/{id}.{format}": {"get": ("A motion as bvh, glb, npz, mp4 or png",
-                                           {"parameters": options} | _answered("the file", _FILE, kind="*/*"))},
-        "/characters": {"post": ("Send a GLB, VRM, glTF or BVH character",
-                                 {"parameters": [name]} | upload | _answered("id, joints", _OBJECT, status=201))},
-        "/characters/{id}": {"get": ("The character's file", _answered("the file", _FILE, kind="*/*"))},
-        "/generate": {"post": ("What an MMCP request asks, with the extra mmcp; /mmcp/docs describes it",
-                               _asked(_OBJECT) | _answered("glTF", _OBJECT, kind="model/gltf+json"))},
-        "/project": {
-            "get": ("The project as it was saved last", _answered("any JSON; null before the first", {})),
-            "put": ("Save the project; 409 where its id and revision are not those of what is there",
-                    {"parameters": [_query("over", "ID.REVISION of what it may replace all the same")]}
-                    | _asked({}) | _answered("saved, id, revision", _OBJECT)),
-        },
-        "/project/stamp": {"get": ("Id and revision of what was saved last", _answered("null before the first", {}))},
-        "/project/aside": {"post": ("Give what was saved another name in the folder", _answered("kept", _OBJECT))},
-        "/timeline.yaml": {"post": ("A timeline's JSON to its YAML",
-                                    timeline | _answered("YAML", _TEXT, kind="application/yaml"))},
-        "/timeline.json": {"post": ("A timeline's YAML to its JSON",
-                                    _asked(_TEXT, "application/yaml") | _answered("JSON", _OBJECT))},
-    }  # fmt: skip
-    return {path: _operations(path, methods) for path, methods in found.items()}
-
-
-def _operations(path: str, methods: dict[str, tuple[str, dict[str, Any]]]) -> dict[str, Any]:
-    named = [word[1:].split("}")[0] for word in path.replace(".", "/").split("/") if word.startswith("{")]
-    inside = [{"name": word, "in": "path", "required": True, "schema": _TEXT} for word in named]
+def _about_jobs() -> dict[str, dict[str, dict[str, Any]]]:
+    one = _with("id", "of the job", ID, place="path")
+    made = _answered("the job's id", ref("NewJob"), status=202)
+    found = _answered("the job", ref("Job"))
+    after = (
+        _with("Last-Event-ID", "go on behind this event", WHOLE, place="header"),
+        _with("after", "the same", WHOLE),
+    )
+    events = _answered("progress, level, then done, failed or cancelled", TEXT, kind="text/event-stream")
     return {
-        method: {"summary": text, **more, "parameters": [*inside, *more.get("parameters", ())]}
-        for method, (text, more) in methods.items()
+        "/jobs": {"post": _operation("create_job", "Ask for motion", _asked(ref("JobRequest")), made)},
+        "/jobs/{id}": {
+            "get": _operation("get_job", "How far a job is", found, parameters=(one,)),
+            "delete": _operation("cancel_job", "Cancel a job", found, parameters=(one,)),
+        },
+        "/jobs/{id}/events": {
+            "get": _operation(
+                "follow_job", "What happens to a job, and every pose on the way", events, parameters=(one, *after)
+            )
+        },
+    }
+
+
+def _about_motions() -> dict[str, dict[str, dict[str, Any]]]:
+    name, asf = _with("name", "the file's name; only its ending counts"), _with("asf", "id of the ASF of an AMC", ID)
+    required = name | {"required": True}
+    one, character = _with("id", "of the motion", ID, place="path"), _with("id", "of the character", ID, place="path")
+    kind = _with("format", "of the file", ref("MotionFormat"), place="path")
+    options = (
+        _with("skeleton", "smpl22, mixamo, unreal, vrm, rigify or a character's id"),
+        _with("person", "0, 1, ...", WHOLE),
+    )
+    file, body = _answered("the file; its own media type is in the answer", FILE, kind=BYTES), _asked(FILE, BYTES)
+    motion, sent = _answered("the motion", ref("Motion")), _answered("its id", ref("SentMotion"), status=201)
+    known = _answered("id, joints; of an .asf without them", ref("SentCharacter"), status=201)
+    return {
+        "/motions": {
+            "post": _operation(
+                "upload_motion", "Send a BVH, AMC, ASF, GLB, VRM or NPZ file", body, sent, parameters=(required, asf)
+            )
+        },
+        "/motions/{id}": {
+            "get": _operation(
+                "get_motion", "Places, rotations and root, as base64 of little-endian float32", motion,
+                parameters=(one,),
+            )
+        },
+        "/motions/{id}.{format}": {
+            "get": _operation(
+                "export_motion", "A motion as bvh, glb, npz, mp4 or png", file, parameters=(one, kind, *options)
+            )
+        },
+        "/characters": {
+            "post": _operation(
+                "upload_character", "Send a GLB, VRM, glTF or BVH character", body, known, parameters=(required,)
+            )
+        },
+        "/characters/{id}": {
+            "get": _operation("get_character", "The character's file", file, parameters=(character,))
+        },
+    }  # fmt: skip
+
+
+def _about_the_rest() -> dict[str, dict[str, dict[str, Any]]]:
+    health, known = _answered("ok, version, warm", ref("Health")), _answered("what there is", ref("Capabilities"))
+    project = _answered("any JSON; null before the first", ANYTHING)
+    aside = _answered("the name it has now", ANYTHING)
+    saved, gltf = _answered("saved", ref("Saved")), _answered("glTF", ref("Gltf"), kind="model/gltf+json")
+    text, timeline = _answered("YAML", TEXT, kind="text/yaml"), _answered("JSON", ref("Timeline"))
+    return {
+        "/health": {"get": _operation("get_health", "Whether the server is there, and warm", health)},
+        "/capabilities": {"get": _operation("get_capabilities", "Joints, tasks, limits, formats", known)},
+        "/generate": {
+            "post": _operation(
+                "generate_mmcp", "What an MMCP request asks, with the extra mmcp", _asked(ref("MmcpRequest")), gltf
+            )
+        },
+        "/project": {
+            "get": _operation("get_project", "The project as it was saved last", project),
+            "put": _operation(
+                "save_project",
+                "Save the project; 409 where its id and revision are not those of what is there",
+                _asked(ANYTHING),
+                saved,
+                parameters=(_with("over", "ID.REVISION of what it may replace all the same"),),
+            ),
+        },
+        "/project/stamp": {
+            "get": _operation("get_project_stamp", "Id and revision of what was saved last; null before it", project)
+        },
+        "/project/aside": {
+            "post": _operation("set_project_aside", "Give what was saved another name in the folder", aside)
+        },
+        "/timeline.yaml": {
+            "post": _operation("timeline_to_yaml", "A timeline's JSON to its YAML", _asked(ref("Timeline")), text)
+        },
+        "/timeline.json": {
+            "post": _operation(
+                "timeline_to_json", "A timeline's YAML, in UTF-8, to its JSON", _asked(FILE, BYTES), timeline
+            )
+        },
     }
 
 
 def document(limits: Limits) -> dict[str, Any]:
     """The OpenAPI document of a server with these limits."""
-    error = {"type": "object", "properties": {"error": _TEXT}}
     return {
         "openapi": "3.1.0",
         "info": {"title": "motionloom", "version": version("motionloom"), "description": "See docs/server.md."},
         "paths": _paths(),
-        "components": {"schemas": {"request": _job_schema(limits), "job": _JOB, "error": error}},
+        "components": {
+            "schemas": components(limits),
+            "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
+        },
+        "security": [{}, {"token": []}],
     }
 
 
@@ -183,9 +172,8 @@ def as_page(found: dict[str, Any]) -> str:
         for method, about in methods.items()
     ]
     schemas = html.escape(json.dumps(found["components"]["schemas"], indent=1))
-    style = "body{font:16px sans-serif;max-width:50em;margin:2em auto;padding:0 1em}pre{overflow:auto}h2{font-size:1em}"
     return (
-        f"<!doctype html><html lang=en><meta charset=utf-8><title>motionloom: the server</title><style>{style}</style>"
+        f"<!doctype html><html lang=en><meta charset=utf-8><title>motionloom: the server</title><style>{STYLE}</style>"
         f"<h1>motionloom {html.escape(found['info']['version'])}</h1><p>The same as JSON: "
         f"<a href=openapi.json>openapi.json</a></p>{''.join(rows)}<h2>Schemas</h2><pre>{schemas}</pre></html>"
     )

@@ -109,7 +109,8 @@ class Project:
     def without_paths(self, sentence: str) -> str:
         """A sentence of the library with the server's folders taken out of it."""
         for place in (self.temporary, self.motions, self.characters, self.folder):
-            sentence = sentence.replace(f"{place}{os.sep}", "").replace(str(place), "the project folder")
+            sentence = sentence.replace(f"{place}{os.sep}", "")
+            sentence = re.sub(f"(?:the folder )?{re.escape(str(place))}", "the project folder", sentence)
         return sentence
 
     # -- motions

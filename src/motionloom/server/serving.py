@@ -8,6 +8,7 @@ import threading
 import webbrowser
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,8 +20,10 @@ from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import Applied
 from motionloom.server import page
 from motionloom.server.app import build
+from motionloom.server.connections import Connection
 from motionloom.server.guard import door, is_loopback
 from motionloom.server.limits import Limits
+from motionloom.server.policy import HEADERS
 from motionloom.server.project import Project
 from motionloom.server.refusal import Refusal
 from motionloom.server.worker import Worker
@@ -28,8 +31,6 @@ from motionloom.server.worker import Worker
 if TYPE_CHECKING:
     from motionloom.live.sessions import Sessions
     from motionloom.weights.prior import Prior
-
-CONNECTIONS = 512
 
 
 @dataclass(frozen=True)
@@ -57,10 +58,9 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
         token = secrets.token_urlsafe(24)
     if token is not None and (len(token) < 8 or not token.isascii() or not token.isprintable()):
         raise MotionloomError("a token has at least 8 printable letters or digits; leave --token out to get one made")
-    project = Project(options.project, limits or Limits())
-    worker = Worker(
-        project, limits or Limits(), weights=options.weights, device=options.device, adapters=options.adapters
-    )
+    limits = limits or Limits()
+    project = Project(options.project, limits)
+    worker = Worker(project, limits, weights=options.weights, device=options.device, adapters=options.adapters)
     known = door(options.host, token, hosts=options.hosts, origins=options.origins, page=page.files())
     live = _Live(worker)
     app = build(project, worker, known, more=[WebSocketRoute("/live", live.answer)])
@@ -72,9 +72,16 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
     elif options.show:
         print(f"motionloom: {page.MISSING}", file=sys.stderr, flush=True)
     config = uvicorn.Config(
-        app, log_level="warning", access_log=False, server_header=False, limit_concurrency=CONNECTIONS,
-        timeout_graceful_shutdown=2, ws_max_size=1 << 18, ws_max_queue=16,
-    )  # fmt: skip
+        app,
+        http=partial(Connection, limits=limits, waiting={}),  # type: ignore[arg-type]
+        headers=HEADERS,
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=2,
+        ws_max_size=1 << 18,
+        ws_max_queue=16,
+    )
     try:
         uvicorn.Server(config).run(sockets=[bound])
     finally:

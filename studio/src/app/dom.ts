@@ -18,10 +18,16 @@ function fill(element: Element, props: Props, children: (Child | Child[])[]): El
   for (const [key, value] of Object.entries(props)) {
     if (value === null || value === undefined || value === false) continue;
     if (key.startsWith("on")) (element as unknown as Props)[key.toLowerCase()] = value;
-    else element.setAttribute(key, value === true ? "" : String(value));
+    else attribute(element, key, value === true ? "" : String(value));
   }
   for (const child of children.flat()) if (child || child === "") element.append(child);
   return element;
+}
+
+/** Set an attribute; a style goes through its object, as the server's policy lets no page set one as text. */
+function attribute(element: Element, name: string, value: string): void {
+  if (name === "style") (element as HTMLElement).style.cssText = value;
+  else element.setAttribute(name, value);
 }
 
 const HANDLERS = [
@@ -64,7 +70,7 @@ function take(there: Element, next: Element): void {
     if (!next.hasAttribute(name) && !isOpen) there.removeAttribute(name);
   }
   for (const { name, value } of next.attributes) {
-    if (there.getAttribute(name) !== value) there.setAttribute(name, value);
+    if (there.getAttribute(name) !== value) attribute(there, name, value);
   }
   const [mine, its] = [there as unknown as Props, next as unknown as Props];
   for (const name of HANDLERS) if (mine[name] !== its[name]) mine[name] = its[name];

@@ -7,6 +7,12 @@ import { keptTake } from "../project/model";
 import { bytes, motionFile } from "../server/api";
 import type { Scene } from "./scene";
 
+/** A character loads nothing from elsewhere: a picture that it names outside of its own file is a white one. */
+const WHITE =
+  "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg==";
+const inside = new THREE.LoadingManager();
+inside.setURLModifier((url) => (/^(blob|data):/.test(url) ? url : WHITE));
+
 interface Actor {
   readonly root: THREE.Object3D;
   readonly mixer: THREE.AnimationMixer;
@@ -60,7 +66,7 @@ export class Character {
 
   private async actor(motion: string, character: string, person: number | undefined): Promise<Actor> {
     const file = await bytes(motionFile(motion, "glb", { skeleton: character, person }));
-    const gltf = await new GLTFLoader().parseAsync(await file.arrayBuffer(), "");
+    const gltf = await new GLTFLoader(inside).parseAsync(await file.arrayBuffer(), "");
     const mixer = new THREE.AnimationMixer(gltf.scene);
     for (const clip of gltf.animations) mixer.clipAction(clip).play();
     gltf.scene.traverse((one) => {

@@ -20,6 +20,7 @@ MODEL = "motionloom"
 CONSTRAINTS = ["root_path", "effector_target", "pose_keyframe", "ground_height"]
 SEGMENTS = ["text", "unconditioned", "pose", "motion_reference"]
 SECONDS = 60.0
+PAGES = ("/docs", "/docs/oauth2-redirect", "/redoc")
 log = logging.getLogger("motionloom.server")
 
 
@@ -99,5 +100,8 @@ async def ended(job: Job) -> None:
 
 
 def application(worker: Worker) -> Any:
-    """The SDK's application over the worker."""
-    return build_app(MotionloomBackbone(worker), title="motionloom, MMCP")
+    """The SDK's application over the worker, without its pages: they load scripts from elsewhere, which
+    the server's policy lets no page do."""
+    app = build_app(MotionloomBackbone(worker), title="motionloom, MMCP")
+    app.router.routes[:] = [one for one in app.router.routes if getattr(one, "path", "") not in PAGES]
+    return app
