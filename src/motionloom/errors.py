@@ -1,4 +1,6 @@
-"""The one exception a user is meant to see."""
+"""The one exception a user is meant to see, and how what it quotes is shown."""
+
+import json
 
 
 class MotionloomError(ValueError):
@@ -21,6 +23,15 @@ def one_line(message: str) -> str:
     if len(message) > LONGEST_MESSAGE:
         half = LONGEST_MESSAGE // 2 - 3
         message = f"{message[:half]} ... {message[-half:]}"
-    if message.isprintable():
-        return message
-    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in message)
+    return _escaped(message)
+
+
+def printable(text: str) -> str:
+    """Text of several lines as a terminal may show it; tabs stay. What is written out is so as in JSON: ``\\u001b``."""
+    return "\n".join(_escaped(line, keep="\t") for line in text.split("\n"))
+
+
+def _escaped(line: str, keep: str = "") -> str:
+    if line.isprintable():
+        return line
+    return "".join(each if each.isprintable() or each in keep else json.dumps(each)[1:-1] for each in line)

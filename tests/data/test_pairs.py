@@ -101,7 +101,7 @@ def test_completion_needs_no_captions_and_text_does(one):
         ("walk: " + "x" * 2000, "at most 1000"),
         ("walk: a\x1b[2Jb", "printable"),
         (b"walk: \xff\xfe", "UTF-8"),
-        ("walk: x\n" * 200_000, "1 MiB"),
+        ("walk: x\n" * 200_000, "files above 1.0 MB"),
     ],
     ids=["empty", "no-mark", "no-words", "stranger", "escape", "long", "control", "binary", "large"],
 )

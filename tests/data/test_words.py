@@ -50,6 +50,8 @@ def test_sides_change_and_nothing_else(text: str, mirrored: str) -> None:
         ("bends down and stretches the arms", "bend down and stretch the arms"),
         ("stands up then waves", "stand up then wave"),
         ("boxes", "box"),
+        ("s", "s"),
+        ("walks and s", "walk and s"),
     ],
 )
 def test_commands_are_bare_verbs(phrase: str, command: str) -> None:
@@ -68,6 +70,8 @@ def test_commands_are_bare_verbs(phrase: str, command: str) -> None:
         ("lies down", "lying down"),
         ("carries a box", "carrying a box"),
         ("begins to walk", "beginning to walk"),
+        ("s", "s"),
+        ("walks, s, and ,", "walking, s, and ,"),
     ],
 )
 def test_gerunds_of_verb_phrases(phrase: str, fragment: str) -> None:

@@ -108,6 +108,13 @@ def test_bones_that_are_not_driven_keep_their_rest(tmp_path: Path) -> None:
     assert 23 not in {channel["target"]["node"] for channel in new["animations"][-1]["channels"]}
 
 
+def test_a_mesh_with_fewer_bind_matrices_than_joints_is_left_out_and_told(tmp_path: Path) -> None:
+    hero = Hero()
+    hero.json["accessors"][hero.json["skins"][0]["inverseBindMatrices"]]["count"] -= 1
+    with pytest.warns(UserWarning, match="1 of its 1 pieces of mesh are left out"):
+        assert load_character(hero.write(tmp_path / "hero.glb")).surfaces(remark=True) == []
+
+
 def test_what_another_clip_moves_has_one_key_at_rest(tmp_path: Path) -> None:
     """Programs that go from clip to clip leave a node where the last clip had it, unless the next one says."""
     hero = Hero().clip("wave", wave())

@@ -1,6 +1,7 @@
 """FBX by way of Blender: how it is found, what is said where it is not, and, where it is, the way out and back."""
 
 import os
+import shlex
 import shutil
 import sys
 from pathlib import Path
@@ -34,7 +35,9 @@ def no_blender(monkeypatch: pytest.MonkeyPatch) -> None:
 def stand_in(folder: Path, body: str) -> Path:
     """A program that is called as Blender is: its last words are the file read, the file made and the rate."""
     script = folder / "stand-in"
-    script.write_text(f"#!{sys.executable}\nimport shutil, sys\nsource, made, fps = sys.argv[-3:]\n{body}\n")
+    program = f"import shutil, sys\nsource, made, fps = sys.argv[-3:]\n{body}\n"
+    words = shlex.join([sys.executable, "-c", program])  # the first line of a script cannot name a path with blanks
+    script.write_text(f'#!/bin/sh\nexec {words} "$@"\n')
     script.chmod(0o755)
     return script
 
@@ -72,6 +75,16 @@ def test_what_blender_gets_is_a_glb_and_its_rate(tmp_path: Path) -> None:
     with blender.using(stand_in(tmp_path, body)):
         out = save(waver(), tmp_path / "out.fbx")
     assert out.read_bytes()[:4] == b"glTF"
+
+
+def test_folders_may_have_blanks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """That of the program, of Python and of the files."""
+    folder = tmp_path / "a folder"
+    folder.mkdir()
+    (folder / "python").symlink_to(sys.executable)
+    monkeypatch.setattr(sys, "executable", str(folder / "python"))
+    with blender.using(stand_in(folder, "shutil.copyfile(source, made)")):
+        assert save(waver(), folder / "out.fbx").read_bytes()[:4] == b"glTF"
 
 
 @pytest.mark.parametrize(

@@ -217,9 +217,49 @@ def test_unknown_suffixes_are_refused_with_the_known_ones(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_device_without_an_end_is_left_at_the_limit():
-    with pytest.raises(MotionloomError, match=r"gives more than 3\.0 MB"):
-        read_bytes("/dev/zero", max_bytes=3_000_000)
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no devices here")
+def test_a_device_is_no_file():
+    for name in ("/dev/zero", "/dev/null"):
+        with pytest.raises(MotionloomError, match="is a device"):
+            read_bytes(name)
+
+
+@pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="no files here that do not say their size")
+def test_a_file_that_says_it_is_empty_is_left_at_the_limit():
+    assert Path("/proc/self/maps").stat().st_size == 0
+    with pytest.raises(MotionloomError, match="gives more than 100 bytes"):
+        read_bytes("/proc/self/maps", max_bytes=100)
+    assert len(read_bytes("/proc/self/maps", max_bytes=10_000_000)) > 1000
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no devices here")
+def test_nothing_is_read_out_of_a_device(tmp_path):
+    """By whoever reads what a user names: motions, maps of joints, weights, jobs, recipes, captions, timelines."""
+    from motionloom.cli import main
+
+    io.save(Motion(SMPL22, 30, np.zeros((2, 3)), np.tile(IDENTITY, (2, 22, 1))), tmp_path / "a.bvh")
+    for suffix in (".bvh", ".glb", ".npz", ".json", ".toml", ".yaml", ".jsonl", ".safetensors", ".svg", ".txt"):
+        (tmp_path / f"zero{suffix}").symlink_to("/dev/zero")
+    zero, out = str(tmp_path / "zero"), str(tmp_path / "out.bvh")
+    for words in (
+        ["export", f"{zero}.bvh", out],
+        ["export", f"{zero}.glb", out],
+        ["export", f"{zero}.npz", out],
+        ["export", str(tmp_path / "a.bvh"), out, "--skeleton", f"{zero}.glb"],
+        ["export", str(tmp_path / "a.bvh"), out, "--skeleton", "smpl", "--source-map", f"{zero}.json"],
+        ["compose", f"{zero}.yaml", "--out", out],
+        ["control", "walk", "--path", f"{zero}.svg", "--out", out],
+        ["control", "walk", "--goal", f"{zero}.json", "--out", out],
+        ["generate", "--from", f"{zero}.txt", "--out", out],
+        ["generate", "walk", "--weights", f"{zero}.safetensors", "--out", out],
+        ["generate", "walk", "--adapter", f"{zero}.safetensors", "--out", out],
+        ["batch", f"{zero}.jsonl", "--out", str(tmp_path / "made")],
+        ["train", "prior", "--recipe", f"{zero}.toml", "--data", str(tmp_path), "--out", str(tmp_path / "run")],
+        ["teach", "a walk", f"{zero}.bvh", "--out", str(tmp_path / "b.safetensors")],
+        ["weights", f"{zero}.safetensors"],
+    ):
+        assert main(words) == 2, words
+    assert not (tmp_path / "out.bvh").exists()
 
 
 def test_a_pipe_is_read_to_its_end():

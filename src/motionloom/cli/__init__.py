@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from motionloom.cli.newcomers import COMMANDS, suggestion, with_command, with_options
+from motionloom.cli.terminal import escaping
 from motionloom.errors import MotionloomError, one_line
 from motionloom.interruption import interruptible, was_interrupted
 
@@ -69,7 +70,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; 0 done, 2 a mistake in what was asked or given, 130 interrupted (also by SIGTERM, SIGHUP)."""
     try:  # from here on: a Ctrl-C while the commands are still being imported is one too
-        with interruptible():
+        with interruptible(), escaping():
             return _told(argv)
     except KeyboardInterrupt:  # while the end was being reported
         return 130

@@ -2,12 +2,14 @@
 
 import argparse
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.cli.reading import as_unit
 from motionloom.cli.sampling import add_adapters, fail
 from motionloom.cli.skeletons import HANDS
+from motionloom.cli.terminal import escaping, unescaped
 
 if TYPE_CHECKING:
     from motionloom.bulk.batch import Where
@@ -269,18 +271,20 @@ class _Progress:
         self.rows, self.there, self.made, self.clock = rows, 0, 0, time.monotonic
         self.began = self.reported = self.clock()
         self.since = 0  # rows made before the clock of the rate began: a worker first loads its weights
-        screen = Console(stderr=True)
+        screen = Console(file=unescaped(sys.stderr))
         columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn())
         self.bar = Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal)
         self.quiet = not screen.is_terminal
         self.task = self.bar.add_task("batch", total=rows, rate="")
+        self.shown = ExitStack()
 
     def __enter__(self) -> "_Progress":
-        self.bar.start()
+        self.shown.enter_context(self.bar)
+        self.shown.enter_context(escaping())  # the bar has put streams of its own in between
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.bar.stop()
+        self.shown.close()
 
     def moved(self, rows: int) -> None:
         """So many rows more were made."""

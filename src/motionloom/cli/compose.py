@@ -203,12 +203,12 @@ def _report(
     if not streams:
         print(f"{len(rows):,} segments, {seconds:.2f} s in all; nothing was made")
     for row in rows[:SHOWN]:
-        print(f"{row['begin']:9.2f}  {_printable(row['text'])}")
+        print(f"{row['begin']:9.2f}  {_shortened(row['text'])}")
     if len(rows) > SHOWN:
         print(f"           ... and {len(rows) - SHOWN:,} more; --json lists all")
 
 
-def _printable(text: str) -> str:
-    """A prompt as one line of the terminal, whatever stands in it."""
-    line = "".join(letter if letter.isprintable() else "?" for letter in " ".join(text.split())[:80])
+def _shortened(text: str) -> str:
+    """A prompt as one line of a table."""
+    line = " ".join(text.split())
     return line if len(line) < 80 else line[:77] + "..."

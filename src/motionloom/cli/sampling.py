@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from motionloom.cli.newcomers import one_sentence, suggestion, with_options
 from motionloom.cli.skeletons import Target, add_skeleton, own_outs, read_target
+from motionloom.cli.terminal import escaping, unescaped
 from motionloom.cli.writing import add_writing, check_rate, check_unit
 
 if TYPE_CHECKING:
@@ -223,6 +224,6 @@ def bar(label: str) -> Iterator[Callable[[int, int], None]]:
     from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    with Progress(console=Console(file=unescaped(sys.stderr)), transient=True) as progress, escaping():
         task = progress.add_task(label, total=None)
         yield lambda done, total: progress.update(task, completed=done, total=total)

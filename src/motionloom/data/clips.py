@@ -11,9 +11,11 @@ from motionloom.data.actions import PREFIX
 from motionloom.data.words import LABELS, check_caption
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import WIDTH
-from motionloom.io.tensors import save_tensors
+from motionloom.io.tensors import check_head, save_tensors
 from motionloom.io.text import plain_json
 
+MAX_BYTES = 256 << 20
+"""Of a clip's file: more than an hour and a half of features."""
 SHORTEST = 20
 """Frames of the shortest stretch that is described."""
 THEN, MADE = "then", "made "
@@ -70,6 +72,7 @@ def write_clip(folder: Path, clip: Clip) -> None:
 def read_clip(path: Path) -> Clip:
     """The inverse of `write_clip`; raises MotionloomError for a damaged file."""
     try:
+        check_head(path, max_bytes=MAX_BYTES)
         with safe_open(path, framework="numpy") as file:
             about = plain_json(file.metadata()["clip"])
             features = file.get_tensor("features")

@@ -20,6 +20,7 @@ from motionloom.features.layout import FPS
 from motionloom.io import READS
 from motionloom.kinematics.physics import Array
 from motionloom.motion import Motion
+from motionloom.reading import read_bytes
 from motionloom.retarget import to_smpl22
 
 MOST_CLIPS = 20
@@ -118,10 +119,8 @@ def _named(line: str) -> tuple[str, str]:
 
 def _lines(path: Path) -> list[str]:
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise MotionloomError(f"{path} is larger than 1 MiB; it takes one short line for each caption")
-        return path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+        return read_bytes(path, max_bytes=MAX_BYTES, empty=True).decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
         raise MotionloomError(f"{path} is not text in UTF-8 ({type(error).__name__}); save it again as text") from None
 
 

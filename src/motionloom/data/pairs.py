@@ -10,6 +10,7 @@ over the mean of both people's legs. Where both have equal legs nothing slides; 
 mean, each one's planted feet slide by about d / 2 of how fast that person travels.
 """
 
+import io
 import re
 from collections.abc import Callable, Iterator
 from csv import DictReader
@@ -28,6 +29,7 @@ from motionloom.io import load
 from motionloom.io.atomic import finished
 from motionloom.io.text import read_utf8
 from motionloom.kinematics.physics import Array
+from motionloom.reading import read_bytes
 from motionloom.skeleton import SMPL22
 
 _MAX_CAPTIONS = 1 << 20
@@ -93,8 +95,8 @@ def read_pack_pairs(folder: Path | str, *, say: Callable[[str], None] = lambda l
     folder = Path(folder)
     manifest = folder / "manifest.csv"
     try:
-        with open(manifest, newline="", encoding="utf-8") as lines:
-            rows = {row["path"]: row for row in DictReader(lines)}
+        lines = io.StringIO(read_utf8(manifest, max_bytes=sources.MAX_MANIFEST, empty=True), newline="")
+        rows = {row["path"]: row for row in DictReader(lines)}
         couples = [
             (row, rows[row["partner"]]) for row in rows.values() if row.get("partner") and row["path"] < row["partner"]
         ]
@@ -186,12 +188,7 @@ def _captions(folder: Path, names: set[str], *, needed: bool) -> dict[str, tuple
                 f"there is no {path}; it says what each pair does, as in '{min(names)}: two people dance'"
             )
         return {}
-    try:
-        if path.stat().st_size > _MAX_CAPTIONS:
-            raise MotionloomError(f"{path} is larger than 1 MiB; it takes one short line for each caption")
-        lines = read_utf8(path, max_bytes=_MAX_CAPTIONS, empty=True).splitlines()
-    except OSError as error:
-        raise MotionloomError(f"{path} cannot be read ({error.strerror}); save it again as text") from None
+    lines = read_utf8(path, max_bytes=_MAX_CAPTIONS, empty=True).splitlines()
     said: dict[str, tuple[str, ...]] = {}
     for number, line in enumerate(lines, start=1):
         if line.strip() and not line.lstrip().startswith("#"):
@@ -224,7 +221,7 @@ def _own_pair(name: str, files: tuple[Path, Path], split: str, captions: tuple[s
     first, second = files
     motions = load(first), load(second)
     label = f"{first} and {second}"
-    if first.stat().st_size == second.stat().st_size and first.read_bytes() == second.read_bytes():
+    if read_bytes(first) == read_bytes(second):
         raise MotionloomError(f"{label} are the same file; a pair needs a recording of each person")
     return Pair(name, split, captions, "own", sources.UNKNOWN_LICENCE, together(*motions, name=label))
 

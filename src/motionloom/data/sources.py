@@ -2,6 +2,7 @@
 
 import csv
 import gzip
+import io
 import re
 import zlib
 from collections.abc import Callable, Iterator, Sequence
@@ -29,6 +30,8 @@ HUMANML3D_LICENCE = "HumanML3D / AMASS: research use under the licences of AMASS
 LATEST = 1e6
 """Seconds: no label of a recording begins later."""
 _MAX_LIST = 64 << 20
+MAX_MANIFEST = 64 << 20
+"""Bytes of a manifest.csv."""
 _MAX_LINE = 1 << 20
 _PACKED = 32
 """How many times its size a packed file of captions may unfold to; text packs to a tenth."""
@@ -108,11 +111,11 @@ def _pack(folder: Path) -> Iterator[Take]:
             written.setdefault(row["clip"], []).append(span)
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise _unusable(captions, error, "mend it") from None
-    with open(manifest, newline="", encoding="utf-8") as lines:
-        try:
-            yield from (_pack_take(folder, row, written) for row in csv.DictReader(lines))
-        except (KeyError, TypeError, ValueError, AttributeError, OverflowError, csv.Error) as error:
-            raise _unusable(manifest, error, "mend it") from None
+    try:
+        lines = io.StringIO(text.read_utf8(manifest, max_bytes=MAX_MANIFEST, empty=True), newline="")
+        yield from (_pack_take(folder, row, written) for row in csv.DictReader(lines))
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, csv.Error) as error:
+        raise _unusable(manifest, error, "mend it") from None
 
 
 def _pack_take(folder: Path, row: dict[str, str], written: dict[str, list[Span]]) -> Take:

@@ -73,7 +73,8 @@ def gerund(verb_phrase: str) -> str:
 def _with_verbs(form: Callable[[str], str], verb_phrase: str) -> str:
     words = verb_phrase.split(" ")
     opens = [True, *(w in ("and", "then") or w.endswith(",") for w in words[:-1])]
-    verbs = [first and w.rstrip(",").endswith("s") and w not in _NO_VERBS for w, first in zip(words, opens)]
+    ends = [len(w.rstrip(",")) > 1 and w.rstrip(",").endswith("s") for w in words]  # a lone s is no verb
+    verbs = [first and end and w not in _NO_VERBS for w, first, end in zip(words, opens, ends)]
     return " ".join(form(w.rstrip(",")) + "," * w.endswith(",") if verb else w for w, verb in zip(words, verbs))
 
 

@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -315,8 +316,7 @@ def frame_rate(seconds: str) -> float | None:
     value = text.number(seconds)
     if value is None or not 1e-6 <= value <= 1e4:
         return None
-    mantissa, _, exponent = seconds.lower().partition("e")
-    digit = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+    digit = 10.0 ** max(int(Decimal(seconds).as_tuple().exponent), -300)  # of an exponent of any number of digits
     for rates, apart in ((_RATES, 0.012), (_BROADCAST, 0.012), ((max(round(1 / value), 1),), 1e-4)):
         near = [r for r in rates if abs(1 / r - value) < digit and abs(r * value - 1) < apart]
         if near:

@@ -166,6 +166,8 @@ def _influences(
     if skin.get("inverseBindMatrices") is not None:
         flat = document.accessor(skin["inverseBindMatrices"], "MAT4", "inverse bind matrices")
         binds = flat.reshape(-1, 4, 4).transpose(0, 2, 1)[: len(listed)]
+        if len(binds) < len(listed):
+            raise document.bad(f"a skin has {len(listed)} joints and {len(binds)} inverse bind matrices")
     moves = np.array([rest.matrix(n) @ bind for n, bind in zip(listed, binds, strict=True)])
     sets = [k for k in range(8) if f"JOINTS_{k}" in attributes]
     which = [document.accessor(attributes[f"JOINTS_{k}"], "VEC4", "the joints of a mesh") for k in sets]

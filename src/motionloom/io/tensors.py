@@ -1,5 +1,7 @@
-"""Safetensors files, written: whole or not at all, with the rights that other files get, one sentence when it fails."""
+"""Safetensors files: written whole or not at all; read after a look at what their heads claim."""
 
+import os
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -12,6 +14,30 @@ from motionloom.io.atomic import atomic_path
 
 if TYPE_CHECKING:
     from torch import Tensor
+
+
+MAX_HEAD = 32 << 20
+"""Bytes of a file's head, which names its tensors and says what it holds."""
+MAX_TENSORS = 10_000
+"""Tensors of a file. Each costs time, and an empty one takes but 60 bytes."""
+
+
+def check_head(path: Path | str, *, max_bytes: int) -> None:
+    """Look at the size of a safetensors file and at its head before anybody parses it.
+
+    Raises ValueError where it is no file, larger than ``max_bytes``, or its head has more than `MAX_HEAD` bytes or
+    `MAX_TENSORS` tensors; OSError where it cannot be read.
+    """
+    if not stat.S_ISREG(os.stat(path).st_mode):
+        raise ValueError("it is no file")
+    with open(path, "rb") as file:
+        if os.fstat(file.fileno()).st_size > max_bytes:
+            raise ValueError(f"it is larger than the {max_bytes >> 20} MiB of such a file")
+        length = int.from_bytes(file.read(8), "little")
+        if length > MAX_HEAD:
+            raise ValueError(f"its head has more than {MAX_HEAD >> 20} MiB")
+        if file.read(length).count(b"{") > MAX_TENSORS:  # whatever a name is, each tensor's entry begins with one
+            raise ValueError(f"it has more than {MAX_TENSORS:,} tensors")
 
 
 def save_tensors(

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
 from motionloom.motion import MAX_POSES
+from motionloom.reading import MAX_BYTES, read_bytes
 
-MAX_BYTES = 2 * 1024**3
-"""Files above this size (2 GB) are refused."""
 LIMIT = 1e9
 """Numbers beyond this are no lengths or angles of anybody, and are refused with NaN and infinity."""
 FREE_POSES = 2_000_000
@@ -24,43 +23,9 @@ MAX_DEPTH = 64
 _CHUNK = 4 * 1024**2
 
 
-def read_bytes(path: Path | str, *, max_bytes: int = MAX_BYTES) -> bytes:
-    """The file's bytes; raises `MotionloomError` if it is missing, a folder, empty or larger than ``max_bytes``."""
-    path = Path(path)
-    if path.is_dir():
-        raise MotionloomError(f"{path} is a folder; name a file in it")
-    try:
-        size = path.stat().st_size
-        if size > max_bytes:
-            raise MotionloomError(f"{path} has {_sized(size)}; files above {_sized(max_bytes)} are not read")
-        data = path.read_bytes() if path.is_file() else _read_stream(path, max_bytes)
-    except (OSError, ValueError) as error:
-        if isinstance(error, MotionloomError):
-            raise
-        raise MotionloomError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from None
-    if not data or data.isspace():
-        raise MotionloomError(f"{path} is empty")
-    return data
-
-
-def _read_stream(path: Path, max_bytes: int) -> bytes:
-    """All that comes out of a pipe or a device, which do not say their size and need not end."""
-    data = bytearray()
-    with path.open("rb") as stream:
-        while piece := stream.read(1 << 20):
-            data += piece
-            if len(data) > max_bytes:
-                raise MotionloomError(f"{path} gives more than {_sized(max_bytes)}, which is not read")
-    return bytes(data)
-
-
-def _sized(size: int) -> str:
-    return f"{size / 1e9:.1f} GB" if size >= 1e8 else f"{size / 1e6:.1f} MB"
-
-
-def read_text(path: Path | str, *, max_bytes: int = MAX_BYTES) -> bytes:
+def read_text(path: Path | str, *, max_bytes: int = MAX_BYTES, empty: bool = False) -> bytes:
     """The bytes of a text file with plain line ends (``\\n``) and without a byte-order mark; refuses binary junk."""
-    data = read_bytes(path, max_bytes=max_bytes)
+    data = read_bytes(path, max_bytes=max_bytes, empty=empty)
     if b"\0" in data:
         raise MotionloomError(f"{path} is not a text file: it holds binary data")
     if b"\r" in data:
@@ -71,9 +36,7 @@ def read_text(path: Path | str, *, max_bytes: int = MAX_BYTES) -> bytes:
 def read_utf8(path: Path | str, *, max_bytes: int, empty: bool = False) -> str:
     """The text of a file in UTF-8, line ends and byte-order mark as in `read_text`; ``empty`` ones only if allowed."""
     try:
-        if empty and Path(path).stat().st_size == 0:
-            return ""
-        return read_text(path, max_bytes=max_bytes).decode("utf-8")
+        return read_text(path, max_bytes=max_bytes, empty=empty).decode("utf-8")
     except UnicodeDecodeError:
         raise MotionloomError(f"{path} is not UTF-8 text; save it as UTF-8") from None
 

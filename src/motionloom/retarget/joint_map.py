@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
+from motionloom.reading import read_bytes
 from motionloom.retarget.names import Parts, parts_by_name, read_word
 from motionloom.retarget.topology import common_ancestor, is_above, parts_by_shape, path_down
 from motionloom.skeleton import SMPL22, Skeleton
@@ -270,10 +271,8 @@ def _read_override(skeleton: Skeleton, override: Override | None) -> dict[str, d
 
 def _load_json(path: Path) -> object:
     try:
-        if path.stat().st_size > 1_000_000:
-            raise MotionloomError(f"{path} is no joint map: it has more than a million characters")
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        return json.loads(read_bytes(path, max_bytes=1_000_000).decode("utf-8"))
+    except (ValueError, RecursionError) as error:
         if isinstance(error, MotionloomError):
             raise
         raise MotionloomError(f"{path} cannot be read as a joint map in JSON: {error}") from None

@@ -18,7 +18,7 @@ from torch import Tensor, nn
 
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import finished
-from motionloom.io.tensors import save_tensors
+from motionloom.io.tensors import check_head, save_tensors
 from motionloom.io.text import plain_json
 
 FORMAT = 1
@@ -60,6 +60,7 @@ class Container:
     def signed(self, path: Path) -> bool:
         """Whether a file, damaged or not, is of this kind, by what its head says."""
         try:
+            check_head(path, max_bytes=self.max_bytes)
             with safe_open(path, framework="pt") as file:
                 head = file.metadata() or {}
             return self.key in head and (not self.kind or plain_json(head[self.key])["kind"] == self.kind)
@@ -123,8 +124,7 @@ KINDS = (PRIORS, PREDICTORS, PAIRS, ADAPTERS)
 def read_tensors(path: Path, max_bytes: int = MAX_BYTES) -> tuple[dict[str, Tensor], dict[str, str]]:
     """Tensors and metadata of a safetensors file, sizes checked; pickles are refused by what they are."""
     try:
-        if path.stat().st_size > max_bytes:
-            raise MotionloomError(f"{path} is larger than the {max_bytes >> 20} MiB of such a file; name another")
+        check_head(path, max_bytes=max_bytes)
         with safe_open(path, framework="pt") as file:
             return {key: file.get_tensor(key) for key in file.keys()}, dict(file.metadata() or {})  # noqa: SIM118
     except (SafetensorError, OSError, *_WRONG, RuntimeError) as error:

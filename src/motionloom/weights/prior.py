@@ -17,6 +17,7 @@ from torch import Tensor
 
 from motionloom.diffusion import SCHEDULES, Schedule
 from motionloom.errors import MotionloomError
+from motionloom.io.tensors import check_head
 from motionloom.nets.prior import Condition, NetConfig, PriorNet, condition
 from motionloom.nets.text import MiniLM, TextEncoder
 from motionloom.nets.text.known import Known, pack_known, unpack_known, with_sentences
@@ -142,9 +143,12 @@ def save_prior(prior: Prior, path: Path | str, *, half: bool = True) -> Path:
 def read_card(path: Path) -> Card:
     """What a weight file says about itself, without its weights; raises MotionloomError as `load_prior` does."""
     try:
+        check_head(path, max_bytes=PRIORS.max_bytes)
         with safe_open(path, framework="pt") as file:
             return Card(**_about(path, PRIORS.describe(path, dict(file.metadata() or {})))["card"])
-    except SafetensorError as error:
+    except (SafetensorError, OSError, ValueError) as error:
+        if isinstance(error, MotionloomError):
+            raise
         raise MotionloomError(f"{path} is not a whole safetensors file ({error}); fetch the weights again") from None
 
 

@@ -108,8 +108,9 @@ def test_both_splits_and_the_releases_own_folder_are_found(tmp_path: Path) -> No
         json.dumps({"1": entry(None) | {"frame_ann": {"labels": 3}}}),
         json.dumps({"1": entry([label("walk", 0, 2) | {"act_cat": "walk"}])}),
         json.dumps({"1": entry([label("walk", 0, 2) | {"proc_label": 3}])}), json.dumps({"1": entry([{}] * 1001)}),
+        json.dumps({"1": entry([label("walk " * 500, 0, 2)])}),
     ],
-    ids=range(16),
+    ids=range(17),
 )  # fmt: skip
 def test_other_json_is_refused_in_one_sentence_with_the_files_name(tmp_path: Path, damage: str) -> None:
     (tmp_path / "train.json").write_bytes(damage.encode("latin-1"))

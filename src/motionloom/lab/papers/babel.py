@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.data.paths import inside
+from motionloom.data.words import check_caption
 from motionloom.errors import MotionloomError
 from motionloom.features.babel import FPS, Y_UP, encode
 from motionloom.io import npz, text
@@ -176,7 +177,9 @@ def _text(label: dict[str, Any]) -> str:
     said = label.get("proc_label") or label.get("raw_label") or ""
     if not isinstance(said, str):
         raise ValueError("a label is not text")
-    return " ".join(said.split())
+    plain = " ".join(said.split())
+    check_caption(plain)
+    return plain
 
 
 def _segment(label: dict[str, Any]) -> Segment:

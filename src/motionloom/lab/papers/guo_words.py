@@ -19,6 +19,7 @@ from motionloom.errors import MotionloomError
 from motionloom.io import npz
 from motionloom.io.text import plain_json
 from motionloom.lab.papers.plain_pickle import read_plain_file
+from motionloom.reading import read_bytes
 
 TAGS = (
     "VERB", "NOUN", "DET", "ADP", "NUM", "AUX", "PRON", "ADJ", "ADV",
@@ -134,9 +135,7 @@ def read_special(path: Path | str) -> dict[str, str]:
     """
     path = Path(path)
     try:
-        if path.stat().st_size > 1 << 20:
-            raise ValueError("it is larger than 1 MiB")
-        text = path.read_text(encoding="utf-8")
+        text = read_bytes(path, max_bytes=1 << 20).decode("utf-8")
         table = plain_json(text) if path.suffix == ".json" else _literal_lists(text)
         if not isinstance(table, dict) or not set(table) <= set(SPECIAL):
             raise ValueError(f"the classes are {', '.join(SPECIAL)}")

@@ -22,9 +22,12 @@ from typing import Any, cast
 import numpy as np
 
 from motionloom.errors import MotionloomError
+from motionloom.reading import read_bytes
 
-MAX_OPERATIONS = 1 << 21
-"""Operations of one file; also the items it may unfold to when shared containers are counted each time."""
+MAX_OPERATIONS = 1 << 18
+"""Operations of one file. Each costs microseconds; a list of 50,000 words takes 100,000."""
+MAX_ITEMS = 1 << 21
+"""Items a file may unfold to when shared containers are counted each time."""
 MAX_DEPTH = 64
 """Containers within containers."""
 
@@ -88,14 +91,7 @@ class _Array:
 def read_plain_file(path: Path | str, *, limit: int) -> object:
     """`read_plain` on a file of at most `limit` bytes."""
     path = Path(path)
-    try:
-        size = path.stat().st_size
-        data = path.read_bytes() if size <= limit else b""
-    except OSError as error:
-        raise MotionloomError(f"{path} cannot be read ({error.strerror}); name a pickle file") from None
-    if size > limit:
-        raise MotionloomError(f"{path} holds {size} bytes and is not opened; at most {limit} are read")
-    return read_plain(data, limit=limit, name=str(path))
+    return read_plain(read_bytes(path, max_bytes=limit, empty=True), limit=limit, name=str(path))
 
 
 def read_plain(data: bytes, *, limit: int, name: str = "the pickle") -> object:
@@ -329,8 +325,8 @@ class Finished:
             self.done[id(value)] = self._container(value, depth + 1)
             self.open.discard(id(value))
         finished, size = self.done[id(value)]
-        if size > MAX_OPERATIONS:
-            raise ValueError(f"it unfolds to more than {MAX_OPERATIONS} items")
+        if size > MAX_ITEMS:
+            raise ValueError(f"it unfolds to more than {MAX_ITEMS} items")
         return finished, size
 
     def _container(self, value: Any, depth: int) -> tuple[Any, int]:

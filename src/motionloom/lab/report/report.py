@@ -16,6 +16,7 @@ from motionloom.io.text import plain_json
 from motionloom.lab.report.files import check_report, write_json, write_text
 from motionloom.lab.report.files import markdown as table
 from motionloom.lab.report.files import plain as columns_of_text
+from motionloom.reading import read_bytes
 
 Better = Literal["up", "down", "real", ""]
 REAL = "real"
@@ -121,14 +122,9 @@ def read(path: Path | str) -> Report:
     path = Path(path)
     try:
         path = path / "report.json" if path.is_dir() else path
-        if path.stat().st_size > LARGEST_FILE:
-            raise MotionloomError(f"{path} has more than {LARGEST_FILE >> 20} MiB; it is not a report")
-        text = path.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        if isinstance(error, MotionloomError):
-            raise
-        said = getattr(error, "strerror", None) or error
-        raise MotionloomError(f"cannot read {path}: {said}; name a report.json or its folder") from None
+        text = read_bytes(path, max_bytes=LARGEST_FILE)
+    except MotionloomError as error:
+        raise MotionloomError(f"{error}; name a report.json or its folder") from None
     try:
         return decode(plain_json(text, finite=True))
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:

@@ -11,6 +11,7 @@ from pathlib import Path
 from motionloom.errors import MotionloomError
 from motionloom.lab.report.files import write_text
 from motionloom.lab.report.report import Report, markdown
+from motionloom.reading import read_bytes
 
 PLACE = re.compile(r"(<!-- suite ([\w.-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 QUICK_MARK = "<!-- quick -->\n"
@@ -51,12 +52,10 @@ def shown(report: Report) -> str:
 def check_page(path: Path) -> str:
     """The text of a page of results: ask before long work. `MotionloomError` if there is none."""
     try:
-        if path.stat().st_size > LARGEST:
-            raise MotionloomError(f"{path} has more than {LARGEST >> 20} MiB; name a page with marker comments")
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        said = getattr(error, "strerror", None) or "it is no text"
-        raise MotionloomError(f"cannot read {path}: {said}; name a page with marker comments") from None
+        return read_bytes(path, max_bytes=LARGEST, empty=True).decode("utf-8")
+    except ValueError as error:
+        said = error if isinstance(error, MotionloomError) else f"{path} is no text in UTF-8"
+        raise MotionloomError(f"{said}; name a page with marker comments") from None
 
 
 def fill_page(path: Path, reports: Sequence[Report], *, again: bool = False) -> list[str]:

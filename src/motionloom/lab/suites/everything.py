@@ -16,6 +16,7 @@ from motionloom.lab.report import report as reports
 from motionloom.lab.report.report import Report
 from motionloom.lab.suites.needs import NoData
 from motionloom.lab.suites.registry import SUITES, Job, Suite
+from motionloom.reading import read_bytes
 from motionloom.weights.prior import find_weights
 
 QUICK = "Quick run: few seeds and clips, to see that everything works; these are no numbers to quote."
@@ -123,7 +124,7 @@ def _files(folder: Path) -> str:
 def _finished(folder: Path, mark: str) -> Report | None:
     """The report of a finished run of these settings; anything else, damaged files too, is measured anew."""
     try:
-        done = plain_json((folder / "done.json").read_text(encoding="utf-8"))
+        done = plain_json(read_bytes(folder / "done.json", max_bytes=1 << 20))
         if isinstance(done, dict) and done.get("fingerprint") == mark:
             return reports.read(folder / "report.json")
     except (OSError, ValueError, RecursionError):

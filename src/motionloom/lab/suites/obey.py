@@ -17,6 +17,7 @@ from motionloom.lab.metrics.obedience import CHECKS, Check
 from motionloom.lab.report.files import check_report, write_json
 from motionloom.lab.suites.generator import generator
 from motionloom.lab.suites.harness import Generate, Run, takes_run
+from motionloom.reading import read_bytes
 from motionloom.weights.prior import Prior
 
 ENOUGH = 0.9
@@ -25,6 +26,8 @@ MOSTLY = 0.7
 """Share of seeds that must obey for a prompt to count as mostly obeyed."""
 Judge = Check | Everyday
 """What has a prompt and limits, of either set."""
+_LARGEST = 64 << 20
+"""Bytes of the attempts that a stopped run kept."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +124,7 @@ def _read(path: Path, settings: dict[str, Any]) -> dict[str, list[Attempt]]:
     if not path.is_file():
         return {}
     try:
-        kept = plain_json(path.read_text(encoding="utf-8"))
+        kept = plain_json(read_bytes(path, max_bytes=_LARGEST))
         if kept["settings"] != settings:
             raise MotionloomError(f"{path} was made with other settings; name another --out folder or delete it")
         return {str(check["name"]): [_attempt(a) for a in check["attempts"]] for check in kept["checks"]}

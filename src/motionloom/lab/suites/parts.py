@@ -15,6 +15,7 @@ from typing import Any
 from motionloom.errors import MotionloomError
 from motionloom.io.text import plain_json
 from motionloom.lab.report.files import write_json
+from motionloom.reading import read_bytes
 
 LARGEST = 1 << 20
 
@@ -43,9 +44,7 @@ class Parts:
         if path is None or not path.is_file():
             return None
         try:
-            if path.stat().st_size > LARGEST:
-                raise ValueError("it is too large")
-            found = plain_json(path.read_text(encoding="utf-8"))
+            found = plain_json(read_bytes(path, max_bytes=LARGEST))
             settings, numbers = str(found["settings"]), {str(k): float(v) for k, v in found["numbers"].items()}
             if not all(map(math.isfinite, numbers.values())):
                 raise ValueError("it holds numbers that are not finite")

@@ -30,6 +30,7 @@ from motionloom.lab.metrics.transitions import (
 )
 from motionloom.lab.suites.harness import embedded
 from motionloom.lab.suites.protocol import Transitions
+from motionloom.reading import read_bytes
 
 FORMAT = 1
 LARGEST_FILE = 1 << 20
@@ -170,9 +171,7 @@ def load_shipped(path: Path | None = None) -> Shipped | None:
     if not path.is_file():
         return None
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise ValueError("it is too large")
-        found = plain_json(path.read_text(encoding="utf-8"))
+        found = plain_json(read_bytes(path, max_bytes=LARGEST_FILE))
         if found["format"] != FORMAT:
             raise ValueError("it has another format")
         seams = {name: _number(found["physical"][name]) for name in (*PHYSICAL, "step")}

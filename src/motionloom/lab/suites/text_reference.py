@@ -18,7 +18,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.io.atomic import check_place
-from motionloom.io.tensors import save_tensors
+from motionloom.io.tensors import check_head, save_tensors
 from motionloom.io.text import plain_json
 from motionloom.kinematics import physics
 from motionloom.kinematics.physics import Array
@@ -182,8 +182,7 @@ def load(path: Path | str, evaluator: Evaluator) -> TextReference:
     if not path.is_file():
         raise MotionloomError(f"there is no reference {path}; name real motions with --data")
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise ValueError(f"it has more than {LARGEST_FILE >> 20} MiB")
+        check_head(path, max_bytes=LARGEST_FILE)
         with safe_open(path, framework="numpy") as file:
             about = plain_json((file.metadata() or {})["reference"])
             if set(file.keys()) != set(_KINDS):

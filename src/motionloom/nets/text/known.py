@@ -12,7 +12,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from motionloom.errors import MotionloomError
+from motionloom.errors import MotionloomError, one_line
 from motionloom.nets.text.protocol import TextEncoder
 from motionloom.nets.text.quantise import dequantise, quantise
 
@@ -64,7 +64,7 @@ class Nearest:
     def remark(self) -> str:
         """One line for somebody whose prompt is not near to anything."""
         said = ", ".join(f"'{sentence}'" for sentence in self.sentences)
-        return f"these weights have seen nothing like '{_short(bare(self.prompt))}'; nearest: {said}"
+        return one_line(f"these weights have seen nothing like '{_short(bare(self.prompt))}'; nearest: {said}")
 
 
 def bare(sentence: str) -> str:
