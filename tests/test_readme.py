@@ -147,26 +147,64 @@ def test_named_files_exist(document: Path) -> None:
     assert not [n for n in named if not (ROOT / n).exists()]
 
 
+FIGURE_PAGES = FILLER["documents"]()
+
+
 @needs_weights
-def test_the_readmes_tables_are_the_measured_ones() -> None:
-    """Each marked table is filled, with exactly what the benchmark wrote: `make tables`."""
+@pytest.mark.parametrize("page", FIGURE_PAGES, ids=lambda path: path.stem)
+def test_figures_are_of_the_weights_that_ship_or_say_so(page: Path) -> None:
+    """Each marked place is what its file says, and names its weights where these are not the shipped ones.
+
+    It fails as soon as a weight file changes; `make tables` then marks the places, and measuring anew clears the marks.
+    """
+    assert fill(page.read_text()) == page.read_text(), "run: make tables"
+
+
+def test_every_suite_of_the_results_says_of_which_weights_it_is() -> None:
+    openings = re.findall(r"<!-- suite [^\n]*-->", (ROOT / "docs" / "results.md").read_text())
+    assert openings
+    assert not [one for one in openings if not re.search(r"; of [\w-]+ [0-9a-f]{12}", one)]
+
+
+def test_no_figure_of_the_readme_stands_outside_of_a_marked_place() -> None:
+    """Shares, counts of seeds and intervals are filled in; whoever types one here has to mark it."""
+    plain = FILLER["PLACE"].sub("", README)
+    assert not re.findall(r"\d+(?:\.\d+)? ?%|\b\d+ of \d+\b|±", plain)
     assert places(README)
     assert all(places(README).values()), "a table of the README is empty"
-    assert fill(README) == README
+
+
+def test_a_changed_weight_file_is_noticed(tmp_path: Path) -> None:
+    """A place of other weights begins with a sentence, once; measured again on what ships it loses it."""
+    weights = tmp_path / "src" / "motionloom" / "weights"
+    weights.mkdir(parents=True)
+    (weights / "default.safetensors").write_bytes(b"new")
+    mark = FILLER["shipped"](weights)["default"]
+    text = "a\n<!-- figures; of default 0123456789ab -->\n7 of 8\n<!-- end -->\nb\n"
+    marked = fill(text, tmp_path)
+    assert "-->\n*Measured on earlier weights (default 0123456789ab).*\n\n7 of 8\n<!-- end -->" in marked
+    assert fill(marked, tmp_path) == marked
+    assert fill(marked.replace("0123456789ab", mark), tmp_path) == text.replace("0123456789ab", mark)
+    with pytest.raises(ValueError, match="twelve digits"):
+        fill(text.replace("0123456789ab", "lately"), tmp_path)
 
 
 def test_tables_are_filled_from_files(tmp_path: Path) -> None:
-    """A marked place takes its file's text once, however often it is filled; one without a file stays."""
-    (tmp_path / "a.md").write_text("# Title\n\n| 1 |\n")
+    """A marked place takes its file's text and weights once, however often it is filled; one without a file stays."""
+    (tmp_path / "a.md").write_text("# Title\n\n| 1 |\n\nWeights: default 0123456789ab\n")
     (tmp_path / "b.txt").write_text("x  y\n")
     text = "".join(f"<!-- filled from {name} -->\nold\n<!-- end -->\n" for name in ("a.md", "b.txt", "c.md"))
-    once = fill(text, tmp_path)
+    once = fill(text, tmp_path, {"default": "0123456789ab"})
     assert places(once) == {"a.md": "| 1 |", "b.txt": "```text\nx  y\n```", "c.md": "old"}
-    assert fill(once, tmp_path) == once
+    assert "<!-- filled from a.md; of default 0123456789ab -->" in once
+    assert fill(once, tmp_path, {"default": "0123456789ab"}) == once
 
 
 def test_a_table_may_be_shown_by_some_of_its_columns(tmp_path: Path) -> None:
-    (tmp_path / "a.md").write_text("# Title\n\nmade\n\n| x | y | z |\n| --- | --- | --- |\n| 1 |  | 3 |\n\nend\n")
+    other = "| a |\n| --- |\n| 9 |\n\n"
+    (tmp_path / "a.md").write_text(
+        f"# Title\n\nmade\n\n| x | y | z |\n| --- | --- | --- |\n| 1 |  | 3 |\n\n{other}end\n"
+    )
     text = "<!-- filled from a.md: z, x -->\n<!-- end -->\n"
     assert places(fill(text, tmp_path)) == {"a.md": "made\n\n| z | x |\n| --- | --- |\n| 3 | 1 |\n\nend"}
     assert fill(fill(text, tmp_path), tmp_path) == fill(text, tmp_path)
@@ -175,7 +213,9 @@ def test_a_table_may_be_shown_by_some_of_its_columns(tmp_path: Path) -> None:
 
 
 def test_the_readme_is_short_and_shows_five_pictures_and_one_table() -> None:
-    assert len(README.splitlines()) < 200
+    lines = README.splitlines()
+    assert len(lines) < 150
+    assert max(map(len, lines)) <= 120
     assert len(re.findall(r"!\[.+\]\(docs/pictures/", README)) == 5
     assert len(places(README)) == 1
 
@@ -203,3 +243,15 @@ def test_blocks_are_told_apart() -> None:
     )
     assert [(run, language) for run, language, _ in blocks(text)] == [(True, "sh"), (False, "python")]
     assert [shlex.split(line, comments=True) for line in commands(text, "motionloom")] == [["motionloom", "a", "--b"]]
+
+
+DECISIONS = sorted((ROOT / "docs" / "decisions").glob("*.md"))
+
+
+@pytest.mark.parametrize("page", DECISIONS, ids=lambda path: path.stem)
+def test_a_decision_is_one_page_with_a_status(page: Path) -> None:
+    """Its title carries its number, a status line stands below it, and it has at most 60 lines."""
+    title, _, status, *_ = page.read_text().splitlines()
+    assert title.startswith(f"# {page.name[:4]}: ")
+    assert re.match(r"\*\*Status\*\*: (accepted|superseded by \[\d{4}\]\(\d{4})", status)
+    assert len(page.read_text().splitlines()) <= 60

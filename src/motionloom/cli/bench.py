@@ -43,6 +43,21 @@ def _bench(arguments: argparse.Namespace) -> None:
     print(plain(table(found)))
     if on["load"] > 0.5:
         print(f"\nthe machine was busy when this began (load {on['load']}): run it again when nothing else does")
+    print(f"\nWeights: {_weights(arguments)}")
+
+
+def _weights(arguments: argparse.Namespace) -> str:
+    """Name and hash of what was measured, by which pages that show the table are held against what ships."""
+    from motionloom.lab.suites.harness import weight_marks
+    from motionloom.weights.predictor import find_predictor
+    from motionloom.weights.prior import find_weights
+
+    if arguments.prediction:
+        path = find_predictor(arguments.weights or "predictor")
+    else:
+        path = find_weights(arguments.weights or "default")
+    [(name, mark)] = weight_marks([path]).items()
+    return f"{name} {mark}"
 
 
 def _generated(arguments: argparse.Namespace) -> dict[str, Any]:

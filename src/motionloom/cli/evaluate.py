@@ -113,6 +113,15 @@ def _run(arguments: argparse.Namespace):
     return Run(arguments.weights, folder=arguments.out, device=arguments.device, progress=say)
 
 
+def _weights_line(arguments: argparse.Namespace) -> str:
+    """Name and hash of the weights that were measured: pages which show the table are held against them."""
+    from motionloom.lab.suites.harness import weight_marks
+    from motionloom.weights.prior import find_weights
+
+    [(name, mark)] = weight_marks([find_weights(arguments.weights)]).items()
+    return f"Weights: {name} {mark}"
+
+
 def _settings(arguments: argparse.Namespace) -> dict:
     return {name: getattr(arguments, name) for name in ("weights", "steps", "guidance", "solver", "finished")}
 
@@ -148,12 +157,13 @@ def _obedience(arguments: argparse.Namespace) -> None:
     )
     if "paraphrases_obeyed_share" in found:
         said += (
-            f"; in other words {found['paraphrases_obeyed']} of {found['paraphrases']}, "
+            f";\nin other words {found['paraphrases_obeyed']} of {found['paraphrases']}, "
             f"{found['paraphrases_mostly_obeyed']} and {found['paraphrases_obeyed_share']:.1%}"
         )
     if arguments.out:
         parts = [files.markdown(themes)] if len(themes) > 1 else []
-        text = "\n\n".join([f"# Obedience of {arguments.weights}", f"{said}.", *parts, files.markdown(rows)])
+        parts += [files.markdown(rows), _weights_line(arguments)]
+        text = "\n\n".join([f"# Obedience of {arguments.weights}", f"{said}.", *parts])
         files.write_text(arguments.out / "report.md", text + "\n")
     if arguments.sheet:
         generate.draw(checks, arguments.sheet, seed=seed)
@@ -199,9 +209,8 @@ def _realism(arguments: argparse.Namespace) -> None:
         said += "; the real numbers are of other actions: name recordings with --data to compare like with like"
     if arguments.out:
         files.write_json(arguments.out / "realism.json", found)
-        files.write_text(
-            arguments.out / "realism.md", f"# Realism of {arguments.weights}\n\n{said}.\n\n{files.markdown(rows)}\n"
-        )
+        parts = [f"# Realism of {arguments.weights}", f"{said}.", files.markdown(rows), _weights_line(arguments)]
+        files.write_text(arguments.out / "realism.md", "\n\n".join(parts) + "\n")
     print(json.dumps(found, indent=1) if arguments.json else f"{files.plain(rows)}\n\n{said}")
 
 

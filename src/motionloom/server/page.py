@@ -9,8 +9,9 @@ from starlette.routing import BaseRoute, Route
 
 FOLDER = Path(__file__).with_name("page")
 MISSING = (
-    "The studio's page is not built into this installation: run 'make studio' in a clone of motionloom, or install a "
-    "wheel, which carries it. The server itself works; /docs says what it answers."
+    "The studio's page is not built into this installation: run 'make studio' in a clone of motionloom, or install "
+    "it again ('pip install .') with Node.js 22 or later on the PATH. The server itself works; /docs says what it "
+    "answers."
 )
 
 
@@ -30,7 +31,8 @@ def routes() -> list[BaseRoute]:
 
 def _given(place: Path):
     kind = mimetypes.guess_type(place.name)[0] or "application/octet-stream"
-    kept = "no-cache" if place.suffix == ".html" else "max-age=31536000, immutable"
+    # Only names with a hash of what is in them stay the same for ever.
+    kept = "max-age=31536000, immutable" if place.parent.name == "assets" else "no-cache"
 
     async def give(request: Request) -> Response:
         return FileResponse(place, media_type=kind, headers={"Cache-Control": kept})

@@ -165,6 +165,18 @@ export function help(app: App, actions: Actions, root: HTMLDialogElement): void 
           "With the path or joint tool the arrow keys move the cursor or the joint (Shift: finer), Page Up and Page Down its height, Enter puts a point. 1 to 9 keep a take or choose a future. Alt while dragging does not snap. Ctrl and the wheel zoom the timeline.",
         ),
       ),
+      h(
+        "section",
+        {},
+        h("h3", {}, "About"),
+        h(
+          "p",
+          { class: "quiet" },
+          "motionloom is free under the MIT licence. The page contains the work of others: ",
+          h("a", { href: "third-party-notices.txt", target: "_blank", rel: "noopener" }, "third-party notices"),
+          ".",
+        ),
+      ),
     ),
   );
   root.addEventListener("close", close);

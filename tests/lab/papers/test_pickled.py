@@ -31,7 +31,7 @@ def test_objects_are_read_as_numpy_would(tmp_path: Path, protocol: int, order: A
     for subject, actions in table.items():
         assert list(found[subject]) == list(actions)
         for action, array in actions.items():
-            assert found[subject][action].dtype == array.dtype
+            assert found[subject][action].dtype == array.dtype.newbyteorder("=")  # as NumPy's own reader does
             assert np.array_equal(found[subject][action], array)
 
 

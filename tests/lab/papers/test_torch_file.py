@@ -111,7 +111,7 @@ def tensor_pickle(
     """The pickle of one tensor as torch writes it, with numbers of choice."""
 
     def number(value: int) -> bytes:
-        return b"I" + str(value).encode() + b"\n"
+        return b"\x8a\x08" + struct.pack("<q", value)
 
     def row(values: tuple) -> bytes:
         return b"(" + b"".join(map(number, values)) + b"t"

@@ -1,6 +1,7 @@
 """The run over all suites with made-up ones: what is run, kept, refused and told, and the page that is filled."""
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -220,10 +221,12 @@ def test_a_quick_run_is_marked_and_never_replaces_a_full_one_unless_asked(job: J
     quick = replace(job, quick=True)
     (first,) = run_all(quick, out, [one.suite()])
     assert first.report
-    assert first.report.protocol == {"n": 2, "quick": True}
+    marks = first.report.protocol["files"]
+    assert first.report.protocol == {"n": 2, "quick": True, "files": marks}
+    assert re.fullmatch("[0-9a-f]{12}", marks["weights"])
     assert QUICK in markdown(first.report)
     run_all(job, out, [one.suite()], keep=tmp_path / "kept")
-    assert read(tmp_path / "kept" / "one.json").protocol == {"n": 10}
+    assert read(tmp_path / "kept" / "one.json").protocol == {"n": 10, "files": marks}
     with pytest.raises(MotionloomError, match="full run"):
         run_all(quick, out, [one.suite()])
     with pytest.raises(MotionloomError, match=r"kept.*full run"):
@@ -382,6 +385,15 @@ def test_a_page_is_filled_at_its_marks_and_filling_twice_changes_nothing() -> No
     assert once.endswith("<!-- end -->\n\nmore words\n")
     assert results.fill(once, [made()])[0] == once
     assert "| ours | 2.000 |" in results.fill(once, [made(number=2.0)])[0]
+
+
+def test_the_page_says_of_which_weight_files_a_suite_is() -> None:
+    files = {"default": "0123456789ab", "duet": "ba9876543210"}
+    once, _ = results.fill(PAGE, [replace(made(), protocol={"files": files})])
+    assert "<!-- suite one; of default 0123456789ab, duet ba9876543210 -->" in once
+    again, _ = results.fill(once, [replace(made(), protocol={"files": {"default": "ffffffffffff"}})])
+    assert "<!-- suite one; of default ffffffffffff -->" in again
+    assert "0123456789ab" not in again
 
 
 def test_a_suite_without_a_place_gets_one_once() -> None:

@@ -1,7 +1,7 @@
-"""Arrays in dictionaries out of .npz files that keep them as pickled objects, without unpickling anything.
+"""Arrays in dictionaries out of .npz files that keep them as pickled objects.
 
 The usual files of Human3.6M and HumanEva-I hold one object: a dictionary of dictionaries of arrays. A pickle is a
-program, so it is not run: `lab.papers.plain_pickle` reads what plain values and arrays it writes down.
+program, and nothing of it is run: `lab.papers.plain_pickle` reads what plain values and arrays it writes down.
 """
 
 from pathlib import Path

@@ -1,21 +1,20 @@
-"""Pickles of plain values and numpy arrays, read without unpickling.
+"""Pickles of plain values and numpy arrays, read by Python's own unpickler with everything that acts taken out.
 
-This is no unpickler: nothing named in the file is looked up or called. The bytes are split into operations
-(`pickletools` knows their arguments), and the loop below carries out only those that push a value, remember it, or fill
-a container. The few names that numpy's own pickles hold stand as words, and `_made` turns them into arrays itself
-from bytes whose length it checks. Files that name anything else, or that use an operation which is not in the lists
-below, are refused as a whole. Python 2's pickles (protocols 0 to 2) are read with latin-1 strings, as
-``pickle.load(file, encoding="latin1")`` would.
+Of the unpickler's operations those are left that push a value, remember it, or fill a list or a table (`OPERATIONS`).
+``find_class`` knows the few names that numpy's own pickles hold, and answers with methods of this class, which make
+arrays from bytes whose length they check. Any other name and any other operation ends the reading. Python 2's pickles
+(protocols 0 to 2) are read with latin-1 strings, as ``pickle.load(file, encoding="latin1")`` would.
 """
 
-import codecs
 import io
 import math
+import pickle
 import pickletools
 import re
+import struct
 from collections import Counter
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
@@ -30,62 +29,53 @@ MAX_ITEMS = 1 << 21
 """Items a file may unfold to when shared containers are counted each time."""
 MAX_DEPTH = 64
 """Containers within containers."""
-
-_SPARE = 16 << 20
-"""Bytes that arrays and decoded texts may hold beyond twice the pickle's own: a few that are shared."""
-
-_OPERATIONS = {operation.code: operation for operation in pickletools.opcodes}
-_PUSHES = {
-    "BINUNICODE", "SHORT_BINUNICODE", "BINUNICODE8", "UNICODE", "STRING", "BINSTRING", "SHORT_BINSTRING",
-    "BINBYTES", "SHORT_BINBYTES", "BINBYTES8", "BYTEARRAY8", "FLOAT", "BINFLOAT",
-    "BININT", "BININT1", "BININT2", "INT", "LONG", "LONG1", "LONG4",
-}  # fmt: skip
-_CONSTANTS: Mapping[str, object] = {"NONE": None, "NEWTRUE": True, "NEWFALSE": False, "EMPTY_TUPLE": ()}
-_EMPTY: Mapping[str, Callable[[], object]] = {"EMPTY_LIST": list, "EMPTY_DICT": dict}
-_REMEMBERS = {"BINPUT", "LONG_BINPUT", "PUT", "MEMOIZE"}
-_RECALLS = {"BINGET", "LONG_BINGET", "GET"}
-_TUPLES = {"TUPLE1": 1, "TUPLE2": 2, "TUPLE3": 3}
-_IGNORED = {"PROTO", "FRAME"}
-
+BROKEN = (
+    pickle.UnpicklingError,
+    struct.error,
+    EOFError,
+    ValueError,
+    IndexError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    OverflowError,
+    MemoryError,
+    RecursionError,
+)
+"""What a damaged pickle raises in `PlainUnpickler.value`."""
 NAMES: Mapping[tuple[str, str], str] = {
     ("numpy", "ndarray"): "ndarray",
     ("numpy", "dtype"): "dtype",
     ("_codecs", "encode"): "encode",
     ("__builtin__", "bytes"): "bytes",
     ("builtins", "bytes"): "bytes",
-    **{(f"numpy.{core}.multiarray", "_reconstruct"): "_reconstruct" for core in ("core", "_core")},
-    **{(f"numpy.{core}.multiarray", "scalar"): "scalar" for core in ("core", "_core")},
-    **{(f"numpy.{core}.numeric", "_frombuffer"): "_frombuffer" for core in ("core", "_core")},
+    ("numpy.core.multiarray", "_reconstruct"): "reconstruct",
+    ("numpy._core.multiarray", "_reconstruct"): "reconstruct",
+    ("numpy.core.multiarray", "scalar"): "scalar",
+    ("numpy._core.multiarray", "scalar"): "scalar",
+    ("numpy.core.numeric", "_frombuffer"): "frombuffer",
+    ("numpy._core.numeric", "_frombuffer"): "frombuffer",
 }
-"""The words that plain pickles may say."""
+"""The names that plain pickles may say; each is a method ``make_...`` of the unpickler."""
+OPERATIONS = frozenset(
+    {
+        *("PROTO", "FRAME", "STOP", "MARK", "NONE", "NEWTRUE", "NEWFALSE"),
+        *("INT", "BININT", "BININT1", "BININT2", "LONG", "LONG1", "LONG4", "FLOAT", "BINFLOAT"),
+        *("STRING", "BINSTRING", "SHORT_BINSTRING", "UNICODE"),
+        *("BINUNICODE", "SHORT_BINUNICODE", "BINUNICODE8"),
+        *("BINBYTES", "SHORT_BINBYTES", "BINBYTES8", "BYTEARRAY8"),
+        *("EMPTY_TUPLE", "TUPLE", "TUPLE1", "TUPLE2", "TUPLE3"),
+        *("EMPTY_LIST", "LIST", "APPEND", "APPENDS"),
+        *("EMPTY_DICT", "DICT", "SETITEM", "SETITEMS"),
+        *("PUT", "BINPUT", "LONG_BINPUT", "MEMOIZE", "GET", "BINGET", "LONG_BINGET"),
+        *("GLOBAL", "STACK_GLOBAL", "REDUCE", "BUILD"),
+    }
+)
+"""What is left of the unpickler; names and calls lead to methods of `PlainUnpickler` alone."""
+_SPARE = 16 << 20
+"""Bytes that arrays and decoded texts may hold beyond twice the pickle's own: a few that are shared."""
 _DTYPE = re.compile(r"[|<>=]?(b1|[iu][1248]|f[248]|c8|c16|[SU][1-9][0-9]{0,4}|O8?)")
-
-
-@dataclass(frozen=True)
-class Name:
-    """One of the words of numpy's pickles; never the thing it names."""
-
-    word: str
-
-
-@dataclass(eq=False)
-class _Dtype:
-    """A numpy type as its pickle builds it: first the letters, then the byte order."""
-
-    letters: str
-    order: str | None = None
-
-    def numpy(self) -> np.dtype:
-        dtype = np.dtype(self.letters)
-        return dtype if self.order in (None, "|") else dtype.newbyteorder(cast(Any, self.order))
-
-
-@dataclass(eq=False)
-class _Array:
-    """An array as its pickle builds it: empty first, since others may refer to it before it is filled."""
-
-    shape: tuple[int, ...] = ()
-    values: np.ndarray | list[Any] | None = None
+_OPERATION_NAMES = {ord(operation.code): operation.name for operation in pickletools.opcodes}
 
 
 def read_plain_file(path: Path | str, *, limit: int) -> object:
@@ -106,7 +96,7 @@ def read_plain(data: bytes, *, limit: int, name: str = "the pickle") -> object:
     Returns:
         Dictionaries (keys: strings, bytes, numbers or None), lists, tuples, strings, bytes, whole numbers of at most 64
         bits, floats, booleans, None, numpy arrays (of numbers, strings, or of such values again: dtype object) and
-        numpy scalars. Arrays may be read-only. Numbers may be NaN: the caller knows whether that is wrong.
+        numpy scalars. Numbers may be NaN: the caller knows whether that is wrong.
 
     Raises:
         MotionloomError: Anything else in it (a class, a call, a persistent id, a value that holds itself), or it is
@@ -116,7 +106,7 @@ def read_plain(data: bytes, *, limit: int, name: str = "the pickle") -> object:
         if len(data) > limit:
             raise ValueError(f"it holds {len(data)} bytes, more than {limit}")
         stream = io.BytesIO(data)
-        value = Machine(min(limit, _SPARE + 2 * len(data))).run(stream)
+        value = PlainUnpickler(stream, min(limit, _SPARE + 2 * len(data))).value()
         if stream.read(1):
             raise ValueError("it does not hold exactly one value")
         return value
@@ -125,254 +115,260 @@ def read_plain(data: bytes, *, limit: int, name: str = "the pickle") -> object:
         raise MotionloomError(f"{name} is not a pickle of plain values and is not opened ({reason})") from None
 
 
-BROKEN = (ValueError, IndexError, KeyError, TypeError, AttributeError, OverflowError, MemoryError, RecursionError)
-"""What a damaged pickle raises in a `Machine`."""
+class _Dispatch(dict[int, Callable[..., None]]):
+    """The unpickler's table of operations: counts them, and names the one that is not allowed."""
+
+    def __init__(self, allowed: Mapping[int, Callable[..., None]]) -> None:
+        super().__init__(allowed)
+        self.left = MAX_OPERATIONS
+
+    def __getitem__(self, code: int) -> Callable[..., None]:
+        self.left -= 1
+        if self.left < 0:
+            raise ValueError(f"it has more than {MAX_OPERATIONS} operations")
+        if code not in self:
+            raise ValueError(f"it asks for {_OPERATION_NAMES.get(code, f'the unknown operation {code}')}")
+        return super().__getitem__(code)
 
 
-@dataclass
-class Machine:
-    """Carries out the operations of one pickle; `lab.papers.torch_file` teaches it the few names of torch's files."""
+@dataclass(eq=False)
+class _Dtype:
+    """A numpy type as its pickle builds it: first the letters, then the byte order."""
 
-    limit: int
-    """Most bytes of all arrays together, and of all texts that are made bytes."""
-    names: Mapping[tuple[str, str], str] = field(default_factory=lambda: NAMES)
-    """The words that the file may say, by module and name."""
-    stack: list[Any] = field(default_factory=list)
-    below: list[list[Any]] = field(default_factory=list)  # the stacks under each open mark
-    memo: dict[int, Any] = field(default_factory=dict)
-    made: Counter[str] = field(default_factory=Counter)  # bytes of arrays, and of texts made bytes
+    letters: str
+    order: str | None = None
 
-    def run(self, stream: io.BytesIO) -> object:
-        """The value of the pickle that begins where the stream is; the stream is left behind it.
+    def numpy(self) -> np.dtype:
+        dtype = np.dtype(self.letters)
+        return dtype if self.order in (None, "|") else dtype.newbyteorder(cast(Any, self.order))
 
-        Raises one of `BROKEN` for whatever is wrong with it.
-        """
-        for _ in range(MAX_OPERATIONS):
-            operation = _OPERATIONS.get(stream.read(1).decode("latin-1"))
-            if operation is None:
-                raise ValueError("it is damaged or cut short")
-            if operation.name == "STOP":
-                return self._result()
-            if operation.name == "STRING":
-                value = _quoted(stream.readline())  # pickletools' own reader admits ASCII only
-            else:
-                value = None if operation.arg is None else operation.arg.reader(stream)
-            self._step(operation.name, value)
-        raise ValueError(f"it has more than {MAX_OPERATIONS} operations")
 
-    def _result(self) -> object:
-        if self.below or len(self.stack) != 1:
+class PlainUnpickler(pickle._Unpickler):
+    """Reads one pickle of plain values; `lab.papers.torch_file` teaches it the few names of torch's files."""
+
+    names: Mapping[tuple[str, str], str] = NAMES
+    operations: frozenset[str] = OPERATIONS
+    leaves: tuple[type, ...] = (str, bytes, bytearray, float, bool, type(None), np.generic)
+    """Values without parts that a result may hold, beside whole numbers."""
+    stack: list[Any]
+    metastack: list[list[Any]]
+    append: Callable[[Any], None]
+    read: Callable[[int], bytes]
+    pop_mark: Callable[[], list[Any]]
+
+    def __init__(self, stream: io.BytesIO, limit: int) -> None:
+        super().__init__(stream, encoding="latin1")
+        self.limit = limit
+        self.bytes_made: Counter[str] = Counter()
+        self.unbuilt: dict[int, np.ndarray] = {}
+        own = {"BUILD": "load_build", "SETITEM": "load_setitem", "SETITEMS": "load_setitems", "DICT": "load_dict"}
+        table = {}
+        known = pickle._Unpickler.dispatch
+        for code, function in known.items():
+            name = _OPERATION_NAMES[code]
+            if name in self.operations:
+                table[code] = getattr(type(self), own[name]) if name in own else function
+        table[ord(pickle.BYTEARRAY8)] = type(self).load_bytearray8
+        self.dispatch = _Dispatch(table)  # type: ignore[misc]
+
+    def value(self) -> Any:
+        """The value of the pickle; the stream is left behind it. Raises one of `BROKEN` for whatever is wrong."""
+        found = self.load()
+        if self.stack or self.metastack:
             raise ValueError("it does not hold exactly one value")
-        return Finished().of(self.stack[0], 0)[0]
+        if self.unbuilt:
+            raise ValueError("its array is incomplete")
+        _Unfolded(self.leaves).count(found)
+        return found
 
-    def _step(self, name: str, value: Any) -> None:
-        stack = self.stack
-        if name in _PUSHES:
-            stack.append(_checked(value))
-        elif name in _CONSTANTS:
-            stack.append(_CONSTANTS[name])
-        elif name in _EMPTY:
-            stack.append(_EMPTY[name]())
-        elif name in _REMEMBERS:
-            self.memo[len(self.memo) if name == "MEMOIZE" else value] = stack[-1]
-        elif name in _RECALLS:
-            stack.append(self.memo[value])
-        elif name == "MARK":
-            self.below.append(stack)
-            self.stack = []
-        elif name in ("TUPLE", "LIST", "DICT", "APPENDS", "SETITEMS"):
-            self.stack = self.below.pop()
-            self._gather(name, stack)
-        elif name in ("APPEND", "SETITEM"):
-            values = self._take(1 if name == "APPEND" else 2)
-            _fill(stack[-1], values)
-        elif name in _TUPLES:
-            stack.append(tuple(self._take(_TUPLES[name])))
-        else:
-            self._numpy_step(name, value)
+    # Names, and what is made of them.
 
-    def _gather(self, name: str, values: list[Any]) -> None:
-        if name in ("APPENDS", "SETITEMS"):
-            _fill(self.stack[-1], values)
-        elif name == "TUPLE":
-            self.stack.append(tuple(values))
-        else:
-            container: Any = [] if name == "LIST" else {}
-            _fill(container, values)
-            self.stack.append(container)
+    def find_class(self, module: str, name: str) -> Any:
+        """The method that stands for a name; nothing named in the file is ever looked up."""
+        if (module, name) not in self.names:
+            raise ValueError(f"it names {module[:40]}.{name[:40]}")
+        return getattr(self, f"make_{self.names[module, name]}")
 
-    def _numpy_step(self, name: str, value: Any) -> None:
-        if name == "GLOBAL":
-            module, _, word = value.partition(" ")
-            self.stack.append(self._named(module, word))
-        elif name == "STACK_GLOBAL":
-            self.stack.append(self._named(*self._take(2)))
-        elif name == "REDUCE":
-            called, arguments = self._take(2)
-            if not isinstance(called, Name) or not isinstance(arguments, tuple):
-                raise ValueError("it calls something")
-            self.stack.append(self.made_of(called.word, arguments))
-        elif name == "BUILD":
-            (state,) = self._take(1)
-            self.build(self.stack[-1], state)
-        elif name not in _IGNORED:
-            raise ValueError(f"it asks for {name}")
+    def persistent_load(self, pid: Any) -> Any:
+        """Plain pickles name nothing outside."""
+        raise ValueError("it names something outside")
 
-    def _take(self, count: int) -> list[Any]:
-        if len(self.stack) < count:
-            raise ValueError("it is damaged")
-        values = self.stack[-count:]
-        del self.stack[-count:]
-        return values
+    def make_ndarray(self, *arguments: Any) -> Any:
+        """The class of arrays, which is only named."""
+        raise ValueError("its ndarray cannot be read")
 
-    def _named(self, module: object, word: object) -> Name:
-        if not isinstance(module, str) or not isinstance(word, str):  # whose text might be endless
-            raise ValueError("it names something by other than two words")
-        if (module, word) not in self.names:
-            raise ValueError(f"it names {module[:40]}.{word[:40]}")
-        return Name(self.names[module, word])
+    def make_dtype(self, letters: Any, *more: Any) -> _Dtype:
+        """A numpy type of numbers, text or objects."""
+        if not isinstance(letters, str) or not _DTYPE.fullmatch(letters):
+            raise ValueError("its dtype cannot be read")
+        return _Dtype(letters)
 
-    def made_of(self, word: str, arguments: tuple[Any, ...]) -> object:
-        """What a word of the file makes of its arguments."""
-        if word == "dtype" and isinstance(arguments[0], str) and _DTYPE.fullmatch(arguments[0]):
-            return _Dtype(arguments[0])
-        if word == "_reconstruct" and isinstance(arguments[0], Name) and arguments[0].word == "ndarray":
-            return _Array()
-        if word == "_frombuffer":
-            data, dtype, shape, order = arguments
-            array = _Array()
-            self.build(array, (1, shape, dtype, order == "F", data))
-            return array
-        if word == "scalar" and len(arguments) == 2:
-            return self._values(arguments[1], arguments[0], ())[()]
-        if word == "encode" and len(arguments) == 2 and arguments[1] in ("latin1", "latin-1"):
-            data = _bytes(arguments[0])
-            self._count("texts", len(data))
-            return data
-        if word == "bytes" and not arguments:
-            return b""
-        raise ValueError(f"its {word} cannot be read")
+    def make_reconstruct(self, kind: Any, *more: Any) -> np.ndarray:
+        """An array that is filled later, since others may refer to it before."""
+        if kind != self.make_ndarray:
+            raise ValueError("its array is of no known kind")
+        array = np.zeros(0)
+        self.unbuilt[id(array)] = array
+        return array
 
-    def build(self, made: object, state: object) -> None:
+    def make_frombuffer(self, data: Any, dtype: Any, shape: Any, order: Any) -> np.ndarray:
+        """An array of protocol 5."""
+        array = self.make_reconstruct(self.make_ndarray)
+        self.build(array, (1, shape, dtype, order == "F", data))
+        return array
+
+    def make_scalar(self, dtype: Any, data: Any) -> Any:
+        """One number of a numpy type."""
+        kind, data = self._numbers(data, dtype, ())
+        return np.frombuffer(data, kind)[0]
+
+    def make_encode(self, text: Any, encoding: Any) -> bytes:
+        """Bytes, as protocol 2 writes them."""
+        if encoding not in ("latin1", "latin-1"):
+            raise ValueError("its encode cannot be read")
+        self._count("texts", len(text))
+        return _as_bytes(text)
+
+    def make_bytes(self) -> bytes:
+        """No bytes at all, as protocol 2 writes them."""
+        return b""
+
+    # Operations that fill something.
+
+    def load_build(self) -> None:
+        """BUILD: fills an array or a dtype that was made before, and nothing else."""
+        state = self.stack.pop()
+        self.build(self.stack[-1], state)
+
+    def load_setitem(self) -> None:
+        """SETITEM: one entry of a table."""
+        pair = [self.stack.pop(), self.stack.pop()][::-1]
+        _fill_table(self.stack[-1], pair)
+
+    def load_setitems(self) -> None:
+        """SETITEMS: entries of a table."""
+        items = self.pop_mark()
+        _fill_table(self.stack[-1], items)
+
+    def load_dict(self) -> None:
+        """DICT: a table with its entries."""
+        items = self.pop_mark()
+        table: dict[Any, Any] = {}
+        _fill_table(table, items)
+        self.append(table)
+
+    def load_bytearray8(self) -> None:
+        """BYTEARRAY8, without room for bytes that are not there."""
+        size = int.from_bytes(self.read(8), "little")
+        data = self.read(min(size, self.limit + 1))
+        if len(data) != size:
+            raise ValueError("it is damaged or cut short")
+        self.append(bytearray(data))
+
+    def build(self, built: Any, state: Any) -> None:
         """Fill what was made before with what the file says of it."""
         if not isinstance(state, tuple) or len(state) < 5:
             raise ValueError("its array is incomplete")
-        if isinstance(made, _Dtype) and made.order is None and state[1] in ("<", ">", "|", "="):
+        if isinstance(built, _Dtype):
+            if built.order is not None or state[1] not in ("<", ">", "|", "="):
+                raise ValueError("its dtype cannot be read")
             if any(part is not None for part in state[2:5]):
                 raise ValueError("its array has fields")
-            made.order = state[1]
+            built.order = state[1]
             return
         _, shape, dtype, columns, data = state[:5]
-        if not isinstance(made, _Array) or made.values is not None:
+        if self.unbuilt.pop(id(built), None) is None:
             raise ValueError("it builds something that is no array")
         if not isinstance(shape, tuple) or len(shape) > 16 or not all(type(n) is int and n >= 0 for n in shape):
             raise ValueError("its array has no shape")
-        made.shape = shape
         if isinstance(data, list):
-            made.values = self._objects(data, dtype, shape, by_columns=bool(columns))
+            kind = self._objects(data, dtype, shape, by_columns=bool(columns))
         else:
-            made.values = self._values(data, dtype, shape, "F" if columns else "C")
+            kind, data = self._numbers(data, dtype, shape)
+        built.__setstate__((1, shape, kind, bool(columns), data))
 
-    def _objects(self, data: list[Any], dtype: object, shape: tuple[int, ...], *, by_columns: bool) -> list[Any]:
-        if not isinstance(dtype, _Dtype) or dtype.numpy().hasobject is False or (by_columns and len(shape) > 1):
+    def _objects(self, data: list[Any], dtype: Any, shape: tuple[int, ...], *, by_columns: bool) -> np.dtype:
+        if not isinstance(dtype, _Dtype) or not dtype.numpy().hasobject or (by_columns and len(shape) > 1):
             raise ValueError("its array holds objects")
         self._count("arrays", 8 * len(data))
         if math.prod(shape) != len(data):
             raise ValueError(f"its array of shape {shape} has {len(data)} values")
-        return list(data)
+        return np.dtype(object)
 
-    def _values(self, data: object, dtype: object, shape: tuple[int, ...], order: Any = "C") -> np.ndarray:
+    def _numbers(self, data: Any, dtype: Any, shape: tuple[int, ...]) -> tuple[np.dtype, bytes]:
+        """Type and bytes of an array, as many as its shape has."""
         kind = dtype.numpy() if isinstance(dtype, _Dtype) else np.dtype(object)
         if kind.hasobject or not isinstance(data, bytes | bytearray | str):
             raise ValueError("its array does not hold numbers")
         if len(data) != math.prod(shape) * kind.itemsize:
             raise ValueError(f"its array of shape {shape} has {len(data)} bytes")
         self._count("arrays", len(data))
-        data = _bytes(data)
+        data = _as_bytes(data)
         if kind.kind == "b":
-            return (np.frombuffer(data, np.uint8) != 0).reshape(shape, order=order)
-        if (
-            kind.kind == "U"
-            and (np.frombuffer(data, np.dtype(np.uint32).newbyteorder(kind.byteorder)) > 0x10FFFF).any()
-        ):
-            raise ValueError("its array holds numbers that are no characters")
-        return np.frombuffer(data, kind).reshape(shape, order=order) if data else np.zeros(shape, kind)
+            data = (np.frombuffer(data, np.uint8) != 0).tobytes()
+        if kind.kind == "U" and data:
+            characters = np.frombuffer(data, np.dtype(np.uint32).newbyteorder(kind.byteorder))
+            if (characters > 0x10FFFF).any():
+                raise ValueError("its array holds numbers that are no characters")
+        return kind, data
 
     def _count(self, what: str, size: int) -> None:
         # A short file can name the same long string again and again.
-        self.made[what] += size
-        if self.made[what] > self.limit:
+        self.bytes_made[what] += size
+        if self.bytes_made[what] > self.limit:
             raise ValueError(f"its {what} hold more than {self.limit} bytes")
 
 
-class Finished:
-    """The values with their arrays in place; shared values stay shared, and cycles are refused."""
+class _Unfolded:
+    """Counts the items of a value, shared ones each time; cycles, depth and what is no plain value are refused."""
 
-    def __init__(self) -> None:
-        self.done: dict[int, tuple[Any, int]] = {}
+    def __init__(self, leaves: tuple[type, ...]) -> None:
+        self.leaves = leaves
+        self.sizes: dict[int, int] = {}
         self.open: set[int] = set()
 
-    def of(self, value: Any, depth: int) -> tuple[Any, int]:
-        """The finished value and how many items it unfolds to."""
-        if not isinstance(value, list | dict | tuple | _Array):
-            if isinstance(value, Name | _Dtype):
-                raise ValueError("it holds a name and no value")
-            return value, 1
+    def count(self, value: Any, depth: int = 0) -> int:
+        """How many items the value unfolds to; raises ValueError above `MAX_ITEMS`."""
+        if isinstance(value, self.leaves) or (isinstance(value, np.ndarray) and not value.dtype.hasobject):
+            return 1
+        if type(value) is int:
+            if not -(1 << 63) <= value < 1 << 64:
+                raise ValueError("it holds a number of more than 64 bits")
+            return 1
+        if id(value) in self.sizes:
+            return self.sizes[id(value)]
         if id(value) in self.open or depth > MAX_DEPTH:
             raise ValueError(f"it holds itself or is nested deeper than {MAX_DEPTH}")
-        if id(value) not in self.done:
-            self.open.add(id(value))
-            self.done[id(value)] = self._container(value, depth + 1)
-            self.open.discard(id(value))
-        finished, size = self.done[id(value)]
-        if size > MAX_ITEMS:
-            raise ValueError(f"it unfolds to more than {MAX_ITEMS} items")
-        return finished, size
+        self.open.add(id(value))
+        size = 1
+        for item in self._items(value):
+            size += self.count(item, depth + 1)
+            if size > MAX_ITEMS:
+                raise ValueError(f"it unfolds to more than {MAX_ITEMS} items")
+        self.open.discard(id(value))
+        self.sizes[id(value)] = size
+        return size
 
-    def _container(self, value: Any, depth: int) -> tuple[Any, int]:
-        if isinstance(value, _Array):
-            if value.values is None:
-                raise ValueError("its array is incomplete")
-            if isinstance(value.values, np.ndarray):
-                return value.values, 1
-        items = value.values if isinstance(value, _Array) else value.values() if isinstance(value, dict) else value
-        pairs = [self.of(item, depth) for item in cast(Any, items)]
-        finished, size = [item for item, _ in pairs], 1 + sum(count for _, count in pairs)
+    def _items(self, value: Any) -> Iterable[Any]:
         if isinstance(value, dict):
-            return dict(zip(value, finished, strict=True)), size
-        if isinstance(value, _Array):
-            array = np.empty(len(finished), dtype=object)
-            for place, item in enumerate(finished):
-                array[place] = item
-            return array.reshape(value.shape), size
-        return (tuple(finished) if isinstance(value, tuple) else finished), size
+            return value.values()
+        if isinstance(value, np.ndarray):
+            return value.ravel()
+        if isinstance(value, list | tuple):
+            return value
+        raise ValueError("it holds a name and no value")
 
 
-def _bytes(data: object) -> bytes:
+def _as_bytes(data: Any) -> bytes:
     if not isinstance(data, str | bytes | bytearray):
         raise ValueError("its bytes are none")
     return data.encode("latin-1") if isinstance(data, str) else bytes(data)
 
 
-def _quoted(line: bytes) -> str:
-    text = line.strip()
-    if len(text) < 2 or text[:1] not in (b'"', b"'") or text[-1:] != text[:1] or not line.endswith(b"\n"):
-        raise ValueError("it is damaged")
-    return cast(bytes, codecs.escape_decode(text[1:-1])[0]).decode("latin-1")
-
-
-def _checked(value: Any) -> Any:
-    if type(value) is int and not -(1 << 63) <= value < 1 << 64:
-        raise ValueError("it holds a number of more than 64 bits")
-    return value
-
-
-def _fill(container: Any, values: list[Any]) -> None:
-    if isinstance(container, list):
-        container.extend(values)
-    elif isinstance(container, dict) and len(values) % 2 == 0:
-        if not all(isinstance(key, str | bytes | int | float | None) for key in values[::2]):
-            raise ValueError("a key of its table is no plain value")
-        container.update(zip(values[::2], values[1::2], strict=True))
-    else:
-        raise ValueError("it fills something that is no list or table")
+def _fill_table(table: Any, items: list[Any]) -> None:
+    # Keys are looked at before they are hashed: a deep tuple would end the process.
+    if not isinstance(table, dict) or len(items) % 2:
+        raise ValueError("it fills something that is no table")
+    if not all(isinstance(key, str | bytes | int | float | None) for key in items[::2]):
+        raise ValueError("a key of its table is no plain value")
+    table.update(zip(items[::2], items[1::2], strict=True))

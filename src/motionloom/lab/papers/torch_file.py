@@ -1,17 +1,17 @@
-"""Files of `torch.save`, read without torch's own reader: plain values and tensors, nothing that acts.
+"""Files of `torch.save`, read by `torch.load(weights_only=True)` behind a look at their names and sizes.
 
-The archive is read once and by one reader, so that what was measured is what is used: members must be stored and not
-packed, and hold together no more than the file. The pickle inside is read as `lab.papers.plain_pickle` reads all of
-them, with the few names that state dicts need; every tensor must lie within the bytes that are there. Files of before
-torch 1.6 (a row of pickles, then the numbers) are read too.
+Torch's own weights-only reader trusts what a file says of sizes, and calls a few things besides. So the pickle inside
+is read first as `lab.papers.plain_pickle` reads all of them, with the few names that state dicts need: every tensor
+must lie within numbers that are there. An archive is then packed anew from the members that were looked at, so that
+torch reads the very bytes that were measured. Files of before torch 1.6 (a row of pickles, then the numbers) are read
+too.
 """
 
 import io
 import struct
 import zipfile
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,23 +20,35 @@ from torch import Tensor
 
 from motionloom.errors import MotionloomError
 from motionloom.io.text import read_bytes
-from motionloom.lab.papers.plain_pickle import BROKEN, NAMES, Machine, Name
+from motionloom.lab.papers.plain_pickle import BROKEN, NAMES, OPERATIONS, PlainUnpickler
 
 MAX_BYTES = 2 << 30
 MAX_MEMBERS = 100_000
 _OLD = b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19." + b"\x80\x02M\xe9\x03."
 """How files of before torch 1.6 begin: a magic number, and version 1001."""
+_OLD_HEAD = {
+    "protocol_version": 1001,
+    "little_endian": True,
+    "type_sizes": {"short": 2, "int": 4, "long": 4},
+}
 _TYPES = {
-    "FloatStorage": torch.float32, "DoubleStorage": torch.float64, "HalfStorage": torch.float16,
-    "BFloat16Storage": torch.bfloat16, "LongStorage": torch.int64, "IntStorage": torch.int32,
-    "ShortStorage": torch.int16, "CharStorage": torch.int8, "ByteStorage": torch.uint8, "BoolStorage": torch.bool,
-}  # fmt: skip
+    "FloatStorage": torch.float32,
+    "DoubleStorage": torch.float64,
+    "HalfStorage": torch.float16,
+    "BFloat16Storage": torch.bfloat16,
+    "LongStorage": torch.int64,
+    "IntStorage": torch.int32,
+    "ShortStorage": torch.int16,
+    "CharStorage": torch.int8,
+    "ByteStorage": torch.uint8,
+    "BoolStorage": torch.bool,
+}
+
 _NAMES = {
     **NAMES,
-    ("collections", "OrderedDict"): "OrderedDict",
+    ("collections", "OrderedDict"): "table",
     ("torch._utils", "_rebuild_tensor_v2"): "tensor",
     ("torch._utils", "_rebuild_parameter"): "parameter",
-    **{("torch", kind): kind for kind in _TYPES},
 }
 
 
@@ -51,10 +63,11 @@ def read_torch_file(path: Path | str) -> Any:
     """
     try:
         data = read_bytes(path, max_bytes=MAX_BYTES)
-        return _from_archive(data) if data.startswith(b"PK") else _from_row(data)
+        checked = _checked_archive(data) if data.startswith(b"PK") else _checked_row(data)
+        return torch.load(checked, map_location="cpu", weights_only=True)
     except MotionloomError:
         raise
-    except (*BROKEN, zipfile.BadZipFile, struct.error, EOFError, OSError, RuntimeError) as error:
+    except (*BROKEN, zipfile.BadZipFile, OSError, RuntimeError) as error:
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise MotionloomError(f"{path} holds more than tensors or is damaged, and is not opened ({reason})") from None
 
@@ -65,7 +78,8 @@ def is_plain(value: Tensor) -> bool:
     return usual and value.is_contiguous() and value.nbytes <= value.untyped_storage().nbytes()
 
 
-def _from_archive(data: bytes) -> object:
+def _checked_archive(data: bytes) -> io.BytesIO:
+    """The archive of the members that were looked at; ValueError where one is not what the pickle says of it."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = archive.infolist()
         if len(members) > MAX_MEMBERS or any(m.compress_type != zipfile.ZIP_STORED for m in members):
@@ -79,145 +93,119 @@ def _from_archive(data: bytes) -> object:
         known = {m.filename.removeprefix(top): m for m in members}
         if "byteorder" in known and archive.read(known["byteorder"]) != b"little":
             raise ValueError("its numbers are big-endian")
-        machine = _TorchMachine(len(data), _NAMES)
-        value = machine.run(io.BytesIO(archive.read(pickles[0])))
-        for key, storage in machine.storages.items():
-            if f"data/{key}" not in known:
-                raise ValueError("its archive lacks the numbers of a tensor")
-            storage.fill(archive.read(known[f"data/{key}"]))
-    return _with_tensors(value)
+        pickled = archive.read(known["data.pkl"])
+        look = _Look(io.BytesIO(pickled), len(data))
+        look.value()
+        again = io.BytesIO()
+        with zipfile.ZipFile(again, "w", zipfile.ZIP_STORED) as checked:
+            checked.writestr("checked/data.pkl", pickled)
+            checked.writestr("checked/version", "3\n")
+            checked.writestr("checked/byteorder", "little")
+            for key, storage in look.storages.items():
+                if f"data/{key}" not in known:
+                    raise ValueError("its archive lacks the numbers of a tensor")
+                numbers = archive.read(known[f"data/{key}"])
+                if len(numbers) != storage.size:
+                    raise ValueError(f"{len(numbers)} bytes are there for {storage.count} numbers")
+                checked.writestr(f"checked/data/{key}", numbers)
+    again.seek(0)
+    return again
 
 
-def _from_row(data: bytes) -> object:
+def _checked_row(data: bytes) -> io.BytesIO:
     """A magic number, a version, what machine it was, the value, the names of storages, then each one's numbers."""
     if not data.startswith(_OLD):
         raise ValueError("it is no file of torch.save")
     stream = io.BytesIO(data)
     stream.seek(len(_OLD))
-    if Machine(len(data)).run(stream) != {**_ROW_HEAD, "type_sizes": {"short": 2, "int": 4, "long": 4}}:
+    if PlainUnpickler(stream, len(data)).value() != _OLD_HEAD:
         raise ValueError("it was written on a machine of another kind")
-    machine = _TorchMachine(len(data), _NAMES)
-    value = machine.run(stream)
-    keys = Machine(len(data)).run(stream)
-    if not isinstance(keys, list) or set(keys) != set(machine.storages) or len(set(keys)) != len(keys):
+    look = _Look(stream, len(data))
+    look.value()
+    keys = PlainUnpickler(stream, len(data)).value()
+    if not isinstance(keys, list) or set(keys) != set(look.storages) or len(set(keys)) != len(keys):
         raise ValueError("it does not hold the numbers of its tensors")
     for key in keys:
-        storage = machine.storages[key]
+        storage = look.storages[key]
         if stream.read(8) != struct.pack("<q", storage.count):
             raise ValueError("it does not hold the numbers of its tensors")
-        storage.fill(stream.read(min(storage.size, len(data))))
-    return _with_tensors(value)
+        if stream.seek(storage.size, io.SEEK_CUR) > len(data):
+            raise ValueError(f"fewer bytes are there than {storage.count} numbers have")
+    stream.seek(0)
+    return stream
 
 
-_ROW_HEAD = {"protocol_version": 1001, "little_endian": True}
-
-
-@dataclass(eq=False)
+@dataclass(frozen=True)
 class _Storage:
     """Numbers of one kind, of which tensors are parts."""
 
     kind: torch.dtype
     count: int
-    numbers: Tensor = field(default_factory=lambda: torch.empty(0))
 
     @property
     def size(self) -> int:
         """Bytes."""
         return self.count * self.kind.itemsize
 
-    def fill(self, data: bytes) -> None:
-        """Take the numbers; raises ValueError unless they are as many as was said."""
-        if len(data) != self.size:
-            raise ValueError(f"{len(data)} bytes are there for {self.count} numbers")
-        if data:
-            self.numbers = torch.frombuffer(bytearray(data), dtype=self.kind)
-        else:
-            self.numbers = torch.empty(0, dtype=self.kind)
 
-
-@dataclass(eq=False)
 class _Part:
-    """A tensor whose numbers are not read yet."""
-
-    storage: _Storage
-    first: int
-    shape: tuple[int, ...]
-    strides: tuple[int, ...]
-
-    @cached_property
-    def tensor(self) -> Tensor:
-        """The tensor; raises ValueError where it is not within its storage."""
-        if not _whole(self.first, *self.shape, *self.strides) or len(self.shape) != len(self.strides):
-            raise ValueError("a tensor has no shape")
-        reach = self.first + 1 + sum((n - 1) * step for n, step in zip(self.shape, self.strides, strict=True))
-        if all(self.shape) and reach > self.storage.count:
-            raise ValueError("a tensor reaches beyond its numbers")
-        if not all(self.shape):
-            return torch.empty(self.shape, dtype=self.storage.kind)
-        return torch.as_strided(self.storage.numbers, self.shape, self.strides, self.first)
+    """Stands for a tensor that lies within its numbers."""
 
 
-def _whole(*numbers: object) -> bool:
+def _whole(numbers: Iterable[object]) -> bool:
     return all(type(n) is int and 0 <= n < 1 << 62 for n in numbers)
 
 
-@dataclass
-class _TorchMachine(Machine):
-    """Reads a pickle in which tensors are named by the storages that follow it."""
+class _Look(PlainUnpickler):
+    """Reads a pickle in which tensors are named by the storages that follow it, and measures them."""
 
-    storages: dict[str, _Storage] = field(default_factory=dict)
+    names = _NAMES
+    operations = OPERATIONS | {"BINPERSID"}
+    leaves = (*PlainUnpickler.leaves, _Part)
 
-    def _step(self, name: str, value: Any) -> None:
-        if name == "BINPERSID":
-            (said,) = self._take(1)
-            self.stack.append(self._storage(said))
-        else:
-            super()._step(name, value)
+    def __init__(self, stream: io.BytesIO, limit: int) -> None:
+        super().__init__(stream, limit)
+        self.storages: dict[str, _Storage] = {}
 
-    def _storage(self, said: Any) -> _Storage:
-        if (
-            not isinstance(said, tuple)
-            or len(said) not in (5, 6)
-            or said[0] != "storage"
-            or said[5:] not in ((), (None,))
-        ):
+    def find_class(self, module: str, name: str) -> Any:
+        """See `PlainUnpickler.find_class`; a kind of storage is known by its numbers' type."""
+        return _TYPES[name] if module == "torch" and name in _TYPES else super().find_class(module, name)
+
+    def persistent_load(self, pid: Any) -> _Storage:
+        """A storage by its name; ValueError where the same name is two kinds, or it names anything else."""
+        if not isinstance(pid, tuple) or len(pid) not in (5, 6) or pid[0] != "storage" or pid[5:] not in ((), (None,)):
             raise ValueError("it names something outside")
-        _, kind, key, _, count = said[:5]
-        if not isinstance(kind, Name) or kind.word not in _TYPES or not isinstance(key, str) or not _whole(count):
+        _, kind, key, _, count = pid[:5]
+        if not isinstance(kind, torch.dtype) or not isinstance(key, str) or not _whole([count]):
             raise ValueError("it names numbers of no known kind")
-        storage = self.storages.setdefault(key, _Storage(_TYPES[kind.word], count))
-        if (storage.kind, storage.count) != (_TYPES[kind.word], count):
+        if self.storages.setdefault(key, _Storage(kind, count)) != _Storage(kind, count):
             raise ValueError("it names the same numbers as two kinds")
-        return storage
+        return self.storages[key]
 
-    def made_of(self, word: str, arguments: tuple[Any, ...]) -> object:
-        """See `Machine.made_of`."""
-        if word == "OrderedDict" and not arguments:
-            return {}
-        if word == "parameter" and len(arguments) == 3 and isinstance(arguments[0], _Part):
-            return arguments[0]
-        if word == "tensor" and len(arguments) >= 4:
-            storage, first, shape, strides = arguments[:4]
-            if isinstance(storage, _Storage) and isinstance(shape, tuple) and isinstance(strides, tuple):
-                if len(shape) > 16:
-                    raise ValueError("a tensor has more than 16 dimensions")
-                return _Part(storage, first, shape, strides)
-        return super().made_of(word, arguments)
+    def make_table(self) -> dict[Any, Any]:
+        """An ordered dictionary, filled later."""
+        return {}
 
-    def build(self, made: object, state: object) -> None:
-        """See `Machine.build`; what an ordered dictionary has beside its entries (`_metadata`) is not needed."""
-        if not (isinstance(made, dict) and isinstance(state, dict)):
-            super().build(made, state)
+    def make_parameter(self, part: Any, *more: Any) -> _Part:
+        """A tensor that was trained."""
+        if not isinstance(part, _Part):
+            raise ValueError("its parameter is no tensor")
+        return part
 
+    def make_tensor(self, storage: Any, first: Any, shape: Any, strides: Any, *more: Any) -> _Part:
+        """A tensor, if it lies within its numbers."""
+        if not isinstance(storage, _Storage) or not isinstance(shape, tuple) or not isinstance(strides, tuple):
+            raise ValueError("a tensor is incomplete")
+        if len(shape) > 16:
+            raise ValueError("a tensor has more than 16 dimensions")
+        if not _whole([first, *shape, *strides]) or len(shape) != len(strides):
+            raise ValueError("a tensor has no shape")
+        reach = first + 1 + sum((n - 1) * step for n, step in zip(shape, strides, strict=True))
+        if all(shape) and reach > storage.count:
+            raise ValueError("a tensor reaches beyond its numbers")
+        return _Part()
 
-def _with_tensors(value: object) -> object:
-    """The value with its tensors in their places."""
-    if isinstance(value, _Part):
-        return value.tensor
-    if isinstance(value, _Storage):
-        raise ValueError("it holds numbers that are no tensor")
-    if isinstance(value, Mapping):
-        return {key: _with_tensors(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return type(value)(_with_tensors(inner) for inner in value)
-    return value
+    def build(self, built: Any, state: Any) -> None:
+        """See `PlainUnpickler.build`; what an ordered dictionary has beside its entries (`_metadata`) is let be."""
+        if not (isinstance(built, dict) and isinstance(state, dict)):
+            super().build(built, state)

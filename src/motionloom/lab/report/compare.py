@@ -21,7 +21,7 @@ Z = 1.96
 CONTROLS = (REAL, "shuffled", "chance")
 CLOCKED = ("ms", "per_second", "memory")
 """Columns of suites about quality that a busier or another machine changes; the suite of speed is for these."""
-SUBJECT = ("weights",)
+SUBJECT = ("weights", "files")
 """Keys of a protocol that say what was measured rather than how; in the suite of the evaluator, itself as well."""
 
 

@@ -1,7 +1,8 @@
 """The page of results: each suite's report between its own pair of marker comments.
 
-``<!-- suite NAME -->`` and ``<!-- end -->`` enclose what is replaced; all else stays as people wrote it. Filling twice
-changes nothing.
+``<!-- suite NAME; of WEIGHTS HASH -->`` and ``<!-- end -->`` enclose what is replaced; all else stays as people wrote
+it. The hashes are those of the weight files that were measured, so that a page can be held against the files that ship
+(`tools/fill_readme.py`). Filling twice changes nothing.
 """
 
 import re
@@ -13,7 +14,9 @@ from motionloom.lab.report.files import write_text
 from motionloom.lab.report.report import Report, markdown
 from motionloom.reading import read_bytes
 
-PLACE = re.compile(r"(<!-- suite ([\w.-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+PLACE = re.compile(r"(<!-- suite ([\w.-]+)(?:; of [^\n]*?)? -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+FILES = "files"
+"""Key of a protocol: name and hash of each weight file that was measured."""
 QUICK_MARK = "<!-- quick -->\n"
 LARGEST = 8 << 20
 
@@ -38,9 +41,15 @@ def fill(text: str, reports: Sequence[Report], *, again: bool = False) -> tuple[
         if quick and full_before and not again:
             left.append(report.suite)
             return found[0]
-        return f"{found[1]}{QUICK_MARK if quick else ''}{shown(report)}{found[4]}"
+        return f"{_opening(report)}{QUICK_MARK if quick else ''}{shown(report)}{found[4]}"
 
     return PLACE.sub(one, text), left
+
+
+def _opening(report: Report) -> str:
+    files = report.protocol.get(FILES)
+    of = f"; of {', '.join(f'{name} {mark}' for name, mark in files.items())}" if isinstance(files, dict) else ""
+    return f"<!-- suite {report.suite}{of.replace('-->', '')} -->\n"
 
 
 def shown(report: Report) -> str:

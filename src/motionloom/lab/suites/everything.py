@@ -14,6 +14,8 @@ from motionloom.io.text import plain_json
 from motionloom.lab.report import files
 from motionloom.lab.report import report as reports
 from motionloom.lab.report.report import Report
+from motionloom.lab.report.results import FILES
+from motionloom.lab.suites.harness import weight_marks
 from motionloom.lab.suites.needs import NoData
 from motionloom.lab.suites.registry import SUITES, Job, Suite
 from motionloom.reading import read_bytes
@@ -88,6 +90,7 @@ def _one(suite: Suite, job: Job, folder: Path, *, again: bool) -> Outcome:
         made = suite.run(replace(job, folder=parts), settings)
         if job.quick:
             made = replace(made, protocol={**made.protocol, "quick": True}, notes=(QUICK, *made.notes))
+        made = replace(made, protocol={**made.protocol, FILES: weight_marks(suite.weights(job))})
         (folder / "done.json").unlink(missing_ok=True)  # a kill before the next line must not pair it with this report
         reports.write(made, folder)
         files.write_json(folder / "done.json", {"fingerprint": mark, "settings": dict(settings), "quick": job.quick})

@@ -133,6 +133,11 @@ def check_names(names: Sequence[str], known: Collection[str], what: str) -> None
         raise MotionloomError(f"the {what} are {', '.join(known)}; got {', '.join(names)[:200] or 'none'}")
 
 
+def weight_marks(paths: Sequence[Path]) -> dict[str, str]:
+    """Name of each weight file and the first 12 digits of its SHA-256, by which pages say what they measured."""
+    return {path.stem: digest(path)[:12] for path in paths}
+
+
 def digest(path: Path) -> str:
     """Changes with the content of a file."""
     with path.open("rb") as file:

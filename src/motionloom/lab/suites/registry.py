@@ -15,7 +15,9 @@ from motionloom.lab.report.report import Report
 from motionloom.lab.suites import needs, obey, physical, realism
 from motionloom.lab.suites.control_kinds import QUICK, SUITE
 from motionloom.lab.suites.harness import Generate, Run, Say, digest, evaluator_file, silent
-from motionloom.weights.prior import Prior, shipped
+from motionloom.weights.prior import Prior, find_weights, shipped
+
+HERE = Path(__file__).parent
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,13 @@ class Suite:
     """Further files whose content changes the numbers, the weights under test aside."""
     needs: Callable[[Path], None] = lambda data: None
     """Raises `needs.NoData` where the data have nothing of the kind it measures."""
+    prior: bool = True
+    """Whether the job's weights are measured; else only `files` are."""
+
+    def weights(self, job: Job) -> list[Path]:
+        """The weight files that the numbers are of; real motion that ships beside a suite is none."""
+        files = [path for path in self.files(job) if path.suffix == ".safetensors" and path.parent != HERE]
+        return [*([find_weights(job.weights)] if self.prior else []), *files]
 
     def settings(self, quick: bool) -> Mapping[str, Any]:
         """Those of a quick or of a full run."""
@@ -234,7 +243,7 @@ SUITES: tuple[Suite, ...] = (
     Suite("prediction", "many futures of held-out pasts beside what came, baselines and the published sampler",
           _prediction, {"windows": 64, "samples": 50, "published_steps": 100},
           {"windows": 6, "samples": 6, "published_steps": 20}, "needed", _predictors,
-          needs.need_recordings),
+          needs.need_recordings, False),
     Suite("duet-completion", "two people's next seconds beside what came, the prior alone and standing still",
           _completion, {"crops": 200, "samples": 5, "steps": 24}, {"crops": 6, "samples": 2, "steps": 6},
           "needed", _blocks, needs.need_pairs),
@@ -252,7 +261,7 @@ SUITES: tuple[Suite, ...] = (
     Suite("realism", "skate, penetration, jerk, bones and speeds beside real clips", _realism,
           {"count": 64}, {"count": 16}, "used"),
     Suite("evaluator", "what the shipped evaluator notices on held-out real motions", _evaluator,
-          {"repeats": 20}, {"repeats": 2}, "needed", _judge, needs.need_captions),
+          {"repeats": 20}, {"repeats": 2}, "needed", _judge, needs.need_captions, False),
     Suite("agreement", "whether the evaluator's ranking agrees with physical obedience", _agreement,
           {"seeds": 4}, {"seeds": 1}, "", _judge),
     Suite("speed", "time and memory as ratios within one run", _speed, {"quick": False}, {"quick": True}),
