@@ -13,11 +13,11 @@ from tests.kinematics import people
 
 
 def living(seconds: float = 4.0, *, turned: float = 0.0) -> np.ndarray:
-    """Somebody who stands, shifts the hips by two centimetres and lets the hands hang."""
+    """Somebody who stands, sways by five centimetres and lets the hands hang."""
     body = people.standing(seconds)
-    wave = np.sin(2 * np.pi * np.arange(len(body)) / (FPS * 2.5))
+    wave = np.sin(2 * np.pi * np.arange(len(body)) / (FPS * 1.2))
     high = np.clip(body[..., 1:2] - 0.1, 0, 1)
-    body = body + 0.02 * wave[:, None, None] * high * np.array([1.0, 0.0, 0.0])
+    body = body + 0.05 * wave[:, None, None] * high * np.array([1.0, 0.0, 0.0])
     return ph.turned(body, np.full((len(body), 1), turned)) + np.array([1.0, 0.0, 2.0])
 
 
@@ -63,6 +63,6 @@ def test_a_pose_in_which_nobody_stands_is_held_and_sways_as_recorded() -> None:
     assert not augment.stands_on(sitting[-1], idle)
     longer = augment.held(sitting, 0, 60, fps=FPS, seed=1, idle=idle)
     tail = longer[len(sitting) :]
-    assert np.abs(tail - sitting[-1]).max() < 0.06
+    assert np.abs(tail - sitting[-1]).max() < 0.12
     assert np.ptp(tail[:, 15, 0]) > 0.01
     np.testing.assert_allclose(tail[:, [10, 11]], np.broadcast_to(sitting[-1, [10, 11]], (60, 2, 3)), atol=5e-3)

@@ -207,8 +207,10 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = au
         length = min(note.last - note.first, int(rng.integers(70, 160)))
         first = note.first + int(rng.integers(note.last - note.first - length + 1))
         side = str(rng.choice(["left", "right"]))
+        alive = idle.body(length, rng) if where == "stand" else None
         body = hml.decode_positions(below.features[first : first + length].astype(np.float64))
-        if where == "stand" and rng.random() < 0.7:
+        body = at_origin(body if alive is None else alive)
+        if where == "stand" and alive is None and rng.random() < 0.7:
             body = lower_arms(body)
         begin = float(rng.uniform(0.8, 1.0))
         needed = round(FPS * (begin + 1.5 * gesture.times))
@@ -274,9 +276,11 @@ def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle =
     bodies = [found for found in _labelled(clips, ("stand",)).get("stand", []) if _stands_plainly(*found)]
     for number in range(round(count / 10) if bodies else 0):
         below, note = bodies[rng.integers(len(bodies))]
-        body = hml.decode_positions(below.features[note.first : note.first + 60].astype(np.float64))
-        if rng.random() < 0.7:
-            body = lower_arms(body)
+        body = idle.body(LOOPED, rng)
+        if body is None:
+            body = hml.decode_positions(below.features[note.first : note.first + 60].astype(np.float64))
+            if rng.random() < 0.7:
+                body = lower_arms(body)
         body = augment.held(body, 0, max(0, LOOPED - len(body)), fps=FPS, seed=seed * 100_003 + number, idle=idle)
         for kind, posture in enumerate(postures(body, rng)):
             begin = float(rng.uniform(0.8, 1.0))

@@ -14,13 +14,15 @@ from motionloom.features.layout import FPS
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 
-SHORTEST = 50
+SHORTEST = 30
 """Frames that a stretch has at least."""
-MOST = 160
+MOST = 60
 """Stretches that are kept of all; the liveliest."""
-_PLANTED = 0.2
-"""Metres per second that ankles and toes move at most."""
-_HANDS = 0.9
+_ALIVE = 0.15
+"""Share of the frames in which some joint moves at 0.2 m/s or more: less is a statue."""
+_PLANTED = 0.4
+"""Metres per second that the stiller end of each foot moves at most."""
+_HANDS = 1.5
 """Metres per second that hands move at most."""
 
 
@@ -46,11 +48,15 @@ class Idle:
         near = [k for k in np.argsort(order)[:6] if np.sqrt((gaps[k] ** 2).mean()) < limit and order[k] < 2.5 * limit]
         return self.stretches[near[rng.integers(len(near))]] if near else None
 
+    def body(self, frames: int, rng: np.random.Generator) -> Array | None:
+        """Somebody who stands for so many frames: (frames, 22, 3) metres."""
+        return extended(self.stretches[rng.integers(len(self.stretches))], frames) if self.stretches else None
+
     def sway(self, frames: int, rng: np.random.Generator) -> Array | None:
         """How a standing body moves about its first pose: (frames, 22, 3) metres, left, up and forward of it."""
-        if not self.stretches:
+        stretch = self.body(frames, rng)
+        if stretch is None:
             return None
-        stretch = extended(self.stretches[rng.integers(len(self.stretches))], frames)
         own = _from_feet(stretch)
         return own - own[:1]
 
@@ -75,7 +81,9 @@ def find_idle(clips: Sequence[Clip]) -> Idle:
             continue
         positions = hml.decode_positions(clip.features.astype(np.float64))
         for first, last in _spans(_stands(positions)):
-            found.append((float(_liveliness(positions[first:last])), positions[first:last]))
+            alive = _liveliness(positions[first:last])
+            if alive >= _ALIVE:
+                found.append((alive, positions[first:last]))
     found.sort(key=lambda one: -one[0])
     return Idle(tuple(stretch for _, stretch in found[:MOST]))
 
@@ -84,12 +92,14 @@ def _stands(positions: Array) -> np.ndarray:
     """(frames,) bool: upright on both planted feet that are side by side, with hanging hands that do nothing fast."""
     speed = np.linalg.norm(ph.velocity(positions, FPS), axis=-1)
     trunk = positions[:, [16, 17]].mean(axis=1) - positions[:, [1, 2]].mean(axis=1)
-    upright = trunk[:, 1] > 0.96 * np.linalg.norm(trunk, axis=-1)
-    hanging = positions[:, [20, 21], 1].max(axis=1) < positions[:, 6, 1]
-    apart = np.linalg.norm((positions[:, 7] - positions[:, 8])[:, [0, 2]], axis=-1) < 0.4
-    planted = (speed[:, [7, 8, 10, 11]].max(axis=1) < _PLANTED) & (positions[:, [10, 11], 1].max(axis=1) < 0.08)
-    tall = positions[:, 0, 1] > 0.88
-    return planted & upright & hanging & apart & tall & (speed[:, [20, 21]].max(axis=1) < _HANDS)
+    upright = trunk[:, 1] > 0.94 * np.linalg.norm(trunk, axis=-1)
+    hanging = positions[:, [20, 21], 1].max(axis=1) < positions[:, 9, 1]
+    apart = np.linalg.norm((positions[:, 7] - positions[:, 8])[:, [0, 2]], axis=-1) < 0.5
+    planted = (np.minimum(speed[:, [7, 8]], speed[:, [10, 11]]) < _PLANTED).all(axis=1)
+    low = positions[:, [10, 11], 1].max(axis=1) < 0.1
+    return (
+        planted & low & upright & hanging & apart & (positions[:, 0, 1] > 0.84) & (speed[:, [20, 21]] < _HANDS).all(1)
+    )
 
 
 def _spans(holds: np.ndarray) -> list[tuple[int, int]]:
@@ -98,5 +108,5 @@ def _spans(holds: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _liveliness(stretch: Array) -> float:
-    """Metres per second, the mean over joints and frames."""
-    return float(np.linalg.norm(ph.velocity(stretch, FPS), axis=-1).mean())
+    """The share of frames in which some joint moves at 0.2 m/s or more."""
+    return float((np.linalg.norm(ph.velocity(stretch, FPS), axis=-1).max(axis=1) >= 0.2).mean())

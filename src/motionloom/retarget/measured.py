@@ -30,6 +30,8 @@ _BENT = 0.15
 """Sine of a knee's or an elbow's bend from which on the plane of the bend is known."""
 _SLOPES = np.radians((-10, 45))
 """By how much the bone to the toes points down on feet that are flat; a rest pose with others is on its toes."""
+_FOOT = 0.24
+"""Lengths of the shin: a shorter bone leads down to the ground below the ankle and not to the toes."""
 _DOUBTFUL = 0.005
 """The weight of a frame that says little, beside 1: it counts where no frame says more."""
 
@@ -89,12 +91,18 @@ def measure_sole(places: Array, world: Array, driver: int | None, *, rest: Array
 
     places: (frames, 22, 3) metres, y up; world: (frames, joints, 4) the joints' orientations; driver: the joint that
     turns the foot; rest: (22, 3) metres, a rest pose that is upright along y; foot: SMPL's number of the ankle. None
-    where the rest pose has flat feet, or where the foot never stands.
+    where the rest pose has flat feet, or where the foot never stands and its bone is too short to lead to toes.
     """
-    stands = _stands(places, foot)
-    if driver is None or stands.sum() < 3 or stands_on_flat_feet(rest, foot):
+    if driver is None or stands_on_flat_feet(rest, foot):
         return None
-    soles = rot.multiply(rot.inverse(world[stands, driver]), _level_sole(places, foot)[stands])
+    stands, length = _stands(places, foot), np.linalg.norm(rest[foot + 3] - rest[foot])
+    if stands.sum() >= 3:
+        world_soles = _level_sole(places, foot)
+    elif length > _FOOT * np.linalg.norm(rest[foot] - rest[foot - 3]):
+        stands, world_soles = np.ones(len(places), dtype=bool), _sole(places, foot)
+    else:
+        return None
+    soles = rot.multiply(rot.inverse(world[stands, driver]), world_soles[stands])
     return mean_rotation(soles, np.ones(len(soles)))
 
 
