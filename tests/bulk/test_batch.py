@@ -294,6 +294,35 @@ def test_what_only_a_process_finds_out_is_reported_in_its_sentence(
     assert not list(folder.glob("out/shard-*"))
 
 
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("1 / 0", r"a process that makes motions failed \(ZeroDivisionError: division by zero\)$"),
+        ("import os; os._exit(7)", r"end before they begin, by exit code 7: what they printed says more$"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", r"by signal 9: is there enough memory\?$"),
+    ],
+    ids=["an exception", "an end", "a kill"],
+)
+def test_what_ends_every_process_is_told_and_memory_is_asked_for_where_one_was_killed(
+    weights: str, folder: Path, monkeypatch: pytest.MonkeyPatch, line: str, said: str
+) -> None:
+    (folder / "fatal_judge.py").write_text(line + "\n")
+    monkeypatch.setenv("PYTHONPATH", str(folder))
+    with pytest.raises(MotionloomError, match=said):
+        list(batch(rows(2), folder / "out", options=options(weights, judge="fatal_judge:judge"), where=ONE))
+    assert not list(folder.glob("out/shard-*"))
+
+
+def test_a_judge_that_fails_at_one_row_is_that_rows_error(
+    weights: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folder / "row_judge.py").write_text("def judge(text, places, fps):\n    return 1 / ('jumps' not in text) > 0\n")
+    monkeypatch.setenv("PYTHONPATH", str(folder))
+    found = list(batch(rows(6), folder / "out", options=options(weights, judge="row_judge:judge"), where=ONE))
+    assert [one.state for one in found] == ["made", "made", "failed"] * 2
+    assert "ZeroDivisionError: division by zero" in found[2].why
+
+
 def test_the_table_has_a_row_for_every_row(weights: str, folder: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     out = folder / "out"

@@ -1,5 +1,6 @@
 """Who works in a folder: one driver for each shard, and what becomes of the claims of those who died."""
 
+import errno
 import json
 import os
 import signal
@@ -152,6 +153,16 @@ def test_a_driver_that_was_taken_for_dead_notices(monkeypatch: pytest.MonkeyPatc
         with pytest.raises(MotionloomError, match="took over out"):
             held.check()
     assert other.exists()  # which is not its own to remove
+
+
+def test_a_claim_for_which_there_is_no_room_is_told_and_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(value: object, file: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(claim_module.json, "dump", full)
+    with pytest.raises(MotionloomError, match="cannot write to out: No space left"), claim(OUT, (0, 1)):
+        pass
+    assert not OUT.exists()
 
 
 def test_work_of_a_driver_who_lives_is_not_cleared() -> None:

@@ -2,13 +2,16 @@
 
 import json
 import os
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
-from motionloom.bulk.batch import Where, batch
+from motionloom.bulk.batch import Where, batch, run
 from motionloom.bulk.claim import Driver
+from motionloom.bulk.jobs import Jobs
+from motionloom.bulk.metadata import read_batch
 from motionloom.bulk.verify import Verified, verify
 from motionloom.cli import main
 from motionloom.errors import MotionloomError
@@ -73,6 +76,25 @@ def test_what_is_lost_or_foreign_is_damage_and_what_was_never_made_is_not(weight
     (OUT / "metadata.jsonl").unlink(missing_ok=True)
     (OUT / "metadata.parquet").unlink(missing_ok=True)
     assert verify(OUT) == Verified(2, 3, 4 + 2, 0, ())  # as of a batch that is under way
+
+
+@pytest.mark.parametrize("cut", [lambda data: data.split(b"\n")[0], flipped], ids=["cut", "flipped"])
+def test_a_damaged_shard_is_read_by_nobody_and_left_out_of_no_table(
+    weights: str, cut: Callable[[bytes], bytes]
+) -> None:
+    """Before, its rows were missing without a word."""
+    make(weights)
+    record = OUT / "records" / "000001.jsonl"
+    record.write_bytes(cut(record.read_bytes()))
+    with pytest.raises(MotionloomError, match=r"shard 1 of out is damaged; 'motionloom batch --verify out'"):
+        list(read_batch(OUT, motions=False))
+    (OUT / "records" / "000000.jsonl").unlink()
+    asked = options(weights, shard_rows=2)
+    with pytest.raises(MotionloomError, match="shard 1 of out is damaged"):  # which is another's to make
+        list(run(Jobs.of(rows(5)), OUT, options=asked, where=Where(1, (0, 2))))
+    list(run(Jobs.of(rows(5)), OUT, options=asked, where=Where(1, (1, 2))))
+    assert [one.state for one in read_batch(OUT, motions=False)] == ["made"] * 5
+    assert verify(OUT) == Verified(3, 3, 8, 0, ())
 
 
 def test_a_manifest_that_is_lost_is_written_anew_where_that_is_asked_for(weights: str) -> None:

@@ -25,6 +25,7 @@ from tests.io.gltf_skin import Scene
 from tests.io.rigged import Hero, wave
 from tests.io.test_bind_pose import place
 from tests.io.test_character import check_only_one_animation_is_new
+from tests.retarget.test_toes import heels_up, with_tips
 from tests.tasks.test_edit import person
 
 TINY = ("--steps", "2", "--no-foot-lock")
@@ -181,6 +182,74 @@ def test_the_same_three_in_a_bvh() -> None:
     np.testing.assert_allclose(np.ptp(found["hips"][:, 0], axis=0), 0, atol=1e-5)
     assert np.ptp(found["motion"][:, 0, 2]) > 0.5
     assert np.ptp(found["in-place"][:, 1, 2]) < 1e-5
+
+
+def test_toe_tips_of_a_bvh_skeleton_stay_out_of_the_floor() -> None:
+    tips = with_tips()
+    turns = np.tile([1.0, 0, 0, 0], (1, len(tips), 1))
+    save_bvh(Motion(tips, 30.0, np.zeros((1, 3)), turns), "tips.bvh")
+    save_bvh(heels_up(), "heels.bvh")
+    assert main(["export", "heels.bvh", "out.bvh", "--skeleton", "tips.bvh"]) == 0
+    assert io.load("out.bvh").positions()[..., 1].min() > -0.01
+
+
+# Several clips in one file -------------------------------------------------------------------------------------------
+
+
+def test_several_motions_become_clips_of_one_file() -> None:
+    """In one call, behind those that were there, or in their place."""
+    save_bvh(person(1.0, 20.0), "run.bvh")
+    line = ["export", "walk.bvh", "run.bvh", "--skeleton", "hero.glb", "--out", "out.glb"]
+    assert main(line) == 0
+    assert open_glb("out.glb").clips == ["wave", "walk", "run"]
+    assert [round(seconds, 2) for _, seconds in open_glb("out.glb").lengths] == [0.63, 1.97, 0.95]
+    assert main([*line, "--clip-name", "go", "--clip-name", "wave", "--force"]) == 0
+    assert open_glb("out.glb").clips == ["wave", "go", "wave_2"]
+    assert main([*line, "--clip-name", "go", "--replace", "--force"]) == 0
+    assert open_glb("out.glb").clips == ["go", "go_2"]
+    one = load_glb("out.glb", clip="go_2")
+    assert main(["export", "run.bvh", "alone.glb", "--skeleton", "hero.glb", "--replace"]) == 0
+    np.testing.assert_allclose(one.positions(), load_glb("alone.glb").positions(), atol=1e-6)
+
+
+def test_what_one_of_our_clips_moves_is_held_in_the_others(tmp_path: Path) -> None:
+    character = load_character("hero.glb")
+    still = Motion(
+        character.skeleton, 20.0, np.tile(character.skeleton.offsets[0], (5, 1)),
+        np.tile([1.0, 0, 0, 0], (5, len(character.skeleton), 1)),
+    )  # fmt: skip
+    turns = still.rotations.copy()
+    finger = character.skeleton.index("finger")
+    turns[:, finger] = [0.5, 0.5, 0.5, 0.5]
+    scene = Scene(character.save_clips([(replace(still, rotations=turns), "a"), (still, "b")], tmp_path / "two.glb"))
+    moved = {channel["target"]["node"] for channel in scene.clip("b")["channels"]}
+    assert character.rig.nodes[finger] in moved
+
+
+def test_generate_writes_all_its_motions_into_one_file(weights: str) -> None:
+    line = ["generate", "a person walks", "a person turns", "--seconds", "1", "--weights", weights, *TINY]
+    assert main([*line, "--skeleton", "hero.glb", "--one-file", "--out", "out.glb", "--out", "film.npz"]) == 0
+    assert open_glb("out.glb").clips == ["wave", "a person walks", "a person turns"]
+    assert sorted(path.name for path in Path().glob("film*")) == ["film_0.npz", "film_1.npz"]
+    names = ["--clip-name", "walk", "--clip-name", "turn"]
+    assert main([*line, "--skeleton", "hero.glb", *names, "--out", "each.glb"]) == 0
+    assert [open_glb(f"each_{k}.glb").clips[-1] for k in (0, 1)] == ["walk", "turn"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("walk.bvh", "walk.bvh", "--out", "out.bvh"), "2 motions go into one file as animations of a character"),
+        (("walk.bvh",), "one file to write is needed"),
+        (("walk.bvh", "out.glb", "--skeleton", "hero.glb", "--clip-name", "a", "--clip-name", "b"), "needs one --clip"),
+    ],
+)
+def test_clips_that_cannot_be_are_refused(
+    words: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", *words]) == 2
+    assert said in complaint(capsys)
+    assert not list(Path().glob("out*"))
 
 
 # Where it stands -----------------------------------------------------------------------------------------------------

@@ -174,6 +174,61 @@ def test_soles_that_dip_raise_the_whole_character_but_no_leap(tmp_path: Path) ->
         assert (low > rest - 0.01) == raised, (angle, low, rest)
 
 
+def test_soles_of_one_that_was_made_with_z_up_stay_out_of_the_floor_too(tmp_path: Path) -> None:
+    turns = np.zeros((30, 22, 3))
+    turns[:, [7, 8], 0] = -0.7
+    standing = Motion(SMPL22, 30.0, np.tile(SMPL22.offsets[0], (30, 1)), rot.rotvec_to_quat(turns))
+    lower = standing.positions()[0, 10, 1] - SMPL22.rest_positions()[10, 1]
+    standing = replace(standing, root=standing.root - np.array([0.0, lower, 0.0]))
+    lying = Hero()
+    lying.json["nodes"][22]["rotation"] = [0.5**0.5, 0.0, 0.0, 0.5**0.5]
+    lowest = []
+    for hero in (Hero(), lying):
+        character = load_character(hero.write(tmp_path / "hero.glb"))
+        out = character.save(retarget(standing, character.skeleton), tmp_path / "out.glb", name="ours")
+        scene = Scene(out)
+        places = scene.vertices(scene.worlds(scene.clip("ours"), np.arange(30) / 30.0))
+        lowest.append(min(vertices[..., 1].min() for vertices in places.values()))
+    assert lowest[1] == pytest.approx(lowest[0], abs=2e-3)
+
+
+def said(hero: Hero, path: Path) -> str:
+    """What is remarked on a character as it is read."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        load_character(hero.write(path))
+    return "; ".join(str(one.message) for one in caught)
+
+
+def test_what_does_not_move_with_the_character_is_said(tmp_path: Path) -> None:
+    assert said(Hero(), tmp_path / "hero.glb") == ""
+    loose = Hero()
+    loose.json["nodes"] += [{"name": "helmet", "mesh": 0}, {"name": "shield", "mesh": 0}, {"name": "ring", "mesh": 0}]
+    loose.json["scenes"][0]["nodes"] += [25, 26]
+    loose.json["nodes"][23]["children"] = [27]
+    assert "'helmet', 'shield' hang on no bone and stay" in said(loose, tmp_path / "loose.glb")
+    two = Hero()
+    count = len(two.json["nodes"])
+    for node in copy.deepcopy(two.json["nodes"]):
+        node["children"] = [child + count for child in node.get("children", [])]
+        two.json["nodes"].append(
+            {key: value for key, value in node.items() if value != []} | ({"skin": 1} if "skin" in node else {})
+        )
+    skin = two.json["skins"][0]
+    two.json["skins"].append(skin | {"joints": [joint + count for joint in skin["joints"]]})
+    assert "holds 2 skeletons; the one of 'pelvis' moves" in said(two, tmp_path / "two.glb")
+
+
+def test_soles_that_are_not_known_are_said(tmp_path: Path) -> None:
+    squeezed = Hero()
+    squeezed.json["meshes"][0]["primitives"][0]["extensions"] = {"KHR_draco_mesh_compression": {"bufferView": 0}}
+    del squeezed.json["accessors"][squeezed.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"]]["bufferView"]
+    assert "its soles are not known" in said(squeezed, tmp_path / "draco.glb")
+    high = Hero()
+    high.json["nodes"][22]["translation"] = [0.0, 3.0, 0.0]
+    assert "does not stand on the floor at rest, so that its soles" in said(high, tmp_path / "high.glb")
+
+
 def test_feet_on_controls_are_carried_along(tmp_path: Path) -> None:
     """Feet that hang on the root instead of on their shins, as in rigs made for IK, stay on their legs."""
     hang = {"left_ankle": "pelvis", "right_ankle": "pelvis"}

@@ -11,7 +11,8 @@ from motionloom import rotations as rot
 from motionloom.io.character import load_character
 from motionloom.motion import Motion
 from motionloom.retarget import joint_map, retarget, to_smpl22
-from motionloom.skeleton import SMPL22
+from motionloom.skeleton import SMPL22, Skeleton
+from tests.io.gltf_skin import Scene
 from tests.io.rigged import wave
 from tests.shared import shared
 
@@ -47,6 +48,46 @@ def test_a_vrm_animation_comes_back(tmp_path: Path) -> None:
     back = io.load(io.save(motion, tmp_path / "wave.vrma"))
     assert joint_map(back.skeleton).names()["left_knee"] == {"left_knee": 1.0}
     np.testing.assert_allclose(back.positions()[:, -22:], motion.positions(), atol=1e-5)
+
+
+def played(path: Path, height: float) -> np.ndarray:
+    """(frames, 3) the way of an avatar's hips, that are so high at rest, by the specification's scale."""
+    scene = Scene(path)
+    hips = scene.json["extensions"]["VRMC_vrm_animation"]["humanoid"]["humanBones"]["hips"]["node"]
+    (clip,) = scene.json["animations"]
+    (moved,) = [c for c in clip["channels"] if c["target"] == {"node": hips, "path": "translation"}]
+    way = scene.values(clip["samplers"][moved["sampler"]]["output"])
+    return way * height / scene.worlds(None, np.zeros(1))[0, hips, 1, 3]
+
+
+def test_an_avatar_goes_as_far_as_with_the_clip_in_its_own_file(tmp_path: Path) -> None:
+    """Its hips are 12 cm lower over its legs than the uniform person's, under a bone on the ground."""
+    offsets = np.concatenate([[[0.0, 0.0, 0.0]], SMPL22.offsets])
+    offsets[1, 1] -= 0.12
+    offsets[[2, 3, 4], 1] += 0.12
+    names = ("root", *(f"bone {j}" for j in range(22)))
+    parts = {part: f"bone {SMPL22.index(part)}" for part in SMPL22.names}
+    avatar = Skeleton(names, (-1, *(p + 1 for p in SMPL22.parents)), offsets, humanoid=parts, on_floor=True)
+    walk = waving()
+    walk = Motion(SMPL22, 30.0, walk.root + np.linspace(0, 3, 40)[:, None] * [0.3, 0.0, 1.0], walk.rotations)
+    own = retarget(walk, avatar)
+    path = io.save(own, tmp_path / "walk.vrma")
+    hips = own.positions()[:, avatar.index("bone 0")]
+    np.testing.assert_allclose(played(path, avatar.rest_positions()[1, 1]), hips, atol=1e-5)
+    back = io.load(path)
+    moved = back.positions()[:, [back.skeleton.index(f"bone {j}") for j in range(22)]]
+    np.testing.assert_allclose(moved, own.positions()[:, 1:], atol=1e-5)
+
+
+def test_a_real_avatar_goes_as_far_too(tmp_path: Path) -> None:
+    skeleton = load_character(shared("rigs/vrm1_example.vrm")).skeleton
+    walk = waving()
+    own = retarget(
+        Motion(SMPL22, 30.0, walk.root + np.arange(40)[:, None] * [0.0, 0.0, 0.05], walk.rotations), skeleton
+    )
+    hips = skeleton.index(skeleton.humanoid["pelvis"])
+    found = played(io.save(own, tmp_path / "walk.vrma"), skeleton.rest_positions()[hips, 1])
+    np.testing.assert_allclose(found, own.positions()[:, hips], atol=1e-4)
 
 
 def test_somebody_elses_vrm_animation_moves_a_vrm_character(tmp_path: Path) -> None:

@@ -50,6 +50,8 @@ def walking(speed: float, seconds: float = 4.0, *, fps: float = FPS) -> np.ndarr
         for joint in (f"{side}_ankle", f"{side}_foot"):
             p[:, J[joint], 2] += place - speed * t
             p[:, J[joint], 1] += 0.2 * np.sin(np.pi * swing)  # over 5 cm one frame after lift-off
+        # knees are ahead of the line from hip to ankle, as people's are
+        p[:, J[f"{side}_knee"]] = (p[:, J[f"{side}_hip"]] + p[:, J[f"{side}_ankle"]]) / 2 + [0.0, 0.0, 0.05]
     return p
 
 

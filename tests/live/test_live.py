@@ -9,6 +9,7 @@ from motionloom.errors import MotionloomError
 from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer, Taken
 from motionloom.live.live import Frame, Live, motion_of
 from motionloom.live.settings import Settings
+from motionloom.live.words import stays
 from motionloom.motion import Motion
 from motionloom.weights.prior import Prior
 from tests.live import people
@@ -209,6 +210,118 @@ def test_a_wrist_reaches_its_place_in_time(real: Prior) -> None:
     live.reach("left_wrist", wanted, within=0.8)
     places = live.take(22).positions()[:, 20]
     assert np.linalg.norm(places[15:19] - wanted, axis=-1).min() < 0.06
+
+
+def fastest(motion: Motion) -> float:
+    """Metres per second of the pelvis over the floor at most."""
+    return float(np.linalg.norm(np.diff(motion.root[:, [0, 2]], axis=0), axis=-1).max() * motion.fps)
+
+
+def test_what_is_out_of_reach_is_walked_to_first(real: Prior) -> None:
+    wanted = np.array([3.0, 1.3, 1.0])
+    live = Live(real, seed=1)
+    live.take(20)
+    live.reach("right_wrist", wanted)
+    motion = live.take(160)
+    assert np.linalg.norm(motion.positions()[:, 21] - wanted, axis=-1).min() < 0.12
+    assert fastest(motion) < 2.5
+    assert fastest(motion.frames(140, 160)) < 0.3, "he stays there"
+
+
+@pytest.mark.parametrize("words", ["", "a person walks forward"])
+def test_nobody_flies_to_what_is_a_hundred_metres_away(real: Prior, words: str) -> None:
+    live = Live(real, seed=1)
+    live.say(words)
+    live.take(20)
+    live.reach("right_wrist", (100.0, 1.5, 0.0), within=0.6)
+    motion = live.take(120)
+    assert fastest(motion) < 2.5
+    assert motion.root[-1, 0] > 4.0, "he is on his way"
+
+
+def test_nobody_flies_back_to_what_he_has_left_behind(real: Prior) -> None:
+    """A far time, and a steering away from what is about to be reached."""
+    live = Live(real, seed=1)
+    live.say("a person walks forward")
+    live.reach("left_wrist", (0.3, 1.2, 0.6), within=12.0)
+    assert fastest(live.take(300)) < 2.5
+    other = Live(real, seed=1)
+    other.reach("right_wrist", (0.3, 1.2, 0.5), within=2.0)
+    other.take(10)
+    other.steer(-1.5, 3.0)
+    assert fastest(other.take(80)) < 6.0
+
+
+def test_two_hands_reach_far_places_one_after_the_other(real: Prior) -> None:
+    places = {20: np.array([-1.8, 1.2, 0.5]), 21: np.array([1.8, 1.2, 0.0])}
+    live = Live(real, seed=1)
+    live.take(20)
+    live.reach("right_wrist", places[21])
+    live.reach("left_wrist", places[20])
+    seen = live.take(240).positions()
+    for joint, place in places.items():
+        assert np.linalg.norm(seen[:, joint] - place, axis=-1).min() < 0.12
+
+
+def test_who_is_steered_elsewhere_gives_up_what_he_walked_to(real: Prior) -> None:
+    live = Live(real, seed=1)
+    live.reach("right_wrist", (5.0, 1.2, 0.0))
+    live.take(20)
+    live.steer(-np.pi / 2, 1.2)
+    motion = live.take(160)
+    assert motion.root[-1, 0] < -3.0
+    live.steer()
+    assert live.take(60).root[-1, 0] < -3.0
+
+
+def test_words_that_go_nowhere_end_a_steer_and_a_path(real: Prior) -> None:
+    for words in ("a person sits down", "a person stands still", "lies down on the floor"):
+        live = Live(real, seed=1)
+        live.steer(0.0, 3.0)
+        live.take(60)
+        live.say(words)
+        motion = live.take(70)
+        end = motion.root[-1] - motion.root[-20]
+        assert np.linalg.norm(end[[0, 2]]) < 0.6, words
+    live = Live(real, seed=1)
+    live.path([(0.0, 8.0)])
+    live.take(40)
+    live.say("a person sits down")
+    assert live.take(120).root[-1, 2] < 5.0
+
+
+def test_who_is_steered_while_words_go_nowhere_goes_in_other_words(prior: Prior) -> None:
+    live = Live(prior, settings=QUICK)
+    live.say("a person sits down")
+    assert next(live).words == "a person sits down"
+    live.steer(0.0, 1.2)
+    assert played(live, {}, 6)[-1].words == "a person walks forward"
+    live.steer()
+    assert played(live, {}, 6)[-1].words == "a person sits down"
+    live.say("a person walks like a zombie")
+    live.steer(0.0, 1.2)
+    assert played(live, {}, 6)[-1].words == "a person walks like a zombie"
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("a person sits down", True),
+        ("a person stands still", True),
+        ("a person stops running", True),
+        ("a person walks to a chair and sits down", True),
+        ("somebody lies on the floor", True),
+        ("a person kneels", True),
+        ("a person stands up and walks away", False),
+        ("a person walks forward", False),
+        ("a person jumps", False),
+        ("a person waves", False),
+        ("a person crouches and sneaks forward", False),
+        ("", False),
+    ],
+)
+def test_words_say_whether_somebody_stays(words: str, expected: bool) -> None:
+    assert stays(words) is expected
 
 
 def test_a_pose_is_taken_where_the_person_is(real: Prior) -> None:

@@ -107,6 +107,12 @@ class Server:
         with urllib.request.urlopen(request, timeout=120) as response:
             return json.load(response)
 
+    def put(self, project: dict[str, Any]) -> None:
+        """Save a project as the next state of the one that is there."""
+        there = self.ask("/project/stamp")
+        over = "" if there is None else f"?over={there['id']}.{there['revision']}"
+        self.ask(f"/project{over}", {**project, **(there or {"id": "test", "revision": 0})}, method="PUT")
+
 
 @contextmanager
 def server(folder: Path) -> Iterator[Server]:

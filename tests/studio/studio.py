@@ -15,7 +15,7 @@ SLOW = 240_000
 LOOK = 20
 """Milliseconds between two looks at the page."""
 PROJECT = {
-    "version": 1, "name": "Test", "seed": 3, "count": 1, "kept": 0, "drawn": "", "takes": [], "clips": [],
+    "version": 2, "name": "Test", "seed": 3, "count": 1, "kept": 0, "drawn": "", "takes": [], "clips": [],
     "frozen": [], "base": None, "reactTo": None, "character": None,
 }  # fmt: skip
 FORGET = "if (location.protocol === 'http:' && name !== 'kept') { localStorage.clear(); name = 'kept' }"
@@ -65,8 +65,8 @@ class Studio:
         self.drawn()
 
     def put(self, project: dict[str, Any]) -> None:
-        """Save a project as the page would."""
-        self.server.ask("/project", project, method="PUT")
+        """Save a project over what is there, whatever that is."""
+        self.server.put(project)
 
     def says(self, place, text: str) -> None:
         """Wait until a place of the page, a locator, has the text."""

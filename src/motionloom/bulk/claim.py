@@ -116,6 +116,9 @@ def claim(out: Path, share: Share) -> Iterator[Claim]:
     try:
         place, driver = _claimed(work, share)
     except OSError as error:
+        with suppress(OSError):  # both only where they are empty
+            work.rmdir()
+            out.rmdir()
         raise MotionloomError(f"cannot write to {out}: {error.strerror or error}") from None
     held = Claim(place, driver)
     try:
@@ -140,16 +143,27 @@ def _claimed(work: Path, share: Share) -> tuple[Path, Driver]:
     while True:
         work.mkdir(parents=True, exist_ok=True)
         gone = _gone(work, share)
-        with suppress(FileNotFoundError, FileExistsError), _alone(work):  # somebody came first, or cleared up
-            if dict(_others(work, share)) != gone:
-                continue
-            for one in gone:
-                one.unlink()
-            with place.open("x", encoding="utf-8") as file:
-                json.dump(asdict(driver), file)
+        with suppress(FileNotFoundError, FileExistsError):  # somebody came first, or cleared up behind himself
+            with _alone(work):
+                if dict(_others(work, share)) != gone:
+                    continue
+                for one in gone:
+                    one.unlink()
+                _write(place, driver)
             for one in filter(None, gone.values()):
                 warnings.warn(f"{one}, is gone without having ended its work; this one goes on with it", stacklevel=4)
             return place, driver
+
+
+def _write(place: Path, driver: Driver) -> None:
+    """Raises FileExistsError where somebody has it."""
+    with place.open("x", encoding="utf-8") as file:
+        try:
+            json.dump(asdict(driver), file)
+            file.flush()
+        except OSError:  # a full disk: half a claim would keep others away
+            place.unlink()
+            raise
 
 
 def _gone(work: Path, share: Share) -> dict[Path, Driver | None]:

@@ -110,9 +110,11 @@ class Store:
         return found[0]
 
     def entries(self, shard: int) -> Iterator[Entry]:
-        """What became of each row of a shard, in their order; nothing where its record is damaged or not there."""
+        """What became of each row of a shard, in their order; `MotionloomError` where its record is not whole."""
         found = self._record(shard)
-        yield from found[1] if found is not None else ()
+        if found is None:
+            raise damaged_shard(self, shard)
+        yield from found[1]
 
     def damage(self, shard: int) -> list[Path]:
         """Files of a shard that are not as they were written, missing ones and foreign ones too; the record first."""
@@ -172,6 +174,14 @@ class Store:
             file.writelines(line + b"\n" for line in (first, *lines))
             file.flush()
             os.fsync(file.fileno())
+
+
+def damaged_shard(store: Store, shard: int) -> MotionloomError:
+    """The error of whoever wants to read a shard that is not as it was written."""
+    return MotionloomError(
+        f"shard {shard} of {store.out} is damaged; 'motionloom batch --verify {store.out}' says what, and the command "
+        "that made the batch makes it anew"
+    )
 
 
 def _hash_record(head: Head, lines: Sequence[bytes]) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.bulk.folder import RECORDS, Entry, Store, read_manifest
+from motionloom.bulk.folder import RECORDS, Entry, Store, damaged_shard, read_manifest
 from motionloom.bulk.jobs import arrow, parquet
 from motionloom.bulk.row import hash_file
 from motionloom.bulk.writers import file_names, json_line, parquet_schema
@@ -140,16 +140,14 @@ def read_batch(out: Path | str, *, motions: bool = True) -> Iterator[Result]:
     store = Store(folder, manifest["files"])
     shards = -(-int(manifest["rows"]) // int(manifest["shard_rows"]))
     for shard in range(shards):
-        if store.head(shard) is None and store.record(shard).exists():
-            raise MotionloomError(
-                f"shard {shard} of {folder} is damaged; 'motionloom batch --verify {folder}' says what, and the "
-                "command that made the batch makes it anew"
-            )
-        if store.head(shard) is not None:
-            entries = list(store.entries(shard))
-            made = {entry["id"]: entry.get("people", 1) for entry in entries if entry["state"] == "made"}
-            read = _motions(store, shard, made) if motions else {}
-            yield from (result(entry, read.get(entry.get("id"), ())) for entry in entries)
+        if store.head(shard) is None:
+            if store.record(shard).exists():
+                raise damaged_shard(store, shard)
+            continue
+        entries = list(store.entries(shard))
+        made = {entry["id"]: entry.get("people", 1) for entry in entries if entry["state"] == "made"}
+        read = _motions(store, shard, made) if motions else {}
+        yield from (result(entry, read.get(entry.get("id"), ())) for entry in entries)
 
 
 People = tuple[Motion, ...]

@@ -6,7 +6,19 @@ from collections.abc import Generator, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionloom.cli.sampling import add_sampling, bar, check_outs, fail, load_prior, moves, remark_unknown, sampling_of
+from motionloom.cli.sampling import (
+    add_loop,
+    add_sampling,
+    bar,
+    check_loop,
+    check_outs,
+    fail,
+    load_prior,
+    looped,
+    moves,
+    remark_unknown,
+    sampling_of,
+)
 from motionloom.cli.skeletons import Target, open_target
 from motionloom.cli.writing import check_overwriting
 
@@ -40,6 +52,7 @@ def add(subparsers) -> None:
     parser.add_argument(
         "--guidance", type=float, help="strength of the text where a segment has none of its own (default 2.5)"
     )
+    add_loop(parser)
     add_sampling(parser)
     parser.add_argument("--check", action="store_true", help="only say what would be made")
     parser.add_argument("--schema", action="store_true", help="print the JSON Schema of timeline files")
@@ -61,6 +74,7 @@ def _compose(arguments: argparse.Namespace) -> int:
         return 0
     from motionloom.tasks.long import with_loaded
 
+    check_loop(arguments, timeline.seconds)
     check_overwriting(arguments, outs, also=() if timeline.start is None else (Path(timeline.start),))
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [segment.text for segment in timeline.segments[:REMARKED]])
@@ -161,10 +175,17 @@ def _pieces(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline")
     named = {"guidance": timeline.guidance, "seed": timeline.seed}
     settings: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
     with bar("composing") as move:
-        yield from long.compose(
+        pieces = long.compose(
             prior, timeline.segments, start=start, path=timeline.path, foot_lock=arguments.foot_lock,
             progress=moves(move, arguments.steps, len(timeline.segments)), **(settings | sampling_of(arguments)),
         )  # fmt: skip
+        if not arguments.loop:
+            yield from pieces
+            return
+        from motionloom.tasks.splice import concatenated
+
+        seed = arguments.seed if arguments.seed is not None else timeline.seed or 0
+        yield looped(arguments, prior, concatenated(*pieces), timeline.segments[-1].text, seed=seed)
 
 
 def _saved(streams: Sequence["Stream"]) -> list["Stream"]:

@@ -1,24 +1,29 @@
 """`motionloom control`: words and goals to motion files."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.cli.finished import finished_motions, groups
 from motionloom.cli.newcomers import one_sentence
 from motionloom.cli.sampling import (
+    add_loop,
     add_sampling,
     bar,
     check_count,
+    check_loop,
     check_outs,
     check_prompt,
     fail,
     load_prior,
+    looped,
     places,
     remark_unknown,
     report,
     sampling_of,
 )
+from motionloom.cli.skeletons import add_one_file
 from motionloom.cli.writing import check_overwriting
 
 if TYPE_CHECKING:
@@ -66,6 +71,8 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         help="none (the default), fitting (the shipped ones for these goals), or names of adapters, repeatable",
     )  # fmt: skip
     parser.add_argument("--schema", action="store_true", help="print what a goal file may hold as JSON Schema and end")
+    add_loop(parser)
+    add_one_file(parser)
     add_sampling(parser)
     parser.set_defaults(run=run_control)
 
@@ -87,6 +94,13 @@ def run_control(arguments: argparse.Namespace) -> int:
     check_prompt(arguments.prompt)
     files = places(outs, arguments.count, target=target)
     goal = _goal(arguments)
+    if arguments.loop:
+        from motionloom.goals.goal import FPS
+
+        check_loop(arguments, len(goal.positions) / FPS)
+        print(
+            f"note: the last {arguments.blend:g} s are drawn anew for --loop; goals there are not kept", file=sys.stderr
+        )
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [arguments.prompt])
@@ -160,7 +174,10 @@ def _made(
                 progress=moved, **sampling_of(arguments) | some,
             )  # fmt: skip
             judged += made
-            yield [one.motion for one in made]
+            yield [
+                looped(arguments, prior, one.motion, arguments.prompt, seed=arguments.seed + some["first"] + number)
+                for number, one in enumerate(made)
+            ]
 
 
 def _adapters(names: list[str], prior: "Prior") -> "Adapters":
@@ -184,8 +201,6 @@ def _report(
     seconds: float,
     remarks: list[str],
 ) -> None:
-    import sys
-
     for number, one in enumerate(made):
         which = f"motion {number} (seed {arguments.seed + number}): " if len(made) > 1 else ""
         for sentence in one.missed:

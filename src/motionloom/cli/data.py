@@ -3,9 +3,11 @@
 import argparse
 from pathlib import Path
 
+from motionloom.cli.writing import add_force, check_overwriting
+
 
 def add(subparsers) -> None:
-    """Register `data build`."""
+    """Register `data build` and `data look`."""
     data = subparsers.add_parser("data", help="turn recordings into a training set")
     commands = data.add_subparsers(metavar="COMMAND", required=True)
     build = commands.add_parser(
@@ -32,6 +34,13 @@ def add(subparsers) -> None:
         "in set.json; may be given again",
     )  # fmt: skip
     build.set_defaults(run=_build)
+    look = commands.add_parser("look", help="a page of pictures: recordings beside the clips that were made of them")
+    look.add_argument("set", type=Path, metavar="SET", help="folder of a built set")
+    look.add_argument("folders", nargs="+", type=Path, help="the recordings that it was made of")
+    look.add_argument("--out", type=Path, required=True, help="picture to write, .png")
+    look.add_argument("--each", type=int, default=2, metavar="N", help="clips of each source (default 2)")
+    add_force(look)
+    look.set_defaults(run=_look)
 
 
 def _build(arguments: argparse.Namespace) -> None:
@@ -47,3 +56,11 @@ def _build(arguments: argparse.Namespace) -> None:
 def _reasons(said: list[str]) -> dict[str, str]:
     """``NAME=REASON`` by name."""
     return {name: reason for name, _, reason in (text.partition("=") for text in said)}
+
+
+def _look(arguments: argparse.Namespace) -> None:
+    from motionloom.data.look import draw_look
+    from motionloom.lab.papers.readers import find_takes
+
+    check_overwriting(arguments, [arguments.out])
+    print(draw_look(arguments.set, arguments.folders, arguments.out, each=arguments.each, find=find_takes))

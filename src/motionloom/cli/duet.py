@@ -8,11 +8,13 @@ from motionloom.cli.finished import Finished, groups
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
     add_adapters,
+    add_loop,
     bar,
     check_count,
     check_prompt,
     fail,
     load_prior,
+    looped,
     moves,
     places,
     report,
@@ -71,6 +73,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument(
         "--pair-weights", default="duet", metavar="NAME|PATH", help="what makes two of one (default duet)"
     )
+    add_loop(parser)
     _add_sampling(parser)
     add_reading(parser)
     take_text_anywhere(parser)
@@ -127,7 +130,11 @@ def run_duet(arguments: argparse.Namespace) -> int:
                     arguments, prior, block, given=given, timeline=timeline, goal=goal, progress=moved, some=some
                 )
                 seconds = duets[0][0].seconds
-                yield duets
+                seed = (arguments.seed or 0) + some["first"]
+                yield [
+                    [looped(arguments, prior, person, "", seed=seed + number) for person in duet]
+                    for number, duet in enumerate(duets)
+                ]
 
     interrupted = made.take(drawn())
     report(arguments, _about(arguments, made.count, seconds), made.written, made.sampling)
@@ -281,6 +288,8 @@ def _check(arguments: argparse.Namespace) -> None:
     kinds = [name for name in ("past", "react-to", "timeline") if getattr(arguments, name.replace("-", "_"))]
     if len(kinds) > 1:
         fail(f"--{kinds[0]} and --{kinds[1]} are different tasks; give one of them")
+    if arguments.loop and kinds == ["react-to"]:
+        fail("--loop would change the motion that is reacted to; leave it out")
     if arguments.text is not None:
         check_prompt(arguments.text)
     elif not kinds:
@@ -313,6 +322,8 @@ def check_pair_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target |
     if not arguments.out and Path(arguments.skeleton or "").suffix.lower() in CHARACTERS:
         outs = [out for name in ("duet_a", "duet_b") for out in own_outs(arguments, name)]
     skin = read_target(arguments, outs)
+    if skin is not None:
+        skin.names(["first", "second"])
     if len({out.resolve() for out in outs}) != len(outs):
         fail("the same --out is given twice; give each file its own name")
     check_unit(arguments, outs)
@@ -378,7 +389,7 @@ def write_pairs(
             person = seen.setdefault(suffix, 0)
             seen[suffix] += 1
             if skin is not None:
-                written.append(skin.save(duet[person], out, caption=caption))
+                written.append(skin.save(duet[person], out, caption=skin.names([caption] * 2)[person]))
             elif suffix == ".bvh":
                 unit, orders = manners[person]
                 written.append(save_bvh(duet[person], out, order=orders, unit=unit))

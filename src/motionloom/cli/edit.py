@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 from motionloom.cli.finished import Finished, groups
 from motionloom.cli.reading import add_reading, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
+    add_loop,
     add_sampling,
     bar,
     check_count,
@@ -20,7 +21,7 @@ from motionloom.cli.sampling import (
     take_text_anywhere,
     write,
 )
-from motionloom.cli.skeletons import Target, put_all
+from motionloom.cli.skeletons import Target, add_one_file, put_all
 from motionloom.cli.writing import at_rate, check_overwriting
 
 if TYPE_CHECKING:
@@ -47,8 +48,8 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "--between", nargs=2, type=float, action="append", default=[], metavar=("FROM", "TO"),
         help="change only these seconds, repeatable",
     )  # fmt: skip
-    parser.add_argument("--loop", action="store_true", help="make the end meet the beginning")
-    parser.add_argument("--blend", type=float, default=1.0, help="seconds drawn anew for --loop (default 1)")
+    add_loop(parser)
+    add_one_file(parser)
     parser.add_argument("--extend", type=float, default=0.0, metavar="SECONDS", help="go on behind the clip")
     parser.add_argument(
         "--strength", type=float, default=1.0, help="how far from the clip, above 0 to 1 (default 1: from noise alone)"
@@ -71,6 +72,7 @@ def run_edit(arguments: argparse.Namespace) -> int:
     if arguments.text is not None:
         check_prompt(arguments.text)
     captions = [arguments.text or arguments.clip.stem] * arguments.count
+    captions = captions if target is None else target.names(captions)
     files = places(outs, arguments.count, target=target)
     clip, unit, orders = read_clip(arguments, arguments.clip)
     check_size(arguments, arguments.clip, clip)

@@ -19,6 +19,7 @@ from motionloom.cli.skeletons import add_skeleton, read_target
 from motionloom.cli.writing import add_force, add_writing, at_rate, check_overwriting, check_rate
 
 if TYPE_CHECKING:
+    from motionloom.cli.skeletons import Target
     from motionloom.motion import Motion
 
 
@@ -30,9 +31,11 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         description="Turn a motion (.bvh, .amc with its .asf, .glb, .npz) into .bvh, .glb, .npz, .mp4, .gif or .png; "
         "the name of OUT picks the format.",
     )
-    export.add_argument("input", metavar="IN", type=Path)
-    export.add_argument("output", metavar="OUT", type=Path, nargs="?")
-    export.add_argument("--out", type=Path, metavar="NAME", help="the same as OUT")
+    export.add_argument(
+        "inputs", metavar="IN", type=Path, nargs="+",
+        help="the motion, and OUT behind it; several become animations of one --skeleton character",
+    )  # fmt: skip
+    export.add_argument("--out", type=Path, metavar="NAME", help="the file to write, instead of OUT")
     add_reading(export)
     export.add_argument("--fps", type=as_rate, metavar="N", help="resample to this frame rate")
     add_skeleton(export, own="IN's")
@@ -66,26 +69,24 @@ def run_export(arguments: argparse.Namespace) -> None:
     from motionloom import io
     from motionloom.errors import MotionloomError
 
-    target = _output(arguments)
+    arguments.inputs, target = _files(arguments)
     skin = read_target(arguments, [target])
     io.check_output(target, own=skin and skin.suffix)
-    motion, unit, orders = read_clip(arguments, arguments.input)
-    if skin is None:
-        check_size(arguments, arguments.input, motion)
+    if len(arguments.inputs) > 1 and (skin is None or not skin.writes(target)):
+        raise MotionloomError(
+            f"{len(arguments.inputs)} motions go into one file as animations of a character: --skeleton hero.glb "
+            "--out moving.glb; else export one at a time"
+        )
+    names = None if skin is None else skin.names([path.stem for path in arguments.inputs])
+    read = [_exported(arguments, path, skin) for path in arguments.inputs]
     check_overwriting(arguments, [target])
-    motion = crop(motion, arguments)
-    if arguments.mirror:
-        motion = motion.mirror()
     if arguments.source_map and not skin:
         raise MotionloomError("--source-map says which joints are which for a --skeleton; name one")
-    if skin:
-        unit, orders = skin.unit, skin.orders
-        motion = skin.put(motion, source=str(arguments.input), source_map=arguments.source_map)
-    if arguments.fps:
-        motion = motion.resample(arguments.fps)
-    if skin and skin.writes(target):
+    motions = [motion for motion, _, _ in read]
+    motion, unit, orders = read[0]
+    if skin and names and skin.writes(target):
         _only_bvh(arguments, target)
-        skin.save(motion, target, caption=arguments.input.stem)
+        skin.save_clips(motions, target, names)
     elif target.suffix.lower() == ".bvh":
         from motionloom.io.bvh import save_bvh, unit_that_reads_back
 
@@ -96,8 +97,24 @@ def run_export(arguments: argparse.Namespace) -> None:
     else:
         _only_bvh(arguments, target)
         (io.save if skin is None else skin.save)(motion, target)
-    print(f"wrote {target}: {_summary(motion)}")
-    note_rate(arguments, [arguments.input])
+    print(f"wrote {target}: {'; '.join(_summary(motion) for motion in motions)}")
+    note_rate(arguments, arguments.inputs)
+
+
+def _exported(
+    arguments: argparse.Namespace, path: Path, skin: "Target | None"
+) -> "tuple[Motion, float | None, dict[str, str]]":
+    """A motion as it is to be written, and the unit and the orders of rotations of a BVH."""
+    motion, unit, orders = read_clip(arguments, path)
+    if skin is None:
+        check_size(arguments, path, motion)
+    motion = crop(motion, arguments)
+    if arguments.mirror:
+        motion = motion.mirror()
+    if skin:
+        unit, orders = skin.unit, skin.orders
+        motion = skin.put(motion, source=str(path), source_map=arguments.source_map)
+    return motion if arguments.fps is None else motion.resample(arguments.fps), unit, orders
 
 
 def run_view(arguments: argparse.Namespace) -> None:
@@ -161,14 +178,15 @@ def _summary(motion: "Motion") -> str:
     return f"{frames}, {motion.seconds:.2f} s at {motion.fps:g} frames per second, {len(motion.skeleton)} joints"
 
 
-def _output(arguments: argparse.Namespace) -> Path:
-    """Where to write, whether it is named as OUT or with ``--out``."""
+def _files(arguments: argparse.Namespace) -> tuple[list[Path], Path]:
+    """What is read, and where to write, whether that is named as OUT or with ``--out``."""
     from motionloom.errors import MotionloomError
 
-    if (arguments.output is None) == (arguments.out is None):
-        given = "none" if arguments.out is None else f"{arguments.output} and {arguments.out}"
-        raise MotionloomError(f"one file to write is needed, such as: motionloom export IN OUT; got {given}")
-    return arguments.out or arguments.output
+    if arguments.out is not None:
+        return arguments.inputs, arguments.out
+    if len(arguments.inputs) < 2:
+        raise MotionloomError("one file to write is needed, such as: motionloom export IN OUT; got none")
+    return arguments.inputs[:-1], arguments.inputs[-1]
 
 
 def _only_bvh(arguments: argparse.Namespace, target: Path) -> None:

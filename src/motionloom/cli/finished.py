@@ -128,6 +128,8 @@ def finished_motions(
     unit: metres that a unit of a BVH is, without a target; rate: frames per second, None: as they are made.
     """
 
+    captions = captions if target is None else target.names(captions)
+
     def written(motions: "Sequence[Motion]", places: list[list[Path]], first: int) -> None:
         for several in places:
             write(motions, several, captions[first : first + len(motions)], target, unit=unit)

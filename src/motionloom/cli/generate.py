@@ -10,18 +10,22 @@ from typing import TYPE_CHECKING, Any
 from motionloom.cli.finished import finished_motions
 from motionloom.cli.newcomers import one_sentence
 from motionloom.cli.sampling import (
+    add_loop,
     add_sampling,
     bar,
     check_count,
+    check_loop,
     check_outs,
     check_prompt,
     fail,
     load_prior,
+    looped,
     places,
     remark_unknown,
     report,
     sampling_of,
 )
+from motionloom.cli.skeletons import add_one_file
 from motionloom.cli.writing import check_overwriting
 
 if TYPE_CHECKING:
@@ -61,6 +65,8 @@ def add(subparsers) -> None:
     )  # fmt: skip
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
     parser.add_argument("--solver", help="ddim, ddpm (the default), dpm2m or dpm2m-sde")
+    add_loop(parser)
+    add_one_file(parser)
     add_sampling(parser)
     parser.set_defaults(run=_generate)
 
@@ -79,9 +85,15 @@ def _generate(arguments: argparse.Namespace) -> int:
 
     check_best_of(arguments.best_of)
     timelines = {prompt: _timeline(arguments, prior, prompt) for prompt in prompts}
+    for found in timelines.values():
+        check_loop(arguments, found.seconds)
     remarks = remark_unknown(prior, [segment.text for found in timelines.values() for segment in found.segments])
     made = finished_motions(files, captions, target, unit=arguments.out_unit, rate=arguments.fps)
-    drawn = _drawn(arguments, prior, [timelines[caption] for caption in captions])
+    asked = [timelines[caption] for caption in captions]
+    drawn = (
+        looped(arguments, prior, motion, asked[number].segments[-1].text, seed=arguments.seed + number)
+        for number, motion in enumerate(_drawn(arguments, prior, asked))
+    )
     seated: list[list[Seat]] = []
     interrupted = made.take([motion] for motion in _noting(seated, drawn, target))
     motions = [

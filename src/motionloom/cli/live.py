@@ -62,6 +62,8 @@ def _live(arguments: argparse.Namespace) -> int:
         _report(arguments, script, [], None, {})
         return 0
     outs, target = check_outs(arguments) if script.people == 1 else check_pair_outs(arguments)
+    if target is not None and script.people == 1:
+        target.names(["live"])
     if arguments.fps is not None and not 1 <= arguments.fps <= 240:
         fail(f"--fps must be 1 to 240; got {arguments.fps:g}")
     check_unit(arguments, outs)

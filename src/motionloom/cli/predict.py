@@ -124,6 +124,8 @@ def run_predict(arguments: argparse.Namespace) -> int:
     _check(arguments, longest=DAY)
     outs = arguments.out or [Path("futures")]
     skin = read_target(arguments, [*outs, *(Path(f"future.{one}") for one in arguments.format or ())])
+    if skin is not None:
+        skin.names(["future"])
     own = skin and skin.suffix
     formats = arguments.format or [own[1:] if own else "bvh"]
     wanted = targets(outs, arguments.count, formats, pictures=not arguments.no_picture, own=own)
@@ -185,6 +187,8 @@ def run_switch(arguments: argparse.Namespace) -> int:
     _check(arguments, longest=LONG)
     outs = arguments.out or [Path("switch.bvh")]
     skin = read_target(arguments, outs)
+    if skin is not None:
+        skin.names(["switch"])
     own = skin and skin.suffix
     for out in outs:
         check_output(out, own=own)  # files, and no folder

@@ -52,6 +52,34 @@ def add_sampling(
     add_writing(parser, unit=own_unit)
 
 
+def add_loop(parser: argparse.ArgumentParser) -> None:
+    """``--loop``, for `looped`."""
+    parser.add_argument("--loop", action="store_true", help="make the end meet the beginning")
+    parser.add_argument("--blend", type=float, default=1.0, help="seconds drawn anew for --loop (default 1)")
+
+
+def check_loop(arguments: argparse.Namespace, seconds: float) -> None:
+    """Refuse a ``--loop`` of motions that are too short for it."""
+    if arguments.loop:
+        from motionloom.tasks.edit import Loop
+
+        Loop(arguments.blend).check(seconds, 0.0)
+
+
+def looped(arguments: argparse.Namespace, prior: "Prior", motion: "Motion", text: str, *, seed: int) -> "Motion":
+    """The motion with its end drawn anew so that the beginning can follow it, where the line says ``--loop``.
+
+    text: what the person does there.
+    """
+    if not arguments.loop:
+        return motion
+    from motionloom.tasks.edit import Loop, edit
+
+    settings = {name: value for name, value in sampling_of(arguments).items() if name in ("steps", "guidance")}
+    (closed,) = edit(prior, motion, text, Loop(arguments.blend), foot_lock=arguments.foot_lock, seed=seed, **settings)
+    return closed
+
+
 def sampling_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """The settings of `Sampling` that the line says, as keywords of a task; the others are the task's own."""
     names = ("steps", "solver", "guidance", "seed", "count", "temperature", "pair_guidance")
@@ -146,11 +174,15 @@ def numbered(out: Path, count: int) -> list[Path]:
 def places(outs: Sequence[Path], count: int, *, sheets: bool = True, target: Target | None = None) -> list[list[Path]]:
     """The files of ``count`` motions for each ``--out``, refused where nothing can be written.
 
-    sheets: a picture shows all motions, and so is one file.
+    sheets: a picture shows all motions, and so is one file; so is a character's own file with ``--one-file``.
     """
     from motionloom.io import check_output
 
-    several = [[out] if sheets and out.suffix.lower() == ".png" else numbered(out, count) for out in outs]
+    def whole(out: Path) -> bool:
+        own = target is not None and target.one_file and target.writes(out)
+        return own or (sheets and out.suffix.lower() == ".png")
+
+    several = [[out] if whole(out) else numbered(out, count) for out in outs]
     for place in (place for one in several for place in one):
         check_output(place, own=target and target.suffix)
     return several
@@ -168,6 +200,8 @@ def write(
     from motionloom.io import save
     from motionloom.io.bvh_writer import save_bvh
 
+    if target is not None and target.one_file and target.writes(files[0]):
+        return [target.save_clips(motions, files[0], target.names(captions))]
     if target is not None and len(files) == len(motions):
         return [target.save(one, file, caption=said) for one, file, said in zip(motions, files, captions, strict=True)]
     if unit is not None and files[0].suffix.lower() == ".bvh":

@@ -45,7 +45,10 @@ def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform per
         help="where motions of a .glb, .gltf or .vrm character start: where it stands and faces (character, the "
         "default of one that stands elsewhere), or at the origin, facing +Z",
     )  # fmt: skip
-    parser.add_argument("--clip-name", metavar="NAME", help="name of the animation in the character's file")
+    parser.add_argument(
+        "--clip-name", metavar="NAME", action="append",
+        help="name of the animation in the character's file; repeatable, one for each motion",
+    )  # fmt: skip
     parser.add_argument("--replace", action="store_true", help="leave only this animation in the character's file")
     parser.add_argument("--target-map", type=Path, metavar="JSON", help="which joints are which, of the --skeleton")
 
@@ -64,8 +67,11 @@ class Target:
     root: "RootMode" = "motion"
     hands: "HandPose" = "as-is"
     joint_map: Path | None = None
-    clip_name: str | None = None
+    clip_names: tuple[str, ...] = ()
+    """Of the animations that are written: none, one for all, or one for each."""
     replace: bool = False
+    one_file: bool = False
+    """Whether several motions become animations of one file."""
     kept: object = None
     """What must stay as long as the character does: a folder with what an FBX became."""
 
@@ -100,6 +106,7 @@ class Target:
         from motionloom.retarget.anatomy import read_body
         from motionloom.retarget.hands import pose_hands
         from motionloom.retarget.root import place_root
+        from motionloom.retarget.toes import bend_toes
 
         try:
             made = retarget(motion, self.skeleton, source_map=source_map, target_map=self.joint_map)
@@ -107,7 +114,7 @@ class Target:
             hint = "--source-map or --target-map"
             raise MotionloomError(f"{source} onto {self.name}: {error} ({hint})") from None
         body = read_body(self.skeleton, self.joint_map)
-        return pose_hands(place_root(move(made, body), body, self.root), self.hands, self.joint_map)
+        return pose_hands(place_root(move(bend_toes(made, body), body), body, self.root), self.hands, self.joint_map)
 
     @property
     def place(self) -> "GroundPose | None":
@@ -151,12 +158,30 @@ class Target:
         """Whether a file of this name is the character's own with one more animation."""
         return path.suffix.lower() in self.suffixes
 
+    def names(self, captions: Sequence[str]) -> list[str]:
+        """What motions of these captions are called in the character's file; refuses names of another count."""
+        from motionloom.errors import MotionloomError
+
+        if len(self.clip_names) not in (0, 1, len(captions)):
+            needed = (
+                "one motion needs one --clip-name"
+                if len(captions) == 1
+                else (f"{len(captions)} motions need one --clip-name or {len(captions)}")
+            )
+            raise MotionloomError(f"{needed}; got {len(self.clip_names)}")
+        several = self.clip_names * len(captions) if len(self.clip_names) == 1 else self.clip_names
+        return list(several or captions)
+
     def save(self, motion: "Motion", path: Path, *, caption: str | None = None) -> Path:
-        """Write a motion that is `put` on the skeleton; the suffix picks the format."""
+        """Write a motion that is `put` on the skeleton; the suffix picks the format.
+
+        ``caption`` labels a picture, and is the animation's name where the line gives none.
+        """
         from motionloom import io
 
         if self.character is not None and self.writes(path):
-            return self._save_own(self.character, motion, path, self.clip_name or caption)
+            name = self.clip_names[0] if len(self.clip_names) == 1 else caption
+            return self._save_own(self.character, [(motion, name)], path)
         if self.character is not None and path.suffix.lower() == ".usda":
             from motionloom.io.usda import save_usda
 
@@ -167,10 +192,15 @@ class Target:
             return save_bvh(motion, path, order=self.orders, unit=self.unit)
         return io.save(motion, path, captions=None if caption is None else [caption])
 
-    def _save_own(self, character: "Character", motion: "Motion", path: Path, name: str | None) -> Path:
-        """The character's own file with one more animation; as FBX by way of a GLB."""
+    def save_clips(self, motions: "Sequence[Motion]", path: Path, names: Sequence[str]) -> Path:
+        """Write motions that are `put` on the skeleton as animations of the character's own file."""
+        assert self.character is not None
+        return self._save_own(self.character, list(zip(motions, names, strict=True)), path)
+
+    def _save_own(self, character: "Character", clips: "Sequence[tuple[Motion, str | None]]", path: Path) -> Path:
+        """The character's own file with more animations; as FBX by way of a GLB."""
         if path.suffix.lower() != ".fbx":
-            return character.save(motion, path, name=name, replace=self.replace)
+            return character.save_clips(clips, path, replace=self.replace)
         import tempfile
 
         from motionloom.errors import MotionloomError
@@ -179,11 +209,18 @@ class Target:
         if ".glb" not in character.suffixes:
             raise MotionloomError(f"a {character.path.suffix} character is not written as {path}; give it as a .glb")
         with tempfile.TemporaryDirectory() as folder:
-            made = character.save(motion, Path(folder) / "moving.glb", name=name, replace=self.replace)
+            made = character.save_clips(clips, Path(folder) / "moving.glb", replace=self.replace)
             try:
-                return glb_to_fbx(made, path, fps=motion.fps)
+                return glb_to_fbx(made, path, fps=clips[0][0].fps)
             except MotionloomError as error:
                 raise MotionloomError(str(error).replace(str(made), str(character.path))) from None
+
+
+def add_one_file(parser: argparse.ArgumentParser) -> None:
+    """``--one-file``."""
+    parser.add_argument(
+        "--one-file", action="store_true", help="write several motions of a character as animations of one file"
+    )
 
 
 def own_outs(arguments: argparse.Namespace, name: str, suffix: str = ".bvh") -> list[Path]:
@@ -197,8 +234,8 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
     from motionloom.errors import MotionloomError
 
     if arguments.skeleton is None:
-        for name in ("root", "hands", "at", "clip_name", "replace", "target_map"):
-            if getattr(arguments, name):
+        for name in ("root", "hands", "at", "clip_name", "replace", "one_file", "target_map"):
+            if getattr(arguments, name, None):
                 raise MotionloomError(f"--{name.replace('_', '-')} goes with a --skeleton; name one")
         _note_mannequin(arguments, outs)
         return None
@@ -207,17 +244,20 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
     _check_humanoid(found)
     if found.character is not None:
         path = Path(found.name)
-        if not any(found.writes(out) or not out.suffix for out in outs) and (arguments.clip_name or arguments.replace):
-            raise MotionloomError(f"--clip-name and --replace are for the character's own file, a {path.suffix}")
+        own = arguments.clip_name or arguments.replace or found.one_file
+        if own and not any(found.writes(out) or not out.suffix for out in outs):
+            raise MotionloomError(
+                f"--clip-name, --replace and --one-file are for the character's own file, a {path.suffix}"
+            )
         for out in outs:
             if out.suffix.lower() == ".glb" and not found.writes(out):
                 raise MotionloomError(f"{out} would not hold the character; it is written as a {path.suffix}")
             if out.exists() and out.resolve() == path.resolve():
                 raise MotionloomError(f"{out} is the character itself; give the moving one another name with --out")
         _note_place(found)
-    elif arguments.clip_name or arguments.replace or arguments.at:
+    elif arguments.clip_name or arguments.replace or arguments.at or found.one_file:
         raise MotionloomError(
-            f"--clip-name, --replace and --at are for .glb, .gltf and .vrm characters; got {found.name}"
+            f"--clip-name, --replace, --one-file and --at are for .glb, .gltf and .vrm characters; got {found.name}"
         )
     return found
 
@@ -237,7 +277,8 @@ def _note_place(target: Target) -> None:
 
 def _note_mannequin(arguments: argparse.Namespace, outs: Sequence[Path]) -> None:
     """Say that a character whose motion is read does not come out itself."""
-    source = next((getattr(arguments, name) for name in ("input", "clip", "past") if hasattr(arguments, name)), None)
+    source = next((getattr(arguments, name) for name in ("inputs", "clip", "past") if hasattr(arguments, name)), None)
+    source = source[0] if isinstance(source, list) else source
     bodies = [out for out in outs if out.suffix.lower() in (".glb", ".usda", ".fbx")]
     if not isinstance(source, Path) or source.suffix.lower() not in CHARACTERS[:3] or not bodies:
         return
@@ -281,7 +322,8 @@ def _find(arguments: argparse.Namespace) -> Target:
     options = {
         "root": arguments.root or "motion", "at": arguments.at, "hands": arguments.hands or "as-is",
         "joint_map": arguments.target_map,
-        "clip_name": arguments.clip_name, "replace": arguments.replace,
+        "clip_names": tuple(arguments.clip_name or ()), "replace": arguments.replace,
+        "one_file": getattr(arguments, "one_file", False),
     }  # fmt: skip
     if name.lower() in NAMED and not path.exists():
         return Target(name, named_skeleton(name.lower()), **options)
@@ -323,6 +365,7 @@ def open_target(target: Target, path: Path, *, caption: str = "") -> "Stream":
     """A file whose motion is put on the skeleton when all of it is there."""
     from motionloom.io.stream import Kept
 
+    target.names([caption])
     return Kept(path, lambda whole: target.save(target.put(whole), path, caption=caption))
 
 

@@ -75,7 +75,7 @@ def admit(out: Path, take: str, places: Places, clip: Clip, *, allowed: str = ""
         temp.write_text(json.dumps(asdict(compared)), encoding="utf-8")
     if compared.refused:
         raise MotionloomError(
-            f"its body does not do what was recorded: {', '.join(faults[:4])}; see `motionloom data look`, and let it "
+            f"its body does not do what was recorded: {', '.join(faults[:4])}; see 'motionloom data look', and let it "
             "in all the same with --allow NAME=REASON"
         )
 

@@ -7,6 +7,8 @@ bytes behind those that were there.
 import base64
 import copy
 import json
+import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,8 +21,9 @@ from motionloom.errors import MotionloomError
 from motionloom.ground import GroundPose
 from motionloom.io.atomic import atomic_path
 from motionloom.io.glb import Document, pack_glb, read_document_chunks
+from motionloom.io.gltf_bind import on_floor
 from motionloom.io.gltf_mesh import Surface, read_surfaces
-from motionloom.io.gltf_nodes import Node, upwards
+from motionloom.io.gltf_nodes import Node, printable, upwards
 from motionloom.io.gltf_read import OpenedGlb, open_glb, settled
 from motionloom.io.gltf_rig import Rig, Worlds, parents_first, read_rig, worlds
 from motionloom.motion import Motion
@@ -74,43 +77,63 @@ class Character:
         return read_surfaces(self.file.document, self.nodes, self.file.parents, self.rig, remark=remark)
 
     def save(self, motion: Motion, path: str | Path, *, name: str | None = None, replace: bool = False) -> Path:
-        """Write the character's own file with one more animation, or with ``replace`` this one only.
+        """Write the character's own file with one more animation: `save_clips` of one."""
+        return self.save_clips([(motion, name)], path, replace=replace)
 
-        ``motion`` is on `skeleton`, in metres and +Y up. Keyed are the joints of its body and those between them, and
-        places of those that move against what they hang on; all others keep their rest, those that the file's other
-        animations move by one key of it. ``name`` of the animation (``motion``) gets a number where the file has one
-        of that name. The new file ends as the old one, a .vrm also in .glb.
+    def save_clips(
+        self, clips: Sequence[tuple[Motion, str | None]], path: str | Path, *, replace: bool = False
+    ) -> Path:
+        """Write the character's own file with these animations behind its own, or with ``replace`` these only.
+
+        Motions are on `skeleton`, in metres and +Y up. Keyed are the joints of its body and those between them, and
+        places of those that move against what they hang on; all others keep their rest, those that another animation
+        in the file moves by one key of it. A name (``motion`` for None) gets a number where the file has one of that
+        name. The new file ends as the old one, a .vrm also in .glb.
         Raises `MotionloomError` for a motion of another skeleton, another suffix, or a place that cannot be written.
         """
         path = Path(path)
-        if motion.skeleton.names != self.skeleton.names or motion.skeleton.parents != self.skeleton.parents:
-            raise MotionloomError(f"the motion is not on the skeleton of {self.path}; retarget it first")
+        for motion, _ in clips:
+            if motion.skeleton.names != self.skeleton.names or motion.skeleton.parents != self.skeleton.parents:
+                raise MotionloomError(f"the motion is not on the skeleton of {self.path}; retarget it first")
         if path.suffix.lower() not in self.suffixes:
             raise MotionloomError(
                 f"the character of {self.path} is written as such a file; name it *{self.path.suffix}, not {path.name}"
             )
         document = copy.deepcopy(self.file.document.json)
         new = _Insertion(document, self.file.document)
-        animation = {"name": self._free_name(name or "motion", replace), "channels": [], "samplers": []}
-        animation["extras"] = {"fps": motion.fps}
-        clock = new.add(np.arange(len(motion))[:, None] / motion.fps, bounds=True)
-        keys = self._keys(motion)
-        held = [] if replace else self._held({(node, path_) for node, path_, _ in keys})
-        start = new.add(np.zeros((1, 1)), bounds=True) if held and len(motion) > 1 else clock
-        for node, path_, values in keys + held:
-            times = clock if len(values) == len(motion) else start
-            animation["samplers"].append({"input": times, "output": new.add(values), "interpolation": "LINEAR"})
-            channel = {"sampler": len(animation["samplers"]) - 1, "target": {"node": node, "path": path_}}
-            animation["channels"].append(channel)
-            _use_parts(document["nodes"][node], self.nodes[node])
-        document["animations"] = [*([] if replace else document.get("animations", [])), animation]
+        animations = [] if replace else document.get("animations", [])
+        taken = set() if replace else set(self.file.clips)
+        keys = [self._keys(motion) for motion, _ in clips]
+        moved = {(node, path_) for some in keys for node, path_, _ in some}
+        moved |= set() if replace else {key for channels in self.file.channels for key in channels}
+        for (motion, name), own in zip(clips, keys, strict=True):
+            held = self._held(moved - {(node, path_) for node, path_, _ in own})
+            animations.append(self._animation(new, motion, own, held) | {"name": _free_name(name or "motion", taken)})
+            taken.add(animations[-1]["name"])
+            for node, _, _ in own + held:
+                _use_parts(document["nodes"][node], self.nodes[node])
+        document["animations"] = animations
         with atomic_path(path) as temporary:
             temporary.write_bytes(new.packed(self.path))
         return path
 
-    def _free_name(self, name: str, replace: bool) -> str:
-        taken = set() if replace else set(self.file.clips)
-        return name if name not in taken else next(n for k in range(2, 10**6) if (n := f"{name}_{k}") not in taken)
+    def _animation(
+        self,
+        new: "_Insertion",
+        motion: Motion,
+        keys: list[tuple[int, str, Array]],
+        held: list[tuple[int, str, Array]],
+    ) -> dict[str, Any]:
+        """The JSON of a motion's channels, and of what is held at rest, whose numbers are added to ``new``."""
+        animation: dict[str, Any] = {"name": "", "channels": [], "samplers": [], "extras": {"fps": motion.fps}}
+        clock = new.add(np.arange(len(motion))[:, None] / motion.fps, bounds=True)
+        start = new.add(np.zeros((1, 1)), bounds=True) if held and len(motion) > 1 else clock
+        for node, path, values in keys + held:
+            times = clock if len(values) == len(motion) else start
+            animation["samplers"].append({"input": times, "output": new.add(values), "interpolation": "LINEAR"})
+            channel = {"sampler": len(animation["samplers"]) - 1, "target": {"node": node, "path": path}}
+            animation["channels"].append(channel)
+        return animation
 
     def _keys(self, motion: Motion) -> list[tuple[int, str, Array]]:
         """Node, path and values (frames, width) of every channel."""
@@ -141,19 +164,19 @@ class Character:
             now = worlds(self.nodes, parents, [n], sampled, above=now)
         return keys
 
-    def _held(self, keyed: set[tuple[int, str]]) -> list[tuple[int, str, Array]]:
-        """The rest, once, of what the file's animations move and the new one does not.
+    def _held(self, moved: set[tuple[int, str]]) -> list[tuple[int, str, Array]]:
+        """The rest, once, of the channels that other animations move and this one does not.
 
         Without it Blender and Godot would leave such a node where the animation that was shown before had it.
         """
         inside = set(self.rig.nodes)
-        moved = {key for channels in self.file.channels for key in channels if key[0] in inside}
         rest = {
             (n, path): {
                 "translation": self.nodes[n].place, "rotation": np.roll(self.nodes[n].turn, -1),
                 "scale": self.nodes[n].scale,
             }[path]
-            for n, path in moved - keyed
+            for n, path in moved
+            if n in inside
         }  # fmt: skip
         return [(n, path, value[None]) for (n, path), value in sorted(rest.items(), key=lambda item: item[0])]
 
@@ -167,6 +190,10 @@ class Character:
             apart = np.abs(motion.translations - self.skeleton.offsets).max(axis=(0, 2)) > 1e-5
             free |= set(np.flatnonzero(apart).tolist())
         return free
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    return name if name not in taken else next(n for k in range(2, 10**6) if (n := f"{name}_{k}") not in taken)
 
 
 def load_character(path: str | Path, *, joint_map: Override | None = None) -> Character:
@@ -185,9 +212,37 @@ def load_character(path: str | Path, *, joint_map: Override | None = None) -> Ch
         except MotionloomError as error:
             problem = problem or error
         else:
-            return _with_soles(Character(path, file, nodes, rig, found))
+            character = Character(path, file, nodes, rig, found)
+            _remark_on_what_stays(character)
+            return _with_soles(character)
     assert problem is not None
     raise MotionloomError(f"{path}: {problem}")
+
+
+def _remark_on_what_stays(character: Character) -> None:
+    """Say which skeletons and meshes of the file do not move with the character."""
+    file = character.file
+    if len(file.people) > 1:
+        warnings.warn(
+            f"{character.path} holds {len(file.people)} skeletons; the one of {character.skeleton.names[0]!r} moves, "
+            "the others stay as they are",
+            stacklevel=3,
+        )
+    carriers = frozenset().union(*file.people)
+    loose = [
+        printable(entry.get("name")) or f"node_{number}"
+        for number, entry in enumerate(file.document.items("nodes"))
+        if entry.get("mesh") is not None
+        and entry.get("skin") is None
+        and carriers.isdisjoint(upwards(number, file.parents))
+    ]
+    if loose:
+        more = f" and {len(loose) - 5} more" if len(loose) > 5 else ""
+        warnings.warn(
+            f"{character.path}: {', '.join(map(repr, loose[:5]))}{more} hang on no bone and stay where they are while "
+            "the character moves; parent them to a bone in the program that made them",
+            stacklevel=3,
+        )
 
 
 _DOWN = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, -0.4, 0) for z in (-1, 0, 1) if x or y or z])
@@ -196,18 +251,29 @@ _DOWN = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, -0.4, 0) for z in 
 
 def _with_soles(character: Character) -> Character:
     """The character whose skeleton knows the corners of its feet, where it has a mesh and stands on the floor."""
-    skeleton = character.skeleton
-    if not skeleton.on_floor:
+    skeleton, document = character.skeleton, character.file.document
+    up = read_body(skeleton, character.joints.names()).up
+    rest, found = skeleton.rest_positions(), {}
+    meshes = [mesh for mesh in document.items("meshes") if mesh.get("primitives")]
+    if not on_floor(rest @ up):
+        if meshes:
+            _remark_on_soles(character, "does not stand on the floor at rest")
         return character
     feet = {skeleton.index(name) for j in (7, 8, 10, 11) for name, weight in character.joints.points[j] if weight}
     feet = below(skeleton, feet)
-    rest, found = skeleton.rest_positions(), {}
+    down = rot.rotate(rot.shortest_arc(np.array([0.0, 1.0, 0.0]), up), _DOWN)
     points = [(s.points, s.joints[np.arange(len(s.points)), s.weights.argmax(axis=1)]) for s in character.surfaces()]
     for j in sorted(feet):
         own = np.concatenate([places[of == j] for places, of in points] or [np.zeros((0, 3))]) - rest[j]
         if len(own):
-            found[j] = own[np.unique((own @ _DOWN.T).argmax(axis=0))]
+            found[j] = own[np.unique((own @ down.T).argmax(axis=0))]
+    if meshes and not points:
+        _remark_on_soles(character, "has meshes that are compressed (Draco, meshopt) or stored in an unusual way")
     return replace(character, rig=replace(character.rig, skeleton=replace(skeleton, soles=found)))
+
+
+def _remark_on_soles(character: Character, why: str) -> None:
+    warnings.warn(f"{character.path} {why}, so that its soles are not known and may dip into the floor", stacklevel=4)
 
 
 def _inside(now: Worlds, node: int, place: Array) -> Array:

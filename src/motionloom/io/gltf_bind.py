@@ -99,9 +99,9 @@ def _hanging(nodes: list[Node], parents: list[int], node: int, known: dict[int, 
     return found
 
 
-def on_floor(places: Array) -> bool:
-    """Whether somebody whose joints are there at rest (joints, 3) stands with the soles at y = 0."""
-    low, high = float(places[:, 1].min()), float(places[:, 1].max())
+def on_floor(heights: Array) -> bool:
+    """Whether somebody whose joints are so high at rest (joints,) stands with the soles at 0."""
+    low, high = float(heights.min()), float(heights.max())
     return high > 0 and abs(low) < 0.1 * (high - low)
 
 
@@ -126,7 +126,7 @@ def _space(document: Document, nodes: list[Node], parents: list[int], skin: _Ski
             return standing  # turned and moved over the floor at most: that is where it stands
         turn = turn_of(apart)
         away = np.inf if turn is None else angle(turn, rot.IDENTITY)
-        if apart[1, 1] > _LEAN and away < nearest and on_floor(places):
+        if apart[1, 1] > _LEAN and away < nearest and on_floor(places[:, 1]):
             best, nearest = space, away
     return best
 

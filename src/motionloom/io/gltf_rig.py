@@ -115,7 +115,7 @@ def read_rig(
         np.array(offsets),
         frozenset(slots[n] for n in tips if slots[n] > 0),
         humanoid={part: names[n] for part, n in known.items() if n in names},
-        on_floor=on_floor(np.array([places[n] for n in order])),
+        on_floor=on_floor(np.array([places[n][1] for n in order])),
     )
     moved = frozenset(slots[n] for n in shifted)
     return Rig(skeleton, tuple(order), np.array([turns[n] for n in order]), moved)

@@ -3,9 +3,9 @@
 import math
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,8 @@ from motionloom.live.body import body, put
 from motionloom.live.commands import Command, Path, Pose, Reach, Say, Steer
 from motionloom.live.course import ARRIVED, Course, Trail, braking, steered
 from motionloom.live.settings import Settings
-from motionloom.live.words import STANDS, for_pace, is_standing
+from motionloom.live.targets import SOON, Target, must_go, same_place, way_to, within_reach
+from motionloom.live.words import STANDS, for_pace, stays
 from motionloom.motion import Motion, ground_pose
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.long import Past
@@ -31,6 +32,8 @@ Array = NDArray[np.float64]
 
 STAY = 4
 """Frames that a joint is asked to stay where it was asked to be."""
+GOES = 0.15
+"""Metres per second from which on somebody who is steered goes somewhere."""
 RUNS = 1.6
 """Metres per second from which on somebody who is to stand still first slows down: words alone stop a runner in half a
 second."""
@@ -108,11 +111,12 @@ class _Plan:
 
 @dataclass(frozen=True, eq=False)
 class _Due:
-    """Something to be in one frame, in the world."""
+    """Something that windows are asked for: how somebody is in one frame."""
 
     frame: int
-    goal: Goal
-    """Of one frame."""
+    command: Reach | Pose
+    there: GroundPose
+    """Where the person was thought to be then."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +127,9 @@ class State:
     words: str
     steer: Steer
     trail: Trail | None
+    targets: tuple[Target, ...]
+    goes_to: Target | None
+    stands: int
     due: tuple[_Due, ...]
     asked: tuple[Command, ...]
 
@@ -134,6 +141,9 @@ class Person(Asked):
         self._prior, self._settings, self.skeleton = prior, settings, skeleton or SMPL22
         self._words, self._steer = "", Steer()
         self._trail: Trail | None = None
+        self._targets: deque[Target] = deque(maxlen=MOST_ASKED)  # what is to be reached, and is not asked of windows
+        self._goes_to: Target | None = None  # that which the trail leads to
+        self._stands = 0  # the frame until which somebody who has come to a place stands there
         self._asked: deque[Command] = deque()
         self._due: deque[_Due] = deque(maxlen=MOST_ASKED)
         self._plan: _Plan | None = None if start is None else self._begun(start)
@@ -155,11 +165,16 @@ class Person(Asked):
 
     def state(self) -> State:
         """What `restore` brings back."""
-        return State(self._plan, self._words, self._steer, copy(self._trail), tuple(self._due), tuple(self._asked))
+        return State(
+            self._plan, self._words, self._steer, copy(self._trail), tuple(self._targets), self._goes_to, self._stands,
+            tuple(self._due), tuple(self._asked),
+        )  # fmt: skip
 
     def restore(self, state: State) -> None:
         """Be as in a state; what was asked since is forgotten."""
         self._plan, self._words, self._steer, self._trail = state.plan, state.words, state.steer, copy(state.trail)
+        self._targets = deque(state.targets, maxlen=MOST_ASKED)
+        self._goes_to, self._stands = state.goes_to, state.stands
         self._due = deque(state.due, maxlen=MOST_ASKED)
         self._asked = deque(state.asked)
 
@@ -217,50 +232,128 @@ class Person(Asked):
     def _take_up(self, command: Command, frame: int, course: Course) -> None:
         if isinstance(command, Say):
             self._words = command.text
+            if stays(command.text) and (self._trail is not None or self._steered):
+                self._go(Steer(), None)
         elif isinstance(command, Steer):
-            self._steer, self._trail = command, None
+            self._go(command, None)
         elif isinstance(command, Path):
-            self._steer, self._trail = Steer(), Trail(command, course)
+            self._go(Steer(), Trail(command, course))
         else:
-            due = frame + max(4, round(command.within * FPS))
-            self._due.append(_Due(due, self._goal_of(command, due, course)))
+            self._targets.append(Target(command, frame + max(4, round(command.within * FPS))))
 
-    def _goal_of(self, command: Reach | Pose, due: int, course: Course) -> Goal:
+    def _go(self, steer: Steer, trail: Trail | None, goes_to: Target | None = None) -> None:
+        """Go another way than before; what was gone to is given up."""
+        self._steer, self._trail, self._goes_to, self._stands = steer, trail, goes_to, 0
+        self._targets = deque((one for one in self._targets if not one.near), maxlen=MOST_ASKED)
+
+    @property
+    def _steered(self) -> bool:
+        """Whether somebody is steered somewhere."""
+        return self._steer.direction is not None if self._steer.speed is None else self._steer.speed > GOES
+
+    def _goal_of(self, command: Reach | Pose, there: GroundPose) -> Goal:
+        """Of one frame, for somebody who is there then."""
         goal = Goal.nothing(1)
         if isinstance(command, Reach):
             joint = SMPL22.index(command.joint)
             goal.positions[0, joint] = command.position
             goal.asked[0, joint] = True
             return goal
-        plan = self._plan
-        there = course.place if plan is None else plan.places[min(due - plan.first, len(plan.places) - 1)]
         places = np.array(command.places)
         goal.positions[0] = there.to_world(places - places[:1] * [1, 0, 1])
         goal.asked[0] = True
         return goal
 
+    def _place_in(self, frame: int, course: Course) -> GroundPose:
+        """Where somebody will be in a frame if he goes on as he does."""
+        if (plan := self._plan) is None:
+            return course.place
+        last = len(plan.places) - 1
+        beyond, there = max(0, frame - plan.first - last), plan.places[min(frame - plan.first, last)]
+        back = plan.places[max(0, last - 4)]
+        x, z = ((there.x - back.x) / 4, (there.z - back.z) / 4) if beyond else (0.0, 0.0)
+        return GroundPose(there.x + beyond * x, there.z + beyond * z, there.facing)
+
+    def _look_at_targets(self, frame: int, course: Course) -> int:
+        """Ask windows for what is near, walk to what is not; gives the frames after which to look again."""
+        again = self._settings.used
+        waiting, self._targets = self._targets, deque(maxlen=MOST_ASKED)
+        for target in waiting:
+            if target.due < frame + 4:  # others were walked to first
+                target = replace(target, due=frame + SOON)
+            command, left = target.command, target.due - frame
+            early = target.first > frame
+            if early and not (isinstance(command, Reach) and must_go(command, course.place, left)):
+                self._targets.append(target)
+                again = min(again, target.first - frame)
+                continue
+            there = self._place_in(target.due, course)
+            far = isinstance(command, Reach) and not target.near and not within_reach(command, there, left)
+            if not far and not early:
+                self._due.append(_Due(target.due, command, there))
+            elif not far or self._goes_to is not None or self._stands > frame:
+                self._targets.append(target)
+            else:
+                assert isinstance(command, Reach)
+                self._go(Steer(), Trail(way_to(command, course.place, left), course), target)
+        return again
+
+    def _still_due(self, frame: int, course: Course) -> Iterator[_Due]:
+        """What is asked of the next window: a pose comes along with somebody, and what he has left behind is walked to,
+        unless he is steered elsewhere."""
+        for due in self._due:
+            left, there = due.frame - frame, self._place_in(due.frame, course)
+            if left + STAY <= 0:
+                continue
+            if isinstance(due.command, Pose):
+                yield due if same_place(due.there, there, max(left, 0)) else replace(due, there=there)
+            elif within_reach(due.command, there, max(left, 0)):
+                yield due
+            elif self._trail is None and not self._steered:
+                self._targets.append(Target(due.command, due.frame))
+
+    def _arrive(self, frame: int, course: Course) -> None:
+        """End a trail that is over; who has gone to something stands there until he has reached it."""
+        if self._trail is None or self._trail.left(course, frame) > ARRIVED:
+            return
+        target, self._trail, self._goes_to = self._goes_to, None, None
+        if target is not None:
+            due = max(target.due, frame + SOON)
+            self._targets.appendleft(Target(target.command, due, near=True))
+            self._stands = due + STAY
+
     def _wanted(self, frame: int, course: Course) -> tuple[Goal, str, int]:
         """What is asked of the next frames, in the world; the words; and after how many frames to sample again."""
-        frames, again = self._settings.ahead, self._settings.used
-        words, steer = self._words, self._steer
-        if self._trail is not None and self._trail.left(course, frame) <= ARRIVED:
-            self._trail = None
+        frames = self._settings.ahead
+        self._arrive(frame, course)
+        again = self._look_at_targets(frame, course)
+        if self._stands > frame:
+            again = min(again, self._stands - frame)
         if self._trail is not None:
             goal, over = self._trail.goal(course, frames, FPS, frame=frame)
-            again = max(self._settings.rest, min(again, over))
-            words = words or for_pace(self._trail.speed, None, None)
+            again = min(again, over)
         else:
-            stops = steer.speed is None and is_standing(words) and FPS * math.hypot(*course.velocity) > RUNS
-            goal = braking(course, frames) if stops else steered(course, steer, frames, FPS)
-            pace = (0.0 if steer.direction is None else WALKING) if steer.speed is None else steer.speed
-            words = words or for_pace(pace, steer.direction, steer.facing)
-        while self._due and self._due[0].frame + STAY <= frame:
-            self._due.popleft()
+            stops = self._steer.speed is None and stays(self._words) and FPS * math.hypot(*course.velocity) > RUNS
+            goal = braking(course, frames) if stops else steered(course, self._steer, frames, FPS)
+        self._due = deque(self._still_due(frame, course), maxlen=MOST_ASKED)
         for due in self._due:
-            here = np.arange(max(due.frame - frame, 0), min(due.frame + STAY - frame, frames))
-            for k in here:
-                goal = overlaid(due.goal.padded(int(k), frames - int(k) - 1), goal)
-        return goal, words or STANDS, again
+            one = self._goal_of(due.command, due.there)
+            for k in range(max(due.frame - frame, 0), min(due.frame + STAY - frame, frames)):
+                goal = overlaid(one.padded(k, frames - k - 1), goal)
+        return goal, self._said(frame), max(self._settings.rest, again)
+
+    def _said(self, frame: int) -> str:
+        """The words for what is done from a frame on; those that go nowhere are not for somebody who goes."""
+        if self._stands > frame:
+            return STANDS
+        steer, words = self._steer, self._words
+        if self._trail is not None:
+            pace, away = self._trail.speed, self._goes_to is not None
+            return for_pace(pace, None, None) if away or stays(words) else words or for_pace(pace, None, None)
+        pace = (0.0 if steer.direction is None else WALKING) if steer.speed is None else steer.speed
+        if not words or (stays(words) and self._steered):
+            return for_pace(pace, steer.direction, steer.facing)
+        return words
 
 
 def decoded(features: Array, begin: GroundPose) -> tuple[Array, Array, list[GroundPose]]:

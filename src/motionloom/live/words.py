@@ -15,12 +15,17 @@ _FORWARD = (
 _BACKWARDS, _SIDEWAYS = "a person walks backwards", "a person walks sideways"
 
 
-_STANDING = re.compile(r"\b(stands?|standing|stops?|halts?)\b", re.IGNORECASE)
+_GOING = r"""walk\w*|runs?|running|jog\w*|sprint\w*|stroll\w*|march\w*|step\w*|skip\w*|hop\w*|jump\w*|crawl\w*|sneak\w*|
+    creep\w*|limp\w*|stagger\w*|wander\w*|danc\w*|goes|go|going|moves?|moving|rush\w*|hurr\w+|climb\w*|strid\w+"""
+_STAYING = r"""stands?|standing|stays?|staying|waits?|waiting|sits?|sitting|seated|lies?|lying|lays|laying|kneel\w*|
+    squat\w*|crouch\w*|sleep\w*|rests?|resting|falls?|falling|collaps\w+|freez\w+|(?:stops?|halts?)(?:\s+\w+ing)?"""
+_EITHER = re.compile(rf"\b(?:(?P<staying>{_STAYING})|{_GOING})\b", re.IGNORECASE | re.VERBOSE)
 
 
-def is_standing(words: str) -> bool:
-    """Whether words ask for somebody who stays where he is."""
-    return bool(_STANDING.search(words))
+def stays(words: str) -> bool:
+    """Whether words end with somebody who stays where he is: stands, sits or lies. The last of several verbs counts."""
+    found = list(_EITHER.finditer(words))
+    return bool(found) and found[-1]["staying"] is not None
 
 
 def for_pace(speed: float, direction: float | None, facing: float | None) -> str:

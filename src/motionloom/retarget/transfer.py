@@ -393,7 +393,7 @@ def _lack(ankles: Array, goals: _Goals, body: Body, *, world: Array, places: Arr
     rest. A foot that the source has below it, such as down a stair, may be as low there.
     """
     rest = body.skeleton.rest_positions()
-    floor = min(0.0, *(float((rest[j] + corners)[:, 1].min()) for j, corners in body.skeleton.soles.items()))
+    floor = min(0.0, *(float(((rest[j] + corners) @ body.up).min()) for j, corners in body.skeleton.soles.items()))
     joints = placed(body.skeleton, world)
     lack = np.zeros(ankles.shape[:2])
     for side, foot in enumerate(FEET):

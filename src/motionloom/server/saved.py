@@ -84,7 +84,11 @@ class Saved:
             if seen is None:
                 return None
             if self._known[0] != seen:
-                data = self.project.read_project()
+                try:
+                    data = self.project.read_project()
+                except OSError as error:
+                    why = f"project.json in the project folder cannot be read ({error.strerror}); {ASIDE}"
+                    raise Refusal(422, why) from None
                 self._known = seen, None if data is None else _stamp_of(_parsed(data))
             return self._known[1]
 

@@ -46,7 +46,7 @@ def lowered(drop: np.ndarray, back: np.ndarray | float = 0.0) -> np.ndarray:
 def bent(angle: np.ndarray) -> np.ndarray:
     """Somebody on straight legs whose trunk leans forward by (frames,) radians."""
     p = standing(len(angle) / FPS)
-    pelvis = p[:, :1].copy()
+    pelvis = p[:, [1, 2]].mean(axis=1, keepdims=True)  # it is the hips that bend
     sin, cos = np.sin(angle)[:, None], np.cos(angle)[:, None]
     around = p[:, UPPER] - pelvis
     y, z = around[..., 1] * cos - around[..., 2] * sin, around[..., 2] * cos + around[..., 1] * sin

@@ -115,7 +115,7 @@ def test_any_json_in_place_of_results_is_read_or_refused(
 def test_a_changed_bound_changes_the_fingerprint() -> None:
     from dataclasses import replace
 
-    other = replace(FORWARD, bounds=(replace(FORWARD.bounds[0], low=9.0), *FORWARD.bounds[1:]))
+    other = replace(FORWARD, limits=(replace(FORWARD.limits[0], low=9.0), *FORWARD.limits[1:]))
     assert obey.fingerprint([FORWARD]) != obey.fingerprint([other])
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from motionloom.kinematics import gestures as g
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array, J
+from motionloom.kinematics.wholeness import wholeness
 
 Measures = dict[str, float]
 
@@ -55,6 +56,7 @@ MEANING: dict[str, str] = {
     "leg_energy": "m/s of the ankles against the body, mean",
     "mean_stir": "m/s of all joints, mean",
     "stir": "m/s of the quickest joint, 90th percentile",
+    "whole": "share of the frames in which the body is a person's (kinematics/wholeness.py)",
 }
 """What each number is."""
 
@@ -143,4 +145,8 @@ def _posture(p: Array, fps: float) -> Measures:
     }
 
 
-_PARTS: tuple[Callable[[Array, float], Measures], ...] = (_path, _legs, _arms, _posture)
+def _body(p: Array, fps: float) -> Measures:
+    return {"whole": wholeness(p)}
+
+
+_PARTS: tuple[Callable[[Array, float], Measures], ...] = (_path, _legs, _arms, _posture, _body)

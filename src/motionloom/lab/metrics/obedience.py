@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from motionloom.errors import MotionloomError
 from motionloom.kinematics.physics import Array
+from motionloom.kinematics.wholeness import ENOUGH
 from motionloom.lab.metrics.actions import Measures, measure
 
 _INFINITY = float("inf")
@@ -39,6 +40,10 @@ class Bound:
         return lower if self.high == _INFINITY else f"{lower} and <= {self.high:g}"
 
 
+WHOLE = Bound("whole", "the body is a person's: pelvis, trunk, head, knees and elbows", low=ENOUGH)
+"""Every check of every set asks for this first; somebody who is folded obeys nothing."""
+
+
 @dataclass(frozen=True)
 class Check:
     """One prompt and what a body must do to obey it."""
@@ -49,13 +54,18 @@ class Check:
     """Length to generate."""
     paraphrases: tuple[str, ...]
     """The same prompt in other words."""
-    bounds: tuple[Bound, ...]
+    limits: tuple[Bound, ...]
     words: str
     """Pattern of captions of real clips that show the action."""
     unless: str = r"(?!)"
     """Pattern of captions that say too much or too little to count as a pure example."""
     related: str = r"(?!)"
     """Pattern of captions of clips that may rightly pass as well; they count neither for nor against."""
+
+    @property
+    def bounds(self) -> tuple[Bound, ...]:
+        """The limits, and the one that holds for everybody: a whole body."""
+        return (*self.limits, WHOLE)
 
     def measured(self, positions: Array, fps: float) -> Measures:
         """All numbers of one motion, (frames, 22, 3) metres, at ``fps`` frames per second."""

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from motionloom.kinematics.wholeness import wholeness
 from motionloom.lab.metrics.everyday.body import Body
-from motionloom.lab.metrics.obedience import Bound, Measures
+from motionloom.lab.metrics.obedience import WHOLE, Bound, Measures
 
 SUNK = Bound("sunk", "nobody goes through the floor", high=0.08)
 AFLOAT = Bound("afloat", "somebody who does not jump or climb touches the floor", high=0.15)
@@ -49,8 +50,8 @@ class Everyday:
 
     @property
     def bounds(self) -> tuple[Bound, ...]:
-        """The limits, and those that hold for every body: it neither sinks into the floor nor hangs in the air."""
-        return (*self.limits, SUNK, *((AFLOAT,) if self.grounded else ()))
+        """The limits, and those for every body: it is whole, and neither sinks into the floor nor hangs in the air."""
+        return (*self.limits, WHOLE, SUNK, *((AFLOAT,) if self.grounded else ()))
 
     def measured(self, positions: np.ndarray, fps: float) -> Measures:
         """All numbers that are limited, rounded to four places.
@@ -63,7 +64,7 @@ class Everyday:
 
     def of(self, body: Body) -> Measures:
         """As `measured`, of signals that are there already."""
-        found = {**self.measures(body), **about_the_floor(body)}
+        found = {**self.measures(body), "whole": wholeness(body.p), **about_the_floor(body)}
         return {name: round(float(value), 4) for name, value in found.items()}
 
     def obeyed(self, measures: Measures) -> bool:
