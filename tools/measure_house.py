@@ -3,7 +3,8 @@
 python tools/measure_house.py [--json]
 
 Canonical lines are those after `ruff format` at 88 columns, as most projects write, without comments that hold lines
-together: what is packed into long lines counts in full. `tests/test_house.py` holds a budget for each room. Parameters: of public functions and methods, without self and cls, over `PARAMETERS`. Complexity: cyclomatic with
+together: what is packed into long lines counts in full. `tests/test_house.py` holds a budget for each room.
+Parameters: of public functions and methods, without self and cls, over `PARAMETERS`. Complexity: cyclomatic with
 boolean operators and comprehensions, over `COMPLEXITY` (ruff's C901 counts neither, and finds nothing over 16).
 """
 

@@ -13,8 +13,6 @@ move without end and do what is asked meanwhile.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from motionloom import _moved
-
 if TYPE_CHECKING:
     from motionloom.bulk.batch import batch
     from motionloom.bulk.metadata import read_batch
@@ -39,8 +37,6 @@ if TYPE_CHECKING:
     from motionloom.weights.pair import PairBlock
     from motionloom.weights.predictor import Predictor, save_predictor
     from motionloom.weights.prior import Prior, save_prior
-
-_moved.install()
 
 _PLACES = {
     "batch": "bulk.batch",

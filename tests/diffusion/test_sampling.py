@@ -5,7 +5,6 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from motionloom import diffusion
 from motionloom.diffusion import (
     SOLVERS,
     cosine,
@@ -141,17 +140,3 @@ def test_masked_noise_is_zero_where_the_mask_holds():
 def test_seeds_that_do_not_fit_the_rows_are_refused(mistake):
     with pytest.raises(ValueError, match="seeds"):
         mistake()
-
-
-def test_noise_under_its_old_names_is_the_same_and_says_the_new_ones():
-    with pytest.warns(FutureWarning, match="row_draw is row_noise now"):
-        draw = diffusion.row_draw([3])
-    x = row_noise([3])(torch.empty(1, 2, 3))
-    draw(x)
-    with pytest.warns(FutureWarning, match="draw= is noise= now"):
-        old = run(wavy, x, levels=levels(SCHEDULE, 4), solver=SOLVERS["ddpm"], schedule=SCHEDULE, draw=draw)
-    noise = row_noise([3])
-    noise(x)
-    assert torch.equal(
-        old, run(wavy, x, levels=levels(SCHEDULE, 4), solver=SOLVERS["ddpm"], schedule=SCHEDULE, noise=noise)
-    )

@@ -15,7 +15,7 @@ from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22
 from motionloom.retarget.onto import match_root
 from motionloom.skeleton import SMPL22, Skeleton
-from motionloom.tasks.edit import Extend, Loop, Redraw, edit, kept_numbers
+from motionloom.tasks.edit import Extend, Loop, Redraw, changes_asked, edit, kept_numbers
 from motionloom.tasks.inpaint import inpaint_motion
 from motionloom.tasks.sampling import Sampling
 from motionloom.tasks.splice import carried, kept_parts, person_at_20, splice, standing
@@ -295,6 +295,13 @@ def test_standing_tells_the_facing() -> None:
     np.testing.assert_allclose(rot.rotate(turn, np.array([0.0, 0, 1])), [1, 0, 0], atol=1e-6)
 
 
+def asked_and_edited(prior: Prior, asked: dict) -> None:
+    """Changes by single options, as the command line and the server ask for them."""
+    options = {key: asked[key] for key in asked if key in ("keep", "between", "loop", "extend", "strength", "blend")}
+    changes = changes_asked(asked.get("text", ""), **options)
+    edit(prior, person(3.0), changes=changes, **{key: asked[key] for key in asked if key not in options})
+
+
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
@@ -326,18 +333,8 @@ def test_standing_tells_the_facing() -> None:
 )
 def test_what_cannot_be_asked_is_refused(prior: Prior, asked: dict, said: str) -> None:
     with pytest.raises(MotionloomError, match=said) as caught:
-        edit(prior, person(3.0), **asked)  # by their old names
+        asked_and_edited(prior, asked)
     assert "\n" not in str(caught.value)
-
-
-def test_old_keywords_are_the_new_values_and_say_so(prior: Prior) -> None:
-    """To the bit."""
-    clip, changes = person(3.0), [Redraw([(0.5, 1.2)], ["head"], 0.5), Extend(0.5), Loop(0.6)]
-    old = {"between": [(0.5, 1.2)], "keep": ["head"], "strength": 0.5, "extend": 0.5, "loop": True, "blend": 0.6}
-    with pytest.warns(FutureWarning, match="changes="):
-        [before] = edit(prior, clip, "a person jumps", **old, **FEW)  # type: ignore[arg-type]
-    [now] = edit(prior, clip, "a person jumps", changes, **FEW)
-    assert np.array_equal(before.rotations, now.rotations)
 
 
 def test_clips_that_cannot_be_edited_are_refused(prior: Prior) -> None:

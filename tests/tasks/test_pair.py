@@ -187,13 +187,7 @@ def test_a_path_leads_one_of_the_two(prior: Prior, block: PairBlock, person: int
     assert len(duet[0]) == len(duet[1]) == 40
 
 
-def test_a_goal_by_its_old_keywords_says_the_new_one(prior: Prior, block: PairBlock) -> None:
-    with pytest.warns(FutureWarning, match="goals="):
-        [old] = generate_pair(prior, block, SAID[0], goal=walk(40), person=1, steps=2)  # type: ignore[call-arg]
-    [new] = generate_pair(prior, block, SAID[0], goals=(None, walk(40)), steps=2)
-    assert np.array_equal(old[0].root, new[0].root)
-    with pytest.warns(FutureWarning), pytest.raises(MotionloomError, match="person 2"):
-        generate_pair(prior, block, SAID[0], goal=walk(40), person=2)  # type: ignore[call-arg]
+def test_two_people_with_a_goal_each_are_refused(prior: Prior, block: PairBlock) -> None:
     with pytest.raises(MotionloomError, match="both people have a goal"):
         generate_pair(prior, block, SAID[0], goals=(walk(40), walk(40)))
 

@@ -1,9 +1,8 @@
-"""One value for all settings, and old names that say the new ones."""
+"""One value for all settings."""
 
 import numpy as np
 import pytest
 
-from motionloom._moved import renamed
 from motionloom.errors import MotionloomError
 from motionloom.tasks.sampling import PairSampling, PredictionSampling, Sampling
 
@@ -57,15 +56,3 @@ def test_seeds_of_motions_follow_each_other() -> None:
     assert Sampling(seed=5).seeds(3) == [5, 6, 7]
     with pytest.raises(MotionloomError, match="one person has one seed"):
         Sampling(seed=(1, 2)).seeds(1)
-
-
-def test_an_old_keyword_is_the_new_one_and_says_so() -> None:
-    @renamed({"clean": "foot_lock"})
-    def task(*, foot_lock: bool = True) -> bool:
-        return foot_lock
-
-    with pytest.warns(FutureWarning, match="clean= is foot_lock= now") as caught:
-        assert task(clean=False) is False  # type: ignore[call-arg]
-    assert caught[0].filename == __file__
-    with pytest.raises(TypeError, match="'clean' and 'foot_lock'"):
-        task(clean=False, foot_lock=False)  # type: ignore[call-arg]

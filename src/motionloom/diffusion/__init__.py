@@ -3,8 +3,6 @@
 Nothing here knows about motion. Read `schedule`, `solvers`, `sampling`, then `denoisers` and `constraints`.
 """
 
-from motionloom._moved import old_names
-
 from .bases import Basis, Dct, Frames
 from .constraints import Constraint, chain, handshake, observe
 from .denoisers import Denoiser, Weight, blend, from_noise, guide, inpaint, join_rows, mix
@@ -69,7 +67,3 @@ __all__ = [
     "sqrt",
     "staggered",
 ]
-
-__getattr__ = old_names(
-    __name__, {"Draw": "NoiseSource", "Guess": "RowsDenoiser", "row_draw": "row_noise", "masked_draw": "masked_noise"}
-)

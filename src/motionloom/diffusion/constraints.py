@@ -11,8 +11,6 @@ from typing import TypeAlias
 import torch
 from torch import Tensor
 
-from motionloom._moved import renamed
-
 from .bases import Basis
 from .denoisers import mix
 from .schedule import NoiseSource, Schedule, State
@@ -21,7 +19,6 @@ Constraint: TypeAlias = Callable[[State, int], State]
 """(state, the level it has just reached) -> edited state, of the same shape."""
 
 
-@renamed({"draw": "noise"})
 def observe(
     known: State, mask: Tensor, schedule: Schedule, noise: NoiseSource, *, basis: Basis | None = None
 ) -> Constraint:

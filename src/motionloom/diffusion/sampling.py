@@ -18,8 +18,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom._moved import renamed
-
 from .constraints import Constraint, chain
 from .denoisers import Denoiser
 from .schedule import NoiseSource, Schedule, State
@@ -36,7 +34,6 @@ class Snapshot(NamedTuple):
     """The denoised estimate that the move was made with."""
 
 
-@renamed({"draw": "noise"})
 def sample(
     denoise: Denoiser,
     x: State,
@@ -67,7 +64,6 @@ def _walk(
         yield Snapshot(s, x, clean)
 
 
-@renamed({"draw": "noise"})
 def run(
     denoise: Denoiser,
     x: State,
@@ -85,7 +81,6 @@ def run(
     return x
 
 
-@renamed({"draw": "noise"})
 def restart(clean: State, schedule: Schedule, level: int, noise: NoiseSource) -> State:
     """Clean data taken to `level` with fresh noise: the start of a walk that keeps what this noise leaves of it."""
     return schedule.noised(clean, level, noise(clean))
@@ -119,7 +114,6 @@ def row_noise(seeds: Sequence[int], lengths: Sequence[int] | None = None) -> Noi
     return noise
 
 
-@renamed({"draw": "noise"})
 def masked_noise(noise: NoiseSource, mask: Tensor) -> NoiseSource:
     """Noise scaled by (1 - mask): none where the state is to stay noise-free (noise-filtered control, soft too)."""
     return lambda like: noise(like) * (1.0 - mask.to(like.dtype))

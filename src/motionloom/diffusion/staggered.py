@@ -18,8 +18,6 @@ from itertools import pairwise
 import torch
 from torch import Tensor
 
-from motionloom._moved import renamed
-
 from .schedule import NoiseSource, Schedule, State
 from .solvers import Solver, Step
 
@@ -67,7 +65,6 @@ RowsDenoiser = Callable[[Sequence[int], Sequence[State], Sequence[int]], Sequenc
 """(numbers of rows, their states (length, features), their levels) -> estimates of their clean data."""
 
 
-@renamed({"together": "batch_size"})
 def staggered(
     links: Iterable[Link],
     denoise: RowsDenoiser,

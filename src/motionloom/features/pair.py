@@ -16,7 +16,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motionloom._moved import old_names, say
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.humanml import Heading, recover_root
@@ -28,9 +27,6 @@ from motionloom.retarget import to_smpl22
 from motionloom.retarget.anatomy import read_body
 
 Array = NDArray[np.float64]
-__getattr__ = old_names(
-    __name__, {"seen": "relative", "put": "to_world", "told_from": "from_world", "upright": "normalized"}
-)
 __all__ = ["compose", "mirrored"]
 
 
@@ -43,12 +39,6 @@ class Encoded(NamedTuple):
     """(2, 4) ground poses in the world, at frame 0."""
     floors: Array
     """(2,) metres: the height that each person's features call 0."""
-
-    @property
-    def stands(self) -> Array:
-        """The old name of ``poses``, for one release."""
-        say("Encoded.stands", "Encoded.poses")
-        return self.poses
 
 
 def swapped(pair: Numbers, axis: int = 0) -> Numbers:

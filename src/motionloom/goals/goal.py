@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom._moved import old_names
 from motionloom.errors import MotionloomError
 from motionloom.ground import GroundPose
 from motionloom.motion import ground_pose
@@ -25,7 +24,6 @@ AGREE_TURN = np.radians(5.0)
 """Radians: the same for directions."""
 SET_OUT = 0.05
 """Metres from its beginning at which a path shows its first direction."""
-__getattr__ = old_names(__name__, {"Placement": "GroundPose", "placement_of": "start_of"})
 _ACROSS = list(SMPL22.resolve(["left_hip", "right_hip", "left_shoulder", "right_shoulder"]))
 
 

@@ -14,7 +14,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motionloom._moved import renamed
 from motionloom.blending import quintic_decay
 from motionloom.diffusion import SOLVERS, guide, row_noise, row_seed, sample
 from motionloom.edits.boundary import match_boundary
@@ -200,7 +199,6 @@ def _check(predictor: Predictor, past: Array, frames: int, known: Known | None) 
         )
 
 
-@renamed({"rows": "batch_size"})
 def futures(
     predictor: Predictor,
     past: np.ndarray,

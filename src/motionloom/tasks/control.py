@@ -7,14 +7,13 @@ The goal is seen from the person's ground pose at frame 0; there it steers every
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal, TypeAlias, Unpack
+from typing import Literal, TypeAlias, Unpack
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from motionloom import rotations as rot
-from motionloom._moved import renamed, say
 from motionloom.diffusion import Denoiser, Weight, blend, guide, mix
 from motionloom.edits import fitting
 from motionloom.edits.steering import Correction, corrected, toward
@@ -58,14 +57,7 @@ class Controlled:
     missed: tuple[str, ...]
     """A sentence for each of the targets that are more than `MISSED` off, at most `SENTENCES`, the worst first."""
 
-    @property
-    def drawn(self) -> Motion:
-        """The old name of ``sampled``, for one release."""
-        say("Controlled.drawn", "Controlled.sampled")
-        return self.sampled
 
-
-@renamed({"clean": "foot_lock", "exact": "fit"})
 def control(
     prior: Prior,
     prompt: str,
@@ -95,9 +87,6 @@ def control(
     Raises:
         MotionloomError: for what cannot be asked; a goal out of reach is no error (see `Controlled.missed`).
     """
-    weights: Any = settings.pop("weights", None)  # type: ignore[typeddict-item]
-    if weights is not None and not isinstance(adapters, str):
-        adapters = _weighted(adapters, weights)
     chosen = Sampling.of(sampling, settings)
     longest = round(LONGEST * prior.fps)
     if not 4 <= len(goal) <= longest:
@@ -110,14 +99,6 @@ def control(
     )  # fmt: skip
     sampled = [moved(to_motion(row.double().numpy(), prior.fps, foot_lock=foot_lock), place) for row in made]
     return [judged(fitting.fit(motion, goal) if fit else motion, motion, goal) for motion in sampled]
-
-
-def _weighted(adapters: Sequence[Adapter | Weighted], weights: Sequence[Weight]) -> list[Weighted]:
-    """The old way to say it: weights beside the adapters."""
-    say("weights=", "adapters=[(adapter, weight), ...]", above=5)
-    if len(weights) != len(adapters):
-        raise MotionloomError(f"there are {len(weights)} weights for {len(adapters)} adapters; give one for each")
-    return [(one, weight) for one, weight in zip(adapters, weights, strict=True) if isinstance(one, Adapter)]
 
 
 @torch.inference_mode()

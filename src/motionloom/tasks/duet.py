@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom._moved import renamed
 from motionloom.edits.relative_pose import PoseGuidance, relative_pose_guidance
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
@@ -66,7 +65,6 @@ BATCH = 8
 # Somebody is given
 
 
-@renamed({"clean": "foot_lock", "together": "pair_guidance"})
 def react(
     prior: Prior,
     block: PairBlock,
@@ -130,7 +128,6 @@ def _floor(motion: Motion) -> float:
 # Several prompts
 
 
-@renamed({"clean": "foot_lock", "together": "pair_guidance", "at_once": "batch_size"})
 def compose_pair(
     prior: Prior,
     block: PairBlock,

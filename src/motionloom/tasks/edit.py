@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom._moved import renamed, say
 from motionloom.edits.boundary import InpaintWindow
 from motionloom.errors import MotionloomError
 from motionloom.features import layout
@@ -150,7 +149,6 @@ class Loop:
 Change: TypeAlias = Redraw | Extend | Loop
 
 
-@renamed({"clean": "foot_lock"})
 def edit(
     prior: Prior,
     motion: Motion,
@@ -180,11 +178,8 @@ def edit(
 
     (Inpainting: Lugmayr et al. 2022; of motion: Tevet et al. 2023. Strength: Meng et al., SDEdit, 2022.)
     """
-    old: dict[str, Any] = {name: settings.pop(name) for name in _OLD if name in settings}  # type: ignore[misc]
-    if old:
-        say(f"edit({', '.join(old)})", "edit(changes=[Redraw(...), Extend(...), Loop(...)])", above=4)
     asked = [changes] if isinstance(changes, Redraw | Extend | Loop) else list(changes)
-    asked = asked or changes_asked(text, **old)
+    asked = asked or changes_asked(text)
     chosen = Sampling.of(sampling, settings)
     chosen.levels(prior.schedule)
     if skeleton not in ("own", "smpl"):
@@ -201,9 +196,6 @@ def edit(
             version = change.apply(sampler, version, seed)
         made.append(version)
     return made
-
-
-_OLD = ("keep", "between", "loop", "extend", "strength", "blend")
 
 
 def changes_asked(

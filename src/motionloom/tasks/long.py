@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom._moved import renamed
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction, toward
 from motionloom.errors import MotionloomError
@@ -69,7 +68,6 @@ class Row:
         return self.before + self.frames + self.after
 
 
-@renamed({"clean": "foot_lock", "together": "batch_size"})
 def compose(
     prior: Prior,
     segments: Iterable[Segment],
@@ -160,7 +158,6 @@ def _begun(
     return past, track, past.end if past else track.place(0) if track else GroundPose()
 
 
-@renamed({"together": "batch_size"})
 @torch.inference_mode()
 def long_features(
     prior: Prior,

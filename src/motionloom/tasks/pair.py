@@ -6,7 +6,7 @@ each relative to the own first frame; the relative pose of the two is sampled wi
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 import torch
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom._moved import renamed, say
 from motionloom.diffusion import Denoiser, NoiseSource, row_noise, row_seed
 from motionloom.edits.fitting import fit
 from motionloom.edits.relative_pose import relative_pose_guidance
@@ -211,7 +210,6 @@ def stacked(pairs: Sequence[Observed]) -> Observed:
 # From words
 
 
-@renamed({"clean": "foot_lock", "together": "pair_guidance"})
 def generate_pair(
     prior: Prior,
     block: PairBlock,
@@ -240,7 +238,7 @@ def generate_pair(
     Raises:
         MotionloomError: for what cannot be asked.
     """
-    goal, person = _goal_of(goals, settings)
+    goal, person = _goal_of(goals)
     said, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
     if not all(words.strip() for words in said):
         raise MotionloomError("a prompt is empty; say in words what the two people do")
@@ -267,12 +265,8 @@ def generate_pair(
     return made
 
 
-def _goal_of(goals: tuple[Goal | None, Goal | None], settings: Any) -> tuple[Goal | None, int]:
-    """The one goal and whose it is; also by the old keywords, which are taken out of the settings."""
-    if "goal" in settings or "person" in settings:
-        say("goal=, person=", "goals=(of the first, of the second)", above=5)
-        goal, person = settings.pop("goal", None), check_person(settings.pop("person", 0))
-        goals = (None, goal) if person else (goal, None)
+def _goal_of(goals: tuple[Goal | None, Goal | None]) -> tuple[Goal | None, int]:
+    """The one goal and whose it is."""
     if None not in goals:
         raise MotionloomError("both people have a goal; give one to one of them, and the other goes along")
     return next((goal for goal in goals if goal), None), int(goals[0] is None and goals[1] is not None)
@@ -312,7 +306,6 @@ def check_person(person: int) -> int:
 # Going on
 
 
-@renamed({"clean": "foot_lock", "together": "pair_guidance"})
 def complete_pair(
     prior: Prior,
     block: PairBlock,

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
-from motionloom._moved import renamed
 from motionloom.errors import MotionloomError
 from motionloom.features.humanml import positions_at
 from motionloom.features.positions import SMPL_LAYOUT
@@ -48,7 +47,6 @@ TARGET = 1.0
 """Seconds of the target that are shown to the network, at most."""
 
 
-@renamed({"clean": "foot_lock"})
 def predict(
     predictor: Predictor,
     past: Motion,
@@ -99,7 +97,6 @@ def predict(
     ]
 
 
-@renamed({"clean": "foot_lock"})
 def predict_pieces(
     predictor: Predictor,
     past: Motion,
@@ -128,7 +125,6 @@ def predict_pieces(
     yield from chain([past], _on_past(seen, (window[0] for window in windows), total, hold=parts, foot_lock=foot_lock))
 
 
-@renamed({"clean": "foot_lock"})
 def switch(
     predictor: Predictor,
     past: Motion,

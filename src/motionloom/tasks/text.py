@@ -11,7 +11,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom._moved import renamed
 from motionloom.errors import MotionloomError
 from motionloom.features import babel, humanml
 from motionloom.features.layout import LAYOUT, WIDTH
@@ -95,7 +94,6 @@ def _in_turn(progress: Progress | None, *, of: int) -> tuple[Progress | None, Pr
     return first, lambda done, calls: progress(before + done, before + calls)
 
 
-@renamed({"clean": "foot_lock"})
 def generate(
     prior: Prior,
     prompts: Sequence[str] | str,
@@ -134,7 +132,6 @@ def generate(
     return [motion for _, motion in sorted(made, key=lambda numbered: numbered[0])]
 
 
-@renamed({"clean": "foot_lock"})
 def generate_each(
     prior: Prior,
     prompts: Sequence[str] | str,
@@ -180,7 +177,6 @@ def places_of(prior: Prior, states: Tensor) -> np.ndarray:
     return np.stack([finish(prior, row, foot_lock=False).positions() for row in features])
 
 
-@renamed({"clean": "foot_lock"})
 def to_motion(features: np.ndarray, fps: float, *, foot_lock: bool = True) -> Motion:
     """Features (frames, 263) to a person with constant bones; with ``foot_lock`` the planted feet hold still."""
     motion = motion_from_positions(humanml.decode_positions(features), fps)
@@ -196,7 +192,6 @@ def check_features(prior: Prior) -> None:
         )
 
 
-@renamed({"clean": "foot_lock"})
 def finish(prior: Prior, features: Tensor | np.ndarray, *, foot_lock: bool = True) -> Motion:
     """Features (frames, numbers) of this prior, not standardised, to a motion at its frame rate.
 

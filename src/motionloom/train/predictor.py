@@ -16,7 +16,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from motionloom._moved import say
 from motionloom.data.prediction import Protocol, Recording
 from motionloom.diffusion import SCHEDULES, Dct, Frames
 from motionloom.errors import MotionloomError
@@ -35,7 +34,6 @@ the root's path in the future; some joints in some stretches."""
 STATISTICS = 4096
 """Windows that mean and spread are measured on."""
 HELD = 256
-FORMERLY = {"manner": "variant", "untold": "condition_dropout"}
 """Old names of settings; the variant ``told`` is ``masked`` now."""
 
 
@@ -62,7 +60,6 @@ class Settings:
     def parse(values: dict[str, Any]) -> "Settings":
         """From a recipe's table; raises MotionloomError for what there is not and for values of the wrong kind."""
         hints = get_type_hints(Settings)
-        values = _today(values)
         for key, value in values.items():
             if key not in hints:
                 known = ", ".join(f.name for f in fields(Settings))
@@ -80,17 +77,6 @@ class Settings:
         if not 1 <= settings.kept <= 8192:
             raise MotionloomError("[predictor] kept is a number of frequencies, from 1 to the frames of a window")
         return settings
-
-
-def _today(values: dict[str, Any]) -> dict[str, Any]:
-    """A recipe's table under the names of today, with a warning for each old one."""
-    for old in FORMERLY.keys() & values.keys():
-        say(f"[predictor] {old}", FORMERLY[old], above=4)
-    values = {FORMERLY.get(key, key): value for key, value in values.items()}
-    if values.get("variant") == "told":
-        say("[predictor] variant 'told'", "'masked'", above=4)
-        values["variant"] = "masked"
-    return values
 
 
 class Drawn(NamedTuple):

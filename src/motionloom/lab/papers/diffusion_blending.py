@@ -16,7 +16,6 @@ from typing import Unpack
 import torch
 from torch import Tensor
 
-from motionloom._moved import renamed
 from motionloom.diffusion import (
     SOLVERS,
     Denoiser,
@@ -90,7 +89,6 @@ def control_features(
     )  # fmt: skip
 
 
-@renamed({"draw": "noise"})
 def controlled(
     denoise: Denoiser,
     observed: Observed,

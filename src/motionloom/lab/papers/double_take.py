@@ -21,7 +21,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from motionloom._moved import renamed
 from motionloom.diffusion import (
     DDPM,
     SOLVERS,
@@ -219,7 +218,6 @@ def handshakes(plan: Plan) -> Constraint:
     return joined
 
 
-@renamed({"draw": "noise"})
 def first_take(
     denoise: Denoiser,
     x: State,
@@ -259,7 +257,6 @@ def keep_weights(plan: Plan, keep: Keep) -> Tensor:
     return result
 
 
-@renamed({"draw": "noise"})
 def second_take(
     denoise: Denoiser,
     sandwich: State,
@@ -312,7 +309,6 @@ class TakeOptions(TypedDict, total=False):
     second_take_only: bool
 
 
-@renamed({"draws": "noise"})
 def double_take(
     first: Denoiser,
     second: Denoiser,

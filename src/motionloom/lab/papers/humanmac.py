@@ -19,7 +19,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motionloom._moved import renamed
 from motionloom.diffusion import (
     Basis,
     Constraint,
@@ -104,7 +103,6 @@ class Options(TypedDict, total=False):
     """False leaves the observation to the condition alone."""
 
 
-@renamed({"draw": "noise"})
 def published_completion(
     denoise: Denoiser, observed: Tensor, rows: int, *, basis: Basis, schedule: Schedule, noise: NoiseSource,
     **options: Unpack[Options],

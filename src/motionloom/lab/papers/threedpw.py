@@ -1,7 +1,7 @@
 """3DPW sequence files as their owners distribute them: the sequences with two people, as pairs.
 
 von Marcard et al., Recovering Accurate 3D Human Pose in the Wild, ECCV 2018. A sequence is a Python 2 pickle of lists
-and numpy arrays at 30 frames per second; it is read by `lab.papers.plain_pickle`, which runs nothing of it. The
+and numpy arrays at 30 frames per second, read by `lab.papers.plain_pickle`, which runs nothing of it. The published
 data of ComMDM (Shafir et al., 2023) was made from these files by code that is not released; what is done here is ours:
 
 * *Upright.* The axis along which heads are over ankles becomes +Y.

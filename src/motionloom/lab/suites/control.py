@@ -31,7 +31,7 @@ from motionloom.lab.report.report import REAL, Column, Report
 from motionloom.lab.suites import control_kinds, text_reference
 from motionloom.lab.suites.control_kinds import Kind, Target
 from motionloom.lab.suites.control_methods import BASE, METHODS, OURS, Made, Maker, Sampling, checked, fits, maker
-from motionloom.lab.suites.harness import Run, check_names, digest, diversity, row_of, takes_run
+from motionloom.lab.suites.harness import Run, check_names, digest, diversity, row_of
 from motionloom.lab.suites.items import Item, fitting, pick, read_items, spread
 from motionloom.lab.suites.parts import Parts
 from motionloom.lab.suites.protocol import Protocol, Selection
@@ -306,7 +306,6 @@ def _notes(trial: Trial) -> tuple[str, ...]:
     )
 
 
-@takes_run()
 def run(
     run: Run,
     *,

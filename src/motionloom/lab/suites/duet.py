@@ -24,7 +24,7 @@ from motionloom.lab.suites import duet_blocks
 from motionloom.lab.suites import duet_ways as ways
 from motionloom.lab.suites.duet_blocks import Beside
 from motionloom.lab.suites.duet_ways import FRAMES, GIVEN, Crops, Way
-from motionloom.lab.suites.harness import Run, Say, check_names, digest, takes_run
+from motionloom.lab.suites.harness import Run, Say, check_names, digest
 from motionloom.lab.suites.needs import NoData, pairs_of
 from motionloom.lab.suites.parts import Parts
 from motionloom.tasks.text import STEPS
@@ -82,7 +82,6 @@ class How:
 QUICK = How(crops=6, samples=2, steps=6)
 
 
-@takes_run()
 def run(
     run: Run,
     *,

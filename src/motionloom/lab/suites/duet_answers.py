@@ -17,7 +17,7 @@ from motionloom.lab.report.report import Column, Report, Value
 from motionloom.lab.suites import duet_text as judged
 from motionloom.lab.suites.duet import HELD_OUT
 from motionloom.lab.suites.duet_text import KINDS, NOTES, How, Make, Table
-from motionloom.lab.suites.harness import Run, takes_run
+from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.needs import NoData
 from motionloom.tasks.control import moved
 from motionloom.tasks.duet import react
@@ -75,7 +75,6 @@ class Windows:
         return [window for caption, count, seed in turns for window in self.draw(caption, count, seed)]
 
 
-@takes_run()
 def run(run: Run, *, block: str | Path | None = None, how: How | None = None, kinds: Sequence[str] = KINDS) -> Report:
     """Measure a two-person block on people of the held-out pairs of ``run.data``; arguments as of `duet_text.run`."""
     how = how or How()

@@ -16,7 +16,7 @@ from motionloom.lab.report.report import Report
 from motionloom.lab.suites import duet_text as judged
 from motionloom.lab.suites.duet_answers import own_seed
 from motionloom.lab.suites.duet_text import KINDS, NOTES, Make, Table
-from motionloom.lab.suites.harness import Run, takes_run
+from motionloom.lab.suites.harness import Run
 from motionloom.motion import Motion
 from motionloom.tasks.control import moved
 from motionloom.tasks.duet import compose_pair
@@ -46,7 +46,6 @@ class How(judged.How):
 QUICK = How(duets=2, steps=6, segments=2)
 
 
-@takes_run()
 def run(run: Run, *, block: str | Path | None = None, how: How | None = None, kinds: Sequence[str] = KINDS) -> Report:
     """Measure a two-person block on long duets for the captions of train pairs; arguments as of `duet_text.run`."""
     how = how or How()

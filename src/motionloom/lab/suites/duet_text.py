@@ -24,7 +24,7 @@ from motionloom.lab.metrics import pair_groups as groups
 from motionloom.lab.report.report import REAL, Column, Report, Row, Value
 from motionloom.lab.suites.duet import HELD_OUT, chosen_block
 from motionloom.lab.suites.duet_ways import no_communication_net
-from motionloom.lab.suites.harness import Run, Say, check_names, takes_run
+from motionloom.lab.suites.harness import Run, Say, check_names
 from motionloom.lab.suites.needs import pairs_of
 from motionloom.tasks.control import moved
 from motionloom.tasks.pair import (
@@ -128,7 +128,6 @@ class Table:
     """Further columns of all that was made, in the order of `turns`."""
 
 
-@takes_run()
 def run(run: Run, *, block: str | Path | None = None, how: How | None = None, kinds: Sequence[str] = KINDS) -> Report:
     """Measure a two-person block against the pairs of ``run.data`` and their captions.
 

@@ -3,14 +3,12 @@
 import hashlib
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, fields
-from functools import wraps
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from motionloom._moved import say
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.kinematics.physics import Array
@@ -83,31 +81,6 @@ class Run:
     def parts(self, settings: Mapping[str, Any]) -> Parts:
         """Where pieces of this run are kept."""
         return Parts(self.folder, fingerprint(settings))
-
-
-def takes_run(*, place: int = 0, first: str = "weights", weights: str = "default") -> Callable[[F], F]:
-    """Let a suite that takes a `Run` take, for one release, what it took before: settings of the run as keywords.
-
-    Args:
-        place: of the run among the arguments.
-        first: what was there instead of it: a field of the run or another keyword.
-        weights: those that were meant where none were named.
-    """
-
-    def wrap(suite: F) -> F:
-        @wraps(suite)
-        def _call(*args: Any, **given: Any) -> Any:
-            if "run" in given or any(isinstance(one, Run) for one in args):
-                return suite(*args, **given)
-            say(f"{suite.__module__}.{suite.__name__} with {first}, data and the like", "one with a Run of them")
-            if len(args) > place:
-                given[first] = args[place]
-            kept = {field.name: given.pop(field.name) for field in fields(Run) if field.name in given}
-            return suite(*args[:place], Run(**{"weights": weights, **kept}), *args[place + 1 :], **given)
-
-        return _call  # type: ignore[return-value]
-
-    return wrap
 
 
 def readable(prior: Prior, steps: int) -> Prior:

@@ -16,7 +16,7 @@ from motionloom.lab.metrics.everyday.check import Everyday
 from motionloom.lab.metrics.obedience import CHECKS, Check
 from motionloom.lab.report.files import check_report, write_json
 from motionloom.lab.suites.generator import generator
-from motionloom.lab.suites.harness import Generate, Run, takes_run
+from motionloom.lab.suites.harness import Generate, Run
 from motionloom.reading import read_bytes
 from motionloom.weights.prior import Prior
 
@@ -68,7 +68,6 @@ def attempts(check: Judge, generate: Generate, prompt: str, *, seeds: int, first
     return found
 
 
-@takes_run(first="generate")
 def run(
     run: Run,
     checks: Sequence[Judge] = CHECKS,

@@ -20,7 +20,7 @@ from motionloom.lab.report import report as reports
 from motionloom.lab.report.published_rows import published
 from motionloom.lab.report.report import REAL, SAME, Column, Report, Row, Value
 from motionloom.lab.suites import prediction_trial as trials
-from motionloom.lab.suites.harness import Run, check_names, check_steps, digest, takes_run
+from motionloom.lab.suites.harness import Run, check_names, check_steps, digest
 from motionloom.lab.suites.prediction_trial import Array, Trial, Way
 from motionloom.tasks.completion import SOLVER, SPACING, STEPS, futures
 from motionloom.weights.predictor import Predictor, find_predictor
@@ -84,7 +84,6 @@ class How:
 QUICK = How(samples=6, windows=6, published_steps=20)
 
 
-@takes_run(weights="predictor")
 def run(
     run: Run,
     *,

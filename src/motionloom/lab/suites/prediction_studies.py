@@ -19,7 +19,7 @@ from motionloom.lab.report import report as reports
 from motionloom.lab.report.report import REAL, Column, Report, Row, Value
 from motionloom.lab.suites import prediction, prediction_behaviour
 from motionloom.lab.suites import prediction_trial as trials
-from motionloom.lab.suites.harness import Run, Say, silent, takes_run
+from motionloom.lab.suites.harness import Run, Say, silent
 from motionloom.lab.suites.prediction_trial import Trial
 from motionloom.tasks.completion import SOLVER, SPACING, STEPS
 from motionloom.train.loop import changed
@@ -93,7 +93,6 @@ def budget(
     return replace(found, **{key: value for key, value in said.items() if value is not None})
 
 
-@takes_run(place=1, weights="predictor")
 def run(name: str, run: Run, *, protocol: str | None = None, keep: Path, budget: Budget) -> Report:
     """Do a study and write its table and picture into ``run.folder``.
 

@@ -11,7 +11,7 @@ from motionloom.lab.metrics.obedience import CHECKS
 from motionloom.lab.metrics.realism import NUMBERS, average, compare, speed_distance
 from motionloom.lab.suites.clips import RealClip
 from motionloom.lab.suites.generator import generator
-from motionloom.lab.suites.harness import Generate, Run, takes_run
+from motionloom.lab.suites.harness import Generate, Run
 from motionloom.weights.prior import Prior
 
 SHORTEST, LONGEST = 2.0, 9.8
@@ -51,7 +51,6 @@ def everyday(count: int) -> list[Order]:
     return [Order((check.prompt,) * max(1, count // len(CHECKS)), check.seconds) for check in CHECKS]
 
 
-@takes_run(first="generate")
 def run(
     run: Run, wanted: Sequence[Order], *, generate: Generate | None = None, seed: int = 0
 ) -> tuple[list[Array], float]:

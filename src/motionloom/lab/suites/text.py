@@ -23,7 +23,7 @@ from motionloom.lab.metrics.retrieval import matching_distance, multimodality_of
 from motionloom.lab.report import published_rows
 from motionloom.lab.report.report import REAL, Column, Report, Row, Value
 from motionloom.lab.suites import text_reference
-from motionloom.lab.suites.harness import Run, diversity, embedded, plain_words, readable, row_of, takes_run
+from motionloom.lab.suites.harness import Run, diversity, embedded, plain_words, readable, row_of
 from motionloom.lab.suites.items import fitting, pick, read_items, spread
 from motionloom.lab.suites.parts import Parts
 from motionloom.lab.suites.protocol import Protocol, Selection
@@ -284,7 +284,6 @@ def _about(evaluator: Evaluator) -> tuple[str, ...]:
     return (f"Evaluator {evaluator.name}. {said}",) if said else ()
 
 
-@takes_run()
 def run(
     run: Run,
     *,

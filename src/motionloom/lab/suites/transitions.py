@@ -28,7 +28,7 @@ from motionloom.lab.metrics.transitions import (
 from motionloom.lab.report import published_rows
 from motionloom.lab.report.report import REAL, Column, Report
 from motionloom.lab.suites import text_reference
-from motionloom.lab.suites.harness import Run, Say, diversity, embedded, row_of, takes_run
+from motionloom.lab.suites.harness import Run, Say, diversity, embedded, row_of
 from motionloom.lab.suites.items import fitting, read_items
 from motionloom.lab.suites.long_baselines import Long, Method, methods, titled
 from motionloom.lab.suites.parts import Parts
@@ -274,7 +274,6 @@ def _notes(trial: Trial) -> tuple[str, ...]:
     return (*notes, "Time depends on the machine and on what else it does.")
 
 
-@takes_run()
 def run(
     run: Run,
     *,
