@@ -31,7 +31,7 @@ from motionloom.lab.suites import obey
 from motionloom.lab.suites.generator import generator
 from motionloom.lab.suites.harness import Run
 from motionloom.nets.prior import NetConfig, PriorNet
-from motionloom.nets.text import TextEncoder
+from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.train.loop import Average, train
 from motionloom.train.objectives import CleanError, Conditioned, Drawn, WordBank, feature_scale, masked_error
 from motionloom.train.prior import restandardised, text_encoder

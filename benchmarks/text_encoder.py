@@ -31,7 +31,7 @@ from safetensors.torch import load_file
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom.nets.text import MiniLM
+from motionloom.runtime.text.minilm import MiniLM
 from motionloom.nets.text.hub import open_pretrained
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))

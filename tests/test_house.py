@@ -187,3 +187,68 @@ def test_the_wheel_carries_every_file_of_the_package(tmp_path: Path) -> None:
 def test_shipped_weights_are_small() -> None:
     """Each shipped weight file stays under 45 MB."""
     assert all(w.stat().st_size < 45e6 for w in WEIGHTS)
+
+
+PRODUCT = """
+import importlib.abc, pkgutil, sys
+
+class NoTorch(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] == "torch":
+            raise ImportError("PyTorch was asked for: " + name)
+
+sys.meta_path.insert(0, NoTorch())
+"""
+"""Put before a program, it cannot import PyTorch."""
+FOR_TRAINING = ("nets", "train", "lab", "data")
+"""Rooms that may import PyTorch."""
+
+
+def test_the_product_is_imported_without_torch() -> None:
+    """Every module but those of the rooms that train and measure."""
+    code = PRODUCT + (
+        "import importlib, motionloom\n"
+        "for found in pkgutil.walk_packages(motionloom.__path__, 'motionloom.'):\n"
+        f"    if found.name.split('.')[1] not in {FOR_TRAINING} and not found.name.endswith('__main__'):\n"
+        "        importlib.import_module(found.name)\n"
+        "print('torch' in sys.modules)\n"
+    )
+    done = run("-c", code)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "False"
+
+
+@pytest.mark.skipif(not WEIGHTS, reason="no shipped weights in src/motionloom/weights")
+@pytest.mark.parametrize(
+    "name",
+    ["generate", "compose", "control path", "edit text", "predict", "switch", "duet", "live"],
+)
+def test_the_product_draws_without_torch(name: str, tmp_path: Path) -> None:
+    """A command of each task, as `tests/outputs` has it."""
+    code = PRODUCT + (
+        f"sys.path.insert(0, {str(ROOT)!r})\n"
+        "from pathlib import Path\n"
+        "from tests.outputs.commands import places\n"
+        f"print(len(places({name!r}, Path({str(tmp_path)!r}))))\n"
+    )
+    done = run("-c", code)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 10
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not WEIGHTS, reason="no shipped weights in src/motionloom/weights")
+def test_a_batch_and_the_server_draw_without_torch(tmp_path: Path) -> None:
+    """A row of a batch, and what the server's worker draws with."""
+    code = PRODUCT + (
+        "from pathlib import Path\n"
+        "from motionloom.bulk.maker import Maker, Options\n"
+        "from motionloom.cli import main\n"
+        f"folder = Path({str(tmp_path)!r})\n"
+        '(folder / \'jobs.jsonl\').write_text(\'{"prompt": "a person walks", "seconds": 1}\\n\')\n'
+        "import motionloom.server.worker, motionloom.server.drawing, motionloom.live.sessions\n"
+        "words = ['batch', str(folder / 'jobs.jsonl'), '--out', str(folder / 'out'), '--steps', '2', '--workers', '1']\n"
+        "sys.exit(main(words))\n"
+    )
+    done = run("-c", code)
+    assert done.returncode == 0, done.stderr

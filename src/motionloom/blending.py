@@ -3,12 +3,13 @@
 ``u`` is how far the fade has got, from 0 to 1; what comes back has its shape.
 """
 
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = TypeVar("Numbers", bound=Any)
+from motionloom.arrays import Numbers
+
 Array = NDArray[np.float64]
 
 

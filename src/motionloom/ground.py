@@ -6,16 +6,15 @@ leading axes that broadcast.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from torch import Tensor
+from motionloom.arrays import Numbers, namespace
+from motionloom.arrays import stack as stack
 
 Array = NDArray[np.float64]
-Numbers = TypeVar("Numbers", "Tensor", np.ndarray)
 
 
 def turned(points: np.ndarray, angle: np.ndarray | float) -> Array:
@@ -104,7 +103,7 @@ def normalized(poses: Numbers) -> Numbers:
     c, s, x, z = parts(poses)
     length = (c * c + s * s) ** 0.5
     here = length > 1e-6
-    xp: Any = np if isinstance(poses, np.ndarray) else _torch()
+    xp = namespace(poses)
     size = xp.where(here, length, xp.ones_like(length))
     return stack(xp.where(here, c / size, xp.ones_like(c)), xp.where(here, s / size, 0 * s), x, z)
 
@@ -118,17 +117,3 @@ def mirrored(poses: Numbers) -> Numbers:
 def parts(poses: Any) -> tuple[Any, Any, Any, Any]:
     """cos, sin, x, z of (..., 4), each (...)."""
     return poses[..., 0], poses[..., 1], poses[..., 2], poses[..., 3]
-
-
-def stack(*numbers: Any) -> Any:
-    """Numbers (...) that broadcast, side by side on a new last axis."""
-    if isinstance(numbers[0], np.ndarray | np.generic | float):
-        return np.stack(np.broadcast_arrays(*numbers), axis=-1)
-    torch = _torch()
-    return torch.stack(torch.broadcast_tensors(*numbers), dim=-1)
-
-
-def _torch() -> Any:
-    import torch  # only for tensors, which somebody who has torch made
-
-    return torch

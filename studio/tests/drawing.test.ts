@@ -8,6 +8,7 @@ import { Signal } from "../src/app/signal";
 import { type MotionClip, POSE, jointAt, motionClip, overlaid } from "../src/body/clip";
 import { History } from "../src/project/history";
 import { exampleProject } from "../src/project/model";
+import { planKey } from "../src/project/plan";
 import { write } from "../src/project/timeline";
 
 /** Stands for the server: jobs wait until a test lets them go on. */
@@ -136,6 +137,23 @@ describe("a draw", () => {
     jobs.level(12);
     await new Promise((resume) => setTimeout(resume, 30));
     expect(app.denoising.value).toBe(preview);
+  });
+
+  it.each([
+    ["has drawn the same", { takes: [{ motion: "other", seed: 1, seconds: 6.5, people: 1, how: "drawn" }] }],
+    ["wrote something else", { seed: 99 }],
+  ])("is given up where another page %s", async (what, more) => {
+    const { app, jobs, drawer } = begun();
+    drawer.schedule();
+    await vi.waitFor(() => expect(app.session.value.drawing).not.toBeNull());
+    const { value } = app.project;
+    const drawn = what === "has drawn the same" ? planKey(value) : "";
+    app.project.follow({ ...value, ...more, drawn }, "elsewhere");
+    expect(app.session.value.drawing).toBeNull();
+    await vi.waitFor(() => jobs.end()).catch(() => undefined);
+    await new Promise((resume) => setTimeout(resume, 30));
+    expect(app.project.value.takes.map((one) => one.motion)).toEqual("takes" in more ? ["other"] : []);
+    expect(jobs.asked).toHaveLength(1);
   });
 
   it("on its way is finished before a stretch of it is frozen", async () => {

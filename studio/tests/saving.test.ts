@@ -108,6 +108,8 @@ interface Page {
   readonly app: App;
   readonly begin: Start;
   readonly saver: { settle(choice: "copy" | "theirs" | "mine"): Promise<void> };
+  /** Was called to draw what is not drawn. */
+  readonly drew: ReturnType<typeof vi.fn>;
   words(): string[];
   write(text: string): void;
 }
@@ -126,7 +128,8 @@ async function opened(): Promise<Page> {
     denoising: new Signal<readonly never[]>([]),
     live: new Signal<null>(null),
   } as unknown as App;
-  const saver = new Saver(app, begin, () => undefined);
+  const drew = vi.fn();
+  const saver = new Saver(app, begin, drew);
   const edit = (text: string) => (old: Project) => ({
     ...old,
     segments: [{ ...old.segments[0]!, text }, ...old.segments.slice(1)],
@@ -135,6 +138,7 @@ async function opened(): Promise<Page> {
     app,
     begin,
     saver,
+    drew,
     words: () => app.project.value.segments.map((one) => one.text),
     write: (text) => app.project.change("write", edit(text)),
   };
@@ -246,6 +250,16 @@ describe("two pages", () => {
     await passes();
     expect(one.words()[0]).toBe("second");
     expect(one.app.project.undoLabel).toBe("what another page did");
+  });
+
+  it("draw once what the other wrote and has not drawn, after a while", async () => {
+    server.saved = film("A");
+    const [one, two] = [await opened(), await opened()];
+    one.write("first");
+    await passes(14_000);
+    expect(two.drew).not.toHaveBeenCalled();
+    await passes(60_000);
+    expect([one.drew.mock.calls.length, two.drew.mock.calls.length]).toEqual([0, 1]);
   });
 
   it("of one new folder begin the same project", async () => {

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -29,7 +28,7 @@ def test_every_row_is_in_one_group_of_rows_with_as_many_tokens(frames: list[int]
         assert len({-(-frames[row] // 4) for row in group}) == 1  # tokens of 4 frames
 
 
-def drawn(prior: Prior, rows: list[int], lengths: list[int]) -> list[torch.Tensor]:
+def drawn(prior: Prior, rows: list[int], lengths: list[int]) -> list[np.ndarray]:
     return draw_group(prior, [PROMPTS[i] for i in rows], lengths, seeds=rows, steps=4)
 
 
@@ -42,14 +41,14 @@ def test_a_row_drawn_with_others_is_the_row_drawn_alone(config) -> None:
     assert [len(row) for row in together[:4]] == lengths
     for row, length in enumerate(lengths):
         alone = drawn(prior, [row], [length])[0]
-        assert torch.equal(alone, together[row])
+        assert np.array_equal(alone, together[row])
 
 
 def test_the_sampler_of_batches_draws_what_that_of_single_motions_does() -> None:
     prior = tiny.prior()
     here = drawn(prior, [0, 1, 2], [30, 24, 30])
     there = sample_features(prior, PROMPTS[:3], [30, 24, 30], seeds=[0, 1, 2], steps=4)
-    assert max(float((a - b).abs().max()) for a, b in zip(here, there, strict=True)) < 1e-4
+    assert max(float(np.abs(a - b).max()) for a, b in zip(here, there, strict=True)) < 1e-4
 
 
 @pytest.mark.slow
@@ -67,11 +66,4 @@ def test_the_shipped_prior_makes_the_same_positions_in_any_company() -> None:
     for rows, lengths in (([1, 0], [100, 97]), ([3, 2, 1, 0, 0], [98, 99, 100, 100, 97])):
         assert np.abs(places(rows, lengths)[rows.index(1)] - alone).max() < 3e-6
     by_itself = generate(prior, PROMPTS[1], seconds=5.0, seed=1, steps=4)[0].positions()
-    assert np.abs(by_itself - alone).max() < 2e-5  # one row alone: sums in another order
-
-
-def test_bfloat16_makes_nearly_the_same() -> None:
-    prior = tiny.prior()
-    exact = draw_group(prior, ["a person walks"], [40], seeds=[1], steps=4)[0]
-    coarse = draw_group(prior, ["a person walks"], [40], seeds=[1], steps=4, bf16=True)[0]
-    assert 0 < float((exact - coarse).abs().max()) < 0.2
+    assert np.abs(by_itself - alone).max() < 2e-5

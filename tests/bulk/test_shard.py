@@ -448,3 +448,13 @@ def test_a_folder_of_something_else_is_refused(ready: Maker) -> None:
     (OUT / "manifest.json").write_text('{"kind": "train"}')
     with pytest.raises(MotionloomError, match="does not describe a batch"):
         make(ready, rows(2))
+
+
+def test_a_damaged_tar_is_one_sentence(ready: Maker) -> None:
+    make(ready, rows(2), replace(ready.options, format="webdataset"))
+    place = OUT / "shard-000000.tar"
+    data = place.read_bytes()
+    place.write_bytes(b"\xff" * 600 + data[600:])
+    with pytest.raises(MotionloomError, match=r"shard-000000\.tar is damaged") as caught:
+        results()
+    assert "\n" not in str(caught.value)

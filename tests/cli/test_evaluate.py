@@ -15,6 +15,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.lab.report.report import Column, Report, Row, Value, encode, read
 from motionloom.lab.suites.registry import Suite, Tools, chosen
+from tests.data import people
 from tests.kinematics.people import FPS, standing, walking
 
 
@@ -116,6 +117,23 @@ def test_realism_without_recordings_says_what_it_compares_with(capsys: pytest.Ca
     assert "--data" in capsys.readouterr().out
 
 
+def test_bodies_are_compared_with_recordings_on_their_own_skeletons(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Percentiles of two people in a folder; walkers beside themselves are held as they are."""
+    for name, person in (("walks", walking(1.2, 4.0)), ("stands", standing(4.0))):
+        people.write_bvh(tmp_path / "own" / f"{name}.bvh", person)
+    assert main(["evaluate", "reach", "--recordings", str(tmp_path / "own"), "--out", str(tmp_path / "b.json")]) == 0
+    reach = json.loads((tmp_path / "b.json").read_text())["reach"]
+    assert reach["pelvis"][0] == pytest.approx(reach["pelvis"][4], abs=0.5)  # nobody bends
+    capsys.readouterr()
+    line = ["evaluate", "realism", "--count", "20", "--recordings", str(tmp_path / "own"), "--json"]
+    assert main(line) == 0
+    body = json.loads(capsys.readouterr().out)["body"]
+    assert body["numbers"]["whole"] == {"share": 1.0, "passes": True}
+    assert body["numbers"]["pelvis"]["people"] == pytest.approx(reach["pelvis"])
+
+
 def test_reference_of_a_built_set(built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["evaluate", "reference", "--data", str(built), "--out", str(tmp_path / "r.json")]) == 0
     assert "2/2" in capsys.readouterr().out
@@ -134,6 +152,9 @@ def test_reference_of_a_built_set(built: Path, tmp_path: Path, capsys: pytest.Ca
         ["obedience", "--seeds", "many"],
         ["realism", "--count", "-1"],
         ["realism", "--data", "nowhere"],
+        ["realism", "--recordings", "nowhere"],
+        ["reach"],
+        ["reach", "--recordings", "nowhere"],
         ["reference"],
         ["reference", "--data", "nowhere"],
         ["all", "--only", "fly"],

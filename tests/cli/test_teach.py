@@ -12,7 +12,7 @@ from motionloom import io
 from motionloom.cli import main
 from motionloom.features import humanml
 from motionloom.kinematics.ik import motion_from_positions
-from motionloom.nets.text.known import known_sentences
+from motionloom.runtime.text.known import known_sentences
 from motionloom.train import teach as module
 from motionloom.weights.adapter import Adapter
 from motionloom.weights.prior import Prior, save_prior

@@ -10,11 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from motionloom.nets.text.known import known_sentences
 
 from motionloom.cli import main, parser
 from motionloom.cli.terminal import escaping, unescaped
 from motionloom.errors import one_line, printable
-from motionloom.nets.text.known import known_sentences
 from motionloom.weights.prior import save_prior
 from tests.nets import tiny
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import torch
 
 from motionloom.diffusion import DDPM, Schedule, cosine, linear, masked_noise
 from tests.conformance.runner import KNOWN, MASK, MOTION, NOISE, Case, cases, compare, normal, stream
@@ -20,8 +19,8 @@ def test_schedule_and_posterior_tables_are_the_published_ones(case):
     moves = [DDPM.move(schedule, level, level - 1) for level in range(1, schedule.steps + 1)]
     variance = np.array([move.noise**2 for move in moves])
     tables = {
-        "beta": schedule.betas.numpy(),
-        "alpha_bar": schedule.alpha_bar[1:].numpy(),
+        "beta": schedule.betas,
+        "alpha_bar": schedule.alpha_bar[1:],
         "posterior_variance": variance,
         "posterior_log_variance_clipped": np.log(np.append(variance[1], variance[1:])),
         "coef_x0": np.array([move.clean for move in moves]),
@@ -36,19 +35,19 @@ def test_schedule_and_posterior_tables_are_the_published_ones(case):
 @pytest.mark.parametrize("case", cases("diffusion", kind="single_steps"))
 def test_one_step_of_noising_and_of_sampling_is_the_published_one(case):
     schedule, seed, shape = schedule_of(case), case.config["seed"], case.config["shape"]
-    clean, state, noise = (torch.from_numpy(normal(stream(seed, k), shape)) for k in (KNOWN, MOTION, NOISE))
+    clean, state, noise = (np.asarray(normal(stream(seed, k), shape)) for k in (KNOWN, MOTION, NOISE))
 
     def draw(like):
         return noise
 
     if case.config.get("mask") == "soft":
-        mask = torch.from_numpy(stream(seed, MASK).random(tuple(shape), dtype=np.float32))
+        mask = np.asarray(stream(seed, MASK).random(tuple(shape), dtype=np.float32))
         draw = masked_noise(draw, mask)
     step, done = DDPM.start(schedule), set()
     for t in case.config["t"]:
         results = {
             f"q_sample_t{t}": schedule.noised(clean, t + 1, draw(clean)),
-            f"post_mean_t{t}": step(state, clean, t + 1, t, torch.zeros_like),
+            f"post_mean_t{t}": step(state, clean, t + 1, t, np.zeros_like),
             f"p_sample_t{t}": step(state, clean, t + 1, t, draw),
         }
         for name in results.keys() & case.outputs.keys():

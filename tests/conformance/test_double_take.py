@@ -4,8 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import torch
-from torch import Tensor
 
 from motionloom.diffusion import cosine, guide
 from motionloom.lab.papers.double_take import MODES, Plan, Takes, double_take, flags
@@ -24,7 +22,7 @@ def networks(recorded: Case):
     made = {"dummy": dummy, "mdm": published_network}[config["network"]]
     shape = (rows, config["channels"], 1, max(config["lengths"]))
     net, cond, null = made(as_sampling(recorded, shape))  # type: ignore[arg-type]
-    nothing = null[: rows - 1] if isinstance(null, Tensor) else type(null)(*(part[: rows - 1] for part in null))
+    nothing = null[: rows - 1] if isinstance(null, np.ndarray) else type(null)(*(part[: rows - 1] for part in null))
     return guide(net, cond, null, config["guidance"]), guide(net, nothing, nothing, 0.0)
 
 
@@ -33,7 +31,7 @@ def taken(recorded: Case) -> tuple[Takes, int]:
     config, count = recorded.config, 0
     noise = as_sampling(recorded, ())
 
-    def draw(like: Tensor) -> Tensor:
+    def draw(like: np.ndarray) -> np.ndarray:
         nonlocal count
         count += 1
         noise.config["shape"] = [like.shape[0], like.shape[2], 1, like.shape[1]]
@@ -41,15 +39,14 @@ def taken(recorded: Case) -> tuple[Takes, int]:
 
     source = recorded_draw(noise)  # type: ignore[arg-type]
     plan = Plan.of(config["lengths"], config["handshake"], config["blend"])
-    x = draw(torch.empty(len(config["lengths"]), max(config["lengths"]), config["channels"]))
+    x = draw(np.empty((len(config["lengths"]), max(config["lengths"]), config["channels"]), np.float32))
     first, second = networks(recorded)
     schedule = cosine(config["steps"])
     assert round(MODES["published"].restart * config["steps"]) == config["steps"] - config["skip"]
-    with torch.inference_mode():
-        takes = double_take(
-            first, second, x, plan, mode=MODES["published"], way=range(config["steps"], -1, -1), schedule=schedule,
-            noise=(draw, draw), second_take_only=config["second_take_only"],
-        )  # fmt: skip
+    takes = double_take(
+        first, second, x, plan, mode=MODES["published"], way=range(config["steps"], -1, -1), schedule=schedule,
+        noise=(draw, draw), second_take_only=config["second_take_only"],
+    )  # fmt: skip
     return takes, count
 
 
@@ -59,7 +56,7 @@ def test_both_takes_give_the_published_numbers(recorded):
     plan = Plan.of(recorded.config["lengths"], recorded.config["handshake"], recorded.config["blend"])
     assert count == recorded.config["noise_draws"]
     compare(recorded, "first_take", to_motion(takes.first))
-    compare(recorded, "first_is_transition", flags(plan).numpy().astype(np.float32))
+    compare(recorded, "first_is_transition", flags(plan).astype(np.float32))
     compare(recorded, "sandwich", to_motion(takes.sandwich))
     compare(recorded, "mask", takes.keep)
     compare(recorded, "second_take", to_motion(takes.second))

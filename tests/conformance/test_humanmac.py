@@ -9,11 +9,11 @@ import math
 import numpy as np
 import pytest
 import torch
-from torch import Tensor
 
 from motionloom.diffusion import SCHEDULES, Dct, NoiseSource, Schedule, from_betas, from_noise
 from motionloom.lab.papers.humanmac import PARTS, Fixed, Padding, Target, padded, published_completion
-from motionloom.nets.predictor import NetConfig, TransLinear, waves
+from motionloom.nets.predictor import TransLinear, waves
+from motionloom.runtime.predictor import PredictorConfig
 from tests.conformance import runner
 from tests.conformance.runner import (
     MOTION,
@@ -35,15 +35,15 @@ PADDINGS: dict[str, Padding] = {"LastFrame": "last", "Zero": "zero", "Repeat": "
 @pytest.mark.parametrize("recorded", cases("humanmac", kind="humanmac_schedule"))
 def test_schedules_are_the_published_ones(recorded: Case) -> None:
     schedule = SCHEDULES[recorded.config["schedule"].lower()](recorded.config["steps"])
-    compare(recorded, "alpha_bar", schedule.alpha_bar[torch.tensor(recorded.config["indices"]) + 1])
+    compare(recorded, "alpha_bar", schedule.alpha_bar[np.array(recorded.config["indices"]) + 1])
 
 
 def filled(config: Settings) -> TransLinear:
     """The network of a case with weights by rule; the test of `state_dict` cases compares its names and shapes."""
-    net = TransLinear(NetConfig(3 * config["joints"], config["coefficients"], config["layers"]))
+    net = TransLinear(PredictorConfig(3 * config["joints"], config["coefficients"], config["layers"]))
     shapes = {name: value.shape for name, value in net.state_dict().items()}
     state = weights(shapes, config["seed"], scale=0.03)
-    net.load_state_dict({name: torch.from_numpy(array) for name, array in state.items()})
+    net.load_state_dict({name: np.asarray(array) for name, array in state.items()})
     return net.eval().requires_grad_(False)
 
 
@@ -51,9 +51,9 @@ def filled(config: Settings) -> TransLinear:
 def test_the_network_gives_the_recorded_guess(recorded: Case) -> None:
     config, net = recorded.config, filled(recorded.config)
     shape = config["batch"], config["coefficients"], 3 * config["joints"]
-    x, told = (torch.from_numpy(normal(stream(config["seed"], k), shape)) for k in (MOTION, TEXT))
-    compare(recorded, "conditional", net(x, torch.tensor(config["timesteps"]), told))
-    compare(recorded, "unconditional", net(x, torch.tensor(config["timesteps"])))
+    x, told = (np.asarray(normal(stream(config["seed"], k), shape)) for k in (MOTION, TEXT))
+    compare(recorded, "conditional", net(x, np.array(config["timesteps"]), told))
+    compare(recorded, "unconditional", net(x, np.array(config["timesteps"])))
 
 
 @pytest.mark.parametrize("recorded", cases("humanmac", kind="state_dict"))
@@ -61,17 +61,17 @@ def test_names_and_shapes_of_the_weights_are_the_published_ones(recorded: Case) 
     keys = recorded.lists["keys"]
     layers = {name.split(".")[1] for name in keys if name.startswith("temporal_decoder_blocks.")}
     with torch.device("meta"):
-        net = TransLinear(NetConfig(keys["out.bias"][0], keys["sequence_embedding"][0], len(layers)))
+        net = TransLinear(PredictorConfig(keys["out.bias"][0], keys["sequence_embedding"][0], len(layers)))
     found = {name: list(value.shape) for name, value in net.state_dict().items()}
     assert found == {name: list(shape) for name, shape in keys.items()}
-    assert sum(p.numel() for p in net.parameters()) == recorded.lists["n_parameters"]
+    assert sum(p.size for p in net.parameters()) == recorded.lists["n_parameters"]
     assert len(found) == recorded.lists["n_entries"]
 
 
 def counted(draw: NoiseSource) -> tuple[NoiseSource, list[tuple[int, ...]]]:
     shapes: list[tuple[int, ...]] = []
 
-    def drawn(like: Tensor) -> Tensor:
+    def drawn(like: np.ndarray) -> np.ndarray:
         shapes.append(tuple(like.shape))
         return draw(like)
 
@@ -86,16 +86,16 @@ def test_whole_runs_give_the_published_motions(recorded: Case) -> None:
     schedule, padding = SCHEDULES[config["schedule"].lower()](config["steps"]), PADDINGS[config["padding"]]
     control = mode.startswith("fix")
     steps = 0.05 * normal(stream(seed, MOTION), (1 if control else n, frames, 3 * config["joints"])).astype(np.float64)
-    motion = torch.from_numpy(steps.cumsum(axis=1).astype(np.float32))
-    spectrum = basis.to_spectrum(padded(motion[:, :h], frames, padding)).expand(n, -1, -1)
+    motion = np.asarray(steps.cumsum(axis=1).astype(np.float32))
+    spectrum = np.broadcast_to(basis.to_spectrum(padded(motion[:, :h], frames, padding)), (n, -1, -1))
     told = None if config["unconditional"] else spectrum
 
-    def noise(x: Tensor, level: int) -> Tensor:
+    def noise(x: np.ndarray, level: int) -> np.ndarray:
         b = schedule.at(level)[1]
-        return b * x + 0.1 * net(x, torch.full((len(x),), level - 1), told)
+        return b * x + 0.1 * net(x, np.full((len(x),), level - 1), told)
 
     rng = stream(seed, NOISE)
-    draw, shapes = counted(lambda like: torch.from_numpy(normal(rng, like.shape)).to(like))
+    draw, shapes = counted(lambda like: np.asarray(normal(rng, like.shape)).to(like))
     fixed = Fixed(motion, list(PARTS.values())[int(mode[-1])]) if control else None
     target = Target(motion[:1, -2 * h :], relax=20) if mode == "switch" else None
     state, result = published_completion(
@@ -113,10 +113,10 @@ def test_whole_runs_give_the_published_motions(recorded: Case) -> None:
 SAMPLER = "oracle_sampler_"
 
 
-def wave(shape: tuple[int, ...], a: float, b: float) -> Tensor:
+def wave(shape: tuple[int, ...], a: float, b: float) -> np.ndarray:
     """sin(a i + b) over the row-major index i, float32."""
     i = np.arange(math.prod(shape), dtype=np.float64).reshape(shape)
-    return torch.from_numpy(np.sin(a * i + b).astype(np.float32))
+    return np.asarray(np.sin(a * i + b).astype(np.float32))
 
 
 def sums() -> dict:
@@ -150,12 +150,12 @@ def sizes(name: str) -> tuple[int, int, int, int]:
     return channels, kept, frames, frames // 5
 
 
-def check(actual: Tensor, recorded: dict, *, near: float = 2e-5) -> None:
+def check(actual: np.ndarray, recorded: dict, *, near: float = 2e-5) -> None:
     """The shape, sums, and the first and last five elements, which are recorded to six decimals."""
-    flat = actual.reshape(-1).double()
+    flat = actual.reshape(-1).astype(np.float64)
     assert list(actual.shape) == recorded["shape"]
     assert float(flat.sum()) == pytest.approx(recorded["sum"], abs=near)
-    assert float(flat.abs().sum()) == pytest.approx(recorded["abs_sum"], abs=near)
+    assert float(np.abs(flat).sum()) == pytest.approx(recorded["abs_sum"], abs=near)
     assert flat[:5].tolist() == pytest.approx(recorded["first5"], abs=5e-6)
     assert flat[-5:].tolist() == pytest.approx(recorded["last5"], abs=5e-6)
 
@@ -165,11 +165,11 @@ def float32_cosine(steps: int) -> Schedule:
 
     The formula in float64 has 4e-4 more noise at the first level (0.99995872 of signal, not 0.99995875).
     """
-    kept = torch.cos((torch.linspace(0, steps, steps + 1) / steps + 0.008) / 1.008 * torch.pi / 2) ** 2
+    kept = np.cos((np.linspace(0, steps, steps + 1) / steps + 0.008) / 1.008 * torch.pi / 2) ** 2
     betas = (1 - kept[1:] / kept[:-1]).clamp(0, 0.999)
     schedule = from_betas("cosine in float32", betas)
-    signal = torch.cat([torch.ones(1), torch.cumprod(1 - betas, dim=0)])
-    schedule.__dict__["alpha_bar"] = signal.double()  # what the cached property would compute in float64
+    signal = np.concatenate([np.ones((1,), np.float32), torch.cumprod(1 - betas, axis=0)])
+    schedule.__dict__["alpha_bar"] = signal.astype(np.float64)  # what the cached property would compute in float64
     return schedule
 
 
@@ -177,22 +177,22 @@ def float32_cosine(steps: int) -> Schedule:
 def test_networks_filled_with_waves_give_the_reference_sums(name: str, count: str) -> None:
     recorded, (channels, kept, *_) = sums()[name], sizes(name)
     layers = (recorded["n_tensors"] - 11) // 21  # 11 tensors lie outside the layers, 21 in each
-    net = TransLinear(NetConfig(channels=channels, kept=kept, layers=layers)).eval()
+    net = TransLinear(PredictorConfig(channels=channels, kept=kept, layers=layers)).eval()
     state = net.state_dict()
-    assert (sum(p.numel() for p in net.parameters()), len(state)) == (recorded[count], recorded["n_tensors"])
+    assert (sum(p.size for p in net.parameters()), len(state)) == (recorded[count], recorded["n_tensors"])
     for r, key in enumerate(sorted(state)):
-        i = np.arange(state[key].numel(), dtype=np.float64)
+        i = np.arange(state[key].size, dtype=np.float64)
         values = 0.03 * np.sin(0.37 * i + 0.11 * r) + (1.0 if key.endswith("norm.weight") else 0.0)
-        state[key].copy_(torch.from_numpy(values).reshape(state[key].shape))
+        state[key].copy_(np.asarray(values).reshape(state[key].shape))
     shape = (2, kept, channels)
     with torch.inference_mode():
         for key, told in (("forward_mod", wave(shape, 0.021, 1.0)), ("forward_nomod", None)):
-            guess = net(wave(shape, 0.05, 0.2), torch.tensor([1, 500]), told)
+            guess = net(wave(shape, 0.05, 0.2), np.array([1, 500]), told)
             check(guess, recorded[key], near=1e-3)
 
 
 def test_the_time_embedding_has_cosines_first() -> None:
-    recorded, made = sums(), waves(torch.tensor([500]), 512)[0].tolist()
+    recorded, made = sums(), waves(np.array([500]), 512)[0].tolist()
     assert made[:4] == pytest.approx(recorded["timestep_embedding_500_first4"], abs=1e-4)
     assert made[256:260] == pytest.approx(recorded["timestep_embedding_500_at256"], abs=1e-4)
 
@@ -204,12 +204,12 @@ def test_every_schedule_has_the_reference_anchors() -> None:
         assert found == pytest.approx(anchors, abs=1e-6), name
 
 
-def oracle(name: str, case: str) -> tuple[Tensor, Tensor, int]:
+def oracle(name: str, case: str) -> tuple[np.ndarray, np.ndarray, int]:
     """The sampler with a perfect guess of another motion: coefficients, motion, draws."""
     channels, kept, frames, h = sizes(name)
     basis, schedule, calls = Dct(frames, kept), float32_cosine(1000), 0
 
-    def draw(like: Tensor) -> Tensor:
+    def draw(like: np.ndarray) -> np.ndarray:
         nonlocal calls
         calls += 1
         return math.sqrt(2) * wave(tuple(like.shape), 0.7, 1.3 * (calls - 1))
@@ -240,7 +240,7 @@ def test_the_sampler_with_a_perfect_guess_gives_the_reference_sums(name: str, ru
         "tgt_rmse": result[:, -2 * h :] - motion[:1, -2 * h :],
     }
     for error in errors.keys() & recorded.keys():
-        assert float(errors[error].square().mean().sqrt()) == pytest.approx(recorded[error], abs=2e-6), error
+        assert float((errors[error] ** 2).mean().sqrt()) == pytest.approx(recorded[error], abs=2e-6), error
     assert recorded.keys() <= errors.keys() | {"y", "x", "randn_calls"}
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.fft import dct
@@ -13,8 +12,8 @@ from tests.diffusion.exact import shared_draw
 SCHEDULE = cosine(40)
 
 
-def some(*shape: int, seed: int = 0) -> torch.Tensor:
-    return shared_draw(seed)(torch.empty(shape, dtype=torch.float64))
+def some(*shape: int, seed: int = 0) -> np.ndarray:
+    return shared_draw(seed)(np.empty(shape, dtype=np.float64))
 
 
 sizes = st.integers(1, 60).flatmap(lambda frames: st.tuples(st.just(frames), st.integers(1, frames)))
@@ -23,27 +22,27 @@ sizes = st.integers(1, 60).flatmap(lambda frames: st.tuples(st.just(frames), st.
 @given(size=sizes)
 def test_rows_are_orthonormal(size: tuple[int, int]) -> None:
     matrix = Dct(*size).matrix
-    torch.testing.assert_close(matrix @ matrix.T, torch.eye(size[1], dtype=torch.float64), atol=1e-12, rtol=0)
+    np.testing.assert_allclose(matrix @ matrix.T, np.eye(size[1], dtype=np.float64), atol=1e-12, rtol=0)
 
 
 @given(size=sizes)
 def test_the_spectrum_is_scipys(size: tuple[int, int]) -> None:
-    x = some(2, size[0], 3).numpy()
+    x = some(2, size[0], 3)
     expected = dct(x, type=2, norm="ortho", axis=1)[:, : size[1]]
-    np.testing.assert_allclose(Dct(*size).to_spectrum(torch.from_numpy(x)), expected, atol=1e-12)
+    np.testing.assert_allclose(Dct(*size).to_spectrum(np.asarray(x)), expected, atol=1e-12)
 
 
 @given(size=sizes)
 def test_what_the_basis_holds_comes_back(size: tuple[int, int]) -> None:
     basis, y = Dct(*size), some(3, size[1], 2)
-    torch.testing.assert_close(basis.to_spectrum(basis.to_time(y)), y, atol=1e-12, rtol=0)
+    np.testing.assert_allclose(basis.to_spectrum(basis.to_time(y)), y, atol=1e-12, rtol=0)
 
 
 @pytest.mark.parametrize("basis", [Dct(30, 30), Frames(30)], ids=["all frequencies", "frames"])
 def test_with_everything_kept_motion_comes_back(basis: Dct | Frames) -> None:
     x = some(2, 30, 4)
     assert basis.kept == 30
-    torch.testing.assert_close(basis.to_time(basis.to_spectrum(x)), x, atol=1e-12, rtol=0)
+    np.testing.assert_allclose(basis.to_time(basis.to_spectrum(x)), x, atol=1e-12, rtol=0)
 
 
 def test_dropping_frequencies_gives_the_nearest_motion_that_is_left() -> None:
@@ -51,12 +50,12 @@ def test_dropping_frequencies_gives_the_nearest_motion_that_is_left() -> None:
     near = basis.to_time(basis.to_spectrum(x))
     for seed in range(1, 6):
         other = near + 0.1 * basis.to_time(some(1, 7, 2, seed=seed))
-        assert (x - near).norm() < (x - other).norm()
+        assert np.linalg.norm(x - near) < np.linalg.norm(x - other)
 
 
 def test_a_pose_that_does_not_move_is_its_first_coefficient() -> None:
-    spectrum = Dct(25, 4).to_spectrum(torch.full((1, 25, 1), 2.0, dtype=torch.float64))
-    torch.testing.assert_close(spectrum.flatten(), torch.tensor([10.0, 0, 0, 0], dtype=torch.float64))
+    spectrum = Dct(25, 4).to_spectrum(np.full((1, 25, 1), 2.0, dtype=np.float64))
+    np.testing.assert_allclose(spectrum.flatten(), np.array([10.0, 0, 0, 0], dtype=np.float64), atol=1e-5)
 
 
 @pytest.mark.parametrize("kept", [0, -1, 11])
@@ -66,8 +65,8 @@ def test_there_are_as_many_frequencies_as_frames(kept: int) -> None:
 
 
 def test_type_and_leading_axes_are_the_callers() -> None:
-    assert Dct(10, 3).to_spectrum(torch.zeros(2, 5, 10, 4)).shape == (2, 5, 3, 4)
-    assert Dct(10, 3).to_time(torch.zeros(3, 4, dtype=torch.float32)).dtype == torch.float32
+    assert Dct(10, 3).to_spectrum(np.zeros((2, 5, 10, 4), np.float32)).shape == (2, 5, 3, 4)
+    assert Dct(10, 3).to_time(np.zeros((3, 4), dtype=np.float32)).dtype == np.float32
 
 
 @pytest.mark.parametrize("soft", [False, True], ids=["hard", "soft"])
@@ -76,10 +75,10 @@ def test_knowing_frames_is_equation_7_written_out(level: int, soft: bool) -> Non
     """Both halves to time by loops over frames and frequencies, mixed frame by frame, and back."""
     frames, kept = 9, 4
     x, known, noise = some(2, kept, 3), some(2, kept, 3, seed=1), some(2, kept, 3, seed=2)
-    mask = torch.zeros(frames, 3, dtype=torch.float64)
+    mask = np.zeros((frames, 3), dtype=np.float64)
     mask[:4] = 1
     mask[4] = 0.3 if soft else 1
-    held = observe(known, mask if soft else mask.bool(), SCHEDULE, lambda like: noise, basis=Dct(frames, kept))
+    held = observe(known, mask if soft else mask.astype(bool), SCHEDULE, lambda like: noise, basis=Dct(frames, kept))
     made = held(x, level)
     a, b = np.sqrt(float(SCHEDULE.alpha_bar[level])), np.sqrt(1 - float(SCHEDULE.alpha_bar[level]))
     waves = [
@@ -99,10 +98,10 @@ def test_knowing_frames_is_equation_7_written_out(level: int, soft: bool) -> Non
 
 def test_in_the_basis_of_frames_knowing_is_as_without_a_basis() -> None:
     x, known = some(2, 5, 3), some(2, 5, 3, seed=1)
-    mask = torch.tensor([True, True, False, False, False])[:, None]
+    mask = np.array([True, True, False, False, False])[:, None]
     plain = observe(known, mask, SCHEDULE, row_noise([1, 2]))(x, 9)
     framed = observe(known, mask, SCHEDULE, row_noise([1, 2]), basis=Frames(5))(x, 9)
-    assert torch.equal(plain, framed)
+    assert np.array_equal(plain, framed)
 
 
 # Published shares of signal at published index i (level i + 1) of 1000, float32 there.
@@ -126,5 +125,5 @@ def test_schedules_have_the_published_shares_of_signal(name: str) -> None:
 def test_schedules_of_any_length_fall_from_clean_to_noise(name: str, steps: int) -> None:
     schedule = SCHEDULES[name](steps)
     assert schedule.steps == steps
-    assert bool((schedule.alpha_bar.diff() < 0).all())
+    assert (np.diff(schedule.alpha_bar) < 0).all()
     assert float(schedule.alpha_bar[-1]) < 2e-3

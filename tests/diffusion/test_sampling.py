@@ -1,7 +1,7 @@
 """The loop: what it visits, what it yields, and that noise belongs to rows."""
 
+import numpy as np
 import pytest
-import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -18,11 +18,12 @@ from motionloom.diffusion import (
 from tests.diffusion.exact import shared_draw, wavy
 
 SCHEDULE = cosine(40)
+KNOWN = [[0.27437130, 0.09358235, -0.10971181, -0.21990466], [-1.2224977, -2.1383154, -0.06472305, -0.70555127]]
 
 
 def made(seeds, *, name="ddpm", tokens=6, lengths=None):
     draw = row_noise(seeds, lengths)
-    x = draw(torch.empty(len(seeds), tokens, 3))
+    x = draw(np.empty((len(seeds), tokens, 3), np.float32))
     return run(wavy, x, levels=levels(SCHEDULE, 10), solver=SOLVERS[name], schedule=SCHEDULE, noise=draw)
 
 
@@ -37,34 +38,34 @@ def test_a_row_is_bit_for_bit_the_same_alone_in_a_batch_and_in_any_order(seeds, 
     shuffled = randomness.sample(range(len(seeds)), len(seeds))
     again = made([seeds[i] for i in shuffled], name=name)
     for place, i in enumerate(shuffled):
-        assert torch.equal(again[place], together[i])
-        assert torch.equal(made([seeds[i]], name=name)[0], together[i])
+        assert np.array_equal(again[place], together[i])
+        assert np.array_equal(made([seeds[i]], name=name)[0], together[i])
 
 
 def test_a_row_with_a_length_is_the_same_under_any_padding():
     padded = made([1, 2], tokens=9, lengths=[4, 9])
-    assert torch.equal(padded[0, :4], made([1], tokens=4)[0])
-    assert torch.equal(padded[1], made([2], tokens=9)[0])
+    assert np.array_equal(padded[0, :4], made([1], tokens=4)[0])
+    assert np.array_equal(padded[1], made([2], tokens=9)[0])
 
 
 def test_row_noise_is_standard_normal_new_in_every_draw_and_different_between_rows():
     draw = row_noise([0, 1])
-    first, second = (draw(torch.empty(2, 100, 100)) for _ in range(2))
-    numbers = torch.stack([first, second]).reshape(4, -1)
-    torch.testing.assert_close(torch.cov(numbers), torch.eye(4), atol=0.05, rtol=0)
-    torch.testing.assert_close(numbers.mean(1), torch.zeros(4), atol=0.05, rtol=0)
+    first, second = (draw(np.empty((2, 100, 100), np.float32)) for _ in range(2))
+    numbers = np.stack([first, second]).reshape(4, -1)
+    np.testing.assert_allclose(np.cov(numbers), np.eye(4), atol=0.05, rtol=0)
+    np.testing.assert_allclose(numbers.mean(1), np.zeros((4,), np.float32), atol=0.05, rtol=0)
 
 
 def test_row_noise_takes_type_and_shape_of_its_argument():
-    noise = row_noise([3])(torch.empty(1, 2, 3, 4, dtype=torch.float64))
-    assert (noise.dtype, noise.shape) == (torch.float64, (1, 2, 3, 4))
-    assert torch.equal(noise.float(), row_noise([3])(torch.empty(1, 2, 3, 4)))
+    noise = row_noise([3])(np.empty((1, 2, 3, 4), dtype=np.float64))
+    assert (noise.dtype, noise.shape) == (np.float64, (1, 2, 3, 4))
+    assert np.array_equal(noise.astype(np.float32), row_noise([3])(np.empty((1, 2, 3, 4), np.float32)))
 
 
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
-def test_row_noise_is_the_same_on_a_gpu():
-    on_gpu = row_noise([3, 4])(torch.empty(2, 5, 6, device="cuda"))
-    assert torch.equal(on_gpu.cpu(), row_noise([3, 4])(torch.empty(2, 5, 6)))
+def test_row_noise_is_that_of_pcg64_on_every_machine():
+    """The numbers of NumPy's generator for a known seed, written down; its rejections may round in the last place."""
+    noise = row_noise([2**62 - 1, 5])(np.empty((2, 1, 4), np.float32))
+    np.testing.assert_allclose(noise[:, 0], KNOWN, rtol=1e-6)
 
 
 def test_the_walk_visits_its_levels_guess_then_move_then_edit():
@@ -78,14 +79,14 @@ def test_the_walk_visits_its_levels_guess_then_move_then_edit():
         events.append(("edit", level))
         return x * 0 + level
 
-    x = torch.zeros(1, 1, 1)
+    x = np.zeros((1, 1, 1), np.float32)
     walk = sample(
         denoise,
         x,
         levels=[9, 4, 0],
         solver=SOLVERS["ddim"],
         schedule=SCHEDULE,
-        noise=torch.zeros_like,
+        noise=np.zeros_like,
         constrain=constrain,
     )
     assert events == []
@@ -95,46 +96,53 @@ def test_the_walk_visits_its_levels_guess_then_move_then_edit():
 
 
 def test_a_walk_of_one_level_is_no_walk():
-    x = torch.ones(1, 2, 3)
-    assert run(wavy, x, levels=[7], solver=SOLVERS["dpm2m"], schedule=SCHEDULE, noise=torch.zeros_like) is x
+    x = np.ones((1, 2, 3), np.float32)
+    assert run(wavy, x, levels=[7], solver=SOLVERS["dpm2m"], schedule=SCHEDULE, noise=np.zeros_like) is x
 
 
 @pytest.mark.parametrize("walk", [[], [3, 3], [1, 2], [41, 0], [3, -1]])
 def test_levels_that_do_not_fall_or_do_not_exist_are_refused_before_anything_runs(walk):
     with pytest.raises(ValueError, match="level"):
         sample(
-            wavy, torch.zeros(1, 1, 1), levels=walk, solver=SOLVERS["ddpm"], schedule=SCHEDULE, noise=torch.zeros_like
+            wavy,
+            np.zeros((1, 1, 1), np.float32),
+            levels=walk,
+            solver=SOLVERS["ddpm"],
+            schedule=SCHEDULE,
+            noise=np.zeros_like,
         )
 
 
 def test_a_run_changes_none_of_its_arguments_and_keeps_their_type():
-    x = shared_draw(0)(torch.empty(2, 3, 4, dtype=torch.float32))
-    before, walk = x.clone(), levels(SCHEDULE, 5)
+    x = shared_draw(0)(np.empty((2, 3, 4), dtype=np.float32))
+    before, walk = x.copy(), levels(SCHEDULE, 5)
     for solver in SOLVERS.values():
         end = run(wavy, x, levels=walk, solver=solver, schedule=SCHEDULE, noise=row_noise([0, 1]))
-        assert end.dtype == torch.float32
-        assert torch.equal(x, before)
+        assert end.dtype == np.float32
+        assert np.array_equal(x, before)
 
 
 def test_a_restart_keeps_what_the_level_leaves_of_the_data():
-    clean = torch.full((1, 200, 200), 3.0)
+    clean = np.full((1, 200, 200), 3.0)
     noisy = restart(clean, SCHEDULE, 12, row_noise([5]))
     signal, noise = SCHEDULE.at(12)
     assert noisy.mean().item() == pytest.approx(3 * signal, abs=0.02)
     assert noisy.std().item() == pytest.approx(noise, abs=0.02)
-    assert torch.equal(restart(clean, SCHEDULE, 0, row_noise([5])), clean)
+    assert np.array_equal(restart(clean, SCHEDULE, 0, row_noise([5])), clean)
 
 
 def test_masked_noise_is_zero_where_the_mask_holds():
-    mask = torch.tensor([True, False])
-    noise, plain = (draw(torch.empty(1, 3, 2)) for draw in (masked_noise(row_noise([1]), mask), row_noise([1])))
-    assert torch.equal(noise[..., 0], torch.zeros(1, 3))
-    assert torch.equal(noise[..., 1], plain[..., 1])
+    mask = np.array([True, False])
+    noise, plain = (
+        draw(np.empty((1, 3, 2), np.float32)) for draw in (masked_noise(row_noise([1]), mask), row_noise([1]))
+    )
+    assert np.array_equal(noise[..., 0], np.zeros((1, 3), np.float32))
+    assert np.array_equal(noise[..., 1], plain[..., 1])
 
 
 @pytest.mark.parametrize(
     "mistake",
-    [lambda: row_noise([1, 2])(torch.empty(3, 1, 1)), lambda: row_noise([1, 2], [4])],
+    [lambda: row_noise([1, 2])(np.empty((3, 1, 1), np.float32)), lambda: row_noise([1, 2], [4])],
     ids=["rows", "lengths"],
 )
 def test_seeds_that_do_not_fit_the_rows_are_refused(mistake):

@@ -1,10 +1,9 @@
-"""What is sampled leaves what is known without a jump: the curves are scipy's, for arrays and tensors."""
+"""What is sampled leaves what is known without a jump: the curves are scipy's."""
 
 from collections.abc import Callable
 
 import numpy as np
 import pytest
-import torch
 from scipy.interpolate import BPoly
 
 from motionloom import rotations as rot
@@ -23,14 +22,13 @@ def curve(over: int, zeros: int) -> np.ndarray:
 
 @pytest.mark.parametrize(("decay", "zeros"), [(cubic_decay, 1), (quintic_decay, 2)])
 @pytest.mark.parametrize("frames", [1, 2, 9])
-@pytest.mark.parametrize("of", [np.asarray, torch.from_numpy])
 def test_a_difference_fades_as_the_polynomial_with_its_value_and_slope_that_ends_at_rest(
-    of: Callable, frames: int, decay: Callable, zeros: int
+    frames: int, decay: Callable, zeros: int
 ) -> None:
     """From the last known frame on, and from the first sampled one on."""
-    behind = match_boundary(of(LACK), of(SLOPE), frames, decay=decay)
+    behind = match_boundary(LACK, SLOPE, frames, decay=decay)
     np.testing.assert_allclose(behind, curve(frames + 1, zeros)[1:-1], atol=1e-12)
-    at = match_boundary(of(LACK), of(SLOPE), frames, first=0, decay=decay)
+    at = match_boundary(LACK, SLOPE, frames, first=0, decay=decay)
     np.testing.assert_allclose(at, curve(frames, zeros)[:-1], atol=1e-12)
 
 

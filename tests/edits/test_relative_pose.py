@@ -5,24 +5,23 @@ from typing import TypeAlias
 
 import numpy as np
 import pytest
-import torch
-from torch import Tensor
 
 from motionloom.edits import relative_pose as duet_places
 from motionloom.edits.relative_pose import Places, relative_pose_guidance
 from motionloom.features import pair as two
 from motionloom.features.pair import PUBLISHED_CODE
 from motionloom.ground import relative
-from motionloom.nets.pair import PairNet, join
+from motionloom.runtime.pair import PairSession, join
 from motionloom.tasks.pair import PairEdits, generate_pair, known_state, pair_features, pair_noise
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from tests.nets import tiny
+from tests.noise import normal
 from tests.tasks.two_people import block as block_of
 
 FRAMES = 100
 SAID = ["a person walks", "a person turns left"]
-BESIDE = torch.tensor([[1.0, 0.0, 0.0, 0.0], [-0.8, 0.6, 0.3, 1.0]])
+BESIDE = np.array([[1.0, 0.0, 0.0, 0.0], [-0.8, 0.6, 0.3, 1.0]])
 
 
 @pytest.fixture(scope="module")
@@ -38,35 +37,35 @@ def block(prior: Prior) -> PairBlock:
 class Told:
     """A network that always says that two people stand to each other as in `BESIDE`."""
 
-    def __init__(self, net: PairNet) -> None:
-        self.net, self.talk = net, net.talk
-        self.shown: list[tuple[Tensor, Tensor]] = []
+    def __init__(self, net: PairSession) -> None:
+        self.places, self.silent = net.places, net.silent
+        self.shown: list[tuple[np.ndarray, np.ndarray]] = []
 
-    def __call__(self, x: Tensor, level: int, bound) -> Tensor:
+    def __call__(self, x: np.ndarray, level: int, bound) -> np.ndarray:
         self.shown.append((x, bound.lengths))
-        places = self.talk.config.places.encode(BESIDE).repeat(len(x) // 2, 1)
+        places = np.tile(self.places.encode(BESIDE), (len(x) // 2, 1))
         return join(places, x[:, 1:])
 
 
-def drifting(prior: Prior) -> Tensor:
+def drifting(prior: Prior) -> np.ndarray:
     """Features (2, frames, 263) of people who turn and go their own ways."""
-    features = torch.randn(2, FRAMES, 263, generator=torch.Generator().manual_seed(1)) * 0.01
-    features[0, :, :3] += torch.tensor([0.004, 0.01, 0.02])
-    features[1, :, :3] += torch.tensor([-0.006, -0.01, 0.015])
-    return features * (prior.std > 0) + torch.where(prior.std > 0, 0.0, prior.mean)
+    features = normal((2, FRAMES, 263), 1) * 0.01
+    features[0, :, :3] += np.array([0.004, 0.01, 0.02])
+    features[1, :, :3] += np.array([-0.006, -0.01, 0.015])
+    return features * (prior.std > 0) + np.where(prior.std > 0, 0.0, prior.mean)
 
 
-def led(prior: Prior, block: PairBlock, places: Places, weight: float = 1.0) -> tuple[Tensor, Tensor, Told]:
+def led(prior: Prior, block: PairBlock, places: Places, weight: float = 1.0) -> tuple[np.ndarray, np.ndarray, Told]:
     """Ways (2, frames, 4) in the world before and after."""
-    net, spread = block.net(prior), torch.where(prior.std > 0, prior.std, 1.0)
-    told, code, before = Told(net), net.talk.config.places, drifting(prior)
+    net, spread = block.net(prior), np.where(prior.std > 0, prior.std, np.float32(1))
+    told, code, before = Told(net), net.places, drifting(prior)
     denoised = join(code.encode(BESIDE), (before - prior.mean) / spread)
     made = places.guided(
         prior, told, net.bind(prior.condition(SAID)), state=denoised, denoised=denoised, level=25, weight=weight  # type: ignore
     )  # fmt: skip
-    assert torch.equal(made[:, 0], denoised[:, 0])
+    assert np.array_equal(made[:, 0], denoised[:, 0])
     after = made[:, 1:] * spread + prior.mean
-    torch.testing.assert_close(after[..., 3:], before[..., 3:], rtol=0, atol=1e-5)
+    np.testing.assert_allclose(after[..., 3:], before[..., 3:], rtol=0, atol=1e-5)
     ways = [two.compose(BESIDE[:, None], two.along(one)) for one in (before, after)]
     return ways[0], ways[1], told
 
@@ -76,11 +75,11 @@ def test_a_drift_is_gone_at_the_anchors(prior: Prior, block: PairBlock, weight: 
     before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2), weight)
     expected = relative(BESIDE[0], BESIDE[1])
     for knot in (40, 80):
-        away = (relative(before[0, knot], before[1, knot]) - expected).abs().max()
-        error = (relative(after[0, knot], after[1, knot]) - expected).abs().max()
+        away = np.abs(relative(before[0, knot], before[1, knot]) - expected).max()
+        error = np.abs(relative(after[0, knot], after[1, knot]) - expected).max()
         assert away > 0.3
-        assert (error < 1e-4) if weight else (error - away).abs() < 1e-4
-    torch.testing.assert_close(after[:, 0], before[:, 0])
+        assert (error < 1e-4) if weight else np.abs(error - away) < 1e-4
+    np.testing.assert_allclose(after[:, 0], before[:, 0], atol=1e-5)
 
 
 def test_half_led_is_half_of_the_way(prior: Prior, block: PairBlock) -> None:
@@ -88,10 +87,10 @@ def test_half_led_is_half_of_the_way(prior: Prior, block: PairBlock) -> None:
     places = Places.of([1, 2], FRAMES, [0], [False] * 2)
     free, half, whole = (led(prior, block, places, weight)[1][:, [40, 80]] for weight in (0.0, 0.5, 1.0))
     way = [(one[1] - one[0])[:, 2:] for one in (free, half, whole)]
-    assert (way[2] - way[0]).norm(dim=-1).min() > 0.2
-    torch.testing.assert_close(way[1], (way[0] + way[2]) / 2, rtol=0, atol=1e-4)
+    assert np.linalg.norm(way[2] - way[0], axis=-1).min() > 0.2
+    np.testing.assert_allclose(way[1], (way[0] + way[2]) / 2, rtol=0, atol=1e-4)
     for person in (0, 1):
-        torch.testing.assert_close(
+        np.testing.assert_allclose(
             relative(free[person], half[person])[:, :2],
             relative(half[person], whole[person])[:, :2],
             rtol=0,
@@ -102,46 +101,46 @@ def test_half_led_is_half_of_the_way(prior: Prior, block: PairBlock) -> None:
 def test_each_goes_half_of_the_way(prior: Prior, block: PairBlock) -> None:
     before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2))
     moved = (after - before)[..., 2:]
-    assert moved.abs().max() > 0.2
-    torch.testing.assert_close(moved[0], -moved[1], rtol=0, atol=1e-4)
+    assert np.abs(moved).max() > 0.2
+    np.testing.assert_allclose(moved[0], -moved[1], rtol=0, atol=1e-4)
     turned = [relative(before[i], after[i])[:, 1] for i in (0, 1)]
-    assert turned[0].abs().max() > 0.2
-    torch.testing.assert_close(turned[0], -turned[1], rtol=0, atol=1e-4)
+    assert np.abs(turned[0]).max() > 0.2
+    np.testing.assert_allclose(turned[0], -turned[1], rtol=0, atol=1e-4)
 
 
 @pytest.mark.parametrize("given", [0, 1])
 def test_nobody_given_is_moved_and_the_other_goes_the_whole_way(prior: Prior, block: PairBlock, given: int) -> None:
     before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [0], [given == 0, given == 1]))
-    torch.testing.assert_close(after[given], before[given], rtol=0, atol=1e-5)
+    np.testing.assert_allclose(after[given], before[given], rtol=0, atol=1e-5)
     expected = relative(BESIDE[0], BESIDE[1])
-    torch.testing.assert_close(relative(after[0, 80], after[1, 80])[:2], expected[:2], rtol=0, atol=1e-4)
-    assert (after[1 - given] - before[1 - given])[80, 2:].norm() > 0.3
+    np.testing.assert_allclose(relative(after[0, 80], after[1, 80])[:2], expected[:2], rtol=0, atol=1e-4)
+    assert np.linalg.norm((after[1 - given] - before[1 - given])[80, 2:]) > 0.3
 
 
 def test_frames_before_the_beginning_stay(prior: Prior, block: PairBlock) -> None:
     before, after, _ = led(prior, block, Places.of([1, 2], FRAMES, [30], [False] * 2))
-    torch.testing.assert_close(after[:, :31], before[:, :31], rtol=0, atol=1e-4)
-    torch.testing.assert_close(relative(after[0, 80], after[1, 80]), relative(BESIDE[0], BESIDE[1]), rtol=0, atol=1e-4)
+    np.testing.assert_allclose(after[:, :31], before[:, :31], rtol=0, atol=1e-4)
+    np.testing.assert_allclose(relative(after[0, 80], after[1, 80]), relative(BESIDE[0], BESIDE[1]), rtol=0, atol=1e-4)
 
 
 def test_the_network_is_shown_crops_that_begin_at_the_anchors(prior: Prior, block: PairBlock) -> None:
     _, _, told = led(prior, block, Places.of([1, 2], FRAMES, [0], [False] * 2))
     [(x, lengths)] = told.shown
-    motion = (drifting(prior) - prior.mean) / torch.where(prior.std > 0, prior.std, 1.0)
+    motion = (drifting(prior) - prior.mean) / np.where(prior.std > 0, prior.std, np.float32(1))
     assert lengths.tolist() == [60, 60, 20, 20]
-    torch.testing.assert_close(x[:2, 1:], motion[:, 40:100])
-    torch.testing.assert_close(x[2:, 1:21], motion[:, 80:])
+    np.testing.assert_allclose(x[:2, 1:], motion[:, 40:100], atol=1e-5)
+    np.testing.assert_allclose(x[2:, 1:21], motion[:, 80:], atol=1e-5)
 
 
 def test_what_a_change_costs_is_spread_without_jumps() -> None:
-    spread = duet_places._spread([10, 50, 90], 101).numpy()
+    spread = duet_places._spread([10, 50, 90], 101)
     np.testing.assert_allclose(spread[[5, 10, 50, 90, 100]], [[0, 0], [0, 0], [1, 0], [0, 1], [0, 1]], atol=1e-6)
     assert np.abs(np.diff(spread[11:90], axis=0)).max() < 2 / duet_places.SPACING
     assert np.abs(np.diff(spread[11:90], 2, axis=0)).max() < 0.2 / duet_places.SPACING  # nor a bend, as of lines
 
 
 def test_no_more_than_sixty_frames_are_shown() -> None:
-    motion = torch.arange(100.0).repeat(2, 1)[..., None]
+    motion = np.tile(np.arange(100.0), (2, 1))[..., None]
     crops, lengths = duet_places._crops(motion, [0, 1, 1], [0, 39, 50])
     assert (crops.shape, lengths.tolist()) == ((3, 60, 1), [60, 60, 50])
     assert crops[:, 0, 0].tolist() == [0, 39, 50]
@@ -151,7 +150,7 @@ def test_no_more_than_sixty_frames_are_shown() -> None:
 def test_what_places_are_asked_with_is_not_what_the_duet_begins_as() -> None:
     noise = Places.of([1, 2], 200, [0], [False] * 2).noise
     assert noise.shape == (10, 4)
-    assert not torch.isin(noise, pair_noise([1, 2])(torch.zeros(2, 201, 263))).any()
+    assert not np.isin(noise, pair_noise([1, 2])(np.zeros((2, 201, 263), np.float32))).any()
 
 
 def test_exchanged_people_stay_together_exchanged(prior: Prior, block: PairBlock) -> None:
@@ -159,17 +158,17 @@ def test_exchanged_people_stay_together_exchanged(prior: Prior, block: PairBlock
     one, _ = pair_features(prior, net, SAID, 70, seeds=[1, 2], **shared)
     other, _ = pair_features(prior, net, SAID[::-1], 70, seeds=[2, 1], **shared)
     free, _ = pair_features(prior, net, SAID, 70, seeds=[1, 2], pair_guidance=0.0, **shared)
-    torch.testing.assert_close(one[0], other[0].flip(0), rtol=0, atol=1e-3)
-    assert (one - free).abs().max() > 1e-3
+    np.testing.assert_allclose(one[0], np.flip(other[0], 0), rtol=0, atol=1e-3)
+    assert np.abs(one - free).max() > 1e-3
     many, _ = pair_features(prior, net, SAID * 2, 70, seeds=[1, 2, 3, 4], **shared)
-    torch.testing.assert_close(many[0], one[0], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(many[0], one[0], rtol=0, atol=1e-3)
 
 
 def test_what_is_known_stays_known(prior: Prior, block: PairBlock) -> None:
     net, first = block.net(prior), drifting(prior)[:, :20]
     observed = known_state(prior, net, first, BESIDE, 90)
     made, _ = pair_features(prior, net, SAID, 90, seeds=[1, 2], edits=PairEdits(observed), steps=2)
-    torch.testing.assert_close(made[0, :, :20], first, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(made[0, :, :20], first, rtol=0, atol=1e-5)
 
 
 def test_a_fresh_block_leads_nobody(prior: Prior) -> None:
@@ -188,7 +187,7 @@ def test_a_fresh_block_leads_nobody(prior: Prior) -> None:
 class Asked(Told):
     """Keeps everything that it is shown."""
 
-    def __call__(self, x: Tensor, level, bound) -> Tensor:
+    def __call__(self, x: np.ndarray, level, bound) -> np.ndarray:
         self.state, self.level, self.bound = x, level, bound
         return super().__call__(x, level, bound)
 
@@ -199,45 +198,47 @@ def test_every_question_is_of_its_own_pair_at_its_own_level_and_given_the_noised
     """Two pairs, with anchors at frames 40 and 80, and at 80."""
     net, said = block.net(prior), [*SAID, "a person jumps", "a person sits down"]
     bound, told = net.bind(prior.condition(said)), Asked(net)
-    drift, spread = drifting(prior), torch.where(prior.std > 0, prior.std, 1.0)
-    denoised = join(net.talk.config.places.encode(BESIDE).repeat(2, 1), ((drift - prior.mean) / spread).repeat(2, 1, 1))
-    state = torch.randn(denoised.shape, generator=torch.Generator().manual_seed(2))
+    drift, spread = drifting(prior), np.where(prior.std > 0, prior.std, np.float32(1))
+    denoised = join(net.places.encode(BESIDE)[[0, 1, 0, 1]], ((drift - prior.mean) / spread)[[0, 1, 0, 1]])
+    state = normal(denoised.shape, 2)
     places = Places.of([1, 2, 3, 4], FRAMES, [0, 40], [False] * 4)
-    level = torch.tensor([7, 7, 30, 30])
+    level = np.array([7, 7, 30, 30])
     made = places.guided(prior, told, bound, state=state, denoised=denoised, level=level, weight=1.0)  # type: ignore
     asked = [(row, frame) for frame in (40, 80) for row in (0, 1)] + [(2, 80), (3, 80)]
-    assert torch.as_tensor(told.level).tolist() == [7, 7, 7, 7, 30, 30]
+    assert np.asarray(told.level).tolist() == [7, 7, 7, 7, 30, 30]
     assert told.bound.lengths.tolist() == [min(60, FRAMES - frame) for _, frame in asked]
     ways = two.compose(BESIDE[:, None], two.along(drift))
     for number, (row, frame) in enumerate(asked):
         length, own = min(60, FRAMES - frame), int(level[row])
-        torch.testing.assert_close(told.state[number, 1 : 1 + length], state[row, 1 + frame : 1 + frame + length])
-        assert torch.equal(told.bound.text[number], bound.text[row])
+        np.testing.assert_allclose(
+            told.state[number, 1 : 1 + length], state[row, 1 + frame : 1 + frame + length], atol=1e-5
+        )
+        assert np.array_equal(told.bound.text[number], bound.text[row])
         there = relative(ways[row % 2, frame], ways[1 - row % 2, frame])  # the other, as seen from there
         signal, noise = prior.schedule.at(own)
-        torch.testing.assert_close(told.state[number, 0, :4], signal * there + noise * places.noise[number])
+        np.testing.assert_allclose(told.state[number, 0, :4], signal * there + noise * places.noise[number], atol=1e-5)
     # what is asked of the one pair changes nothing of the other
     for pair, (begin, kept) in enumerate(((0, slice(0, 4)), (40, slice(4, 6)))):
         rows = slice(2 * pair, 2 * pair + 2)
         alone = Places.of([[1, 2], [3, 4]][pair], FRAMES, [begin], [False] * 2)
-        assert torch.equal(alone.noise, places.noise[kept])
+        assert np.array_equal(alone.noise, places.noise[kept])
         one = alone.guided(
             prior, Told(net), net.bind(prior.condition(said[rows])), state=state[rows], denoised=denoised[rows],  # type: ignore
             level=level[rows], weight=1.0,
         )  # fmt: skip
-        torch.testing.assert_close(made[rows], one, rtol=0, atol=1e-5)
-    assert places.noise.unique().numel() == places.noise.numel()  # nothing is drawn twice
+        np.testing.assert_allclose(made[rows], one, rtol=0, atol=1e-5)
+    assert np.unique(places.noise).size == places.noise.size  # nothing is drawn twice
 
 
 def test_who_is_moved_differs_from_pair_to_pair(prior: Prior, block: PairBlock) -> None:
     net = block.net(prior)
-    drift, spread = drifting(prior), torch.where(prior.std > 0, prior.std, 1.0)
-    denoised = join(net.talk.config.places.encode(BESIDE).repeat(2, 1), ((drift - prior.mean) / spread).repeat(2, 1, 1))
+    drift, spread = drifting(prior), np.where(prior.std > 0, prior.std, np.float32(1))
+    denoised = join(net.places.encode(BESIDE)[[0, 1, 0, 1]], ((drift - prior.mean) / spread)[[0, 1, 0, 1]])
     places = Places.of([1, 2, 3, 4], FRAMES, [0, 0], [True, False, False, True])
     made = places.guided(
         prior, Told(net), net.bind(prior.condition(SAID * 2)), state=denoised, denoised=denoised, level=25, weight=1.0  # type: ignore
     )  # fmt: skip
-    moved = (made - denoised).abs().amax((1, 2))
+    moved = np.abs(made - denoised).max((1, 2))
     assert moved[[0, 3]].max() < 1e-5
     assert moved[[1, 2]].min() > 0.1
 
@@ -253,12 +254,14 @@ def test_anchors_stand_evenly_up_to_twenty_frames_before_the_end(
     assert Places.of([1, 2], frames, [begin], [False] * 2).anchors == (anchors,)
 
 
-def leads(prior: Prior, block: PairBlock, mask: Tensor, frozen=(False, False)) -> tuple[Tensor, Tensor, Told]:
+def leads(
+    prior: Prior, block: PairBlock, mask: np.ndarray, frozen=(False, False)
+) -> tuple[np.ndarray, np.ndarray, Told]:
     """An estimate before and after the guidance, where ``mask`` (2, 1 + frames) says what is known."""
-    net, spread = block.net(prior), torch.where(prior.std > 0, prior.std, 1.0)
+    net, spread = block.net(prior), np.where(prior.std > 0, prior.std, np.float32(1))
     told = Told(net)
-    denoised = join(net.talk.config.places.encode(BESIDE), (drifting(prior) - prior.mean) / spread)
-    known = mask[..., None].expand(denoised.shape)
+    denoised = join(net.places.encode(BESIDE), (drifting(prior) - prior.mean) / spread)
+    known = np.broadcast_to(mask[..., None], (denoised.shape))
     lead = relative_pose_guidance(prior, told, net.bind(prior.condition(SAID)), seeds=[1, 2], mask=known, frozen=frozen)  # type: ignore
     return denoised, lead(denoised, denoised, 25), told
 
@@ -283,27 +286,27 @@ def test_anchors_begin_two_seconds_behind_the_common_beginning_and_known_numbers
     case: str, prior: Prior, block: PairBlock
 ) -> None:
     spans, lengths, moves = KNOWN[case]
-    mask = torch.zeros(2, FRAMES + 1, dtype=torch.bool)
+    mask = np.zeros((2, FRAMES + 1), dtype=np.bool_)
     for row, some in enumerate(spans):
         for first, last in some:
             mask[row, first:last] = True
     before, after, told = leads(prior, block, mask)
     assert [one.tolist() for _, one in told.shown] == ([lengths] if lengths else [])
-    assert torch.equal(after[mask], before[mask])
-    assert [bool((row > 0.01).any()) for row in (after - before).abs()] == moves
+    assert np.array_equal(after[mask], before[mask])
+    assert [bool((row > 0.01).any()) for row in np.abs(after - before)] == moves
 
 
 @pytest.mark.parametrize("away", [0, 1])
 def test_whom_others_move_is_not_led(prior: Prior, block: PairBlock, away: int) -> None:
-    nothing = torch.zeros(2, FRAMES + 1, dtype=torch.bool)
+    nothing = np.zeros((2, FRAMES + 1), dtype=np.bool_)
     before, after, _ = leads(prior, block, nothing, frozen=(away == 0, away == 1))
-    off = (after - before).abs().amax((1, 2))
+    off = np.abs(after - before).max((1, 2))
     assert off[away] < 1e-5
     assert off[1 - away] > 0.1
 
 
 def test_places_of_the_world_lead_nobody(prior: Prior, block: PairBlock) -> None:
     of_world = replace(block, config=replace(block.config, places=PUBLISHED_CODE))
-    before, after, told = leads(prior, of_world, torch.zeros(2, FRAMES + 1, dtype=torch.bool))
-    assert torch.equal(before, after)
+    before, after, told = leads(prior, of_world, np.zeros((2, FRAMES + 1), dtype=np.bool_))
+    assert np.array_equal(before, after)
     assert not told.shown

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
-from torch import Tensor
 
 from motionloom.edits.steering import Correction, corrected, toward
 from motionloom.features import humanml
@@ -15,6 +13,7 @@ from motionloom.kinematics.physics import heading
 from motionloom.skeleton import SMPL22
 from motionloom.weights.prior import Prior
 from tests.nets import tiny
+from tests.noise import normal
 
 WRIST, HEAD = SMPL22.index("right_wrist"), SMPL22.index("head")
 LEVELS = (50, 25, 1)
@@ -23,23 +22,23 @@ LEVELS = (50, 25, 1)
 @pytest.fixture(scope="module")
 def prior() -> Prior:
     """Statistics like those of people: somebody with bent elbows, a velocity of a centimetre, places off by 5 cm."""
-    mean, std = torch.zeros(263), torch.full((263,), 0.05)
-    places = torch.from_numpy(SMPL22.rest_positions()).float()
-    places[[20, 21]] = places[[18, 19]] + torch.tensor([0.0, 0.0, 0.26])
+    mean, std = np.zeros((263,), np.float32), np.full(263, 0.05, np.float32)
+    places = np.asarray(SMPL22.rest_positions()).astype(np.float32)
+    places[[20, 21]] = places[[18, 19]] + np.array([0.0, 0.0, 0.26])
     mean[3], mean[4:67] = places[0, 1], places[1:].reshape(-1)
-    mean[2], std[:3] = 0.03, torch.tensor([0.01, 0.01, 0.01])
+    mean[2], std[:3] = 0.03, np.array([0.01, 0.01, 0.01])
     return replace(tiny.prior(), mean=mean, std=std)
 
 
-def guess(frames: int = 60, seed: int = 0) -> Tensor:
+def guess(frames: int = 60, seed: int = 0) -> np.ndarray:
     """Smooth noise."""
-    noise = torch.randn(frames + 12, 263, generator=torch.Generator().manual_seed(seed))
-    return torch.nn.functional.avg_pool1d(noise.T[None], 13, 1)[0].T * 3
+    noise = normal((frames + 12, 263), seed)
+    return 3 * np.lib.stride_tricks.sliding_window_view(noise, 13, axis=0).mean(-1)
 
 
-def decoded(row: Tensor, prior: Prior, first: int = 0) -> np.ndarray:
+def decoded(row: np.ndarray, prior: Prior, first: int = 0) -> np.ndarray:
     """Places by the published decoder, seen from where the root is at frame ``first``."""
-    features = (row * prior.std + prior.mean).double().numpy()
+    features = (row * prior.std + prior.mean).astype(np.float64)
     places = humanml.decode_positions(features)
     turn, root = humanml.recover_root(features)
     facing = -2 * np.arctan2(turn[first, 2], turn[first, 0])
@@ -111,7 +110,7 @@ def test_a_dense_path_is_followed_and_the_body_turns_with_it(prior: Prior) -> No
     frames = 60
     angle = np.linspace(0, np.pi / 2, frames)
     goal = asking(frames, 0, {k: (1 - np.cos(a), 0.0, np.sin(a)) for k, a in enumerate(angle)})
-    row = toward(goal, prior)(torch.zeros(frames, 263), 25)
+    row = toward(goal, prior)(np.zeros((frames, 263), np.float32), 25)
     after = decoded(row, prior)
     np.testing.assert_allclose(after[:, 0, [0, 2]], goal.positions[:, 0, [0, 2]], atol=0.01)
     np.testing.assert_allclose(heading(after)[15:50], angle[15:50], atol=0.15)
@@ -133,9 +132,9 @@ def test_a_goal_may_begin_inside_a_row(prior: Prior) -> None:
     np.testing.assert_allclose(changed[:1], row[:1], atol=0.3)
 
 
-def planted(row: Tensor, prior: Prior, standing: slice) -> Tensor:
+def planted(row: np.ndarray, prior: Prior, standing: slice) -> np.ndarray:
     """The guess with its left foot told to be in contact."""
-    row = row.clone()
+    row = row.copy()
     row[standing, 259:261] = 1 / prior.std[259]
     return row
 
@@ -162,9 +161,9 @@ def test_the_displacements_stay_those_of_the_places(prior: Prior) -> None:
     row = guess()
     goal = asking(60, 0, {40: (1.0, 0.0, 2.0)})
     changed = toward(goal, prior)(row, 25)
-    before, after = ((part * prior.std + prior.mean).double() for part in (row, changed))
+    before, after = ((part * prior.std + prior.mean).astype(np.float64) for part in (row, changed))
     shown = humanml.displacements(after) - humanml.displacements(before)
-    said = (after - before)[:-1, 193:259].unflatten(-1, (22, 3))
+    said = (after - before)[:-1, 193:259].reshape(-1, 22, 3)
     np.testing.assert_allclose(said, shown, atol=1e-5)
 
 
@@ -177,11 +176,11 @@ def test_what_is_out_of_reach_moves_limbs_by_less_than_a_metre(prior: Prior) -> 
 
 def test_rows_are_corrected_alone(prior: Prior) -> None:
     """Each row gets its own correction; a row without one is the network's guess bit for bit."""
-    rows = torch.stack([guess(seed=0), guess(seed=1), guess(seed=2)])
+    rows = np.stack([guess(seed=0), guess(seed=1), guess(seed=2)])
     change: Correction = toward(asking(60, 0, {40: (1.0, 0.0, 2.0)}), prior)
     edited = corrected(lambda state, level: rows, [None, change, None])(rows, 25)
-    assert torch.equal(edited[[0, 2]], rows[[0, 2]])
-    assert torch.equal(edited[1], change(rows[1], 25))
+    assert np.array_equal(edited[[0, 2]], rows[[0, 2]])
+    assert np.array_equal(edited[1], change(rows[1], 25))
     denoise = lambda state, level: rows  # noqa: E731
     assert corrected(denoise, [None, None, None]) is denoise
     with pytest.raises(ValueError, match="per row"):

@@ -148,14 +148,17 @@ def safetensors(data: bytes, rng: random.Random) -> bytes:
     length = struct.unpack("<Q", data[:8])[0]
     head, body = json.loads(data[8 : 8 + length]), data[8 + length :]
     about = head.get("__metadata__", {})
-    choice = rng.randrange(4)
-    if choice <= 1 and about:
+    choice = rng.randrange(25)
+    if choice == 24:
+        empty = {"dtype": "F32", "shape": [0], "data_offsets": [len(body)] * 2}
+        head |= {f"x{number}": empty for number in range(rng.choice((10, 9_000, 12_000)))}
+    elif choice < 12 and about:
         key = rng.choice(list(about))
         try:
             about[key] = json.dumps(change(json.loads(about[key]), rng))
         except ValueError:
             about[key] = rng.choice(("", "x", "1" * 5000, "[" * 5000))
-    elif choice == 2:
+    elif choice < 18:
         head = change(head, rng)
     else:
         names = [n for n in head if n != "__metadata__"]
@@ -190,7 +193,8 @@ def glb(data: bytes, rng: random.Random) -> bytes:
 OPERATIONS = [
     *(bytes([code]) for code in b"]}(N02tleasuRbQ\x93\x94"),
     b"h\0", b"q\0", b"h\x01", b"h\x02", b"K\xff", b"J\xff\xff\xff\x7f", b"\x8a\xff" + b"\xff" * 20, b"(h\0h\0e",
-    b"]" * 3000, b"(" * 3000, b"]q\0(h\0h\0e" * 30, b"cos\nsystem\n", b"c__builtin__\nbytearray\nJ\0\0\0\x40\x85R",
+    b"]" * 3000, b"(" * 3000, b"(" + b"]" * 500_000 + b"e",
+    b"]q\0(h\0h\0e" * 30, b"cos\nsystem\n", b"c__builtin__\nbytearray\nJ\0\0\0\x40\x85R",
     b"I" + b"9" * 6000 + b"\n", b"F1e999\n", b"\x8e" + b"\xff" * 8, b"\x8d" + b"\0" * 6 + b"\x10\0",
 ]  # fmt: skip
 

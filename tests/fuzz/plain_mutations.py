@@ -14,12 +14,15 @@ LARGEST = 900_000
 """Bytes of a damaged file."""
 NUMBERS = [b"nan", b"NaN", b"-inf", b"Infinity", b"1e308", b"-1e308", b"1e999", b"1e-320", b"0", b"-0", b"-1", b"1",
            b"0.5", b"1e9", b"2147483648", b"-9223372036854775809", b"18446744073709551616", b"9" * 400, b"9" * 5000,
+           b"1e" + b"9" * 5000, b"1e-" + b"9" * 5000, b"0.03e" + b"0" * 5000, b"-" + b"9" * 5000 + b".5",
+           b"0." + b"0" * 5000 + b"1e5000",
            b"0x10", b"1_0", b"1,5", b"--1", b"1e", b"\xd9\xa1", b"true", b"null", b"'1'", b"1" + b"0" * 30]  # fmt: skip
 WORDS = [b"", b" ", b"\0", b"\n", b"\r", b"\x1b[31m", b"\xff\xfe", b"\xef\xbb\xbf", b"\xe9", b"\xed\xa0\x80",
          b"../../x", b"/etc/passwd", b"%s%n", b"{", b"}", b"[", b"]", b"(", b")", b"\"", b"'", b"#", b":", b"=", b",",
          b"<", b">", b"&", b"*", b"!", b"\\", b"\\u0000", b"a.a.a.a", b"x" * 300, b" " * 3000, b"(" * 500, b"[" * 3000,
          b"{\"a\":" * 2000, "\u2028".encode(), "\u202e".encode(), b"-----", b"MOTION", b"End Site\n{\n}\n",
-         b"\x80\x04.", b"PK\x03\x04"]  # fmt: skip
+         b"\x80\x04.", b"PK\x03\x04",
+         b"walk " * 500, b"s", b", s,", b"\x1b]0;x\x07", "\x9b2J".encode(), b"\x7f"]  # fmt: skip
 NUMBER = re.compile(rb"[-+]?\d[\d.]*(?:[eE][-+]?\d+)?")
 TOKEN = re.compile(rb"[^\s,;:{}\[\]()\"'<>=]+")
 PLAIN: list[Any] = [None, True, False, 0, -1, 1, 2**31, 2**63, 2**64, 10**30, 10**400, 0.5, -0.0, 1e308, 1e-320, 1e999,
@@ -180,10 +183,19 @@ def change(value: Any, rng: random.Random) -> Any:
     return value
 
 
+def count(value: Any, rng: random.Random) -> Any:
+    """One whole number a little more or less, or another one of the same value: counts no longer fit each other."""
+    numbers = [(o, k) for o, k in _places(value, []) if type(o[k]) is int]
+    inside, key = rng.choice(numbers)
+    other, at = rng.choice(numbers)
+    inside[key] = rng.choice((inside[key] - 1, inside[key] + 1, other[at], inside[key] // 2, inside[key] * 2))
+    return value
+
+
 def tree(data: bytes, rng: random.Random) -> bytes:
     value = json.loads(data)
     for _ in range(rng.choice((1, 1, 2, 5))):
-        value = change(value, rng)
+        value = rng.choice((change, change, change, count))(value, rng)
     return json.dumps(value).encode("utf-8", "surrogatepass")
 
 

@@ -131,9 +131,10 @@ def read_checkpoint(name: str) -> Callable[[Path], object]:
 
 
 def humanmac(folder: Path) -> None:
-    from motionloom.nets.predictor import NetConfig, TransLinear
+    from motionloom.nets.predictor import TransLinear
+    from motionloom.runtime.predictor import PredictorConfig
 
-    net = TransLinear(NetConfig(channels=48, kept=20, layers=2, width=16, heads=2))
+    net = TransLinear(PredictorConfig(channels=48, kept=20, layers=2, width=16, heads=2))
     torch.save(net.state_dict(), folder / "a.pt")
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from motionloom import rotations as rot
 from motionloom.io.character import load_character
+from motionloom.io.gltf import load_glb
 from motionloom.motion import Motion
 from motionloom.retarget import retarget
 from motionloom.skeleton import SMPL22
@@ -133,3 +134,24 @@ def test_a_mesh_that_was_made_lying_is_left_to_its_nodes(tmp_path: Path) -> None
     packed[:, [3, 7, 11]], packed[:, 15] = 0.0, 1.0
     skin["inverseBindMatrices"] = hero.add(packed, 5126, "MAT4")
     np.testing.assert_allclose(rest_of(hero.write(tmp_path / "a.glb")), SMPL22.rest_positions(), atol=1e-5)
+
+
+def test_matrices_with_a_damaged_last_row_are_read_as_they_are_meant(tmp_path: Path) -> None:
+    hero = Hero()
+    skin = hero.json["skins"][0]
+    damaged = hero.values(skin["inverseBindMatrices"], 16).copy()
+    damaged[:, [3, 7, 11, 15]] = 0.0
+    skin["inverseBindMatrices"] = hero.add(damaged, 5126, "MAT4")
+    np.testing.assert_allclose(rest_of(hero.write(tmp_path / "a.glb")), SMPL22.rest_positions(), atol=1e-5)
+
+
+def test_a_mesh_under_absurd_scales_changes_nothing(tmp_path: Path) -> None:
+    hero = lean(Hero(), 25.0)
+    first = len(hero.json["nodes"])
+    hero.json["nodes"] += [{"scale": [9e8] * 3, "children": [first + k + 1]} for k in range(40)]
+    hero.json["nodes"] += [{"mesh": 0, "skin": 0}]
+    hero.json["scenes"][0]["nodes"].append(first)
+    with np.errstate(all="raise", under="ignore"):
+        skeleton = load_glb(hero.write(tmp_path / "a.glb")).skeleton
+    body = [skeleton.index(name) for name in SMPL22.names]
+    np.testing.assert_allclose(skeleton.rest_positions()[body], SMPL22.rest_positions(), atol=1e-5)

@@ -13,7 +13,7 @@ from motionloom.errors import MotionloomError
 from motionloom.lab import bench
 from motionloom.lab.bench import long, prediction, speed, start
 from motionloom.nets.prior import NetConfig, PriorNet
-from motionloom.nets.text import TextEmbedding
+from motionloom.runtime.text.protocol import TextEmbedding
 from motionloom.weights.prior import Card, Prior
 from tests.tasks.small_predictor import small_predictor
 

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import torch
 
 from motionloom.features import humanml
 from motionloom.live.settings import Settings
@@ -18,4 +17,4 @@ def prior() -> Prior:
     features = humanml.motion_to_features(person(2.0))
     std = np.full(263, 0.02, np.float32)
     std[:3] = 0.004
-    return replace(tiny.prior(), mean=torch.from_numpy(features.mean(0)), std=torch.from_numpy(std))
+    return replace(tiny.prior(), mean=features.mean(0), std=std)

@@ -38,6 +38,16 @@ def test_frames_are_due_at_their_times_and_a_late_one_delays_what_follows() -> N
     assert pace.until(frame(7)) == pytest.approx(0.05), "the clock waited: nothing is rushed"
 
 
+def test_frames_that_are_shown_more_slowly_are_as_far_apart_as_that() -> None:
+    now, rate = 10.0, 0.5
+    pace = Pace(lambda: now, lambda: rate)
+    assert pace.late(frame(0)) == 0.0
+    assert pace.until(frame(1)) == pytest.approx(0.1)
+    now, rate = 10.1, 1.0
+    assert pace.late(frame(1)) == pytest.approx(0.05), "it was due at the rate of now"
+    assert pace.until(frame(2)) == pytest.approx(0.05)
+
+
 def test_a_player_gives_the_frames_of_its_live_and_says_how_to_make_them_again() -> None:
     prior = people.prior()
     with Player(Live(prior, seed=2, settings=QUICK)) as player:
@@ -90,7 +100,7 @@ class Simulation:
         self.times: list[float] = []
         self.late: list[float] = []
         self._took, self._asked = took, sorted(asked.items(), key=lambda one: one[0])
-        self._pace = Pace(lambda: self.clock)
+        self._pace = Pace(lambda: self.clock, lambda: self.player.health.rate)
 
     def run(self, count: int) -> "Simulation":
         """Until so many frames were shown."""
@@ -151,11 +161,11 @@ def test_windows_that_take_long_make_commands_wait_and_no_frame_late(each: float
     assert made.replayed()
 
 
-def test_a_machine_that_cannot_keep_up_is_late_and_leaves_nothing_out() -> None:
-    late = Simulation(lambda window: 3.0, {}).run(130).late
-    assert sum(wait > clock.LATE for wait in late[:130]) == 3, (
-        "once for each window: the clock waits, then all is on time"
-    )
+def test_a_machine_that_falls_behind_is_late_twice_and_leaves_nothing_out() -> None:
+    """Windows that were quick take three seconds from one moment on, which nobody can know before."""
+    made = Simulation(lambda window: 0.2 if window < 12 else 3.0, {}).run(700)
+    assert sum(wait > clock.LATE for wait in made.late) == 2, "the clock waits, then all is shown more slowly"
+    assert [frame.number for frame in made.frames[:700]] == list(range(700))
 
 
 def test_a_command_waits_for_one_window_however_long_the_buffer_is() -> None:
@@ -210,3 +220,26 @@ def test_an_error_of_the_planner_reaches_who_takes_frames() -> None:
         player.take(PATIENCE)
     player.stop()
     assert player.ended
+
+
+@pytest.mark.parametrize("asked", [{}, {float(k): Say("a person walks") for k in range(2, 100, 3)}])
+@pytest.mark.parametrize("seconds", [2.2, 3.0, 5.0])
+def test_a_machine_that_is_too_slow_shows_all_more_slowly_and_says_so(
+    asked: dict[float, Command], seconds: float
+) -> None:
+    """Windows of two seconds of motion that take longer: no frame is late, and the player says at what rate it shows
+    them and how late it follows."""
+    made = Simulation(lambda _: seconds, asked).run(300)
+    health = made.player.health
+    assert max(made.late[LONG.used :]) < clock.LATE
+    assert health.rate == pytest.approx(LONG.used / 20 / (clock.SLOWER * seconds))
+    assert f"at {health.rate:.2f} of its speed" in health.problem
+    steps = np.diff(made.times[100:])
+    assert np.abs(steps - 0.05 / health.rate).max() < 0.03, "evenly"
+    assert made.replayed()
+
+
+def test_a_machine_that_keeps_up_shows_motion_as_it_moves() -> None:
+    made = Simulation(lambda _: 0.4, {2.0: Say("a person walks")}).run(200)
+    assert made.player.health.rate == 1.0
+    assert made.player.health.problem == ""

@@ -3,11 +3,12 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from safetensors.torch import save_file
+from safetensors.numpy import save_file
 from torch import Tensor
 
 from motionloom.diffusion import DDPM, guide, inpaint, levels, observe, row_noise, run
@@ -17,8 +18,13 @@ from motionloom.lab.papers.commdm import adds_of, from_published_pair, is_pair
 from motionloom.lab.papers.published_priors import import_block
 from motionloom.nets.pair import PairConfig, PairNet, Talk, fitting, join, other, part
 from motionloom.nets.prior import Bound, NetConfig, condition
+from motionloom.runtime import pair as runtime_pair
+from motionloom.runtime.prior_condition import Bound as arrays_of
+from motionloom.train.export import pair_graph
+from motionloom.train.modules import arrays, pair_session, prior_session
 from motionloom.weights import pair as pair_block
 from motionloom.weights.adapter import fingerprint
+from motionloom.weights.container import graph_tensors
 from motionloom.weights.pair import KEY, PairBlock, blocks
 from tests.lab.papers.test_mdm import table
 from tests.nets import tiny
@@ -45,7 +51,8 @@ def talk_of(prior: NetConfig, *, fresh: bool = False, seed: int = 5, **given) ->
 def net_of(variant: str, **given) -> PairNet:
     prior = tiny.prior(VARIANTS[variant])
     talk = talk_of(VARIANTS[variant], **given)
-    return PairNet(prior.net, talk, prior.schedule, mean=prior.mean, std=prior.std).eval()
+    mean, std = torch.from_numpy(prior.mean), torch.from_numpy(prior.std)
+    return PairNet(tiny.net(VARIANTS[variant]), talk, prior.schedule, mean=mean, std=std).eval()
 
 
 def bound_of(net: PairNet, rows: int, seed: int = 1, lengths: list[int] | None = None) -> Bound:
@@ -105,7 +112,7 @@ def test_a_pair_alone_is_the_pair_in_a_batch_with_padding(variant, aware):
     batch = net(x, 9, bound)
     alone = chosen(bound, torch.tensor([2, 3]))._replace(lengths=torch.tensor([-1, -1]))
     single = net(x[2:, :11], 9, alone)
-    torch.testing.assert_close(batch[2:, :11], single, rtol=0, atol=2e-5)
+    torch.testing.assert_close(batch[2:, :11], single, rtol=0, atol=8e-5)
 
 
 @variants
@@ -144,7 +151,8 @@ def test_an_aware_block_sees_where_the_others_head_and_wrists_are():
     inner = base.through(base.enter(x[:, 1:], 1, bound), bound, slice(2))
     signal, noise = net.schedule.at(1)
     trust = signal * 0.49 / (0.49 * signal**2 + noise**2)
-    partner = net._other_seen(inner, bound, net.talk.config.places.encode(stands) / trust, FRAMES, 1)
+    places, signals = net.talk.config.places.encode(stands) / trust, torch.full((2,), float(signal))
+    partner = net._other_seen(inner, bound, places, signals, None, FRAMES)
     assert partner.shape == (2, 5, 4 * 13)
     partner = partner.reshape(2, 20, 13)
     assert not partner[:, FRAMES:].any()
@@ -194,26 +202,26 @@ def test_a_fresh_block_learns_where_people_stand_and_what_they_do(variant):
 
 @variants
 def test_guidance_and_known_numbers_compose_in_the_one_loop(variant):
-    prior, net = tiny.prior(VARIANTS[variant]), net_of(variant)
-    known = state_of(4, 4)
-    mask = torch.zeros_like(known, dtype=torch.bool)
+    prior, net = tiny.prior(VARIANTS[variant]), pair_session(net_of(variant))
+    known = state_of(4, 4).numpy()
+    mask = np.zeros(known.shape, bool)
     mask[:, :9], mask[0::2] = True, True  # the place and 8 frames; all of the first people
 
-    def sample(rows: Tensor, known: Tensor) -> Tensor:
+    def sample(rows: list[int]) -> np.ndarray:
         cond = prior.condition(["the cat sat"] * 4)
-        bound, null = chosen(net.bind(cond), rows), chosen(net.bind(cond.null()), rows)
-        draw = row_noise([10, 11, 12, 13][: len(rows)] if len(rows) < 4 else [[10, 11, 12, 13][i] for i in rows])
-        hold = observe(known, mask[: len(rows)], prior.schedule, draw)
-        denoise = inpaint(guide(net, bound, null, 2.5), known, mask[: len(rows)])
-        x = hold(draw(known), 50)
+        bound, null = ([part[rows] for part in net.bind(one)] for one in (cond, cond.null()))
+        draw = row_noise([[10, 11, 12, 13][row] for row in rows])
+        given, held = known[rows], mask[rows]
+        hold = observe(given, held, prior.schedule, draw)
+        denoise = inpaint(guide(net, arrays_of(*bound), arrays_of(*null), 2.5), given, held)
         way = levels(prior.schedule, 5)
-        with torch.inference_mode():
-            return run(denoise, x, levels=way, solver=DDPM, schedule=prior.schedule, noise=draw, constrain=hold)
+        x = hold(draw(given), 50)
+        return run(denoise, x, levels=way, solver=DDPM, schedule=prior.schedule, noise=draw, constrain=hold)
 
-    whole = sample(torch.arange(4), known)
-    assert torch.equal(whole[mask], known[mask])
-    assert whole.isfinite().all()
-    torch.testing.assert_close(sample(torch.arange(2), known[:2]), whole[:2], rtol=0, atol=1e-4)
+    whole = sample([0, 1, 2, 3])
+    np.testing.assert_array_equal(whole[mask], known[mask])
+    assert np.isfinite(whole).all()
+    np.testing.assert_array_equal(sample([0, 1]), whole[:2])
 
 
 def test_states_are_put_together_and_taken_apart():
@@ -222,6 +230,10 @@ def test_states_are_put_together_and_taken_apart():
     assert torch.equal(part(state)[0], places)
     assert torch.equal(part(state)[1], motion)
     assert not state[:, 0, 4:].any()
+    plain = runtime_pair.join(places.numpy(), motion.numpy())  # the same without PyTorch
+    np.testing.assert_array_equal(plain, state)
+    np.testing.assert_array_equal(runtime_pair.part(plain)[0], places)
+    np.testing.assert_array_equal(runtime_pair.other(plain), other(state))
     for shape in ((3, 9, 263), (2, 1, 263)):
         net = net_of("published")
         with pytest.raises(MotionloomError, match="even number"):
@@ -258,10 +270,9 @@ def test_other_blocks_that_do_not_fit():
 def block_of(variant: str, **given) -> tuple[PairBlock, object]:
     prior = tiny.prior(VARIANTS[variant])
     talk = talk_of(VARIANTS[variant], **given)
-    made = PairBlock(
-        "dance", talk.config, talk.state_dict(), "tiny", fingerprint(prior.net), "free", "two people", {"n": 1}
-    )
-    return made, prior
+    graph = pair_graph(talk.config, prior.net.config)
+    about = ("tiny", fingerprint(prior.net), "free", "two people", {"n": 1})
+    return PairBlock("dance", talk.config, arrays(talk), *about, graph=graph), prior
 
 
 @variants
@@ -269,12 +280,13 @@ def test_a_block_comes_back_from_its_file(variant, tmp_path):
     made, prior = block_of(variant, aware=True, layers=2)
     back = PairBlock.load(made.save(tmp_path / "a.safetensors", half=False), prior)  # type: ignore[arg-type]
     assert (back.name, back.config, back.licence, back.notes) == ("dance", made.config, "free", {"n": 1})
-    x, net = state_of(2), back.net(prior)  # type: ignore[arg-type]
-    bound = bound_of(net, 2)
-    assert torch.equal(net(x, 5, bound), made.net(prior)(x, 5, bound))  # type: ignore[arg-type]
+    x, net = state_of(2).numpy(), back.net(prior)  # type: ignore[arg-type]
+    bound = net.bind(prior.condition(["a person walks", ""]))  # type: ignore[attr-defined]
+    np.testing.assert_array_equal(net(x, 5, bound), made.net(prior)(x, 5, bound))  # type: ignore[arg-type]
     small = PairBlock.load(made.save(tmp_path / "b.safetensors"), prior)  # type: ignore[arg-type]
-    torch.testing.assert_close(small.net(prior)(x, 5, bound), net(x, 5, bound), rtol=0, atol=0.05)  # type: ignore[arg-type]
-    assert (tmp_path / "b.safetensors").stat().st_size < 0.6 * (tmp_path / "a.safetensors").stat().st_size
+    np.testing.assert_allclose(small.net(prior)(x, 5, bound), net(x, 5, bound), rtol=0, atol=0.05)  # type: ignore[arg-type]
+    sizes = [(tmp_path / name).stat().st_size - len(made.graph) for name in ("a.safetensors", "b.safetensors")]
+    assert sizes[1] < 0.6 * sizes[0]
 
 
 def test_a_block_of_the_default_prior_is_a_few_megabytes():
@@ -297,7 +309,8 @@ def test_hostile_files_are_refused(tmp_path, monkeypatch):
     assert path.is_file()
     about = {"format": 1, "name": "a", "base": "b", "fingerprint": made.fingerprint, "licence": "c", "data": "d"}
     sizes = {"width": 32, "heads": 2, "hidden": 48, "split": 2}
-    good = {k: v.clone() for k, v in made.tensors.items()}
+    good = {k: v.copy() for k, v in made.tensors.items()}
+    graph = graph_tensors({"pair": made.graph})
     first = sorted(good)[0]
     cases = {
         "nothing": (None, good), "list": ([1], good), "newer": (about | {"format": 2, "config": sizes}, good),
@@ -305,10 +318,13 @@ def test_hostile_files_are_refused(tmp_path, monkeypatch):
         "huge": (about | {"config": sizes | {"width": 8192, "heads": 4}}, good),
         "number for text": (about | {"config": sizes, "licence": 3}, good),
         "missing": (about | {"config": sizes}, {k: v for k, v in good.items() if k != first}),
-        "more": (about | {"config": sizes}, good | {"x": torch.zeros(1)}),
-        "shape": (about | {"config": sizes}, good | {first: torch.zeros(1)}),
-        "nan": (about | {"config": sizes}, good | {first: good[first] * float("nan")}),
-        "whole numbers": (about | {"config": sizes}, good | {first: good[first].long()}),
+        "more": (about | {"config": sizes}, good | {"x": np.zeros(1, np.float32)}),
+        "shape": (about | {"config": sizes}, good | {first: np.zeros(1, np.float32)}),
+        "nan": (about | {"config": sizes}, good | {first: good[first] * np.float32(np.nan)}),
+        "whole numbers": (about | {"config": sizes}, good | {first: good[first].astype(np.int64)}),
+        "no graph": (about | {"config": sizes}, good),
+        "another graph": (about | {"config": sizes}, good | graph_tensors({"pair": prior.net.graphs["bind"]})),
+        "bytes": (about | {"config": sizes}, good | graph_tensors({"pair": b"no graph"})),
     }  # fmt: skip
     for number, (said, tensors) in enumerate(cases.values()):
         bad = tmp_path / f"{number}.safetensors"
@@ -316,7 +332,7 @@ def test_hostile_files_are_refused(tmp_path, monkeypatch):
         with pytest.raises(MotionloomError) as caught:
             PairBlock.load(bad, prior)  # type: ignore[arg-type]
         assert str(caught.value).count("\n") == 0
-    save_file(good, tmp_path / "good.safetensors", metadata={KEY: json.dumps(about | {"config": sizes})})
+    save_file(good | graph, tmp_path / "good.safetensors", metadata={KEY: json.dumps(about | {"config": sizes})})
     PairBlock.load(tmp_path / "good.safetensors", prior)  # type: ignore[arg-type]
     (tmp_path / "cut.safetensors").write_bytes(path.read_bytes()[:-5])
     for name in ("cut.safetensors", "no-such-file"):
@@ -367,10 +383,10 @@ def test_a_published_checkpoint_comes_apart_where_its_block_sits(tmp_path):
     torch.save(state, tmp_path / "model000100000.pt")
     (tmp_path / "args.json").write_text(json.dumps({"multi_func": "in_both_out_cond"}))
     whole = tiny.prior()
-    made = import_block(tmp_path / "model000100000.pt", replace(whole, net=prior), base="pw3d")
+    made = import_block(tmp_path / "model000100000.pt", replace(whole, net=prior_session(prior)), base="pw3d")
     assert made.config.adds == "condition"
     assert made.name == "model000100000"
-    assert torch.equal(made.tensors["place.weight"], state["multi_person.canon_out.weight"])
+    np.testing.assert_array_equal(made.tensors["place.weight"], state["multi_person.canon_out.weight"])
     with pytest.raises(MotionloomError, match="same file"):
         import_block(tmp_path / "model000100000.pt", whole, base="tiny")
 

@@ -5,13 +5,14 @@ import torch
 from torch import Tensor
 
 from motionloom.errors import MotionloomError
-from motionloom.nets.predictor import NetConfig, TransLinear, waves
+from motionloom.nets.predictor import TransLinear, waves
+from motionloom.runtime.predictor import PredictorConfig
 
-SMALL = NetConfig(channels=6, kept=5, layers=4, width=32, heads=2)
-BESIDE = NetConfig(channels=6, kept=5, layers=4, width=32, heads=2, condition=(6, 8), beside=True)
+SMALL = PredictorConfig(channels=6, kept=5, layers=4, width=32, heads=2)
+BESIDE = PredictorConfig(channels=6, kept=5, layers=4, width=32, heads=2, condition=(6, 8), beside=True)
 
 
-def awake(config: NetConfig, seed: int = 0) -> TransLinear:
+def awake(config: PredictorConfig, seed: int = 0) -> TransLinear:
     """A network whose every weight matters: none is left at zero."""
     with torch.random.fork_rng():
         torch.manual_seed(seed)
@@ -22,7 +23,7 @@ def awake(config: NetConfig, seed: int = 0) -> TransLinear:
     return net.eval().requires_grad_(False)
 
 
-def given(config: NetConfig, rows: int = 3) -> tuple[Tensor, Tensor, Tensor]:
+def given(config: PredictorConfig, rows: int = 3) -> tuple[Tensor, Tensor, Tensor]:
     generator = torch.Generator().manual_seed(5)
     x = torch.randn(rows, config.kept, config.channels, generator=generator)
     return x, torch.arange(1, rows + 1) * 100, torch.randn(rows, *config.condition_shape, generator=generator)
@@ -30,10 +31,10 @@ def given(config: NetConfig, rows: int = 3) -> tuple[Tensor, Tensor, Tensor]:
 
 @pytest.mark.parametrize(
     ("config", "parameters", "tensors"),
-    [(NetConfig(), 28_401_712, 179), (NetConfig(channels=42, kept=10, layers=4), 14_451_754, 95)],
+    [(PredictorConfig(), 28_401_712, 179), (PredictorConfig(channels=42, kept=10, layers=4), 14_451_754, 95)],
     ids=["human3.6m", "humaneva"],
 )
-def test_published_sizes(config: NetConfig, parameters: int, tensors: int) -> None:
+def test_published_sizes(config: PredictorConfig, parameters: int, tensors: int) -> None:
     with torch.device("meta"):
         net = TransLinear(config)
     assert sum(p.numel() for p in net.parameters()) == parameters
@@ -41,7 +42,7 @@ def test_published_sizes(config: NetConfig, parameters: int, tensors: int) -> No
 
 
 @pytest.mark.parametrize("config", [SMALL, BESIDE], ids=["published", "beside"])
-def test_a_new_network_says_nothing_so_its_first_loss_is_one(config: NetConfig) -> None:
+def test_a_new_network_says_nothing_so_its_first_loss_is_one(config: PredictorConfig) -> None:
     """E[eps^2] = 1 for noise eps."""
     net = TransLinear(config).eval()
     x, t, told = given(config)
@@ -61,11 +62,11 @@ def test_every_block_is_the_identity_at_the_start() -> None:
 @pytest.mark.parametrize("layers", [1, 3, 7])
 def test_odd_layers_are_refused_in_words(layers: int) -> None:
     with pytest.raises(MotionloomError, match="even"):
-        NetConfig(layers=layers)
+        PredictorConfig(layers=layers)
 
 
 @pytest.mark.parametrize("config", [SMALL, BESIDE], ids=["published", "beside"])
-def test_rows_do_not_see_each_other(config: NetConfig) -> None:
+def test_rows_do_not_see_each_other(config: PredictorConfig) -> None:
     net, (x, t, told) = awake(config), given(config)
     together = net(x, t, told)
     alone = torch.cat([net(x[i : i + 1], t[i : i + 1], told[i : i + 1]) for i in range(3)])
@@ -74,7 +75,7 @@ def test_rows_do_not_see_each_other(config: NetConfig) -> None:
 
 
 @pytest.mark.parametrize("config", [SMALL, BESIDE], ids=["published", "beside"])
-def test_rows_that_are_not_told_are_as_with_nothing_to_tell(config: NetConfig) -> None:
+def test_rows_that_are_not_told_are_as_with_nothing_to_tell(config: PredictorConfig) -> None:
     net, (x, t, told) = awake(config), given(config)
     mixed = net(x, t, told, torch.tensor([True, False, True]))
     torch.testing.assert_close(mixed[1], net(x, t)[1])
@@ -163,10 +164,10 @@ def test_beside_every_token_sees_its_own_row() -> None:
 )  # fmt: skip
 def test_sizes_that_cannot_be_are_refused(values: dict) -> None:
     with pytest.raises(MotionloomError):
-        NetConfig.parse(values)
+        PredictorConfig.parse(values)
 
 
 @pytest.mark.parametrize("values", [[1], "ab", 3, None], ids=str)
 def test_settings_that_are_no_settings_are_refused(values: object) -> None:
     with pytest.raises(MotionloomError):
-        NetConfig.parse(values)  # pyright: ignore[reportArgumentType]
+        PredictorConfig.parse(values)  # pyright: ignore[reportArgumentType]

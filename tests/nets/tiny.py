@@ -6,8 +6,8 @@ import torch
 
 from motionloom.diffusion import cosine
 from motionloom.nets.prior import NetConfig, PriorNet
-from motionloom.nets.text import MiniLM
-from motionloom.nets.text.minilm import pack
+from motionloom.runtime.text.minilm import MiniLM, pack
+from motionloom.train.modules import prior_session, text_encoder
 from motionloom.weights.prior import Card, Prior
 from tests.nets.text import tiny
 
@@ -20,7 +20,8 @@ PUBLISHED = NetConfig(width=32, layers=2, heads=4, hidden=48, text=tiny.WIDTH, d
 
 def text() -> MiniLM:
     """A MiniLM with random weights and the vocabulary of `tests.nets.text.tiny`."""
-    return MiniLM.from_tensors(pack(tiny.weights(), tiny.VOCABULARY))
+    weights = {name: value.numpy() for name, value in tiny.weights().items()}
+    return text_encoder(pack(weights, tiny.VOCABULARY))
 
 
 def net(config: NetConfig = MODULATED, seed: int = 0) -> PriorNet:
@@ -42,4 +43,4 @@ def prior(config: NetConfig = MODULATED, *, seed: int = 0, levels: int = 50) -> 
     mean = torch.randn(config.features, generator=generator) * 0.1
     std = torch.rand(config.features, generator=generator) * 0.1 + 0.01
     card = Card("tiny", "do what you like", "random numbers", {"steps": 3})
-    return Prior(net(config, seed), cosine(levels), mean, std, text(), card)
+    return Prior(prior_session(net(config, seed)), cosine(levels), mean.numpy(), std.numpy(), text(), card)

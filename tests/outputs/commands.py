@@ -6,12 +6,10 @@ The commands are typed as a user types them, so that no move or new name inside 
 import contextlib
 import io
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from motionloom import Motion, load, save
 from motionloom.cli import main
@@ -128,17 +126,6 @@ def write_inputs(folder: Path) -> None:
     save(Motion(bones, clip.fps, clip.root * 1.3, clip.rotations).resample(30), folder / "larger.bvh")
 
 
-@contextlib.contextmanager
-def one_thread() -> Iterator[None]:
-    """Torch on one thread, so that sums are taken in one order."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-
-
 def places(name: str, folder: Path) -> np.ndarray:
     """All joint positions that a command makes, (frames, joints, 3) metres, its files one behind the other."""
     write_inputs(folder)
@@ -149,7 +136,7 @@ def places(name: str, folder: Path) -> np.ndarray:
     for file in files:
         words += ["--out", str(made / file)]
     said = io.StringIO()
-    with one_thread(), contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
         code = main(words)
     if code:
         raise RuntimeError(f"{' '.join(words)} ended with {code}: {said.getvalue()}")

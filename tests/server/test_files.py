@@ -9,9 +9,12 @@ import pytest
 from motionloom import load
 from motionloom.io import load_scene, save
 from motionloom.io.character import load_character
+from motionloom.io.gltf import load_glb
 from motionloom.motion import Motion
 from motionloom.retarget.named import named_skeleton
 from motionloom.skeleton import SMPL22
+from tests.io.rigged import Hero
+from tests.io.test_bind_pose import place
 from tests.server.serving import Server, decoded
 
 
@@ -94,6 +97,14 @@ def test_a_character_is_given_back_and_moves(server: Server, walk: str, tmp_path
     moving = fetched(server, f"/motions/{walk}.glb?skeleton={sent['id']}", tmp_path / "moving.glb")
     assert load_character(moving).skeleton.names == load_character(rig).skeleton.names
     assert "a person walks" in load_character(moving).file.clips
+
+
+def test_a_character_moves_where_it_stands(server: Server, walk: str, tmp_path: Path) -> None:
+    rig = place(Hero()).write(tmp_path / "hero.glb")
+    _, sent = server.json("POST", "/characters?name=hero.glb", rig.read_bytes())
+    moving = load_glb(fetched(server, f"/motions/{walk}.glb?skeleton={sent['id']}", tmp_path / "moving.glb"))
+    pelvis = moving.positions()[0, moving.skeleton.index("pelvis")]
+    np.testing.assert_allclose(pelvis[[0, 2]], [3.0, 1.0], atol=0.01)
 
 
 @pytest.mark.parametrize(

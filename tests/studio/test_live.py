@@ -69,7 +69,7 @@ def test_the_stick_of_a_gamepad_steers(studio: Studio):
     done(studio, "walk")
     shown(studio, 3.0)
     page.evaluate("PAD.axes = [0.8, 0]")
-    shown(studio, 4.0)
+    shown(studio, 6.0)  # a busy machine follows some seconds later
     page.evaluate("PAD.axes = [0, 0]")
     studio.key("r")
     studio.until("document.querySelector('#inspector .take small')?.textContent === 'live'")

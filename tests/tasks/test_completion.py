@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 from scipy.interpolate import BPoly
-from torch import Tensor
 
-from motionloom.diffusion import row_seed
+from motionloom.diffusion import row_noise, row_seed
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import SMPL_LAYOUT, bone_lengths
 from motionloom.tasks.completion import Known, complete, futures, joined, next_frames
+from tests.noise import normal
 from tests.tasks.small_predictor import FRAMES, OBSERVED, small_predictor
 from tests.tasks.test_edit import person
 
@@ -19,8 +18,8 @@ PREDICTOR = small_predictor()
 PAST = np.stack([person(3.0, 30.0).positions()[at : at + OBSERVED] for at in (0, 40)])
 
 
-def some(*shape: int, seed: int = 0) -> Tensor:
-    return torch.randn(shape, generator=torch.Generator().manual_seed(seed), dtype=torch.float64)
+def some(*shape: int, seed: int = 0) -> np.ndarray:
+    return normal(shape, seed)
 
 
 # Led from what is known
@@ -30,11 +29,11 @@ def some(*shape: int, seed: int = 0) -> Tensor:
 def test_a_course_leaves_known_frames_in_value_and_slope_and_comes_to_its_own(known: tuple[int, int]) -> None:
     """A known line beside a made line goes on as the quintic of scipy through their difference."""
     first, last = known
-    t = torch.arange(30.0, dtype=torch.float64)[None, :, None]
-    made, given = (2 + 0.5 * t).expand(1, 30, 3), (1 - 0.25 * t).expand(1, 30, 3)
-    mask = torch.zeros(1, 30, 1, dtype=torch.float64)
+    t = np.arange(30.0, dtype=np.float64)[None, :, None]
+    made, given = np.broadcast_to(2 + 0.5 * t, (1, 30, 3)), np.broadcast_to(1 - 0.25 * t, (1, 30, 3))
+    mask = np.zeros((1, 30, 1), dtype=np.float64)
     mask[:, first:last] = 1
-    result = joined(made, torch.where(mask > 0, given, 99.0), mask, ease=6)[0, :, 0].numpy()
+    result = joined(made, np.where(mask > 0, given, 99.0), mask, ease=6)[0, :, 0]
     expected = np.where(mask[0, :, 0] > 0, given[0, :, 0], made[0, :, 0])
     for border, step, room in ((last - 1, 1, min(6, 30 - last)), (first, -1, min(6, first))):
         slope = -0.75 * step if last - first > 1 else 0.0
@@ -48,37 +47,37 @@ def test_a_course_leaves_known_frames_in_value_and_slope_and_comes_to_its_own(kn
 def test_between_two_known_stretches_there_is_no_jump_at_either_border(free: int) -> None:
     """Second differences stay as small as the difference of both courses spread over the gap asks."""
     frames = 20 + free
-    made, given = torch.zeros(1, frames, 3), torch.full((1, frames, 3), 1.0)
-    mask = torch.ones(1, frames, 1)
+    made, given = np.zeros((1, frames, 3), np.float32), np.full((1, frames, 3), 1.0)
+    mask = np.ones((1, frames, 1), np.float32)
     mask[:, 10 : 10 + free] = 0
-    result = joined(made, given, mask, ease=12)[0, :, 0].numpy()
+    result = joined(made, given, mask, ease=12)[0, :, 0]
     assert (np.delete(result, slice(10, 10 + free)) == 1).all()
     assert abs(np.diff(result)).max() < 1.9 / (min(free, 12) + 1) + 1e-6
     np.testing.assert_allclose(result, result[::-1], atol=1e-6)
 
 
 def test_known_numbers_come_back_exactly_and_soft_masks_mix() -> None:
-    made, known, mask = some(4, 30, 12), some(4, 30, 12, seed=1), torch.zeros(4, 30, 4, dtype=torch.float64)
+    made, known, mask = some(4, 30, 12), some(4, 30, 12, seed=1), np.zeros((4, 30, 4), dtype=np.float64)
     mask[:2, :6], mask[2, 3:9, 1], mask[3, 5:, 2], mask[3, 20, 0] = 1, 1, 0.25, 1
     result = joined(made, known, mask, ease=4)
-    each = mask.repeat_interleave(3, dim=-1)
-    assert torch.equal(result[each == 1], known[each == 1])
-    torch.testing.assert_close(result[3, 5:, 6:9], 0.75 * made[3, 5:, 6:9] + 0.25 * known[3, 5:, 6:9])
-    alone = torch.cat([joined(*(x[i : i + 1] for x in (made, known, mask)), ease=4) for i in range(4)])
-    assert torch.equal(result, alone)
+    each = np.repeat(mask, 3, axis=-1)
+    assert np.array_equal(result[each == 1], known[each == 1])
+    np.testing.assert_allclose(result[3, 5:, 6:9], 0.75 * made[3, 5:, 6:9] + 0.25 * known[3, 5:, 6:9], atol=1e-5)
+    alone = np.concatenate([joined(*(x[i : i + 1] for x in (made, known, mask)), ease=4) for i in range(4)])
+    assert np.array_equal(result, alone)
 
 
 def test_nothing_known_and_all_known_change_nothing() -> None:
     made, known = some(2, 9, 6), some(2, 9, 6, seed=1)
-    assert torch.equal(joined(made, known, torch.zeros(2, 9, 2), ease=3), made)
-    assert torch.equal(joined(made, known, torch.ones(2, 9, 2), ease=3), known)
+    assert np.array_equal(joined(made, known, np.zeros((2, 9, 2), np.float32), ease=3), made)
+    assert np.array_equal(joined(made, known, np.ones((2, 9, 2), np.float32), ease=3), known)
 
 
 # Completing
 
 
-def told() -> tuple[Tensor, Tensor, Tensor]:
-    features, mask = some(3, FRAMES, 66).float(), torch.zeros(3, FRAMES, 22)
+def told() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    features, mask = some(3, FRAMES, 66).astype(np.float32), np.zeros((3, FRAMES, 22), np.float32)
     mask[:, :OBSERVED], mask[1, 20:30, 16:21], mask[2, -4:, 1:] = 1, 1, 1
     return features, mask, features[:, OBSERVED - 1]
 
@@ -87,31 +86,29 @@ def test_a_row_is_the_same_alone_and_among_others() -> None:
     features, mask, pose = told()
     together = complete(PREDICTOR, features, mask, pose, seeds=[5, 6, 7])
     alone = complete(PREDICTOR, features[1:2], mask[1:2], pose[1:2], seeds=[6])
-    torch.testing.assert_close(together[1:2], alone, atol=1e-4, rtol=1e-4)
-    each = mask.repeat_interleave(3, dim=-1)
-    assert torch.equal(together[each == 1], features[each == 1])
-    assert not torch.allclose(complete(PREDICTOR, features, mask, pose, seeds=[5, 8, 7])[1], together[1], atol=1e-3)
+    np.testing.assert_allclose(together[1:2], alone, atol=1e-4, rtol=1e-4)
+    each = np.repeat(mask, 3, axis=-1)
+    assert np.array_equal(together[each == 1], features[each == 1])
+    assert not np.allclose(complete(PREDICTOR, features, mask, pose, seeds=[5, 8, 7])[1], together[1], atol=1e-3)
 
 
 def test_guidance_one_is_the_told_pass_zero_the_untold_and_two_goes_beyond() -> None:
     """With one step the answer is the network's guess from noise of the temperature, linear in the guidance."""
     features, mask, pose = told()
 
-    def made(guidance: float, temperature: float = 1.0) -> Tensor:
+    def made(guidance: float, temperature: float = 1.0) -> np.ndarray:
         asked = {"steps": 1, "guidance": guidance, "temperature": temperature}
         return complete(PREDICTOR, features, mask, pose, seeds=[1, 2, 3], **asked)
 
     rows = PREDICTOR.condition(features, mask, pose)
-    noise = torch.stack([torch.randn(16, 66, generator=torch.Generator().manual_seed(s)) for s in (1, 2, 3)])
+    noise = row_noise([1, 2, 3])(np.empty((3, 16, 66), np.float32))
     for guidance, scale in ((1.0, 1.0), (0.0, 1.0), (1.0, 0.5), (1.0, 0.0)):
-        with torch.inference_mode():
-            told_or_not = torch.full((3,), bool(guidance))
-            guess = PREDICTOR.denoiser(rows, told_or_not)(scale * noise, PREDICTOR.schedule.steps)
-            plain = joined(PREDICTOR.to_features(guess, pose), features, mask, ease=12)
-        torch.testing.assert_close(made(guidance, scale), plain, atol=1e-4, rtol=1e-4)
-    assert (made(1.0) - made(1.0, 0.5)).abs().max() > 0.01
-    assert (made(1.0) - made(0.0)).abs().max() > 0.01
-    torch.testing.assert_close(made(2.0), 2 * made(1.0) - made(0.0), atol=1e-3, rtol=1e-3)
+        guess = PREDICTOR.denoiser(rows, np.full(3, bool(guidance)))(scale * noise, PREDICTOR.schedule.steps)
+        plain = joined(PREDICTOR.to_features(guess, pose), features, mask, ease=12)
+        np.testing.assert_allclose(made(guidance, scale), plain, atol=1e-4, rtol=1e-4)
+    assert np.abs(made(1.0) - made(1.0, 0.5)).max() > 0.01
+    assert np.abs(made(1.0) - made(0.0)).max() > 0.01
+    np.testing.assert_allclose(made(2.0), 2 * made(1.0) - made(0.0), atol=1e-3, rtol=1e-3)
 
 
 # Futures

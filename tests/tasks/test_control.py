@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from motionloom.errors import MotionloomError
 from motionloom.goals.goal import Goal
@@ -13,7 +12,9 @@ from motionloom.ground import GroundPose
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.control import control, controlled_numbers, fitting_adapters, judged
 from motionloom.tasks.text import generate
-from motionloom.weights.adapter import Adapter, fingerprint, linears
+from motionloom.train.low_rank import linears
+from motionloom.train.modules import prior_module
+from motionloom.weights.adapter import Adapter, fingerprint
 from motionloom.weights.prior import Prior
 from tests.nets import tiny
 
@@ -23,10 +24,10 @@ WRIST = SMPL22.index("right_wrist")
 @pytest.fixture(scope="module")
 def prior() -> Prior:
     """A random network around a person of rest pose."""
-    mean, std = torch.zeros(263), torch.full((263,), 0.02)
-    places = torch.from_numpy(SMPL22.rest_positions()).float()
+    mean, std = np.zeros((263,), np.float32), np.full(263, 0.02, np.float32)
+    places = np.asarray(SMPL22.rest_positions()).astype(np.float32)
     mean[3], mean[4:67] = places[0, 1], places[1:].reshape(-1)
-    mean[2], std[:3] = 0.03, torch.tensor([0.002, 0.002, 0.005])
+    mean[2], std[:3] = 0.03, np.array([0.002, 0.002, 0.005])
     return replace(tiny.prior(), mean=mean, std=std)
 
 
@@ -91,8 +92,8 @@ def test_the_numbers_that_a_goal_is_about() -> None:
     goal = path()
     goal.asked[3, WRIST] = True
     mask = controlled_numbers(goal)
-    assert mask[5].nonzero().ravel().tolist() == [0, 1, 2]
-    assert mask[3].nonzero().ravel().tolist() == [0, 1, 2, 64, 65, 66]
+    assert np.flatnonzero(mask[5]).tolist() == [0, 1, 2]
+    assert np.flatnonzero(mask[3]).tolist() == [0, 1, 2, 64, 65, 66]
 
 
 def test_adapters_see_the_last_steered_estimate_and_none_that_change_nothing_change_little(prior: Prior) -> None:
@@ -108,9 +109,9 @@ def test_adapters_see_the_last_steered_estimate_and_none_that_change_nothing_cha
 
 def adapter(prior: Prior) -> Adapter:
     """Of rank 1 and zeros."""
-    layers = linears(prior.net)
-    tensors = {f"{name}.down": torch.zeros(1, layer.in_features) for name, layer in layers.items()}
-    tensors |= {f"{name}.up": torch.zeros(layer.out_features, 1) for name, layer in layers.items()}
+    layers = linears(prior_module(prior))
+    tensors = {f"{name}.down": np.zeros((1, layer.in_features), np.float32) for name, layer in layers.items()}
+    tensors |= {f"{name}.up": np.zeros((layer.out_features, 1), np.float32) for name, layer in layers.items()}
     return Adapter("blank", "any", 1, tensors, "tiny", fingerprint(prior.net))
 
 

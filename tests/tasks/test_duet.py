@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
@@ -12,9 +11,9 @@ from motionloom.goals.goal import Goal
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.physics import heading
 from motionloom.motion import Motion
-from motionloom.nets.pair import PairNet, join
-from motionloom.nets.prior import Bound
 from motionloom.retarget import to_smpl22
+from motionloom.runtime.pair import PairSession, join
+from motionloom.runtime.prior_condition import Bound
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import duet as tasks
 from motionloom.tasks.duet import compose_pair, duet_features, react
@@ -22,6 +21,7 @@ from motionloom.tasks.splice import concatenated, person_at_20
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from tests.nets import tiny
+from tests.noise import normal
 from tests.tasks.two_people import block as block_of
 from tests.tasks.two_people import walkers
 
@@ -62,7 +62,7 @@ def test_whoever_is_given_stays_and_the_other_stands_where_he_was_drawn(
         uniform = np.stack([person_at_20(motion) for motion in (given, partner)])
         encoded = two.encode(uniform)
         elsewhere = two.compose(np.array([0.0, 1.0, 7.0, -3.0]), encoded.poses)
-        return torch.from_numpy(encoded.features)[None], torch.from_numpy(elsewhere)[None]
+        return np.asarray(encoded.features)[None], np.asarray(elsewhere)[None]
 
     monkeypatch.setattr(tasks, "pair_features", true)
     [(first, second)] = react(prior, block, given, "two people walk", foot_lock=False)
@@ -108,19 +108,21 @@ def test_rows_denoised_together_or_alone_make_the_same(prior: Prior, block: Pair
     both = [tasks._asked(longer, i, None, 0) for i in (0, 1)]
     one, several = (list(duet_features(prior, net, both, steps=3, batch_size=n)) for n in (1, 8))
     for (a, stands), (b, others) in zip(one, several, strict=True):
-        torch.testing.assert_close(a, b, rtol=0, atol=1e-4)
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-4)
         np.testing.assert_allclose(stands, others, atol=1e-3)
     assert [piece.shape for piece, _ in one] == [(2, n, 263) for n in (70, 66, 68)]
     again = one[1][0][:, 1:3] - one[0][0][:, -3:-1]  # the second row begins with what the first one ends with
-    assert again.abs().max() > 1e-3
+    assert np.abs(again).max() > 1e-3
 
 
 def test_only_who_listens_hears_the_prompt_of_the_other(prior: Prior, block: PairBlock) -> None:
     changed = [SEGMENTS[0], replace(SEGMENTS[1], text="a person turns :: a person walks left"), SEGMENTS[2]]
     for one, deaf in ((block, False), (block_of(prior, fresh=True), True)):
         rows = [[tasks._asked(some, i, None, 0) for i in (0, 1)] for some in (SEGMENTS, changed)]
-        first, second = (torch.cat([p[0] for p, _ in duet_features(prior, one.net(prior), r, steps=3)]) for r in rows)
-        assert torch.allclose(first, second, atol=1e-5) == deaf
+        first, second = (
+            np.concatenate([p[0] for p, _ in duet_features(prior, one.net(prior), r, steps=3)]) for r in rows
+        )
+        assert np.allclose(first, second, atol=1e-5) == deaf
 
 
 def test_each_row_is_shown_and_moved_from_where_the_two_are_when_it_begins(
@@ -128,33 +130,33 @@ def test_each_row_is_shown_and_moved_from_where_the_two_are_when_it_begins(
 ) -> None:
     """A network that always guesses the same: D of a later row, as shown without its noise, is what bodies made of
     the finished motion stand like at the first frame of that row; each is led with noise and words of its own."""
-    shown: dict[int, list[tuple[torch.Tensor, int]]] = {}
-    begins: dict[int, torch.Tensor] = {}
+    shown: dict[int, list[tuple[np.ndarray, int]]] = {}
+    begins: dict[int, np.ndarray] = {}
     leads: list[dict] = []
-    stands = torch.tensor([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
+    stands = np.array([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
     places = block.config.places.encode(stands)
-    features = torch.zeros(263)
-    features[:4] = torch.tensor([0.03, 0.01, 0.02, 0.9])  # everybody walks a circle, the second another one
-    other = features * torch.tensor([-0.5] + [1.0] * 262)
-    clean = (torch.stack([features, other]) - prior.mean) / prior.std
+    features = np.zeros((263,), np.float32)
+    features[:4] = np.array([0.03, 0.01, 0.02, 0.9])  # everybody walks a circle, the second another one
+    other = features * np.array([-0.5] + [1.0] * 262)
+    clean = (np.stack([features, other]) - prior.mean) / prior.std
 
-    def constant(net: PairNet, x: torch.Tensor, level, bound) -> torch.Tensor:
+    def constant(net: PairSession, x: np.ndarray, level, bound) -> np.ndarray:
         half = len(x) // 2  # with text, then without
         for row in range(half // 2):
             length = int(bound.lengths[2 * row])
-            shown.setdefault(length, []).append((x[2 * row : 2 * row + 2, 0, :4].clone(), int(level[2 * row])))
-        motion = clean.repeat(len(x) // 2, 1)[:, None].expand(-1, x.shape[1] - 1, -1)
-        return join(places.repeat(len(x) // 2, 1), motion)
+            shown.setdefault(length, []).append((x[2 * row : 2 * row + 2, 0, :4].copy(), int(level[2 * row])))
+        motion = np.repeat(np.tile(clean, (len(x) // 2, 1))[:, None], x.shape[1] - 1, axis=1)
+        return join(np.tile(places, (len(x) // 2, 1)), motion)
 
-    def led(_: object, row: tasks._PairRow, level: int, motion: torch.Tensor, begin: torch.Tensor, *, state):
+    def led(_: object, row: tasks._PairRow, level: int, motion: np.ndarray, begin: np.ndarray, *, state):
         begins[row.length] = begin
         return motion
 
-    def guidance(prior: Prior, net: PairNet, bound: Bound, **how) -> object:
+    def guidance(prior: Prior, net: PairSession, bound: Bound, **how) -> object:
         leads.append(how | {"text": bound.text})
         return None
 
-    monkeypatch.setattr(PairNet, "forward", constant)
+    monkeypatch.setattr(PairSession, "__call__", constant)
     monkeypatch.setattr(tasks._PairDenoiser, "_moved", led)
     monkeypatch.setattr(tasks, "relative_pose_guidance", guidance)
     segments = [
@@ -165,8 +167,8 @@ def test_each_row_is_shown_and_moved_from_where_the_two_are_when_it_begins(
     both = [tasks._asked(segments, i, None, 0) for i in (0, 1)]
     both[1][0] = replace(both[1][0], goal=Goal.nothing(20))  # which asks for nothing
     pieces = list(duet_features(prior, block.net(prior), both, steps=4, pair_guidance=0.7))
-    motion = torch.cat([piece for piece, _ in pieces], dim=1).double().numpy()
-    there = two.decode(motion, stands.double().numpy())[:, :, 0]
+    motion = np.concatenate([piece for piece, _ in pieces], axis=1).astype(np.float64)
+    there = two.decode(motion, stands.astype(np.float64))[:, :, 0]
     for length, frame in ((4 + 16 + 6, 20 - 4), (6 + 22, 36 - 6)):  # by half of the transition earlier
         calls = shown[length]
         noise = calls[0][0]
@@ -190,7 +192,7 @@ def test_each_row_is_shown_and_moved_from_where_the_two_are_when_it_begins(
     for how, said in zip(leads, ("a person walks", "a person turns", "a person walks"), strict=True):
         net = block.net(prior)
         words = [said, "a person jumps" if said == "a person turns" else said]
-        torch.testing.assert_close(how["text"], net.bind(prior.condition(words)).text)
+        np.testing.assert_allclose(how["text"], net.bind(prior.condition(words)).text, atol=1e-5)
 
 
 @pytest.mark.parametrize("asked", [None, 0, 1])
@@ -199,16 +201,16 @@ def test_a_block_that_wants_them_beside_each_other_keeps_them_there_for_long(
 ) -> None:
     """A network that always draws two people who walk apart by 0.3 m/s, and always says they stand 1 and 2 m apart;
     who has a goal of his own is not moved for that."""
-    beside = torch.tensor([[1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 1.0, 2.0]])
-    places, features = block.config.places.encode(beside), torch.zeros(2, 263)
+    beside = np.array([[1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 1.0, 2.0]])
+    places, features = block.config.places.encode(beside), np.zeros((2, 263), np.float32)
     features[1, 2], features[:, 3] = 0.015, 0.9
-    clean = (features - prior.mean) / torch.where(prior.std > 0, prior.std, 1.0)
+    clean = (features - prior.mean) / np.where(prior.std > 0, prior.std, np.float32(1))
 
-    def constant(net: PairNet, x: torch.Tensor, level, bound) -> torch.Tensor:
-        motion = clean.repeat(len(x) // 2, 1)[:, None].expand(-1, x.shape[1] - 1, -1)
-        return join(places.repeat(len(x) // 2, 1), motion)
+    def constant(net: PairSession, x: np.ndarray, level, bound) -> np.ndarray:
+        motion = np.repeat(np.tile(clean, (len(x) // 2, 1))[:, None], x.shape[1] - 1, axis=1)
+        return join(np.tile(places, (len(x) // 2, 1)), motion)
 
-    monkeypatch.setattr(PairNet, "forward", constant)
+    monkeypatch.setattr(PairSession, "__call__", constant)
     segments = [Segment("a person walks", 4.0, transition=1.0)] * 3
     both = [tasks._asked(segments, i, None, 0) for i in (0, 1)]
     if asked is not None:
@@ -217,7 +219,7 @@ def test_a_block_that_wants_them_beside_each_other_keeps_them_there_for_long(
         both[asked] = [replace(segment, goal=goal) for segment in both[asked]]
     for together, far in ((0.0, (3.0, 4.0)), (1.0, (0.0, 0.8))):
         drawn = list(duet_features(prior, block.net(prior), both, steps=4, pair_guidance=together))
-        made = torch.cat([piece for piece, _ in drawn], dim=1).double().numpy()
+        made = np.concatenate([piece for piece, _ in drawn], axis=1).astype(np.float64)
         roots = two.decode(made, drawn[0][1])[:, :, 0]
         off = np.linalg.norm((roots[1] - roots[0])[:, [0, 2]] - [1.0, 2.0], axis=-1)
         assert far[0] <= off.max() < far[1]
@@ -230,18 +232,18 @@ def test_a_block_that_wants_them_beside_each_other_keeps_them_there_for_long(
 def test_a_row_is_led_from_where_it_begins_and_shows_the_noised_state(prior: Prior, block: PairBlock) -> None:
     net, asked = block.net(prior), {}
 
-    def lead(state: torch.Tensor, clean: torch.Tensor, level: int) -> torch.Tensor:
+    def lead(state: np.ndarray, clean: np.ndarray, level: int) -> np.ndarray:
         asked.update(state=state, clean=clean, level=level)
         return clean + 1
 
     row = tasks._PairRow((), net, lead, None)
     denoiser = tasks._PairDenoiser(prior, net, [50, 1], 1.0)
-    state, motion = torch.randn(2, 2, 30, 263, generator=torch.Generator().manual_seed(0))
-    begin = torch.tensor([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
-    assert torch.equal(denoiser._moved(row, 50, motion, begin, state=state), motion + 1)
+    state, motion = normal((2, 2, 30, 263), 0)
+    begin = np.array([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
+    assert np.array_equal(denoiser._moved(row, 50, motion, begin, state=state), motion + 1)
     assert asked["level"] == 50
-    assert torch.equal(asked["state"], join(block.config.places.encode(begin), state))
-    assert torch.equal(asked["clean"], join(block.config.places.encode(begin), motion))
+    assert np.array_equal(asked["state"], join(block.config.places.encode(begin), state))
+    assert np.array_equal(asked["clean"], join(block.config.places.encode(begin), motion))
 
 
 def test_a_path_for_one_of_them_holds_through_all_segments(
@@ -249,14 +251,14 @@ def test_a_path_for_one_of_them_holds_through_all_segments(
 ) -> None:
     """A network that always draws two real people, who look where their features say that they do."""
     encoded = two.encode(np.stack([person_at_20(motion) for motion in walkers(1.2, larger=1.0)]))
-    clean = (torch.from_numpy(encoded.features[:, 8]).float() - prior.mean) / prior.std
-    places = block.config.places.encode(torch.from_numpy(encoded.poses).float())
+    clean = (np.asarray(encoded.features[:, 8]).astype(np.float32) - prior.mean) / prior.std
+    places = block.config.places.encode(np.asarray(encoded.poses).astype(np.float32))
 
-    def constant(net: PairNet, x: torch.Tensor, level, bound) -> torch.Tensor:
-        motion = clean.repeat(len(x) // 2, 1)[:, None].expand(-1, x.shape[1] - 1, -1)
-        return join(places.repeat(len(x) // 2, 1), motion)
+    def constant(net: PairSession, x: np.ndarray, level, bound) -> np.ndarray:
+        motion = np.repeat(np.tile(clean, (len(x) // 2, 1))[:, None], x.shape[1] - 1, axis=1)
+        return join(np.tile(places, (len(x) // 2, 1)), motion)
 
-    monkeypatch.setattr(PairNet, "forward", constant)
+    monkeypatch.setattr(PairSession, "__call__", constant)
     path = Goal.nothing(54)
     path.positions[:, 0, 0] = np.linspace(2.0, 5.0, 54)
     path.asked[:, 0] = [True, False, True]
@@ -270,21 +272,21 @@ def test_guesses_go_where_their_person_is_asked_to_be(
     prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A network that always draws people who stand; the second is asked to be 0.3 m to his left after two seconds."""
-    features = torch.zeros(2, 263)
+    features = np.zeros((2, 263), np.float32)
     features[:, 3] = 0.9
-    clean = (features - prior.mean) / torch.where(prior.std > 0, prior.std, 1.0)
+    clean = (features - prior.mean) / np.where(prior.std > 0, prior.std, np.float32(1))
 
-    def constant(net: PairNet, x: torch.Tensor, level, bound) -> torch.Tensor:
-        motion = clean.repeat(len(x) // 2, 1)[:, None].expand(-1, x.shape[1] - 1, -1)
+    def constant(net: PairSession, x: np.ndarray, level, bound) -> np.ndarray:
+        motion = np.repeat(np.tile(clean, (len(x) // 2, 1))[:, None], x.shape[1] - 1, axis=1)
         return join(x[:, 0, :4], motion)
 
-    monkeypatch.setattr(PairNet, "forward", constant)
+    monkeypatch.setattr(PairSession, "__call__", constant)
     both = [tasks._asked([Segment("a person walks", 2.0)], i, None, 0) for i in (0, 1)]
     goal = Goal.nothing(40)
     goal.asked[39, 0, 0], goal.positions[39, 0, 0] = True, 0.3
     both[1] = [replace(both[1][0], goal=goal)]
     [(piece, _)] = duet_features(prior, block.net(prior), both, steps=4, pair_guidance=0.0)
-    first, second = two.along(piece.double())[:, 39, 2]
+    first, second = two.along(piece.astype(np.float64))[:, 39, 2]
     assert abs(first) < 1e-4
     assert second == pytest.approx(0.3, abs=0.05)
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
 from motionloom import rotations as rot
 from motionloom.edits.boundary import InpaintWindow, arrival, joining
@@ -21,6 +20,7 @@ from motionloom.tasks.sampling import Sampling
 from motionloom.tasks.splice import carried, kept_parts, person_at_20, splice, standing
 from motionloom.weights.prior import Prior
 from tests.nets import tiny
+from tests.noise import normal
 
 FEW = {"steps": 2, "guidance": 1.0}
 
@@ -29,7 +29,7 @@ FEW = {"steps": 2, "guidance": 1.0}
 def prior() -> Prior:
     """Random weights around a standing person, so that what is drawn has human sizes."""
     features = humanml.motion_to_features(person(2.0))
-    return replace(tiny.prior(), mean=torch.from_numpy(features.mean(0)), std=torch.full((WIDTH,), 0.02))
+    return replace(tiny.prior(), mean=np.asarray(features.mean(0)), std=np.full(WIDTH, 0.02, np.float32))
 
 
 def person(seconds: float, fps: float = 20.0) -> Motion:
@@ -117,10 +117,10 @@ def test_the_numbers_of_kept_parts_are_the_published_masks() -> None:
 
 def test_a_stretch_arrives_where_the_clip_goes_on() -> None:
     """Random features bent by `arrival` integrate to the known facing and place, by a loop over frames."""
-    known = torch.from_numpy(humanml.motion_to_features(person(5.0)))[None].double()
-    mask = torch.ones_like(known, dtype=torch.bool)
+    known = np.asarray(humanml.motion_to_features(person(5.0)))[None].astype(np.float64)
+    mask = np.ones_like(known, dtype=np.bool_)
     mask[:, 30:70] = False
-    wild = torch.where(mask, known, known + 0.05 * torch.randn(known.shape, generator=torch.Generator().manual_seed(1)))
+    wild = np.where(mask, known, known + 0.05 * normal(known.shape, 1))
     stretch = InpaintWindow(np.zeros((100, 22, 3)), 30, 70, np.zeros(WIDTH, bool))
     bent = arrival(known, mask, stretch)(wild)
 
@@ -131,40 +131,40 @@ def test_a_stretch_arrives_where_the_clip_goes_on() -> None:
             place += complex(features[frame, 1], features[frame, 2]) * np.exp(1j * angle)
         return angle, place
 
-    (a, p), (b, q), (_, far) = (walked(x[0].numpy()) for x in (known, bent, wild))
+    (a, p), (b, q), (_, far) = (walked(x[0]) for x in (known, bent, wild))
     assert abs(np.exp(1j * a) - np.exp(1j * b)) < 1e-6
     assert abs(p - q) < 1e-6 < 0.1 < abs(p - far)
-    assert torch.equal(bent[mask], wild[mask])
+    assert np.array_equal(bent[mask], wild[mask])
 
 
 def test_what_is_drawn_leaves_the_known_frames_without_a_jump() -> None:
     """Parabolas known outside, a line far away drawn inside: value and change go on at the borders."""
-    t = torch.arange(60.0, dtype=torch.float64)[None, :, None]
-    rates = torch.linspace(-1, 1, WIDTH, dtype=torch.float64)
+    t = np.arange(60.0, dtype=np.float64)[None, :, None]
+    rates = np.linspace(-1, 1, WIDTH, dtype=np.float64)
     known = 0.01 * rates * (t - 20) ** 2 + 1
-    mask = torch.ones_like(known, dtype=torch.bool)
+    mask = np.ones_like(known, dtype=np.bool_)
     mask[:, 20:40] = False
     mask[:, :, 30] = True
-    drawn = torch.where(mask, known, 5 + 0.3 * t)
+    drawn = np.where(mask, known, 5 + 0.3 * t)
     joined = joining(known, mask, 20, 40)(drawn)
-    assert torch.equal(joined[mask], known[mask])
+    assert np.array_equal(joined[mask], known[mask])
     free = [n for n in range(259) if n != 30]
     for border, step in ((19, 1), (40, -1)):
         pace = known[:, border] - known[:, border - step]
         first, second = joined[:, border + step], joined[:, border + 2 * step]
-        torch.testing.assert_close((first - known[:, border])[:, free], pace[:, free])
-        assert ((second - first - pace)[:, free].abs() < 0.5).all(), "a jump would be 4 or more"
-    torch.testing.assert_close(joined[:, 29:31], drawn[:, 29:31], atol=0.6, rtol=0)
+        np.testing.assert_allclose((first - known[:, border])[:, free], pace[:, free], atol=1e-5)
+        assert (np.abs((second - first - pace)[:, free]) < 0.5).all(), "a jump would be 4 or more"
+    np.testing.assert_allclose(joined[:, 29:31], drawn[:, 29:31], atol=0.6, rtol=0)
 
 
 def test_an_open_stretch_is_left_alone() -> None:
     """At the clip's end, and where the root is known anyway, there is nothing to arrive at."""
-    known = torch.from_numpy(humanml.motion_to_features(person(3.0)))[None]
-    mask = torch.zeros_like(known, dtype=torch.bool)
+    known = np.asarray(humanml.motion_to_features(person(3.0)))[None]
+    mask = np.zeros_like(known, dtype=np.bool_)
     at_end = InpaintWindow(np.zeros((60, 22, 3)), 30, known.shape[1], np.zeros(WIDTH, bool))
-    assert torch.equal(arrival(known, mask, at_end)(2 * known), 2 * known)
+    assert np.array_equal(arrival(known, mask, at_end)(2 * known), 2 * known)
     mask[..., :3] = True
-    assert torch.equal(arrival(known, mask, replace(at_end, last=50))(2 * known), 2 * known)
+    assert np.array_equal(arrival(known, mask, replace(at_end, last=50))(2 * known), 2 * known)
 
 
 @pytest.mark.parametrize(("first", "last"), [(15, 30), (0, 30), (15, 59)])
@@ -181,9 +181,10 @@ def test_known_frames_come_back_in_the_world(prior: Prior, first: int, last: int
 def test_little_strength_stays_nearer_to_the_clip(prior: Prior) -> None:
     clip = person(3.0)
     near, far = (
-        np.abs(made.positions() - clip.positions()).mean()
-        for s in (0.02, 1.0)
-        for made in edit(prior, clip, "a person jumps", Redraw(strength=s), seed=1, **FEW)
+        np.mean([np.abs(made.positions() - clip.positions()).mean() for made in several])
+        for several in (
+            edit(prior, clip, "a person jumps", Redraw(strength=s), seed=1, count=4, **FEW) for s in (0.02, 1.0)
+        )
     )
     assert near < 0.8 * far
 
@@ -258,13 +259,13 @@ def test_the_skeleton_can_be_the_persons(prior: Prior) -> None:
 def test_a_long_clip_costs_what_its_window_costs(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
     """The network sees at most 8 seconds of a clip of half a minute."""
     seen: list[int] = []
-    forward = type(prior.net).forward
+    forward = type(prior.net).__call__
 
     def counted(net, x, *rest):
         seen.append(x.shape[1])
         return forward(net, x, *rest)
 
-    monkeypatch.setattr(type(prior.net), "forward", counted)
+    monkeypatch.setattr(type(prior.net), "__call__", counted)
     edit(prior, person(30.0), "a person jumps", Redraw([(14, 16)]), **FEW)
     assert 0 < max(seen) <= 160
 

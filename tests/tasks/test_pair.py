@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
 from motionloom.diffusion import levels
 from motionloom.errors import MotionloomError
@@ -14,8 +13,8 @@ from motionloom.features.pair import one_world
 from motionloom.goals.goal import Goal
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
-from motionloom.nets.pair import PairNet
 from motionloom.retarget import to_smpl22
+from motionloom.runtime.pair import PairSession
 from motionloom.tasks import pair
 from motionloom.tasks.duet import react
 from motionloom.tasks.pair import (
@@ -33,6 +32,7 @@ from motionloom.tasks.text import finish, sample_features
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from tests.nets import tiny
+from tests.noise import normal
 from tests.tasks.two_people import block as block_of
 from tests.tasks.two_people import walkers
 
@@ -56,8 +56,8 @@ def features(prior: Prior, block: PairBlock, prompts: list[str], seeds: list[int
 
 def both_known(prior: Prior, block: PairBlock, count: int = 5) -> Observed:
     """A state whose first frames and D are known."""
-    first = torch.randn(2, count, 263, generator=torch.Generator().manual_seed(3)) * prior.std + prior.mean
-    stands = torch.tensor([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
+    first = normal((2, count, 263), 3) * prior.std + prior.mean
+    stands = np.array([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
     return known_state(prior, block.net(prior), first, stands, FRAMES)
 
 
@@ -65,14 +65,14 @@ def both_known(prior: Prior, block: PairBlock, count: int = 5) -> Observed:
 def test_exchanged_people_get_exchanged_motions(prior: Prior, block: PairBlock, known: bool) -> None:
     observed = both_known(prior, block)
     given = {"edits": PairEdits(observed)} if known else {}
-    exchanged = replace(observed, values=observed.values.flip(0), mask=observed.mask.flip(0))
+    exchanged = replace(observed, values=np.flip(observed.values, 0), mask=np.flip(observed.mask, 0))
     turned = {"edits": PairEdits(exchanged)} if known else {}
     one, stands = features(prior, block, SAID, [1, 2], **given)
     other, exchanged = features(prior, block, SAID[::-1], [2, 1], **turned)
-    torch.testing.assert_close(one[0], other[0].flip(0), rtol=0, atol=1e-4)
+    np.testing.assert_allclose(one[0], np.flip(other[0], 0), rtol=0, atol=1e-4)
     expected = two.relative(exchanged[0, 1], exchanged[0, 0])
-    torch.testing.assert_close(two.relative(stands[0, 0], stands[0, 1]), expected, rtol=0, atol=1e-4)
-    assert not torch.allclose(one[0, 0], one[0, 1], atol=1e-2)
+    np.testing.assert_allclose(two.relative(stands[0, 0], stands[0, 1]), expected, rtol=0, atol=1e-4)
+    assert not np.allclose(one[0, 0], one[0, 1], atol=1e-2)
 
 
 def test_a_pair_is_the_same_in_any_company(prior: Prior, block: PairBlock) -> None:
@@ -81,58 +81,60 @@ def test_a_pair_is_the_same_in_any_company(prior: Prior, block: PairBlock) -> No
     many, stands = features(prior, block, SAID * 9, seeds)
     for number in (0, 7, 8):
         alone, there = features(prior, block, SAID, seeds[2 * number : 2 * number + 2])
-        torch.testing.assert_close(many[number], alone[0], rtol=0, atol=1e-3)
-        torch.testing.assert_close(stands[number], there[0], rtol=1e-5, atol=1e-3)
+        np.testing.assert_allclose(many[number], alone[0], rtol=0, atol=1e-3)
+        np.testing.assert_allclose(stands[number], there[0], rtol=1e-5, atol=1e-3)
 
 
 def test_people_who_do_not_listen_are_the_priors_own(prior: Prior) -> None:
     made, _ = features(prior, block_of(prior, fresh=True), SAID, [3, 4])
     alone = sample_features(prior, SAID, [FRAMES] * 2, seeds=[3, 4], steps=4)
-    torch.testing.assert_close(made[0], torch.stack(alone), rtol=0, atol=1e-5)
+    np.testing.assert_allclose(made[0], np.stack(alone), rtol=0, atol=1e-5)
 
 
 def test_the_other_persons_words_matter_to_people_who_listen(prior: Prior, block: PairBlock) -> None:
     one, _ = features(prior, block, SAID, [3, 4])
     other, _ = features(prior, block, [SAID[0], "a person jumps"], [3, 4])
-    assert (one[0, 0] - other[0, 0]).abs().max() > 1e-3
+    assert np.abs(one[0, 0] - other[0, 0]).max() > 1e-3
 
 
 def test_what_is_known_is_shown_without_noise_and_comes_back(
     prior: Prior, block: PairBlock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    seen: list[tuple[torch.Tensor, int]] = []
-    forward = PairNet.forward
+    seen: list[tuple[np.ndarray, int]] = []
+    forward = PairSession.__call__
 
-    def recorded(net: PairNet, x: torch.Tensor, level: int, bound) -> torch.Tensor:
-        seen.append((x[:2].clone(), level))
+    def recorded(net: PairSession, x: np.ndarray, level: int, bound) -> np.ndarray:
+        seen.append((x[:2].copy(), level))
         return forward(net, x, level, bound)
 
-    monkeypatch.setattr(PairNet, "forward", recorded)
+    monkeypatch.setattr(PairSession, "__call__", recorded)
     observed = both_known(prior, block)
     state, mask = observed.values, observed.mask
     made, _ = features(prior, block, SAID, [1, 2], edits=PairEdits(observed))
     assert [level for _, level in seen] == list(levels(prior.schedule, 4, spacing="early"))[:-1]
     for x, level in seen:
-        torch.testing.assert_close(x[mask], prior.schedule.at(level)[0] * state[mask])
+        np.testing.assert_allclose(x[mask], prior.schedule.at(level)[0] * state[mask], atol=1e-5)
     expected = state[:, 1:6] * prior.std + prior.mean
-    torch.testing.assert_close(made[0, :, :5], expected, rtol=0, atol=1e-6)
-    assert (made[0, :, 5:] - prior.mean).abs().max() > 1e-3
+    np.testing.assert_allclose(made[0, :, :5], expected, rtol=0, atol=1e-6)
+    assert np.abs(made[0, :, 5:] - prior.mean).max() > 1e-3
 
 
 def test_a_change_of_guesses_sees_one_persons_frames_and_no_more(prior: Prior, block: PairBlock) -> None:
     observed, seen = both_known(prior, block), []
     state, mask = observed.values, observed.mask
 
-    def change(guess: torch.Tensor, level: int) -> torch.Tensor:
+    def change(guess: np.ndarray, level: int) -> np.ndarray:
         seen.append(guess)
-        return torch.where(mask[1, 1:], guess, 0.5)
+        return np.where(mask[1, 1:], guess, 0.5)
 
     made, _ = features(prior, block, SAID, [1, 2], edits=PairEdits(observed, [None, change]))
     assert len(seen) == 5
-    assert all(torch.equal(guess[:5], state[1, 1:6]) for guess in seen)
+    assert all(np.array_equal(guess[:5], state[1, 1:6]) for guess in seen)
     assert seen[0].shape == (FRAMES, 263)
-    torch.testing.assert_close(made[0, 1, 5:], (0.5 * prior.std + prior.mean).expand(FRAMES - 5, -1))
-    assert (made[0, 0, 5:] - made[0, 1, 5:]).abs().max() > 1e-2
+    np.testing.assert_allclose(
+        made[0, 1, 5:], np.broadcast_to(0.5 * prior.std + prior.mean, (FRAMES - 5, 263)), atol=1e-5
+    )
+    assert np.abs(made[0, 0, 5:] - made[0, 1, 5:]).max() > 1e-2
 
 
 def test_duets_are_repeated_by_their_seeds(prior: Prior, block: PairBlock) -> None:
@@ -163,7 +165,7 @@ def test_files_keep_the_distance_that_was_drawn(prior: Prior, block: PairBlock) 
     [duet] = generate_pair(prior, block, SAID[0], seconds=0.7, steps=4, seed=1, foot_lock=False)
     made, stands = pair_features(prior, block.net(prior), [SAID[0]] * 2, 14, seeds=person_seeds(1, 0), steps=4)
     alone = np.stack([finish(prior, one, foot_lock=False).positions() for one in made[0]])
-    expected = two.to_world(alone, stands[0].double().numpy()[:, None, None])
+    expected = two.to_world(alone, stands[0].astype(np.float64)[:, None, None])
     np.testing.assert_allclose(np.stack([motion.positions() for motion in duet]), expected, atol=1e-4)
 
 
@@ -200,7 +202,7 @@ def test_the_other_one_stands_as_drawn_beside_who_follows_a_path(
     real = pair.pair_features
     monkeypatch.setattr(pair, "pair_features", lambda *a, **k: drawn.append(real(*a, **k)) or drawn[-1])
     [duet] = generate_pair(prior, block, SAID[0], goals=(None, walk(40)), steps=3, foot_lock=False)
-    stands = drawn[0][1][0].double().numpy()
+    stands = drawn[0][1][0].astype(np.float64)
     there = np.array([np.cos(np.pi / 2), np.sin(np.pi / 2), 1.0, 2.0])
     other = GroundPose.of_numbers(two.compose(there, two.relative(stands[1], stands[0])))
     np.testing.assert_allclose(duet[0].root[0, [0, 2]], [other.x, other.z], atol=0.05)
@@ -245,7 +247,7 @@ def test_a_true_future_comes_back_onto_both_bodies_in_place(
         at = count - 1 + (np.arange(frames + 1) - (seen - 1)) / 20 * whole[0].fps
         uniform = one_world([to_smpl22(motion).positions() for motion in whole], legs)
         encoded = two.encode(np.stack([positions_at(person, at) for person in uniform]))
-        return torch.from_numpy(encoded.features)[None], torch.from_numpy(encoded.poses)[None]
+        return np.asarray(encoded.features)[None], np.asarray(encoded.poses)[None]
 
     monkeypatch.setattr(pair, "pair_features", true)
     [duet] = complete_pair(prior, block, (past[0], past[1]), seconds=0.5)
@@ -259,22 +261,22 @@ def test_whose_guesses_are_changed_is_still_unless_said_otherwise(
 ) -> None:
     """Nine pairs, of which eight are denoised at once; the last but one row is changed."""
     asked: list[dict] = []
-    shown: list[torch.Tensor] = []
+    shown: list[np.ndarray] = []
 
-    def guidance(prior: Prior, net: PairNet, bound: object, **how):
+    def guidance(prior: Prior, net: PairSession, bound: object, **how):
         asked.append(how)
 
-        def lead(state: torch.Tensor, guess: torch.Tensor, level: int) -> torch.Tensor:
+        def lead(state: np.ndarray, guess: np.ndarray, level: int) -> np.ndarray:
             shown.append(guess)
             return guess
 
         return lead
 
     monkeypatch.setattr(pair, "relative_pose_guidance", guidance)
-    change = [None] * 16 + [lambda guess, level: torch.full_like(guess, 7.0), None]
-    known = torch.zeros(18, 1 + FRAMES, 263, dtype=torch.bool)
+    change = [None] * 16 + [lambda guess, level: np.full_like(guess, 7.0), None]
+    known = np.zeros((18, 1 + FRAMES, 263), dtype=np.bool_)
     known[17, 1:5] = True
-    observed = Observed(torch.zeros(known.shape), known, noise_free=True)
+    observed = Observed(np.zeros(known.shape, np.float32), known, noise_free=True)
     how = {"seeds": list(range(18)), "steps": 1, "pair_guidance": 0.5}
     for frozen, expected in ((None, [True, False]), ([False] * 17 + [True], [False, True])):
         shown.clear()

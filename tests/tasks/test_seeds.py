@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import torch
 
 from motionloom.tasks.text import generate
 from motionloom.weights.prior import Prior
@@ -14,14 +13,6 @@ PROMPT = "a person walks forward and waves"
 @pytest.fixture(scope="module")
 def prior() -> Prior:
     return Prior.load()
-
-
-@pytest.fixture(autouse=True)
-def threads():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 def test_alone_a_seed_makes_the_same_motion_bit_for_bit(prior: Prior) -> None:

@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from motionloom.errors import MotionloomError
 from motionloom.features.babel import decode, facing
 from motionloom.lab.papers.published_priors import import_published
 from motionloom.motion import Motion
-from motionloom.nets.text import TextEmbedding
+from motionloom.runtime.text.protocol import TextEmbedding
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.text import finish, generate, sample_features, to_motion
 from motionloom.weights.prior import Prior, load_prior, save_prior
 from tests.lab.papers.test_mdm import state, write
 from tests.nets import tiny
+from tests.noise import normal
 
 FEW = {"seconds": 1.0, "steps": 3}
 
@@ -39,7 +39,7 @@ def test_a_row_is_the_same_in_any_company(prior: Prior) -> None:
     for row in (1, 3, 8, 9):
         alone = features(prior, [prompts[row]], [frames[row]], [row])[0]
         assert alone.shape == (frames[row], 263)
-        torch.testing.assert_close(together[row], alone, rtol=0, atol=1e-5)
+        np.testing.assert_allclose(together[row], alone, rtol=0, atol=1e-5)
 
 
 def test_motion_i_is_drawn_from_seed_plus_i(prior: Prior) -> None:
@@ -53,14 +53,14 @@ def test_motion_i_is_drawn_from_seed_plus_i(prior: Prior) -> None:
 
 def test_seeds_and_prompts_matter_and_repetition_is_exact(prior: Prior) -> None:
     one = features(prior, ["a person walks"], [8], [1])[0]
-    assert torch.equal(one, features(prior, ["a person walks"], [8], [1])[0])
-    assert not torch.allclose(one, features(prior, ["a person walks"], [8], [2])[0])
-    assert not torch.allclose(one, features(prior, ["a person turns left"], [8], [1])[0])
+    assert np.array_equal(one, features(prior, ["a person walks"], [8], [1])[0])
+    assert not np.allclose(one, features(prior, ["a person walks"], [8], [2])[0])
+    assert not np.allclose(one, features(prior, ["a person turns left"], [8], [1])[0])
 
 
 def test_no_guidance_ignores_the_prompt(prior: Prior) -> None:
     a, b = (features(prior, [text], [8], [1], guidance=0.0)[0] for text in ("a person walks", "a jump"))
-    torch.testing.assert_close(a, b, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(a, b, rtol=0, atol=1e-5)
 
 
 def test_lengths_and_rate_are_what_was_asked(prior: Prior) -> None:
@@ -126,8 +126,8 @@ class Words:
 
     def encode(self, texts: Sequence[str] | str) -> TextEmbedding:
         said = [texts] if isinstance(texts, str) else list(texts)
-        pooled = torch.stack([torch.randn(512, generator=torch.Generator().manual_seed(len(t))) for t in said])
-        return TextEmbedding(pooled[:, None], torch.ones(len(said), 1, dtype=torch.bool), pooled)
+        pooled = np.stack([normal((512,), len(t)) for t in said])
+        return TextEmbedding(pooled[:, None], np.ones((len(said), 1), dtype=np.bool_), pooled)
 
 
 @pytest.mark.parametrize("flags", [False, True], ids=["plain", "transitions"])
@@ -150,7 +150,7 @@ def test_babel_features_are_finished_as_its_codec_decodes_them(tmp_path: Path) -
     drawn = sample_features(prior, ["walk"], [20], seeds=[3], steps=2)[0]
     assert drawn.shape == (20, 135)
     whole = finish(prior, drawn, foot_lock=False)
-    limbs = decode(drawn.double().numpy()).positions()
+    limbs = decode(drawn.astype(np.float64)).positions()
     bent = np.linalg.norm(limbs - limbs[:, :1], axis=-1)
     places = whole.positions()
     np.testing.assert_allclose(np.linalg.norm(places - places[:, :1], axis=-1), bent, atol=1e-6)
@@ -173,7 +173,7 @@ def test_a_walk_of_263_numbers_is_finished_as_before() -> None:
     """The choice by width leaves HumanML3D as it was: `to_motion`."""
     prior = tiny.prior()
     features = sample_features(prior, ["a person walks"], [12], seeds=[0], steps=2)[0]
-    wanted = to_motion(features.double().numpy(), 20.0)
+    wanted = to_motion(features.astype(np.float64), 20.0)
     np.testing.assert_array_equal(finish(prior, features).positions(), wanted.positions())
 
 

@@ -11,6 +11,8 @@ from motionloom.io import load
 from motionloom.motion import Motion
 from motionloom.nets.pair import Talk, fitting
 from motionloom.tasks.splice import carried
+from motionloom.train.export import pair_graph
+from motionloom.train.modules import arrays
 from motionloom.weights.adapter import fingerprint
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -26,7 +28,8 @@ def block(prior: Prior, *, fresh: bool = False) -> PairBlock:
         with torch.no_grad():
             for value in () if fresh else talk.parameters():
                 value.add_(torch.randn(value.shape) * 0.3)
-    return PairBlock("tiny", talk.config, talk.state_dict(), prior.card.name, fingerprint(prior.net))
+    graph = pair_graph(talk.config, prior.net.config)
+    return PairBlock("tiny", talk.config, arrays(talk), prior.card.name, fingerprint(prior.net), graph=graph)
 
 
 def walkers(seconds: float, *, larger: float = 1.2, beside: float = 1.5, later: int = 5) -> tuple[Motion, Motion]:

@@ -13,8 +13,10 @@ from motionloom.features.layout import LAYOUT
 from motionloom.features.pair import decode, encode
 from motionloom.nets.pair import PairNet, Talk, other, part
 from motionloom.train.duets import KEEN, NEAR, Duets, Sight
+from motionloom.train.modules import prior_module
 from motionloom.train.objectives import WEIGHTS
 from motionloom.train.pair import BEGUN, Drawn, Held, PairError, Parts, Settings, _over_rows, given_slots, held_out
+from motionloom.train.tensors import noised, tensor
 from motionloom.weights.prior import Prior
 from tests.kinematics import people
 from tests.nets import tiny
@@ -49,7 +51,8 @@ def objective(*, fresh: bool = False, settings: Settings | None = None, prior: P
     with torch.no_grad():
         for value in () if fresh else talk.parameters():
             value.add_(torch.randn(value.shape) * 0.2)
-    net = PairNet(prior.net, talk, prior.schedule, mean=prior.mean, std=prior.std)
+    mean, std = tensor(prior.mean), tensor(prior.std)
+    net = PairNet(prior_module(prior), talk, prior.schedule, mean=mean, std=std)
     return PairError(net, prior, Duets([pair(), pair("b", turn=2.0)]), settings=settings, recipe=recipe(**changes))
 
 
@@ -151,7 +154,7 @@ def test_given_slots_have_no_noise_and_both_people_one_level_and_own_noise():
     made, watch = objective(settings=Settings(prefix=0.5, react=0.5)), Watch()
     drawn = made.drawn(1, 2, 8)
     made.denoised(watch, drawn)
-    signal = made.schedule.signal[drawn.level].float()
+    signal = tensor(made.schedule.signal)[drawn.level].float()
     still = watch.state - signal[:, None, None] * drawn.clean
     assert still[drawn.given].abs().max() < 1e-6 < 0.01 < still[~drawn.given].abs().mean()
     assert torch.equal(drawn.level[0::2], drawn.level[1::2])
@@ -184,8 +187,9 @@ def test_a_fresh_block_costs_what_the_prior_alone_costs_and_the_square_of_d():
     drawn = made.drawn(3, 4, 4)
     parts = made.parts(made.denoised(made.net.eval(), drawn), drawn)
     prior, motion = tiny.prior(), drawn.clean[:, 1:]
-    noised = prior.schedule.noised(motion, drawn.level, drawn.noise[:, 1:])
-    alone = prior.net(noised, drawn.level, prior.net.bind(drawn.cond))
+    state = noised(prior.schedule, motion, drawn.level, drawn.noise[:, 1:])
+    base = prior_module(prior)
+    alone = base(state, drawn.level, base.bind(drawn.cond))
     error = ((alone - motion) ** 2 * made.scale).mean()
     torch.testing.assert_close(parts.motion, error)
     torch.testing.assert_close(parts.place, (drawn.clean[:, 0, :4] ** 2).mean())

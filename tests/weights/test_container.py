@@ -1,11 +1,24 @@
-"""Weights of a file go into a network only if they are its own, each by name."""
+"""Weights of a file go into a network only if they are its own, each by name; graphs beside them are no weights."""
 
+import hashlib
+from pathlib import Path
+
+import numpy as np
 import pytest
 import torch
 from torch import nn
 
 from motionloom.errors import MotionloomError
-from motionloom.weights.container import check, fill, shapes
+from motionloom.train.modules import fill, shapes
+from motionloom.weights.container import (
+    PRIORS,
+    check,
+    finite,
+    graph_tensors,
+    read_tensors,
+    split_graphs,
+    weights_digest,
+)
 
 
 def good() -> dict[str, torch.Tensor]:
@@ -41,5 +54,26 @@ def test_weights_that_do_not_fit_are_named(change: dict, said: str) -> None:
     with pytest.raises(MotionloomError, match=f"a.safetensors .*{said}"):
         fill(net, weights, "a.safetensors")
     with pytest.raises(MotionloomError, match=said):
-        check(weights, shapes(net), "it")
+        check({key: value.numpy() for key, value in weights.items()}, shapes(net), "it")
     assert torch.equal(net.weight, before)
+
+
+def test_what_figures_quote_leaves_graphs_out(tmp_path: Path) -> None:
+    """The digest of a file with graphs is that of the same file without: SHA-256 of its bytes."""
+    plain, more = tmp_path / "a.safetensors", tmp_path / "b.safetensors"
+    weights = {"net.b": np.arange(6, dtype=np.float16), "net.a": np.ones((2, 2), np.float32)}
+    PRIORS.write(plain, weights, {"card": "x"})
+    PRIORS.write(more, weights | graph_tensors({"prior": b"abc"}), {"card": "x"})
+    assert plain.read_bytes() != more.read_bytes()
+    assert weights_digest(more) == weights_digest(plain) == hashlib.sha256(plain.read_bytes()).hexdigest()
+    tensors, _ = read_tensors(more)
+    assert split_graphs(tensors)[1] == {"prior": b"abc"}
+
+
+@pytest.mark.parametrize("kind", [np.float16, np.float32])
+def test_numbers_that_are_not_finite_are_seen(kind: type) -> None:
+    values = np.array([-65504, 0, 6e-8, 65504], kind)
+    assert finite(values)
+    assert finite(values[:0])
+    for bad in (np.nan, np.inf, -np.inf):
+        assert not finite(np.append(values, kind(bad)))

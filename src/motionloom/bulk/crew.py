@@ -32,10 +32,8 @@ def cores() -> int:
 
 
 def gpus() -> int:
-    """GPUs that this process may use; 1 where there is none, so that the processes can say what is wrong."""
-    import torch
-
-    return max(torch.cuda.device_count(), 1)
+    """GPUs of this machine, as NVIDIA's driver lists them; 1 where it does not, so that processes say what is wrong."""
+    return max(len(list(Path("/proc/driver/nvidia/gpus").glob("*"))), 1)
 
 
 def gpu_of(process: int, visible: str, count: int) -> str:

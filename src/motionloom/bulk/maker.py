@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from motionloom.bulk.measures import Filter, Judge, Values, find_judge, in_one, measure, measure_two
-from motionloom.bulk.row import Asked, Sources, hash_adapters, hash_file, unexpected
-from motionloom.bulk.sampling import LEAST, draw_group, groups
+from motionloom.bulk.row import Asked, Sources, hash_adapters, unexpected
+from motionloom.bulk.sampling import draw_group, groups
 from motionloom.edits.fitting import fit
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import parse_adapter
@@ -26,7 +26,7 @@ from motionloom.tasks.duet import compose_pair
 from motionloom.tasks.long import compose, with_loaded
 from motionloom.tasks.pair import Duet, generate_pair, prompts_of
 from motionloom.tasks.text import GUIDANCE, SOLVER, STEPS, check, check_features, finish, to_motion
-from motionloom.weights.container import PAIRS
+from motionloom.weights.container import PAIRS, weights_digest
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior, find_weights
 
@@ -48,7 +48,6 @@ class Options:
     pair_guidance: float = 1.0
     """How firmly two people keep to where that wants them, 0 to 1."""
     device: str = "cpu"
-    bf16: bool = False
     """Let the network compute in bfloat16."""
     steps: int = STEPS
     guidance: float = GUIDANCE
@@ -81,12 +80,12 @@ class Options:
         later = {"hands": (self.hands, "as-is"), "unit": (self.unit, 1.0)}  # left out as they always were: old ids hold
         return {name: value for name, (value, usual) in later.items() if value != usual} | {
             "weights": weights, "steps": self.steps, "guidance": self.guidance, "solver": self.solver,
-            "raw": self.raw, "fps": self.fps, "bf16": self.bf16,
+            "raw": self.raw, "fps": self.fps,
         }  # fmt: skip
 
     def of_duets(self) -> dict[str, Any]:
         """What else determines motions of two people; raises `MotionloomError` for a file that is not there."""
-        return {"weights": hash_file(PAIRS.find(self.pair_weights)), "guidance": self.pair_guidance}
+        return {"weights": weights_digest(PAIRS.find(self.pair_weights)), "guidance": self.pair_guidance}
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +117,7 @@ def hash_weights(options: Options) -> str:
 
     Raises `MotionloomError` for an adapter that is no file.
     """
-    found = hash_file(find_weights(options.weights))
+    found = weights_digest(find_weights(options.weights))
     if not options.adapters:
         return found
     said = [found, *hash_adapters([parse_adapter(one) for one in options.adapters])]
@@ -151,7 +150,7 @@ class Maker:
             seed=options.seed, skeleton=options.skeleton,
         )  # fmt: skip
         self.judge: Judge | None = find_judge(options.judge) if options.judge else None
-        self.together = TOGETHER.get(self.prior.mean.device.type, TOGETHER["cpu"])
+        self.together = TOGETHER.get(options.device.partition(":")[0], TOGETHER["cpu"])
 
     def make(
         self, asked: Sequence[Asked], *, begin: Callable[[Asked], None] | None = None
@@ -206,7 +205,6 @@ class Maker:
         drawn = draw_group(
             self.prior, [one.row.prompt for one in rows], [one.frames for one in rows],
             seeds=[one.seed for one in rows], guidance=options.guidance, steps=options.steps, solver=options.solver,
-            bf16=options.bf16,
         )  # fmt: skip
         return [
             self._alone(one, finish(self.prior, features, foot_lock=not options.raw))
@@ -217,23 +215,23 @@ class Maker:
         """As `motionloom.tasks.control.control`, for prompts and seeds that share a goal."""
         goal = rows[0].goal
         assert goal is not None
-        self._only_fp32_ddpm(rows[0])
-        place, filled = start_of(goal), [*rows, *[rows[0]] * (LEAST - len(rows))]
+        self._only_ddpm(rows[0])
+        place = start_of(goal)
         drawn = steered_features(
-            self.prior, [one.row.prompt for one in filled], goal.seen_from(place), seeds=[one.seed for one in filled],
+            self.prior, [one.row.prompt for one in rows], goal.seen_from(place), seeds=[one.seed for one in rows],
             guidance=self.options.guidance, steps=self.options.steps,
         )  # fmt: skip
         foot_lock = not self.options.raw
         placed = [
-            moved(to_motion(features.numpy().astype(np.float64), self.prior.fps, foot_lock=foot_lock), place)
-            for features in drawn[: len(rows)]
+            moved(to_motion(features.astype(np.float64), self.prior.fps, foot_lock=foot_lock), place)
+            for features in drawn
         ]
         return [judged(fit(motion, goal), motion, goal) for motion in placed]
 
     def _compose(self, asked: Asked) -> Made:
         timeline = asked.timeline
         assert timeline is not None
-        self._only_fp32_ddpm(asked)
+        self._only_ddpm(asked)
         guidance = self.options.guidance if timeline.guidance is None else timeline.guidance
         pieces = compose(
             self.prior, timeline.segments, seed=asked.seed, guidance=guidance, steps=self.options.steps,
@@ -247,8 +245,6 @@ class Maker:
 
     def _duet(self, asked: Asked) -> Made:
         """Two people, one pair at a time: what is drawn beside it would change the last bits."""
-        if self.options.bf16:
-            raise MotionloomError("the task duet is made in float32")
         duet, texts = self._two(asked), (asked.text, asked.text) if asked.timeline else prompts_of(asked.row.prompt)
         measured = measure_two(duet, texts, self.judge)
         if asked.goal is not None:
@@ -280,9 +276,9 @@ class Maker:
         )  # fmt: skip
         return duet
 
-    def _only_fp32_ddpm(self, asked: Asked) -> None:
-        if self.options.bf16 or self.options.solver != SOLVER:
-            raise MotionloomError(f"the task {asked.row.task} is made in float32 with the solver {SOLVER}")
+    def _only_ddpm(self, asked: Asked) -> None:
+        if self.options.solver != SOLVER:
+            raise MotionloomError(f"the task {asked.row.task} is made with the solver {SOLVER}")
 
     def _alone(self, asked: Asked, motion: Motion, **measured: float) -> Made:
         return self._finished(asked, [motion], [{**measure(motion, asked.text, self.judge), **measured}])

@@ -170,14 +170,18 @@ def _motions(store: Store, shard: int, made: dict[str, int]) -> dict[Any, People
 
 def _from_tar(place: Path) -> dict[Any, People]:
     found: dict[str, People] = {}
-    with tarfile.open(place) as tar, tempfile.TemporaryDirectory(prefix="motionloom-") as folder:
-        for member in tar:
-            data = tar.extractfile(member)
-            if member.name.endswith(".npz") and data is not None:
-                part = Path(folder) / "motion.npz"
-                part.write_bytes(data.read())
-                name = member.name.partition(".")[0]
-                found[name] = (*found.get(name, ()), load(part))
+    try:
+        with tarfile.open(place, "r:") as tar, tempfile.TemporaryDirectory(prefix="motionloom-") as folder:
+            for member in tar:
+                data = tar.extractfile(member)
+                if member.name.endswith(".npz") and data is not None:
+                    part = Path(folder) / "motion.npz"
+                    part.write_bytes(data.read())
+                    name = member.name.partition(".")[0]
+                    found[name] = (*found.get(name, ()), load(part))
+    except (tarfile.TarError, KeyError, OSError) as error:
+        reason = " ".join(str(error).split())[:120]
+        raise MotionloomError(f"{place} is damaged ({reason}); delete it and run the batch again") from None
     return found
 
 

@@ -35,11 +35,10 @@ class Hand:
     """What an actor does: shards, one after the other."""
 
     def __init__(self, line: str) -> None:
-        import torch
-
         from motionloom.bulk.maker import Maker
+        from motionloom.runtime import set_threads
 
-        torch.set_num_threads(1)
+        set_threads(1)
         self.batch, self.problem = Batch.from_json(line), ""
         try:
             self.maker = Maker(

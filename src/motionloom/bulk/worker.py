@@ -49,12 +49,11 @@ def _listen(lines: "queue.Queue[str]", source: TextIO = sys.stdin) -> None:
 
 
 def _work(lines: "queue.Queue[str]", say: Any) -> None:
-    import torch
-
     from motionloom.bulk.maker import Maker
     from motionloom.bulk.shard import Batch, Task, make_shard
+    from motionloom.runtime import set_threads
 
-    torch.set_num_threads(1)  # there is a process for each core
+    set_threads(1)  # there is a process for each core
     batch = Batch.from_json(lines.get())
     maker = Maker(batch.options, folder=Path(batch.folder), weights=batch.weights, pair=batch.pair)
     say({"ready": True})

@@ -99,6 +99,8 @@ def _told(argv: Sequence[str] | None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
+    # small products: numpy's own threads would wait on the cores that the networks compute on
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     words = list(sys.argv[1:] if argv is None else argv)
     top = parser(COMMANDS.get(words[0], words[0]) if words else None)
     commands = next(a.choices for a in top._actions if isinstance(a, argparse._SubParsersAction))
@@ -127,7 +129,7 @@ def _blender(chosen: Path | None) -> AbstractContextManager[None]:
 
 @contextmanager
 def _seldom_collected() -> Iterator[None]:
-    """Look for garbage in cycles less often: importing torch makes many objects, and all of them are needed."""
+    """Look for garbage in cycles less often: imports make many objects, and all of them are needed."""
     before = gc.get_threshold()
     gc.set_threshold(100_000, *before[1:])
     try:

@@ -79,7 +79,6 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     )  # fmt: skip
     add_adapters(parser)
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
-    parser.add_argument("--bf16", action="store_true", help="let the network compute in bfloat16")
     parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one per core, or per GPU)")
     parser.add_argument(
         "--shard", metavar="I/N", help="make only every N-th shard from I on (default: as the Slurm array says)"
@@ -160,12 +159,10 @@ def _options(arguments: argparse.Namespace) -> "Options":
         fail(f"--seed must be 0 or more and below 2**62; got {arguments.seed}")
     if arguments.variants is not None and arguments.variants < 1:
         fail(f"--variants must be 1 or more; got {arguments.variants}")
-    if arguments.bf16 and arguments.device == "cpu":
-        fail("--bf16 is for --device cuda; a CPU makes motions in float32")
     given = {name: getattr(arguments, name) for name in ("steps", "guidance", "solver")}
     obeys = arguments.filter is not None and "obeys" in Filter(arguments.filter).names
     return Options(
-        weights=arguments.weights, adapters=arguments.adapter, device=arguments.device, bf16=arguments.bf16,
+        weights=arguments.weights, adapters=arguments.adapter, device=arguments.device,
         raw=arguments.raw, fps=arguments.fps, pair_weights=arguments.pair_weights,
         pair_guidance=arguments.pair_guidance, shard_rows=arguments.shard_rows,
         hands=arguments.hands, unit=arguments.out_unit,
@@ -193,12 +190,11 @@ def _where(arguments: argparse.Namespace) -> "Where":
 
 
 def _estimate(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", where: "Where") -> None:
-    import torch
-
     from motionloom.bulk.batch import processes
     from motionloom.bulk.estimate import estimate
+    from motionloom.runtime import set_threads
 
-    torch.set_num_threads(1)
+    set_threads(1)
     found = estimate(jobs, options, workers=(where.workers or processes(options)) * (where.shard or (0, 1))[1])
     if arguments.json:
         import json

@@ -70,7 +70,20 @@ def _physical(commands) -> None:
         "--data", type=Path, help="built set or recordings with held-out clips (default: shipped numbers)"
     )
     realism.add_argument("--count", type=int, default=64, help="motions to compare (default 64)")
+    realism.add_argument(
+        "--recordings", type=Path, action="append", metavar="FOLDER",
+        help="recordings whose own skeletons bodies are compared with (repeatable; default: shipped percentiles)",
+    )  # fmt: skip
     realism.set_defaults(run=_realism)
+
+    reach = commands.add_parser(
+        "reach", help="how recorded people hold their bodies: percentiles for 'evaluate realism'"
+    )
+    reach.add_argument(
+        "--recordings", type=Path, action="append", required=True, metavar="FOLDER", help="recordings (repeatable)"
+    )
+    reach.add_argument("--out", type=Path, help="write the percentiles to this JSON file")
+    reach.set_defaults(run=_reach)
 
     reference = commands.add_parser("reference", help="judge real clips: pass rates, false alarms, realism numbers")
     reference.add_argument("--data", type=Path, required=True, help="built set or recordings")
@@ -186,7 +199,7 @@ def _realism(arguments: argparse.Namespace) -> None:
 
     from motionloom.errors import MotionloomError
     from motionloom.lab.report import files
-    from motionloom.lab.suites import realism
+    from motionloom.lab.suites import bodies, realism
     from motionloom.lab.suites.clips import real_clips
     from motionloom.lab.suites.reference import known
 
@@ -201,17 +214,37 @@ def _realism(arguments: argparse.Namespace) -> None:
         wanted, real = realism.orders(chosen), [clip.positions for clip in chosen]
     else:
         wanted, real = realism.everyday(arguments.count), known()["realism"]["held_out"]
+    reach = bodies.reach_of(arguments.recordings, say=say) if arguments.recordings else bodies.known()
     made, fps = realism.run(_run(arguments), wanted, generate=_generator(arguments), seed=arguments.seed)
-    found = {"settings": _settings(arguments), **realism.judge(made, fps, real)}
-    rows = realism.table(found)
-    said = f"{found['passed']} of {len(rows) - 1} numbers within 1.5 times of real (or too small to see)"
+    body = bodies.judge(made, reach)
+    found = {"settings": _settings(arguments), **realism.judge(made, fps, real), "body": body}
+    rows, held = realism.table(found), bodies.table(body)
+    said = (
+        f"{found['passed']} of {len(rows) - 1} numbers within 1.5 times of real (or too small to see), and "
+        f"{body['passed']} of {body['of']} of the body within what recorded people do"
+    )
     if not arguments.data:
         said += "; the real numbers are of other actions: name recordings with --data to compare like with like"
     if arguments.out:
         files.write_json(arguments.out / "realism.json", found)
-        parts = [f"# Realism of {arguments.weights}", f"{said}.", files.markdown(rows), _weights_line(arguments)]
-        files.write_text(arguments.out / "realism.md", "\n\n".join(parts) + "\n")
-    print(json.dumps(found, indent=1) if arguments.json else f"{files.plain(rows)}\n\n{said}")
+        parts = [f"# Realism of {arguments.weights}", f"{said}.", files.markdown(rows), files.markdown(held)]
+        files.write_text(arguments.out / "realism.md", "\n\n".join([*parts, _weights_line(arguments)]) + "\n")
+    print(json.dumps(found, indent=1) if arguments.json else f"{files.plain(rows)}\n\n{files.plain(held)}\n\n{said}")
+
+
+def _reach(arguments: argparse.Namespace) -> None:
+    import json
+
+    from motionloom.lab.metrics.bodies import LEVELS
+    from motionloom.lab.report import files
+    from motionloom.lab.suites import bodies
+
+    if arguments.out:
+        files.check_report(arguments.out)
+    found = {"percentiles": list(LEVELS), "reach": bodies.reach_of(arguments.recordings, say=say)}
+    if arguments.out:
+        files.write_json(arguments.out, found)
+    print(json.dumps(found, indent=1))
 
 
 def _reference(arguments: argparse.Namespace) -> None:

@@ -85,12 +85,14 @@ def _made(arguments: argparse.Namespace, script: "Script") -> "Stage":
     from motionloom.live.live import Live
     from motionloom.live.pair import LivePair
     from motionloom.live.settings import Settings
+    from motionloom.runtime import set_threads
     from motionloom.weights.pair import PairBlock
 
     settings = Settings(steps=arguments.steps, guidance=arguments.guidance)
     starts = [load(path) for path in arguments.start or ()]
     seed = script.seed if arguments.seed is None else arguments.seed
     shared: dict[str, Any] = {"seed": seed, "fps": arguments.fps or 20.0, "settings": settings}
+    set_threads(1)  # a window's matrices are small: two threads would wait for each other at every layer
     prior = load_prior(arguments)
     if script.people == 1:
         return Live(prior, start=starts[0] if starts else None, **shared)

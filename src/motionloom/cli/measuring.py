@@ -50,16 +50,16 @@ def selected(arguments: argparse.Namespace) -> "Selection | None":
 
 
 def set_threads(arguments: argparse.Namespace) -> None:
-    """Have torch use ``--threads``."""
+    """Have the networks use ``--threads``."""
     from motionloom.errors import MotionloomError
 
     if arguments.threads is None:
         return
     if not 1 <= arguments.threads <= 1024:
         raise MotionloomError(f"the number of threads must be from 1 to 1024; got {arguments.threads}")
-    import torch
+    from motionloom.train.threads import set_threads
 
-    torch.set_num_threads(arguments.threads)
+    set_threads(arguments.threads)
 
 
 def given(arguments: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:

@@ -238,7 +238,7 @@ def remark_unknown(prior: "Prior", prompts: Sequence[str]) -> list[str]:
     """
     import sys
 
-    from motionloom.nets.text.known import nearest
+    from motionloom.runtime.text.known import nearest
 
     asked = [prompt for prompt in dict.fromkeys(prompts) if prompt.strip()]
     if prior.known is None or not asked:

@@ -117,16 +117,16 @@ def _check_threads(arguments: argparse.Namespace) -> None:
 
 def _set_threads(arguments: argparse.Namespace) -> None:
     if arguments.threads is not None:
-        import torch
+        from motionloom.runtime import set_threads
 
-        torch.set_num_threads(arguments.threads)
+        set_threads(arguments.threads)
 
 
 def _leave_a_core() -> None:
-    """Torch, which the server imports later, gets one thread less than there are cores, unless the user has said it.
+    """The networks get one thread less than there are cores, unless the user has said how many.
 
     With a thread on every core each layer waits for the one whose core draws the page's pictures: on two cores a draw
     of 10 s took 8.8 s beside a browser without a GPU, and 1.7 s so (docs/decisions/0023).
     """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    os.environ.setdefault("OMP_NUM_THREADS", str(max(cores - 1, 1)))
+    os.environ.setdefault("MOTIONLOOM_THREADS", str(max(cores - 1, 1)))

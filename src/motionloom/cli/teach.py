@@ -151,15 +151,14 @@ def _teach(
 ) -> None:
     import time
 
-    import torch
-
     from motionloom.train.teach import Lesson, teach
+    from motionloom.train.threads import set_threads
     from motionloom.weights.prior import Prior
 
     if arguments.threads is not None:
         if arguments.threads < 1:
             fail(f"--threads must be 1 or more; got {arguments.threads}")
-        torch.set_num_threads(arguments.threads)
+        set_threads(arguments.threads)
     given = {key: getattr(arguments, key) for key in ("steps", "rank", "keep") if getattr(arguments, key) is not None}
     if not 0 <= arguments.seed < 2**31:
         fail(f"--seed must be 0 or more and below 2**31; got {arguments.seed}")
@@ -168,7 +167,7 @@ def _teach(
     )  # fmt: skip
     prior = Prior.load(arguments.weights, device=arguments.device)
     began = time.perf_counter()
-    adapter = teach(prior, examples, lesson, say=lambda line: print(line, file=sys.stderr))
+    adapter = teach(prior, examples, lesson, device=arguments.device, say=lambda line: print(line, file=sys.stderr))
     adapter.save(out)
     about = {
         "file": str(out), "megabytes": round(out.stat().st_size / 1e6, 2), "captions": list(adapter.captions),

@@ -103,14 +103,13 @@ def _train(arguments: argparse.Namespace, make: Callable[..., Path]) -> None:
 
 def _recipe(arguments: argparse.Namespace) -> "Recipe":
     """The recipe with its changes; checks and applies what is said about the run."""
-    import torch
-
     from motionloom.errors import MotionloomError
     from motionloom.train.recipe import changes, load_recipe
+    from motionloom.train.threads import set_threads
 
     for option in ("threads", "stop"):
         if getattr(arguments, option) is not None and getattr(arguments, option) < 1:
             raise MotionloomError(f"--{option} must be 1 or more; got {getattr(arguments, option)}")
     if arguments.threads:
-        torch.set_num_threads(arguments.threads)
+        set_threads(arguments.threads)
     return load_recipe(arguments.recipe, changes(arguments.set))

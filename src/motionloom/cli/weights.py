@@ -36,10 +36,20 @@ def add(subparsers) -> None:
     parser.add_argument("--half", action="store_true", help="write float16: half the size, nearly the same numbers")
     add_force(parser)
     parser.set_defaults(run=_import)
-    parser = subparsers.add_parser("weights", help="what a weight file holds, or which ones ship with motionloom")
-    parser.add_argument(
-        "weights", nargs="?", metavar="NAME|FILE", help="a shipped name or a file (default: list the shipped)"
+    parser = subparsers.add_parser(
+        "weights", help="what a weight file holds, or which ones ship with motionloom; older files as ones of today"
     )
+    parser.add_argument(
+        "weights",
+        nargs="*",
+        metavar="NAME|FILE",
+        help="a shipped name or a file (default: list the shipped); or: convert OLD.safetensors NEW.safetensors, which "
+        "writes the graphs of its networks into a file that has none",
+    )
+    parser.add_argument(
+        "--prior", type=Path, metavar="FILE", help="to convert a two-person block: the prior it belongs to, if not ours"
+    )
+    add_force(parser)
     parser.add_argument("--actions", action="store_true", help="list what a prior has learned, with seconds of each")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(run=_weights)
@@ -130,15 +140,25 @@ def _numbers(path: Path) -> "np.ndarray":
 
 
 def _weights(arguments: argparse.Namespace) -> None:
+    from motionloom.errors import MotionloomError
     from motionloom.weights.pair import blocks
     from motionloom.weights.predictor import shipped_predictors
     from motionloom.weights.prior import find_weights, shipped
 
+    if arguments.weights[:1] == ["convert"]:
+        _convert(arguments)
+        return
+    if len(arguments.weights) > 1:
+        raise MotionloomError(f"one weight file at a time; got {', '.join(arguments.weights)}")
+    if arguments.prior is not None:
+        raise MotionloomError(
+            "--prior belongs to 'motionloom weights convert', which makes files of today from older ones"
+        )
     if arguments.actions:
         _actions(arguments)
         return
     names = blocks() | shipped_predictors() | shipped()
-    if arguments.weights is None:
+    if not arguments.weights:
         described = [describe(path, name) for name, path in names.items()]
         if arguments.json:
             print(json.dumps(described, indent=1))
@@ -148,9 +168,35 @@ def _weights(arguments: argparse.Namespace) -> None:
         if not described:
             print("no weights ship with this installation; name a file")
         return
-    asked = str(arguments.weights)
+    [asked] = arguments.weights
     about = describe(names.get(asked) or find_weights(asked), asked if asked in names else None)
     print(json.dumps(about, indent=1) if arguments.json else _card(about))
+
+
+def _convert(arguments: argparse.Namespace) -> None:
+    """Write an older file again with graphs; raises MotionloomError where it cannot be, or PyTorch is missing."""
+    from motionloom.errors import MotionloomError
+    from motionloom.io.atomic import check_place
+
+    if len(arguments.weights) != 3 or arguments.actions or arguments.json:
+        raise MotionloomError(
+            "say which file to read and which to write: motionloom weights convert OLD NEW.safetensors"
+        )
+    old, new = map(Path, arguments.weights[1:])
+    if new.suffix != ".safetensors":
+        raise MotionloomError(f"weights are written as .safetensors; {new.name} has another suffix")
+    if not old.is_file():
+        raise MotionloomError(f"there is no file {old} to convert")
+    check_place(new)
+    check_overwriting(arguments, [new], also=[old])
+    try:
+        from motionloom.train.convert import convert
+    except ImportError as error:
+        raise MotionloomError(
+            f"graphs are written by the training package, and {error.name or 'it'} is not installed: "
+            "pip install motionloom-train"
+        ) from None
+    print(f"wrote {convert(old, new, prior=arguments.prior)}")
 
 
 def _actions(arguments: argparse.Namespace) -> None:
@@ -158,10 +204,11 @@ def _actions(arguments: argparse.Namespace) -> None:
     from motionloom.errors import MotionloomError
     from motionloom.weights.prior import Prior
 
-    known = Prior.load(arguments.weights or "default").known
+    weights = arguments.weights[0] if arguments.weights else "default"
+    known = Prior.load(weights).known
     if known is None:
         raise MotionloomError(
-            f"the weights {arguments.weights or 'default'!r} do not say what they have learned: they are older than "
+            f"the weights {weights!r} do not say what they have learned: they are older than "
             "such tables; their card says which recordings they know"
         )
     if arguments.json:
@@ -215,7 +262,7 @@ def _network(
         "licence": whole.card.licence,
         "data": whole.card.data,
         "variant": variant,
-        "parameters": sum(p.numel() for p in whole.net.parameters()),
+        "parameters": sum(value.size for value in whole.net.weights.values()),
         "sizes": {"layers": config.layers, "width": config.width, "heads": config.heads} | sizes,
         **seen,
         "frames_per_second": whole.fps,
@@ -234,7 +281,7 @@ def _block(path: Path) -> dict[str, Any]:
         "licence": block.licence,
         "data": block.data,
         "variant": "aware" if config.aware else f"corrects {config.adds}",
-        "parameters": sum(value.numel() for value in block.tensors.values()),
+        "parameters": sum(value.size for value in block.tensors.values()),
         "sizes": {"layers": config.layers, "behind": config.split, "width": config.width, "heads": config.heads},
         "belongs_to": {"name": block.base, "fingerprint": block.fingerprint},
         "notes": block.notes,
@@ -251,7 +298,7 @@ def _adapter(path: Path) -> dict[str, Any]:
         "licence": adapter.licence,
         "data": adapter.data,
         "variant": "low rank" if adapter.taught else f"low rank, {adapter.control}",
-        "parameters": sum(value.numel() for value in adapter.tensors.values()),
+        "parameters": sum(value.size for value in adapter.tensors.values()),
         "sizes": {"rank": adapter.rank} | ({"given rank": adapter.given_rank} if adapter.sees_given else {}),
         "belongs_to": {"name": adapter.base, "fingerprint": adapter.fingerprint},
         "notes": adapter.notes,

@@ -1,11 +1,11 @@
-"""Diffusion on plain tensors: schedules, solvers, one sampling loop, and the two kinds of edits.
+"""Diffusion on plain arrays: schedules, solvers, one sampling loop, and the two kinds of edits.
 
 Nothing here knows about motion. Read `schedule`, `solvers`, `sampling`, then `denoisers` and `constraints`.
 """
 
 from .bases import Basis, Dct, Frames
 from .constraints import Constraint, chain, handshake, observe
-from .denoisers import Denoiser, Weight, blend, from_noise, guide, inpaint, join_rows, mix
+from .denoisers import Denoiser, Weight, blend, from_noise, guide, inpaint, join_rows, lerp, mix
 from .sampling import Snapshot, masked_noise, restart, row_noise, row_seed, run, sample
 from .schedule import (
     SCHEDULES,
@@ -15,6 +15,7 @@ from .schedule import (
     State,
     cosine,
     from_betas,
+    generator,
     levels,
     linear,
     sigmoid,
@@ -49,10 +50,12 @@ __all__ = [
     "cosine",
     "from_betas",
     "from_noise",
+    "generator",
     "guide",
     "handshake",
     "inpaint",
     "join_rows",
+    "lerp",
     "levels",
     "linear",
     "masked_noise",

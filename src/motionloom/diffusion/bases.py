@@ -8,8 +8,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from .schedule import State
 
@@ -26,20 +25,20 @@ class Dct:
             raise ValueError(f"of {self.frames} frames 1 to {self.frames} frequencies can be kept, not {self.kept}")
 
     @cached_property
-    def matrix(self) -> Tensor:
+    def matrix(self) -> np.ndarray:
         """(kept, frames) float64, orthonormal rows: its transpose is the way back."""
-        k, i = torch.arange(self.kept, dtype=torch.float64)[:, None], torch.arange(self.frames, dtype=torch.float64)
-        rows = math.sqrt(2 / self.frames) * torch.cos(math.pi * (i + 0.5) * k / self.frames)
+        k, i = np.arange(self.kept)[:, None], np.arange(self.frames)
+        rows = math.sqrt(2 / self.frames) * np.cos(math.pi * (i + 0.5) * k / self.frames)
         rows[0] = math.sqrt(1 / self.frames)
         return rows
 
-    def to_spectrum(self, x: Tensor) -> State:
+    def to_spectrum(self, x: np.ndarray) -> State:
         """(..., frames, features) to (..., kept, features)."""
-        return self.matrix.to(x) @ x
+        return self.matrix.astype(x.dtype) @ x
 
-    def to_time(self, y: State) -> Tensor:
+    def to_time(self, y: State) -> np.ndarray:
         """(..., kept, features) to (..., frames, features), without what the dropped frequencies would add."""
-        return self.matrix.to(y).mT @ y
+        return self.matrix.astype(y.dtype).T @ y
 
 
 @dataclass(frozen=True)
@@ -53,11 +52,11 @@ class Frames:
         """All frames."""
         return self.frames
 
-    def to_spectrum(self, x: Tensor) -> State:
+    def to_spectrum(self, x: np.ndarray) -> State:
         """(..., frames, features) as it is."""
         return x
 
-    def to_time(self, y: State) -> Tensor:
+    def to_time(self, y: State) -> np.ndarray:
         """(..., frames, features) as it is."""
         return y
 

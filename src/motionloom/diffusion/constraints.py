@@ -8,8 +8,7 @@ chain      one after the other
 from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from .bases import Basis
 from .denoisers import mix
@@ -20,11 +19,11 @@ Constraint: TypeAlias = Callable[[State, int], State]
 
 
 def observe(
-    known: State, mask: Tensor, schedule: Schedule, noise: NoiseSource, *, basis: Basis | None = None
+    known: State, mask: np.ndarray, schedule: Schedule, noise: NoiseSource, *, basis: Basis | None = None
 ) -> Constraint:
     """Where `mask` is 1 (True) the state becomes signal * known + sigma * noise(known), at the level it reached.
 
-    With normal noise it is the known half of RePaint (Lugmayr et al. 2022, eq. 8a). With `noise=torch.zeros_like`
+    With normal noise it is the known half of RePaint (Lugmayr et al. 2022, eq. 8a). With `noise=np.zeros_like`
     it is the noise-filtered sampling of PriorMDM's fine-tuned control, where the network is shown the goal without
     noise. A soft mask mixes linearly. The loop does not edit the starting state: call the constraint on it first.
 
@@ -53,8 +52,8 @@ def handshake(lengths: Sequence[int], overlap: int) -> Constraint:
     def joined(x: State, level: int) -> State:
         if len(lengths) != len(x) or max(lengths) > x.shape[1]:
             raise ValueError(f"lengths {list(lengths)} do not fit a state of {len(x)} rows of {x.shape[1]} tokens")
-        x = x.clone()
-        a = (torch.arange(overlap, dtype=x.dtype, device=x.device) / overlap).view((-1,) + (1,) * (x.ndim - 2))
+        x = x.copy()
+        a = (np.arange(overlap, dtype=x.dtype) / overlap).reshape((-1,) + (1,) * (x.ndim - 2))
         for row in range(1, len(lengths)):
             end = slice(lengths[row - 1] - overlap, lengths[row - 1])
             shared = (1.0 - a) * x[row - 1, end] + a * x[row, :overlap]

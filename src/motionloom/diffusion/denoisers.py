@@ -12,24 +12,23 @@ are the ways to bind and to edit:
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias, TypeVar
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from .schedule import Schedule, State
 
 Denoiser: TypeAlias = Callable[[State, int], State]
 """(state, its level) -> estimate of the clean data, of the same shape."""
 
-Weight: TypeAlias = float | Tensor | Callable[[int], float | Tensor]
-"""A factor of an estimate: a number, a tensor that broadcasts to the state, or either as a function of the level."""
+Weight: TypeAlias = float | np.ndarray | Callable[[int], float | np.ndarray]
+"""A factor of an estimate: a number, an array that broadcasts to the state, or either as a function of the level."""
 
 C = TypeVar("C")
 
 
 def join_rows(first: Any, second: Any) -> Any:
-    """The rows of two conditions, one after the other: tensors, None, and (named) tuples of such."""
-    if isinstance(first, Tensor):
-        return torch.cat([first, second])
+    """The rows of two conditions, one after the other: arrays, None, and (named) tuples of such."""
+    if isinstance(first, np.ndarray):
+        return np.concatenate([first, second])
     if isinstance(first, tuple):
         parts = [join_rows(a, b) for a, b in zip(first, second, strict=True)]
         return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
@@ -42,7 +41,7 @@ def guide(
     net: Callable[[State, int, C], State],
     cond: C,
     null: C,
-    scale: float | Tensor,
+    scale: float | np.ndarray,
     *,
     join: Callable[[C, C], C] = join_rows,
 ) -> Denoiser:
@@ -50,41 +49,47 @@ def guide(
 
     `net(state, level, condition)` answers the clean data; `cond` and `null` hold one entry per row, with all that
     belongs to rows inside them (also lengths), because the network is shown (conditional rows, unconditional
-    rows). `join` puts two conditions behind each other; it is called once, here. `scale` is a number or a tensor
+    rows). `join` puts two conditions behind each other; it is called once, here. `scale` is a number or an array
     (rows,). Where every scale is 1 only the conditional pass is made, where every scale is 0 only the
     unconditional one; a row with scale 0 or 1 gets exactly that pass's answer beside any other rows.
     """
-    scales = torch.as_tensor(scale).detach().cpu().reshape(-1)
-    if not bool(torch.isfinite(scales).all()):
+    scales = np.asarray(scale, dtype=np.float64).reshape(-1)
+    if not np.isfinite(scales).all():
         raise ValueError("the guidance scale must be finite")
     for only, bound in ((0.0, null), (1.0, cond)):
-        if bool((scales == only).all()):
+        if (scales == only).all():
             return lambda x, level: net(x, level, bound)
     both = join(cond, null)
 
     def guided(x: State, level: int) -> State:
         if len(scales) not in (1, len(x)):
             raise ValueError(f"there are {len(scales)} guidance scales for {len(x)} rows: give one, or one per row")
-        conditional, unconditional = net(torch.cat([x, x]), level, both).to(x.dtype).chunk(2)
-        s = scales.to(x).view((-1,) + (1,) * (x.ndim - 1))
-        return torch.lerp(unconditional, conditional, s)  # exact at both ends
+        conditional, unconditional = np.split(net(np.concatenate([x, x]), level, both), 2)
+        s = scales.astype(x.dtype).reshape((-1,) + (1,) * (x.ndim - 1))
+        return lerp(unconditional, conditional, s)
 
     return guided
 
 
-def inpaint(denoise: Denoiser, known: State, mask: Tensor) -> Denoiser:
+def lerp(first: np.ndarray, second: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """first + share * (second - first), exact where the share is 0 or 1; it may be larger. The three broadcast."""
+    change = second - first
+    return np.where(share < 0.5, first + share * change, second - (1 - share) * change)
+
+
+def inpaint(denoise: Denoiser, known: State, mask: np.ndarray) -> Denoiser:
     """Holds the estimate to `known` where `mask` is 1 (True), leaves it alone at 0, mixes linearly in between."""
     return lambda x, level: mix(denoise(x, level), known, mask)
 
 
-def mix(free: State, known: State, mask: Tensor) -> State:
+def mix(free: State, known: State, mask: np.ndarray) -> State:
     """(1 - mask) * free + mask * known; a boolean mask selects. The three broadcast."""
-    if mask.dtype == torch.bool:
-        return torch.where(mask, known, free)
+    if mask.dtype == np.bool_:
+        return np.where(mask, known, free)
     return (1.0 - mask) * free + mask * known
 
 
-def from_noise(net: Callable[[State, int], Tensor], schedule: Schedule) -> Denoiser:
+def from_noise(net: Callable[[State, int], np.ndarray], schedule: Schedule) -> Denoiser:
     """The denoiser of a network that predicts the noise in the state (Ho et al. 2020, eq. 15)."""
 
     def denoise(x: State, level: int) -> State:
@@ -100,7 +105,7 @@ def blend(denoisers: Sequence[Denoiser], weights: Sequence[Weight]) -> Denoiser:
         raise ValueError(f"blending needs one weight per denoiser, got {len(weights)} for {len(denoisers)}")
 
     def blended(x: State, level: int) -> State:
-        total = torch.zeros_like(x)
+        total = np.zeros_like(x)
         for denoise, weight in zip(denoisers, weights):
             total = total + (weight(level) if callable(weight) else weight) * denoise(x, level)
         return total

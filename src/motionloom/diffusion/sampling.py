@@ -1,13 +1,12 @@
 """The sampling loop from noise to data: estimate the clean data, move to a cleaner level, and again.
 
     noise = row_noise(range(seed, seed + rows))
-    x = noise(torch.empty(rows, tokens, features))
+    x = noise(np.empty((rows, tokens, features), np.float32))
     motion = run(guide(net, text, nothing, 2.5), x, levels=levels(schedule, 20), solver=DpmSolver2M(),
                  schedule=schedule, noise=noise)
 
 There are two places to interfere: the denoiser (an edit of the denoised estimate, `denoisers`) and `constrain` (an
-edit of the state after each move, `constraints`). Gradients are the caller's affair: wrap a run in
-`torch.inference_mode()`.
+edit of the state after each move, `constraints`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,12 +14,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from .constraints import Constraint, chain
 from .denoisers import Denoiser
-from .schedule import NoiseSource, Schedule, State
+from .schedule import NoiseSource, Schedule, State, generator
 from .solvers import Solver, Step
 
 
@@ -94,26 +91,25 @@ def row_seed(seed: int, number: int, turn: int = 0) -> int:
 def row_noise(seeds: Sequence[int], lengths: Sequence[int] | None = None) -> NoiseSource:
     """Noise that belongs to rows: row i takes it from its own generator, seeded with `seeds[i]`.
 
-    So a row's noise does not depend on the other rows, on their count or order, or on the device: it is sampled
-    in float32 on the CPU and moved. With `lengths` (valid tokens per row) a row has noise for those tokens only and
+    So a row's noise does not depend on the other rows, on their count or order. With `lengths` (valid tokens per row) a row has noise for those tokens only and
     gets zeros behind them, so that its noise does not depend on the padding either.
     """
-    generators = [torch.Generator().manual_seed(seed) for seed in seeds]
+    generators = [generator(seed) for seed in seeds]
     if lengths is not None and len(lengths) != len(generators):
         raise ValueError(f"there are {len(lengths)} lengths for {len(generators)} seeds")
 
-    def noise(like: Tensor) -> Tensor:
+    def noise(like: State) -> State:
         if len(like) != len(generators):
             raise ValueError(f"noise for {len(like)} rows was asked of {len(generators)} seeds: give one seed per row")
-        sampled = torch.zeros(like.shape)
-        for row, generator in enumerate(generators):
+        sampled = np.zeros(like.shape, np.float32)
+        for row, own in enumerate(generators):
             valid = sampled[row] if lengths is None else sampled[row, : lengths[row]]
-            valid.copy_(torch.randn(valid.shape, generator=generator))
-        return sampled.to(like)
+            own.standard_normal(dtype=np.float32, out=valid)
+        return sampled.astype(like.dtype, copy=False)
 
     return noise
 
 
-def masked_noise(noise: NoiseSource, mask: Tensor) -> NoiseSource:
+def masked_noise(noise: NoiseSource, mask: np.ndarray) -> NoiseSource:
     """Noise scaled by (1 - mask): none where the state is to stay noise-free (noise-filtered control, soft too)."""
-    return lambda like: noise(like) * (1.0 - mask.to(like.dtype))
+    return lambda like: noise(like) * (1.0 - mask.astype(like.dtype))

@@ -5,8 +5,7 @@
 Level 0 is clean data (signal 1, noise 0); level T is almost pure noise. Published code counts t = 0 ... T-1
 without the clean level: published t is level t + 1, its `alphas_cumprod[t]` is `signal[t + 1] ** 2`.
 
-The tables are float64 on the CPU. `Schedule.at` gives Python floats, which leave the type and the device of the
-tensors they multiply alone.
+The tables are float64. `Schedule.at` gives Python floats, which leave the type of the arrays they multiply alone.
 """
 
 import bisect
@@ -17,14 +16,19 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TypeAlias
 
-import torch
-from torch import Tensor
+import numpy as np
 
-State: TypeAlias = Tensor
+State: TypeAlias = np.ndarray
 """What is denoised: (rows, tokens, features). Only the first axis, the rows of a batch, has a meaning here."""
 
-NoiseSource: TypeAlias = Callable[[Tensor], Tensor]
-"""Standard normal noise of the shape, type and device of its argument."""
+NoiseSource: TypeAlias = Callable[[State], State]
+"""Standard normal noise of the shape and type of its argument."""
+
+
+def generator(seed: int) -> np.random.Generator:
+    """Where the noise of one seed comes from: PCG64 (O'Neill 2014), the same on every machine."""
+    return np.random.Generator(np.random.PCG64(seed))
+
 
 SPACINGS = ("index", "early", "quadratic", "snr")
 """Ways to choose the levels of a short walk, see `levels`."""
@@ -35,7 +39,7 @@ class Schedule:
     """A variance-preserving noise schedule of T levels above clean."""
 
     name: str
-    betas: Tensor
+    betas: np.ndarray
     """(T,) float64: entry l - 1 is the share of the variance that going from level l - 1 to l replaces by noise."""
 
     @property
@@ -44,20 +48,19 @@ class Schedule:
         return len(self.betas)
 
     @cached_property
-    def alpha_bar(self) -> Tensor:
+    def alpha_bar(self) -> np.ndarray:
         """(T+1,) float64: the share of the variance that is signal, 1 at level 0."""
-        kept = torch.cumprod(1.0 - self.betas, dim=0)
-        return torch.cat([torch.ones(1, dtype=torch.float64), kept])
+        return np.concatenate([[1.0], np.cumprod(1.0 - self.betas)])
 
     @cached_property
-    def signal(self) -> Tensor:
+    def signal(self) -> np.ndarray:
         """(T+1,) float64, falling from 1."""
-        return self.alpha_bar.sqrt()
+        return np.sqrt(self.alpha_bar)
 
     @cached_property
-    def noise(self) -> Tensor:
+    def noise(self) -> np.ndarray:
         """(T+1,) float64, rising from 0."""
-        return (1.0 - self.alpha_bar).sqrt()
+        return np.sqrt(1.0 - self.alpha_bar)
 
     @cached_property
     def _pairs(self) -> list[tuple[float, float]]:
@@ -75,19 +78,18 @@ class Schedule:
             return math.inf
         return math.log(signal / noise) if signal > 0.0 else -math.inf
 
-    def noised(self, clean: State, level: int | Tensor, noise: Tensor) -> State:
+    def noised(self, clean: State, level: int | np.ndarray, noise: State) -> State:
         """Clean data taken to a level with the given noise (Ho et al. 2020, eq. 4).
 
-        `level` is one number, or an integer tensor (rows,) with one level per row, as in training.
+        `level` is one number, or whole numbers (rows,), one for each row.
         """
         if isinstance(level, int):
             a, b = self.at(level)
             return a * clean + b * noise
-        if level.device.type == "cpu":  # elsewhere looking would stall the device
-            self.check(int(level.min()))
-            self.check(int(level.max()))
+        self.check(int(level.min()))
+        self.check(int(level.max()))
         shape = (-1,) + (1,) * (clean.ndim - 1)
-        a, b = (table.to(clean)[level.to(clean.device)].view(shape) for table in (self.signal, self.noise))
+        a, b = (table.astype(clean.dtype)[level].reshape(shape) for table in (self.signal, self.noise))
         return a * clean + b * noise
 
     def check(self, level: int) -> None:
@@ -96,10 +98,10 @@ class Schedule:
             raise ValueError(f"no level {level}; the {self.name} schedule has levels 0 (clean) to {self.steps}")
 
 
-def from_betas(name: str, betas: Sequence[float] | Tensor) -> Schedule:
+def from_betas(name: str, betas: Sequence[float] | np.ndarray) -> Schedule:
     """A schedule from its T betas, each in (0, 1]."""
-    table = torch.as_tensor(betas, dtype=torch.float64).cpu().clone()
-    if table.ndim != 1 or not len(table) or not bool(((table > 0) & (table <= 1)).all()):
+    table = np.array(betas, dtype=np.float64)
+    if table.ndim != 1 or not len(table) or not ((table > 0) & (table <= 1)).all():
         raise ValueError(f"the betas of schedule {name!r} must be a list of numbers in (0, 1]")
     return Schedule(name, table)
 
@@ -133,7 +135,7 @@ def linear(steps: int) -> Schedule:
     """The linear schedule (Ho et al. 2020), 1e-4 ... 0.02 at 1000 steps, scaled by 1000 / steps and cut at 0.999."""
     _check_steps(steps)
     scale = 1000 / steps
-    return from_betas("linear", torch.linspace(scale * 1e-4, scale * 0.02, steps, dtype=torch.float64).clamp(max=0.999))
+    return from_betas("linear", np.linspace(scale * 1e-4, scale * 0.02, steps).clip(max=0.999))
 
 
 SCHEDULES: Mapping[str, Callable[[int], Schedule]] = MappingProxyType(

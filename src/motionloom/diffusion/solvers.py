@@ -32,8 +32,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
-from torch import Tensor
-
 from .schedule import NoiseSource, Schedule, State
 
 Step: TypeAlias = Callable[[State, State, int, int, NoiseSource], State]
@@ -130,7 +128,7 @@ SOLVERS: Mapping[str, Solver] = MappingProxyType(
 """Solvers by the names that commands and recipes use."""
 
 
-def _extrapolate(clean: Tensor, before: tuple[Tensor, float] | None, h: float) -> Tensor:
+def _extrapolate(clean: State, before: tuple[State, float] | None, h: float) -> State:
     if before is None or math.isinf(h) or math.isinf(before[1]):
         return clean
     last, length = before

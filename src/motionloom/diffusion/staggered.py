@@ -15,10 +15,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-import torch
-from torch import Tensor
+import numpy as np
 
-from .schedule import NoiseSource, Schedule, State
+from .denoisers import lerp
+from .schedule import NoiseSource, Schedule, State, generator
 from .solvers import Solver, Step
 
 
@@ -37,18 +37,18 @@ class Link:
 class _Row:
     link: Link
     step: Step
-    generator: torch.Generator
+    generator: np.random.Generator
     state: State
     done: int = 0
     """Moves made."""
-    sampled: dict[int, Tensor] = field(default_factory=dict)
+    sampled: dict[int, State] = field(default_factory=dict)
     """The row's own noise by the move it is for (0: the start), as long as it or the next row needs it."""
     draws: int = 0
 
-    def noise(self, move: int, features: int) -> Tensor:
+    def noise(self, move: int, features: int) -> State:
         """(length, features) sampled in order, so that the noise of a move does not depend on who asks first."""
         while self.draws <= move:
-            self.sampled[self.draws] = torch.randn((self.link.length, features), generator=self.generator)
+            self.sampled[self.draws] = self.generator.standard_normal((self.link.length, features), np.float32)
             self.draws += 1
         return self.sampled[move]
 
@@ -58,7 +58,7 @@ class _Row:
         for old in [move for move in self.sampled if move <= self.done]:
             used = self.sampled.pop(old)
             if old >= self.done - 1:
-                self.sampled[old] = used[-max(self.link.overlap, 1) :].clone()
+                self.sampled[old] = used[-max(self.link.overlap, 1) :].copy()
 
 
 RowsDenoiser = Callable[[Sequence[int], Sequence[State], Sequence[int]], Sequence[State]]
@@ -79,7 +79,7 @@ def staggered(
     """Clean rows (length, features) in order, overlaps included twice; the copies of an overlap are equal.
 
     ``links`` is read as the walk gets there. ``batch_size``: rows per network call at most. ``moved`` is called with
-    how many rows made a move. Rows live where the estimates do, on any device. Raises ValueError where the overlaps of
+    how many rows made a move. Raises ValueError where the overlaps of
     a row do not fit into it, and for levels that do not fall.
     """
     if len(levels) < 2 or any(s >= t for t, s in pairwise(levels)) or batch_size < 1:
@@ -122,7 +122,7 @@ class _Chain:
         before = self.rows.get(number - 1)
         if before is not None:
             self._check(number - 1, before.link, link)
-        row = _Row(link, self.solver.start(self.schedule), torch.Generator().manual_seed(link.seed), torch.empty(0))
+        row = _Row(link, self.solver.start(self.schedule), generator(link.seed), np.empty(0))
         self.rows[number] = row
         row.state = self._noise(number, 0)
         return True
@@ -157,7 +157,7 @@ class _Chain:
         cleans = self.denoise(numbers, [row.state for row in rows], at)
         for number, row, clean, level in zip(numbers, rows, cleans, at, strict=True):
             noise = self._noise_of(number, row.done + 1)
-            row.state = row.step(row.state.to(clean), clean, level, self.levels[row.done + 1], noise)
+            row.state = row.step(row.state, clean, level, self.levels[row.done + 1], noise)
             row.moved()
         for number in numbers:
             self._shake(number - 1, number)
@@ -171,19 +171,19 @@ class _Chain:
         if a is None or b is None or a.done != b.done or not a.link.overlap:
             return
         h = a.link.overlap
-        weight = (torch.arange(h, dtype=a.state.dtype, device=a.state.device) / h)[:, None]
-        shared = torch.lerp(a.state[-h:], b.state[:h], weight)
-        a.state = torch.cat([a.state[:-h], shared])
-        b.state = torch.cat([shared, b.state[h:]])
+        weight = (np.arange(h, dtype=a.state.dtype) / h)[:, None]
+        shared = lerp(a.state[-h:], b.state[:h], weight)
+        a.state = np.concatenate([a.state[:-h], shared])
+        b.state = np.concatenate([shared, b.state[h:]])
 
     def _noise_of(self, number: int, move: int) -> NoiseSource:
-        return lambda like: self._noise(number, move).to(like)
+        return lambda like: self._noise(number, move).astype(like.dtype, copy=False)
 
-    def _noise(self, number: int, move: int) -> Tensor:
+    def _noise(self, number: int, move: int) -> State:
         """The row's noise for a move: its own, but that of the row before where they overlap."""
         row, before = self.rows[number], self.rows.get(number - 1)
         own = row.noise(move, self.features)
         if before is None or not before.link.overlap:
             return own
         h = before.link.overlap
-        return torch.cat([before.noise(move, self.features)[-h:], own[h:]])
+        return np.concatenate([before.noise(move, self.features)[-h:], own[h:]])

@@ -5,12 +5,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from motionloom import rotations as rot
 from motionloom.blending import cubic_decay
@@ -18,7 +16,6 @@ from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT
 
 Array = NDArray[np.float64]
-Numbers = TypeVar("Numbers", bound=Any)
 
 JOIN = 10
 """Frames over which what the network samples goes over from the known frames' course to its own."""
@@ -48,12 +45,12 @@ class InpaintWindow:
 
 
 def match_boundary(
-    lack: Numbers, slope: Numbers, frames: int, *, first: int = 1, decay: Callable[[Any], Any] = cubic_decay
-) -> Numbers:
+    lack: np.ndarray, slope: np.ndarray, frames: int, *, first: int = 1, decay: Callable[[Any], Any] = cubic_decay
+) -> np.ndarray:
     """What to add to the frames beside a boundary, so that neither value nor velocity jumps there.
 
     Args:
-        lack: (...) what the sampled motion lacks to the known one at the boundary, an array or a tensor.
+        lack: (...) what the sampled motion lacks to the known one at the boundary.
         slope: (...) by how much that grows per frame on the way to the boundary.
         frames: over how many frames both die down to nothing.
         first: 1: the boundary is the last known frame; 0: it is the first sampled frame, which lacks so much.
@@ -62,11 +59,8 @@ def match_boundary(
     Returns:
         (frames, ...) for the frames one after the other, away from the boundary.
     """
-    shape, over = (frames, *[1] * lack.ndim), frames + first
-    if isinstance(lack, Tensor):
-        u = torch.arange(first, over, device=lack.device, dtype=lack.dtype).reshape(shape) / max(over, 1)
-    else:
-        u = np.arange(first, over).reshape(shape) / max(over, 1)
+    over = frames + first
+    u = np.arange(first, over, dtype=lack.dtype).reshape(frames, *[1] * lack.ndim) / max(over, 1)
     value, change = decay(u)
     return value * lack + change * over * slope
 
@@ -89,7 +83,7 @@ def match_rotations(made: Array, known: Array, border: int, step: int, frames: i
     return result
 
 
-def arrival(known: Tensor, mask: Tensor, window: InpaintWindow) -> Callable[[Tensor], Tensor]:
+def arrival(known: np.ndarray, mask: np.ndarray, window: InpaintWindow) -> Callable[[np.ndarray], np.ndarray]:
     """A function that bends the root's free velocities so that facing and place at frame ``last`` are the known ones.
 
     On features (rows, frames, 263), not standardised. What is missing is spread over the stretch as sin², so that
@@ -97,17 +91,17 @@ def arrival(known: Tensor, mask: Tensor, window: InpaintWindow) -> Callable[[Ten
     """
     first, last = window.first, window.last
     tied = (window.facing or window.place) and first > 0 and last < known.shape[1]
-    if not tied or bool(mask[:, first:last, :3].any()):
+    if not tied or mask[:, first:last, :3].any():
         return lambda features: features
-    share = torch.sin(torch.pi * (torch.arange(last - first, device=known.device) + 0.5) / (last - first)) ** 2
-    share = share / share.sum()
+    share = np.sin(np.pi * (np.arange(last - first) + 0.5) / (last - first)) ** 2
+    share = (share / share.sum()).astype(known.dtype)
     goal = humanml.recover_root(known)[1][:, last]
 
-    def arrive(features: Tensor) -> Tensor:
-        bent = features.clone()
+    def arrive(features: np.ndarray) -> np.ndarray:
+        bent = features.copy()
         if window.facing:
             lacking = (known - features)[:, first:last, 0].sum(1)
-            lacking = lacking - torch.pi * (lacking / torch.pi).round()
+            lacking = lacking - np.pi * (lacking / np.pi).round()
             bent[:, first:last, 0] += share * lacking[:, None]
         if window.place:
             turn, root = humanml.recover_root(bent)
@@ -123,7 +117,7 @@ def arrival(known: Tensor, mask: Tensor, window: InpaintWindow) -> Callable[[Ten
     return arrive
 
 
-def joining(known: Tensor, mask: Tensor, first: int, last: int) -> Callable[[Tensor], Tensor]:
+def joining(known: np.ndarray, mask: np.ndarray, first: int, last: int) -> Callable[[np.ndarray], np.ndarray]:
     """A function that bends the free numbers so that they leave the known ones, and come to them, without a jump.
 
     On features (rows, frames, 263), not standardised; ``mask`` is True at known ones, the stretch is ``first`` to
@@ -136,15 +130,15 @@ def joining(known: Tensor, mask: Tensor, first: int, last: int) -> Callable[[Ten
     free[..., LAYOUT["contacts"]] = False
     borders = [(first - 1, 1)] * (first >= 2) + [(last, -1)] * (last <= frames - 2)
 
-    def join(features: Tensor) -> Tensor:
-        bent = features.clone()
+    def join(features: np.ndarray) -> np.ndarray:
+        bent = features.copy()
         for border, step in borders if reach >= 2 else ():
             pace = known[:, border] - known[:, border - step]
             start = border + step
             lack = known[:, border] + pace - features[:, start]
             slope = pace - (features[:, start + step] - features[:, start])
-            at = start + step * torch.arange(reach, device=known.device)
-            bent[:, at] += match_boundary(lack, slope, reach, first=0).transpose(0, 1)
-        return torch.where(free, bent, features)
+            at = start + step * np.arange(reach)
+            bent[:, at] += match_boundary(lack, slope, reach, first=0).swapaxes(0, 1)
+        return np.where(free, bent, features)
 
     return join

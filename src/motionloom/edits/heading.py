@@ -5,9 +5,7 @@ together. A foot that stands does not turn with them: legs are moved so that it 
 """
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from motionloom.blending import smoothstep
 from motionloom.edits.steering import Correction, product, standing
@@ -32,13 +30,12 @@ def heading_for(direction: float, prior: Prior, *, first: int) -> Correction:
     direction: radians, seen from where the person stands and faces at row frame ``first``. The turn begins there and
     takes `SOONEST` to `LONGEST` frames. How long, and which of two ways round, the first estimate decides.
     """
-    mean = prior.mean.cpu().double().numpy()
-    spread = torch.where(prior.std > 0, prior.std, 1.0).cpu().double().numpy()
+    mean, spread = prior.mean.astype(np.float64), prior.spread.astype(np.float64)
     before: list[float] = []  # the turn that was made of the estimate before
     over: list[float] = []
 
-    def correct(denoised: Tensor, level: int) -> Tensor:
-        features = denoised.detach().cpu().double().numpy() * spread + mean
+    def correct(denoised: np.ndarray, level: int) -> np.ndarray:
+        features = denoised * spread + mean
         way = _ways(features, first)
         lack = np.unwrap(np.asarray(turn_between(direction, np.angle(way))))
         middle = float(np.median(lack))
@@ -48,12 +45,11 @@ def heading_for(direction: float, prior: Prior, *, first: int) -> Correction:
         if not over:
             over.append(SOONEST + (LONGEST - SOONEST) * min(abs(before[0]) / np.pi, 1.0))
         turn = np.concatenate([np.zeros(first), lack * smoothstep(np.arange(len(lack)) / over[0])])
-        changed = denoised.clone()
-        step = torch.from_numpy(-np.diff(turn) / 2 / spread[0]).to(denoised)
-        changed[: len(step), 0] += step
+        changed = denoised.copy()
+        changed[: len(turn) - 1, 0] -= (np.diff(turn) / 2 / spread[0]).astype(denoised.dtype)
         turned = _moved_along(denoised, changed, prior)
-        features = standing(turned.detach().cpu().double().numpy() * spread + mean, first)
-        return torch.from_numpy((features - mean) / spread).to(denoised)
+        features = standing(turned * spread + mean, first)
+        return ((features - mean) / spread).astype(denoised.dtype)
 
     return correct
 
@@ -71,10 +67,9 @@ def _ways(features: Array, first: int) -> NDArray[np.complex128]:
     return way * np.exp(-1j * facing[first])
 
 
-def _moved_along(old: Tensor, new: Tensor, prior: Prior) -> Tensor:
+def _moved_along(old: np.ndarray, new: np.ndarray, prior: Prior) -> np.ndarray:
     """``new`` with the displacements of the joints changed as its root was."""
-    spread = torch.where(prior.std > 0, prior.std, 1.0)
-    before, after = (humanml.displacements((part * spread + prior.mean)[None])[0] for part in (old, new))
-    result = new.clone()
-    result[:-1, LAYOUT["joint_velocity"]] += (after - before).flatten(1) / spread[LAYOUT["joint_velocity"]]
+    before, after = (humanml.displacements(part * prior.spread + prior.mean) for part in (old, new))
+    result, block = new.copy(), LAYOUT["joint_velocity"]
+    result[:-1, block] += (after - before).reshape(len(new) - 1, -1) / prior.spread[block]
     return result

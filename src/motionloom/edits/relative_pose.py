@@ -11,16 +11,13 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-import torch
-from torch import Tensor
-from torch.nn import functional as F
 
 from motionloom.diffusion import row_noise, row_seed
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
-from motionloom.ground import compose, relative
-from motionloom.nets.pair import PLACE, PairNet, join, part
-from motionloom.nets.prior import Bound
+from motionloom.ground import compose, relative, stack
+from motionloom.runtime.pair import PLACE, PairSession, join, part
+from motionloom.runtime.prior_condition import Bound
 from motionloom.weights.prior import Prior
 
 SPACING = 40
@@ -33,17 +30,17 @@ SURE = 40
 """Frames behind a past of both that stay as they are: their momentum says more than the block does."""
 
 
-PoseGuidance: TypeAlias = Callable[[Tensor, Tensor, int], Tensor]
+PoseGuidance: TypeAlias = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
 """(states (rows, 1 + frames, 263), their denoised estimates, level) -> the estimates, changed."""
 
 
 def relative_pose_guidance(
     prior: Prior,
-    net: PairNet,
+    net: PairSession,
     bound: Bound,
     *,
     seeds: Sequence[int],
-    mask: Tensor,
+    mask: np.ndarray,
     frozen: Sequence[bool],
     weight: float = 1.0,
 ) -> PoseGuidance:
@@ -58,18 +55,17 @@ def relative_pose_guidance(
         frozen: who is not moved, as those are not whose frames are all known; then the other goes all of the way.
         weight: share of the way, 0 to 1.
     """
-    silent = not any(bool(value.any()) for value in net.talk.place.parameters())
-    if not weight or silent or net.talk.config.places.kind != "mutual":
+    if not weight or net.silent or net.places.kind != "mutual":
         return lambda state, denoised, level: denoised
-    known = mask[:, 1:, :3].all(dim=-1)
-    both = known.unflatten(0, (-1, 2)).all(dim=1)
+    known = mask[:, 1:, :3].all(axis=-1)
+    both = people(known).all(axis=1)
     given = [kept or bool(row.all()) for kept, row in zip(frozen, known, strict=True)]
-    past = both.cumprod(dim=1).sum(dim=1).tolist()
+    past = both.cumprod(axis=1).sum(axis=1).tolist()
     places = Places.of(seeds, known.shape[1], [count + SURE if count else 0 for count in past], given)
 
-    def guided(state: Tensor, denoised: Tensor, level: int) -> Tensor:
+    def guided(state: np.ndarray, denoised: np.ndarray, level: int) -> np.ndarray:
         made = places.guided(prior, net, bound, state=state, denoised=denoised, level=level, weight=weight)
-        return torch.where(mask, denoised, made)
+        return np.where(mask, denoised, made)
 
     return guided
 
@@ -80,11 +76,11 @@ class Places:
 
     anchors: tuple[tuple[int, ...], ...]
     """Frames of each pair."""
-    spread: tuple[Tensor, ...]
+    spread: tuple[np.ndarray, ...]
     """(frames, anchors) of each pair: how much of what is done at an anchor is done in a frame."""
-    shares: Tensor
+    shares: np.ndarray
     """(pairs, 2) how much of the way each person goes."""
-    noise: Tensor
+    noise: np.ndarray
     """(2 * all anchors, 4) of the numbers of D."""
 
     @staticmethod
@@ -93,55 +89,70 @@ class Places:
         stays as it is."""
         anchors = tuple(_anchors(begin, frames) for begin in begins)
         spread = tuple(_spread([begin, *some], frames) for some, begin in zip(anchors, begins, strict=True))
-        free = 1.0 - torch.tensor([float(one) for one in given]).view(-1, 2)
-        shares = free / free.sum(1, keepdim=True).clamp(min=1.0)
+        free = 1.0 - np.array(given, dtype=np.float32).reshape(-1, 2)
+        shares = free / free.sum(1, keepdims=True).clip(min=1.0)
         most = max(len(some) for some in anchors)
-        noise = row_noise([row_seed(seed, 0, 2) for seed in seeds])(torch.zeros(len(seeds), max(most, 1), PLACE))
-        noise = [noise[2 * i : 2 * i + 2, : len(some)].transpose(0, 1).flatten(0, 1) for i, some in enumerate(anchors)]
-        return Places(anchors, spread, shares, torch.cat(noise))
+        shape = len(seeds), max(most, 1), PLACE
+        noise = row_noise([row_seed(seed, 0, 2) for seed in seeds])(np.empty(shape, np.float32))
+        own = [noise[2 * i : 2 * i + 2, : len(some)].swapaxes(0, 1) for i, some in enumerate(anchors)]
+        return Places(anchors, spread, shares, np.concatenate([one.reshape(-1, PLACE) for one in own]))
 
     def guided(
-        self, prior: Prior, net: PairNet, bound: Bound, *, state: Tensor, denoised: Tensor, level: int | Tensor,
+        self,
+        prior: Prior,
+        net: PairSession,
+        bound: Bound,
+        *,
+        state: np.ndarray,
+        denoised: np.ndarray,
+        level: int | np.ndarray,
         weight: float,
-    ) -> Tensor:  # fmt: skip
+    ) -> np.ndarray:
         """Estimates (rows, 1 + frames, 263) of states at a level, changed; ``level``: one, or one per row."""
         owner = [pair for pair, some in enumerate(self.anchors) for _ in some]
         if not owner or not self.shares.any():
             return denoised
-        code, spread = net.talk.config.places, torch.where(prior.std > 0, prior.std, 1.0)
+        code = net.places
         places, motion = part(denoised)
-        features = motion * spread + prior.mean
-        poses = code.decode(places.unflatten(0, (-1, 2)))
-        ways = compose(poses.flatten(0, 1)[:, None], two.along(features)).unflatten(0, (-1, 2))
+        features = motion * prior.spread + prior.mean
+        poses = code.decode(people(places))
+        ways = people(compose(poses.reshape(-1, 1, PLACE), two.along(features)))
         at = [anchor for some in self.anchors for anchor in some]
-        now = torch.stack([ways[pair, :, frame] for pair, frame in zip(owner, at, strict=True)])
-        rows = torch.tensor([2 * pair + person for pair in owner for person in (0, 1)], device=denoised.device)
+        now = np.stack([ways[pair, :, frame] for pair, frame in zip(owner, at, strict=True)])
+        rows = np.array([2 * pair + person for pair in owner for person in (0, 1)])
         levels = level if isinstance(level, int) else level[rows]
-        noised = prior.schedule.noised(code.encode(now).flatten(0, 1), levels, self.noise.to(denoised))
+        noised = prior.schedule.noised(code.encode(now).reshape(-1, PLACE), levels, self.noise)
         crops, lengths = _crops(state[:, 1:], rows.tolist(), [frame for frame in at for _ in (0, 1)])
         asked = Bound(*(one[rows] for one in bound))._replace(lengths=lengths)
         answer, _ = part(net(join(noised, crops), levels, asked))
-        lacking = _lacking(now, code.decode(answer.unflatten(0, (-1, 2)))) * weight
-        return join(places, (self._moved(features, ways, lacking) - prior.mean) / spread)
+        lacking = _lacking(now, code.decode(people(answer))) * weight
+        return join(places, (self._moved(features, ways, lacking) - prior.mean) / prior.spread)
 
-    def _moved(self, features: Tensor, ways: Tensor, lacking: Tensor) -> Tensor:
+    def _moved(self, features: np.ndarray, ways: np.ndarray, lacking: np.ndarray) -> np.ndarray:
         """Features (rows, frames, 263) with what lacks at the anchors (all anchors, 3): facing, x and z."""
         made, start = [], 0
         for pair, (some, spread) in enumerate(zip(self.anchors, self.spread, strict=True)):
-            change = spread.to(features) @ lacking[start : start + len(some)]
+            change = spread @ lacking[start : start + len(some)]
             start += len(some)
             for person, sign in ((0, -1.0), (1, 1.0)):
                 share = sign * float(self.shares[pair, person])
                 made.append(_along(features[2 * pair + person], ways[pair, person], share * change))
-        return torch.stack(made)
+        return np.stack(made)
 
 
-def _crops(motion: Tensor, rows: Sequence[int], begins: Sequence[int]) -> tuple[Tensor, Tensor]:
+def people(rows: np.ndarray) -> np.ndarray:
+    """Rows (2 * pairs, ...) of people as (pairs, 2, ...)."""
+    return rows.reshape(-1, 2, *rows.shape[1:])
+
+
+def _crops(motion: np.ndarray, rows: Sequence[int], begins: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """What of a motion (some rows, frames, 263) is in ``rows`` from frames ``begins`` on, padded; and how long."""
     crops = [motion[row, begin : begin + SHOWN] for row, begin in zip(rows, begins, strict=True)]
     lengths = [len(crop) for crop in crops]
-    padded = [F.pad(crop, (0, 0, 0, max(lengths) - len(crop))) for crop in crops]
-    return torch.stack(padded), torch.tensor(lengths, device=motion.device)
+    padded = np.zeros((len(crops), max(lengths), motion.shape[-1]), motion.dtype)
+    for row, crop in zip(padded, crops, strict=True):
+        row[: len(crop)] = crop
+    return padded, np.array(lengths)
 
 
 def _anchors(begin: int, frames: int) -> tuple[int, ...]:
@@ -151,47 +162,45 @@ def _anchors(begin: int, frames: int) -> tuple[int, ...]:
     return tuple(begin + round(room * number / count) for number in range(1, count + 1))
 
 
-def _spread(at: Sequence[int], frames: int) -> Tensor:
+def _spread(at: Sequence[int], frames: int) -> np.ndarray:
     """(frames, anchors), from the begin and the anchors behind it: smooth curves, 1 at the own anchor, 0 at the others
     and at the begin; level behind the last."""
     if len(at) == 1:
-        return torch.zeros(frames, 0)
+        return np.zeros((frames, 0), np.float32)
     along = np.interp(np.arange(frames), at, np.arange(len(at)))
-    return torch.from_numpy(positions_at(np.eye(len(at))[..., None], along)[:, 1:, 0]).float()
+    return positions_at(np.eye(len(at))[..., None], along)[:, 1:, 0].astype(np.float32)
 
 
-def _lacking(now: Tensor, asked: Tensor) -> Tensor:
+def _lacking(now: np.ndarray, asked: np.ndarray) -> np.ndarray:
     """(rows, 3): what the second person's facing, x and z lack, relative to the first; from poses (rows, 2, 4)."""
     first, second = now[:, 0], now[:, 1]
     there = relative(asked[:, 0], asked[:, 1])
     turn = relative(relative(first, second), there)
-    angle = torch.atan2(turn[:, 1], turn[:, 0])
+    angle = np.arctan2(turn[:, 1], turn[:, 0])
     first, second = _turned(first, -angle / 2), _turned(second, angle / 2)
     line = compose(first, there)[:, 2:] - first[:, 2:]
-    return torch.cat([angle[:, None], line - (second - first)[:, 2:]], dim=1)
+    return np.concatenate([angle[:, None], line - (second - first)[:, 2:]], axis=1)
 
 
-def _turned(poses: Tensor, angle: Tensor) -> Tensor:
+def _turned(poses: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Ground poses (rows, 4) of people who turn on the spot, in radians (rows,) to their left."""
-    c, s = angle.cos(), angle.sin()
-    return torch.stack(
-        [c * poses[:, 0] - s * poses[:, 1], s * poses[:, 0] + c * poses[:, 1], poses[:, 2], poses[:, 3]], dim=1
-    )
+    c, s = np.cos(angle), np.sin(angle)
+    return stack(c * poses[:, 0] - s * poses[:, 1], s * poses[:, 0] + c * poses[:, 1], poses[:, 2], poses[:, 3])
 
 
-def _along(features: Tensor, way: Tensor, change: Tensor) -> Tensor:
+def _along(features: np.ndarray, way: np.ndarray, change: np.ndarray) -> np.ndarray:
     """Features (frames, 263) of somebody who goes ``way`` (frames, 4), with a change (frames, 3) of facing, x and z."""
-    new = features.clone()
+    new = features.copy()
     turn, step = change[1:, 0], change[1:, 1:] - change[:-1, 1:]
     new[:-1, 0] -= (change[1:, 0] - change[:-1, 0]) / 2
     # velocities are given in the heading of the frame they lead to
-    x, z = _back(features[:-1, 1], features[:-1, 2], turn.cos(), turn.sin())
+    x, z = _back(features[:-1, 1], features[:-1, 2], np.cos(turn), np.sin(turn))
     there = _turned(way[1:], turn)
     more = _back(step[:, 0], step[:, 1], there[:, 0], there[:, 1])
     new[:-1, 1], new[:-1, 2] = x + more[0], z + more[1]
     return new
 
 
-def _back(x: Tensor, z: Tensor, c: Tensor, s: Tensor) -> tuple[Tensor, Tensor]:
+def _back(x: np.ndarray, z: np.ndarray, c: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A way on the ground as somebody who turned by an angle of this cosine and sine sees it."""
     return c * x - s * z, c * z + s * x

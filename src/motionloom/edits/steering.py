@@ -11,9 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from motionloom.diffusion import Denoiser
 from motionloom.edits.reach import REACH, lowered, out_of_reach, room_above
@@ -30,7 +28,7 @@ from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
 
-Correction: TypeAlias = Callable[[Tensor, int], Tensor]
+Correction: TypeAlias = Callable[[np.ndarray, int], np.ndarray]
 """(standardised denoised estimate (frames, features) of one row, its level) -> the same, changed."""
 
 EXACT, FEW = 0.002, 0.05
@@ -64,19 +62,19 @@ def toward(goal: Goal, prior: Prior, *, first: int = 0, known: bool = False) -> 
         raise MotionloomError(f"goals need weights that make HumanML3D's {WIDTH} numbers; these make {len(prior.mean)}")
     if first < 0:
         raise MotionloomError(f"a goal cannot begin at frame {first} of a row; give 0 or more")
-    mean, std = prior.mean.cpu().double().numpy(), prior.std.cpu().double().numpy()
+    mean, std = prior.mean.astype(np.float64), prior.std.astype(np.float64)
     plans: dict[tuple[int, float], _Plan] = {}
 
-    def correct(denoised: Tensor, level: int) -> Tensor:
+    def correct(denoised: np.ndarray, level: int) -> np.ndarray:
         if goal.empty or first >= len(denoised):
             return denoised
         noise = prior.schedule.at(level)[1]
         key = len(denoised), next(width for least, width in _WIDTHS if noise >= least)
         if key not in plans:
             plans[key] = _plan(_in_row(goal, first, len(denoised)), first, key[1])
-        features = denoised.detach().cpu().double().numpy() * std + mean
+        features = denoised * std + mean
         changed = (_bent(features, plans[key], first if known else 0) - features) / std
-        return denoised + torch.from_numpy(changed).to(denoised)
+        return denoised + changed.astype(denoised.dtype)
 
     return correct
 
@@ -88,12 +86,12 @@ def corrected(denoise: Denoiser, corrections: Sequence[Correction | None]) -> De
     return lambda state, level: corrected_rows(denoise(state, level), corrections, level)
 
 
-def corrected_rows(denoised: Tensor, corrections: Sequence[Correction | None], level: int) -> Tensor:
+def corrected_rows(denoised: np.ndarray, corrections: Sequence[Correction | None], level: int) -> np.ndarray:
     """Estimates (rows, frames, features) of which row i went through ``corrections[i]``, if there is one."""
     if len(denoised) != len(corrections):
         raise ValueError(f"{len(corrections)} corrections for {len(denoised)} rows: give one, or None, per row")
     rows = [row if change is None else change(row, level) for row, change in zip(denoised, corrections, strict=True)]
-    return torch.stack(rows)
+    return np.stack(rows)
 
 
 # What does not depend on the estimate
@@ -161,13 +159,12 @@ def _plan(goal: Goal, first: int, width: float) -> _Plan:
 def product(matrix: Array, values: NDArray[Any]) -> NDArray[Any]:
     """A real matrix (rows, n) times values (n,) or (n, columns), real or complex.
 
-    By torch: numpy would start threads of its own, which then wait, on the cores that the network's threads need for
-    its next estimate. Complex numbers go as two real columns each, so that the matrix stays real.
+    Complex numbers go as two real columns each, so that the matrix stays real.
     """
     if np.iscomplexobj(values):
         columns = values.reshape(len(values), -1).view(np.float64)
         return product(matrix, columns).view(np.complex128).reshape(len(matrix), *values.shape[1:])
-    return (torch.from_numpy(matrix) @ torch.from_numpy(values)).numpy()
+    return matrix @ values
 
 
 def _bell(frames: int, width: float) -> Array:
@@ -186,7 +183,7 @@ def _gain(covariance: Array, asked: NDArray[np.intp], noise: Array) -> Array:
     if not len(asked):
         return np.zeros((len(covariance), 0))
     inner = covariance[np.ix_(asked, asked)] + np.diag(noise**2)
-    return torch.linalg.solve(torch.from_numpy(inner), torch.from_numpy(covariance[asked])).numpy().T
+    return np.linalg.solve(inner, covariance[asked]).T
 
 
 def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Array | None) -> _Limbs | None:
@@ -197,7 +194,7 @@ def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Ar
     if still is not None:
         inner += still[np.ix_(t, t)]
     inner[np.diag_indices_from(inner)] += EXACT**2
-    return _Limbs((t, j), torch.linalg.inv(torch.from_numpy(inner)).numpy(), together)
+    return _Limbs((t, j), np.linalg.inv(inner), together)
 
 
 def _thinned(asked: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -339,7 +336,7 @@ def _encoded(old: Array, denoised: _Estimate) -> Array:
     new[:, 1:3] = turned(steps, -denoised.facing[1:])[:, [0, 2]]
     new[:, 3] = denoised.local[:, 0, 1]
     new[:, LAYOUT["ric"]] = denoised.local[:, 1:].reshape(len(old), -1)
-    before, after = (humanml.displacements(torch.from_numpy(part)).numpy() for part in (old, new))
+    before, after = (humanml.displacements(part) for part in (old, new))
     new[:-1, LAYOUT["joint_velocity"]] += (after - before).reshape(len(old) - 1, -1)
     return new
 

@@ -10,14 +10,13 @@ Rotations are SMPL's own, with twist: identity is the T-pose with +Y up, facing 
 Features are float32; arithmetic is float64.
 """
 
-from typing import Literal, overload
+from typing import Literal
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from motionloom import rotations as rot
+from motionloom.arrays import Numbers, cross, namespace, stack, unit
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
@@ -113,8 +112,8 @@ def decode(features: np.ndarray, fps: float = FPS) -> Motion:
     features = np.asarray(features, dtype=np.float64)
     if features.ndim != 2 or not len(features):
         raise MotionloomError(f"features must be (frames, {WIDTH}) with at least one frame; got {features.shape}")
-    root, local = _pose(torch.from_numpy(features))
-    return Motion(SMPL22, fps, root.numpy(), rot.unroll(rot.normalize(rot.matrix_to_quat(local.numpy()))))
+    root, local = _pose(features)
+    return Motion(SMPL22, fps, root, rot.unroll(rot.normalize(rot.matrix_to_quat(local))))
 
 
 def forward(motion: Motion) -> Motion:
@@ -126,42 +125,38 @@ def forward(motion: Motion) -> Motion:
     return Motion(motion.skeleton, motion.fps, rot.rotate(turn, motion.root), turned, motion.translations)
 
 
-@overload
-def decode_positions(features: Tensor) -> Tensor: ...
-@overload
-def decode_positions(features: np.ndarray) -> np.ndarray: ...
-def decode_positions(features: Tensor | np.ndarray):
+def decode_positions(features: Numbers) -> Numbers:
     """Features (..., frames, 135) to joint positions (..., frames, 22, 3) in metres, +Y up; differentiable for tensors.
 
     Forward kinematics on the uniform person, in the world of `decode`. (Published code puts the same rotations on the
     SMPL-H body of zero shape, whose files have a licence of their own.)
     """
-    if isinstance(features, np.ndarray):
-        return decode_positions(torch.from_numpy(features)).numpy()
+    xp = namespace(features)
     root, local = _pose(features)
-    bones = torch.as_tensor(SMPL22.offsets, dtype=features.dtype, device=features.device)
+    bones = xp.asarray(SMPL22.offsets, dtype=features.dtype, device=features.device)
     world, places = [local[..., 0, :, :]], [root]
     for j, p in enumerate(SMPL22.parents[1:], start=1):
         places.append(places[p] + world[p] @ bones[j])
         world.append(world[p] @ local[..., j, :, :])
-    return torch.stack(places, dim=-2)
+    return xp.stack(places, axis=-2)
 
 
-def _pose(features: Tensor) -> tuple[Tensor, Tensor]:
+def _pose(features: Numbers) -> tuple[Numbers, Numbers]:
     """Root (..., frames, 3) and rotations (..., frames, 22, 3, 3), the first in the world; +Y up."""
     if features.ndim < 2 or features.shape[-1] != WIDTH:
         raise MotionloomError(f"features must be (..., frames, {WIDTH}); got {tuple(features.shape)}")
+    xp = namespace(features)
     speed = features[..., LAYOUT["root_velocity"]]
     planar = speed.cumsum(-2) - speed[..., :1, :]
-    root = torch.stack([planar[..., 0], features[..., 0], -planar[..., 1]], dim=-1)
-    local = _rows_to_matrix(features[..., LAYOUT["rot6d"]].unflatten(-1, (len(SMPL22), 6)))
-    up = torch.as_tensor(Y_UP, dtype=features.dtype, device=features.device)
-    return root, torch.cat([up @ local[..., :1, :, :], local[..., 1:, :, :]], dim=-3)
+    root = stack(planar[..., 0], features[..., 0], -planar[..., 1])
+    local = _rows_to_matrix(features[..., LAYOUT["rot6d"]].reshape(*features.shape[:-1], len(SMPL22), 6))
+    up = xp.asarray(Y_UP, dtype=features.dtype, device=features.device)
+    return root, xp.concatenate([up @ local[..., :1, :, :], local[..., 1:, :, :]], axis=-3)
 
 
-def _rows_to_matrix(rows: Tensor) -> Tensor:
+def _rows_to_matrix(rows: Numbers) -> Numbers:
     """(..., 6) to matrices (..., 3, 3): Gram-Schmidt on the first two rows (Zhou et al., CVPR 2019; PyTorch3D)."""
     first, second = rows[..., :3], rows[..., 3:]
-    x = torch.nn.functional.normalize(first, dim=-1)
-    y = torch.nn.functional.normalize(second - (x * second).sum(-1, keepdim=True) * x, dim=-1)
-    return torch.stack([x, y, torch.linalg.cross(x, y)], dim=-2)
+    x = unit(first)
+    y = unit(second - (x * second).sum(-1, keepdims=True) * x)
+    return namespace(rows).stack([x, y, cross(x, y)], axis=-2)

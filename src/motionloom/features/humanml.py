@@ -12,14 +12,13 @@ that. Rotations are shortest arcs from the rest directions, without twist, and n
 """
 
 from itertools import pairwise
-from typing import Literal, overload
+from typing import Any, Literal
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from motionloom import rotations as rot
+from motionloom.arrays import Numbers, cross, namespace, stack, unit
 from motionloom.blending import hermite
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FEET, FPS, LAYOUT, WIDTH
@@ -206,89 +205,69 @@ def positions_at(positions: np.ndarray, at: np.ndarray) -> Array:
 # Features to positions
 
 
-@overload
-def recover_root(features: Tensor) -> tuple[Tensor, Tensor]: ...
-@overload
-def recover_root(features: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
-def recover_root(features: Tensor | np.ndarray):
+def recover_root(features: Numbers) -> tuple[Numbers, Numbers]:
     """Integrate the root: features (..., frames, 263) to heading (..., frames, 4) and place (..., frames, 3) in metres.
 
     The quaternion turns the world into the heading frame; frame 0 is at x = z = 0 facing +Z.
     """
-    if isinstance(features, np.ndarray):
-        quaternion, place = recover_root(torch.from_numpy(features))
-        return quaternion.numpy(), place.numpy()
+    xp = namespace(features)
     half = _later(features[..., 0]).cumsum(-1)
-    zero = torch.zeros_like(half)
-    step = _turn_back(half, _later(features[..., 1]), _later(features[..., 2]))
-    x, z = (part.cumsum(-1) for part in step)
-    quaternion = torch.stack([half.cos(), zero, half.sin(), zero], dim=-1)
-    return quaternion, torch.stack([x, features[..., 3], z], dim=-1)
+    x, z = _turn_back(half, _later(features[..., 1]), _later(features[..., 2]))
+    quaternion = stack(xp.cos(half), 0 * half, xp.sin(half), 0 * half)
+    return quaternion, stack(x.cumsum(-1), features[..., 3], z.cumsum(-1))
 
 
-@overload
-def decode_positions(features: Tensor) -> Tensor: ...
-@overload
-def decode_positions(features: np.ndarray) -> np.ndarray: ...
-def decode_positions(features: Tensor | np.ndarray):
+def decode_positions(features: Numbers) -> Numbers:
     """Features (..., frames, 263) to joint positions (..., frames, 22, 3) in metres; differentiable for tensors.
 
     Reads the root and the places of the joints (the first 67 numbers) only, which need not have constant bones.
     """
     _check_width(features)
-    if isinstance(features, np.ndarray):
-        return decode_positions(torch.from_numpy(features)).numpy()
     _, root = recover_root(features)
     half = _later(features[..., 0]).cumsum(-1)[..., None]
-    local = features[..., LAYOUT["ric"]].unflatten(-1, (21, 3))
+    local = features[..., LAYOUT["ric"]].reshape(*features.shape[:-1], 21, 3)
     x, z = _turn_back(half, local[..., 0], local[..., 2])
-    joints = torch.stack([x + root[..., :1], local[..., 1], z + root[..., 2:]], dim=-1)
-    return torch.cat([root[..., None, :], joints], dim=-2)
+    joints = stack(x + root[..., :1], local[..., 1], z + root[..., 2:])
+    return namespace(features).concatenate([root[..., None, :], joints], axis=-2)
 
 
-def displacements(features: Tensor) -> Tensor:
+def displacements(features: Numbers) -> Numbers:
     """How far joints go to the next frame, (..., frames, 263) to (..., frames - 1, 22, 3) metres; differentiable.
 
     In the heading frame, read from the root and the places (the first 67 numbers): of a real motion it equals the
     ``joint_velocity`` block, of a generated one it is what `decode_positions` shows.
     """
     _check_width(features)
-    places = torch.cat([torch.zeros_like(features[..., :3]), features[..., LAYOUT["ric"]]], dim=-1)
-    places = places.unflatten(-1, (22, 3))
-    height = torch.zeros_like(places)
-    height[..., 0, 1] = features[..., 3]
-    places = places + height
+    height, lead = features[..., 3], features.shape[:-1]
+    root = stack(0 * height, height, 0 * height)[..., None, :]
+    joints = features[..., LAYOUT["ric"]].reshape(*lead, 21, 3)
+    places = namespace(features).concatenate([root, joints], axis=-2)
     now, following = places[..., :-1, :, :], places[..., 1:, :, :]
     half, x, z = (features[..., :-1, None, n] for n in range(3))
     x, z = _turn_back(half, following[..., 0] + x, following[..., 2] + z)
-    return torch.stack([x, following[..., 1], z], dim=-1) - now
+    return stack(x, following[..., 1], z) - now
 
 
-@overload
-def positions_from_rot6d(features: Tensor, offsets: np.ndarray = OFFSETS) -> Tensor: ...
-@overload
-def positions_from_rot6d(features: np.ndarray, offsets: np.ndarray = OFFSETS) -> np.ndarray: ...
-def positions_from_rot6d(features: Tensor | np.ndarray, offsets: np.ndarray = OFFSETS):
+def positions_from_rot6d(features: Numbers, offsets: np.ndarray = OFFSETS) -> Numbers:
     """The other decoder: (..., frames, 22, 3) metres by forward kinematics of the rotations on constant bones.
 
     As published, the heading quaternion itself (world into heading, not its inverse) stands at the head of every chain.
     """
     _check_width(features)
-    if isinstance(features, np.ndarray):
-        return positions_from_rot6d(torch.from_numpy(features), offsets).numpy()
+    xp, lead = namespace(features), features.shape[:-1]
     quaternion, root = recover_root(features)
-    local = _columns_to_matrix(features[..., LAYOUT["rot6d"]].unflatten(-1, (21, 6)))
+    local = _columns_to_matrix(features[..., LAYOUT["rot6d"]].reshape(*lead, 21, 6))
     w, y = quaternion[..., 0], quaternion[..., 2]
-    zero, one, c, s = torch.zeros_like(w), torch.ones_like(w), 1 - 2 * y * y, 2 * w * y
-    head = torch.stack([c, zero, s, zero, one, zero, -s, zero, c], dim=-1).unflatten(-1, (3, 3))
-    bones = torch.as_tensor(offsets, dtype=features.dtype, device=features.device)
-    places: list[Tensor] = [root] * 22
+    zero, one, c, s = 0 * w, 0 * w + 1, 1 - 2 * y * y, 2 * w * y
+    head = stack(c, zero, s, zero, one, zero, -s, zero, c).reshape(*lead, 3, 3)
+    bones = xp.asarray(offsets, dtype=features.dtype, device=features.device)
+    places = [root] * 22
     for chain in _CHAINS:
         world = head
         for before, j in pairwise(chain):
             world = world @ local[..., j - 1, :, :]
             places[j] = places[before] + world @ bones[j]
-    return torch.stack(places, dim=-2)
+    return xp.stack(places, axis=-2)
 
 
 def mirror(features: np.ndarray) -> NDArray[np.float32]:
@@ -322,7 +301,7 @@ def _checked(positions: np.ndarray) -> Array:
     return positions
 
 
-def _check_width(features: Tensor | np.ndarray) -> None:
+def _check_width(features: Any) -> None:
     if features.ndim < 2 or features.shape[-1] != WIDTH:
         raise MotionloomError(f"features must be (..., frames, {WIDTH}); got {tuple(features.shape)}")
 
@@ -347,19 +326,20 @@ def _to_forward(facing: np.ndarray) -> Array:
     return rot.shortest_arc(facing, np.array([0.0, 0.0, 1.0]))
 
 
-def _later(x: Tensor) -> Tensor:
+def _later(x: Numbers) -> Numbers:
     """One frame later, 0 in frame 0."""
-    return torch.cat([torch.zeros_like(x[..., :1]), x[..., :-1]], dim=-1)
+    return namespace(x).concatenate([0 * x[..., :1], x[..., :-1]], axis=-1)
 
 
-def _turn_back(half: Tensor, x: Tensor, z: Tensor) -> tuple[Tensor, Tensor]:
+def _turn_back(half: Numbers, x: Numbers, z: Numbers) -> tuple[Numbers, Numbers]:
     """Turn by -2 half about +Y: from the heading frame into the world."""
-    c, s = (2 * half).cos(), (2 * half).sin()
+    xp = namespace(half)
+    c, s = xp.cos(2 * half), xp.sin(2 * half)
     return x * c - z * s, x * s + z * c
 
 
-def _columns_to_matrix(columns: Tensor) -> Tensor:
+def _columns_to_matrix(columns: Numbers) -> Numbers:
     """(..., 6) to matrices (..., 3, 3): Gram-Schmidt on the first two columns (Zhou et al., CVPR 2019)."""
-    x = torch.nn.functional.normalize(columns[..., :3], dim=-1)
-    z = torch.nn.functional.normalize(torch.linalg.cross(x, columns[..., 3:]), dim=-1)
-    return torch.stack([x, torch.linalg.cross(z, x), z], dim=-1)
+    x = unit(columns[..., :3])
+    z = unit(cross(x, columns[..., 3:]))
+    return namespace(columns).stack([x, cross(z, x), z], axis=-1)

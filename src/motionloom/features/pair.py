@@ -12,16 +12,15 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
+from motionloom.arrays import Numbers, namespace
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.humanml import Heading, recover_root
 from motionloom.features.layout import FPS
 from motionloom.features.positions import SMPL_LAYOUT
-from motionloom.ground import Numbers, compose, from_world, mirrored, normalized, parts, relative, stack, to_world
+from motionloom.ground import compose, from_world, mirrored, normalized, parts, relative, stack, to_world
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.retarget.anatomy import read_body
@@ -43,8 +42,7 @@ class Encoded(NamedTuple):
 
 def swapped(pair: Numbers, axis: int = 0) -> Numbers:
     """The two people exchanged; ``axis`` is the one of length 2."""
-    result: Any = pair.flip(axis) if isinstance(pair, Tensor) else np.flip(pair, axis).copy()
-    return result
+    return namespace(pair).roll(pair, 1, axis)
 
 
 # Features and ground poses
@@ -168,8 +166,7 @@ def as_published(poses: Numbers) -> Numbers:
 
 
 def _pile(first: Any, second: Any) -> Any:
-    both = first, second
-    return torch.stack(both, dim=-2) if isinstance(first, Tensor) else np.stack(both, axis=-2)
+    return namespace(first).stack((first, second), axis=-2)
 
 
 def _checked(positions: np.ndarray) -> Array:

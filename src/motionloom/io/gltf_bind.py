@@ -61,6 +61,7 @@ def _inverse(document: Document, number: int, joints: set[int]) -> dict[int, Arr
     matrices = document.matrices(skin.get("inverseBindMatrices"), "inverse bind matrices")
     if matrices is None or len(matrices) < len(listed):
         return {}
+    matrices[:, 3] = [0.0, 0.0, 0.0, 1.0]
     return {n: m for n, m in zip(listed, matrices) if n in joints and turn_of(m) is not None}
 
 
@@ -68,7 +69,7 @@ def turn_of(matrix: Array) -> Array | None:
     """(4,) the rotation in a matrix (3 or 4 rows) that scales alike in all directions; None if it does more."""
     linear = matrix[:3, :3]
     size = np.linalg.norm(linear, axis=0)
-    if not (size > 1e-12).all():
+    if not ((size > 1e-12) & (size < 1e12)).all():  # nor where it is not finite
         return None
     turn = linear / size
     if np.abs(turn.T @ turn - np.eye(3)).max() > 0.02 or np.linalg.det(turn) < 0:
@@ -112,7 +113,8 @@ def _space(document: Document, nodes: list[Node], parents: list[int], skin: _Ski
         return standing
     wearers = [k for k, entry in enumerate(document.items("nodes")) if entry.get("skin") == skin.number]
     above = [n for n in upwards(top, parents)[1:] if n not in skin.inverse]
-    tried = [np.eye(4), *(_hanging(nodes, parents, n, {}) for n in (*above, *wearers[:8]))]
+    with np.errstate(over="ignore", invalid="ignore"):  # of nodes above other nodes nobody checked the scales
+        tried = [np.eye(4), *(_hanging(nodes, parents, n, {}) for n in (*above, *wearers[:8]))]
     inside = np.array([np.linalg.inv(m) for m in skin.inverse.values()])
     best, nearest = standing, np.inf
     for candidate in tried:

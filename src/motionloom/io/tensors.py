@@ -4,17 +4,13 @@ import os
 import stat
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from safetensors import SafetensorError
+from safetensors.numpy import save
 
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
-
-if TYPE_CHECKING:
-    from torch import Tensor
-
 
 MAX_HEAD = 32 << 20
 """Bytes of a file's head, which names its tensors and says what it holds."""
@@ -40,26 +36,19 @@ def check_head(path: Path | str, *, max_bytes: int) -> None:
             raise ValueError(f"it has more than {MAX_TENSORS:,} tensors")
 
 
-def save_tensors(
-    tensors: "Mapping[str, np.ndarray] | Mapping[str, Tensor]", path: Path | str, *, metadata: Mapping[str, str]
-) -> Path:
-    """Write arrays or tensors as a .safetensors file and give the path back.
+def save_tensors(tensors: Mapping[str, np.ndarray], path: Path | str, *, metadata: Mapping[str, str]) -> Path:
+    """Write arrays as a .safetensors file and give the path back.
 
     Args:
-        tensors: By name; either numpy arrays or contiguous torch tensors on the CPU, not both.
+        tensors: By name.
         path: The file; what stood there is replaced at the very end.
         metadata: Text by name, kept in the file's head.
 
     Raises:
         MotionloomError: The place cannot be written to, the disk is full, or the tensors cannot be written down.
     """
-    made: dict[str, Any] = dict(tensors)
     try:
-        if all(isinstance(value, np.ndarray) for value in made.values()):
-            from safetensors.numpy import save
-        else:
-            from safetensors.torch import save
-        data = save(cast(Any, made), dict(metadata))
+        data = save({name: np.asarray(value, order="C") for name, value in tensors.items()}, dict(metadata))
     except SafetensorError as error:
         raise MotionloomError(f"cannot write {path}: {error}") from error
     with atomic_path(path) as temporary:  # not safetensors' own writer: that makes files which only the owner may read

@@ -4,8 +4,8 @@ Only frames that were handed out are fixed. When something is asked, what is in 
 frame on that a window can be ready for, so a command waits about as long as a window takes, however long the
 buffer is; a window that is being sampled because the buffer runs short is given up for it. Where a new window comes too
 late, because frames that it was to replace were shown meanwhile, those stay, and it is sampled once more from later on.
-On a slow machine windows follow each other less often, and `Health` says so. When frames are late all the same the
-clock waits: what is shown never jumps.
+On a slow machine windows follow each other less often, and where one takes longer than its frames last, all is shown
+more slowly, evenly; `Health` says so. When frames are late all the same the clock waits: what is shown never jumps.
 """
 
 import threading
@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 from math import ceil
+from statistics import median_low
 from typing import Generic
 
 from motionloom.features.layout import FPS
@@ -35,8 +36,13 @@ SLOW = 0.6
 """Seconds that a command waits from which on the machine is said to be too slow."""
 LATE = 0.02
 """Seconds after its time from which on a frame counts as late."""
+SLOWER, SLOWEST = 1.15, 0.2
+"""A window is shown for so many times as long as one takes, where that is longer than its frames last; and the rate
+below which nothing is shown evenly."""
 REMEMBERED = 20
 """Windows whose drawing times are looked at."""
+LATELY = 3
+"""Of them the last, half of which say that the machine has become slow."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,8 @@ class Health:
     """Commands that were thrown away because too many came."""
     times: float
     """Frames are made so many times faster than they are shown; 0 before the first."""
+    rate: float = 1.0
+    """How fast frames are shown: 1 as somebody moves, less where the machine makes them more slowly than that."""
     problem: str = ""
     """In words, where the machine is too slow."""
 
@@ -65,25 +73,31 @@ def first_of(shown: Frame | tuple[Frame, Frame]) -> Frame:
 
 
 class Pace:
-    """When frames are due: the first at once, the others at their times from there; a late one delays all behind it."""
+    """When frames are due: the first at once, each other one so long after the one before as they are apart, at the
+    rate at which they are shown; a late one delays all behind it."""
 
-    def __init__(self, now: Callable[[], float]) -> None:
-        self._now = now
-        self._begun: float | None = None
+    def __init__(self, now: Callable[[], float], rate: Callable[[], float] = lambda: 1.0) -> None:
+        """rate: gives how fast motion is shown, 1 as it moves (`Health.rate`)."""
+        self._now, self._rate = now, rate
+        self._last: tuple[float, float] | None = None
+        """Time of the frame that was shown last, and when it was."""
 
     def until(self, frame: Frame) -> float:
         """Seconds until a frame is due, 0 where it is late."""
-        if self._begun is None:
-            self._begun = self._now() - frame.time
-        return max(0.0, self._begun + frame.time - self._now())
+        return max(0.0, self._due(frame) - self._now())
 
     def late(self, frame: Frame) -> float:
         """Seconds that a frame comes after its time; asked once, when it is shown."""
-        assert self._begun is not None
-        late = max(0.0, self._now() - self._begun - frame.time)
-        if late > LATE:
-            self._begun += late  # the clock waits, so that what follows is not rushed
+        due = self._due(frame)
+        late = max(0.0, self._now() - due)
+        self._last = frame.time, due + (late if late > LATE else 0.0)  # the clock waits: what follows is not rushed
         return late
+
+    def _due(self, frame: Frame) -> float:
+        if self._last is None:
+            return self._now()
+        time, shown = self._last
+        return shown + (frame.time - time) / self._rate()
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +182,7 @@ class Player(Generic[Shown]):
 
     def frames(self) -> Iterator[Shown]:
         """Frames, each at its time; without end, or until `stop`."""
-        pace = Pace(self._now)
+        pace = Pace(self._now, lambda: self._health.rate)
         while (coming := self.coming()) is not None:
             time.sleep(pace.until(first_of(coming)))
             found = self.take()
@@ -193,7 +207,7 @@ class Player(Generic[Shown]):
             if self.coming(timeout) is None:
                 return None
             found = self._buffer.popleft()
-            self._next, self._due = self._next + 1, self._now() + 1 / self._live.fps
+            self._next, self._due = self._next + 1, self._now() + 1 / (self._live.fps * self._health.rate)
             self._log += found.taken
             self._changed.notify_all()
             return found.shown
@@ -243,7 +257,7 @@ class Player(Generic[Shown]):
         """The first frame of the buffer from which on what is asked can be followed: a window is ready before it is
         due, and what was asked before is not too near."""
         wait = self._lead - max(0.0, self._due - self._now())
-        first = max(0, ceil(wait * self._live.fps - 1e-6))
+        first = max(0, ceil(wait * self._live.fps * self._health.rate - 1e-6))
         marks = (ready.mark for ready in islice(self._buffer, first, None))
         return next((mark for mark in marks if self._takes(mark)), None)
 
@@ -314,10 +328,18 @@ class Player(Generic[Shown]):
         self._length = min(max(WINDOWS * longest, SHORTEST), LONGEST)
         self._rest = self._live.stretch(1.25 * longest)
         times = self._live.number / self._live.fps / max(self._busy, 1e-9)
-        problem = ""
-        if self._lead > SLOW:
-            problem = (
-                f"this machine takes {longest:.2f} s for a window of motion: what is asked is followed every "
-                f"{self._rest / FPS:.2f} s and {self._lead:.2f} s late"
-            )
-        self._health = replace(self._health, ahead=self._lead, times=times, problem=problem)
+        lately = median_low([*self._took][-LATELY:])
+        lasts = self._live.settings.used / FPS
+        rate = max(SLOWEST, min(1.0, lasts / (SLOWER * max(usual, lately))))
+        self._health = replace(
+            self._health, ahead=self._lead, times=times, rate=rate, problem=self._problem(longest, rate)
+        )
+
+    def _problem(self, longest: float, rate: float) -> str:
+        if self._lead <= SLOW:
+            return ""
+        said = (
+            f"this machine takes {longest:.2f} s for a window of motion: what is asked is followed every "
+            f"{self._rest / (FPS * rate):.2f} s and {self._lead:.2f} s late"
+        )
+        return said if rate == 1 else f"{said}, and all is shown at {rate:.2f} of its speed"

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
@@ -22,7 +21,6 @@ from motionloom.features.layout import FPS, WIDTH
 from motionloom.live.commands import Command, Taken
 from motionloom.live.person import Asked, Person, Request, State
 from motionloom.live.settings import Settings
-from motionloom.live.threads import one_thread
 from motionloom.live.window import Noise, Sampler
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22, Skeleton
@@ -245,8 +243,7 @@ class Stage(ABC, Generic[Shown]):
             requests = [person.request(self._next, take=take) for person in self.people]
             self.fresh += [Taken(self._frame, asked, i) for i, one in enumerate(requests) for asked in one.taken]
             self._log += self.fresh
-            with one_thread():
-                self._windows(requests)
+            self._windows(requests)
             self._drawn, self._again = self._next, self._next + min(request.again for request in requests)
             self._followed = self._next if take else self._followed
         made = [person.pose_at(self._next) for person in self.people]
@@ -301,8 +298,8 @@ class Live(Stage[Frame], Asked):
     def _windows(self, requests: Sequence[Request]) -> None:
         (request,), (person,) = requests, self.people
         count, frames = len(request.known), self.settings.ahead
-        noise = self._noise.of(self._next - count, count + frames, self._sampler.prior.mean.device)
-        known = torch.from_numpy(request.known).float()
+        noise = self._noise.of(self._next - count, count + frames)
+        known = request.known.astype(np.float32)
         features = self._sampler(request.words, known, frames, noise, edits=request.edits, turns=request.turns)
         person.accept(request, features, self._next)
 

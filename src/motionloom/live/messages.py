@@ -109,7 +109,8 @@ def health(state: Health) -> dict[str, Any]:
     """How the server keeps up."""
     return {
         "type": "health", "late": state.late, "worst": round(state.worst, 4), "ahead": round(state.ahead, 4),
-        "dropped": state.dropped, "times": round(state.times, 2), "problem": state.problem,
+        "dropped": state.dropped, "times": round(state.times, 2), "rate": round(state.rate, 3),
+        "problem": state.problem,
     }  # fmt: skip
 
 

@@ -7,7 +7,6 @@ knows the last half second of both and their relative pose. Their bodies follow 
 from collections.abc import Sequence
 
 import numpy as np
-import torch
 
 from motionloom.diffusion import row_seed
 from motionloom.edits.steering import Correction
@@ -82,12 +81,12 @@ class LivePair(Stage[tuple[Frame, Frame]]):
 
     def _windows(self, requests: Sequence[Request]) -> None:
         count, frames, prior = len(requests[0].known), self.settings.ahead, self._prior
-        known = torch.from_numpy(np.stack([request.known for request in requests])).float()
+        known = np.stack([request.known for request in requests]).astype(np.float32)
         changes: list[Correction | None] = [None, None]
         observed = None
         if count:
             poses = relative(requests[0].begin.numbers(), np.stack([request.begin.numbers() for request in requests]))
-            observed = known_state(prior, self._net, known, torch.from_numpy(poses).float(), count + frames)
+            observed = known_state(prior, self._net, known, poses, count + frames)
         for i, request in enumerate(requests):
             if count or request.edits or request.turns:
                 changes[i] = leaving(prior, known[i], frames, edits=request.edits, turns=request.turns)
@@ -99,8 +98,8 @@ class LivePair(Stage[tuple[Frame, Frame]]):
             sampling=PairSampling(guidance=self.settings.guidance, steps=self.settings.steps),
         )  # fmt: skip
         self._calls += self.settings.steps
-        made = features[0].double().numpy()
-        begins = [None if count else GroundPose.of_numbers(pose) for pose in sampled[0].numpy()]
+        made = features[0].astype(np.float64)
+        begins = [None if count else GroundPose.of_numbers(pose) for pose in sampled[0]]
         for i, (person, request) in enumerate(zip(self.people, requests, strict=True)):
             window = np.concatenate([request.known, made[i, count:]])
             person.accept(request, window, self._next, begins[i])

@@ -189,7 +189,7 @@ class Person(Asked):
     def _begun(self, start: Motion) -> _Plan:
         """A plan that is over: the end of a motion of anybody, behind which frame 0 is."""
         past = Past.of(start)
-        known = past.known.double().numpy()
+        known = past.known.astype(np.float64)
         positions, contacts, places = decoded(known, _back(known, past.end))
         motion = body(positions, contacts, FPS, None)
         return _Plan(-len(known), known, places, motion, put(motion, self.skeleton, None), STANDS)

@@ -120,8 +120,8 @@ async def _followed(websocket: Socket, session: Session, said: Mapping[str, Any]
 
 async def _play(websocket: Socket, session: Session) -> None:
     """Send poses at their times."""
-    pace, reported = Pace(time.monotonic), time.monotonic()
     player = session.player
+    pace, reported = Pace(time.monotonic, lambda: player.health.rate), time.monotonic()
     while True:
         while (found := session.pending or player.coming(timeout=0.0)) is None:
             if player.ended:

@@ -8,16 +8,25 @@ from collections import OrderedDict
 from collections.abc import Sequence
 
 import numpy as np
-import torch
-from torch import Tensor
-from torch.nn import functional as F
 
-from motionloom.diffusion import SOLVERS, Denoiser, NoiseSource, guide, inpaint, levels, observe, row_seed, sample
+from motionloom.diffusion import (
+    SOLVERS,
+    Denoiser,
+    NoiseSource,
+    generator,
+    guide,
+    inpaint,
+    levels,
+    observe,
+    row_seed,
+    sample,
+)
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction
 from motionloom.features import humanml
 from motionloom.live.settings import Settings
-from motionloom.nets.prior import Bound
+from motionloom.runtime.prior_condition import Bound
+from motionloom.tasks.long import lengthened
 from motionloom.tasks.watching import report
 from motionloom.weights.prior import Prior
 
@@ -33,18 +42,18 @@ class Noise:
     def __init__(self, seed: int, moves: int, features: int) -> None:
         self._seed = seed
         self._shape = 2 * moves + 2, features  # each move takes noise, and what is known is shown at noise of its own
-        self._kept: dict[int, Tensor] = {}
+        self._kept: dict[int, np.ndarray] = {}
 
-    def of(self, first: int, frames: int, device: torch.device) -> NoiseSource:
+    def of(self, first: int, frames: int) -> NoiseSource:
         """The noise of the frames from ``first`` on, for one walk: its k-th call gets the k-th part."""
         self._kept = {number: kept for number, kept in self._kept.items() if number >= first}
         for number in range(first, first + frames):
             if number not in self._kept:
-                generator = torch.Generator().manual_seed(row_seed(self._seed, number + (1 << 20)))
-                self._kept[number] = torch.randn(self._shape, generator=generator)
-        whole = torch.stack([self._kept[number] for number in range(first, first + frames)], dim=1).to(device)
+                own = generator(row_seed(self._seed, number + (1 << 20)))
+                self._kept[number] = own.standard_normal(self._shape, np.float32)
+        whole = np.stack([self._kept[number] for number in range(first, first + frames)], axis=1)
         calls = iter(range(len(whole)))
-        return lambda like: whole[next(calls)][None].to(like)
+        return lambda like: whole[next(calls)][None].astype(like.dtype, copy=False)
 
 
 class Sampler:
@@ -57,11 +66,10 @@ class Sampler:
         self._bound: OrderedDict[str, tuple[Bound, Bound]] = OrderedDict()
         self._levels = levels(prior.schedule, settings.steps, spacing=settings.spacing)  # type: ignore[arg-type]
 
-    @torch.inference_mode()
     def __call__(
         self,
         text: str,
-        known: Tensor,
+        known: np.ndarray,
         frames: int,
         noise: NoiseSource,
         *,
@@ -75,21 +83,21 @@ class Sampler:
         before it is made to leave the known frames without a jump; turns: the same behind that, for edits that jump
         nowhere.
         """
-        prior, count = self.prior, len(known)
-        spread = torch.where(prior.std > 0, prior.std, 1.0)
-        given = torch.cat([known.to(prior.mean), prior.mean.new_zeros(frames, len(prior.mean))])[None]
-        mask = torch.zeros_like(given, dtype=torch.bool)
+        prior, count, spread = self.prior, len(known), self.prior.spread
+        given = lengthened(known, count + frames)[None]
+        mask = np.zeros(given.shape, np.bool_)
         mask[:, :count] = True
         data = (given - prior.mean) / spread
         changed = leaving(prior, known, frames, edits=edits, turns=turns)
         free = self._guided(text, count + frames)
 
-        def denoise(state: Tensor, level: int) -> Tensor:
+        def denoise(state: np.ndarray, level: int) -> np.ndarray:
             self.calls += 1
             return changed(inpaint(free, data, mask)(state, level)[0], level)[None]
 
-        def poses(clean: Tensor) -> np.ndarray:
-            return humanml.decode_positions((clean * spread + prior.mean).cpu().double().numpy()[0])[None, None]
+        def poses(clean: np.ndarray) -> np.ndarray:
+            features = (clean * spread + prior.mean).astype(np.float64)
+            return humanml.decode_positions(features[0])[None, None]
 
         hold = observe(data, mask, prior.schedule, noise)
         state = hold(noise(data), self._levels[0])
@@ -100,7 +108,7 @@ class Sampler:
         for done, snapshot in enumerate(walk, start=1):
             state = snapshot.state
             report(done, len(self._levels) - 1, [0], lambda clean=snapshot.clean: poses(clean))
-        return torch.where(mask, given, state * spread + prior.mean)[0].cpu().double().numpy()
+        return np.where(mask, given, state * spread + prior.mean)[0].astype(np.float64)
 
     def _guided(self, text: str, frames: int) -> Denoiser:
         """The prior's denoised estimate under a text; an empty one asks for nothing in particular. Guided early.
@@ -118,48 +126,47 @@ class Sampler:
         early = [level for level in self._levels if self.prior.schedule.at(level)[1] >= self.settings.guided]
         strong, plain = self.settings.guidance, float(self.settings.guidance != 0)
         guided, late = guide(net, own, null, strong), guide(net, own, null, plain)
-        lengths = torch.arange(frames, frames - ways, -1, device=self.prior.mean.device)
+        lengths = np.arange(frames, frames - ways, -1)
         own, null = (
-            Bound(*(part.repeat_interleave(ways, 0) for part in one))._replace(lengths=lengths) for one in (own, null)
+            Bound(*(part.repeat(ways, axis=0) for part in one))._replace(lengths=lengths) for one in (own, null)
         )
         last = self._levels[-2]
         shifted = guide(net, own, null, strong if last in early else plain)
 
-        def denoise(state: Tensor, level: int) -> Tensor:
+        def denoise(state: np.ndarray, level: int) -> np.ndarray:
             if level != last or ways == 1:
                 return guided(state, level) if level in early else late(state, level)
-            rows = shifted(torch.cat([F.pad(state[:, k:], (0, 0, 0, k)) for k in range(ways)]), level)
-            total = torch.zeros_like(state)
+            rows = shifted(np.concatenate([lengthened(state[:, k:], frames) for k in range(ways)]), level)
+            total = np.zeros_like(state)
             for k, row in enumerate(rows):
                 total[:, k:] += row[: frames - k]
-            count = torch.arange(1, frames + 1, device=state.device).clamp(max=ways)
+            count = np.arange(1, frames + 1, dtype=state.dtype).clip(max=ways)
             return total / count[:, None]
 
         return denoise
 
 
 def leaving(
-    prior: Prior, known: Tensor, frames: int, *, edits: Sequence[Correction], turns: Sequence[Correction]
+    prior: Prior, known: np.ndarray, frames: int, *, edits: Sequence[Correction], turns: Sequence[Correction]
 ) -> Correction:
     """What every estimate of a window goes through: ``edits``, no jump behind what is known, ``edits`` again in the
     late ones, ``turns``.
 
     known: (n, 263) features, not standardised, of which ``frames`` are behind; the known ones stay as they are.
     """
-    spread = torch.where(prior.std > 0, prior.std, 1.0)
-    given = torch.cat([known.to(prior.mean), prior.mean.new_zeros(frames, len(prior.mean))])[None]
-    mask = torch.zeros_like(given, dtype=torch.bool)
+    spread, given = prior.spread, lengthened(known, len(known) + frames)[None]
+    mask = np.zeros(given.shape, np.bool_)
     mask[:, : len(known)] = True
     meet = joining(given, mask, len(known), len(known) + frames)
     data = (given - prior.mean) / spread
 
-    def changed(denoised: Tensor, level: int) -> Tensor:
+    def changed(denoised: np.ndarray, level: int) -> np.ndarray:
         for edit in edits:
             denoised = edit(denoised, level)
         denoised = ((meet(denoised[None] * spread + prior.mean) - prior.mean) / spread)[0]
         late = prior.schedule.at(level)[1] < SETTLING
         for turn in (*(edits if late else ()), *turns):  # a heading bent at the border turns all that is behind it
             denoised = turn(denoised, level)
-        return torch.where(mask[0], data[0], denoised)
+        return np.where(mask[0], data[0], denoised)
 
     return changed

@@ -14,8 +14,6 @@ units of each token's own size.
 """
 
 import copy
-from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
 
 import torch
 from torch import Tensor, nn
@@ -23,76 +21,18 @@ from torch.nn import functional as F
 
 from motionloom.diffusion import Schedule
 from motionloom.errors import MotionloomError
-from motionloom.features.layout import WIDTH, ric
-from motionloom.features.pair import PlaceCode, along
+from motionloom.features.layout import ric
+from motionloom.features.pair import along
 from motionloom.ground import compose, relative, to_world
 from motionloom.nets.prior import Bound, Condition, Inner, NetConfig, PriorNet, valid_frames
 from motionloom.nets.prior import PublishedBlock as EncoderBlock
+from motionloom.runtime.pair import PLACE, SEEN
+from motionloom.runtime.pair import PairConfig as PairConfig
 
-PLACE = 4
-"""Numbers of D per person."""
-SEEN = (15, 20, 21)
-"""Joints of the other person that an ``aware`` block sees: head and wrists."""
 _SPREAD = 0.7
 """Standard deviation of the numbers of D, roughly: how far a noisy one is trusted."""
 _FAR = 5.0
 """Metres beyond which the other person is shown no further away."""
-
-
-@dataclass(frozen=True)
-class PairConfig:
-    """Sizes of a communication block; the defaults are the published ones."""
-
-    layers: int = 1
-    split: int = 8
-    """It sits after so many layers of the prior; 0: before the first."""
-    width: int = 512
-    heads: int = 4
-    hidden: int = 1024
-    dropout: float = 0.1
-    adds: Literal["all", "condition"] = "all"
-    """What is corrected: all tokens, or the condition token alone (variant ``published`` only)."""
-    aware: bool = False
-    """Whether its input also says where the other person is, frame by frame, by what the priors alone would make."""
-    places: PlaceCode = field(default_factory=PlaceCode)
-
-    def __post_init__(self) -> None:
-        numbers = (self.layers, self.width, self.heads, self.hidden)
-        whole = all(isinstance(n, int) and not isinstance(n, bool) and 0 < n <= 8192 for n in numbers)
-        split = isinstance(self.split, int) and not isinstance(self.split, bool) and 0 <= self.split <= 256
-        flags = self.adds in ("all", "condition") and isinstance(self.aware, bool)
-        if not (whole and split and flags) or self.layers > 16 or self.width % self.heads:
-            raise MotionloomError(f"the communication block's sizes are not usable: {asdict(self)}")
-        if isinstance(self.dropout, bool) or not isinstance(self.dropout, int | float) or not 0 <= self.dropout < 1:
-            raise MotionloomError(f"the communication block's sizes are not usable: {asdict(self)}")
-
-    @staticmethod
-    def parse(values: dict[str, Any]) -> "PairConfig":
-        """From plain data out of a recipe or a weight file."""
-        try:
-            plain = dict(values)
-            plain["places"] = PlaceCode(**plain.get("places", {}))
-            return PairConfig(**plain)
-        except (TypeError, ValueError) as error:
-            raise MotionloomError(f"the communication block's settings are not usable: {error}") from None
-
-    def check(self, prior: NetConfig) -> None:
-        """Raise MotionloomError where such a block cannot sit in such a prior."""
-        if self.split > prior.layers:
-            raise MotionloomError(
-                f"the communication block sits after layer {self.split}, and the prior has {prior.layers}; "
-                "use the weights it belongs to"
-            )
-        if prior.flags or prior.features < PLACE:
-            raise MotionloomError("two people need weights without transition flags; use others")
-        if prior.variant == "published" and self.width != prior.width:
-            raise MotionloomError(
-                f"a communication block of width {self.width} does not fit a prior of width {prior.width}"
-            )
-        if self.adds == "condition" and prior.variant != "published":
-            raise MotionloomError("this prior has no condition token to correct; let the block add to all tokens")
-        if self.aware and (prior.features != WIDTH or self.places.kind != "mutual"):
-            raise MotionloomError(f"an aware block needs HumanML3D's {WIDTH} numbers and places of the kind mutual")
 
 
 def fitting(prior: NetConfig, *, layers: int = 1, split: int | None = None, aware: bool = False) -> PairConfig:
@@ -115,7 +55,7 @@ class Talk(nn.Module):
         super().__init__()
         config.check(prior)
         self.config = config
-        self.normed = prior.variant == "modulated"
+        self.normed, self.shape = prior.variant == "modulated", (prior.width,)
         partner = prior.patch * (PLACE + 3 * len(SEEN)) if config.aware else 0
         sizes = NetConfig(width=config.width, heads=config.heads, hidden=config.hidden, dropout=config.dropout)
         self.places = nn.Linear(2 * PLACE, config.width)
@@ -136,7 +76,7 @@ class Talk(nn.Module):
         Rows 2k and 2k + 1 are two people. mask (rows, 1, 1, 1 + tokens): True where there is something. partner: see
         `PairNet._other_seen`.
         """
-        own = F.layer_norm(tokens, tokens.shape[-1:]) if self.normed else tokens
+        own = F.layer_norm(tokens, self.shape) if self.normed else tokens
         together = [own, other(own)] + ([] if partner is None else [F.pad(partner, (0, 0, 1, 0))])
         start = self.places(torch.cat([places, other(places)], dim=-1))[:, None]
         x = torch.cat([start, self.both(torch.cat(together, dim=-1))], dim=1)
@@ -153,7 +93,7 @@ class Talk(nn.Module):
 
 def other(rows: Tensor) -> Tensor:
     """For each row that of the other person: rows 2k and 2k + 1 exchanged."""
-    return rows.unflatten(0, (-1, 2)).flip(1).flatten(0, 1)
+    return rows.reshape(-1, 2, *rows.shape[1:]).flip(1).reshape(rows.shape)
 
 
 def join(places: Tensor, motion: Tensor) -> Tensor:
@@ -178,7 +118,7 @@ class PairNet(nn.Module):
         talk.config.check(net.config)
         base = copy.deepcopy(net).eval().requires_grad_(False)
         self.talk, self.schedule = talk, schedule
-        self._base = (base, mean, std, schedule.signal.to(mean))  # in a tuple: not a sub-module
+        self._base = (base, mean, std, torch.as_tensor(schedule.signal).to(mean))  # in a tuple: not a sub-module
 
     @property
     def config(self) -> NetConfig:
@@ -201,36 +141,52 @@ class PairNet(nn.Module):
         """
         if x.shape[0] % 2 or x.shape[1] < 2:
             raise MotionloomError(f"two people need an even number of rows, one slot and frames; got {tuple(x.shape)}")
-        base, split = self._base[0], self.talk.config.split
+        base, mean, _, signals = self._base
         places, motion = part(x)
+        frames = motion.shape[1]
         with torch.no_grad():
-            inner = base.through(base.enter(motion, level, bound), bound, slice(split))
-            partner = self._other_seen(inner, bound, places, motion.shape[1], level) if self.talk.config.aware else None
+            inner = base.enter(motion, level, bound)
+        signal = signals[torch.as_tensor(level, device=mean.device).expand(len(x))]
+        inner, place = self.spoken(inner, bound, places, signal, valid_frames(bound.lengths, frames), frames)
+        return join(place, base.leave(inner, frames))
+
+    def spoken(
+        self, inner: Inner, bound: Bound, places: Tensor, signal: Tensor, valid: Tensor | None, frames: int
+    ) -> tuple[Inner, Tensor]:
+        """What comes out of the last block, and the estimate of D (rows, 4).
+
+        inner: what the first block sees. places: (rows, 4) D of the state. signal: (rows,) of the levels.
+        valid: (rows, frames) or None, see `valid_frames`.
+        """
+        base, split = self._base[0], self.talk.config.split
+        with torch.no_grad():
+            inner = base.through(inner, bound, slice(split))
+            aware = self.talk.config.aware
+            partner = self._other_seen(inner, bound, places, signal, valid, frames) if aware else None
         first = base.modulated  # the condition is no token there
         tokens = torch.cat([inner.condition[:, None], inner.x], dim=1) if first else inner.x
         mask = F.pad(inner.mask, (1, 0), value=True) if first and inner.mask is not None else inner.mask
         change, place = self.talk(tokens, places, mask, partner)
         inner = inner._replace(x=inner.x + change[:, first:])
-        denoised = base.leave(base.through(inner, bound, slice(split, None)), motion.shape[1])
-        return join(place, denoised)
+        return base.through(inner, bound, slice(split, None)), place
 
-    def _other_seen(self, inner: Inner, bound: Bound, places: Tensor, frames: int, level: int | Tensor) -> Tensor:
+    def _other_seen(
+        self, inner: Inner, bound: Bound, places: Tensor, signal: Tensor, valid: Tensor | None, frames: int
+    ) -> Tensor:
         """(rows, tokens, patch * 13): where the other stands, faces, and has head and wrists, as the person sees it.
 
         By what the two priors alone estimate and by the D of the state, trusted as far as its noise lets one; numbers
         of a person in metres, `PlaceCode` mutual.
         """
-        base, mean, std, signals = self._base
+        base, mean, std, _ = self._base
         denoised = base.leave(base.through(inner, bound, slice(self.talk.config.split, None)), frames) * std + mean
-        rows = len(denoised)
-        signal = signals[torch.as_tensor(level, device=signals.device).expand(rows)][:, None]
+        rows, signal = denoised.shape[0], signal[:, None]
         trust = signal * _SPREAD**2 / (signal**2 * _SPREAD**2 + 1 - signal**2)
         way = along(denoised)
         place = relative(way, compose(self.talk.config.places.raw(trust * places)[:, None], other(way)))
         joints = torch.stack([denoised[..., ric(j)] for j in SEEN], dim=-2)
         theirs = to_world(other(joints), place[..., None, :]).flatten(-2)
         partner = torch.cat([place, theirs], dim=-1).clamp(-_FAR, _FAR)
-        valid = valid_frames(bound.lengths, frames)
         partner = partner if valid is None else partner * valid[..., None]
         patch = base.config.patch
         return F.pad(partner, (0, 0, 0, -frames % patch)).reshape(rows, -1, patch * partner.shape[-1])

@@ -1,71 +1,16 @@
 """TransLinear, the network of HumanMAC (Chen et al. 2023, section 3.3): a transformer whose tokens are frequencies.
 
 As published, with the published names of its weights, so that published checkpoints load; or with two additions of
-ours (`NetConfig.beside`, `NetConfig.condition`) for networks conditioned on a mask of the numbers that are known.
+ours (`beside` and `condition` of `PredictorConfig`) for networks conditioned on a mask of the numbers that are known.
 """
 
 import math
-from dataclasses import asdict, dataclass
-from typing import Any
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from motionloom.errors import MotionloomError
-
-
-@dataclass(frozen=True)
-class NetConfig:
-    """Sizes; the defaults are the published Human3.6M network of 28,401,712 parameters."""
-
-    channels: int = 48
-    """Numbers per token: 3 per joint."""
-    kept: int = 20
-    """Tokens: frequencies, the lowest first."""
-    layers: int = 8
-    """Even: the first half hands what it was given to the second half."""
-    width: int = 512
-    heads: int = 8
-    dropout: float = 0.2
-    condition: tuple[int, int] | None = None
-    """Rows and channels of the condition; None: the spectrum of the observation, (kept, channels)."""
-    beside: bool = False
-    """Whether every token also sees its own row of the condition (the first ``kept`` rows). Not published."""
-
-    def __post_init__(self) -> None:
-        sizes = (self.channels, self.kept, self.layers, self.width, self.heads, *self.condition_shape)
-        small = all(isinstance(n, int) and not isinstance(n, bool) and 0 < n <= 8192 for n in sizes)
-        small = small and isinstance(self.beside, bool) and self.layers <= 128
-        if not small or self.width % (2 * self.heads) or not 0 <= self.dropout < 1:
-            raise MotionloomError(f"the network's sizes are not usable: {asdict(self)}")
-        if self.layers % 2:
-            raise MotionloomError(
-                f"the number of layers must be even, for the first half feeds the second; got {self.layers}"
-            )
-        if self.beside and self.condition_shape[0] < self.kept:
-            raise MotionloomError(f"{self.kept} tokens cannot each see one of {self.condition_shape[0]} rows")
-
-    @property
-    def condition_shape(self) -> tuple[int, int]:
-        """Rows and channels of the condition."""
-        return self.condition or (self.kept, self.channels)
-
-    @staticmethod
-    def parse(values: dict[str, Any]) -> "NetConfig":
-        """From plain data out of a recipe or a weight file, where ``condition`` was ``told``.
-
-        Raises MotionloomError.
-        """
-        try:
-            settings: dict[str, Any] = {
-                {"told": "condition"}.get(key, key): value for key, value in dict(values).items()
-            }
-            if settings.get("condition") is not None:
-                settings["condition"] = settings["condition"][0], settings["condition"][1]
-            return NetConfig(**settings)
-        except (TypeError, ValueError, IndexError, KeyError) as error:
-            raise MotionloomError(f"the network's settings are not usable: {error}") from None
+from motionloom.runtime.predictor import PredictorConfig
 
 
 class TransLinear(nn.Module):
@@ -75,7 +20,7 @@ class TransLinear(nn.Module):
     *config.condition_shape) or None. ``keep`` (rows,) bool: the rows that get the condition; the others go without.
     """
 
-    def __init__(self, config: NetConfig) -> None:
+    def __init__(self, config: PredictorConfig) -> None:
         super().__init__()
         self.config = config
         width, (rows, channels) = config.width, config.condition_shape
@@ -111,7 +56,7 @@ class TransLinear(nn.Module):
 
 
 class _Block(nn.Module):
-    def __init__(self, config: NetConfig) -> None:
+    def __init__(self, config: PredictorConfig) -> None:
         super().__init__()
         self.sa_block, self.ffn = _Attention(config), _FeedForward(config)
 
@@ -120,9 +65,10 @@ class _Block(nn.Module):
 
 
 class _Attention(nn.Module):
-    def __init__(self, config: NetConfig) -> None:
+    def __init__(self, config: PredictorConfig) -> None:
         super().__init__()
         width, self.heads, self.dropout = config.width, config.heads, config.dropout
+        self.scale = (width // self.heads) ** -0.5
         self.norm = nn.LayerNorm(width)
         self.query, self.key, self.value = (nn.Linear(width, width, bias=False) for _ in range(3))
         self.proj_out = _Stylization(config)
@@ -130,12 +76,12 @@ class _Attention(nn.Module):
     def forward(self, x: Tensor, style: Tensor) -> Tensor:
         z = self.norm(x)
         q, k, v = (m(z).unflatten(-1, (self.heads, -1)).transpose(1, 2) for m in (self.query, self.key, self.value))
-        y = F.scaled_dot_product_attention(q, k, v, dropout_p=self.dropout if self.training else 0.0)
+        y = F.scaled_dot_product_attention(q, k, v, dropout_p=self.dropout if self.training else 0.0, scale=self.scale)
         return x + self.proj_out(y.transpose(1, 2).flatten(2), style)
 
 
 class _FeedForward(nn.Module):
-    def __init__(self, config: NetConfig) -> None:
+    def __init__(self, config: PredictorConfig) -> None:
         super().__init__()
         self.linear1 = nn.Linear(config.width, 2 * config.width)
         self.linear2 = _zeroed(nn.Linear(2 * config.width, config.width))
@@ -149,7 +95,7 @@ class _FeedForward(nn.Module):
 class _Stylization(nn.Module):
     """What closes a sub-block: its result scaled and shifted by time and condition, through one layer from zero."""
 
-    def __init__(self, config: NetConfig) -> None:
+    def __init__(self, config: PredictorConfig) -> None:
         super().__init__()
         width = config.width
         self.emb_layers = nn.Sequential(nn.SiLU(), nn.Linear(width, 2 * width))

@@ -14,61 +14,14 @@ everything that depends on the text alone (projections, keys, values) is compute
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Literal, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from motionloom.errors import MotionloomError
-
-
-@dataclass(frozen=True)
-class NetConfig:
-    """Sizes of a prior network; the defaults are the published HumanML3D model."""
-
-    variant: Literal["published", "modulated"] = "published"
-    features: int = 263
-    """Numbers per frame."""
-    width: int = 512
-    layers: int = 8
-    heads: int = 4
-    hidden: int = 1024
-    """Width of the feed-forward layers."""
-    text: int = 512
-    """Width of the text encoder's vectors."""
-    patch: int = 1
-    """Frames per token."""
-    flags: bool = False
-    """Published only: a 2 x 4 table for per-frame transition flags, appended to the features (BABEL, DoubleTake)."""
-    clock: bool = False
-    """Modulated only: every token's time and the text shift every block, beside the noise (`PriorNet.enter`)."""
-    dropout: float = 0.1
-
-    def __post_init__(self) -> None:
-        numbers = (self.features, self.width, self.layers, self.heads, self.hidden, self.text, self.patch)
-        if self.variant not in ("published", "modulated"):
-            raise MotionloomError(f"no network variant {self.variant!r}; there are published and modulated")
-        if (
-            any(type(n) is not int or not 0 < n <= 65536 for n in numbers)
-            or self.layers > 256
-            or self.width % self.heads
-            or not isinstance(self.flags, bool)
-            or not isinstance(self.clock, bool)
-        ):
-            raise MotionloomError(f"the network's sizes are not usable: {asdict(self)}")
-        if (self.width // self.heads) % 2 or not 0 <= self.dropout < 1:
-            raise MotionloomError(f"the network's sizes are not usable: {asdict(self)}")
-
-    @staticmethod
-    def parse(values: dict[str, Any]) -> "NetConfig":
-        """From plain data out of a recipe or a weight file; ``variant`` was called ``manner``."""
-        try:
-            plain = dict(values)
-            return NetConfig(**{{"manner": "variant"}.get(key, key): value for key, value in plain.items()})
-        except (TypeError, ValueError) as error:
-            raise MotionloomError(f"the network's settings are not usable: {error}") from None
+from motionloom.runtime.sizes import NetConfig as NetConfig
 
 
 class Condition(NamedTuple):
@@ -163,6 +116,7 @@ class Attention(nn.Module):
     def __init__(self, width: int, heads: int, dropout: float = 0.0) -> None:
         super().__init__()
         self.heads, self.dropout = heads, dropout
+        self.scale = (width // heads) ** -0.5
         self.project = nn.Linear(width, 3 * width)
         self.out = nn.Linear(width, width)
 
@@ -170,7 +124,7 @@ class Attention(nn.Module):
         rows, tokens, width = x.shape
         q, k, v = self.project(x).view(rows, tokens, 3, self.heads, -1).permute(2, 0, 3, 1, 4)
         drop = self.dropout if self.training else 0.0
-        y = F.scaled_dot_product_attention(q, k, v, attn_mask=mask, dropout_p=drop)
+        y = F.scaled_dot_product_attention(q, k, v, attn_mask=mask, dropout_p=drop, scale=self.scale)
         return self.out(y.transpose(1, 2).reshape(rows, tokens, width))
 
 
@@ -196,7 +150,7 @@ class ModulatedBlock(nn.Module):
 
     def __init__(self, config: NetConfig) -> None:
         super().__init__()
-        width = config.width
+        width = self.width = config.width
         self.heads = config.heads
         self.attention = Attention(width, config.heads)
         self.query = nn.Linear(width, width)
@@ -208,14 +162,15 @@ class ModulatedBlock(nn.Module):
         self.drop = nn.Dropout(config.dropout)
 
     def forward(self, x: Tensor, inner: Inner, *, keys: Tensor, values: Tensor, words: Tensor) -> Tensor:
-        rows, tokens, width = x.shape
+        rows, tokens, _ = x.shape
+        width = self.width
         shift1, scale1, gate1, shift2, scale2, gate2 = (inner.change + self.table).unsqueeze(2).unbind(1)
         if inner.clock.shape[1]:
             shift1, shift2 = shift1 + inner.clock[..., :width], shift2 + inner.clock[..., width:]
         y = F.layer_norm(x, (width,)) * (1 + scale1) + shift1
         x = x + (1 + gate1) * self.drop(self.attention(y, inner.mask))
         q = self.query(self.norm(x)).view(rows, tokens, self.heads, -1).transpose(1, 2)
-        y = F.scaled_dot_product_attention(q, keys, values, attn_mask=words)
+        y = F.scaled_dot_product_attention(q, keys, values, attn_mask=words, scale=self.attention.scale)
         x = x + self.heard(y.transpose(1, 2).reshape(rows, tokens, width))
         y = F.layer_norm(x, (width,)) * (1 + scale2) + shift2
         return x + (1 + gate2) * self.drop(self.linear2(F.gelu(self.linear1(y), approximate="tanh")))
@@ -278,23 +233,31 @@ class PriorNet(nn.Module):
             )
             x = torch.cat([x, self.flag(flags)], dim=-1)
         valid = valid_frames(bound.lengths, frames)
-        tokens = self.embed(self._patches(x, valid))
+        levels = torch.as_tensor(level, device=x.device).expand(rows)
+        return self.begin(self.embed(self._patches(x, valid)), levels, bound.text, self._mask(valid))
+
+    def begin(self, tokens: Tensor, levels: Tensor, text: Tensor, mask: Tensor | None) -> Inner:
+        """What the first block sees, of embedded frames.
+
+        tokens: (rows, tokens, width), without the condition token. levels: (rows,). text: (rows, width) of `Bound`.
+        mask: see `Inner`.
+        """
+        rows, width = tokens.shape[0], self.config.width
         # published noise index t is level - 1
-        time = torch.as_tensor(level, device=x.device).expand(rows) - 1
-        time = self.time2(F.silu(self.time1(sinusoids(time, self.config.width).to(tokens.dtype))))
-        both, change = time + bound.text, x.new_zeros(rows, 0)
+        time = self.time2(F.silu(self.time1(sinusoids(levels - 1, width).to(tokens.dtype))))
+        both, change = time + text, tokens.new_zeros(rows, 0)
         last = change
         if self.modulated:
             shaping = F.silu(both)
             change, last = self.change(shaping).view(rows, 6, -1), self.last(shaping)[:, None]
         else:
             tokens = torch.cat([both[:, None], tokens], dim=1)
-        places = torch.arange(tokens.shape[1], device=x.device) * self.config.patch
-        times = sinusoids(places, self.config.width).to(tokens.dtype)
-        clock = x.new_zeros(rows, 0)
+        places = torch.arange(tokens.shape[1], device=tokens.device) * self.config.patch
+        times = sinusoids(places, width).to(tokens.dtype)
+        clock = tokens.new_zeros(rows, 0)
         if self.modulated and self.config.clock:  # what a text asks for at a time, on a way that carries no noise
             clock = self.clock(F.silu(both[:, None] + self.place(times)))
-        return Inner(self.drop(tokens + times), both, self._mask(valid), change, last, clock)
+        return Inner(self.drop(tokens + times), both, mask, change, last, clock)
 
     def through(self, inner: Inner, bound: Bound, layers: slice = slice(None)) -> Inner:
         """Through some of the blocks."""
@@ -309,13 +272,17 @@ class PriorNet(nn.Module):
 
     def leave(self, inner: Inner, frames: int) -> Tensor:
         """What the last block gives, to features (rows, frames, features)."""
+        return self.end(inner).reshape(inner.x.shape[0], -1, self.config.features)[:, :frames]
+
+    def end(self, inner: Inner) -> Tensor:
+        """The same as tokens (rows, tokens, patch * features)."""
         x = inner.x
         if self.modulated:
             shift, scale = inner.last.chunk(2, dim=-1)
-            x = F.layer_norm(x, x.shape[-1:]) * (1 + scale) + shift
+            x = F.layer_norm(x, (self.config.width,)) * (1 + scale) + shift
         else:
             x = x[:, 1:]
-        return self.out(x).reshape(len(x), -1, self.config.features)[:, :frames]
+        return self.out(x)
 
     def _patches(self, x: Tensor, valid: Tensor | None) -> Tensor:
         """(rows, frames, numbers) to (rows, tokens, patch * numbers), padded with zeros."""

@@ -17,6 +17,7 @@ from motionloom.retarget import joint_map, retarget, to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.named import NAMED, named_skeleton
 from motionloom.retarget.stand import HERE, started
+from motionloom.retarget.toes import bend_toes
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project, Stored
 from motionloom.server.refusal import Refusal
@@ -104,7 +105,7 @@ def export(project: Project, stored: Stored, kind: str, *, skeleton: str | None,
 
 def _on_character(project: Project, people: Sequence[Motion], kind: str, skeleton: str, caption: str) -> Path:
     path, _ = project.character(skeleton)
-    suffix = path.suffix
+    suffix, character = path.suffix, None
     if suffix == ".bvh":
         from motionloom.io.bvh import read_bvh
 
@@ -113,15 +114,15 @@ def _on_character(project: Project, people: Sequence[Motion], kind: str, skeleto
         raise MotionloomError("an ASF skeleton belongs to AMC files; put motions on a .glb, .vrm, .gltf or .bvh")
     else:
         character = load_character(path)
-        if kind == "glb":
-            if len(people) > 1:
-                raise MotionloomError("a character's file holds one person; name one with person=0 or person=1")
-            moved = retarget(people[0], character.skeleton)
-            if character.stand != HERE:
-                moved = started(moved, read_body(character.skeleton), character.stand)
-            return character.save(moved, project.part(suffix), name=caption[:80] or None)
         target = character.skeleton
-    moved = [retarget(one, target) for one in people]
+        if kind == "glb" and len(people) > 1:
+            raise MotionloomError("a character's file holds one person; name one with person=0 or person=1")
+    body = read_body(target)
+    moved = [bend_toes(retarget(one, target), body) for one in people]
+    if character is not None and character.stand != HERE and len(moved) == 1:
+        moved = [started(moved[0], body, character.stand)]
+    if character is not None and kind == "glb":
+        return character.save(moved[0], project.part(suffix), name=caption[:80] or None)
     part = project.part(f".{kind}")
     return save(moved[0], part, captions=[caption]) if len(moved) == 1 else save_scene(moved, part)
 

@@ -91,8 +91,8 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
 class _Live:
     """Somebody who is steered while he moves (docs/live.md), behind the same door as everything else.
 
-    Live sessions need torch, whose import takes longer than all the rest of a server's start. So they are made for the
-    first client that asks; the worker's thread imports torch meanwhile, while the page is answered already.
+    Live sessions need what draws, whose import takes longer than all the rest of a server's start. So they are made for
+    the first client that asks; the worker's thread imports it meanwhile, while the page is answered already.
     """
 
     def __init__(self, worker: Worker) -> None:

@@ -7,8 +7,7 @@ Odd motions, and those that do only half of what is said, lie far from it. docs/
 
 from dataclasses import replace
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from motionloom.diffusion import row_noise
 from motionloom.diffusion.sampling import row_seed
@@ -26,7 +25,6 @@ def check_best_of(count: int) -> None:
         raise MotionloomError(f"the best is chosen of 1 to {MOST} motions; got {count}")
 
 
-@torch.inference_mode()
 def with_best_seeds(
     prior: Prior, rows: Rows, count: int, sampling: Sampling, *, progress: Progress | None = None
 ) -> Rows:
@@ -49,13 +47,13 @@ def with_best_seeds(
     return replace(rows, seeds=chosen)
 
 
-def _mean(prior: Prior, prompt: str, length: int, seeds: list[int], sampling: Sampling) -> Tensor:
+def _mean(prior: Prior, prompt: str, length: int, seeds: list[int], sampling: Sampling) -> np.ndarray:
     """(length, features) standardised: the network's answer to pure noise, averaged over the noise of the seeds."""
-    noise = row_noise(seeds)(torch.empty(len(seeds), length, len(prior.mean), device=prior.mean.device))
+    noise = row_noise(seeds)(np.empty((len(seeds), length, len(prior.mean)), np.float32))
     level = sampling.levels(prior.schedule)[0]
     return prior.net(noise, level, prior.net.bind(prior.condition([prompt] * len(seeds)))).mean(0)
 
 
-def _distance(state: Tensor, mean: Tensor) -> float:
+def _distance(state: np.ndarray, mean: np.ndarray) -> float:
     numbers = LAYOUT["rot6d"] if len(mean[0]) == WIDTH else slice(None)
-    return float((state - mean)[:, numbers].square().mean())
+    return float(((state - mean)[:, numbers] ** 2).mean())

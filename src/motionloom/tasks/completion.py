@@ -10,9 +10,7 @@ from dataclasses import dataclass
 from typing import Unpack
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from motionloom.blending import quintic_decay
 from motionloom.diffusion import SOLVERS, guide, row_noise, row_seed, sample
@@ -44,18 +42,17 @@ class Known:
     """(frames, parts) 1 where a joint is given, see `Layout.part`; numbers between mix."""
 
 
-@torch.inference_mode()
 def complete(
     predictor: Predictor,
-    features: Tensor,
-    mask: Tensor,
-    pose: Tensor,
+    features: np.ndarray,
+    mask: np.ndarray,
+    pose: np.ndarray,
     *,
     seeds: Sequence[int],
     sampling: PredictionSampling | None = None,
-    poses: Callable[[Tensor], Array] | None = None,
+    poses: Callable[[np.ndarray], Array] | None = None,
     **settings: Unpack[PredictionSettings],
-) -> Tensor:
+) -> np.ndarray:
     """Windows (rows, frames, channels) with what is not known sampled; row i from ``seeds[i]``, alone or in a batch.
 
     ``features`` are read where ``mask`` (rows, frames, parts) is above 0; ``pose`` (rows, channels) is the last
@@ -66,13 +63,13 @@ def complete(
     """
     chosen = PredictionSampling.of(sampling, settings)
     condition = predictor.condition(features, mask, pose)
-    yes, no = (torch.full((len(condition),), flag, device=condition.device) for flag in (True, False))
+    yes, no = (np.full(len(condition), flag) for flag in (True, False))
 
-    def net(x: Tensor, level: int, cond: tuple[Tensor, Tensor]) -> Tensor:
+    def net(x: np.ndarray, level: int, cond: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         return predictor.denoiser(*cond)(x, level)
 
     noise = row_noise(seeds)
-    made = chosen.temperature * noise(torch.empty(len(condition), *predictor.mean.shape, device=condition.device))
+    made = chosen.temperature * noise(np.empty((len(condition), *predictor.mean.shape), np.float32))
     way = chosen.levels(predictor.schedule)
     walk = sample(
         guide(net, (condition, yes), (condition, no), chosen.guidance), made,
@@ -86,7 +83,7 @@ def complete(
     return joined(predictor.to_features(made, pose), features, mask, ease=max(round(EASE * predictor.fps), 1))
 
 
-def joined(made: Tensor, known: Tensor, mask: Tensor, *, ease: int) -> Tensor:
+def joined(made: np.ndarray, known: np.ndarray, mask: np.ndarray, *, ease: int) -> np.ndarray:
     """``known`` where ``mask`` is 1, ``made`` matched to it elsewhere: (rows, frames, channels), mask one per 3 of
     them.
 
@@ -94,29 +91,29 @@ def joined(made: Tensor, known: Tensor, mask: Tensor, *, ease: int) -> Tensor:
     leaves their second derivative alone, or over the whole gap between two borders where that is shorter. Rows whose
     masks are equal are done at once.
     """
-    each = mask.to(made).repeat_interleave(3, dim=-1)
+    each = mask.astype(made.dtype).repeat(3, axis=-1)
     result = (1 - each) * made + each * known
-    sure = (mask >= 1).cpu().numpy()
+    sure = mask >= 1
     patterns, rows = np.unique(sure.reshape(len(sure), -1), axis=0, return_inverse=True)
     for number, pattern in enumerate(patterns.reshape(-1, *sure.shape[1:])):
-        chosen = torch.from_numpy(np.flatnonzero(rows.reshape(-1) == number)).to(made.device)
+        chosen = np.flatnonzero(rows.reshape(-1) == number)
         result[chosen] += _matching(made[chosen], known[chosen], pattern, ease) * (1 - each[chosen])
     return result
 
 
-def _matching(made: Tensor, known: Tensor, sure: NDArray[np.bool_], ease: int) -> Tensor:
+def _matching(made: np.ndarray, known: np.ndarray, sure: NDArray[np.bool_], ease: int) -> np.ndarray:
     """What to add to ``made`` (rows, frames, channels) for one mask (frames, parts)."""
-    added, lack = torch.zeros_like(made), known - made
+    added, lack = np.zeros_like(made), known - made
     courses, parts = np.unique(sure.T, axis=0, return_inverse=True)
     for number, course in enumerate(courses):
         joints = np.flatnonzero(parts.reshape(-1) == number)
-        channels = torch.from_numpy((3 * joints[:, None] + np.arange(3)).ravel()).to(made.device)
+        channels = (3 * joints[:, None] + np.arange(3)).ravel()
         for border, step, room in _borders(course, ease):
             here = lack[:, border][:, channels]
             behind = border - step
             slope = here - lack[:, behind][:, channels] if 0 <= behind < len(course) and course[behind] else 0 * here
-            frames = border + step * torch.arange(1, room + 1, device=made.device)
-            fading = match_boundary(here, slope, room, decay=quintic_decay).transpose(0, 1)
+            frames = border + step * np.arange(1, room + 1)
+            fading = match_boundary(here, slope, room, decay=quintic_decay).swapaxes(0, 1)
             added[:, frames[:, None], channels] += fading
     return added
 
@@ -159,13 +156,13 @@ def next_frames(
         given = np.broadcast_to(known.positions, (rows, *known.positions.shape[-3:]))
         count = min(given.shape[1], predictor.frames - h)
         seen[:, h : h + count], mask[h : h + count] = layout.encode(given[:, :count], place), known.mask[:count]
-    features, like = torch.from_numpy(seen).to(predictor.mean), torch.from_numpy(mask).to(predictor.mean)
+    features, masks = seen.astype(np.float32), np.broadcast_to(mask, (rows, *mask.shape))
 
-    def placed(windows: Tensor) -> Array:
-        return layout.decode(windows[:, h : h + frames].cpu().double().numpy(), place)
+    def placed(windows: np.ndarray) -> Array:
+        return layout.decode(windows[:, h : h + frames], place)
 
     made = complete(
-        predictor, features, like.expand(rows, -1, -1), features[:, h - 1],
+        predictor, features, masks, features[:, h - 1],
         seeds=seeds, sampling=PredictionSampling.of(sampling, settings),
         poses=lambda windows: placed(windows)[:, None],
     )  # fmt: skip

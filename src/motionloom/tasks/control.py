@@ -7,11 +7,9 @@ The goal is seen from the person's ground pose at frame 0; there it steers every
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal, TypeAlias, Unpack
+from typing import Literal, Unpack
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from motionloom import rotations as rot
 from motionloom.diffusion import Denoiser, Weight, blend, guide, mix
@@ -24,15 +22,15 @@ from motionloom.goals.goal import Goal, start_of
 from motionloom.goals.segment import LONGEST
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
-from motionloom.nets.prior import Condition, PriorNet
+from motionloom.runtime.prior import PriorSession
+from motionloom.runtime.prior_condition import Condition
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.sampling import Batch, Progress, Rows, Sampling, Settings, sample, to_features
 from motionloom.tasks.text import alone, check_prompts, to_motion
-from motionloom.weights.adapter import AdaptedNet, Adapter, adapted, show
+from motionloom.weights.adapter import Adapter, adapted, show
 from motionloom.weights.adapter import adapters as shipped
 from motionloom.weights.prior import Prior
 
-Net: TypeAlias = PriorNet | AdaptedNet
 Weighted = tuple[Adapter, Weight]
 Adapters = Literal["none", "fitting"] | Sequence[Adapter | Weighted]
 
@@ -97,11 +95,10 @@ def control(
         prior, [prompt] * chosen.number(), goal.seen_from(place), seeds=chosen.seeds(chosen.number()), adapters=nets,
         sampling=chosen, progress=progress,
     )  # fmt: skip
-    sampled = [moved(to_motion(row.double().numpy(), prior.fps, foot_lock=foot_lock), place) for row in made]
+    sampled = [moved(to_motion(row.astype(np.float64), prior.fps, foot_lock=foot_lock), place) for row in made]
     return [judged(fitting.fit(motion, goal) if fit else motion, motion, goal) for motion in sampled]
 
 
-@torch.inference_mode()
 def steered_features(
     prior: Prior,
     prompts: Sequence[str],
@@ -112,7 +109,7 @@ def steered_features(
     sampling: Sampling | None = None,
     progress: Progress | None = None,
     **settings: Unpack[Settings],
-) -> list[Tensor]:
+) -> list[np.ndarray]:
     """`motionloom.tasks.text.sample_features` for rows of the goal's length, each estimate steered towards ``goal``.
 
     ``goal`` as of `steering.toward`. With ``adapters`` their blended estimates are steered, and the numbers that are
@@ -123,7 +120,7 @@ def steered_features(
     pairs = [one if isinstance(one, tuple) else (one, 1 / len(adapters)) for one in adapters]
     nets, weights = [adapted(prior.net, adapter) for adapter, _ in pairs], [weight for _, weight in pairs]
     chosen, change = Sampling.of(sampling, settings), toward(goal, prior)
-    mask = controlled_numbers(goal).to(prior.mean.device)
+    mask = controlled_numbers(goal)
 
     def steer(denoise: Denoiser, batch: Batch) -> Denoiser:
         if not nets:
@@ -133,11 +130,17 @@ def steered_features(
 
     rows = Rows(prompts, [len(goal)] * len(prompts), seeds)
     made = dict(sample(prior, rows, chosen, edits=[steer], progress=progress, view=alone(prior)))
-    return [to_features(prior, made[row]).cpu() for row in range(len(prompts))]
+    return [to_features(prior, made[row]) for row in range(len(prompts))]
 
 
 def blended(
-    nets: Sequence[Net], cond: Condition, known: Tensor, mask: Tensor, *, weights: Sequence[Weight], guidance: float
+    nets: Sequence[PriorSession],
+    cond: Condition,
+    known: np.ndarray,
+    mask: np.ndarray,
+    *,
+    weights: Sequence[Weight],
+    guidance: float,
 ) -> Denoiser:
     """DiffusionBlending: networks guided by themselves, then their weighted sum; shown what is given if they can be."""
     null = cond.null()
@@ -148,14 +151,14 @@ def blended(
     return guided[0] if len(nets) == 1 and weights[0] == 1.0 else blend(guided, weights)
 
 
-def controlled_numbers(goal: Goal) -> Tensor:
+def controlled_numbers(goal: Goal) -> np.ndarray:
     """(frames, 263) bool: the numbers of the representation that a goal is about, frame by frame."""
     mask = np.zeros((len(goal), len(named("root"))), dtype=bool)
     mask[goal.asked[:, 0].any(axis=-1)] |= named("root_horizontal")
     mask[goal.asked[:, 0, 1], 3] = True
     for joint in range(1, len(SMPL22)):
         mask[goal.asked[:, joint].any(axis=-1), ric(joint)] = True
-    return torch.from_numpy(mask)
+    return mask
 
 
 def fitting_adapters(prior: Prior, goal: Goal) -> list[Adapter]:
@@ -174,21 +177,23 @@ def fitting_adapters(prior: Prior, goal: Goal) -> list[Adapter]:
     return [Adapter.load(name, prior) for name in sorted(chosen)]
 
 
-def _seeing(net: Callable[[Tensor, Tensor], Denoiser], change: Correction, prior: Prior, mask: Tensor) -> Denoiser:
+def _seeing(
+    net: Callable[[np.ndarray, np.ndarray], Denoiser], change: Correction, prior: Prior, mask: np.ndarray
+) -> Denoiser:
     """The steered denoiser that shows its networks the last steered estimate, free of noise, where ``mask`` is True.
 
     ``net`` (given, mask) is the denoiser of the networks that are shown what is given. At the first level nothing is.
     """
-    last: Tensor | None = None
+    last: np.ndarray | None = None
 
-    def seen(state: Tensor, level: int) -> Tensor:
+    def seen(state: np.ndarray, level: int) -> np.ndarray:
         nonlocal last
         if last is None:
-            denoised = net(torch.zeros_like(state), torch.zeros_like(state, dtype=torch.bool))(state, level)
+            denoised = net(np.zeros_like(state), np.zeros(state.shape, np.bool_))(state, level)
         else:
             shown = mix(state, prior.schedule.at(level)[0] * last, mask)
-            denoised = net(last, mask.expand(len(state), -1, -1))(shown, level)
-        last = torch.stack([change(row, level) for row in denoised])
+            denoised = net(last, np.broadcast_to(mask, state.shape))(shown, level)
+        last = np.stack([change(row, level) for row in denoised])
         return last
 
     return seen

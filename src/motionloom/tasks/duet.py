@@ -12,12 +12,10 @@ from itertools import chain, tee
 from typing import Unpack
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
-from torch.nn import functional as F
 
-from motionloom.edits.relative_pose import PoseGuidance, relative_pose_guidance
+from motionloom.diffusion import lerp
+from motionloom.edits.relative_pose import PoseGuidance, people, relative_pose_guidance
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.layout import FPS, WIDTH
@@ -26,14 +24,14 @@ from motionloom.goals.goal import Goal
 from motionloom.goals.segment import LONGEST, Segment
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
-from motionloom.nets.pair import PLACE, PairNet, join, part
-from motionloom.nets.prior import PriorNet
 from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.anatomy import read_body
+from motionloom.runtime.pair import PLACE, PairSession, join, part
+from motionloom.runtime.prior import PriorSession
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.body import solve_stream
 from motionloom.tasks.control import moved
-from motionloom.tasks.long import Row, Track, bound_together, chain_rows, in_world, same_net
+from motionloom.tasks.long import Row, Track, bound_together, chain_rows, in_world, lengthened, same_net
 from motionloom.tasks.pair import (
     Duet,
     PairEdits,
@@ -100,7 +98,7 @@ def react(
     places = one_world([alone, alone], legs)[0]
     known, poses, _ = two.encode(np.stack([places, places]))
     net = block.net(prior)
-    observed = known_state(prior, net, torch.from_numpy(known), torch.from_numpy(poses), known.shape[1])
+    observed = known_state(prior, net, known, poses, known.shape[1])
     observed.mask[:, 0] = observed.mask[1] = False
     features, sampled = pair_features(
         prior, net, said * chosen.number(), known.shape[1], seeds=pair_seeds(chosen),
@@ -108,7 +106,7 @@ def react(
     )  # fmt: skip
     floor, made = _floor(given), []
     at = np.arange(len(given)) / given.fps * FPS
-    for numbers, standing in zip(features, sampled.double().numpy(), strict=True):
+    for numbers, standing in zip(features, sampled.astype(np.float64), strict=True):
         other_pose = GroundPose.of_numbers(poses_at(standing, GroundPose.of_numbers(poses[0]), 0)[1])
         other = moved(finish(prior, numbers[1], foot_lock=foot_lock), other_pose).at(at, given.fps)
         height = np.array([0.0, floor, 0.0])
@@ -193,20 +191,19 @@ def _asked(segments: Sequence[Segment], person: int, track: Track | None, goals_
     return result
 
 
-def _of(pieces: Iterable[Tensor], person: int) -> Iterator[Tensor]:
+def _of(pieces: Iterable[np.ndarray], person: int) -> Iterator[np.ndarray]:
     return (piece[person] for piece in pieces)
 
 
-@torch.inference_mode()
 def duet_features(
     prior: Prior,
-    net: PairNet,
+    net: PairSession,
     segments: Sequence[Sequence[Segment]],
     *,
     sampling: PairSampling | None = None,
     progress: Moves | None = None,
     **settings: Unpack[PairSettings],
-) -> Iterator[tuple[Tensor, Array]]:
+) -> Iterator[tuple[np.ndarray, Array]]:
     """Pieces (2, frames, 263), not standardised, one per segment, and the ground poses (2, 4) at the very first frame.
 
     segments: those of each person, of equal lengths and transitions. Strung together the pieces are the two motions.
@@ -227,19 +224,20 @@ def duet_features(
         motion = smooth(motion) if prior.net.config.patch > 1 else motion
         one = row.people[0]
         features = motion[:, one.before : one.before + one.frames] * prior.std + prior.mean
-        yield features.cpu(), net.talk.config.places.decode(places).cpu().double().numpy()
+        yield features, net.places.decode(places).astype(np.float64)
 
 
-def _parted(state: Tensor) -> tuple[Tensor, Tensor]:
+def _parted(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A row (length, 534) of the chain to two motions (2, length, 263) and, from its first frame, D (2, 4)."""
-    motion = state[:, : 2 * WIDTH].unflatten(1, (2, WIDTH)).transpose(0, 1)
-    return motion, state[0, 2 * WIDTH :].view(2, PLACE)
+    motion = state[:, : 2 * WIDTH].reshape(-1, 2, WIDTH).swapaxes(0, 1)
+    return motion, state[0, 2 * WIDTH :].reshape(2, PLACE)
 
 
-def _strung(motion: Tensor, places: Tensor) -> Tensor:
+def _strung(motion: np.ndarray, places: np.ndarray) -> np.ndarray:
     """The inverse of `_parted`: D is in the first frame, and zeros behind it."""
-    row = motion.transpose(0, 1).flatten(1)
-    return torch.cat([row, F.pad(places.reshape(1, -1), (0, 0, 0, len(row) - 1))], dim=1)
+    frames = motion.shape[1]
+    row = motion.swapaxes(0, 1).reshape(frames, -1)
+    return np.concatenate([row, lengthened(places.reshape(1, -1), frames)], axis=1)
 
 
 @dataclass(eq=False)
@@ -247,14 +245,14 @@ class _PairRow:
     """A row of the chain: both people of a segment."""
 
     people: tuple[Row, ...]
-    net: PairNet
+    net: PairSession
     """With the segment's adapters."""
     guidance: PoseGuidance
     before: "_PairRow | None"
     """The row before, as long as this one is under way."""
-    noise: Tensor | None = None
+    noise: np.ndarray | None = None
     """(2, 4) that this row's D began as."""
-    ends: dict[int, Tensor] = field(default_factory=dict)
+    ends: dict[int, np.ndarray] = field(default_factory=dict)
     """Relative poses (2, 4) at the frame with which the next row begins, by level of the estimate."""
 
     @property
@@ -273,7 +271,7 @@ class _PairDenoiser:
     """Guided estimates of rows of a chain; each row remembers its last one, which says where the next row begins."""
 
     prior: Prior
-    net: PairNet
+    net: PairSession
     levels: Sequence[int]
     pair_guidance: float
 
@@ -282,33 +280,33 @@ class _PairDenoiser:
     ) -> Iterator[_PairRow]:
         """The rows of the chain; whoever has a goal is not moved by pair guidance."""
         before: _PairRow | None = None
-        for number, people in enumerate(both):
+        for number, both_of in enumerate(both):
             goals = [one[number].goal for one in segments]
-            net = self._net(people[0].net, before)
-            mask = torch.zeros(2, 1 + people[0].length, WIDTH, dtype=torch.bool, device=self.prior.mean.device)
+            net = self._net(both_of[0].net, before)
+            mask = np.zeros((2, 1 + both_of[0].length, WIDTH), np.bool_)
             guidance = relative_pose_guidance(
-                self.prior, net, bound_together([one.cond for one in people]), seeds=person_seeds(seed + number, 0),
+                self.prior, net, bound_together([one.cond for one in both_of]), seeds=person_seeds(seed + number, 0),
                 mask=mask, frozen=[goal is not None and not goal.empty for goal in goals], weight=self.pair_guidance,
             )  # fmt: skip
-            before = _PairRow(people, net, guidance, before)
+            before = _PairRow(both_of, net, guidance, before)
             yield before
 
-    def __call__(self, rows: Sequence[_PairRow], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
+    def __call__(self, rows: Sequence[_PairRow], states: Sequence[np.ndarray], at: Sequence[int]) -> list[np.ndarray]:
         parts = [_parted(state) for state in states]
         shown = [self._shown(row, places, level) for row, (_, places), level in zip(rows, parts, at, strict=True)]
         frames = [motion.shape[1] for motion, _ in parts]
-        x = torch.cat(
+        x = np.stack(
             [
-                join(places, F.pad(motion, (0, 0, 0, max(frames) - motion.shape[1])))
+                join(places, lengthened(motion, max(frames)))
                 for places, (motion, _) in zip(shown, parts, strict=True)
             ]
         )
-        denoised = self._estimates(rows, x.unflatten(0, (-1, 2)), frames, at)
+        denoised = self._estimates(rows, x, frames, at)
         made = []
         for row, count, level, one, (state, _) in zip(rows, frames, at, denoised, parts, strict=True):
             places, motion = part(one)
-            people = zip(motion[:, :count], row.people, strict=True)
-            motion = torch.stack([person.correct(part_of, level) for part_of, person in people])
+            each = zip(motion[:, :count], row.people, strict=True)
+            motion = np.stack([person.correct(part_of, level) for part_of, person in each])
             begin = self._begin_or(places, row, level)
             motion = self._moved(row, level, motion, begin, state=state)
             made.append(_strung(motion, places))
@@ -316,63 +314,71 @@ class _PairDenoiser:
             row.ends[level] = two.later(features, begin, row.length - max(row.overlap, 1))
         return made
 
-    def _shown(self, row: _PairRow, places: Tensor, level: int) -> Tensor:
+    def _shown(self, row: _PairRow, places: np.ndarray, level: int) -> np.ndarray:
         """D as the network sees it: sampled for the first row, else the end of the row before, noised as learned."""
         row.noise, end = places if row.noise is None else row.noise, self._begin(row, level)
         if end is None:
             return places
-        return self.prior.schedule.noised(self.net.talk.config.places.encode(end), level, row.noise)
+        return self.prior.schedule.noised(self.net.places.encode(end), level, row.noise)
 
-    def _begin(self, row: _PairRow, level: int) -> Tensor | None:
+    def _begin(self, row: _PairRow, level: int) -> np.ndarray | None:
         """The ground poses when a row begins, by what the row before estimated one level earlier: which of the two
         moves first must not matter."""
         step = self.levels.index(level)
         return row.before.ends.get(self.levels[step - 1]) if step and row.before else None
 
-    def _begin_or(self, places: Tensor, row: _PairRow, level: int) -> Tensor:
+    def _begin_or(self, places: np.ndarray, row: _PairRow, level: int) -> np.ndarray:
         """The same; for the first row and at the first level what D (2, 4) says."""
         begin = self._begin(row, level)
-        return self.net.talk.config.places.decode(places) if begin is None else begin
+        return self.net.places.decode(places) if begin is None else begin
 
-    def kept(self, row: _PairRow, state: Tensor, level: int) -> tuple[Tensor, Tensor]:
+    def kept(self, row: _PairRow, state: np.ndarray, level: int) -> tuple[np.ndarray, np.ndarray]:
         """Features (2, frames, 263) of a denoised row between its seams, and the ground poses in the first one."""
         motion, places = _parted(state)
         features, one = motion * self.prior.std + self.prior.mean, row.people[0]
         own = features[:, one.before : one.before + one.frames]
         return own, two.later(features, self._begin_or(places, row, level), one.before)
 
-    def poses(self, kept: list[tuple[Tensor, Tensor]]) -> Array:
+    def poses(self, kept: list[tuple[np.ndarray, np.ndarray]]) -> Array:
         """(2, frames, 22, 3) of what was `kept` of rows."""
-        return torch.cat([two.decode(own, poses) for own, poses in kept], dim=1).cpu().numpy()
+        return np.concatenate([two.decode(own, poses) for own, poses in kept], axis=1)
 
-    def _moved(self, row: _PairRow, level: int, motion: Tensor, begin: Tensor, *, state: Tensor) -> Tensor:
+    def _moved(
+        self, row: _PairRow, level: int, motion: np.ndarray, begin: np.ndarray, *, state: np.ndarray
+    ) -> np.ndarray:
         """The estimate of a row, its people moved to each other from where they begin."""
-        places = self.net.talk.config.places.encode(begin)
+        places = self.net.places.encode(begin)
         return part(row.guidance(join(places, state), join(places, motion), level))[1]
 
-    def _net(self, base: PriorNet, before: _PairRow | None) -> PairNet:
+    def _net(self, base: PriorSession, before: _PairRow | None) -> PairSession:
         """The block over the prior's network, or over that network with a segment's adapters in it."""
         if base is self.prior.net:
             return self.net
         return before.net if before and before.people[0].net is base else self.net.over(base)
 
-    def _estimates(self, rows: Sequence[_PairRow], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> list[Tensor]:
-        """Guided estimates (2, 1 + frames, numbers) of rows x, one network call for each set of adapters."""
-        denoised: dict[int, Tensor] = {}
+    def _estimates(
+        self, rows: Sequence[_PairRow], x: np.ndarray, frames: Sequence[int], at: Sequence[int]
+    ) -> list[np.ndarray]:
+        """Guided estimates (2, 1 + frames, numbers) of rows x (rows, 2, 1 + frames, numbers), one network call for each set of adapters."""
+        denoised: dict[int, np.ndarray] = {}
         for places in same_net([row.people[0] for row in rows]):
-            people = [person for i in places for person in rows[i].people]
+            persons = [person for i in places for person in rows[i].people]
             made = self._guided(
-                rows[places[0]].net, people, x[places].flatten(0, 1), [frames[i] for i in places],
+                rows[places[0]].net,
+                persons,
+                x[places].reshape(-1, *x.shape[2:]),
+                [frames[i] for i in places],
                 [at[i] for i in places],
-            )  # fmt: skip
-            denoised.update(zip(places, made.unflatten(0, (-1, 2)), strict=True))
+            )
+            denoised.update(zip(places, people(made), strict=True))
         return [denoised[i] for i in range(len(rows))]
 
-    def _guided(self, net: PairNet, rows: Sequence[Row], x: Tensor, frames: Sequence[int], at: Sequence[int]) -> Tensor:
+    def _guided(
+        self, net: PairSession, rows: Sequence[Row], x: np.ndarray, frames: Sequence[int], at: Sequence[int]
+    ) -> np.ndarray:
         """``rows``, and rows of x: a0, b0, a1, b1, ...; frames and levels: one per pair."""
-        lengths = torch.tensor(frames, device=x.device).repeat_interleave(2).repeat(2)
-        level = torch.tensor(at, device=x.device).repeat_interleave(2).repeat(2)
+        lengths, level = (np.tile(np.repeat(each, 2), 2) for each in (frames, at))
         bound = bound_together([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
-        conditional, unconditional = net(torch.cat([x, x]), level, bound).chunk(2)
-        scale = torch.tensor([row.guidance for row in rows]).to(x)[:, None, None]
-        return torch.lerp(unconditional, conditional, scale)
+        conditional, unconditional = np.split(net(np.concatenate([x, x]), level, bound), 2)
+        scale = np.array([row.guidance for row in rows], x.dtype)[:, None, None]
+        return lerp(unconditional, conditional, scale)

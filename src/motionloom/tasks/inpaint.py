@@ -8,9 +8,7 @@ would.
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from motionloom.diffusion import Denoiser
 from motionloom.edits.boundary import InpaintWindow, arrival, joining
@@ -35,7 +33,6 @@ class Inpainted:
     """(frames, 4) as in the features."""
 
 
-@torch.inference_mode()
 def inpaint_motion(
     prior: Prior, window: InpaintWindow, text: str, sampling: Sampling, *, seed: int, progress: Progress | None = None
 ) -> Inpainted:
@@ -44,20 +41,19 @@ def inpaint_motion(
     An empty text asks for nothing in particular. Frames from 0 on are placed by what follows them.
     """
     place = ground_pose(window.positions[0])
-    known = torch.from_numpy(humanml.encode(place.from_world(window.positions))).to(prior.mean)[None]
-    mask = torch.ones_like(known, dtype=torch.bool)
-    mask[:, window.first : window.last] = torch.from_numpy(window.keep).to(mask.device)
-    spread = torch.where(prior.std > 0, prior.std, 1.0)
+    known = humanml.encode(place.from_world(window.positions))[None]
+    mask = np.ones(known.shape, np.bool_)
+    mask[:, window.first : window.last] = window.keep
+    spread = prior.spread
     meet, reach = joining(known, mask, window.first, window.last), arrival(known, mask, window)
 
     def bent(denoise: Denoiser, _: Batch) -> Denoiser:
         return lambda state, level: (
-            reach(meet(denoise(state, level) * spread + prior.mean)) - prior.mean
-        ) / spread  # fmt: skip
+            (reach(meet(denoise(state, level) * spread + prior.mean)) - prior.mean) / spread
+        )
 
-    def poses(states: Tensor) -> Array:
-        features = (states[0] * spread + prior.mean).cpu().double()
-        return _placed(features, known[0].cpu().double(), window, place)[None, None]
+    def poses(states: np.ndarray) -> Array:
+        return _placed(states[0] * spread + prior.mean, known[0], window, place)[None, None]
 
     observed = Observed((known - prior.mean) / spread, mask, strength=window.strength)
     rows = Rows([text], [known.shape[1]], [seed])
@@ -65,14 +61,15 @@ def inpaint_motion(
         prior, rows, sampling, edits=[bent], observed=observed, progress=progress, view=View(poses, begin=window.begin)
     )  # fmt: skip
     made = state[None] * spread + prior.mean
-    made = reach(meet(torch.where(mask, known, smooth(made) if prior.net.config.patch > 1 else made)))
-    features = made[0].cpu().double()
-    return Inpainted(_placed(features, known[0].cpu().double(), window, place), features[:, LAYOUT["contacts"]].numpy())
+    made = reach(meet(np.where(mask, known, smooth(made) if prior.net.config.patch > 1 else made)))
+    contacts = made[0, :, LAYOUT["contacts"]].astype(np.float64)
+    return Inpainted(_placed(made[0], known[0], window, place), contacts)
 
 
-def _placed(features: Tensor, known: Tensor, window: InpaintWindow, place: GroundPose) -> Array:
+def _placed(features: np.ndarray, known: np.ndarray, window: InpaintWindow, place: GroundPose) -> Array:
     """(frames, 22, 3) in the world, where the frames before the stretch are, or else those behind it."""
-    positions = humanml.decode_positions(features).numpy()
+    features, known = features.astype(np.float64), known.astype(np.float64)
+    positions = humanml.decode_positions(features)
     if window.first == 0 and window.last < len(features):
         there, here = (_standing(f, window.last) for f in (known, features))
         turn = GroundPose(there.x, there.z, there.facing - here.facing)
@@ -80,7 +77,7 @@ def _placed(features: Tensor, known: Tensor, window: InpaintWindow, place: Groun
     return place.to_world(positions)
 
 
-def _standing(features: Tensor, frame: int) -> GroundPose:
+def _standing(features: Array, frame: int) -> GroundPose:
     turn, root = humanml.recover_root(features)
-    half = torch.atan2(turn[frame, 2], turn[frame, 0])
+    half = np.arctan2(turn[frame, 2], turn[frame, 0])
     return GroundPose(float(root[frame, 0]), float(root[frame, 2]), -2 * float(half))

@@ -16,11 +16,9 @@ from itertools import islice
 from typing import Unpack
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
-from torch.nn import functional as F
 
+from motionloom.diffusion import lerp
 from motionloom.edits.boundary import joining
 from motionloom.edits.steering import Correction, toward
 from motionloom.errors import MotionloomError
@@ -31,7 +29,8 @@ from motionloom.goals.paths import along
 from motionloom.goals.segment import Segment
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion, ground_pose
-from motionloom.nets.prior import Bound, PriorNet
+from motionloom.runtime.prior import PriorSession
+from motionloom.runtime.prior_condition import Bound
 from motionloom.tasks.adapting import AdaptedPriors, loaded
 from motionloom.tasks.body import Places, solve_stream
 from motionloom.tasks.sampling import Moves, Sampling, Settings, sample_chain
@@ -60,7 +59,7 @@ class Row:
     cond: Bound
     null: Bound
     correct: Correction
-    net: PriorNet
+    net: PriorSession
     """The prior's network, with the segment's adapters merged into it."""
 
     @property
@@ -158,7 +157,6 @@ def _begun(
     return past, track, past.end if past else track.place(0) if track else GroundPose()
 
 
-@torch.inference_mode()
 def long_features(
     prior: Prior,
     segments: Iterable[Segment],
@@ -167,7 +165,7 @@ def long_features(
     sampling: Sampling | None = None,
     progress: Moves | None = None,
     **settings: Unpack[Settings],
-) -> Iterator[Tensor]:
+) -> Iterator[np.ndarray]:
     """Features (frames, 263), not standardised, one piece per segment; strung together they are the long motion.
 
     Piece i has ``round(seconds * fps)`` frames. ``batch_size``: rows per network call; it changes speed and memory, not
@@ -182,11 +180,11 @@ def long_features(
         rows, each = own * chosen.number(), len(own)
     place = past.end if past else GroundPose()
 
-    def features(row: Row, state: Tensor, _: int = 0) -> Tensor:
-        return (state[row.before : row.before + row.frames] * prior.std + prior.mean).cpu()
+    def features(row: Row, state: np.ndarray, _: int = 0) -> np.ndarray:
+        return state[row.before : row.before + row.frames] * prior.std + prior.mean
 
-    def poses(pieces: list[Tensor]) -> Array:
-        return decoded(torch.cat(pieces).numpy().astype(np.float64), place)[0][None]
+    def poses(pieces: list[np.ndarray]) -> Array:
+        return decoded(np.concatenate(pieces).astype(np.float64), place)[0][None]
 
     made = sample_chain(
         prior, rows, denoise, chosen, features=len(prior.mean), batch_size=BATCH, progress=progress,
@@ -197,8 +195,8 @@ def long_features(
 
 
 def _corrected(
-    prior: Prior, last: int, rows: Sequence[Row], states: Sequence[Tensor], at: Sequence[int]
-) -> list[Tensor]:
+    prior: Prior, last: int, rows: Sequence[Row], states: Sequence[np.ndarray], at: Sequence[int]
+) -> list[np.ndarray]:
     """Denoised states of rows, each through what corrects it."""
     denoised = _averaged(prior, list(rows), states, at, last=last)
     return [row.correct(one, level) for row, one, level in zip(rows, denoised, at, strict=True)]
@@ -239,7 +237,7 @@ def with_loaded(prior: Prior, segments: Sequence[Segment]) -> tuple[Segment, ...
 
 
 def _one_after_the_other(edits: Sequence[Correction]) -> Correction:
-    def correct(clean: Tensor, level: int) -> Tensor:
+    def correct(clean: np.ndarray, level: int) -> np.ndarray:
         for edit in edits:
             clean = edit(clean, level)
         return clean
@@ -247,7 +245,9 @@ def _one_after_the_other(edits: Sequence[Correction]) -> Correction:
     return correct
 
 
-def _averaged(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int], *, last: int) -> list[Tensor]:
+def _averaged(
+    prior: Prior, rows: list[Row], states: Sequence[np.ndarray], at: Sequence[int], *, last: int
+) -> list[np.ndarray]:
     """Estimates; those of the last move are averages over all ways to divide the frames into the network's tokens.
 
     A token holds several frames, and between tokens the network leaves small steps. (Averaging over shifts is the
@@ -256,7 +256,7 @@ def _averaged(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Seque
     cleans = _estimates(prior, rows, states, at)
     ending = [i for i, level in enumerate(at) if level == last]
     shifts = range(1, prior.net.config.patch)
-    sums = {i: cleans[i].clone() for i in ending}
+    sums = {i: cleans[i].copy() for i in ending}
     for shift in shifts:
         longer = [i for i in ending if len(states[i]) > shift]
         if not longer:
@@ -267,17 +267,19 @@ def _averaged(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Seque
         for i, clean in zip(longer, shifted, strict=True):
             sums[i][shift:] += clean
     for i, total in sums.items():
-        ways = torch.arange(1, len(total) + 1, device=total.device).clamp(max=len(shifts) + 1)
+        ways = np.arange(1, len(total) + 1, dtype=total.dtype).clip(max=len(shifts) + 1)
         cleans[i] = total / ways[:, None]
     return cleans
 
 
-def _estimates(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
+def _estimates(
+    prior: Prior, rows: list[Row], states: Sequence[np.ndarray], at: Sequence[int]
+) -> list[np.ndarray]:
     """Guided estimates of rows of different lengths and levels, as one network call for each set of adapters."""
-    cleans: dict[int, Tensor] = {}
+    cleans: dict[int, np.ndarray] = {}
     for numbers in same_net(rows):
         some = [rows[i] for i in numbers]
-        made = _estimates_of_one_net(prior, some, [states[i] for i in numbers], [at[i] for i in numbers])
+        made = _estimates_of_one_net(some, [states[i] for i in numbers], [at[i] for i in numbers])
         cleans.update(zip(numbers, made, strict=True))
     return [cleans[i] for i in range(len(rows))]
 
@@ -290,15 +292,17 @@ def same_net(rows: Sequence[Row]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _estimates_of_one_net(prior: Prior, rows: list[Row], states: Sequence[Tensor], at: Sequence[int]) -> list[Tensor]:
+def _estimates_of_one_net(
+    rows: list[Row], states: Sequence[np.ndarray], at: Sequence[int]
+) -> list[np.ndarray]:
     frames = [len(state) for state in states]
-    x = torch.stack([F.pad(state, (0, 0, 0, max(frames) - len(state))) for state in states]).to(prior.mean)
-    lengths = torch.tensor([*frames, *frames], device=x.device)
-    bound = bound_together([row.cond for row in rows] + [row.null for row in rows])._replace(lengths=lengths)
-    level = torch.tensor([*at, *at], device=x.device)
-    conditional, unconditional = rows[0].net(torch.cat([x, x]), level, bound).chunk(2)
-    scale = torch.tensor([row.guidance for row in rows]).to(x)[:, None, None]
-    guided = torch.lerp(unconditional, conditional, scale)
+    x = np.stack([lengthened(state, max(frames)) for state in states])
+    bound = bound_together([row.cond for row in rows] + [row.null for row in rows])
+    bound = bound._replace(lengths=np.array([*frames, *frames]))
+    answer = rows[0].net(np.concatenate([x, x]), np.array([*at, *at]), bound)
+    conditional, unconditional = np.split(answer, 2)
+    scale = np.array([row.guidance for row in rows], x.dtype)[:, None, None]
+    guided = lerp(unconditional, conditional, scale)
     return [clean[:count] for clean, count in zip(guided, frames, strict=True)]
 
 
@@ -306,17 +310,22 @@ def bound_together(bounds: list[Bound]) -> Bound:
     """Rows of several conditions, their words padded to the longest."""
     most = max(one.words.shape[-1] for one in bounds)
 
-    def padded(one: Tensor) -> Tensor:  # words are the axis before the last
-        return F.pad(one, (0, 0, 0, most - one.shape[-2]))
-
     return Bound(
-        torch.cat([one.text for one in bounds]),
-        torch.cat([padded(one.keys) for one in bounds]),
-        torch.cat([padded(one.values) for one in bounds]),
-        torch.cat([F.pad(one.words, (0, most - one.words.shape[-1])) for one in bounds]),
-        torch.cat([one.lengths for one in bounds]),
-        torch.cat([one.flags for one in bounds]),
+        np.concatenate([one.text for one in bounds]),
+        np.concatenate([lengthened(one.keys, most) for one in bounds]),
+        np.concatenate([lengthened(one.values, most) for one in bounds]),
+        np.concatenate([lengthened(one.words, most, axis=-1) for one in bounds]),
+        np.concatenate([one.lengths for one in bounds]),
+        np.concatenate([one.flags for one in bounds]),
+        np.concatenate([one.shown for one in bounds]),
     )
+
+
+def lengthened(array: np.ndarray, length: int, *, axis: int = -2) -> np.ndarray:
+    """An array with zeros behind it, ``length`` long along an axis (-2: frames, or words)."""
+    missing = [(0, 0)] * array.ndim
+    missing[axis] = 0, length - array.shape[axis]
+    return np.pad(array, missing) if missing[axis][1] else array
 
 
 # Into the world
@@ -326,7 +335,7 @@ def bound_together(bounds: list[Bound]) -> Bound:
 class Past:
     """The end of a motion that a long one goes on from."""
 
-    known: Tensor
+    known: np.ndarray
     """(frames, 263) features of its last frames, not standardised."""
     end: GroundPose
     """Where the person is one frame behind them: at frame 0 of what follows."""
@@ -341,21 +350,20 @@ class Past:
             )
         positions = positions[-LOOK_BACK - 1 :]
         begin = ground_pose(positions[0])
-        known = humanml.encode(begin.from_world(positions)).astype(np.float64)
-        return Past(torch.from_numpy(known).float(), decoded(known, begin)[1])
+        known = humanml.encode(begin.from_world(positions))
+        return Past(known, decoded(known.astype(np.float64), begin)[1])
 
     def holder(self, prior: Prior, length: int) -> Correction:
         """Makes the first frames of a row's estimate the known ones, and the next ones leave them without a jump."""
-        count, width = self.known.shape
-        known = torch.cat([self.known, self.known.new_zeros(length - count, width)]).to(prior.mean)[None]
-        mask = torch.zeros_like(known, dtype=torch.bool)
+        count = len(self.known)
+        known = lengthened(self.known, length)[None]
+        mask = np.zeros(known.shape, np.bool_)
         mask[:, :count] = True
         meet = joining(known, mask, count, length)
-        spread = torch.where(prior.std > 0, prior.std, 1.0)
 
-        def hold(clean: Tensor, level: int) -> Tensor:
-            features = torch.where(mask, known, clean * spread + prior.mean)
-            return ((meet(features) - prior.mean) / spread)[0]
+        def hold(clean: np.ndarray, level: int) -> np.ndarray:
+            features = np.where(mask, known, clean * prior.spread + prior.mean)
+            return ((meet(features) - prior.mean) / prior.spread)[0]
 
         return hold
 
@@ -392,11 +400,10 @@ class Track:
 
 
 def in_world(
-    prior: Prior, pieces: Iterable[Tensor], goals: deque[Goal | None], place: GroundPose, track: Track | None
+    prior: Prior, pieces: Iterable[np.ndarray], goals: deque[Goal | None], place: GroundPose, track: Track | None
 ) -> Iterator[Places]:
     """Each piece where the one before it ends; on a path bent once more, so that errors do not add up."""
-    mean, first = prior.mean.cpu(), 0
-    spread = torch.where(prior.std > 0, prior.std, 1.0).cpu()
+    mean, spread, first = prior.mean, prior.spread, 0
     for piece in pieces:
         asked = goals.popleft()
         goal = Goal.nothing(len(piece)) if asked is None else asked.placed(place)
@@ -404,7 +411,7 @@ def in_world(
             part = track.path.crop(first, first + len(piece))
             piece = toward(part.seen_from(place), prior)((piece - mean) / spread, 0) * spread + mean
             goal = overlaid(part, goal)
-        features = piece.numpy().astype(np.float64)
+        features = piece.astype(np.float64)
         positions, after = decoded(features, place)
         yield Places(positions, features[:, LAYOUT["contacts"]], goal)
         place, first = after, first + len(piece)

@@ -9,14 +9,11 @@ from dataclasses import dataclass, replace
 from typing import Unpack
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
-from torch.nn import functional as F
 
 from motionloom.diffusion import Denoiser, NoiseSource, row_noise, row_seed
 from motionloom.edits.fitting import fit
-from motionloom.edits.relative_pose import relative_pose_guidance
+from motionloom.edits.relative_pose import people, relative_pose_guidance
 from motionloom.edits.steering import Correction, corrected_rows, toward
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
@@ -27,11 +24,11 @@ from motionloom.goals.goal import Goal, start_of
 from motionloom.goals.segment import LONGEST
 from motionloom.ground import GroundPose, compose, relative
 from motionloom.motion import Motion
-from motionloom.nets.pair import PairNet, join, part
 from motionloom.retarget import to_smpl22
 from motionloom.retarget.anatomy import read_body
+from motionloom.runtime.pair import PairSession, join, part
 from motionloom.tasks.control import moved
-from motionloom.tasks.long import Past
+from motionloom.tasks.long import Past, lengthened
 from motionloom.tasks.sampling import (
     Batch,
     Observed,
@@ -79,10 +76,9 @@ class PairEdits:
     """Whose motion is not moved by pair guidance; those that are corrected, unless said otherwise."""
 
 
-@torch.inference_mode()
 def pair_features(
     prior: Prior,
-    net: PairNet,
+    net: PairSession,
     prompts: Sequence[str],
     frames: int,
     *,
@@ -91,7 +87,7 @@ def pair_features(
     sampling: PairSampling | None = None,
     progress: Progress | None = None,
     **settings: Unpack[PairSettings],
-) -> tuple[Tensor, Tensor]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Features (pairs, 2, frames, 263), not standardised, and relative poses (pairs, 2, 4) of `features.pair`.
 
     Args:
@@ -112,14 +108,14 @@ def pair_features(
         raise MotionloomError(
             f"two people need two prompts and seeds a pair; got {rows} prompts and {len(seeds)} seeds"
         )
-    mask = torch.zeros(rows, 1 + frames, len(prior.mean), dtype=torch.bool) if given.observed is None else (
-        given.observed.mask.expand(rows, 1 + frames, len(prior.mean))
-    )  # fmt: skip
-    mask = mask.to(prior.mean.device)
+    shape = rows, 1 + frames, len(prior.mean)
+    mask = np.broadcast_to(False if given.observed is None else given.observed.mask, shape)
 
-    def corrected(state: Tensor, batch: Sequence[int], level: int) -> Tensor:
+    def corrected(state: np.ndarray, batch: Sequence[int], level: int) -> np.ndarray:
         some = [changes[i] for i in batch]
-        return torch.cat([state[:, :1], corrected_rows(state[:, 1:], some, level)], dim=1) if any(some) else state
+        if not any(some):
+            return state
+        return np.concatenate([state[:, :1], corrected_rows(state[:, 1:], some, level)], axis=1)
 
     def edit(denoise: Denoiser, batch: Batch) -> Denoiser:
         guided = relative_pose_guidance(
@@ -135,24 +131,22 @@ def pair_features(
         prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress, view=_view(prior, net)
     )  # fmt: skip
     made = dict(walk)
-    state = torch.stack([made[row] for row in range(rows)])
+    state = np.stack([made[row] for row in range(rows)])
     if prior.net.config.patch > 1:
-        state = torch.cat([state[:, :1], smooth(state[:, 1:])], dim=1)
+        state = np.concatenate([state[:, :1], smooth(state[:, 1:])], axis=1)
     if given.observed is not None:
-        state = torch.where(mask, given.observed.values.to(prior.mean).expand(mask.shape), state)
+        state = np.where(mask, given.observed.values, state)
     places, motion = part(corrected(state, range(rows), 0))
-    features = motion * prior.std + prior.mean
-    poses = net.talk.config.places.decode(places.unflatten(0, (-1, 2)))
-    return features.unflatten(0, (-1, 2)).cpu(), poses.cpu()
+    return people(motion * prior.std + prior.mean), net.places.decode(people(places))
 
 
-def _view(prior: Prior, net: PairNet) -> View:
+def _view(prior: Prior, net: PairSession) -> View:
     """Two rows to a motion, in the world of the first person."""
 
-    def poses(states: Tensor) -> Array:
+    def poses(states: np.ndarray) -> Array:
         places, motion = part(states)
-        ground = net.talk.config.places.decode(places.unflatten(0, (-1, 2)))
-        return two.decode((motion * prior.std + prior.mean).unflatten(0, (-1, 2)), ground).cpu().double().numpy()
+        ground = net.places.decode(people(places))
+        return two.decode(people(motion * prior.std + prior.mean), ground).astype(np.float64)
 
     return View(poses, people=2)
 
@@ -160,7 +154,7 @@ def _view(prior: Prior, net: PairNet) -> View:
 def pair_noise(seeds: Sequence[int]) -> NoiseSource:
     """Noise of rows' own seeds; a motion gets the noise it has where nobody else is there, the slot before it other."""
     places, motion = row_noise([row_seed(seed, 0, 1) for seed in seeds]), row_noise(seeds)
-    return lambda like: torch.cat([places(like[:, :1]), motion(like[:, 1:])], dim=1)
+    return lambda like: np.concatenate([places(like[:, :1]), motion(like[:, 1:])], axis=1)
 
 
 def person_seeds(seed: Seed, number: int) -> tuple[int, int]:
@@ -187,23 +181,22 @@ def prompts_of(prompt: Prompt) -> tuple[str, str]:
     return said[0], said[1]
 
 
-def known_state(prior: Prior, net: PairNet, features: Tensor, poses: Tensor, frames: int) -> Observed:
+def known_state(prior: Prior, net: PairSession, features: np.ndarray, poses: np.ndarray, frames: int) -> Observed:
     """A state (2, 1 + frames, 263) in which the first frames of two people are known, and their ground poses.
 
     features: (2, known frames, 263), not standardised; poses: (2, 4). The network sees them without noise.
     """
-    spread = torch.where(prior.std > 0, prior.std, 1.0)
-    motion = (features.to(prior.mean) - prior.mean) / spread
-    places = net.talk.config.places.encode(poses.to(prior.mean))
-    state = join(places, F.pad(motion, (0, 0, 0, frames - motion.shape[1])))
-    mask = torch.zeros_like(state, dtype=torch.bool)
+    motion = (features.astype(np.float32) - prior.mean) / prior.spread
+    places = net.places.encode(poses.astype(np.float32))
+    state = join(places, lengthened(motion, frames))
+    mask = np.zeros(state.shape, np.bool_)
     mask[:, : 1 + motion.shape[1]] = True
     return Observed(state, mask, noise_free=True)
 
 
 def stacked(pairs: Sequence[Observed]) -> Observed:
     """What is known of several pairs."""
-    values, masks = (torch.cat(parts) for parts in zip(*((one.values, one.mask) for one in pairs), strict=True))
+    values, masks = (np.concatenate(parts) for parts in zip(*((one.values, one.mask) for one in pairs), strict=True))
     return replace(pairs[0], values=values, mask=masks)
 
 
@@ -254,7 +247,7 @@ def generate_pair(
         edits=PairEdits(corrections=change * count), sampling=chosen, progress=progress,
     )  # fmt: skip
     made = []
-    for numbers, beside in zip(features, poses.double().numpy(), strict=True):
+    for numbers, beside in zip(features, poses.astype(np.float64), strict=True):
         if goal:
             beside = poses_at(beside, place, person)
         people = [finish(prior, one, foot_lock=foot_lock) for one in numbers]
@@ -340,14 +333,14 @@ def complete_pair(
     seen = known.shape[1]
     frames = seen + int(np.ceil(added / past[0].fps * FPS - 1e-6)) + 1
     net, count = block.net(prior), chosen.number()
-    observed = known_state(prior, net, torch.from_numpy(known), torch.from_numpy(poses), frames)
-    leaving = [Past(torch.from_numpy(one).float(), GroundPose()).holder(prior, frames) for one in known]
+    observed = known_state(prior, net, known, poses, frames)
+    leaving = [Past(one, GroundPose()).holder(prior, frames) for one in known]
     edits = PairEdits(stacked([observed] * count), leaving * count, frozen=[False] * (2 * count))
     features, _ = pair_features(
         prior, net, said * count, frames, seeds=pair_seeds(chosen), edits=edits, sampling=chosen, progress=progress
     )
     made = []
-    for numbers in features.double().numpy():
+    for numbers in features.astype(np.float64):
         places = two.decode(numbers, poses) + floors[:, None, None, None] * np.array([0.0, 1.0, 0.0])
         contacts = numbers[..., LAYOUT["contacts"]]
         duet = [ground.behind(i, places[i], contacts[i], seen, added, foot_lock=foot_lock) for i in (0, 1)]

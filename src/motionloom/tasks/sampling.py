@@ -10,8 +10,6 @@ from difflib import get_close_matches
 from typing import Any, Protocol, Self, TypeAlias, TypedDict, TypeVar
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from motionloom.diffusion import (
     SOLVERS,
@@ -31,8 +29,8 @@ from motionloom.diffusion import (
 )
 from motionloom.diffusion import sample as denoising
 from motionloom.errors import MotionloomError
-from motionloom.nets.pair import PairNet
-from motionloom.nets.prior import Condition
+from motionloom.runtime.pair import PairSession
+from motionloom.runtime.prior_condition import Condition
 from motionloom.tasks.watching import ChainView, Latest, View
 from motionloom.weights.prior import Prior
 
@@ -245,9 +243,9 @@ Edit: TypeAlias = Callable[[Denoiser, Batch], Denoiser]
 class Observed:
     """Part of the states that is given (inpainting)."""
 
-    values: Tensor
+    values: np.ndarray
     """(rows, tokens, features), standardised; read where the mask is True."""
-    mask: Tensor
+    mask: np.ndarray
     """The same shape, bool."""
     noise_free: bool = False
     """The network sees what is given without noise (Shafir et al. 2024, section 3.3), else at the noise of its level
@@ -255,18 +253,17 @@ class Observed:
     strength: float = 1.0
     """Share of the noise levels that the values are taken to, and sampled back from (SDEdit, Meng et al. 2022)."""
 
-    def of(self, rows: Sequence[int], device: torch.device) -> "Observed":
+    def of(self, rows: Sequence[int]) -> "Observed":
         """Those of some rows."""
-        return replace(self, values=self.values[rows].to(device), mask=self.mask[rows].to(device))
+        return replace(self, values=self.values[rows], mask=self.mask[rows])
 
 
-@torch.inference_mode()
 def sample(
     prior: Prior,
     rows: Rows,
     sampling: Sampling,
     *,
-    network: PairNet | None = None,
+    network: PairSession | None = None,
     edits: Sequence[Edit] = (),
     observed: Observed | None = None,
     halfway: bool = False,
@@ -291,11 +288,11 @@ def sample(
         denoise = guide(net, net.bind(batch.cond), net.bind(batch.cond.null()), sampling.guidance)
         if observed is None:
             shape = len(numbers), rows.lengths[numbers[0]], len(prior.mean)
-            state = noise(torch.empty(shape, device=prior.mean.device))
+            state = noise(np.empty(shape, np.float32))
         else:
-            here = observed.of(numbers, prior.mean.device)
+            here = observed.of(numbers)
             denoise = inpaint(denoise, here.values, here.mask)
-            shown = torch.zeros_like if here.noise_free else noise
+            shown = np.zeros_like if here.noise_free else noise
             constrain = observe(here.values, here.mask, prior.schedule, shown)
             whole = here.strength == 1.0
             state = noise(here.values) if whole else restart(here.values, prior.schedule, way[0], noise)
@@ -313,17 +310,17 @@ def sample(
         yield from zip(numbers, state, strict=True)
 
 
-def smooth(features: Tensor) -> Tensor:
+def smooth(features: np.ndarray) -> np.ndarray:
     """(..., frames, numbers) weighted 1/6, 2/3, 1/6 along time, ends repeated.
 
     A network whose tokens hold several frames makes each token smooth and leaves small steps between them.
     """
-    before = torch.cat([features[..., :1, :], features[..., :-1, :]], dim=-2)
-    after = torch.cat([features[..., 1:, :], features[..., -1:, :]], dim=-2)
+    before = np.concatenate([features[..., :1, :], features[..., :-1, :]], axis=-2)
+    after = np.concatenate([features[..., 1:, :], features[..., -1:, :]], axis=-2)
     return (before + 4 * features + after) / 6
 
 
-def to_features(prior: Prior, states: Tensor) -> Tensor:
+def to_features(prior: Prior, states: np.ndarray) -> np.ndarray:
     """Standardised states (..., frames, features) to features, smoothed where tokens hold several frames."""
     features = states * prior.std + prior.mean
     return smooth(features) if prior.net.config.patch > 1 else features
@@ -351,7 +348,6 @@ Moves = Callable[[int], None]
 """Called with how many more row moves were made; a row takes as many as there are steps."""
 
 
-@torch.inference_mode()
 def sample_chain(
     prior: Prior,
     rows: Iterable[R],
@@ -381,9 +377,8 @@ def sample_chain(
             yield Link(row.length, row.overlap, first + motion + own)
 
     def reported(numbers: Sequence[int], states: Sequence[State], at: Sequence[int]) -> Sequence[State]:
-        here = [state.to(prior.mean) for state in states]  # the noise that rows begin with is the CPU's
         some = [waiting[number] for number in numbers]
-        denoised = denoise(some, here, at)
+        denoised = denoise(some, states, at)
         seen.report(numbers, some, denoised, at)
         return denoised
 

@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Unpack
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from motionloom.errors import MotionloomError
 from motionloom.features import babel, humanml
@@ -29,7 +27,6 @@ from motionloom.tasks.watching import View
 from motionloom.weights.prior import Prior
 
 
-@torch.inference_mode()
 def sample_features(
     prior: Prior,
     prompts: Sequence[str],
@@ -40,8 +37,8 @@ def sample_features(
     sampling: Sampling | None = None,
     progress: Progress | None = None,
     **settings: Unpack[Settings],
-) -> list[Tensor]:
-    """Features (frames, 263 or the prior's), not standardised, one per prompt, on the CPU.
+) -> list[np.ndarray]:
+    """Features (frames, 263 or the prior's) float32, not standardised, one per prompt.
 
     Args:
         prompts: one per row; an empty one is refused.
@@ -66,7 +63,7 @@ def _sampled(
     best_of: int,
     sampling: Sampling,
     progress: Progress | None,
-) -> Iterator[tuple[int, Tensor]]:
+) -> Iterator[tuple[int, np.ndarray]]:
     """`sample_features` row by row, each as soon as it is finished: the row's number and its features."""
     check_prompts(prompts)
     check_best_of(best_of)
@@ -77,7 +74,7 @@ def _sampled(
         choosing, progress = _in_turn(progress, of=len(rows.batches(sampling.batch())) * sampling.steps)
         rows = with_best_seeds(prior, rows, best_of, sampling, progress=choosing)
     for row, state in sample(prior, rows, sampling, progress=progress, view=alone(prior)):
-        yield row, to_features(prior, state).cpu()
+        yield row, to_features(prior, state)
 
 
 def _in_turn(progress: Progress | None, *, of: int) -> tuple[Progress | None, Progress | None]:
@@ -169,11 +166,11 @@ def alone(prior: Prior) -> View:
     return View(lambda states: places_of(prior, states)[:, None])
 
 
-def places_of(prior: Prior, states: Tensor) -> np.ndarray:
+def places_of(prior: Prior, states: np.ndarray) -> np.ndarray:
     """(rows, frames, 22, 3) metres of standardised states (rows, frames, numbers); bones may breathe."""
-    features = to_features(prior, states).cpu()
+    features = to_features(prior, states)
     if features.shape[-1] == WIDTH:
-        return humanml.decode_positions(features).numpy()
+        return humanml.decode_positions(features)
     return np.stack([finish(prior, row, foot_lock=False).positions() for row in features])
 
 
@@ -192,15 +189,14 @@ def check_features(prior: Prior) -> None:
         )
 
 
-def finish(prior: Prior, features: Tensor | np.ndarray, *, foot_lock: bool = True) -> Motion:
+def finish(prior: Prior, features: np.ndarray, *, foot_lock: bool = True) -> Motion:
     """Features (frames, numbers) of this prior, not standardised, to a motion at its frame rate.
 
     With ``foot_lock`` the planted feet hold still: as the features say (263), else by height and speed (135).
     Frame 0 stands over the origin; the person starts facing +Z. Raises MotionloomError as `check_features` does.
     """
     check_features(prior)
-    numbers = features.cpu().numpy() if isinstance(features, Tensor) else features
-    return _DECODED[len(prior.mean)](numbers.astype(np.float64), prior.fps, foot_lock)
+    return _DECODED[len(prior.mean)](features.astype(np.float64), prior.fps, foot_lock)
 
 
 def _from_humanml(features: np.ndarray, fps: float, foot_lock: bool) -> Motion:

@@ -20,7 +20,6 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from torch import Tensor
 
 from motionloom.diffusion.sampling import Snapshot
 
@@ -74,7 +73,7 @@ def watching(on_denoised: OnDenoised) -> Iterator[None]:
 class View:
     """How the states of a task are looked at."""
 
-    poses: Callable[[Tensor], np.ndarray]
+    poses: Callable[[np.ndarray], np.ndarray]
     """Denoised states (rows, tokens, features) to (motions, people, frames, 22, 3)."""
     people: int = 1
     """Rows of one motion, which lie next to each other."""
@@ -103,7 +102,7 @@ R = TypeVar("R")
 class ChainView(Generic[R]):
     """How the rows of a chain make long motions, and how these are looked at while rows are at different levels."""
 
-    part: Callable[[R, Tensor, int], Any]
+    part: Callable[[R, np.ndarray, int], Any]
     """A row, its denoised state and the level of that to what is kept of it."""
     poses: Callable[[list[Any]], np.ndarray]
     """What was kept of rows, from the first one on and in order, to (people, frames, 22, 3)."""
@@ -122,7 +121,7 @@ class Latest(Generic[R]):
         self.parts: dict[int, Any] = {}
         self.calls: Counter[int] = Counter()
 
-    def report(self, numbers: Sequence[int], rows: Sequence[R], states: Sequence[Tensor], at: Sequence[int]) -> None:
+    def report(self, numbers: Sequence[int], rows: Sequence[R], states: Sequence[np.ndarray], at: Sequence[int]) -> None:
         """Take in what was predicted for some rows, and report the motions that begin with their first row."""
         if _callback.get() is None:
             return

@@ -6,12 +6,11 @@ What the file says of itself, the standardisation, the text encoder and the tabl
 """
 
 import argparse
-import copy
 import sys
 from dataclasses import replace
 from pathlib import Path
 
-import torch
+import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.weights.prior import Prior, save_prior
@@ -19,21 +18,24 @@ from motionloom.weights.prior import Prior, save_prior
 
 def averaged(before: Prior, after: Prior, share: float) -> Prior:
     """``share`` of ``after`` and the rest of ``before``. Raises `MotionloomError` where their weights do not fit."""
-    same = torch.equal(before.mean, after.mean) and torch.equal(before.std, after.std)
+    same = np.array_equal(before.mean, after.mean) and np.array_equal(before.std, after.std)
     if before.net.config != after.net.config or not same:
         raise MotionloomError(
             "the two are of different networks or standardisations; only stages of one can be averaged"
         )
     if not 0 <= share <= 1:
         raise MotionloomError(f"the share must be from 0 to 1; got {share}")
-    old, new = before.net.state_dict(), after.net.state_dict()
-    net = copy.deepcopy(after.net)
-    net.load_state_dict({name: torch.lerp(old[name].double(), new[name].double(), share) for name in new})
+    old, new = before.net.weights, after.net.weights
+    weights = {name: _mean(old[name], new[name], share) for name in new}
     notes = {
         **after.card.notes,
         "average": f"{1 - share:g} of the weights it began with, {share:g} of those it ended with",
     }
-    return replace(after, net=net, card=replace(after.card, notes=notes))
+    return replace(after, net=replace(after.net, weights=weights), card=replace(after.card, notes=notes))
+
+
+def _mean(old: np.ndarray, new: np.ndarray, share: float) -> np.ndarray:
+    return ((1 - share) * old.astype(np.float64) + share * new).astype(np.float32)
 
 
 def main() -> int:

@@ -17,14 +17,17 @@ from torch import Tensor, nn
 from motionloom.data.sets import FAVOUR, Batches, MotionSet, load_set, read_clips
 from motionloom.errors import MotionloomError
 from motionloom.nets.prior import Condition, PriorNet
-from motionloom.nets.text import TextEncoder
+from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.train.loop import Average, Log, World, changed, train
+from motionloom.train.low_rank import AdapterNet, adapted, show, tensors_of
 from motionloom.train.masks import check_control, draw_masks
+from motionloom.train.modules import prior_module, prior_session
 from motionloom.train.objectives import CleanError, WordBank
 from motionloom.train.prior import restandardised
 from motionloom.train.recipe import Recipe
-from motionloom.weights.adapter import Adapter, AdapterNet, adapted, fingerprint, show, tensors_of
-from motionloom.weights.prior import Card, Prior, find_device, save_prior
+from motionloom.train.tensors import conditions, find_device, noised, tensor
+from motionloom.weights.adapter import Adapter, fingerprint
+from motionloom.weights.prior import Card, Prior, save_prior
 
 HELD_WINDOW, HELD_ROWS = 80, 48
 """Frames and number of the held-out windows that are reported on."""
@@ -57,8 +60,8 @@ class ControlledError(CleanError):
         rng = np.random.default_rng((seed, step, 2))
         masks = draw_masks(self.control, drawn.cond.lengths.cpu().numpy(), drawn.clean.shape[1], rng=rng)
         mask = torch.from_numpy(masks).to(self.device)
-        noised = self.schedule.noised(drawn.clean, drawn.level, drawn.noise * ~mask)
-        return self.error(net(noised, drawn.level, drawn.cond, drawn.clean, mask), drawn)
+        state = noised(self.schedule, drawn.clean, drawn.level, drawn.noise * ~mask)
+        return self.error(net(state, drawn.level, drawn.cond, drawn.clean, mask), drawn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,12 +101,13 @@ def held_out(data: Path | str, prior: Prior, recipe: Recipe) -> Held | None:
         windows.append(torch.from_numpy(clip.features[first : first + HELD_WINDOW]).float())
         said = (n.texts[0] for n in clip.notes if n.kind == "human" and n.first <= first and n.texts)
         prompts.append(next(said, ""))
-    clean = (torch.stack(windows) - prior.mean) / prior.std
+    clean = (torch.stack(windows) - tensor(prior.mean)) / tensor(prior.std)
     masks = draw_masks(recipe.control, np.full(HELD_ROWS, HELD_WINDOW), HELD_WINDOW, rng=rng)
     mask = torch.from_numpy(masks)
     level = torch.linspace(1, prior.schedule.steps, HELD_ROWS).long()[torch.from_numpy(rng.permutation(HELD_ROWS))]
     noise = torch.from_numpy(rng.standard_normal(clean.shape, dtype=np.float32))
-    return Held(clean, prior.schedule.noised(clean, level, noise * ~mask), mask, level, prior.condition(prompts))
+    cond = conditions(prior.condition(prompts))
+    return Held(clean, noised(prior.schedule, clean, level, noise * ~mask), mask, level, cond)
 
 
 def train_control(
@@ -126,7 +130,7 @@ def train_control(
         find_device(device)
     world, folder = World.join(device), Path(folder)
     prior = Prior.load(recipe.start or "default")
-    motions = restandardised(load_set(data, sources=recipe.sources, seed=recipe.seed), prior.mean, prior.std)
+    motions = restandardised(load_set(data, sources=recipe.sources, seed=recipe.seed), tensor(prior.mean), tensor(prior.std))
     torch.manual_seed(recipe.seed)
     net = _trained(recipe, prior, world.device)
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
@@ -149,8 +153,9 @@ def train_control(
         else:
             _adapter(recipe, prior, motions, weights, step).save(place)
         if held:
-            now = made.net if made else adapted(prior.net, Adapter.load(place, prior))
-            say(f"step {step}: {_report(held, now, prior.net)}")
+            base = prior_module(prior)
+            now = prior_module(made) if made else adapted(base, Adapter.load(place, prior))
+            say(f"step {step}: {_report(held, now, base)}")
 
     log = Log(folder, recipe, say=say) if world.rank == 0 else None
     train(objective, recipe, folder, world=world, wrap=_wrap, on_save=export, on_step=log, stop=stop, say=say)
@@ -167,7 +172,7 @@ def _trained(recipe: Recipe, prior: Prior, device: str) -> PriorNet | AdapterNet
     if recipe.full:
         if recipe.adapter:
             raise MotionloomError("a full fine-tune does not go on from an adapter; give one of full and adapter")
-        return Prior.load(recipe.start or "default").net.requires_grad_(True).to(device)
+        return prior_module(prior).requires_grad_(True).to(device)
     start = Adapter.load(recipe.adapter, prior) if recipe.adapter else None
     rank, given_rank = recipe.rank, recipe.given_rank
     if start and (start.rank, start.given_rank) != (rank, given_rank):
@@ -175,8 +180,7 @@ def _trained(recipe: Recipe, prior: Prior, device: str) -> PriorNet | AdapterNet
             f"the adapter {recipe.adapter} has rank {start.rank} and given_rank {start.given_rank}, and the recipe "
             f"says {rank} and {given_rank}; copy them"
         )
-    base = Prior.load(recipe.start or "default", device=device).net
-    return AdapterNet(base, rank, given_rank=given_rank, start=start)
+    return AdapterNet(prior_module(prior).to(device), rank, given_rank=given_rank, start=start)
 
 
 def _report(held: Held, net: nn.Module, base: nn.Module) -> str:
@@ -206,4 +210,4 @@ def _full(recipe: Recipe, prior: Prior, motions: MotionSet, weights: dict[str, T
     licences = "; ".join(motions.licences)
     notes = _notes(recipe, motions, step) | {"control": recipe.control, "from": prior.card.name}
     card = Card(recipe.name, recipe.licence or licences, licences, notes)
-    return Prior(net.eval().requires_grad_(False), prior.schedule, prior.mean, prior.std, prior.text, card)
+    return Prior(prior_session(net), prior.schedule, prior.mean, prior.std, prior.text, card)

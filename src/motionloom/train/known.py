@@ -5,8 +5,8 @@ import numpy as np
 from motionloom.data.actions import PREFIX
 from motionloom.data.sets import MotionSet
 from motionloom.features.layout import FPS
-from motionloom.nets.text import TextEncoder
-from motionloom.nets.text.known import Known, known_sentences
+from motionloom.runtime.text.known import Known, known_sentences
+from motionloom.runtime.text.protocol import TextEncoder
 
 WRITTEN = {"human": "captions that people wrote", "index": "descriptions of the collections"}
 """What the table calls the groups of items that are no single action."""

@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 import torch.distributed as dist
 from torch import Tensor, nn
@@ -99,7 +100,7 @@ def save_state(
     tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
     metadata = {"step": str(step), "recipe": json.dumps(asdict(recipe))}
     metadata["checksum"] = _checksum(tensors, metadata)
-    save_tensors(tensors, folder / STATE, metadata=metadata)
+    save_tensors({k: v.numpy() for k, v in tensors.items()}, folder / STATE, metadata=metadata)
 
 
 def _checksum(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str:
@@ -119,7 +120,8 @@ def load_state(path: Path, net: nn.Module, average: Average, optimizer: torch.op
 
     Raises MotionloomError, and fills nothing, where the file is damaged or of another recipe.
     """
-    tensors, metadata = read_tensors(path)
+    arrays, metadata = read_tensors(path)
+    tensors = {key: torch.from_numpy(np.array(value)) for key, value in arrays.items()}
     if not {"step", "recipe"} <= metadata.keys():
         raise MotionloomError(f"{path} is no state of a training run; train into another folder")
     if "checksum" not in metadata:

@@ -12,8 +12,9 @@ from motionloom.diffusion import Schedule
 from motionloom.features.humanml import displacements
 from motionloom.features.layout import FEET, LAYOUT
 from motionloom.nets.prior import Condition, PriorNet, condition
-from motionloom.nets.text import TextEncoder
-from motionloom.weights.adapter import AdapterNet
+from motionloom.runtime.text.protocol import TextEncoder
+from motionloom.train.low_rank import AdapterNet
+from motionloom.train.tensors import noised, tensor
 
 WEIGHTS = {
     "yaw_velocity": 6.0,
@@ -55,9 +56,9 @@ class WordBank:
             pooled.append(said.pooled)
             for row, mask in zip(said.tokens, said.mask, strict=True):
                 count = min(int(mask.sum()), room)
-                tokens.append(row[:count].half())
+                tokens.append(row[:count].astype(np.float16))
                 self.starts.append(self.starts[-1] + count)
-        self.tokens, self.pooled = torch.cat(tokens), torch.cat(pooled)
+        self.tokens, self.pooled = tensor(np.concatenate(tokens)), tensor(np.concatenate(pooled))
 
     def condition(self, texts: Tensor, lengths: Tensor) -> Condition:
         """The condition of a batch."""
@@ -104,8 +105,8 @@ class CleanError:
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `Objective.loss`."""
         drawn = self.drawn(seed, step, rows)
-        noised = self.schedule.noised(drawn.clean, drawn.level, drawn.noise)
-        return self.error(net(noised, drawn.level, drawn.cond), drawn)
+        state = noised(self.schedule, drawn.clean, drawn.level, drawn.noise)
+        return self.error(net(state, drawn.level, drawn.cond), drawn)
 
     def drawn(self, seed: int, step: int, rows: int) -> Drawn:
         """What a step looks at, from ``(seed, step)`` alone, on the objective's device."""

@@ -21,12 +21,15 @@ from motionloom.features.layout import FPS, LAYOUT
 from motionloom.nets.pair import PLACE, PairConfig, PairNet, Talk, fitting, join, part
 from motionloom.nets.prior import Condition
 from motionloom.train.duets import Crops, Duets, Sight
+from motionloom.train.export import pair_graph
 from motionloom.train.loop import STATE, Average, Log, World, changed, train
+from motionloom.train.modules import arrays, pair_module, prior_module
 from motionloom.train.objectives import WEIGHTS, WordBank, displacement_error
 from motionloom.train.recipe import Recipe
+from motionloom.train.tensors import find_device, noised, tensor
 from motionloom.weights.adapter import fingerprint
 from motionloom.weights.pair import PairBlock
-from motionloom.weights.prior import Prior, find_device
+from motionloom.weights.prior import Prior
 
 BEGUN, LONGEST_BEGUN, SHORTEST_BEGUN = 20, 40, 10
 """Frames of a given beginning: the commonest, the most and the fewest."""
@@ -109,17 +112,19 @@ class Parts(NamedTuple):
 class PairError:
     """Squared error of the denoised estimate of two people: see `train.objectives.Objective`."""
 
-    def __init__(self, net: PairNet, prior: Prior, duets: Duets, *, settings: Settings, recipe: Recipe) -> None:
+    def __init__(
+        self, net: PairNet, prior: Prior, duets: Duets, *, settings: Settings, recipe: Recipe, device: str = "cpu"
+    ) -> None:
         self._net, self.schedule, self.duets = net, prior.schedule, duets
-        self.settings, self.recipe, self.device = settings, recipe, str(prior.mean.device)
-        self.mean, self.std = prior.mean, prior.std
+        self.settings, self.recipe, self.device = settings, recipe, device
+        self.mean, self.std = tensor(prior.mean, device), tensor(prior.std, device)
         self.words = WordBank(prior.text, duets.texts, progress=lambda line: None)
         self.sight = Sight(net.talk.config.places)
         scale = torch.ones_like(self.mean)
         for name, block in LAYOUT.items():
             scale[block] = WEIGHTS[name]
         self.scale = scale / scale.mean()
-        self.shares = settings.faint + (1 - settings.faint) * self.schedule.alpha_bar.to(self.mean)
+        self.shares = settings.faint + (1 - settings.faint) * tensor(self.schedule.alpha_bar).to(self.mean)
 
     @property
     def net(self) -> nn.Module:
@@ -163,7 +168,7 @@ class PairError:
 
     def denoised(self, net: nn.Module, drawn: Drawn) -> Tensor:
         """The network's estimate of the clean states."""
-        state = self.schedule.noised(drawn.clean, drawn.level, drawn.noise * ~drawn.given[..., None])
+        state = noised(self.schedule, drawn.clean, drawn.level, drawn.noise * ~drawn.given[..., None])
         return net(state, drawn.level, self._net.bind(drawn.cond))
 
     def parts(self, denoised: Tensor, drawn: Drawn) -> Parts:
@@ -287,12 +292,14 @@ def train_pair(
         find_device(device)
     world, folder = World.join(device), Path(folder)
     settings = Settings.parse(recipe.pair)
-    prior = Prior.load(recipe.start or "default", device=world.device)
+    prior = Prior.load(recipe.start or "default")
     seen = _usable([pair for pair in pairs if pair.split == "train"], recipe, settings)
     torch.manual_seed(recipe.seed)
     config = settings.config(prior)
-    net = PairNet(prior.net, Talk(config, prior.net.config), prior.schedule, mean=prior.mean, std=prior.std)
-    objective = PairError(net, prior, Duets(seen), settings=settings, recipe=recipe)
+    mean, std = tensor(prior.mean, world.device), tensor(prior.std, world.device)
+    base, talk = prior_module(prior).to(world.device), Talk(config, prior.net.config).to(world.device)
+    net = PairNet(base, talk, prior.schedule, mean=mean, std=std)
+    objective = PairError(net, prior, Duets(seen), settings=settings, recipe=recipe, device=world.device)
     seconds = sum(pair.frames for pair in seen) / FPS
     say(f"{sum(p.numel() for p in net.parameters()):,} trained parameters, {len(seen)} pairs of {seconds:.0f} s")
     for line in changed(folder, recipe) if world.rank == 0 else ():
@@ -340,12 +347,12 @@ class _Export:
         self.digest = fingerprint(prior.net)
         going_on = (folder / STATE).is_file() and self.place.is_file()
         self.best = _loss_of(PairBlock.load(self.place, prior)) if going_on and held else float("inf")
-        self.fresh = held.report(self._block({}, 0).net(prior)) if held else None
+        self.fresh = held.report(pair_module(self._block({}, 0), prior)) if held else None
 
     def __call__(self, _: nn.Module, average: Average, step: int) -> None:
-        weights = {key.removeprefix("talk."): value.cpu() for key, value in average.weights.items()}
+        weights = {key.removeprefix("talk."): value.cpu().numpy() for key, value in average.weights.items()}
         block = self._block(weights, step)
-        now = self.held.report(block.net(self.prior)) if self.held else None
+        now = self.held.report(pair_module(block, self.prior)) if self.held else None
         if now:
             block.notes.update(held_out=asdict(now), fresh=asdict(self.fresh) if self.fresh else {})
         block.save(self.last)
@@ -357,13 +364,13 @@ class _Export:
             best = " (the best so far)" if better else ""
             self.say(f"step {step}: held-out pairs: loss {now.loss:.4f}, {now}; fresh block: {self.fresh}{best}")
 
-    def _block(self, weights: dict[str, Tensor], step: int) -> PairBlock:
+    def _block(self, weights: dict[str, np.ndarray], step: int) -> PairBlock:
         recipe = self.recipe
-        weights = weights or dict(Talk(self.config, self.prior.net.config).state_dict())
+        weights = weights or arrays(Talk(self.config, self.prior.net.config))
         notes = {"steps": step, "batch": recipe.batch, "seed": recipe.seed, "pairs": self.names}
         return PairBlock(
             recipe.name, self.config, weights, self.prior.card.name, self.digest,
-            recipe.licence or self.licences, self.licences, notes,
+            recipe.licence or self.licences, self.licences, notes, pair_graph(self.config, self.prior.net.config),
         )  # fmt: skip
 
 

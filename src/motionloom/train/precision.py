@@ -10,7 +10,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from motionloom.weights.adapter import AdapterNet
+from motionloom.train.low_rank import AdapterNet
 
 CHOICES = ("auto", "bf16", "float32", "off", "none")
 """What a recipe may say; ``off`` and ``none`` are ``float32``."""

@@ -20,11 +20,14 @@ from motionloom.data.prediction import Protocol, Recording
 from motionloom.diffusion import SCHEDULES, Dct, Frames
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import Place
-from motionloom.nets.predictor import NetConfig, TransLinear
+from motionloom.nets.predictor import TransLinear
+from motionloom.runtime.predictor import PredictorConfig
 from motionloom.train.loop import Average, Log, World, changed, train
+from motionloom.train.modules import predictor_module, predictor_session
 from motionloom.train.recipe import Recipe
+from motionloom.train.tensors import find_device, noised, tensor
 from motionloom.weights.predictor import Predictor, condition_shape, find_predictor, load_predictor, save_predictor
-from motionloom.weights.prior import Card, find_device
+from motionloom.weights.prior import Card
 
 WHOLE_PAST = 0.75
 """How often all of the past is given; else its last 2 frames or more."""
@@ -82,13 +85,13 @@ class Settings:
 class Drawn(NamedTuple):
     """Windows of one step."""
 
-    features: Tensor
-    """(rows, frames, channels)"""
-    shown: Tensor
+    features: np.ndarray
+    """(rows, frames, channels) float32."""
+    shown: np.ndarray
     """The same as the condition shows it: some pasts are smoothed."""
-    pose: Tensor
+    pose: np.ndarray
     """(rows, channels) the last observed pose."""
-    mask: Tensor
+    mask: np.ndarray
     """(rows, frames, parts) 1 where it is given."""
 
 
@@ -123,7 +126,7 @@ class Windows:
         mask = np.stack([self._mask(rng, int(h)) for h in past])
         pose = shown[np.arange(rows), past - 1]
         drawn = (features, shown, pose, mask)
-        return Drawn(*(torch.from_numpy(np.ascontiguousarray(x, dtype=np.float32)) for x in drawn))
+        return Drawn(*(np.ascontiguousarray(x, dtype=np.float32) for x in drawn))
 
     def _smoothed(
         self, rng: np.random.Generator, places: NDArray[np.float64], past: NDArray[np.int64]
@@ -180,36 +183,28 @@ class Completion:
     """Mean squared error of the network's estimate at a uniformly drawn level."""
 
     def __init__(
-        self, predictor: Predictor, windows: Windows, *, condition_dropout: float, device: str = "cpu"
+        self, net: nn.Module, predictor: Predictor, windows: Windows, *, condition_dropout: float, device: str = "cpu"
     ) -> None:
-        self.predictor, self.windows, self.condition_dropout, self.device = (
-            predictor.to(device),
-            windows,
-            condition_dropout,
-            device,
-        )
-        scale = predictor.std if predictor.variant == "masked" else torch.ones_like(predictor.std)
-        self.scale = (scale / scale.mean()).to(device)
-
-    @property
-    def net(self) -> nn.Module:
-        """The trained weights."""
-        return self.predictor.net
+        """net: the module that is trained; of the predictor everything else is read."""
+        self.net, self.predictor, self.windows = net.to(device), predictor, windows
+        self.condition_dropout, self.device = condition_dropout, device
+        scale = predictor.std if predictor.variant == "masked" else np.ones_like(predictor.std)
+        self.scale = tensor(scale / scale.mean(), device)
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `Objective.loss`: the noise's error (published, 1 at first), or the clean spectrum's.
 
         The latter is standardised and weighted by its spread, between metres and equal weights for all frequencies.
         """
-        p, drawn = self.predictor, Drawn(*(x.to(self.device) for x in self.windows.draw(seed, step, rows)))
+        p, drawn = self.predictor, self.windows.draw(seed, step, rows)
         generator = torch.Generator().manual_seed(int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0]))
         low = 2 if p.variant == "published" else 1  # the published code never trains its first noisy level
         level = torch.randint(low, p.schedule.steps + 1, (rows,), generator=generator).to(self.device)
-        clean = p.to_state(drawn.features, drawn.pose)
+        clean = tensor(p.to_state(drawn.features, drawn.pose), self.device)
         noise = torch.randn(clean.shape, generator=generator).to(self.device)
         keep = (torch.rand(rows, generator=generator) >= self.condition_dropout).to(self.device)
-        condition = p.condition(drawn.shown, drawn.mask, drawn.pose)
-        predicted = net(p.schedule.noised(clean, level, noise), level - 1, condition, keep)
+        condition = tensor(p.condition(drawn.shown, drawn.mask, drawn.pose), self.device)
+        predicted = net(noised(p.schedule, clean, level, noise), level - 1, condition, keep)
         wanted = noise if p.variant == "published" else clean
         return ((predicted.float() - wanted) ** 2 * self.scale).mean()
 
@@ -222,7 +217,7 @@ def new_predictor(protocol: Protocol, settings: Settings, windows: Windows, *, s
     basis = Dct(frames, settings.kept) if settings.dct else Frames(frames)
     kept = basis.kept
     condition = condition_shape(layout, kept) if settings.variant == "masked" else None
-    config = NetConfig(
+    config = PredictorConfig(
         layout.channels,
         kept,
         settings.layers,
@@ -233,16 +228,16 @@ def new_predictor(protocol: Protocol, settings: Settings, windows: Windows, *, s
         condition is not None,
     )
     drawn = windows.draw(2**31 - 1, 0, STATISTICS)
-    pose = torch.stack([drawn.pose.mean(0), drawn.pose.std(0).clamp(min=1e-3)])
-    plain = torch.zeros(kept, layout.channels)
+    pose = np.stack([drawn.pose.mean(0), drawn.pose.std(0, ddof=1).clip(min=1e-3)])
+    plain = np.zeros((kept, layout.channels), np.float32)
     predictor = Predictor(
-        TransLinear(config), SCHEDULES[schedule](levels), layout, basis, protocol.observed, protocol.fps,
-        settings.variant, plain, torch.ones_like(plain), pose, Card("predictor"),
+        predictor_session(TransLinear(config)), SCHEDULES[schedule](levels), layout, basis, protocol.observed,
+        protocol.fps, settings.variant, plain, np.ones_like(plain), pose, Card("predictor"),
     )  # fmt: skip
     if settings.variant == "published":
         return predictor
     state = predictor.to_state(drawn.features, drawn.pose)
-    return replace(predictor, mean=state.mean(0), std=state.std(0).clamp(min=1e-4))
+    return replace(predictor, mean=state.mean(0), std=state.std(0, ddof=1).clip(min=1e-4))
 
 
 def train_predictor(
@@ -266,18 +261,19 @@ def train_predictor(
     torch.manual_seed(recipe.seed)
     if recipe.start:
         predictor = load_predictor(find_predictor(recipe.start))
-        predictor.net.requires_grad_(True)
         if predictor.layout != protocol.layout or predictor.frames != protocol.frames:
             raise MotionloomError(
                 f"{recipe.start} sees other joints or windows than the data; train from random weights"
             )
     else:
         predictor = new_predictor(protocol, settings, windows, schedule=recipe.schedule, levels=recipe.levels)
+    net = predictor_module(predictor).requires_grad_(True)
     minutes = windows.lengths.sum() / protocol.fps / 60
-    say(f"{sum(p.numel() for p in predictor.net.parameters()):,} parameters, {minutes:.0f} minutes recorded")
+    say(f"{sum(p.numel() for p in net.parameters()):,} parameters, {minutes:.0f} minutes recorded")
     for line in changed(folder, recipe) if world.rank == 0 else ():
         say(f"going on with another recipe than before: {line}")
-    objective = Completion(predictor, windows, condition_dropout=settings.condition_dropout, device=world.device)
+    dropout = settings.condition_dropout
+    objective = Completion(net, predictor, windows, condition_dropout=dropout, device=world.device)
     place = folder / f"{recipe.name}.safetensors"
     held = _held(protocol, settings)
 
@@ -305,7 +301,8 @@ def _held(protocol: Protocol, settings: Settings) -> Windows | None:
 
 @torch.no_grad()
 def _held_loss(made: Predictor, held: Windows, settings: Settings) -> float:
-    return float(Completion(made, held, condition_dropout=settings.condition_dropout).loss(made.net, 0, 0, HELD))
+    net = predictor_module(made)
+    return float(Completion(net, made, held, condition_dropout=settings.condition_dropout).loss(net, 0, 0, HELD))
 
 
 def _finished(
@@ -317,5 +314,4 @@ def _finished(
     notes = {"steps": step, "batch": recipe.batch, "seed": recipe.seed, "minutes": round(float(minutes), 1)}
     notes |= {"data": protocol.name, "subjects": seen, "from": Path(recipe.start).stem}
     card = Card(recipe.name, recipe.licence or protocol.licence, protocol.licence, notes)
-    numbers = {key: getattr(predictor, key).cpu() for key in ("mean", "std", "pose")}
-    return replace(predictor, net=net.eval().requires_grad_(False), card=card, **numbers)
+    return replace(predictor, net=predictor_session(net), card=card)

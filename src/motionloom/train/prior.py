@@ -12,18 +12,20 @@ from motionloom.data.sets import FAVOUR, Batches, MotionSet, load_set
 from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
 from motionloom.nets.prior import NetConfig, PriorNet
-from motionloom.nets.text import MiniLM, TextEncoder
+from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.train.known import known_table
 from motionloom.train.loop import Average, Log, World, changed, train
+from motionloom.train.modules import prior_module, prior_session
+from motionloom.train.modules import text_encoder as embedded
 from motionloom.train.objectives import CleanError, Conditioned, WordBank
 from motionloom.train.recipe import Recipe
+from motionloom.train.tensors import find_device, tensor
+from motionloom.weights.container import read_tensors
 from motionloom.weights.prior import (
     Card,
     Prior,
-    find_device,
     find_weights,
     load_prior,
-    read_tensors,
     save_prior,
 )
 
@@ -51,8 +53,8 @@ def train_prior(
             raise MotionloomError(
                 f"the recipe's network {net.config} is not that of {recipe.start!r}, {start.net.config}; copy its [net]"
             )
-        net.load_state_dict(start.net.state_dict())
-        motions = restandardised(motions, start.mean, start.std)
+        net.load_state_dict(prior_module(start).state_dict())
+        motions = restandardised(motions, tensor(start.mean), tensor(start.std))
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
     words = WordBank(text, motions.texts, progress=say if world.rank == 0 else lambda line: None)
@@ -94,7 +96,7 @@ def text_encoder(weights: str) -> TextEncoder:
     path = find_weights(weights)
     tensors, _ = read_tensors(path)
     if "vocabulary" in tensors:
-        return MiniLM.from_tensors(tensors)
+        return embedded(tensors)
     return load_prior(path).text
 
 
@@ -106,7 +108,7 @@ def _prior(recipe: Recipe, motions: MotionSet, average: Average, step: int, text
     notes |= {"minutes": round(motions.minutes, 1)} | ({"start": recipe.start} if recipe.start else {})
     card = Card(recipe.name, recipe.licence or "; ".join(motions.licences), "; ".join(motions.licences), notes)
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
-    return Prior(net.eval().requires_grad_(False), schedule, motions.mean, motions.std, text, card)
+    return Prior(prior_session(net), schedule, motions.mean.numpy(), motions.std.numpy(), text, card)
 
 
 def _show(prior: Prior, recipe: Recipe, path: Path) -> None:

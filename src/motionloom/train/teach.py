@@ -15,18 +15,22 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from motionloom.arrays import unit
 from motionloom.data.examples import Example
 from motionloom.data.words import LABELS, imperative
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
 from motionloom.nets.prior import Condition
-from motionloom.nets.text.known import bare
+from motionloom.runtime.text.known import bare
 from motionloom.tasks.text import sample_features
 from motionloom.train.loop import Average, World, train
+from motionloom.train.low_rank import AdapterNet, tensors_of
+from motionloom.train.modules import prior_module
 from motionloom.train.objectives import WEIGHTS, Conditioned, WordBank, displacement_error, masked_error
 from motionloom.train.precision import CHOICES, choose
 from motionloom.train.recipe import Recipe
-from motionloom.weights.adapter import TAUGHT, Adapter, AdapterNet, origin, tensors_of
+from motionloom.train.tensors import find_device, noised, tensor
+from motionloom.weights.adapter import TAUGHT, Adapter, origin
 from motionloom.weights.prior import Prior
 
 RANK = 16
@@ -92,14 +96,21 @@ class Lesson:
 
 
 def teach(
-    prior: Prior, examples: Sequence[Example], lesson: Lesson | None = None, *, say: Say = lambda line: None
+    prior: Prior,
+    examples: Sequence[Example],
+    lesson: Lesson | None = None,
+    *,
+    device: str = "cpu",
+    say: Say = lambda line: None,
 ) -> Adapter:
     """An adapter that makes ``prior`` show what the examples show where their captions are asked for.
 
+    device: PyTorch's, that is taught on; motions are sampled where the prior is.
     The same seed teaches the same on the same machine with as many threads and the same `Lesson.amp`, which the
     adapter's notes tell. Raises `MotionloomError` where there is nothing to learn from, and for a prior that does not
     draw 263 numbers a frame at 20 per second.
     """
+    find_device(device)
     lesson = lesson or Lesson()
     if len(prior.mean) != WIDTH or prior.fps != FPS:
         raise MotionloomError(
@@ -115,12 +126,13 @@ def teach(
         prior, kept, [DRAWN_FRAMES] * len(kept), seeds=[lesson.seed + i for i in range(len(kept))], steps=DRAWN_STEPS
     )  # fmt: skip
     torch.manual_seed(lesson.seed)
-    net = AdapterNet(prior.net, lesson.rank, given_rank=0, taught=True)
-    device, amp = str(prior.mean.device), lesson.amp
+    net = AdapterNet(prior_module(prior), lesson.rank, given_rank=0, taught=True)
+    amp = lesson.amp
     if amp == "auto":
         amp, why = choose(net, device)
         say(why)
-    objective = Teaching(net, prior, examples, list(zip(kept, drawn, strict=True)), others, keep=lesson.keep)
+    known = list(zip(kept, drawn, strict=True))
+    objective = Teaching(net, prior, examples, known, others, keep=lesson.keep, device=device)
     recipe = Recipe(
         name=lesson.name, steps=lesson.steps, batch=lesson.batch, rate=lesson.rate, seed=lesson.seed, warmup=40,
         cooldown=0.5, ema=0.99, decay=0.0, save_every=lesson.steps, amp=amp,
@@ -143,9 +155,9 @@ def known_prompts(prior: Prior, captions: Sequence[str], seed: int) -> tuple[lis
     rng = np.random.default_rng((seed, 17))
     pool = list(prior.known.sentences) if prior.known else [phrase for said in LABELS.values() for phrase in said]
     vectors = prior.text.encode([bare(text) for text in pool]).pooled if not prior.known else prior.known.vectors
-    asked = prior.text.encode([bare(text) for text in captions]).pooled.to(vectors)
-    like = (torch.nn.functional.normalize(vectors, dim=1) @ torch.nn.functional.normalize(asked, dim=1).T).amax(1)
-    order = [int(i) for i in like.argsort(descending=True, stable=True) if like[i] < SAME]
+    asked = prior.text.encode([bare(text) for text in captions]).pooled
+    like = (unit(vectors) @ unit(asked).T).max(1)
+    order = [int(i) for i in (-like).argsort(stable=True) if like[i] < SAME]
     if not order:
         raise MotionloomError("these weights know no other sentences than the captions; describe the clips otherwise")
     rest = rng.permutation(order[LIKE:]).tolist()
@@ -172,19 +184,20 @@ class Teaching:
         net: AdapterNet,
         prior: Prior,
         examples: Sequence[Example],
-        drawn: Sequence[tuple[str, Tensor]],
+        drawn: Sequence[tuple[str, np.ndarray]],
         others: Sequence[str] = (),
         *,
         keep: float,
+        device: str = "cpu",
     ) -> None:
-        self.net, self.schedule, self.base = net, prior.schedule, prior.net
-        self.keep, self.device = keep, prior.mean.device
-        self.mean, self.std = prior.mean, prior.std
-        spread = torch.where(prior.std > 0, prior.std, 1.0)
+        self.net, self.schedule, self.base = net, prior.schedule, prior_module(prior).to(device)
+        self.keep, self.device = keep, device
+        self.mean, self.std = tensor(prior.mean, device), tensor(prior.std, device)
         self.examples = examples
-        self.shown = [(torch.from_numpy(e.features).to(prior.mean) - prior.mean) / spread for e in examples]
-        self.begins = [_beginnings(e, shown.cpu().numpy()) for e, shown in zip(examples, self.shown)]
-        self.drawn = torch.stack([(f.to(prior.mean) - prior.mean) / spread for _, f in drawn])
+        shown = [((e.features - prior.mean) / prior.spread).astype(np.float32) for e in examples]
+        self.shown = [tensor(one, device) for one in shown]
+        self.begins = [_beginnings(e, one) for e, one in zip(examples, shown)]
+        self.drawn = torch.stack([tensor((f - prior.mean) / prior.spread, device) for _, f in drawn])
         texts = dict.fromkeys(text for e in examples for caption in e.captions for text in wordings(caption))
         texts |= dict.fromkeys([*(prompt for prompt, _ in drawn), *others])
         self.numbers = {text: number for number, text in enumerate(texts)}
@@ -213,12 +226,12 @@ class Teaching:
         speaks[rows - kept :] = torch.rand(kept, generator=generator) >= SILENT
         cond = self.words.condition(torch.tensor(texts), torch.tensor(lengths)).choose(speaks)
         cond = Condition(*(part.to(self.device) for part in cond))
-        level, noised = level.to(self.device), self.schedule.noised(clean, level.to(self.device), noise)
-        denoised, before = net(noised, level, cond), clean[rows - kept :]
+        state = noised(self.schedule, clean, level, noise)
+        denoised, before = net(state, level, cond), clean[rows - kept :]
         if kept:
             with torch.no_grad():
                 old = Condition(*(part[rows - kept :] for part in cond))
-                before = self.base(noised[rows - kept :], level[rows - kept :], self.base.bind(old))
+                before = self.base(state[rows - kept :], level[rows - kept :], self.base.bind(old))
         return self._error(denoised, clean, before, cond.lengths, rows - kept)
 
     def _rows(self, rng: np.random.Generator, window: int, rows: int, kept: int) -> tuple[Tensor, list[int], list[int]]:

@@ -1,29 +1,27 @@
 """Low-rank changes of a prior's network that teach it an action, a style or one kind of control, and their files.
 
-A layer's weight W becomes W + U D with thin U and D (LoRA, Hu et al. 2022). What is taught from a few clips is merged
-into the weights, each adapter with a factor (`merged`). An adapter for control may also add an input: the
+A layer's weight W becomes W + U D with thin U and D (LoRA, Hu et al. 2022). All are merged into the weights, those that
+are taught from a few clips each with a factor (`merged`). An adapter for control may also add an input: the
 network then sees which numbers are given and what they are, through embed(x) + U_g D_g [given, mask]. In the state
 itself they are scaled by the signal, which is next to nothing at the levels where it is decided what will be shown. The
 published control models are full fine-tunes and have the state alone (Shafir et al. 2024, algorithm 1); those are
 ordinary priors.
-
-An `AdaptedNet` is called like the network it comes from; with `Controlled` as its condition it sees what is given.
 """
 
-import copy
 import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
-import torch
-from torch import Tensor, nn
-from torch.nn import functional as F
+import numpy as np
+from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
-from motionloom.nets.prior import Bound, Condition, NetConfig, PriorNet
+from motionloom.runtime.prior import PriorSession
+from motionloom.runtime.prior_condition import Bound, Floats
+from motionloom.runtime.sizes import NetConfig
 from motionloom.weights.container import ADAPTERS, check, halved
 
 KEY = ADAPTERS.key
@@ -36,29 +34,15 @@ READS = ("words", "text")
 """Last names of the layers that such an adapter changes besides: those that read the text."""
 GIVEN = "given"
 """The name under which an adapter keeps its input for what is given."""
-
-SPARSE = 100
-"""Numbers of a token that are given at once, roughly: how strong that input is when training begins."""
-
-QUICK = 5.0
-"""How much quicker that input learns than the changes of the network: in training it is kept divided by this."""
-
-
-class Controlled(NamedTuple):
-    """The condition of an `AdaptedNet`: what the network is bound to, and what is given."""
-
-    bound: Bound
-    given: Tensor
-    """(rows, frames, features) standardised; what is not given may be anything finite."""
-    mask: Tensor
-    """(rows, frames, features) bool: which numbers are given."""
+NET = "net."
+"""What the names of a prior's weights begin with in its file."""
 
 
 class HasNet(Protocol):
     """A prior, as far as an adapter looks at it."""
 
     @property
-    def net(self) -> PriorNet: ...
+    def net(self) -> PriorSession: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +53,7 @@ class Adapter:
     control: str
     """What it was trained for: ``trajectory``, a joint, ``any`` ..."""
     rank: int
-    tensors: Mapping[str, Tensor]
+    tensors: Mapping[str, np.ndarray]
     """``LAYER.down`` (rank, in) and ``LAYER.up`` (out, rank); ``given.down`` (its rank, patch * 2 * features: for each
     frame of a token first the given numbers, then the mask) and ``given.up``."""
     base: str
@@ -104,8 +88,8 @@ class Adapter:
         path = ADAPTERS.find(adapter)
         found = read_adapter(path)
         found.check_prior(prior, path.name)
-        layers = linears(prior.net, taught=found.taught)
-        check(found.tensors, dict(_shapes(found, prior.net.config, layers)), str(path))
+        changed = layers(prior.net, taught=found.taught)
+        check(found.tensors, dict(_shapes(found, prior.net.config, changed)), str(path))
         return found
 
     @property
@@ -149,15 +133,15 @@ def read_adapter(path: Path) -> Adapter:
         good = isinstance(rank, int) and not isinstance(rank, bool) and 1 <= rank <= MAX_RANK
         if not good or not isinstance(notes, dict) or not all(isinstance(value, str) for value in said.values()):
             raise ValueError("values of the wrong kind")
-    return Adapter(rank=rank, tensors={k: v.float() for k, v in tensors.items()}, notes=notes, **said)
+    return Adapter(rank=rank, tensors={k: v.astype(np.float32) for k, v in tensors.items()}, notes=notes, **said)
 
 
-def fingerprint(net: PriorNet) -> str:
+def fingerprint(net: PriorSession) -> str:
     """A digest of a network's weights as its file holds them (float16)."""
     digest = hashlib.sha256()
-    for name, value in sorted(net.state_dict().items()):
+    for name, value in sorted((key.removeprefix(NET), value) for key, value in net.weights.items()):
         digest.update(f"{name}{tuple(value.shape)}".encode())
-        digest.update(value.detach().cpu().half().contiguous().numpy().tobytes())
+        digest.update(np.ascontiguousarray(value, np.float16).tobytes())
     return digest.hexdigest()
 
 
@@ -166,24 +150,24 @@ def origin(prior: HasNet) -> str:
     return getattr(prior, "origin", "") or fingerprint(prior.net)
 
 
-def linears(net: PriorNet, *, taught: bool = False) -> dict[str, nn.Linear]:
-    """The layers of a network that an adapter changes, by name; ``taught``: also those that read the text."""
+def layers(net: PriorSession, *, taught: bool = False) -> dict[str, np.ndarray]:
+    """Weights (out, in) of the layers of a network that an adapter changes, by name; ``taught``: also those that read
+    the text."""
     names = (*CHANGED, *READS) if taught else CHANGED
+    found = {key.removeprefix(NET).removesuffix(".weight"): key for key in net.weights if key.endswith(".weight")}
     return {
-        name: layer
-        for name, layer in net.named_modules()
-        if isinstance(layer, nn.Linear) and name.rsplit(".", 1)[-1] in names
+        name: net.weights[key]
+        for name, key in found.items()
+        if name.rsplit(".", 1)[-1] in names and net.weights[key].ndim == 2
     }
 
 
-def merged(net: PriorNet, adapters: Sequence[tuple[Adapter, float]]) -> PriorNet:
-    """A copy of the network with W + sum of factor * U D for the weights W; as quick as the network itself.
+def merged(net: PriorSession, adapters: Sequence[tuple[Adapter, float]]) -> PriorSession:
+    """The network with W + sum of factor * U D for the weights W; as quick as the network itself.
 
     Raises `MotionloomError` for an adapter for control, which is no change of weights alone, and for a factor that is
     not finite.
     """
-    made = copy.deepcopy(net).eval().requires_grad_(False)
-    layers = linears(made, taught=True)
     for adapter, factor in adapters:
         if not adapter.taught:
             raise MotionloomError(
@@ -192,159 +176,48 @@ def merged(net: PriorNet, adapters: Sequence[tuple[Adapter, float]]) -> PriorNet
             )
         if not math.isfinite(factor):
             raise MotionloomError(f"the adapter {adapter.name!r} has the factor {factor}; give a number such as 0.8")
-        for name, layer in layers.items():
-            down, up = (adapter.tensors[f"{name}.{part}"].to(layer.weight) for part in ("down", "up"))
-            layer.weight += factor * (up @ down)
-    return made
+    return _changed(net, adapters)
 
 
-class AdaptedNet(nn.Module):
-    """A network with an adapter inside: called as ``net(state, level, condition)`` like a `PriorNet`.
+def adapted(net: PriorSession, adapter: Adapter) -> PriorSession:
+    """The network with the adapter merged into its weights, as quick as the network itself; it may be shown what is
+    given (`show`)."""
+    changed = _changed(net, [(adapter, 1.0)])
+    if not adapter.sees_given:
+        return changed
+    return replace(changed, given=adapter.tensors[f"{GIVEN}.up"] @ adapter.tensors[f"{GIVEN}.down"])
 
-    The condition is a `Controlled`, or a plain `Bound`, which means that nothing is given.
+
+def _changed(net: PriorSession, adapters: Sequence[tuple[Adapter, float]]) -> PriorSession:
+    weights = dict(net.weights)
+    for name, weight in layers(net, taught=any(adapter.taught for adapter, _ in adapters)).items():
+        whole = weight.astype(np.float32)
+        for adapter, factor in adapters:
+            if f"{name}.up" in adapter.tensors:
+                change = adapter.tensors[f"{name}.up"] @ adapter.tensors[f"{name}.down"]
+                whole += np.float32(factor) * change
+        weights[f"{NET}{name}.weight"] = whole
+    return replace(net, weights=weights)
+
+
+def show(net: PriorSession, bound: Bound, given: Floats, mask: NDArray[np.bool_]) -> Bound:
+    """The condition that shows a network what is given, if it takes one.
+
+    Args:
+        net: the network, such as one of `adapted`.
+        bound: its condition, of ``rows`` rows.
+        given: (rows, frames, features) standardised; what is not given may be anything finite.
+        mask: the same shape, bool: which numbers are given.
     """
-
-    def __init__(self, net: PriorNet, sees_given: bool) -> None:
-        super().__init__()
-        self.net, self.sees_given = net, sees_given
-
-    @property
-    def config(self) -> NetConfig:
-        """Sizes of the network."""
-        return self.net.config
-
-    def bind(self, cond: Condition) -> Bound:
-        """See `PriorNet.bind`."""
-        return self.net.bind(cond)
-
-    def forward(self, x: Tensor, level: int | Tensor, bound: Bound | Controlled) -> Tensor:
-        """(rows, frames, features) standardised at ``level`` to the denoised estimate."""
-        if isinstance(bound, Controlled):
-            plain, shown = bound.bound, [torch.where(bound.mask, bound.given.to(x), 0.0), bound.mask.to(x)]
-        else:
-            plain, shown = bound, [torch.zeros_like(x)] * 2
-        return self.net(torch.cat([x, *shown], dim=-1) if self.sees_given else x, level, plain)
-
-
-def show(net: nn.Module, bound: Bound, given: Tensor, mask: Tensor) -> Bound | Controlled:
-    """The condition that shows a network what is given, if it takes one; see `Controlled`."""
-    return Controlled(bound, given, mask) if isinstance(net, AdaptedNet | AdapterNet) else bound
-
-
-def adapted(net: PriorNet, adapter: Adapter) -> AdaptedNet:
-    """A copy of the network with the adapter merged into its weights: as quick as the network itself."""
-    made = copy.deepcopy(net).eval().requires_grad_(False)
-    for name, layer in linears(made, taught=adapter.taught).items():
-        down, up = (adapter.tensors[f"{name}.{part}"].to(layer.weight) for part in ("down", "up"))
-        layer.weight = nn.Parameter(layer.weight + up @ down, requires_grad=False)
-    if adapter.sees_given:
-        down, up = (adapter.tensors[f"{GIVEN}.{part}"].to(made.embed.weight) for part in ("down", "up"))
-        wide = beside(made.embed.weight, up @ down, net.config)
-        made.embed = nn.Linear(wide.shape[1], wide.shape[0], device="meta")
-        made.embed.weight = nn.Parameter(wide, requires_grad=False)
-        made.embed.bias = nn.Parameter(net.embed.bias.detach().clone(), requires_grad=False)
-    return AdaptedNet(made, adapter.sees_given)
-
-
-def beside(embed: Tensor, given: Tensor, config: NetConfig) -> Tensor:
-    """Weights that read frames of [state, given, mask, flags], from those of state and flags and those of the rest."""
-    state = embed.unflatten(1, (config.patch, -1))
-    shown = given.unflatten(1, (config.patch, -1))
-    return torch.cat([state[..., : config.features], shown, state[..., config.features :]], dim=-1).flatten(1)
-
-
-class LowRank(nn.Module):
-    """A frozen layer and its change, kept apart: in training no gradient of the layer's own weight is made."""
-
-    def __init__(self, layer: nn.Linear, down: nn.Parameter, up: nn.Parameter) -> None:
-        super().__init__()
-        self.layer, self.down, self.up = layer, down, up
-
-    def forward(self, x: Tensor) -> Tensor:
-        return self.layer(x) + F.linear(F.linear(x, self.down), self.up)
-
-
-class GivenEmbed(nn.Module):
-    """The first layer with an input for what is given, in training."""
-
-    def __init__(self, embed: nn.Module, down: nn.Parameter, up: nn.Parameter, config: NetConfig) -> None:
-        super().__init__()
-        self.embed, self.down, self.up, self.config = embed, down, up, config
-
-    def forward(self, x: Tensor) -> Tensor:
-        count = self.config.features
-        state, given, flags = x.unflatten(-1, (self.config.patch, -1)).split(
-            [count, 2 * count, x.shape[-1] // self.config.patch - 3 * count], dim=-1
-        )
-        seen = F.linear(F.linear(given.flatten(-2), QUICK * self.down), QUICK * self.up)
-        return self.embed(torch.cat([state, flags], dim=-1).flatten(-2)) + seen
-
-
-class AdapterNet(nn.Module):
-    """An adapter in training over a frozen network, which stays in evaluation mode.
-
-    Its parameters and its state are the adapter's tensors alone; the frozen network is not a part of it.
-    """
-
-    def __init__(
-        self, net: PriorNet, rank: int, *, given_rank: int, start: Adapter | None = None, taught: bool = False
-    ) -> None:
-        super().__init__()
-        base = copy.deepcopy(net).eval().requires_grad_(False)
-        layers = linears(base, taught=taught)
-        sizes = {name: (layer.in_features, layer.out_features, rank) for name, layer in layers.items()}
-        if given_rank:
-            sizes[GIVEN] = (net.config.patch * 2 * net.config.features, net.config.width, given_rank)
-        self.factors = nn.ParameterDict()
-        for name, (inner, outer, size) in sizes.items():
-            spread = 1 / math.sqrt(inner) if name != GIVEN else 1 / (QUICK * math.sqrt(SPARSE))
-            self.factors[_plain(f"{name}.down")] = nn.Parameter(torch.randn(size, inner) * spread)
-            self.factors[_plain(f"{name}.up")] = nn.Parameter(torch.zeros(outer, size))
-        if start:
-            self.load_state_dict({f"factors.{_plain(k)}": v.float() / _pace(k) for k, v in start.tensors.items()})
-        for name, layer in layers.items():
-            parent = base.get_submodule(name.rpartition(".")[0])
-            setattr(parent, name.rsplit(".", 1)[-1], LowRank(layer, *self._pair(name)))
-        if given_rank:
-            setattr(base, "embed", GivenEmbed(base.embed, *self._pair(GIVEN), net.config))  # noqa: B010
-        self._net = (AdaptedNet(base, bool(given_rank)),)  # in a tuple: not a sub-module
-
-    def _pair(self, name: str) -> tuple[nn.Parameter, nn.Parameter]:
-        return self.factors[_plain(f"{name}.down")], self.factors[_plain(f"{name}.up")]  # type: ignore[return-value]
-
-    @property
-    def whole(self) -> AdaptedNet:
-        """The frozen network and the adapter's changes of it."""
-        return self._net[0]
-
-    def bind(self, cond: Condition) -> Bound:
-        """See `PriorNet.bind`."""
-        return self._net[0].bind(cond)
-
-    def forward(self, x: Tensor, level: int | Tensor, bound: Bound | Controlled) -> Tensor:
-        return self._net[0](x, level, bound)
-
-
-def tensors_of(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """An adapter's tensors out of the state of an `AdapterNet`."""
-    named = {key.removeprefix("factors.").replace("/", "."): value for key, value in state.items()}
-    return {key: value * _pace(key) for key, value in named.items()}
-
-
-def _pace(key: str) -> float:
-    return QUICK if key.startswith(f"{GIVEN}.") else 1.0
-
-
-def _plain(name: str) -> str:
-    return name.replace(".", "/")  # names of parameters may not have dots
+    return net.show(bound, given, mask)
 
 
 def _shapes(
-    adapter: Adapter, config: NetConfig, layers: Mapping[str, nn.Linear]
+    adapter: Adapter, config: NetConfig, layers: Mapping[str, np.ndarray]
 ) -> Iterator[tuple[str, tuple[int, ...]]]:
-    for name, layer in layers.items():
-        yield f"{name}.down", (adapter.rank, layer.in_features)
-        yield f"{name}.up", (layer.out_features, adapter.rank)
+    for name, weight in layers.items():
+        yield f"{name}.down", (adapter.rank, weight.shape[1])
+        yield f"{name}.up", (weight.shape[0], adapter.rank)
     if adapter.sees_given:
         down = adapter.tensors[f"{GIVEN}.down"]
         size = min(len(down), MAX_RANK) if down.ndim else 0

@@ -4,6 +4,7 @@ A file is a safetensors file with a JSON description under one key of its head, 
 in it is ever executed; what it claims is checked before anything of that size is made.
 """
 
+import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,9 +13,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import torch
+import numpy as np
 from safetensors import SafetensorError, safe_open
-from torch import Tensor, nn
+from safetensors.numpy import save
 
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import finished
@@ -23,6 +24,8 @@ from motionloom.io.text import plain_json
 
 FORMAT = 1
 MAX_BYTES = 2 << 30
+GRAPH = "graph."
+"""What names of graphs begin with."""
 _WRONG = (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError)
 """What comes of descriptions that say something else than was expected."""
 
@@ -61,13 +64,13 @@ class Container:
         """Whether a file, damaged or not, is of this kind, by what its head says."""
         try:
             check_head(path, max_bytes=self.max_bytes)
-            with safe_open(path, framework="pt") as file:
+            with safe_open(path, framework="np") as file:
                 head = file.metadata() or {}
             return self.key in head and (not self.kind or plain_json(head[self.key])["kind"] == self.kind)
         except (SafetensorError, OSError, *_WRONG):
             return False
 
-    def read(self, path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    def read(self, path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         """The description and the tensors; raises MotionloomError for a file that is damaged or of another kind."""
         tensors, head = read_tensors(path, self.max_bytes)
         return self.describe(path, head), tensors
@@ -100,13 +103,13 @@ class Container:
                 f"{path} does not describe a motionloom {self.noun}; name a file that does, or make it again ({reason})"
             ) from None
 
-    def write(self, path: Path | str, tensors: Mapping[str, Tensor], about: Mapping[str, Any]) -> Path:
+    def write(self, path: Path | str, tensors: Mapping[str, np.ndarray], about: Mapping[str, Any]) -> Path:
         """A .safetensors file, whole or not at all; raises MotionloomError for another suffix."""
         path = Path(path)
         if path.suffix != ".safetensors":
             raise MotionloomError(f"weights are written as .safetensors; {path.name} has another suffix")
         about = {"format": FORMAT, **({"kind": self.kind} if self.kind else {}), **about}
-        kept = {key: value.detach().cpu().contiguous() for key, value in tensors.items()}
+        kept = {key: np.ascontiguousarray(value) for key, value in tensors.items()}
         return save_tensors(kept, path, metadata={self.key: json.dumps(about, default=dict)})
 
 
@@ -121,11 +124,11 @@ ADAPTERS = Container("adapter", "motionloom-adapter", "control", 64 << 20)
 KINDS = (PRIORS, PREDICTORS, PAIRS, ADAPTERS)
 
 
-def read_tensors(path: Path, max_bytes: int = MAX_BYTES) -> tuple[dict[str, Tensor], dict[str, str]]:
+def read_tensors(path: Path, max_bytes: int = MAX_BYTES) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Tensors and metadata of a safetensors file, sizes checked; pickles are refused by what they are."""
     try:
         check_head(path, max_bytes=max_bytes)
-        with safe_open(path, framework="pt") as file:
+        with safe_open(path, framework="np") as file:
             return {key: file.get_tensor(key) for key in file.keys()}, dict(file.metadata() or {})  # noqa: SIM118
     except (SafetensorError, OSError, *_WRONG, RuntimeError) as error:
         if isinstance(error, MotionloomError):
@@ -136,17 +139,12 @@ def read_tensors(path: Path, max_bytes: int = MAX_BYTES) -> tuple[dict[str, Tens
         ) from None
 
 
-def halved(weights: Mapping[str, Tensor], half: bool = True) -> dict[str, Tensor]:
+def halved(weights: Mapping[str, np.ndarray], half: bool = True) -> dict[str, np.ndarray]:
     """Weights as files hold them: float16, or float32 unless ``half``."""
-    return {key: value.detach().to(torch.float16 if half else torch.float32) for key, value in weights.items()}
+    return {key: value.astype(np.float16 if half else np.float32) for key, value in weights.items()}
 
 
-def shapes(net: nn.Module) -> dict[str, tuple[int, ...]]:
-    """Names and shapes of what a network wants; it may be on the device ``meta`` and hold no memory."""
-    return {key: tuple(value.shape) for key, value in net.state_dict().items()}
-
-
-def check(weights: Mapping[str, Tensor], wanted: Mapping[str, Sequence[int]], what: str) -> None:
+def check(weights: Mapping[str, np.ndarray], wanted: Mapping[str, Sequence[int]], what: str) -> None:
     """Raise MotionloomError unless the weights have just these names and shapes and finite floating-point numbers.
 
     what: how the sentence calls them, such as a path.
@@ -161,16 +159,55 @@ def check(weights: Mapping[str, Tensor], wanted: Mapping[str, Sequence[int]], wh
             f"not {right.get(key, 'absent')}; fetch or train it again"
         )
     for key, value in weights.items():
-        if not value.is_floating_point() or not _finite(value):
+        if value.dtype.kind != "f" or not finite(value):
             raise MotionloomError(f"{what} has numbers that are not finite floats, in {key}; fetch or train it again")
 
 
-def _finite(values: Tensor) -> bool:
-    """Whether no number is infinite or NaN, which both ends of the range tell without a mask as large as the tensor."""
-    return not values.numel() or all(bool(end.isfinite()) for end in values.aminmax())
+def finite(values: np.ndarray) -> bool:
+    """Whether no number is infinite or NaN."""
+    if values.dtype == np.float16:  # arithmetic on these is slow
+        return not values.size or int((values.view(np.uint16) & 0x7FFF).max()) < 0x7C00
+    return bool(np.isfinite(values).all())
 
 
-def fill(net: nn.Module, weights: Mapping[str, Tensor], what: str) -> None:
-    """Put weights into a network after `check`; one on the device ``meta`` takes the tensors themselves."""
-    check(weights, shapes(net), what)
-    net.load_state_dict(weights, assign=next(net.parameters(), torch.empty(0)).is_meta)
+# Graphs, which lie beside the weights
+
+
+def split_graphs(tensors: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, bytes]]:
+    """The tensors of a file without its graphs, and these by their names (``prior``, ``bind`` ...)."""
+    weights = {key: value for key, value in tensors.items() if not key.startswith(GRAPH)}
+    return weights, {key[len(GRAPH) :]: tensors[key].tobytes() for key in tensors.keys() - weights.keys()}
+
+
+def graph_tensors(graphs: Mapping[str, bytes]) -> dict[str, np.ndarray]:
+    """Graphs as a file holds them."""
+    return {GRAPH + name: np.frombuffer(graph, np.uint8) for name, graph in graphs.items()}
+
+
+def check_graphs(path: Path, graphs: Mapping[str, bytes], wanted: Sequence[str]) -> None:
+    """Raise MotionloomError where a file lacks some of the graphs that its networks are run with."""
+    if not all(graphs.get(name) for name in wanted):
+        raise MotionloomError(
+            f"{path} has no graphs to run its networks with, as files of older versions have not; write a file that "
+            f"has them by 'motionloom weights convert {path} NEW.safetensors'"
+        )
+
+
+def weights_digest(path: Path) -> str:
+    """The SHA-256 of a weight file as it is without graphs: what figures quote, whoever wrote the graphs.
+
+    Of a file without graphs, of whatever kind, that of its bytes. Raises OSError where it cannot be read.
+    """
+    if not _has_graphs(path):
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    tensors, head = read_tensors(path)
+    return hashlib.sha256(save(split_graphs(tensors)[0], head)).hexdigest()
+
+
+def _has_graphs(path: Path) -> bool:
+    try:
+        with safe_open(path, framework="np") as file:
+            return any(key.startswith(GRAPH) for key in file.keys())  # noqa: SIM118
+    except (SafetensorError, OSError, *_WRONG):
+        return False

@@ -9,15 +9,16 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from torch import Tensor
+import numpy as np
 
 from motionloom.diffusion import Schedule
 from motionloom.errors import MotionloomError
-from motionloom.nets.pair import PairConfig, PairNet, Talk
-from motionloom.nets.prior import PriorNet
-from motionloom.nets.unfilled import unfilled
+from motionloom.runtime.pair import PairConfig, PairSession
+from motionloom.runtime.prior import PriorSession
+from motionloom.runtime.session import check_graph
+from motionloom.runtime.shapes import pair_shapes
 from motionloom.weights.adapter import origin
-from motionloom.weights.container import PAIRS, check, halved, shapes
+from motionloom.weights.container import PAIRS, check, check_graphs, finite, graph_tensors, halved, split_graphs
 
 KEY = PAIRS.key
 UNKNOWN = "unknown: ask whoever gave you this file"
@@ -28,13 +29,13 @@ class HasNet(Protocol):
     """A prior, as far as a block looks at it."""
 
     @property
-    def net(self) -> PriorNet: ...
+    def net(self) -> PriorSession: ...
     @property
     def schedule(self) -> Schedule: ...
     @property
-    def mean(self) -> Tensor: ...
+    def mean(self) -> np.ndarray: ...
     @property
-    def std(self) -> Tensor: ...
+    def std(self) -> np.ndarray: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +44,8 @@ class PairBlock:
 
     name: str
     config: PairConfig
-    tensors: Mapping[str, Tensor]
-    """State of a `Talk`."""
+    tensors: Mapping[str, np.ndarray]
+    """Weights of the block."""
     base: str
     """Name of the prior it belongs to."""
     fingerprint: str
@@ -54,6 +55,8 @@ class PairBlock:
     """What it was trained on, with the acknowledgements that asks for."""
     notes: dict[str, Any] = field(default_factory=dict)
     """How it was made: steps, seed, measured numbers."""
+    graph: bytes = b""
+    """Of prior and block together."""
 
     @staticmethod
     def load(block: str | Path, prior: HasNet) -> "PairBlock":
@@ -68,24 +71,27 @@ class PairBlock:
                 f"the two-person block {path.name} belongs to the weights {found.base!r}, and these are others; "
                 "use those weights, or train a block for these"
             )
-        with unfilled():
-            check(found.tensors, shapes(Talk(found.config, prior.net.config)), str(path))
+        found.config.check(prior.net.config)
+        check(found.tensors, pair_shapes(found.config, prior.net.config), str(path))
+        check_graphs(path, {"pair": found.graph}, ["pair"])
+        check_graph(found.graph, found.weights(prior), PairSession.outputs)
         return found
 
     def save(self, path: Path | str, *, half: bool = True) -> Path:
         """Write it as a .safetensors file and give the path back; the file appears whole or not at all."""
-        if not all(bool(value.isfinite().all()) for value in self.tensors.values()):
+        if not all(finite(value) for value in self.tensors.values()):
             raise MotionloomError("the block has weights that are not finite, and is not written; train it again")
         about = {key: getattr(self, key) for key in _TEXTS}
         about |= {"config": asdict(self.config), "notes": self.notes}
-        return PAIRS.write(path, halved(self.tensors, half), about)
+        return PAIRS.write(path, halved(self.tensors, half) | graph_tensors({"pair": self.graph}), about)
 
-    def net(self, prior: HasNet) -> PairNet:
+    def weights(self, prior: HasNet) -> dict[str, np.ndarray]:
+        """All that the graph is filled with."""
+        return {**prior.net.weights, **self.tensors, "mean": prior.mean, "std": prior.std}
+
+    def net(self, prior: HasNet) -> PairSession:
         """The network of two people, on the prior's device, ready to sample."""
-        talk = Talk(self.config, prior.net.config)
-        talk.load_state_dict(dict(self.tensors))
-        made = PairNet(prior.net, talk.to(prior.mean.device), prior.schedule, mean=prior.mean, std=prior.std)
-        return made.eval().requires_grad_(False)
+        return PairSession(self.config, self.tensors, self.graph, prior.net, prior.schedule, prior.mean, prior.std)
 
 
 def blocks() -> dict[str, Path]:
@@ -109,4 +115,6 @@ def read_block(path: Path) -> PairBlock:
             or not isinstance(config, dict)
         ):
             raise ValueError("values of the wrong kind")
-        return PairBlock(config=PairConfig.parse(config), tensors=tensors, notes=notes, **said)
+        weights, graphs = split_graphs(tensors)
+        graph = graphs.get("pair", b"")
+        return PairBlock(config=PairConfig.parse(config), tensors=weights, notes=notes, graph=graph, **said)

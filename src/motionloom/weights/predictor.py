@@ -16,16 +16,25 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from motionloom.diffusion import SCHEDULES, Basis, Dct, Denoiser, Frames, Schedule, State, from_noise
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import Layout
-from motionloom.nets.predictor import NetConfig, TransLinear
-from motionloom.nets.unfilled import unfilled
-from motionloom.weights.container import PREDICTORS, fill, halved
-from motionloom.weights.prior import Card, find_device
+from motionloom.runtime.predictor import PredictorConfig, PredictorSession
+from motionloom.runtime.session import check_graph, find_device
+from motionloom.runtime.shapes import predictor_shapes
+from motionloom.weights.container import (
+    PREDICTORS,
+    check,
+    check_graphs,
+    graph_tensors,
+    halved,
+    split_graphs,
+)
+from motionloom.weights.prior import NET, Card
+
+Array = np.ndarray
 
 LONGEST_WINDOW = 2000
 
@@ -34,7 +43,7 @@ LONGEST_WINDOW = 2000
 class Predictor:
     """A diffusion model of short windows of motion, ready to complete them."""
 
-    net: TransLinear
+    net: PredictorSession
     schedule: Schedule
     layout: Layout
     basis: Basis
@@ -43,11 +52,11 @@ class Predictor:
     """Frames at the beginning of the window that are usually known."""
     fps: float
     variant: Literal["published", "masked"]
-    mean: Tensor
+    mean: Array
     """(kept, channels) of the state; zeros for the published variant."""
-    std: Tensor
+    std: Array
     """(kept, channels); ones for the published variant."""
-    pose: Tensor
+    pose: Array
     """(2, channels) mean and spread of last observed poses."""
     card: Card
 
@@ -57,7 +66,7 @@ class Predictor:
         return self.basis.frames
 
     @staticmethod
-    def load(weights: str | Path = "predictor", *, device: str | torch.device = "cpu") -> "Predictor":
+    def load(weights: str | Path = "predictor", *, device: str = "cpu") -> "Predictor":
         """Read a weight file: a path, or the name of one that ships with the package (``predictor``).
 
         Raises `MotionloomError` for a file that is missing, damaged or of another kind, and for a device there is not.
@@ -65,45 +74,44 @@ class Predictor:
         place = find_device(device)
         return load_predictor(find_predictor(weights)).to(place)
 
-    def to(self, device: str | torch.device) -> "Predictor":
-        """The same predictor on another device."""
-        moved = {name: getattr(self, name).to(device) for name in ("mean", "std", "pose")}
-        return replace(self, net=self.net.to(device), **moved)
+    def to(self, device: str) -> "Predictor":
+        """The same predictor with its network on another device."""
+        return replace(self, net=self.net.on(device))
 
     # Between windows of features (rows, frames, channels) and states (rows, kept, channels)
 
-    def to_state(self, features: Tensor, pose: Tensor) -> State:
+    def to_state(self, features: Array, pose: Array) -> State:
         """Windows as states; ``pose`` (rows, channels) is the last observed one."""
         x = features - pose[:, None] if self.variant == "masked" else features
         return (self.basis.to_spectrum(x) - self.mean) / self.std
 
-    def to_features(self, state: State, pose: Tensor) -> Tensor:
+    def to_features(self, state: State, pose: Array) -> Array:
         """The inverse of `to_state`, without the frequencies that were dropped."""
         x = self.basis.to_time(state * self.std + self.mean)
         return x + pose[:, None] if self.variant == "masked" else x
 
-    def condition(self, features: Tensor, mask: Tensor, pose: Tensor) -> Tensor:
+    def condition(self, features: Array, mask: Array, pose: Array) -> Array:
         """The condition of windows (rows, frames, channels) known where ``mask`` (rows, frames, parts) is 1.
 
         Unknown numbers are those of ``pose`` (rows, channels), the last observed one.
         """
-        mask = mask.to(features)
-        each = mask.repeat_interleave(3, dim=-1)
+        mask = mask.astype(features.dtype)
+        each = mask.repeat(3, axis=-1)
         known = each * (features - pose[:, None])
         if self.variant == "published":
             return self.basis.to_spectrum(known + pose[:, None])
         spectrum = self.basis.to_spectrum(known) / self.std
         shares = self.basis.to_spectrum(mask) / math.sqrt(self.frames)
-        rows = torch.cat([spectrum, shares], dim=-1)
-        last = torch.zeros_like(rows[:, :1])
+        rows = np.concatenate([spectrum, shares], axis=-1)
+        last = np.zeros_like(rows[:, :1])
         last[..., : pose.shape[-1]] = ((pose - self.pose[0]) / self.pose[1])[:, None]
-        return torch.cat([rows, last], dim=1)
+        return np.concatenate([rows, last], axis=1)
 
-    def denoiser(self, condition: Tensor | None, keep: Tensor | None = None) -> Denoiser:
+    def denoiser(self, condition: Array | None, keep: Array | None = None) -> Denoiser:
         """The network's estimate of the clean state, under a condition or none; ``keep`` (rows,): which rows get it."""
 
         def estimate(x: State, level: int) -> State:
-            return self.net(x, torch.full((len(x),), level - 1, device=x.device), condition, keep)
+            return self.net(x, np.full(len(x), level - 1), condition, keep)
 
         return from_noise(estimate, self.schedule) if self.variant == "published" else estimate
 
@@ -132,8 +140,8 @@ def find_predictor(weights: str | Path) -> Path:
 
 def save_predictor(predictor: Predictor, path: Path | str, *, half: bool = True) -> Path:
     """Write a predictor as a .safetensors file and give the path back; as float16 unless ``half`` is False."""
-    tensors = {f"net.{k}": v for k, v in halved(predictor.net.state_dict(), half).items()}
-    tensors |= {name: getattr(predictor, name).float().clone() for name in ("mean", "std", "pose")}
+    tensors = halved(predictor.net.weights, half) | graph_tensors({"predictor": predictor.net.graph})
+    tensors |= {name: getattr(predictor, name).astype(np.float32) for name in ("mean", "std", "pose")}
     about = {
         "net": asdict(predictor.net.config),
         "schedule": {"name": predictor.schedule.name, "steps": predictor.schedule.steps},
@@ -157,7 +165,7 @@ def load_predictor(path: Path) -> Predictor:
     """Read a predictor; raises MotionloomError where the file is damaged, of another kind or of a newer format."""
     about, tensors = PREDICTORS.read(path)
     with PREDICTORS.parsing(path):
-        config, layout = NetConfig.parse(about["net"]), Layout.parse(about["layout"])
+        config, layout = PredictorConfig.parse(about["net"]), Layout.parse(about["layout"])
         basis = _basis(config.kept, about["frames"], about["dct"])
         schedule, card = _schedule(about["schedule"]), _card(about["card"])
         fps, observed, variant = float(about["fps"]), about["observed"], _variant(about)
@@ -166,11 +174,13 @@ def load_predictor(path: Path) -> Predictor:
             raise ValueError("frames that do not fit together")
         if layout.channels != config.channels or config.condition != condition[variant]:
             raise ValueError("a network that does not fit its layout")
-    with unfilled():  # what a file only claims to hold takes no memory
-        net = TransLinear(config)
-    fill(net, {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}, str(path))
+    tensors, graphs = split_graphs(tensors)
+    weights = {key: value for key, value in tensors.items() if key.startswith(NET)}
+    check({key[len(NET) :]: value for key, value in weights.items()}, predictor_shapes(config), str(path))
+    check_graphs(path, graphs, ["predictor"])
+    check_graph(graphs["predictor"], weights, PredictorSession.outputs)
     return Predictor(
-        net.eval().requires_grad_(False), schedule, layout, basis, observed, fps, variant,
+        PredictorSession(config, weights, graphs["predictor"]), schedule, layout, basis, observed, fps, variant,
         *_statistics(path, tensors, config), card,
     )  # fmt: skip
 
@@ -191,7 +201,7 @@ def _card(about: dict[str, Any]) -> Card:
     return card
 
 
-def _statistics(path: Path, tensors: dict[str, Tensor], config: NetConfig) -> tuple[Tensor, Tensor, Tensor]:
+def _statistics(path: Path, tensors: dict[str, Array], config: PredictorConfig) -> tuple[Array, Array, Array]:
     """Mean and std of the spectra, and the pose's."""
     mean, std, pose = (_usable(path, tensors, key) for key in ("mean", "std", "pose"))
     shape = (config.kept, config.channels)
@@ -207,8 +217,8 @@ def _basis(kept: int, frames: Any, dct: Any) -> Basis:
     return Dct(frames, kept) if dct is True else Frames(frames)
 
 
-def _usable(path: Path, tensors: dict[str, Tensor], name: str) -> Tensor:
-    values = tensors.get(name, torch.empty(0)).float()
-    if not values.numel() or not bool(values.isfinite().all()):
+def _usable(path: Path, tensors: dict[str, Array], name: str) -> Array:
+    values = tensors.get(name, np.empty(0)).astype(np.float32)
+    if not values.size or not np.isfinite(values).all():
         raise MotionloomError(f"{path} lacks usable statistics ({name}); fetch the weights again")
     return values

@@ -8,25 +8,40 @@ sizes, schedule, features, text encoder, licence, provenance, known sentences. N
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import torch
+import numpy as np
 from safetensors import SafetensorError, safe_open
-from torch import Tensor
 
 from motionloom.diffusion import SCHEDULES, Schedule
 from motionloom.errors import MotionloomError
 from motionloom.io.tensors import check_head
-from motionloom.nets.prior import Condition, NetConfig, PriorNet, condition
-from motionloom.nets.text import MiniLM, TextEncoder
-from motionloom.nets.text.known import Known, pack_known, unpack_known, with_sentences
-from motionloom.nets.text.published import TEXTS, PublishedText
-from motionloom.nets.unfilled import unfilled
-from motionloom.weights.adapter import Adapter, merged, origin
-from motionloom.weights.container import PRIORS, fill, halved, read_tensors
+from motionloom.runtime.prior import PriorSession
+from motionloom.runtime.prior_condition import Condition, condition
+from motionloom.runtime.session import find_device
+from motionloom.runtime.shapes import prior_shapes
+from motionloom.runtime.sizes import NetConfig
+from motionloom.runtime.text.known import Known, pack_known, unpack_known, with_sentences
+from motionloom.runtime.text.minilm import MiniLM
+from motionloom.runtime.text.protocol import TextEncoder
+from motionloom.runtime.text.published import TEXTS, PublishedText
+from motionloom.weights.adapter import NET, Adapter, merged, origin
+from motionloom.weights.container import (
+    PRIORS,
+    check,
+    check_graphs,
+    graph_tensors,
+    halved,
+    read_tensors,
+    split_graphs,
+)
 
-__all__ = ["read_tensors"]
+__all__ = ["find_device", "read_tensors"]
+Array = np.ndarray
+GRAPHS = ("prior", "bind")
+"""Graphs of a prior's network; that of the embedded text encoder is ``text``."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +61,11 @@ class Card:
 class Prior:
     """A diffusion model of motion, ready to sample."""
 
-    net: PriorNet
+    net: PriorSession
     schedule: Schedule
-    mean: Tensor
+    mean: Array
     """(features,) of the training data; 263 for HumanML3D."""
-    std: Tensor
+    std: Array
     text: TextEncoder
     card: Card
     fps: float = 20.0
@@ -60,7 +75,7 @@ class Prior:
     """The fingerprint of the network that adapters were merged into; empty where none were."""
 
     @staticmethod
-    def load(weights: str | Path = "default", *, device: str | torch.device = "cpu") -> "Prior":
+    def load(weights: str | Path = "default", *, device: str = "cpu") -> "Prior":
         """Read a weight file: a path, or the name of one that ships with the package (``default``).
 
         Raises `MotionloomError` for a file that is missing, damaged or of another kind, and for a device there is not.
@@ -68,9 +83,14 @@ class Prior:
         place = find_device(device)
         return load_prior(find_weights(weights), place)
 
-    def to(self, device: str | torch.device) -> "Prior":
-        """The same prior with its network and statistics on another device."""
-        return replace(self, net=self.net.to(device), mean=self.mean.to(device), std=self.std.to(device))
+    def to(self, device: str) -> "Prior":
+        """The same prior with its network on another device."""
+        return replace(self, net=self.net.on(device))
+
+    @cached_property
+    def spread(self) -> Array:
+        """``std``, with 1 for numbers that never change."""
+        return np.where(self.std > 0, self.std, np.float32(1))
 
     def with_adapters(self, adapters: Sequence[tuple[Adapter, float]]) -> "Prior":
         """The same prior with adapters of `motionloom teach` merged into its weights, each times its factor.
@@ -88,24 +108,13 @@ class Prior:
 
     def condition(self, prompts: list[str], lengths: list[int] | None = None) -> Condition:
         """Encode prompts, one row each; an empty prompt asks for nothing in particular."""
-        said = self.text.encode(prompts).to(self.mean.device)
+        said = self.text.encode(prompts)
         if self.net.modulated:
             cond = condition(said.pooled, tokens=said.tokens, words=said.mask, lengths=lengths)
         else:
             cond = condition(said.pooled, lengths=lengths)
-        keep = torch.tensor([bool(p.strip()) for p in prompts], device=self.mean.device)
-        return cond if bool(keep.all()) else cond.choose(keep)
-
-
-def find_device(name: str | torch.device) -> torch.device:
-    """The device of that name; raises MotionloomError where this machine or this PyTorch has none."""
-    try:
-        device = torch.device(name)
-        torch.empty(1, device=device).cpu()
-        return device
-    except (RuntimeError, AssertionError, NotImplementedError) as error:
-        reason = " ".join(str(error).split())[:80]
-        raise MotionloomError(f"the device {str(name)!r} cannot be used ({reason}); cpu always can") from None
+        keep = np.array([bool(p.strip()) for p in prompts])
+        return cond if keep.all() else cond.choose(keep)
 
 
 def shipped() -> dict[str, Path]:
@@ -123,10 +132,13 @@ def save_prior(prior: Prior, path: Path | str, *, half: bool = True) -> Path:
 
     The embedded text encoder goes inside. Raises `MotionloomError` for another suffix or a place not to be written.
     """
-    tensors = {f"net.{k}": v for k, v in halved(prior.net.state_dict(), half).items()}
-    tensors |= {"mean": prior.mean.float().clone(), "std": prior.std.float().clone()}
+    tensors = halved(prior.net.weights, half)
+    tensors |= {"mean": prior.mean.astype(np.float32), "std": prior.std.astype(np.float32)}
+    graphs = dict(prior.net.graphs)
     if isinstance(prior.text, MiniLM):
         tensors |= {f"text.{k}": v for k, v in prior.text.to_tensors().items()}
+        graphs["text"] = prior.text.graph
+    tensors |= graph_tensors(graphs)
     about = {
         "net": asdict(prior.net.config),
         "schedule": {"name": prior.schedule.name, "steps": prior.schedule.steps},
@@ -144,7 +156,7 @@ def read_card(path: Path) -> Card:
     """What a weight file says about itself, without its weights; raises MotionloomError as `load_prior` does."""
     try:
         check_head(path, max_bytes=PRIORS.max_bytes)
-        with safe_open(path, framework="pt") as file:
+        with safe_open(path, framework="np") as file:
             return Card(**_about(path, PRIORS.describe(path, dict(file.metadata() or {})))["card"])
     except (SafetensorError, OSError, ValueError) as error:
         if isinstance(error, MotionloomError):
@@ -152,30 +164,33 @@ def read_card(path: Path) -> Card:
         raise MotionloomError(f"{path} is not a whole safetensors file ({error}); fetch the weights again") from None
 
 
-def load_prior(path: Path, device: str | torch.device = "cpu") -> Prior:
+def load_prior(path: Path, device: str = "cpu") -> Prior:
     """Read a prior; raises MotionloomError where the file is damaged, of another kind or of a newer format."""
     about, tensors = PRIORS.read(path)
     about = _about(path, about)
     config = NetConfig.parse(about["net"])
-    with unfilled():
-        net = PriorNet(config)
-    fill(net, {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}, str(path))
+    tensors, graphs = split_graphs(tensors)
+    weights = {key: value for key, value in tensors.items() if key.startswith(NET)}
+    check({key[len(NET) :]: value for key, value in weights.items()}, prior_shapes(config), str(path))
     for name in ("mean", "std"):
-        values = tensors.get(name, torch.empty(0)).float()
-        usable = values.shape == (config.features,) and bool(values.isfinite().all())
+        values = tensors.get(name, np.empty(0)).astype(np.float32)
+        usable = values.shape == (config.features,) and np.isfinite(values).all()
         if not usable or (name == "std" and values.min() < 0):
             raise MotionloomError(f"{path} lacks a usable {name} of {config.features} numbers; fetch the weights again")
     schedule = SCHEDULES[about["schedule"]["name"]](about["schedule"]["steps"])
+    check_graphs(path, graphs, GRAPHS if about["text"] != "minilm" else (*GRAPHS, "text"))
+    net = PriorSession(config, weights, {name: graphs[name] for name in GRAPHS}, device)
+    net.check()
     prior = Prior(
-        net.eval().requires_grad_(False), schedule, tensors["mean"].float(), tensors["std"].float(),
-        _text(path, about["text"], tensors), Card(**about["card"]), float(about["fps"]),
+        net, schedule, tensors["mean"].astype(np.float32), tensors["std"].astype(np.float32),
+        _text(path, about["text"], tensors, graphs), Card(**about["card"]), float(about["fps"]),
         _known(path, about.get("known"), tensors, config.text),
     )  # fmt: skip
     if prior.text.width != config.text:
         raise MotionloomError(
             f"{path} reads texts of width {config.text} and its text encoder gives {prior.text.width}; fetch it again"
         )
-    return prior if str(device) == "cpu" else prior.to(device)
+    return prior
 
 
 def _about(path: Path, about: dict[str, Any]) -> dict[str, Any]:
@@ -194,15 +209,16 @@ def _about(path: Path, about: dict[str, Any]) -> dict[str, Any]:
         return {**about, "card": {k: card[k] for k in kinds if k in card}}
 
 
-def _text(path: Path, name: str, tensors: dict[str, Tensor]) -> TextEncoder:
+def _text(path: Path, name: str, tensors: dict[str, Array], graphs: dict[str, bytes]) -> TextEncoder:
     if name == "minilm":
-        return MiniLM.from_tensors({k[5:]: v for k, v in tensors.items() if k.startswith("text.")})
+        packed = {k[5:]: v for k, v in tensors.items() if k.startswith("text.")}
+        return MiniLM.from_tensors(packed, graphs["text"])
     if name in TEXTS:
         return PublishedText(name)
     raise MotionloomError(f"{path} wants the text encoder {name!r}, which this motionloom does not have")
 
 
-def _known(path: Path, about: Any, tensors: dict[str, Tensor], width: int) -> Known | None:
+def _known(path: Path, about: Any, tensors: dict[str, Array], width: int) -> Known | None:
     if about is None:  # files of before there were tables
         return None
     try:

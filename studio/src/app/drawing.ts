@@ -38,7 +38,7 @@ export class Drawer {
   constructor(private readonly app: App) {
     app.project.subscribe((_, change) => {
       if (change.draft) return;
-      if (change.elsewhere && isDrawn(this.app.project.value)) this.stop();
+      if (change.elsewhere) this.yield();
       this.loadTakes();
       if (change.label) this.schedule(change.typed ? TYPING : 0);
     });
@@ -81,6 +81,12 @@ export class Drawer {
     this.key = "";
     this.app.denoising.value = [];
     this.app.session.update({ drawing: null });
+  }
+
+  /** Give up a draw that another page has done, or whose words are no more; what was asked beside the timeline goes on. */
+  private yield(): void {
+    const { value } = this.app.project;
+    if (this.key && (isDrawn(value) || planKey(value) !== this.key)) this.stop();
   }
 
   /** Until nothing is being drawn any more, nor about to be: what is done with the take then is done with the new one. */

@@ -22,6 +22,7 @@ const RETRY = 1000;
 const ROOM = 5000;
 /** Milliseconds between two looks at what others have saved; other tabs of this browser say it at once. */
 const LOOK = 3000;
+const PATIENCE = 5;
 const UNREADABLE = 422;
 const STALE = 409;
 
@@ -145,6 +146,8 @@ export class Saver {
   /** What kept the last save from coming through. */
   private problem: Problem | null = null;
   private again = false;
+  /** Looks until this page draws itself what another one wrote and has not drawn; 0: it waits for nobody. */
+  private patience = 0;
   /** Somebody has done something here that the server has not got. */
   private edited: boolean;
   private readonly others = new BroadcastChannel(KEY);
@@ -262,7 +265,12 @@ export class Saver {
     try {
       const stamp = await savedStamp();
       const own = this.app.session.value.stamp;
-      if (this.sent || !stamp || (stamp.id === own.id && stamp.revision === own.revision)) return;
+      if (this.sent || !stamp) return;
+      if (stamp.id === own.id && stamp.revision === own.revision) {
+        // Whoever wrote draws; if that page was closed meanwhile, this one does.
+        if (this.patience && !--this.patience) this.back();
+        return;
+      }
       if (this.edited || this.app.session.value.saved !== "saved") await this.save();
       else await this.meet();
     } catch (error) {
@@ -290,6 +298,7 @@ export class Saver {
     this.app.session.update({ stamp, conflict: null, fan: null, saved: "saved" });
     if (!same(project, this.app.project.value)) this.app.project.follow(project, "what another page did");
     this.keepHere(false);
+    this.patience = PATIENCE;
   }
 
   private keepHere(pending: boolean): void {

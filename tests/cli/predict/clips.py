@@ -9,7 +9,8 @@ from motionloom.cli import main
 from motionloom.diffusion import Dct, linear
 from motionloom.features.positions import SMPL_LAYOUT
 from motionloom.motion import Motion
-from motionloom.nets.predictor import NetConfig, TransLinear
+from motionloom.nets.predictor import TransLinear
+from motionloom.runtime.predictor import PredictorConfig
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.weights.predictor import Predictor, condition_shape
 from motionloom.weights.prior import Card
@@ -22,7 +23,7 @@ def tiny_predictor() -> Predictor:
     torch.manual_seed(3)
     shape = condition_shape(SMPL_LAYOUT, KEPT)
     net = TransLinear(
-        NetConfig(channels=66, kept=KEPT, layers=2, width=32, heads=2, condition=shape, beside=True)
+        PredictorConfig(channels=66, kept=KEPT, layers=2, width=32, heads=2, condition=shape, beside=True)
     ).eval()
     zeros = torch.zeros(KEPT, 66)
     pose = torch.stack([torch.zeros(66), torch.ones(66)])

@@ -23,8 +23,7 @@ from motionloom.lab.evaluator.net import (
     load_embedder,
     save_embedder,
 )
-from motionloom.nets.text import MiniLM
-from motionloom.nets.text.minilm import pack
+from motionloom.runtime.text.minilm import MiniLM, pack
 from tests.kinematics import people
 from tests.nets import tiny
 from tests.nets.text import tiny as tiny_text

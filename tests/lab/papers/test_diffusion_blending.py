@@ -3,8 +3,8 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
-import torch
 
 from motionloom.diffusion import SOLVERS, cosine, guide, levels, row_noise, run
 from motionloom.errors import MotionloomError
@@ -13,6 +13,7 @@ from motionloom.lab.papers.diffusion_blending import control_features, controlle
 from motionloom.tasks.sampling import Observed
 from motionloom.weights.adapter import adapted
 from tests.nets import tiny
+from tests.noise import normal
 from tests.weights.test_adapter import adapter_of, trained
 
 PROMPTS, FRAMES = ["a person walks", "a person waves"], 10
@@ -28,9 +29,9 @@ def other(prior):
     return adapted(prior.net, adapter_of(trained(prior.net), prior.net))
 
 
-def given(names: str = "left_wrist,root_horizontal") -> tuple[torch.Tensor, torch.Tensor]:
-    known = torch.randn(2, FRAMES, 263, generator=torch.Generator().manual_seed(4))
-    return known, torch.from_numpy(mask(names)).expand_as(known)
+def given(names: str = "left_wrist,root_horizontal") -> tuple[np.ndarray, np.ndarray]:
+    known = normal((2, FRAMES, 263), 4)
+    return known, np.broadcast_to(np.asarray(mask(names)), known.shape)
 
 
 def draw_of(prior, nets, known, flags, **options):
@@ -43,30 +44,30 @@ def draw_of(prior, nets, known, flags, **options):
 def test_the_walk_is_the_published_loop(seed, noise_free):
     """Ancestral sampling as the published code writes it, by alpha bars and betas, on a formula for a network."""
     schedule, steps = cosine(12), 12
-    generator = torch.Generator().manual_seed(seed)
-    known = torch.randn(2, 7, 5, generator=generator)
-    flags = torch.rand(2, 7, 5, generator=generator) < 0.4
-    noises = [torch.randn(known.shape, generator=generator) for _ in range(steps + 1)]
+    rng = np.random.default_rng(seed)
+    known = rng.standard_normal((2, 7, 5), np.float32)
+    flags = rng.random((2, 7, 5)) < 0.4
+    noises = [rng.standard_normal(known.shape, np.float32) for _ in range(steps + 1)]
     drawn = iter(noises)
 
-    def guess(x: torch.Tensor, level: int) -> torch.Tensor:
-        return torch.tanh(x) + 0.1 * torch.roll(x, 1, dims=1) + 0.01 * level
+    def guess(x: np.ndarray, level: int) -> np.ndarray:
+        return np.tanh(x) + 0.1 * np.roll(x, 1, 1) + 0.01 * level
 
     got = controlled(
         guess, Observed(known, flags, noise_free), levels=range(steps, -1, -1), solver=SOLVERS["ddpm"],
         schedule=schedule, noise=lambda like: next(drawn),
     )  # fmt: skip
-    bars = [1.0, *torch.cumprod(1 - schedule.betas, 0).tolist()]
-    free = (~flags).float() if noise_free else torch.ones_like(known)
+    bars = [1.0, *np.cumprod(1 - schedule.betas).tolist()]
+    free = (~flags).astype(np.float32) if noise_free else np.ones_like(known)
     x = math.sqrt(1 - bars[steps]) * noises[0] * free
     if noise_free:
         x = x + math.sqrt(bars[steps]) * known * flags
     for t in range(steps, 0, -1):
         beta, before = 1 - bars[t] / bars[t - 1], bars[t - 1]
-        clean = torch.where(flags, known, guess(x, t))
+        clean = np.where(flags, known, guess(x, t))
         mean = math.sqrt(before) * beta * clean + math.sqrt(1 - beta) * (1 - before) * x
         x = mean / (1 - bars[t]) + math.sqrt(beta * (1 - before) / (1 - bars[t])) * noises[steps + 1 - t] * free
-    torch.testing.assert_close(got, x, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(got, x, rtol=1e-4, atol=1e-5)
 
 
 def test_given_numbers_come_out_exactly_and_are_free_of_noise_on_the_way(prior, other):
@@ -74,43 +75,46 @@ def test_given_numbers_come_out_exactly_and_are_free_of_noise_on_the_way(prior, 
     known, flags = given()
     seen = []
 
-    def watch(row: torch.Tensor, level: int) -> torch.Tensor:
+    def watch(row: np.ndarray, level: int) -> np.ndarray:
         return row
 
-    class Spy(torch.nn.Module):
+    class Spy:
         bind = staticmethod(prior.net.bind)
 
-        def forward(self, x, level, bound):
+        def show(self, bound, given, mask):
+            return bound
+
+        def __call__(self, x, level, bound):
             seen.append((level, x))
             return prior.net(x, level, bound)
 
     out = draw_of(prior, [Spy()], known, flags, corrections=[watch, None])
-    assert torch.equal(out[flags], known[flags])
+    assert np.array_equal(out[flags], known[flags])
     assert [level for level, _ in seen] == levels(prior.schedule, 6, spacing="early")[:-1]
     for level, x in seen:
         wanted = prior.schedule.at(level)[0] * known
-        torch.testing.assert_close(x[:2][flags], wanted[flags])
-        torch.testing.assert_close(x[2:][flags], wanted[flags])  # the rows without text see it too
-    assert torch.equal(draw_of(prior, [other], known, flags, noise_free=False)[flags], known[flags])
+        np.testing.assert_allclose(x[:2][flags], wanted[flags], atol=1e-5)
+        np.testing.assert_allclose(x[2:][flags], wanted[flags])  # the rows without text see it too
+    assert np.array_equal(draw_of(prior, [other], known, flags, noise_free=False)[flags], known[flags])
 
 
 def test_weights_one_and_zero_are_the_first_network_and_two_equal_networks_are_one(prior, other):
     known, flags = given()
     first, second = (draw_of(prior, [net], known, flags) for net in (prior.net, other))
-    torch.testing.assert_close(draw_of(prior, [prior.net, other], known, flags, weights=(1.0, 0.0)), first)
-    torch.testing.assert_close(draw_of(prior, [prior.net, other], known, flags, weights=(0.0, 1.0)), second)
-    torch.testing.assert_close(draw_of(prior, [other, other], known, flags), second, rtol=1e-4, atol=1e-5)
-    assert float((first - second).abs().max()) > 0.01
+    np.testing.assert_allclose(draw_of(prior, [prior.net, other], known, flags, weights=(1.0, 0.0)), first, atol=1e-5)
+    np.testing.assert_allclose(draw_of(prior, [prior.net, other], known, flags, weights=(0.0, 1.0)), second, atol=1e-5)
+    np.testing.assert_allclose(draw_of(prior, [other, other], known, flags), second, rtol=1e-4, atol=1e-5)
+    assert float(np.abs(first - second).max()) > 0.01
 
 
 def test_weights_may_depend_on_level_frame_and_number(prior, other):
     """In one step the blend can be read off: every number follows the network that its weight names."""
     known, flags = given()
-    chosen = torch.zeros(FRAMES, 263)
+    chosen = np.zeros((FRAMES, 263), np.float32)
     chosen[:4, 100:] = 1.0
     asked = []
 
-    def rest(level: int) -> torch.Tensor:
+    def rest(level: int) -> np.ndarray:
         asked.append(level)
         return 1 - chosen
 
@@ -118,11 +122,10 @@ def test_weights_may_depend_on_level_frame_and_number(prior, other):
         draw_of(prior, nets, known, flags, steps=1, weights=weights)
         for nets, weights in (([prior.net], None), ([other], None), ([prior.net, other], [chosen, rest]))
     )
-    torch.testing.assert_close(both, torch.where(chosen.bool(), first, second))
+    np.testing.assert_allclose(both, np.where(chosen.astype(bool), first, second), atol=1e-5)
     assert asked == [prior.schedule.steps]
 
 
-@torch.no_grad()
 def test_an_empty_mask_is_plain_sampling(prior):
     """The same noise, no control: the motion that the text alone gives."""
     known, flags = given()
@@ -133,17 +136,17 @@ def test_an_empty_mask_is_plain_sampling(prior):
         levels=levels(prior.schedule, 6, spacing="early"), solver=SOLVERS["ddpm"], schedule=prior.schedule, noise=draw,
     )  # fmt: skip
     for noise_free in (True, False):
-        empty = draw_of(prior, [prior.net], torch.full_like(known, torch.nan), flags & False, noise_free=noise_free)
-        torch.testing.assert_close(empty, plain, rtol=1e-4, atol=1e-4)
+        empty = draw_of(prior, [prior.net], np.full_like(known, np.nan), flags & False, noise_free=noise_free)
+        np.testing.assert_allclose(empty, plain, rtol=1e-4, atol=1e-4)
 
 
 def test_rows_do_not_depend_on_each_other_and_nothing_leaks_from_what_is_not_given(prior, other):
     known, flags = given()
     both = draw_of(prior, [other], known, flags)
     alone = control_features(prior, [other], PROMPTS[1:], Observed(known[1:], flags[1:], True), seeds=[6], steps=6)
-    torch.testing.assert_close(both[1:], alone, rtol=1e-4, atol=1e-5)
-    hidden = torch.where(flags, known, 1e6)
-    assert torch.equal(draw_of(prior, [other], hidden, flags), both)
+    np.testing.assert_allclose(both[1:], alone, rtol=1e-4, atol=1e-5)
+    hidden = np.where(flags, known, 1e6)
+    assert np.array_equal(draw_of(prior, [other], hidden, flags), both)
 
 
 def test_networks_see_what_is_given_only_without_noise(prior, other):
@@ -155,25 +158,25 @@ def test_networks_see_what_is_given_only_without_noise(prior, other):
 
     def apart(noise_free: bool) -> float:
         told, untold = (draw_of(prior, [net], known, flags, noise_free=noise_free) for net in (other, deaf))
-        return float((told - untold).abs().max())
+        return float(np.abs(told - untold).max())
 
     assert apart(False) < 1e-4 < 1e-3 < apart(True)
 
 
 def test_corrections_change_the_guess_and_given_numbers_have_the_last_word(prior):
     known, flags = given()
-    out = draw_of(prior, [prior.net], known, flags, corrections=[lambda row, level: torch.full_like(row, 0.25), None])
-    torch.testing.assert_close(out[0], torch.where(flags[0], known[0], 0.25))
-    torch.testing.assert_close(out[1], draw_of(prior, [prior.net], known, flags)[1])
+    out = draw_of(prior, [prior.net], known, flags, corrections=[lambda row, level: np.full_like(row, 0.25), None])
+    np.testing.assert_allclose(out[0], np.where(flags[0], known[0], 0.25), atol=1e-5)
+    np.testing.assert_allclose(out[1], draw_of(prior, [prior.net], known, flags)[1], atol=1e-5)
 
 
 MISTAKES = {
     "no network": lambda k, m: {"nets": []},
     "weights": lambda k, m: {"weights": [0.5, 0.5]},
     "seeds": lambda k, m: {"seeds": [1]},
-    "mask of numbers": lambda k, m: {"mask": m.float()},
+    "mask of numbers": lambda k, m: {"mask": m.astype(np.float32)},
     "mask of another shape": lambda k, m: {"mask": m[:, 1:]},
-    "not finite": lambda k, m: {"known": k * torch.inf},
+    "not finite": lambda k, m: {"known": k * np.inf},
     "steps": lambda k, m: {"steps": 0},
     "solver": lambda k, m: {"solver": "none"},
 }

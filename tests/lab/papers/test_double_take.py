@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from torch import Tensor
 
 from motionloom.diffusion import DDPM, cosine, levels, row_noise, run
 from motionloom.errors import MotionloomError
@@ -32,20 +30,20 @@ SCHEDULE, CHANNELS = cosine(20), 3
 WAY = range(20, -1, -1)
 
 
-def first_net(x: Tensor, level: int) -> Tensor:
+def first_net(x: np.ndarray, level: int) -> np.ndarray:
     """Looks at both neighbours in time, so that padding is seen."""
-    row = torch.arange(len(x))[:, None, None]
-    return torch.tanh(x) + 0.1 * torch.sin(torch.roll(x, 1, dims=1) + level) + 0.05 * row
+    row = np.arange(len(x))[:, None, None]
+    return np.tanh(x) + 0.1 * np.sin(np.roll(x, 1, 1) + level) + 0.05 * row
 
 
-def second_net(x: Tensor, level: int) -> Tensor:
-    return 0.7 * torch.tanh(x) + 0.1 * torch.sin(torch.roll(x, -1, dims=1) + level)
+def second_net(x: np.ndarray, level: int) -> np.ndarray:
+    return 0.7 * np.tanh(x) + 0.1 * np.sin(np.roll(x, -1, 1) + level)
 
 
 def noise(plan: Plan, seed: int):
     rows = plan.repetitions * len(plan.lengths)
     draws = row_noise(range(seed, seed + rows)), row_noise(range(seed + 100, seed + 100 + rows - plan.repetitions))
-    return draws[0](torch.empty(rows, max(plan.lengths), CHANNELS)), draws
+    return draws[0](np.empty(rows, max(plan.lengths), CHANNELS)), draws
 
 
 def both(plan: Plan, mode: Mode, seed: int = 0, **how) -> Takes:
@@ -76,7 +74,7 @@ def naive(plan: Plan, mode: str, seed: int) -> tuple[list[np.ndarray], np.ndarra
         x = step(x, first_net(x, t), t, t - 1, draws[0])
         for i, h in enumerate(hands):
             for j in range(h):
-                old, new = x[i, lengths[i] - h + j].clone(), x[i + 1, j].clone()
+                old, new = x[i, lengths[i] - h + j].copy(), x[i + 1, j].copy()
                 x[i, lengths[i] - h + j] = x[i + 1, j] = (h - j) / h * old + j / h * new
     frames: list[list[int]] = []  # of each transition: which frame of which row, -1 for padding
     weights: list[list[float]] = []
@@ -96,19 +94,19 @@ def naive(plan: Plan, mode: str, seed: int) -> tuple[list[np.ndarray], np.ndarra
             + [naive_weight(mode, "right", k + 1, b) for k in range(len(right))]
             + [1.0] * padding
         )
-    clean = torch.stack(
+    clean = np.stack(
         [
-            torch.stack([x[r, f] if r >= 0 else torch.zeros(CHANNELS) for r, f in zip(rr, ff, strict=True)])
+            np.stack([x[r, f] if r >= 0 else np.zeros((CHANNELS,), np.float32) for r, f in zip(rr, ff, strict=True)])
             for rr, ff in zip(rows, frames, strict=True)
         ]
     )
-    keep = torch.tensor(weights)[..., None]
+    keep = np.array(weights)[..., None]
     start = round({"paper": 0.7, "published": 0.9}[mode] * 20)
     signal, spread = SCHEDULE.at(start)
     y = signal * clean + spread * draws[1](clean)
     for t in range(start, 0, -1):
         y = step(y, (1 - keep) * second_net(y, t) + keep * clean, t, t - 1, draws[1])
-    long = [x[i, : lengths[i]].clone() for i in range(len(lengths))]
+    long = [x[i, : lengths[i]].copy() for i in range(len(lengths))]
     for i, (h, b) in enumerate(zip(hands, ramps, strict=True)):
         middle = lengths[i] - h - hands[max(i - 1, 0)]
         for d in range(-b, h):
@@ -116,7 +114,7 @@ def naive(plan: Plan, mode: str, seed: int) -> tuple[list[np.ndarray], np.ndarra
         for d in range(h + b):
             long[i + 1][d] = y[i, middle + d]
     pieces = [long[0], *(long[i + 1][h:] for i, h in enumerate(hands))]
-    return [row.numpy() for row in x], torch.cat(pieces).numpy()
+    return [row for row in x], np.concatenate(pieces)
 
 
 PLANS = {
@@ -134,9 +132,9 @@ def test_both_takes_equal_a_loop_over_frames(name: str, mode: str) -> None:
     plan = PLANS[name]
     takes = both(plan, MODES[mode], seed=7)
     rows, long = naive(plan, mode, seed=7)
-    assert np.abs(takes.first.numpy() - np.stack(rows)).max() < 1e-5
+    assert np.abs(takes.first - np.stack(rows)).max() < 1e-5
     assert takes.unfolded.shape == (1, len(long), CHANNELS)
-    assert np.abs(takes.unfolded[0].numpy() - long).max() < 1e-5
+    assert np.abs(takes.unfolded[0] - long).max() < 1e-5
 
 
 def test_both_copies_of_a_handshake_are_equal_after_the_first_take() -> None:
@@ -144,16 +142,16 @@ def test_both_copies_of_a_handshake_are_equal_after_the_first_take() -> None:
     takes = both(plan, MODES["paper"])  # which changes handshakes, in both rows
     for i, h in enumerate(plan.handshakes):
         end = plan.lengths[i]
-        assert torch.equal(takes.first[i, end - h : end], takes.first[i + 1, :h])
-        assert torch.equal(takes.rebuilt[i, end - h : end], takes.rebuilt[i + 1, :h])
-        assert not torch.equal(takes.rebuilt[i + 1, :h], takes.first[i + 1, :h])
+        assert np.array_equal(takes.first[i, end - h : end], takes.first[i + 1, :h])
+        assert np.array_equal(takes.rebuilt[i, end - h : end], takes.rebuilt[i + 1, :h])
+        assert not np.array_equal(takes.rebuilt[i + 1, :h], takes.first[i + 1, :h])
 
 
 def test_one_interval_is_plain_sampling_with_the_same_noise() -> None:
     plan = Plan.of([30])
     x, draws = noise(plan, 3)
     plain = run(first_net, x, levels=WAY, solver=DDPM, schedule=SCHEDULE, noise=draws[0])
-    assert torch.equal(both(plan, MODES["paper"], seed=3).unfolded, plain)
+    assert np.array_equal(both(plan, MODES["paper"], seed=3).unfolded, plain)
 
 
 def test_the_first_handshake_frame_is_the_previous_rows_and_the_last_nearly_the_next_ones() -> None:
@@ -161,7 +159,7 @@ def test_the_first_handshake_frame_is_the_previous_rows_and_the_last_nearly_the_
     from motionloom.lab.papers.double_take import handshakes
 
     plan = Plan.of([70, 70], 20, 10)
-    x = torch.stack([torch.zeros(70, 1), torch.ones(70, 1)])
+    x = np.stack([np.zeros((70, 1), np.float32), np.ones((70, 1), np.float32)])
     shared = handshakes(plan)(x, 5)[1, :20, 0]
     assert shared[0] == 0
     assert shared[-1] == pytest.approx(19 / 20)
@@ -172,7 +170,7 @@ def test_the_published_mode_changes_just_the_ramps() -> None:
     plan = Plan.of([90, 80, 100], 20, 10)
     takes = both(plan, MODES["published"])
     before = unfold(takes.first, plan)[0]
-    changed = (takes.unfolded[0] != before).any(dim=-1).nonzero().flatten().tolist()
+    changed = (takes.unfolded[0] != before).any(axis=-1).nonzero().flatten().tolist()
     wanted = []
     for end in plan.ends[:-1]:
         wanted += [*range(end - 30, end - 20), *range(end, end + 10)]
@@ -182,7 +180,7 @@ def test_the_published_mode_changes_just_the_ramps() -> None:
 def test_the_paper_mode_changes_ramps_and_handshakes() -> None:
     plan = Plan.of([90, 80, 100], 20, 10)
     takes = both(plan, MODES["paper"])
-    changed = (takes.unfolded[0] != unfold(takes.first, plan)[0]).any(dim=-1).nonzero().flatten().tolist()
+    changed = (takes.unfolded[0] != unfold(takes.first, plan)[0]).any(axis=-1).nonzero().flatten().tolist()
     assert changed == [frame for end in plan.ends[:-1] for frame in range(end - 30, end + 10)]
 
 
@@ -191,7 +189,7 @@ def test_paper_weights_are_symmetric_for_every_ramp(b: int) -> None:
     """Read backwards they are the same, rise from 0.1 to 0.85, and the handshake keeps 0.1."""
     plan = Plan.of([200, 200], 20, b)
     weights = keep_weights(plan, MODES["paper"].keep)[0]
-    assert torch.equal(weights, weights.flip(0))
+    assert np.array_equal(weights, np.flip(weights, 0))
     assert weights[160:180].tolist() == pytest.approx([0.1] * 20)
     assert (weights == 1).sum() == len(weights) - 20 - 2 * b
     if b:
@@ -225,15 +223,15 @@ def test_the_long_motion_has_every_frame_once(data: st.DataObject) -> None:
     lengths = [least.least(i) + data.draw(st.integers(0, 40)) for i in range(count)]
     plan = Plan.of(lengths, hands, ramps, repetitions=data.draw(st.integers(1, 2)))
     starts = [0, *(end - h for end, h in zip(plan.ends, hands, strict=False))]
-    rows = torch.full((count, max(lengths), 1), -1.0)
+    rows = np.full((count, max(lengths), 1), -1.0)
     for row, (start, length) in enumerate(zip(starts, lengths, strict=True)):
-        rows[row, :length, 0] = torch.arange(start, start + length)
+        rows[row, :length, 0] = np.arange(start, start + length)
     x = rows.repeat(plan.repetitions, 1, 1)
     total = sum(lengths) - sum(hands)
     assert plan.ends[-1] == total
-    assert torch.equal(unfold(x, plan)[..., 0], torch.arange(total).expand(plan.repetitions, total))
+    assert np.array_equal(unfold(x, plan)[..., 0], np.broadcast_to(np.arange(total), (plan.repetitions, total)))
     for row, valid in zip(sandwiches(x, plan), plan.sandwiches * plan.repetitions, strict=True):
-        assert torch.equal(row[:valid, 0].diff(), torch.ones(valid - 1))
+        assert np.array_equal(np.diff(row[:valid, 0]), np.ones((valid - 1,), np.float32))
         assert not row[valid:].any()
     weights = keep_weights(plan, MODES["paper"].keep)
     assert weights.shape == (count - 1, plan.width)
@@ -244,20 +242,20 @@ def test_repetitions_are_rows_of_their_own() -> None:
     lengths, hands, ramps = [50, 60, 45], (10, 8), (5, 3)
     plan, one = Plan.of(lengths, hands, ramps, repetitions=2), Plan.of(lengths, hands, ramps)
 
-    def net(x: Tensor, level: int) -> Tensor:
-        return torch.tanh(x) + 0.01 * level
+    def net(x: np.ndarray, level: int) -> np.ndarray:
+        return np.tanh(x) + 0.01 * level
 
-    def taken(plan: Plan, seeds: list[int], later: list[int]) -> Tensor:
+    def taken(plan: Plan, seeds: list[int], later: list[int]) -> np.ndarray:
         draws = row_noise(seeds), row_noise(later)
-        x = draws[0](torch.empty(len(seeds), 60, CHANNELS))
+        x = draws[0](np.empty((len(seeds), 60, CHANNELS), np.float32))
         return double_take(
             net, net, x, plan, mode=MODES["paper"], way=WAY, schedule=SCHEDULE, noise=draws
         ).unfolded  # fmt: skip
 
     together = taken(plan, [1, 2, 3, 4, 5, 6], [7, 8, 9, 10])
-    alone = torch.cat([taken(one, [1, 2, 3], [7, 8]), taken(one, [4, 5, 6], [9, 10])])
-    assert torch.allclose(together, alone, atol=1e-6)
-    assert torch.equal(flags(plan), torch.cat([flags(one), flags(one)]))
+    alone = np.concatenate([taken(one, [1, 2, 3], [7, 8]), taken(one, [4, 5, 6], [9, 10])])
+    assert np.allclose(together, alone, atol=1e-6)
+    assert np.array_equal(flags(plan), np.concatenate([flags(one), flags(one)]))
 
 
 def test_flags_mark_what_rows_share() -> None:
@@ -312,26 +310,26 @@ def test_features_of_many_prompts_decode_to_one_continuous_motion(config, mode) 
     other, _ = double_take_features(prior, PROMPTS, [70, 83, 75], mode=mode, ramp=10, steps=6, seed=5)
     assert made.shape == (188, 263)
     assert ends == [70, 133, 188]
-    assert torch.isfinite(made).all()
-    assert torch.equal(made, again)
-    assert not torch.equal(made, other)
-    positions = humanml.decode_positions(made.double().numpy())
+    assert np.isfinite(made).all()
+    assert np.array_equal(made, again)
+    assert not np.array_equal(made, other)
+    positions = humanml.decode_positions(made.astype(np.float64))
     speed = np.linalg.norm(np.diff(positions[:, 0, [0, 2]], axis=0), axis=-1)
-    assert speed == pytest.approx(made[:-1, 1:3].norm(dim=-1).numpy(), abs=1e-5)
+    assert speed == pytest.approx(np.linalg.norm(made[:-1, 1:3], axis=-1), abs=1e-5)
 
 
 def test_paper_rows_do_not_see_the_padding_and_published_rows_do() -> None:
     """One row's length changes another row's motion only where padding is attended (first take without handshakes)."""
     prior = tiny.prior(tiny.PUBLISHED)
 
-    def first_rows(mode, longest: int) -> Tensor:
+    def first_rows(mode, longest: int) -> np.ndarray:
         made, _ = double_take_features(
             prior, PROMPTS[:2], [70, longest], mode=mode, ramp=10, steps=4, second_take_only=True
         )
         return made[:30]
 
-    assert torch.allclose(first_rows("paper", 75), first_rows("paper", 90), atol=1e-5)
-    assert not torch.allclose(first_rows("published", 75), first_rows("published", 90), atol=1e-3)
+    assert np.allclose(first_rows("paper", 75), first_rows("paper", 90), atol=1e-5)
+    assert not np.allclose(first_rows("published", 75), first_rows("published", 90), atol=1e-3)
 
 
 def test_a_network_with_flags_sees_what_is_shared() -> None:
@@ -340,7 +338,7 @@ def test_a_network_with_flags_sees_what_is_shared() -> None:
 
     prior = tiny.prior(replace(tiny.PUBLISHED, flags=True))
     made, _ = double_take_features(prior, PROMPTS[:2], [70, 75], ramp=10, steps=4, first_take_only=True)
-    seen: list[Tensor] = []
+    seen: list[np.ndarray] = []
     bind = prior.net.bind
     prior.net.bind = lambda cond: seen.append(cond.flags) or bind(cond)  # type: ignore[method-assign]
     double_take_features(prior, PROMPTS[:2], [70, 75], ramp=10, steps=4)
@@ -389,4 +387,4 @@ def test_first_take_leaves_rows_alone_where_nothing_joins_them() -> None:
     x, draws = noise(plan, 0)
     made = first_take(first_net, x, plan, way=WAY, schedule=SCHEDULE, noise=draws[0], join=False)
     x, draws = noise(plan, 0)
-    assert torch.equal(made, run(first_net, x, levels=WAY, solver=DDPM, schedule=SCHEDULE, noise=draws[0]))
+    assert np.array_equal(made, run(first_net, x, levels=WAY, solver=DDPM, schedule=SCHEDULE, noise=draws[0]))

@@ -7,8 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-import torch
-from torch import Tensor
 
 from motionloom.diffusion import Dct, Schedule, cosine, row_noise
 from motionloom.errors import MotionloomError
@@ -25,13 +23,14 @@ from motionloom.lab.papers.humanmac import (
 from motionloom.nets.predictor import TransLinear
 from motionloom.weights.predictor import Predictor
 from tests.nets.tiny_predictor import predictor
+from tests.noise import normal
 
 SCHEDULE = cosine(1000)
 VARIANTS = ["masked", "published"]
 
 
-def some(*shape: int, seed: int = 0) -> Tensor:
-    return torch.randn(shape, generator=torch.Generator().manual_seed(seed))
+def some(*shape: int, seed: int = 0) -> np.ndarray:
+    return normal(shape, seed)
 
 
 @pytest.mark.parametrize("steps", [1, 10, 25, 40, 100, 500])
@@ -60,11 +59,13 @@ def test_more_steps_than_levels_are_refused(steps: int) -> None:
 
 def test_paddings_are_the_index_lists_and_leave_the_observation_alone() -> None:
     observed = some(2, 3, 4)
-    before = observed.clone()
+    before = observed.copy()
     for padding, index in (("last", [0, 1, 2, 2, 2, 2]), ("repeat", [0, 1, 2, 0, 1, 2])):
-        assert torch.equal(padded(observed, 6, padding), observed[:, index])  # pyright: ignore[reportArgumentType]
-    assert torch.equal(padded(observed, 6, "zero"), torch.cat([before, torch.zeros(2, 3, 4)], dim=1))
-    assert torch.equal(observed, before)
+        assert np.array_equal(padded(observed, 6, padding), observed[:, index])  # pyright: ignore[reportArgumentType]
+    assert np.array_equal(
+        padded(observed, 6, "zero"), np.concatenate([before, np.zeros((2, 3, 4), np.float32)], axis=1)
+    )
+    assert np.array_equal(observed, before)
 
 
 @pytest.mark.parametrize(("frames", "padding"), [(2, "last"), (7, "repeat"), (2, "zero")])
@@ -73,18 +74,18 @@ def test_paddings_that_do_not_go_up_are_refused(frames: int, padding: str) -> No
         padded(some(1, 3, 4), frames, padding)  # pyright: ignore[reportArgumentType]
 
 
-def complete(observed: Tensor, rows: int, *, basis: Dct | None = None, steps: int = 10, seed: int = 0, **how):
+def complete(observed: np.ndarray, rows: int, *, basis: Dct | None = None, steps: int = 10, seed: int = 0, **how):
     """With a perfect guess of a motion that stands still at 0, and 48 channels."""
     basis = basis or Dct(20, 20)
     return published_completion(
-        lambda x, level: torch.zeros_like(x), observed, rows, basis=basis, schedule=SCHEDULE,
+        lambda x, level: np.zeros_like(x), observed, rows, basis=basis, schedule=SCHEDULE,
         noise=row_noise(range(seed, seed + rows)) if len(observed) == rows else _any_draw(seed), steps=steps, **how,
     )  # fmt: skip
 
 
-def _any_draw(seed: int) -> Callable[[Tensor], Tensor]:
-    generator = torch.Generator().manual_seed(seed)
-    return lambda like: torch.randn(like.shape, generator=generator)
+def _any_draw(seed: int) -> Callable[[np.ndarray], np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return lambda like: rng.standard_normal(like.shape, np.float32)
 
 
 def test_some_noise_is_left_on_what_is_known() -> None:
@@ -93,24 +94,24 @@ def test_some_noise_is_left_on_what_is_known() -> None:
     motion = complete(observed, 40)[1]
     left = motion[:, :5] - math.sqrt(1 - 4.12841e-5) * observed
     assert float(left.std()) == pytest.approx(math.sqrt(4.12841e-5), rel=0.03)
-    assert float(motion[:, 5:].abs().mean()) < 0.02
+    assert float(np.abs(motion[:, 5:]).mean()) < 0.02
 
 
 def test_without_completion_the_observation_has_no_say() -> None:
     a, b = (complete(some(2, 5, 48, seed=seed), 2, complete=False)[1] for seed in (1, 2))
-    assert torch.equal(a, b)
+    assert np.array_equal(a, b)
 
 
 def test_part_control_holds_a_part_in_all_frames_and_shares_its_noise() -> None:
     motion = some(1, 20, 48)
     made = complete(motion[:, :5], 3, fixed=Fixed(motion, PARTS["left_arm"]))[1]
     held = slice(30, 39)  # the published channels 3 * 10 to 3 * 12 + 3
-    torch.testing.assert_close(made[..., held], motion.expand(3, -1, -1)[..., held], atol=0.05, rtol=0)
-    assert torch.equal(made[0, ..., held], made[1, ..., held])
-    free = torch.ones(48, dtype=torch.bool)
+    np.testing.assert_allclose(made[..., held], np.broadcast_to(motion, (3, -1, -1))[..., held], atol=0.05, rtol=0)
+    assert np.array_equal(made[0, ..., held], made[1, ..., held])
+    free = np.ones((48,), dtype=np.bool_)
     free[held] = False
-    assert float(made[:, 5:, free].abs().max()) < 0.1
-    assert not torch.equal(made[0, 5:, free], made[1, 5:, free])
+    assert float(np.abs(made[:, 5:, free]).max()) < 0.1
+    assert not np.array_equal(made[0, 5:, free], made[1, 5:, free])
 
 
 def test_parts_are_the_published_ranges() -> None:
@@ -122,26 +123,26 @@ def test_a_target_is_imposed_until_the_relaxed_steps(relax: float) -> None:
     """Counted by draws: the start, one per step, and one for the target in the steps before the last ones."""
     drawn = 0
 
-    def draw(like: Tensor) -> Tensor:
+    def draw(like: np.ndarray) -> np.ndarray:
         nonlocal drawn
         drawn += 1
-        return torch.zeros_like(like)
+        return np.zeros_like(like)
 
-    target = Target(torch.ones(1, 4, 48), relax)
+    target = Target(np.ones((1, 4, 48), np.float32), relax)
     _, motion = published_completion(
-        lambda x, level: torch.zeros_like(x), torch.zeros(2, 5, 48), 2, basis=Dct(20, 20), schedule=SCHEDULE,
+        lambda x, level: np.zeros_like(x), np.zeros((2, 5, 48), np.float32), 2, basis=Dct(20, 20), schedule=SCHEDULE,
         noise=draw, steps=10, target=target,
     )  # fmt: skip
     imposed = max(10 - (relax if isinstance(relax, int) else round(10 * relax)), 0)
     assert drawn == 1 + 10 + imposed
     assert bool(imposed) == (float(motion[:, -4:].mean()) > 1e-3)
     if imposed == 10:
-        torch.testing.assert_close(motion[:, -4:], torch.ones(2, 4, 48), atol=1e-3, rtol=0)
+        np.testing.assert_allclose(motion[:, -4:], np.ones((2, 4, 48), np.float32), atol=1e-3, rtol=0)
 
 
 def test_a_target_longer_than_the_window_is_refused() -> None:
     with pytest.raises(MotionloomError, match="target"):
-        complete(torch.zeros(1, 5, 48), 1, target=Target(torch.zeros(1, 21, 48)))
+        complete(np.zeros((1, 5, 48), np.float32), 1, target=Target(np.zeros((1, 21, 48), np.float32)))
 
 
 @pytest.mark.parametrize(("count", "share", "told"), [(50, 0.5, 25), (50, 1.0, 50), (50, 0.0, 0), (10, 0.26, 3)])
@@ -187,11 +188,13 @@ def test_a_future_does_not_depend_on_the_others(variant: str) -> None:
     np.testing.assert_allclose(fewer, whole[:2, :2], atol=1e-4)
 
 
-def oracle(made: Predictor, answer: Callable[[Tensor], Tensor]) -> Predictor:
+def oracle(made: Predictor, answer: Callable[[np.ndarray], np.ndarray]) -> Predictor:
     """A predictor whose network names what it is answered by the clean state of all rows, as its variant asks."""
 
     class Perfect(TransLinear):
-        def forward(self, x: Tensor, t: Tensor, told: Tensor | None = None, keep: Tensor | None = None) -> Tensor:
+        def forward(
+            self, x: np.ndarray, t: np.ndarray, told: np.ndarray | None = None, keep: np.ndarray | None = None
+        ) -> np.ndarray:
             clean = answer(x)
             if made.variant == "masked":
                 return clean
@@ -208,9 +211,11 @@ def test_a_perfect_guess_gives_the_true_future_but_for_the_noise_that_is_left(va
     world = pasts(replace(made, observed=20), 1)
     if not made.layout.root:
         world += world[:, 4:5, :1] - world[:, :, :1]
-    own = torch.from_numpy(made.layout.encode(world, made.layout.place(world[:, 4]))).float()
+    own = np.asarray(made.layout.encode(world, made.layout.place(world[:, 4]))).astype(np.float32)
     clean = made.to_state(own, own[:, 4])
-    futures = published_futures(oracle(made, lambda x: clean.expand_as(x)), world[:, :5], count=3, steps=20)
+    futures = published_futures(
+        oracle(made, lambda x: np.broadcast_to(clean, x.shape)), world[:, :5], count=3, steps=20
+    )
     off = futures - world[:, None, 5:]
     assert np.abs(off).max() < 0.06
     assert np.abs(off).max() > 1e-4
@@ -220,7 +225,7 @@ def test_the_published_manner_is_the_sampler_on_plain_tensors() -> None:
     """One row: the recorded runs hold for `published_completion`, and so for what predictors go through."""
     made, h = predictor("published"), 5
     past = pasts(made, 1)
-    numbers = torch.from_numpy(made.layout.encode(past, made.layout.place(past[:, -1]))).float()
+    numbers = np.asarray(made.layout.encode(past, made.layout.place(past[:, -1]))).astype(np.float32)
     told = made.basis.to_spectrum(padded(numbers, made.frames))
     seed = int(np.random.SeedSequence((7, 0, 0)).generate_state(1, np.uint64)[0] >> np.uint64(1))
     expected = published_completion(
@@ -228,7 +233,7 @@ def test_the_published_manner_is_the_sampler_on_plain_tensors() -> None:
     )[1][:, h:]
     futures = published_futures(made, past, count=1, seed=7, steps=6)[:, 0]
     found = made.layout.encode(futures, made.layout.place(past[:, -1]))
-    np.testing.assert_allclose(found, expected.numpy(), atol=1e-4)
+    np.testing.assert_allclose(found, expected, atol=1e-4)
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
@@ -236,9 +241,11 @@ def test_the_network_is_called_once_per_step_and_rows_are_conditioned_as_asked(v
     made, calls = predictor(variant), []
 
     class Spy(TransLinear):
-        def forward(self, x: Tensor, t: Tensor, told: Tensor | None = None, keep: Tensor | None = None) -> Tensor:
+        def forward(
+            self, x: np.ndarray, t: np.ndarray, told: np.ndarray | None = None, keep: np.ndarray | None = None
+        ) -> np.ndarray:
             calls.append((len(x), None if told is None else len(told), None if keep is None else keep.tolist()))
-            return torch.zeros_like(x)
+            return np.zeros_like(x)
 
     spy = replace(made, net=Spy(made.net.config).eval())
     published_futures(spy, pasts(made, 2), count=4, steps=6, told_share=0.5)

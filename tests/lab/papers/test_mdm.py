@@ -13,7 +13,7 @@ from torch import Tensor
 
 from motionloom.errors import MotionloomError
 from motionloom.lab.papers.mdm import describe, from_published, own_name, read_published
-from motionloom.nets.text.published import PublishedText
+from motionloom.runtime.text.published import PublishedText
 
 State = dict[str, Tensor]
 

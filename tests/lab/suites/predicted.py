@@ -6,7 +6,8 @@ import torch
 from motionloom.data.prediction import Protocol, Recording
 from motionloom.diffusion import SCHEDULES, Dct
 from motionloom.features.positions import SMPL_LAYOUT, Layout
-from motionloom.nets.predictor import NetConfig, TransLinear
+from motionloom.nets.predictor import TransLinear
+from motionloom.runtime.predictor import PredictorConfig
 from motionloom.skeleton import SMPL22
 from motionloom.weights.predictor import Predictor, condition_shape
 from motionloom.weights.prior import Card
@@ -57,7 +58,7 @@ def predictor(
     fps: float = FPS,
 ) -> Predictor:
     """Random weights, of the variant ``told``."""
-    config = NetConfig(layout.channels, kept, 2, 16, 2, 0.0, condition_shape(layout, kept), True)
+    config = PredictorConfig(layout.channels, kept, 2, 16, 2, 0.0, condition_shape(layout, kept), True)
     with torch.random.fork_rng():
         torch.manual_seed(seed)
         net = TransLinear(config)

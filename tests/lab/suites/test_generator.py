@@ -12,7 +12,7 @@ from motionloom.goals.timeline import timeline_of
 from motionloom.kinematics.physics import bone_length_error
 from motionloom.lab.suites.generator import generator
 from motionloom.nets.prior import NetConfig, PriorNet
-from motionloom.nets.text import TextEmbedding
+from motionloom.runtime.text.protocol import TextEmbedding
 from motionloom.tasks.long import compose
 from motionloom.tasks.splice import concatenated
 from motionloom.weights.prior import Card, Prior

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from motionloom.errors import MotionloomError
-from motionloom.nets.text.wordpiece import SPECIALS
+from motionloom.runtime.text.wordpiece import SPECIALS
 from tests.nets.text.tiny import VOCABULARY
 from tools import compress_text_encoder as compress
 

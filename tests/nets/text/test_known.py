@@ -2,15 +2,15 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
-import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from torch import Tensor
 
+from motionloom.arrays import unit
 from motionloom.errors import MotionloomError
 from motionloom.lab.metrics.obedience import CHECKS as BASIC
-from motionloom.nets.text.known import (
+from motionloom.runtime.text.known import (
     Known,
     bare,
     known_sentences,
@@ -19,7 +19,7 @@ from motionloom.nets.text.known import (
     unpack_known,
     with_sentences,
 )
-from motionloom.nets.text.protocol import TextEmbedding
+from motionloom.runtime.text.protocol import TextEmbedding
 from motionloom.weights.prior import Prior
 
 
@@ -29,12 +29,12 @@ class Letters:
     name, width = "letters", 26
 
     def encode(self, texts: Any) -> TextEmbedding:
-        rows = torch.zeros(len(texts), 26)
+        rows = np.zeros((len(texts), 26), np.float32)
         for row, text in enumerate(texts):
             for letter in text.lower():
                 if letter.isascii() and letter.isalpha():
                     rows[row, ord(letter) - 97] += 1
-        return TextEmbedding(rows[:, None], torch.ones(len(texts), 1, dtype=torch.bool), rows)
+        return TextEmbedding(rows[:, None], np.ones((len(texts), 1), bool), rows)
 
 
 @pytest.mark.parametrize(
@@ -86,20 +86,20 @@ def test_the_nearest_sentences_come_first_and_far_ones_get_a_remark() -> None:
 
 def test_one_sentence_with_the_same_noun_makes_no_prompt_known() -> None:
     """The mean over the nearest eight decides, unless one says nearly the same."""
-    said, asked = torch.eye(9)[1:], torch.zeros(1, 9)
-    asked[0, :2] = torch.tensor([0.7, 0.7])
+    said, asked = np.eye(9, dtype=np.float32)[1:], np.zeros((1, 9), np.float32)
+    asked[0, :2] = 0.7
 
     class Fixed(Letters):
         def encode(self, texts: Any) -> TextEmbedding:
-            return TextEmbedding(asked[:, None], torch.ones(1, 1, dtype=torch.bool), asked)
+            return TextEmbedding(asked[:, None], np.ones((1, 1), bool), asked)
 
     def found(known: Known) -> bool:
         return nearest(known, ["plays golf"], Fixed())[0].near  # type: ignore[arg-type]
 
     names = tuple(f"sentence {number}" for number in range(8))
     assert not found(Known(names, said, {}))  # 0.7 to one, 0 to seven
-    assert found(Known(names, said[:1].expand(8, 9), {}))  # 0.7 to all
-    assert found(Known(names, torch.cat([asked / asked.norm(), said[1:]]), {}))  # the same as one
+    assert found(Known(names, np.repeat(said[:1], 8, axis=0), {}))  # 0.7 to all
+    assert found(Known(names, np.concatenate([asked / np.linalg.norm(asked), said[1:]]), {}))  # the same as one
 
 
 def test_more_sentences_make_a_prompt_known() -> None:
@@ -121,7 +121,7 @@ def test_the_weights_that_ship_know_everyday_actions_and_no_golf() -> None:
 
 
 def table() -> Known:
-    vectors = torch.nn.functional.normalize(torch.randn(3, 8, generator=torch.Generator().manual_seed(1)), dim=1)
+    vectors = unit(np.random.default_rng(1).standard_normal((3, 8), np.float32))
     return Known(("walks", "waves", "sits"), vectors, {"walk": 12.25, "sit": 3.0})
 
 
@@ -162,13 +162,13 @@ def test_a_damaged_description_is_refused(change: dict[str, Any]) -> None:
     "tensors",
     [
         {},
-        {"known.vectors": torch.zeros(3, 8), "known.scale": torch.ones(3).half()},
-        {"known.vectors": torch.zeros(3, 9, dtype=torch.int8), "known.scale": torch.ones(3).half()},
-        {"known.vectors": torch.zeros(3, 8, dtype=torch.int8), "known.scale": torch.ones(2).half()},
-        {"known.vectors": torch.zeros(3, 8, dtype=torch.int8), "known.scale": torch.full((3,), torch.inf).half()},
+        {"known.vectors": np.zeros((3, 8), np.float32), "known.scale": np.ones(3, np.float16)},
+        {"known.vectors": np.zeros((3, 9), np.int8), "known.scale": np.ones(3, np.float16)},
+        {"known.vectors": np.zeros((3, 8), np.int8), "known.scale": np.ones(2, np.float16)},
+        {"known.vectors": np.zeros((3, 8), np.int8), "known.scale": np.full(3, np.inf, np.float16)},
     ],
 )
-def test_damaged_vectors_are_refused(tensors: dict[str, Tensor]) -> None:
+def test_damaged_vectors_are_refused(tensors: dict[str, np.ndarray]) -> None:
     with pytest.raises(ValueError, match="table of known"):
         unpack_known(tensors, pack_known(table())[1], width=8)
 

@@ -1,6 +1,6 @@
 """Splitting into word pieces against splits known from the BERT paper and its published tokenizer."""
 
-from motionloom.nets.text.wordpiece import make_tokenizer
+from motionloom.runtime.text.wordpiece import make_tokenizer
 from tests.nets.text.tiny import VOCABULARY
 
 

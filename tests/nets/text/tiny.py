@@ -4,7 +4,7 @@ import torch
 from torch import Tensor
 
 from motionloom.nets.text.bert import Bert
-from motionloom.nets.text.wordpiece import SPECIALS
+from motionloom.runtime.text.wordpiece import SPECIALS
 
 WORDS = ["a", "person", "walks", "turns", "left", "right", "walk", "##s", "##ing", "jump", "un", "##aff", "##able", "."]
 VOCABULARY = [

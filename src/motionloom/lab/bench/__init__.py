@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any, Literal
 
-import torch
+import onnxruntime
 
 from motionloom.lab.bench.long import FULL, QUICK, entries_of, long_motion
 from motionloom.lab.bench.prediction import cost_of_futures
@@ -27,6 +27,7 @@ from motionloom.lab.bench.speed import (
     speed_of_default,
 )
 from motionloom.lab.bench.start import starts
+from motionloom.runtime.session import threads
 from motionloom.weights.predictor import Predictor
 from motionloom.weights.prior import Prior
 
@@ -87,18 +88,15 @@ def bench_prediction(
 
 def machine(prior: Prior | Predictor) -> dict[str, Any]:
     """What it ran on."""
-    device = prior.mean.device
     return {
-        "device": torch.cuda.get_device_name(device)
-        if device.type == "cuda"
-        else platform.processor() or platform.machine(),
+        "device": prior.net.device if prior.net.device != "cpu" else platform.processor() or platform.machine(),
         "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
         "load": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else 0.0,
-        "threads": torch.get_num_threads(),
-        "torch": torch.__version__,
+        "threads": threads() or os.cpu_count(),
+        "onnxruntime": onnxruntime.__version__,
         "python": platform.python_version(),
-        "type": str(next(prior.net.parameters()).dtype).removeprefix("torch."),
-        "parameters": sum(p.numel() for p in prior.net.parameters()),
+        "type": "float32",
+        "parameters": sum(values.size for values in prior.net.weights.values()),
     }
 
 

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-import torch
-from torch import Tensor
+import numpy as np
 
-from motionloom.diffusion import Denoiser, levels, row_noise
+from motionloom.diffusion import Denoiser, lerp, levels, row_noise
 from motionloom.goals.segment import TRANSITION, Segment
 from motionloom.io.stream import open_stream
 from motionloom.lab.bench.speed import Entry, Process, Sampling, fit, process, timed
@@ -23,7 +22,7 @@ from motionloom.lab.papers.double_take import (
     sandwiches,
     second_take,
 )
-from motionloom.nets.prior import Bound
+from motionloom.runtime.prior_condition import Bound
 from motionloom.tasks.long import BATCH, compose
 from motionloom.tasks.text import SOLVER, SPACING
 from motionloom.weights.prior import Prior
@@ -138,7 +137,7 @@ def _making(prior: Prior, how: Sampling, texts: Sequence[str], each: float, out:
 
 def published_takes(
     prior: Prior, how: Sampling, texts: Sequence[str], *, seconds: float, steps: int
-) -> tuple[Callable[[float, float], tuple[Take, Take]], list[Callable[[], Tensor]]]:
+) -> tuple[Callable[[float, float], tuple[Take, Take]], list[Callable[[], np.ndarray]]]:
     """Jobs that make the first ``steps`` of either take, and what turns the seconds of a step into `Take`s.
 
     As released (Shafir et al. 2024): all prompts are one batch, every level is a step, the second take starts at 0.9 of
@@ -152,21 +151,19 @@ def published_takes(
     way = levels(prior.schedule, prior.schedule.steps)
     later = restarted(way, prior.schedule, mode.restart)
     noise = row_noise(range(len(texts)))
-    x = noise(torch.empty(len(texts), max(plan.lengths), len(prior.mean), device=prior.mean.device))
+    x = noise(np.empty((len(texts), max(plan.lengths), len(prior.mean)), np.float32))
     bound = prior.net.bind(prior.condition(list(texts)))
     null = prior.net.bind(prior.condition([""] * len(texts)).null())
     none = prior.net.bind(prior.condition([""] * len(plan.handshakes)).null())
     inside, weights = sandwiches(x, plan), keep_weights(plan, mode.keep)
 
-    def first() -> Tensor:
+    def first() -> np.ndarray:
         denoise = in_two_calls(prior, bound, null, how.guidance)
-        with torch.inference_mode():
-            return first_take(denoise, x, plan, way=way[: steps + 1], schedule=prior.schedule, noise=noise)
+        return first_take(denoise, x, plan, way=way[: steps + 1], schedule=prior.schedule, noise=noise)
 
-    def second() -> Tensor:
+    def second() -> np.ndarray:
         denoise, again = in_two_calls(prior, none, none, 0.0), row_noise(range(len(inside)))
-        with torch.inference_mode():
-            return second_take(denoise, inside, weights, way=later[: steps + 1], schedule=prior.schedule, noise=again)
+        return second_take(denoise, inside, weights, way=later[: steps + 1], schedule=prior.schedule, noise=again)
 
     def takes(first_s: float, second_s: float) -> tuple[Take, Take]:
         return (
@@ -180,9 +177,9 @@ def published_takes(
 def in_two_calls(prior: Prior, bound: Bound, null: Bound, scale: float) -> Denoiser:
     """Guidance as the released code has it: the network is called once with and once without the text."""
 
-    def denoise(x: Tensor, level: int) -> Tensor:
+    def denoise(x: np.ndarray, level: int) -> np.ndarray:
         with_text = prior.net(x, level, bound)
-        return torch.lerp(prior.net(x, level, null), with_text, scale)
+        return lerp(prior.net(x, level, null), with_text, np.float32(scale))
 
     return denoise
 

@@ -1,7 +1,6 @@
 """What fifty futures of one past cost, beside the published recipe for the same: 50 rows, 100 steps, a call a step."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -52,7 +51,7 @@ def _times(name: str, theirs: float, ours: float, what: str) -> Entry:
 
 
 def _size(predictor: Predictor) -> int:
-    return sum(p.numel() for p in predictor.net.parameters())
+    return sum(values.size for values in predictor.net.weights.values())
 
 
 def _standing(frames: int, joints: int) -> np.ndarray:
@@ -66,5 +65,4 @@ def _published() -> Predictor:
     protocol = Protocol("h36m", 50.0, 25, 100, H36M_LAYOUT, (standing,), "none")
     windows = Windows(protocol.recordings, protocol, variant="published")
     settings = Settings("published", 20, width=512)
-    made = new_predictor(protocol, settings, windows, schedule="cosine", levels=1000)
-    return replace(made, net=made.net.eval().requires_grad_(False))
+    return new_predictor(protocol, settings, windows, schedule="cosine", levels=1000)

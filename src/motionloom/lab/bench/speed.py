@@ -13,14 +13,16 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+import numpy as np
 import torch
-from torch import Tensor
 from torch.nn.attention import SDPBackend, sdpa_kernel
 from torch.utils.flop_counter import FlopCounterMode
 
 from motionloom.diffusion import DDPM, SOLVERS, Denoiser, Solver, guide, levels, row_noise, sample
 from motionloom.errors import MotionloomError
 from motionloom.tasks.text import GUIDANCE, SOLVER, SPACING, STEPS
+from motionloom.train.modules import prior_module
+from motionloom.train.tensors import conditions, tensor
 from motionloom.weights.prior import Prior
 
 LONG = 1000
@@ -62,17 +64,16 @@ def defaults(function: Callable[..., Any]) -> Sampling:
     )
 
 
-@torch.inference_mode()
 def guided(prior: Prior, rows: int, *, guidance: float) -> Denoiser:
     """The guided network for ``rows`` copies of one prompt, its text encoded once."""
     cond = prior.condition([PROMPT] * rows)
     return guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), guidance)
 
 
-def noise(prior: Prior, rows: int, seconds: float) -> Tensor:
+def noise(prior: Prior, rows: int, seconds: float) -> np.ndarray:
     """Where a walk of ``rows`` motions starts."""
     shape = (rows, round(seconds * prior.fps), len(prior.mean))
-    return row_noise(range(rows))(torch.empty(shape, device=prior.mean.device))
+    return row_noise(range(rows))(np.empty(shape, np.float32))
 
 
 def timed(jobs: Sequence[Callable[[], Any]], repeats: int, *, warm: int | None = None) -> list[float]:
@@ -83,28 +84,20 @@ def timed(jobs: Sequence[Callable[[], Any]], repeats: int, *, warm: int | None =
     times: list[list[float]] = [[] for _ in jobs]
     for turn in range(repeats + 1):
         for job, kept in zip(jobs, times, strict=True) if turn else zip(jobs[:warm], times):
-            _wait()
             start = time.perf_counter()
             job()
-            _wait()
             if turn:
                 kept.append(time.perf_counter() - start)
     return [median(kept) for kept in times]
 
 
-def _wait() -> None:
-    if torch.cuda.is_available():
-        torch.cuda.synchronize()
-
-
-def _walk(prior: Prior, denoise: Denoiser, x: Tensor, way: Sequence[int], *, solver: Solver, stop: int | None) -> None:
+def _walk(prior: Prior, denoise: Denoiser, x: np.ndarray, way: Sequence[int], *, solver: Solver, stop: int | None) -> None:
     walk = sample(
         denoise, x, levels=way, solver=solver, schedule=prior.schedule, noise=row_noise(range(len(x)))
     )  # fmt: skip
-    with torch.inference_mode():
-        for number, _ in enumerate(walk, start=1):
-            if number == stop:
-                return
+    for number, _ in enumerate(walk, start=1):
+        if number == stop:
+            return
 
 
 def speed_of_default(prior: Prior, how: Sampling, *, seconds: float, repeats: int) -> Entry:
@@ -125,27 +118,28 @@ def speed_of_default(prior: Prior, how: Sampling, *, seconds: float, repeats: in
     return Entry("1000 steps / default", ratio, "times", ">= 40", ratio >= 40, note)
 
 
-def flops(call: Callable[[], Any]) -> int:
-    """Floating-point operations of the matrix products in a call, two per multiplication and addition."""
+def flops(prior: Prior, x: np.ndarray, level: int) -> int:
+    """Floating-point operations of the matrix products in a guided call, two per multiplication and addition.
+
+    They are counted in the module of the same network.
+    """
+    net, both = prior_module(prior), tensor(np.concatenate([x, x]))
+    bound = net.bind(conditions(prior.condition([PROMPT] * len(both))))
     with torch.inference_mode(), sdpa_kernel(SDPBackend.MATH), FlopCounterMode(display=False) as counter:
-        call()
+        net(both, level, bound)
     return counter.get_total_flops()
 
 
 def efficiency(
     prior: Prior, how: Sampling, *, rows: int, seconds: float, repeats: int, sizes: Sequence[int] = (1024, 2048)
 ) -> Entry:
-    """Operations per second of one guided call over those of a plain matrix product of the same type."""
+    """Operations per second of one guided call over those of a plain matrix product in NumPy."""
     denoise, x = guided(prior, rows, guidance=how.guidance), noise(prior, rows, seconds)
     level = max(1, prior.schedule.steps // 2)
 
-    def call() -> None:
-        with torch.inference_mode():
-            denoise(x, level)
-
-    squares = [torch.randn(n, n, dtype=next(prior.net.parameters()).dtype, device=x.device) for n in sizes]
-    work = flops(call)
-    spent, *products = timed([call, *[_product(a) for a in squares]], repeats)
+    squares = [np.random.default_rng(0).standard_normal((n, n), np.float32) for n in sizes]
+    work = flops(prior, x, level)
+    spent, *products = timed([_call(denoise, x, level), *[_product(a) for a in squares]], repeats)
     best = max(2 * n**3 / t for n, t in zip(sizes, products, strict=True))
     share = 100 * work / spent / best
     note = (
@@ -155,7 +149,7 @@ def efficiency(
     return Entry(f"guided call, {rows} motion(s)", share, "% of a matrix product", ">= 70", share >= 70, note)
 
 
-def _product(a: Tensor) -> Callable[[], Tensor]:
+def _product(a: np.ndarray) -> Callable[[], np.ndarray]:
     return lambda: a @ a
 
 
@@ -178,10 +172,9 @@ def linearity(prior: Prior, how: Sampling, *, counts: Sequence[int], seconds: fl
     )
 
 
-def _call(denoise: Denoiser, x: Tensor, level: int) -> Callable[[], None]:
+def _call(denoise: Denoiser, x: np.ndarray, level: int) -> Callable[[], None]:
     def call() -> None:
-        with torch.inference_mode():
-            denoise(x, level)
+        denoise(x, level)
 
     return call
 

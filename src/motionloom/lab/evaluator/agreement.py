@@ -55,7 +55,7 @@ def score(
     for number, check in enumerate(checks):
         frames = [round(check.seconds * prior.fps)] * seeds
         for one in sample_features(prior, [check.prompt] * seeds, frames, seeds=list(range(seeds)), **settings):
-            drawn = one.double().numpy()
+            drawn = one.astype(np.float64)
             features.append(drawn)
             prompts.append(number)
             obeyed.append(check.obeyed(measure(humanml.decode_positions(drawn), prior.fps)))

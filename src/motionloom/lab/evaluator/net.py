@@ -19,8 +19,11 @@ from torch.nn import functional as F
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT, WIDTH
-from motionloom.nets.text import MiniLM, TextEncoder
-from motionloom.weights.container import Container, check, halved, shapes
+from motionloom.runtime.text.minilm import MiniLM
+from motionloom.runtime.text.protocol import TextEncoder
+from motionloom.train.modules import arrays, shapes
+from motionloom.train.tensors import tensor
+from motionloom.weights.container import Container, check, halved
 
 EVALUATORS = Container("evaluator", "motionloom_evaluator", max_bytes=100 << 20)
 KEY = EVALUATORS.key
@@ -233,7 +236,7 @@ class Embedder:
         found = np.zeros((len(texts), self.net.config.embed))
         for first in range(0, len(texts), ROWS):
             said = self.text.encode(list(texts[first : first + ROWS]))
-            found[first : first + ROWS] = self.net.text(said.tokens, said.mask).double().numpy()
+            found[first : first + ROWS] = self.net.text(tensor(said.tokens), tensor(said.mask)).double().numpy()
         return found
 
 
@@ -243,15 +246,15 @@ def text_digest(text: TextEncoder) -> str:
         raise MotionloomError(f"the evaluator reads the embedded text encoder minilm; these weights have {text.name!r}")
     digest = hashlib.sha256()
     for name, value in sorted(text.to_tensors().items()):
-        digest.update(f"{name} {value.dtype} {tuple(value.shape)};".encode())
-        digest.update(value.contiguous().numpy().tobytes())
+        digest.update(f"{name} torch.{value.dtype} {tuple(value.shape)};".encode())
+        digest.update(np.ascontiguousarray(value).tobytes())
     return digest.hexdigest()
 
 
 def save_embedder(embedder: Embedder, path: Path | str) -> Path:
     """Write an evaluator (float16, without its text encoder, whose digest it keeps) and give the path back."""
-    tensors = {f"net.{k}": v for k, v in halved(embedder.net.state_dict()).items()}
-    tensors |= {"mean": embedder.mean.float().clone(), "std": embedder.std.float().clone()}
+    tensors = {f"net.{k}": v for k, v in halved(arrays(embedder.net)).items()}
+    tensors |= {"mean": embedder.mean.float().numpy(), "std": embedder.std.float().numpy()}
     about = {"net": asdict(embedder.net.config), "text": text_digest(embedder.text), "card": embedder.card}
     return EVALUATORS.write(path, tensors, about)
 
@@ -274,17 +277,18 @@ def load_embedder(path: Path | str, text: TextEncoder) -> Embedder:
         )
     with torch.device("meta"):
         net = EvaluatorNet(about["net"])
-    weights = {k[4:]: v.float() for k, v in tensors.items() if k.startswith("net.")}
+    weights = {k[4:]: tensor(v).float() for k, v in tensors.items() if k.startswith("net.")}
     own = {f"net.{k}": shape for k, shape in shapes(net).items()}
     check(tensors, own | {"mean": (INPUTS,), "std": (INPUTS,)}, str(path))
     if float(tensors["std"].min()) <= 0:
         raise MotionloomError(f"{path} has a spread of 0; fetch the evaluator again")
     net.load_state_dict(weights, assign=True)
     net = net.eval().requires_grad_(False)
-    return Embedder(net, tensors["mean"].float(), tensors["std"].float(), text, about["card"])
+    mean, std = (tensor(tensors[key]).float() for key in ("mean", "std"))
+    return Embedder(net, mean, std, text, about["card"])
 
 
-def _read(path: Path) -> tuple[dict, dict[str, Tensor]]:
+def _read(path: Path) -> tuple[dict, dict[str, np.ndarray]]:
     about, tensors = EVALUATORS.read(path)
     with EVALUATORS.parsing(path):
         names = {field.name for field in fields(EvaluatorConfig)}

@@ -21,7 +21,7 @@ from motionloom.lab.evaluator.net import (
     text_digest,
 )
 from motionloom.lab.evaluator.pairs import Pairs, negatives, senses
-from motionloom.nets.text import TextEncoder
+from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.train.loop import Average, Log, World, train
 from motionloom.train.objectives import WordBank
 from motionloom.train.recipe import Recipe

@@ -15,7 +15,7 @@ from motionloom.features.pair import PUBLISHED_CODE
 from motionloom.lab.papers.mdm import from_published, own_name
 from motionloom.nets.pair import PairConfig, Talk
 from motionloom.nets.prior import PriorNet
-from motionloom.weights.container import fill
+from motionloom.train.modules import fill
 
 _START, _END, _WHOLE = "seqTransEncoder_start.layers.", "seqTransEncoder_end.layers.", "seqTransEncoder.layers."
 _BLOCK, _LAYERS = "multi_person.", "model.layers."

@@ -13,8 +13,7 @@ published code starts from all of it, noised). MDM's inpainting overwrites the e
 from collections.abc import Sequence
 from typing import Unpack
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from motionloom.diffusion import (
     SOLVERS,
@@ -31,15 +30,15 @@ from motionloom.diffusion import (
 )
 from motionloom.edits.steering import Correction, corrected
 from motionloom.errors import MotionloomError
-from motionloom.tasks.control import Net, blended
+from motionloom.runtime.prior import PriorSession
+from motionloom.tasks.control import blended
 from motionloom.tasks.sampling import Observed, Sampling, Settings
 from motionloom.weights.prior import Prior
 
 
-@torch.no_grad()
 def control_features(
     prior: Prior,
-    nets: Sequence[Net],
+    nets: Sequence[PriorSession],
     prompts: Sequence[str],
     observed: Observed,
     *,
@@ -48,7 +47,7 @@ def control_features(
     corrections: Sequence[Correction | None] | None = None,
     sampling: Sampling | None = None,
     **settings: Unpack[Settings],
-) -> Tensor:
+) -> np.ndarray:
     """Motions in which the observed numbers are exact; (rows, frames, features) standardised.
 
     Args:
@@ -69,7 +68,7 @@ def control_features(
     (Shafir et al. 2024, algorithm 2 and section 4.3.)
     """
     chosen = Sampling.of(sampling, settings)
-    mask = torch.as_tensor(observed.mask, device=prior.mean.device)
+    mask = observed.mask
     known = _given(prior, observed.values, mask)
     if not nets or not len(prompts) == len(seeds) == len(known):
         raise MotionloomError(
@@ -79,7 +78,7 @@ def control_features(
     weights = [1 / len(nets)] * len(nets) if weights is None else list(weights)
     if len(weights) != len(nets):
         raise MotionloomError(f"there are {len(weights)} weights for {len(nets)} networks; give one for each")
-    shown = mask if observed.noise_free else torch.zeros_like(mask)
+    shown = mask if observed.noise_free else np.zeros_like(mask)
     denoise = blended(nets, prior.condition(list(prompts)), known, shown, weights=weights, guidance=chosen.guidance)
     if corrections is not None:
         denoise = corrected(denoise, corrections)
@@ -97,31 +96,31 @@ def controlled(
     solver: Solver,
     schedule: Schedule,
     noise: NoiseSource,
-    start: Tensor | None = None,
-) -> Tensor:
+    start: np.ndarray | None = None,
+) -> np.ndarray:
     """The walk of algorithm 2 on any denoiser; (rows, frames, features).
 
     ``start`` is the clean motion that the free numbers are noised from: nothing (zeros) by default; the published code
     starts from the motion that the given numbers were taken from.
     """
     known, mask = observed.values, observed.mask
-    start = torch.zeros_like(known) if start is None else start
+    start = np.zeros_like(known) if start is None else start
     x = schedule.noised(start, levels[0], noise(known))
-    hold = observe(known, mask, schedule, torch.zeros_like) if observed.noise_free else chain()
+    hold = observe(known, mask, schedule, np.zeros_like) if observed.noise_free else chain()
     return run(
         inpaint(denoise, known, mask), hold(x, levels[0]), levels=levels,
         solver=solver, schedule=schedule, noise=noise, constrain=hold,
     )  # fmt: skip
 
 
-def _given(prior: Prior, known: Tensor, mask: Tensor) -> Tensor:
+def _given(prior: Prior, known: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """``known`` where it is given, zeros elsewhere."""
-    if mask.dtype != torch.bool or known.ndim != 3 or mask.shape != known.shape or known.shape[2] != len(prior.mean):
+    if mask.dtype != np.bool_ or known.ndim != 3 or mask.shape != known.shape or known.shape[2] != len(prior.mean):
         raise MotionloomError(
             f"given numbers of shape {tuple(known.shape)} under a {mask.dtype} mask of shape {tuple(mask.shape)} are "
             f"of no use; both must be (motions, frames, {len(prior.mean)}), the mask of booleans"
         )
-    known = torch.where(mask, known.to(prior.mean), 0.0)
-    if not bool(known.isfinite().all()):
+    known = np.where(mask, known, 0.0).astype(np.float32)
+    if not np.isfinite(known).all():
         raise MotionloomError("a given number is not finite (NaN or infinity); correct it or take it out of the mask")
     return known

@@ -18,8 +18,6 @@ from itertools import accumulate
 from typing import Literal, TypedDict, Unpack
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from motionloom.diffusion import (
     DDPM,
@@ -65,12 +63,12 @@ class Keep:
     sampling: Literal["even", "published"] = "even"
     """At distance d = 1 .. b from the handshake: d / b; ``published``: right (d - 1) / b, and nothing where b < 2."""
 
-    def ramp(self, frames: int, side: Literal["left", "right"]) -> Tensor:
+    def ramp(self, frames: int, side: Literal["left", "right"]) -> np.ndarray:
         """(frames,) weights by growing distance from the handshake."""
         if self.sampling == "published" and frames < 2:
-            return torch.full((frames,), self.outside)
+            return np.full(frames, self.outside, np.float32)
         late = self.sampling == "published" and side == "right"
-        distance = torch.arange(frames) + (0 if late else 1)
+        distance = np.arange(frames, dtype=np.float32) + (0 if late else 1)
         return self.low + (self.high - self.low) * distance / max(frames, 1)
 
 
@@ -176,9 +174,9 @@ class Plan:
         parts = [self.lengths[0], *(n - h for n, h in zip(self.lengths[1:], self.handshakes, strict=True))]
         return list(accumulate(parts))
 
-    def split(self, x: Tensor) -> Tensor:
+    def split(self, x: np.ndarray) -> np.ndarray:
         """(repetitions * rows, ...) as (repetitions, rows, ...)."""
-        return x.view(self.repetitions, -1, *x.shape[1:])
+        return x.reshape(self.repetitions, -1, *x.shape[1:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,21 +185,21 @@ class Takes:
 
     first: State
     sandwich: State
-    keep: Tensor
+    keep: np.ndarray
     """(transitions, width)"""
     second: State
     rebuilt: State
-    unfolded: Tensor
+    unfolded: np.ndarray
     """(repetitions, frames of the long motion, features)"""
 
 
-def flags(plan: Plan) -> Tensor:
+def flags(plan: Plan) -> np.ndarray:
     """(rows, longest) integers: 1 on frames that a row shares with another, for networks conditioned on it."""
-    marks = torch.zeros(len(plan.lengths), max(plan.lengths), dtype=torch.long)
+    marks = np.zeros((len(plan.lengths), max(plan.lengths)), np.int64)
     for i, h in enumerate(plan.handshakes):
         marks[i, plan.lengths[i] - h : plan.lengths[i]] = 1
         marks[i + 1, :h] = 1
-    return marks.repeat(plan.repetitions, 1)
+    return np.tile(marks, (plan.repetitions, 1))
 
 
 def handshakes(plan: Plan) -> Constraint:
@@ -209,7 +207,7 @@ def handshakes(plan: Plan) -> Constraint:
     joins = [handshake(plan.lengths[i : i + 2], h) for i, h in enumerate(plan.handshakes)]
 
     def joined(x: State, level: int) -> State:
-        x = x.clone()
+        x = np.ascontiguousarray(x).copy()
         for rows in plan.split(x):
             for i, join in enumerate(joins):
                 rows[i : i + 2] = join(rows[i : i + 2], level)
@@ -237,21 +235,21 @@ def first_take(
 def sandwiches(x: State, plan: Plan) -> State:
     """Middle, handshake (as it ends the earlier row) and middle of each transition, padded with zeros to `width`."""
     rows = plan.split(x)
-    result = x.new_zeros(plan.repetitions, len(plan.handshakes), plan.width, x.shape[2])
+    result = np.zeros((plan.repetitions, len(plan.handshakes), plan.width, x.shape[2]), x.dtype)
     for i, h in enumerate(plan.handshakes):
         end = plan.lengths[i]
         parts = [rows[:, i, plan.middle(i)], rows[:, i, end - h : end], rows[:, i + 1, plan.middle(i + 1)]]
-        result[:, i, : plan.sandwiches[i]] = torch.cat(parts, dim=1)
-    return result.flatten(0, 1)
+        result[:, i, : plan.sandwiches[i]] = np.concatenate(parts, axis=1)
+    return result.reshape(-1, *result.shape[2:])
 
 
-def keep_weights(plan: Plan, keep: Keep) -> Tensor:
+def keep_weights(plan: Plan, keep: Keep) -> np.ndarray:
     """(transitions, width): the share of the first take that each frame of a sandwich keeps; 1 on padding."""
-    result = torch.ones(len(plan.handshakes), plan.width)
+    result = np.ones((len(plan.handshakes), plan.width), np.float32)
     for i, (h, b) in enumerate(zip(plan.handshakes, plan.ramps, strict=True)):
         start = plan.size(i)
         result[i, : plan.sandwiches[i]] = keep.outside
-        result[i, start - b : start] = keep.ramp(b, "left").flip(0)
+        result[i, start - b : start] = keep.ramp(b, "left")[::-1]
         result[i, start : start + h] = keep.handshake
         result[i, start + h : start + h + b] = keep.ramp(b, "right")
     return result
@@ -260,7 +258,7 @@ def keep_weights(plan: Plan, keep: Keep) -> Tensor:
 def second_take(
     denoise: Denoiser,
     sandwich: State,
-    weights: Tensor,
+    weights: np.ndarray,
     *,
     way: Sequence[int],
     schedule: Schedule,
@@ -269,7 +267,7 @@ def second_take(
 ) -> State:
     """Sandwiches noised to ``way[0]`` and refined, the estimate held to them by ``weights`` (transitions, frames)."""
     repetitions = len(sandwich) // len(weights)
-    mask = weights.to(sandwich).repeat(repetitions, 1)[..., None]
+    mask = np.tile(weights.astype(sandwich.dtype), (repetitions, 1))[..., None]
     x = restart(sandwich, schedule, way[0], noise)
     held = inpaint(denoise, sandwich, mask)
     return run(held, x, levels=way, solver=solver, schedule=schedule, noise=noise)
@@ -277,7 +275,7 @@ def second_take(
 
 def rebuild(first: State, second: State, plan: Plan) -> State:
     """The first take with handshakes and ramps out of the second; zeros behind each row's end."""
-    result = torch.zeros_like(first)
+    result = np.zeros_like(first)
     rows, old, new = plan.split(result), plan.split(first), plan.split(second)
     for i, length in enumerate(plan.lengths):
         rows[:, i, :length] = old[:, i, :length]
@@ -288,12 +286,12 @@ def rebuild(first: State, second: State, plan: Plan) -> State:
     return result
 
 
-def unfold(x: State, plan: Plan) -> Tensor:
+def unfold(x: State, plan: Plan) -> np.ndarray:
     """(repetitions, frames, features): row 0 whole, of every further row what lies behind its first handshake."""
     rows = plan.split(x)
     starts = (0, *plan.handshakes)
     parts = [rows[:, i, start:length] for i, (start, length) in enumerate(zip(starts, plan.lengths, strict=True))]
-    return torch.cat(parts, dim=1)
+    return np.concatenate(parts, axis=1)
 
 
 def restarted(way: Sequence[int], schedule: Schedule, share: float) -> list[int]:
@@ -329,8 +327,8 @@ def double_take(
     solver, alone = options.get("solver", DDPM), options.get("second_take_only", False)
     made = first_take(first, x, plan, way=way, schedule=schedule, noise=noise[0], solver=solver, join=not alone)
     if not plan.handshakes:
-        none = made.new_zeros(0, 0, made.shape[2])
-        return Takes(made, none, made.new_zeros(0, 0), none, made, unfold(made, plan))
+        none = np.zeros((0, 0, made.shape[2]), made.dtype)
+        return Takes(made, none, np.zeros((0, 0), made.dtype), none, made, unfold(made, plan))
     inside, weights = sandwiches(made, plan), keep_weights(plan, mode.keep)
     later = restarted(way, schedule, mode.restart)
     refined = second_take(second, inside, weights, way=later, schedule=schedule, noise=noise[1], solver=solver)
@@ -350,7 +348,6 @@ class Settings(TypedDict, total=False):
     second_take_only: bool
 
 
-@torch.inference_mode()
 def double_take_features(
     prior: Prior,
     prompts: Sequence[str],
@@ -361,7 +358,7 @@ def double_take_features(
     ramp: int | Sequence[int] | None = None,
     seed: int = 0,
     **settings: Unpack[Settings],
-) -> tuple[Tensor, list[int]]:
+) -> tuple[np.ndarray, list[int]]:
     """One long motion. The second take's text is empty, and asked once per step.
 
     Args:
@@ -397,7 +394,7 @@ def double_take_features(
     seeds = [int(word) for word in np.random.SeedSequence(seed).generate_state(count + joins, np.uint64) >> 2]
     known = (plan.lengths, plan.sandwiches) if chosen.masked else (None, None)
     noise = row_noise(seeds[:count], known[0]), row_noise(seeds[count:], known[1])
-    x = noise[0](torch.empty(count, max(plan.lengths), len(prior.mean), device=prior.mean.device))
+    x = noise[0](np.empty((count, max(plan.lengths), len(prior.mean)), np.float32))
     first = _with_text(prior, prompts, known[0], flags(plan), guidance)
     way, walker = levels(prior.schedule, steps, spacing=spacing), SOLVERS[solver]  # type: ignore[arg-type]
     if first_take_only:
@@ -409,15 +406,15 @@ def double_take_features(
             second_take_only=second_take_only,
         ).unfolded  # fmt: skip
     finished = made[0] * prior.std + prior.mean
-    return (smooth(finished) if prior.net.config.patch > 1 else finished).cpu(), plan.ends
+    return smooth(finished) if prior.net.config.patch > 1 else finished, plan.ends
 
 
 def _with_text(
-    prior: Prior, prompts: Sequence[str], lengths: Sequence[int] | None, marks: Tensor, guidance: float
+    prior: Prior, prompts: Sequence[str], lengths: Sequence[int] | None, marks: np.ndarray, guidance: float
 ) -> Denoiser:
     cond = prior.condition(list(prompts), list(lengths) if lengths else None)
     if prior.net.config.flags:
-        cond = cond._replace(flags=marks.to(prior.mean.device))
+        cond = cond._replace(flags=marks)
     return guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), guidance)
 
 

@@ -20,6 +20,8 @@ from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Caption
 from motionloom.lab.papers.guo_nets import UNIT, GuoNets, from_state_dict, read_guo
 from motionloom.lab.papers.guo_words import SPECIAL, TAGS, TOKENS, Words, padded, read_array, read_words
+from motionloom.train.modules import arrays
+from motionloom.train.tensors import tensor
 from motionloom.weights.container import Container
 
 CapLen = Literal["true", "published"]
@@ -208,14 +210,13 @@ def read_published(
 
 def save_guo(evaluator: GuoEvaluator, path: Path | str) -> Path:
     """Write the whole evaluator as one .safetensors file (float32) and give the path back."""
-    tensors = {f"net.{k}": v for k, v in evaluator.nets.state_dict().items()}
+    tensors = {f"net.{k}": v for k, v in arrays(evaluator.nets).items()}
     if evaluator.mean is not None and evaluator.std is not None:
-        tensors |= {"mean": torch.from_numpy(evaluator.mean.copy()), "std": torch.from_numpy(evaluator.std.copy())}
+        tensors |= {"mean": evaluator.mean, "std": evaluator.std}
     special = None
     if evaluator.words is not None:
         text = np.frombuffer("\n".join(evaluator.words.names).encode(), dtype=np.uint8)
-        tensors |= {"words.text": torch.from_numpy(text.copy())}
-        tensors |= {"words.vectors": torch.from_numpy(np.ascontiguousarray(evaluator.words.vectors, dtype=np.float32))}
+        tensors |= {"words.text": text, "words.vectors": evaluator.words.vectors.astype(np.float32)}
         special = None if evaluator.words.special is None else dict(evaluator.words.special)
     return GUO.write(path, tensors, {"card": dict(evaluator.card), "special": special})
 
@@ -239,7 +240,7 @@ def load_guo(path: Path | str, *, cap_len: CapLen = "true") -> GuoEvaluator:
     about, tensors = GUO.read(path)
     with GUO.parsing(path):
         _check_about(about)
-    nets = from_state_dict({key[4:]: value for key, value in tensors.items() if key.startswith("net.")})
+    nets = from_state_dict({key[4:]: tensor(value) for key, value in tensors.items() if key.startswith("net.")})
     mean, std = (_numbers(tensors, key) for key in ("mean", "std"))
     return GuoEvaluator(nets, mean, std, _words(path, tensors, about["special"]), cap_len, about["card"])
 
@@ -256,16 +257,16 @@ def _texts(values: object) -> bool:
     return isinstance(values, dict) and all(isinstance(v, str) for v in [*values, *values.values()])
 
 
-def _numbers(tensors: Mapping[str, Tensor], key: str) -> np.ndarray | None:
-    return tensors[key].double().numpy() if key in tensors else None
+def _numbers(tensors: Mapping[str, np.ndarray], key: str) -> np.ndarray | None:
+    return tensors[key].astype(np.float64) if key in tensors else None
 
 
-def _words(path: Path, tensors: Mapping[str, Tensor], special: dict[str, str] | None) -> Words | None:
+def _words(path: Path, tensors: Mapping[str, np.ndarray], special: dict[str, str] | None) -> Words | None:
     if "words.text" not in tensors:
         return None
     try:
-        names = bytes(tensors["words.text"].to(torch.uint8).numpy()).decode().split("\n")
-        return Words(tuple(names), tensors["words.vectors"].float().numpy(), special)
+        names = tensors["words.text"].astype(np.uint8).tobytes().decode().split("\n")
+        return Words(tuple(names), tensors["words.vectors"].astype(np.float32), special)
     except (KeyError, ValueError, RuntimeError) as error:
         if isinstance(error, MotionloomError):
             raise

@@ -16,7 +16,7 @@ from torch.nn.utils.rnn import pack_padded_sequence
 
 from motionloom.errors import MotionloomError
 from motionloom.lab.papers.torch_file import is_plain, read_torch_file
-from motionloom.weights.container import fill
+from motionloom.train.modules import fill
 
 UNIT = 4
 """Frames per snippet."""

@@ -15,9 +15,7 @@ from dataclasses import dataclass
 from typing import Literal, TypedDict, Unpack
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from motionloom.diffusion import (
     Basis,
@@ -36,7 +34,7 @@ from motionloom.errors import MotionloomError
 from motionloom.weights.predictor import Predictor
 
 Padding = Literal["last", "zero", "repeat"]
-Way = Callable[[Tensor], Tensor]
+Way = Callable[[np.ndarray], np.ndarray]
 
 PARTS = {
     "right_leg": (0, 3), "left_leg": (3, 6), "torso": (6, 10), "left_arm": (10, 13), "right_arm": (13, 16),
@@ -56,7 +54,7 @@ def published_levels(schedule: Schedule, steps: int) -> list[int]:
     return [2 + i * schedule.steps // steps for i in reversed(range(steps))] + [1]
 
 
-def padded(observed: Tensor, frames: int, padding: Padding = "last") -> Tensor:
+def padded(observed: np.ndarray, frames: int, padding: Padding = "last") -> np.ndarray:
     """Observed frames (rows, h, channels) and what stands for the others, (rows, ``frames``, channels).
 
     "last": the last observed frame (the paper's). "zero": zeros; published code also destroyed the last observed frame
@@ -66,16 +64,16 @@ def padded(observed: Tensor, frames: int, padding: Padding = "last") -> Tensor:
     if not 1 <= h <= frames or (padding == "repeat" and frames % h):
         raise MotionloomError(f"{h} observed frames cannot be padded to {frames} with {padding!r}")
     if padding == "repeat":
-        return observed.repeat(1, frames // h, 1)
-    tail = observed[:, -1:] if padding == "last" else observed.new_zeros(rows, 1, channels)
-    return torch.cat([observed, tail.expand(-1, frames - h, -1)], dim=1)
+        return np.tile(observed, (1, frames // h, 1))
+    tail = observed[:, -1:] if padding == "last" else np.zeros((rows, 1, channels), observed.dtype)
+    return np.concatenate([observed, np.repeat(tail, frames - h, axis=1)], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
     """Part control: joints that are known in all frames, a contiguous range of the told ones as published."""
 
-    signal: Tensor
+    signal: np.ndarray
     """(1, frames, channels)."""
     joints: tuple[int, int]
     """[first, end), such as one of `PARTS`."""
@@ -85,7 +83,7 @@ class Fixed:
 class Target:
     """Motion switch: the end of the window is to approach this motion (rows or 1, m, channels)."""
 
-    motion: Tensor
+    motion: np.ndarray
     relax: float | int = 0.2
     """The share of the steps, at the end, in which it is not imposed; an int counts steps (20 as published)."""
 
@@ -104,9 +102,9 @@ class Options(TypedDict, total=False):
 
 
 def published_completion(
-    denoise: Denoiser, observed: Tensor, rows: int, *, basis: Basis, schedule: Schedule, noise: NoiseSource,
+    denoise: Denoiser, observed: np.ndarray, rows: int, *, basis: Basis, schedule: Schedule, noise: NoiseSource,
     **options: Unpack[Options],
-) -> tuple[State, Tensor]:  # fmt: skip
+) -> tuple[State, np.ndarray]:  # fmt: skip
     """DCT-Completion.
 
     Args:
@@ -126,16 +124,16 @@ def published_completion(
     fixed, target = options.get("fixed"), options.get("target")
     walk = published_levels(schedule, steps)
     known = padded(observed, basis.frames, padding)
-    mask = torch.zeros(known.shape[1:], dtype=torch.bool, device=known.device)
+    mask = np.zeros(known.shape[1:], np.bool_)
     mask[: observed.shape[1]] = True
     if fixed is not None:
-        own = torch.zeros_like(mask)
+        own = np.zeros_like(mask)
         own[:, 3 * fixed.joints[0] : 3 * fixed.joints[1]] = True
-        known, mask = torch.where(own, fixed.signal, known), mask | own
+        known, mask = np.where(own, fixed.signal, known), mask | own
     held = [Held(basis.to_spectrum(known), mask)] if options.get("complete", True) else []
     if target is not None:
         held.append(_approached(target, rows, walk, basis))
-    start = noise(observed.new_empty(rows, basis.kept, observed.shape[2]))
+    start = noise(np.empty((rows, basis.kept, observed.shape[2]), observed.dtype))
     constrain = mixed_in_time(held, basis.to_time, basis.to_spectrum, schedule, noise)
     state = run(denoise, start, levels=walk, solver=Ddim(), schedule=schedule, noise=noise, constrain=constrain)
     return state, basis.to_time(state)
@@ -146,7 +144,7 @@ class Held:
     """Something known: a state, where in time it is (mask over (..., frames, channels)), and down to which level."""
 
     known: State
-    mask: Tensor
+    mask: np.ndarray
     last: float = 0
 
 
@@ -176,9 +174,10 @@ def _approached(target: Target, rows: int, walk: Sequence[int], basis: Basis) ->
     if not 1 <= m <= basis.frames:
         raise MotionloomError(f"a target of {m} frames does not fit into a window of {basis.frames}")
     relaxed = target.relax if isinstance(target.relax, int) else round(target.relax * steps)
-    before = target.motion[:, :1].expand(-1, basis.frames - m, -1)
-    signal = torch.cat([before, target.motion], dim=1).expand(rows, -1, -1)
-    mask = torch.arange(basis.frames, device=signal.device)[:, None] >= basis.frames - m
+    before = np.repeat(target.motion[:, :1], basis.frames - m, axis=1)
+    signal = np.concatenate([before, target.motion], axis=1)
+    signal = np.broadcast_to(signal, (rows, *signal.shape[1:]))
+    mask = np.arange(basis.frames)[:, None] >= basis.frames - m
     return Held(basis.to_spectrum(signal), mask, walk[steps - relaxed] if relaxed < steps else math.inf)
 
 
@@ -216,32 +215,33 @@ def published_futures(
     if min(count, rows) < 1:
         raise MotionloomError(f"there must be at least one future and one row at a time, not {count} and {rows}")
     place = predictor.layout.place(past[:, -1])
-    conditioned = torch.tensor(told_samples(count, told_share, coin=coin))
-    observed = torch.from_numpy(predictor.layout.encode(past, place)).float().to(predictor.mean.device)
-    made: list[Tensor] = []
+    conditioned = np.array(told_samples(count, told_share, coin=coin))
+    observed = predictor.layout.encode(past, place).astype(np.float32)
+    made: list[np.ndarray] = []
     for first in range(0, len(past) * count, rows):
-        index = torch.arange(first, min(first + rows, len(past) * count))
+        index = np.arange(first, min(first + rows, len(past) * count))
         window, sample = index // count, index % count
         seeds = [row_seed(seed, w, i) for w, i in zip(window.tolist(), sample.tolist())]
-        own = observed[window.to(observed.device)]
-        made.append(_complete(predictor, own, conditioned[sample], noise=row_noise(seeds), steps=steps).cpu())
-    future = torch.cat(made)[:, predictor.observed :].unflatten(0, (len(past), count)).double().numpy()
+        made.append(_complete(predictor, observed[window], conditioned[sample], noise=row_noise(seeds), steps=steps))
+    future = np.concatenate(made)[:, predictor.observed :].astype(np.float64)
+    future = future.reshape(len(past), count, *future.shape[1:])
     return np.stack([predictor.layout.decode(future[:, i], place) for i in range(count)], axis=1)
 
 
-@torch.inference_mode()
-def _complete(predictor: Predictor, observed: Tensor, keep: Tensor, *, noise: NoiseSource, steps: int) -> Tensor:
+def _complete(
+    predictor: Predictor, observed: np.ndarray, keep: np.ndarray, *, noise: NoiseSource, steps: int
+) -> np.ndarray:
     """Windows (rows, frames, channels) after observed ones (rows, h, channels); ``keep`` (rows,): which see it."""
     rows, h, channels = observed.shape
     pose, schedule = observed[:, -1], predictor.schedule
     window = padded(observed, predictor.frames)
-    mask = torch.zeros(rows, predictor.frames, channels, device=observed.device)
+    mask = np.zeros((rows, predictor.frames, channels), np.float32)
     mask[:, :h] = 1
     known = predictor.to_state(window, pose)
     condition = predictor.condition(window, mask[..., ::3], pose) if bool(keep.any()) else None
-    denoise = predictor.denoiser(condition, None if bool(keep.all()) else keep.to(observed.device))
+    denoise = predictor.denoiser(condition, None if bool(keep.all()) else keep)
     constrain = mixed_in_time(
-        [Held(known, mask.bool())], lambda x: predictor.to_features(x, pose), lambda x: predictor.to_state(x, pose),
+        [Held(known, mask > 0)], lambda x: predictor.to_features(x, pose), lambda x: predictor.to_state(x, pose),
         schedule, noise,
     )  # fmt: skip
     walk, start = published_levels(schedule, steps), noise(known)

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -9,8 +10,9 @@ from motionloom.diffusion import SCHEDULES, Dct
 from motionloom.errors import MotionloomError
 from motionloom.lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT
 from motionloom.lab.papers.mdm import read_published
-from motionloom.nets.predictor import NetConfig, TransLinear
-from motionloom.weights.container import fill
+from motionloom.nets.predictor import TransLinear
+from motionloom.runtime.predictor import PredictorConfig
+from motionloom.train.modules import fill, predictor_session
 from motionloom.weights.predictor import Predictor
 from motionloom.weights.prior import Card
 
@@ -42,15 +44,24 @@ def import_humanmac(path: Path | str, *, name: str | None = None, licence: str |
     data, layout, fps, observed, frames = _BENCHMARKS[out.shape[0]]
     blocks = {key.split(".")[1] for key in state if key.startswith("temporal_decoder_blocks.")}
     kept, width = embedding.shape
-    config = NetConfig(channels=layout.channels, kept=kept, layers=len(blocks), width=width)
+    config = PredictorConfig(channels=layout.channels, kept=kept, layers=len(blocks), width=width)
     if kept > frames:
         raise MotionloomError(f"{path} has {kept} frequencies of {frames} frames, which there are not; fetch it again")
     with torch.device("meta"):
         net = TransLinear(config)
     fill(net, {key: value.float() for key, value in state.items()}, str(path))
-    zeros, ones = torch.zeros(kept, layout.channels), torch.ones(kept, layout.channels)
+    zeros, ones = np.zeros((kept, layout.channels), np.float32), np.ones((kept, layout.channels), np.float32)
     card = Card(name or path.stem, licence or Card.licence, f"as published: {data}", {"imported_from": path.name})
     return Predictor(
-        net.eval().requires_grad_(False), SCHEDULES["cosine"](1000), layout, Dct(frames, kept), observed, fps,
-        "published", zeros, ones, torch.stack([zeros[0], ones[0]]), card,
-    )  # fmt: skip
+        predictor_session(net),
+        SCHEDULES["cosine"](1000),
+        layout,
+        Dct(frames, kept),
+        observed,
+        fps,
+        "published",
+        zeros,
+        ones,
+        np.stack([zeros[0], ones[0]]),
+        card,
+    )

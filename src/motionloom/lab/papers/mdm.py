@@ -14,7 +14,7 @@ from motionloom.errors import MotionloomError
 from motionloom.io.text import plain_json, read_bytes
 from motionloom.lab.papers.torch_file import is_plain, read_torch_file
 from motionloom.nets.prior import NetConfig, PriorNet
-from motionloom.weights.container import fill
+from motionloom.train.modules import fill
 
 _IGNORED = ("clip_model.", "sequence_pos_encoder.pe", "embed_timestep.sequence_pos_encoder.pe", "t_pos_encoder.pe")
 _HEADS = 4

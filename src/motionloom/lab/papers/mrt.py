@@ -22,7 +22,8 @@ from torch.nn import functional as F
 from motionloom.diffusion import Dct
 from motionloom.errors import MotionloomError
 from motionloom.nets.prior import sinusoids
-from motionloom.weights.container import Container, check, shapes
+from motionloom.train.modules import arrays, fill
+from motionloom.weights.container import Container
 
 FILES = Container("multi-range transformer", "motionloom-mrt", max_bytes=64 << 20)
 JOINTS = 22
@@ -187,7 +188,7 @@ class MrtFile:
     def save(self, path: Path | str) -> Path:
         """Write it as a .safetensors file; it appears whole or not at all."""
         about = {"config": asdict(self.net.config), "licence": self.licence, "data": self.data, "notes": self.notes}
-        return FILES.write(path, {key: value.float() for key, value in self.net.state_dict().items()}, about)
+        return FILES.write(path, arrays(self.net), about)
 
     @staticmethod
     def load(path: Path | str, *, device: str = "cpu") -> "MrtFile":
@@ -199,9 +200,7 @@ class MrtFile:
         with FILES.parsing(path):
             with torch.device("meta"):
                 net = Mrt(MrtConfig(**about["config"]))
-            check(tensors, shapes(net), str(path))
-            net = net.to_empty(device="cpu")
-            net.load_state_dict(tensors)
+            fill(net, tensors, str(path))
             file = MrtFile(net, str(about["licence"]), str(about["data"]), dict(about["notes"]))
         file.net.to(device).eval().requires_grad_(False)
         return file

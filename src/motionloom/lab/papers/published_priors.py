@@ -5,13 +5,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
 from motionloom.lab.papers.commdm import adds_of, from_published_pair, is_pair
 from motionloom.lab.papers.mdm import FRAME_RATES, describe, from_published, read_published
-from motionloom.nets.text.published import PublishedText
+from motionloom.runtime.text.published import PublishedText
+from motionloom.train.export import pair_graph
+from motionloom.train.modules import arrays, prior_session
 from motionloom.weights.adapter import fingerprint
 from motionloom.weights.pair import UNKNOWN, HasNet, PairBlock
 from motionloom.weights.prior import Card, Prior
@@ -45,9 +46,9 @@ def import_published(
     notes = {"imported_from": path.name, "averaged_weights": published.averaged, "options": options}
     card = Card(name or path.stem, licence or Card.licence, f"as published: {said.data}", notes)
     text = PublishedText("clip-77" if features == 135 else "clip")
-    centre, spread = (torch.from_numpy(np.asarray(values, dtype=np.float32).copy()) for values in (mean, std))
+    centre, spread = (np.array(values, dtype=np.float32) for values in (mean, std))
     schedule = SCHEDULES[said.schedule](said.steps)
-    return Prior(net, schedule, centre, spread, text, card, FRAME_RATES.get(features, 20.0))
+    return Prior(prior_session(net), schedule, centre, spread, text, card, FRAME_RATES.get(features, 20.0))
 
 
 def _plain_options(options: dict[str, Any]) -> dict[str, Any]:
@@ -68,11 +69,10 @@ def import_block(
     if not is_pair(published.state):
         raise MotionloomError(f"{path} holds no communication block; name a checkpoint of two people")
     net, talk = from_published_pair(published.state, adds=adds_of(published.options))
-    digest = fingerprint(net)
+    digest = fingerprint(prior_session(net))
     if digest != fingerprint(prior.net):
         raise MotionloomError(f"the block of {path} belongs to the network of the same file; import that as its prior")
     notes = {"imported_from": path.name, "averaged_weights": published.averaged}
-    tensors = dict(talk.state_dict())
-    return PairBlock(
-        name or path.stem, talk.config, tensors, base, digest, licence or UNKNOWN, "as published: 3DPW", notes
-    )
+    graph = pair_graph(talk.config, net.config)
+    about = (base, digest, licence or UNKNOWN, "as published: 3DPW", notes)
+    return PairBlock(name or path.stem, talk.config, arrays(talk), *about, graph=graph)

@@ -23,7 +23,7 @@ def convert(folder: Path) -> Path:
     state = read_torch_file(source)
     if not isinstance(state, dict) or not all(isinstance(value, Tensor) for value in state.values()):
         raise MotionloomError(f"{source} is not a plain dictionary of tensors; fetch the published file again.")
-    tensors = {str(name): value.clone().contiguous() for name, value in state.items()}
+    tensors = {str(name): value.contiguous().numpy() for name, value in state.items()}
     save_tensors(tensors, target, metadata={"format": "pt"})
     return target
 

@@ -332,7 +332,7 @@ def run(
     how = Sampling(protocol.steps[0], protocol.guidance, protocol.solver, protocol.spacing)
     trial = prepare(
         read_items(run.data, selection), judge, maker(prior, how), protocol,
-        scale=prior.std.cpu().numpy(), selection=selection,
+        scale=prior.std, selection=selection,
     )  # fmt: skip
     files = {name: digest(path) for name, path in adapters().items()}
     said = {**protocol.drawn(), "steps": list(protocol.steps), "adapters": files, "items": identity(trial.items)}

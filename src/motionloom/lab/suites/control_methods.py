@@ -6,7 +6,6 @@ from functools import cache
 from typing import Protocol as Interface
 
 import numpy as np
-import torch
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
@@ -14,7 +13,7 @@ from motionloom.kinematics.physics import Array
 from motionloom.lab.papers.diffusion_blending import control_features
 from motionloom.lab.suites.control_kinds import Kind, Target
 from motionloom.motion import Motion
-from motionloom.tasks.control import Net
+from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.sampling import BATCH as ROWS
 from motionloom.tasks.sampling import Observed
 from motionloom.tasks.text import SOLVER, SPACING, sample_features, smooth, to_motion
@@ -72,7 +71,7 @@ def maker(prior: Prior, how: Sampling) -> Maker:
 
     @cache
     def net(name: str):
-        return adapted(prior.net, Adapter.load(name if name in shipped else "any", prior)).to(prior.mean.device)
+        return adapted(prior.net, Adapter.load(name if name in shipped else "any", prior))
 
     def make(one: Kind, name: str) -> Method:
         if name in (UNCONTROLLED, EXPORTED):
@@ -96,13 +95,13 @@ def uncontrolled(prior: Prior, how: Sampling, *, exported: bool) -> Method:
             prior, [target.prompt for target in targets], [len(target) for target in targets], seeds=seeds,
             guidance=how.guidance, steps=how.steps, solver=how.solver, spacing=how.spacing,
         )  # fmt: skip
-        features = [one.numpy().astype(np.float64) for one in drawn]
+        features = [one.astype(np.float64) for one in drawn]
         return [of_motion(to_motion(one, prior.fps)) if exported else of_features(one) for one in features]
 
     return draw
 
 
-def published(prior: Prior, how: Sampling, nets: Sequence[Net], *, noise_free: bool) -> Method:
+def published(prior: Prior, how: Sampling, nets: Sequence[PriorSession], *, noise_free: bool) -> Method:
     """Control in the representation: the fixed numbers are written into every estimate (`diffusion_blending`)."""
 
     def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
@@ -118,12 +117,12 @@ def published(prior: Prior, how: Sampling, nets: Sequence[Net], *, noise_free: b
 
 
 def _controlled(
-    prior: Prior, how: Sampling, nets: Sequence[Net], targets: Sequence[Target], seeds: Sequence[int],
+    prior: Prior, how: Sampling, nets: Sequence[PriorSession], targets: Sequence[Target], seeds: Sequence[int],
     noise_free: bool,
 ) -> np.ndarray:  # fmt: skip
     """(rows, frames, 263) not standardised, of targets of one length."""
-    mask = torch.from_numpy(np.stack([target.mask for target in targets])).to(prior.mean.device)
-    given = torch.from_numpy(np.stack([target.known for target in targets])).to(prior.mean)
+    mask = np.stack([target.mask for target in targets])
+    given = np.stack([target.known for target in targets]).astype(np.float32)
     known = (given - prior.mean) / prior.std
     state = control_features(
         prior, nets, [target.prompt for target in targets], Observed(known, mask, noise_free), seeds=seeds,
@@ -132,7 +131,7 @@ def _controlled(
     drawn = state * prior.std + prior.mean
     if prior.net.config.patch > 1:
         drawn = smooth(drawn)  # as everything that such a network draws
-    return torch.where(mask, given, drawn).cpu().numpy().astype(np.float64)
+    return np.where(mask, given, drawn).astype(np.float64)
 
 
 def ours(prior: Prior, how: Sampling, *, exact: bool) -> Method:

@@ -331,5 +331,5 @@ def _digest(path: Path) -> str:
 def _digest_of(block: PairBlock) -> str:
     made = hashlib.sha256()
     for key in sorted(block.tensors):
-        made.update(key.encode() + block.tensors[key].detach().cpu().contiguous().numpy().tobytes())
+        made.update(key.encode() + np.ascontiguousarray(block.tensors[key]).tobytes())
     return made.hexdigest()[:12]

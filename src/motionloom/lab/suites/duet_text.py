@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from motionloom.data.pairs import Pair, windows
 from motionloom.errors import MotionloomError
@@ -170,15 +169,15 @@ def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
     frames, net, begun = frames_in(how.seconds, prior.fps), no_communication_net(prior), beginnings(pairs, how)
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
-        nothing = torch.zeros(2, 0, len(prior.mean))
-        known = [known_state(prior, net, nothing, torch.from_numpy(poses), frames) for poses in begun(count, seed)]
+        nothing = np.zeros((2, 0, len(prior.mean)), np.float32)
+        known = [known_state(prior, net, nothing, poses, frames) for poses in begun(count, seed)]
         features, poses = pair_features(
             prior, net, [caption] * (2 * count), frames,
             seeds=[s for number in range(count) for s in person_seeds(seed, number)],
             edits=PairEdits(stacked(known)), guidance=how.guidance, steps=how.steps,
         )  # fmt: skip
         made = []
-        for numbers, standing in zip(features, poses.double().numpy(), strict=True):
+        for numbers, standing in zip(features, poses.astype(np.float64), strict=True):
             first, second = (
                 moved(finish(prior, f, foot_lock=how.clean), GroundPose.of_numbers(s))
                 for f, s in zip(numbers, standing, strict=True)

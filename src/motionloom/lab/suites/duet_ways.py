@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import nn
 
 from motionloom.diffusion import row_seed
 from motionloom.features import pair as two
@@ -19,10 +19,13 @@ from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics.pair import PREFIX
 from motionloom.lab.metrics.prediction import constant_velocity, zero_velocity
 from motionloom.lab.papers.mrt import Mrt, completed
-from motionloom.nets.pair import PairNet, Talk, fitting
-from motionloom.nets.prior import ModulatedBlock, PriorNet, PublishedBlock
+from motionloom.nets.pair import Talk, fitting
+from motionloom.nets.prior import ModulatedBlock, PublishedBlock
+from motionloom.runtime.pair import PairSession
 from motionloom.tasks.long import Past
 from motionloom.tasks.pair import PairEdits, known_state, pair_features, person_seeds, stacked
+from motionloom.train.export import pair_graph
+from motionloom.train.modules import arrays, prior_module, prior_session
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior, save_prior
 
@@ -42,7 +45,7 @@ class Crops:
 
 
 Way = Callable[[Crops, int], Array]
-Features = Callable[..., tuple[Tensor, Tensor]]
+Features = Callable[..., tuple[np.ndarray, np.ndarray]]
 """`tasks.pair.pair_features`, or what takes its place."""
 Given = Literal["past", "tool", "published"]
 FRAMES = 80
@@ -94,7 +97,7 @@ def seen(crop: np.ndarray, given: str) -> np.ndarray:
 
 def drawn(
     prior: Prior,
-    net: PairNet,
+    net: PairSession,
     *,
     given: str = "past",
     seed: int = 0,
@@ -113,11 +116,11 @@ def drawn(
     def way(crops: Crops, sample: int) -> Array:
         known = [two.encode(seen(crop, given)) for crop in crops.positions]
         states = [
-            known_state(prior, net, torch.from_numpy(one.features), torch.from_numpy(one.poses), FRAMES)
+            known_state(prior, net, one.features, one.poses, FRAMES)
             for one in known
         ]
-        people = [torch.from_numpy(person) for one in known for person in one.features]
-        leaving = [Past(person.float(), GroundPose()).holder(prior, FRAMES) for person in people]
+        people = [person for one in known for person in one.features]
+        leaving = [Past(person, GroundPose()).holder(prior, FRAMES) for person in people]
         features, _ = make(
             prior, net, [prompt] * len(people), FRAMES,
             seeds=[s for number in crops.numbers for s in person_seeds(row_seed(seed, sample), number)],
@@ -125,17 +128,16 @@ def drawn(
             guidance=guidance, steps=steps,
         )  # fmt: skip
         poses, floors = np.stack([one.poses for one in known]), np.stack([one.floors for one in known])
-        return two.decode(features.double().numpy(), poses) + floors[..., None, None, None] * _UP
+        return two.decode(features.astype(np.float64), poses) + floors[..., None, None, None] * _UP
 
     return way
 
 
-def no_communication_net(prior: Prior) -> PairNet:
+def no_communication_net(prior: Prior) -> PairSession:
     """The prior without communication: a block that says nothing, and two motions that know nothing of each other."""
-    return PairNet(
-        prior.net, Talk(fitting(prior.net.config), prior.net.config).to(prior.mean.device), prior.schedule,
-        mean=prior.mean, std=prior.std,
-    ).eval()  # fmt: skip
+    silent = Talk(fitting(prior.net.config), prior.net.config)
+    graph = pair_graph(silent.config, prior.net.config)
+    return PairSession(silent.config, arrays(silent), graph, prior.net, prior.schedule, prior.mean, prior.std)
 
 
 def bare(prior: Prior) -> Prior:
@@ -144,14 +146,13 @@ def bare(prior: Prior) -> Prior:
     A block trained over it (`motionloom train duet`) is "communication only": the paper's table 3 has such a row and
     no text says what it was; here it is the communication block in place of the prior's layers.
     """
-    net = PriorNet(prior.net.config)
-    net.load_state_dict(prior.net.state_dict())
+    net = prior_module(prior)
     with torch.no_grad():
         for block in net.blocks:
             for layer in _outs(block):
                 layer.weight.zero_()
                 layer.bias.zero_()
-    return replace(prior, net=net.to(prior.mean.device).eval().requires_grad_(False))
+    return replace(prior, net=prior_session(net))
 
 
 def _outs(block: nn.Module) -> Sequence[nn.Linear]:
@@ -166,7 +167,7 @@ def write_bare(prior: Prior, path: Path | str) -> Path:
     return save_prior(bare(prior), path, half=False)
 
 
-def only_communication(prior: Prior, block: PairBlock | Path | str) -> tuple[Prior, PairNet]:
+def only_communication(prior: Prior, block: PairBlock | Path | str) -> tuple[Prior, PairSession]:
     """The bare prior and the network of a block that was trained over it; raises MotionloomError for another block."""
     silent = bare(prior)
     found = block if isinstance(block, PairBlock) else PairBlock.load(block, silent)

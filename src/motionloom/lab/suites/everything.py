@@ -19,6 +19,7 @@ from motionloom.lab.suites.harness import weight_marks
 from motionloom.lab.suites.needs import NoData
 from motionloom.lab.suites.registry import SUITES, Job, Suite
 from motionloom.reading import read_bytes
+from motionloom.weights.container import weights_digest
 from motionloom.weights.prior import find_weights
 
 QUICK = "Quick run: few seeds and clips, to see that everything works; these are no numbers to quote."
@@ -103,14 +104,14 @@ def _one(suite: Suite, job: Job, folder: Path, *, again: bool) -> Outcome:
 
 def fingerprint(suite: Suite, job: Job) -> str:
     """Changes with the version, the weights, the settings, and the files that a suite reads."""
-    weights = hashlib.sha256(find_weights(job.weights).read_bytes()).hexdigest()
+    weights = weights_digest(find_weights(job.weights))
     said: dict[str, Any] = {
         "version": version("motionloom"),
         "suite": suite.name,
         "weights": weights,
         "settings": dict(suite.settings(job.quick)),
     }
-    said["files"] = [hashlib.sha256(path.read_bytes()).hexdigest() for path in suite.files(job)]
+    said["files"] = [weights_digest(path) for path in suite.files(job)]
     if suite.data and job.data is not None:
         said["data"] = _files(job.data)
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()

@@ -41,7 +41,7 @@ def generator(
         if not frames:
             return []
         drawn = sample_features(prior, prompts, frames, seeds=list(seeds), best_of=best_of, **how)  # type: ignore[arg-type]
-        features = [one.numpy().astype(np.float64) for one in drawn]
+        features = [one.astype(np.float64) for one in drawn]
         if finished:
             return [to_motion(one, prior.fps).positions() for one in features]
         return [humanml.decode_positions(one) for one in features]

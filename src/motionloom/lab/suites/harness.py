@@ -1,6 +1,5 @@
 """What all suites share: where and how they measure, what is opened and refused first, and rows over replications."""
 
-import hashlib
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from motionloom.lab.evaluator.evaluators import Evaluator
 from motionloom.lab.metrics import retrieval
 from motionloom.lab.report.report import Column, Row, Value
 from motionloom.lab.suites.parts import Parts, fingerprint
+from motionloom.weights.container import weights_digest
 from motionloom.weights.prior import Prior, find_weights
 
 Say = Callable[[str], None]
@@ -112,9 +112,8 @@ def weight_marks(paths: Sequence[Path]) -> dict[str, str]:
 
 
 def digest(path: Path) -> str:
-    """Changes with the content of a file."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+    """The beginning of the SHA-256 of a file; of weights without their graphs."""
+    return weights_digest(path)[:16]
 
 
 def evaluator_file(evaluator: str) -> Path | None:

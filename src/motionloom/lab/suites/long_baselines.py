@@ -11,7 +11,6 @@ from functools import partial
 from typing import Literal, TypeAlias
 
 import numpy as np
-import torch
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
@@ -59,9 +58,9 @@ def rows_of(frames: Sequence[int], handshake: int) -> list[int]:
     return [n + (half if i > 0 else 0) + (rest if i < last else 0) for i, n in enumerate(frames)]
 
 
-def from_features(features: torch.Tensor) -> Long:
+def from_features(features: np.ndarray) -> Long:
     """Features as the network draws them, decoded once."""
-    numbers = features.numpy().astype(np.float64)
+    numbers = features.astype(np.float64)
     return Long(numbers, humanml.decode_positions(numbers))
 
 
@@ -77,7 +76,7 @@ def _ours(prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequen
 
     segments = [Segment(text, n / FPS) for text, n in zip(prompts, frames, strict=True)]
     pieces = list(long_features(prior, segments, seed=seed, guidance=how.guidance, steps=how.steps))
-    return from_features(torch.cat(pieces).cpu())
+    return from_features(np.concatenate(pieces))
 
 
 def _exported(prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequence[int], seed: int) -> Long:
@@ -103,13 +102,13 @@ def _double_take(
 
 def _alone(
     prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequence[int], seed: int
-) -> list[torch.Tensor]:
+) -> list[np.ndarray]:
     seeds = [seed + row for row in range(len(prompts))]
     return sample_features(prior, prompts, frames, seeds=seeds, guidance=how.guidance, steps=how.steps)
 
 
 def _concatenated(prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequence[int], seed: int) -> Long:
-    return from_features(torch.cat(_alone(prior, how, prompts, frames, seed)))
+    return from_features(np.concatenate(_alone(prior, how, prompts, frames, seed)))
 
 
 def _slerp(prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequence[int], seed: int) -> Long:

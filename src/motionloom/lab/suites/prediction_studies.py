@@ -168,7 +168,7 @@ def _trained(name: str, lab: Lab) -> tuple[list[Column], list[Row], dict[str, An
         if setting == "kept" and value > lab.protocol.frames:
             continue
         predictor = network(lab, setting, value)
-        size = sum(p.numel() for p in predictor.net.parameters())
+        size = sum(values.size for values in predictor.net.weights.values())
         for steps in (10, 50) if name == "noising" else (STEPS,):
             label = f"{setting} {value}" if name != "noising" else f"{value} levels, {steps} steps"
             lab.progress(f"{label}: {len(trial.windows)} windows")

@@ -330,7 +330,7 @@ def drawer(prior: Prior, protocol: Protocol) -> Draw:
             prior, prompts, frames, seeds=seeds, guidance=protocol.guidance, steps=steps, solver=protocol.solver,
             spacing=protocol.spacing,
         )  # fmt: skip
-        return [features.numpy().astype(np.float64) for features in drawn]
+        return [features.astype(np.float64) for features in drawn]
 
     return draw
 

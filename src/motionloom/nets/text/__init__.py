@@ -1,12 +1,10 @@
-"""Text encoders: a sentence becomes one state per word piece and one pooled vector.
+"""Networks of text encoders, in PyTorch.
 
-The embedded default is `MiniLM`. `ClipText` and `DistilBert` serve the published weights; they need the extras
-`clip` and `distilbert`, and files that are already on this machine.
+`ClipText` and `DistilBert` serve the published weights; they need the extras `clip` and `distilbert`, and files that
+are already on this machine. The embedded default is `motionloom.runtime.text.minilm`, whose network is `bert.Bert`.
 """
 
 from motionloom.nets.text.clip import ClipText
 from motionloom.nets.text.distilbert import DistilBert
-from motionloom.nets.text.minilm import MiniLM
-from motionloom.nets.text.protocol import TextEmbedding, TextEncoder
 
-__all__ = ["ClipText", "DistilBert", "MiniLM", "TextEmbedding", "TextEncoder"]
+__all__ = ["ClipText", "DistilBert"]

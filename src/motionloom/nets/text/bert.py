@@ -12,7 +12,7 @@ class Layer(nn.Module):
 
     def __init__(self, width: int, heads: int, hidden: int) -> None:
         super().__init__()
-        self.heads = heads
+        self.heads, self.scale = heads, (width // heads) ** -0.5
         self.attention_in = nn.Linear(width, 3 * width)  # query, key and value stacked
         self.attention_out = nn.Linear(width, width)
         self.attention_norm = nn.LayerNorm(width, EPSILON)
@@ -24,7 +24,7 @@ class Layer(nn.Module):
         rows, words, width = x.shape
         parts = self.attention_in(x).view(rows, words, 3, self.heads, width // self.heads)
         query, key, value = parts.permute(2, 0, 3, 1, 4)
-        mixed = F.scaled_dot_product_attention(query, key, value, attn_mask=allowed)
+        mixed = F.scaled_dot_product_attention(query, key, value, attn_mask=allowed, scale=self.scale)
         x = self.attention_norm(x + self.attention_out(mixed.transpose(1, 2).reshape(rows, words, width)))
         return self.hidden_norm(x + self.hidden_out(F.gelu(self.hidden_in(x))))
 
@@ -44,8 +44,12 @@ class Bert(nn.Module):
         self.layers = nn.ModuleList(Layer(width, heads, hidden) for _ in range(layers))
 
     def forward(self, ids: Tensor, mask: Tensor) -> Tensor:
-        x = self.norm(self.words(ids) + self.places.weight[: ids.shape[1]])
         allowed = None if bool(mask.all()) else mask[:, None, None, :]
+        return self.layered(self.words(ids) + self.places.weight[: ids.shape[1]], allowed)
+
+    def layered(self, pieces: Tensor, allowed: Tensor | None) -> Tensor:
+        """Embedded word pieces (rows, words, width) to hidden states; allowed: (rows, 1, 1, words) or None."""
+        x = self.norm(pieces)
         for layer in self.layers:
             x = layer(x, allowed)
         return x

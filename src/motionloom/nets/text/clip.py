@@ -8,7 +8,7 @@ import torch
 
 from motionloom.errors import MotionloomError
 from motionloom.nets.text.hub import Pretrained, open_pretrained
-from motionloom.nets.text.protocol import Row, RowCache, TextEmbedding, as_rows, cut, stack_rows
+from motionloom.runtime.text.protocol import Row, RowCache, TextEmbedding, as_rows, cut, stack_rows
 
 HUB_NAME = "openai/clip-vit-base-patch32"
 HUMANML_LENGTH = 22  # 20 word pieces, start and end: what the HumanML3D and KIT models saw
@@ -79,7 +79,7 @@ class ClipText:
             padded = torch.tensor([row + [0] * (longest - len(row)) for row in ids])
             out = self._model(padded.to(self._model.device))
             rows += [
-                (states[: len(row)].clone(), pooled)
+                (states[: len(row)].cpu().numpy().copy(), pooled.cpu().numpy())
                 for row, states, pooled in zip(ids, out.last_hidden_state, out.text_embeds)
             ]
         return rows

@@ -6,7 +6,7 @@ from pathlib import Path
 import torch
 
 from motionloom.nets.text.hub import Pretrained, open_pretrained
-from motionloom.nets.text.protocol import Row, RowCache, TextEmbedding, as_rows, cut, stack_rows
+from motionloom.runtime.text.protocol import Row, RowCache, TextEmbedding, as_rows, cut, stack_rows
 
 HUB_NAME = "distilbert/distilbert-base-uncased"
 BATCH = 64
@@ -63,6 +63,6 @@ class DistilBert:
             real = torch.tensor([[1] * len(row) + [0] * (longest - len(row)) for row in ids])
             device = self._model.device
             out = self._model(padded.to(device), attention_mask=real.to(device)).last_hidden_state
-            words = [states[: len(row)].clone() for row, states in zip(ids, out)]
+            words = [states[: len(row)].cpu().numpy().copy() for row, states in zip(ids, out)]
             rows += [(states, states.mean(0)) for states in words]
         return rows

@@ -1,9 +1,13 @@
 """CLIP's text tower as published networks were trained with it."""
 
 from collections.abc import Sequence
+from importlib import import_module
 
-from motionloom.nets.text.clip import FULL_LENGTH, HUMANML_LENGTH, ClipText
-from motionloom.nets.text.protocol import TextEmbedding
+from motionloom.errors import MotionloomError
+from motionloom.runtime.text.protocol import TextEmbedding, TextEncoder
+
+READER = "motionloom.nets.text.clip"
+"""The module that opens CLIP, which needs PyTorch."""
 
 
 class PublishedText:
@@ -17,14 +21,24 @@ class PublishedText:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self._clip: ClipText | None = None
+        self._clip: TextEncoder | None = None
 
     def encode(self, texts: Sequence[str] | str) -> TextEmbedding:
         """See `TextEncoder.encode`; raises MotionloomError where the extra `clip` or its files are missing."""
         if self._clip is None:
-            self._clip = ClipText.open(length=TEXTS[self.name])
+            self._clip = _open(TEXTS[self.name])
         return self._clip.encode(texts)
 
 
-TEXTS = {"clip": HUMANML_LENGTH, "clip-77": FULL_LENGTH}
+def _open(length: int) -> TextEncoder:
+    try:
+        return import_module(READER).ClipText.open(length=length)
+    except ImportError as error:
+        raise MotionloomError(
+            f"these weights read texts with CLIP, and {error.name or 'a package'} for it is not installed; "
+            "install motionloom with the extra 'clip'"
+        ) from None
+
+
+TEXTS = {"clip": 22, "clip-77": 77}
 """Names of the published text encoders, with the word pieces they read."""

@@ -9,12 +9,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import torch
-from torch import Tensor
+import numpy as np
+from numpy.typing import NDArray
 
+from motionloom.arrays import unit
 from motionloom.errors import MotionloomError, one_line
-from motionloom.nets.text.protocol import TextEncoder
-from motionloom.nets.text.quantise import dequantise, quantise
+from motionloom.runtime.text.protocol import TextEncoder
+from motionloom.runtime.text.quantise import dequantise, quantise
 
 SAME, NEAR, AROUND = 0.75, 0.475, 8
 """A prompt is near to what was learned where the cosine to one sentence is at least `SAME`, or the mean over its
@@ -39,7 +40,7 @@ class Known:
 
     sentences: tuple[str, ...]
     """As training had them, without subject."""
-    vectors: Tensor
+    vectors: NDArray[np.float32]
     """(sentences, width) of unit length, float32."""
     seconds: Mapping[str, float]
     """Seconds of training motion per action."""
@@ -91,8 +92,8 @@ def known_sentences(
     plain = list(dict.fromkeys([*sure, *(bare(s)[:MAX_CHARACTERS] for s in sentences if s.strip())]))
     if not plain:
         raise MotionloomError("there is no training sentence; a table of what is known needs at least one")
-    vectors = torch.cat([encoder.encode(plain[i : i + 256]).pooled.float().cpu() for i in range(0, len(plain), 256)])
-    vectors = torch.nn.functional.normalize(vectors, dim=1)
+    vectors = np.concatenate([encoder.encode(plain[i : i + 256]).pooled for i in range(0, len(plain), 256)])
+    vectors = unit(vectors)
     chosen = sorted(_farthest_first(vectors, max(len(sure), 1), most))
     return Known(tuple(plain[i] for i in chosen), vectors[chosen], dict(seconds))
 
@@ -101,8 +102,10 @@ def nearest(known: Known, prompts: Sequence[str], encoder: TextEncoder, *, count
     """For each prompt its ``count`` nearest known sentences. Raises `MotionloomError` as the encoder does."""
     if not prompts:
         return []
-    asked = torch.nn.functional.normalize(encoder.encode([bare(p) for p in prompts]).pooled.float().cpu(), dim=1)
-    similar, places = (asked @ known.vectors.T).sort(dim=1, descending=True)
+    asked = unit(encoder.encode([bare(p) for p in prompts]).pooled)
+    similar = asked @ known.vectors.T
+    places = np.argsort(-similar, axis=1, kind="stable")
+    similar = np.take_along_axis(similar, places, axis=1)
     return [
         Nearest(prompt, tuple(known.sentences[i] for i in row), float(values[0]), float(values[:AROUND].mean()))
         for prompt, row, values in zip(prompts, places[:, :count].tolist(), similar, strict=True)
@@ -112,19 +115,19 @@ def nearest(known: Known, prompts: Sequence[str], encoder: TextEncoder, *, count
 def with_sentences(known: Known, sentences: Sequence[str], encoder: TextEncoder) -> Known:
     """The table with some more sentences, such as those of an adapter."""
     more = known_sentences(sentences, {}, encoder)
-    return Known((*known.sentences, *more.sentences), torch.cat([known.vectors, more.vectors]), known.seconds)
+    return Known((*known.sentences, *more.sentences), np.concatenate([known.vectors, more.vectors]), known.seconds)
 
 
-def _farthest_first(vectors: Tensor, sure: int, most: int) -> list[int]:
+def _farthest_first(vectors: NDArray[np.float32], sure: int, most: int) -> list[int]:
     """Places of at most ``most`` vectors, the first ``sure`` of them in any case."""
     chosen = list(range(sure))
-    distance = 1 - (vectors @ vectors[:sure].T).amax(dim=1)
+    distance = 1 - (vectors @ vectors[:sure].T).max(axis=1)
     while len(chosen) < min(most, len(vectors)):
         place = int(distance.argmax())
         if distance[place] < 1e-6:  # the rest means the same
             break
         chosen.append(place)
-        distance = torch.minimum(distance, 1 - vectors @ vectors[place])
+        distance = np.minimum(distance, 1 - vectors @ vectors[place])
     return chosen
 
 
@@ -135,14 +138,14 @@ def _short(text: str) -> str:
 # In a weight file: int8 vectors with a scale each, and plain data
 
 
-def pack_known(known: Known) -> tuple[dict[str, Tensor], dict[str, Any]]:
+def pack_known(known: Known) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Tensors ``known.vectors`` (int8) and ``known.scale`` (float16), and what goes into the file's description."""
     values, scale = quantise(known.vectors)
     seconds = {action: round(float(count), 1) for action, count in known.seconds.items()}
     return {"known.vectors": values, "known.scale": scale}, {"sentences": list(known.sentences), "seconds": seconds}
 
 
-def unpack_known(tensors: Mapping[str, Tensor], about: Any, *, width: int) -> Known:
+def unpack_known(tensors: Mapping[str, np.ndarray], about: Any, *, width: int) -> Known:
     """The inverse of `pack_known`. Raises ValueError for what is damaged, too large or of another text encoder."""
     if not isinstance(about, dict) or not isinstance(about.get("sentences"), list):
         raise ValueError("its table of known sentences has no sentences")
@@ -152,11 +155,11 @@ def unpack_known(tensors: Mapping[str, Tensor], about: Any, *, width: int) -> Kn
     ):
         raise ValueError(f"its table of known sentences holds something else, or more than {MAX_SENTENCES}")
     values, scale = tensors.get("known.vectors"), tensors.get("known.scale")
-    if values is None or scale is None or values.dtype != torch.int8 or scale.dtype != torch.float16:
+    if values is None or scale is None or values.dtype != np.int8 or scale.dtype != np.float16:
         raise ValueError("its table of known sentences lacks its vectors")
-    if values.shape != (len(sentences), width) or scale.shape != (len(sentences),) or not bool(scale.isfinite().all()):
+    if values.shape != (len(sentences), width) or scale.shape != (len(sentences),) or not np.isfinite(scale).all():
         raise ValueError(f"its table of known sentences has vectors of shape {tuple(values.shape)}")
-    vectors = torch.nn.functional.normalize(dequantise(values, scale), dim=1)
+    vectors = unit(dequantise(values, scale))
     return Known(tuple(sentences), vectors, seconds)
 
 

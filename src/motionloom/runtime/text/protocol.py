@@ -6,8 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-import torch
-from torch import Tensor
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
 
 CHARACTERS = 20_000
 
@@ -21,13 +23,9 @@ class TextEmbedding:
     pooled: (rows, width) one vector per text.
     """
 
-    tokens: Tensor
-    mask: Tensor
-    pooled: Tensor
-
-    def to(self, device: torch.device | str) -> "TextEmbedding":
-        """The same embedding on another device."""
-        return TextEmbedding(self.tokens.to(device), self.mask.to(device), self.pooled.to(device))
+    tokens: Floats
+    mask: NDArray[np.bool_]
+    pooled: Floats
 
 
 class TextEncoder(Protocol):
@@ -48,7 +46,7 @@ class TextEncoder(Protocol):
         ...
 
 
-Row = tuple[Tensor, Tensor]
+Row = tuple[Floats, Floats]
 """One encoded text: its states (words, width) without padding, and its pooled vector (width,)."""
 
 
@@ -72,10 +70,9 @@ def cut(text: str, split: Callable[[str], list[int]], room: int) -> list[int]:
 def stack_rows(rows: Sequence[Row], width: int) -> TextEmbedding:
     """Pad rows of different lengths with zeros into one embedding."""
     words = max((len(states) for states, _ in rows), default=0)
-    device = rows[0][0].device if rows else torch.device("cpu")
-    tokens = torch.zeros(len(rows), words, width, device=device)
-    mask = torch.zeros(len(rows), words, dtype=torch.bool, device=device)
-    pooled = torch.zeros(len(rows), width, device=device)
+    tokens = np.zeros((len(rows), words, width), np.float32)
+    mask = np.zeros((len(rows), words), np.bool_)
+    pooled = np.zeros((len(rows), width), np.float32)
     for index, (states, vector) in enumerate(rows):
         tokens[index, : len(states)] = states
         mask[index, : len(states)] = True

@@ -1,0 +1,165 @@
+"""Graphs that ONNX Runtime runs. No other module knows it.
+
+A session is made when it is first run, from a graph without weights and the arrays of a weight file. Arrays that go in
+stay where they are, and the buffers of its answers are kept from call to call.
+"""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.runtime.graph import Outline, outline
+
+THREADS = "MOTIONLOOM_THREADS"
+"""The environment variable that says how many threads a session computes with."""
+DEVICES = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider"}
+_threads: int | None = None
+
+Weights: TypeAlias = Callable[[], Mapping[str, np.ndarray]]
+"""Gives arrays by the names of a graph's initialisers."""
+
+
+def set_threads(count: int | None) -> None:
+    """Let sessions that are made afterwards in this process compute with so many threads.
+
+    None: with as many as the environment variable ``MOTIONLOOM_THREADS`` says, else with one per core.
+    """
+    global _threads
+    if count is not None and count < 1:
+        raise MotionloomError(f"a session computes with 1 thread or more; got {count}")
+    _threads = count
+
+
+def threads() -> int:
+    """Threads of sessions made now; 0: one per core."""
+    if _threads is not None:
+        return _threads
+    said = os.environ.get(THREADS, "")
+    if said and not (said.isascii() and said.isdigit() and 0 < int(said) <= 1024):
+        raise MotionloomError(f"{THREADS} is a number of threads from 1 on; got {said!r}")
+    return int(said or 0)
+
+
+def find_device(name: str) -> str:
+    """The device of that name, "cpu", "cuda" or "cuda:1"; raises MotionloomError where there is none."""
+    kind, colon, number = name.partition(":")
+    if kind not in DEVICES or (colon and not (kind == "cuda" and number.isascii() and number.isdigit())):
+        raise MotionloomError(f"the device {name!r} cannot be used: there are {' and '.join(DEVICES)}")
+    if kind != "cpu":
+        import onnxruntime
+
+        if DEVICES[kind] not in onnxruntime.get_available_providers():
+            raise MotionloomError(
+                f"the device {name!r} cannot be used: this ONNX Runtime has no {DEVICES[kind]}, which the package "
+                "onnxruntime-gpu brings; cpu always can"
+            )
+    return name
+
+
+class Session:
+    """A graph and the arrays that are its weights."""
+
+    def __init__(self, graph: bytes, weights: Weights, *, device: str = "cpu", seldom: bool = False) -> None:
+        """A session that is made when it is first run.
+
+        weights: called then. seldom: it is run a few times, so that a second copy of its weights, arranged for speed,
+        is not worth it; a product of one row may then have other bits than the same row beside others.
+        """
+        self.device, self.threads, self._seldom = device, threads(), seldom
+        self._graph, self._weights = graph, weights
+        self._made: _Made | None = None
+
+    def on(self, device: str) -> "Session":
+        """The same on another device."""
+        return Session(self._graph, self._weights, device=find_device(device), seldom=self._seldom)
+
+    def run(self, feeds: Mapping[str, np.ndarray], *, held: Sequence[str] = ()) -> list[np.ndarray]:
+        """The graph's answers, new arrays, in their order.
+
+        feeds: an array for each input; what the graph does not ask for is left.
+        held: names of those that never change once they were given, which are not brought to the device again.
+        Raises MotionloomError where the graph cannot be run.
+        """
+        if self._made is None:
+            self._made = _Made(self._graph, self._weights(), self.device, self.threads, seldom=self._seldom)
+        return self._made.run(feeds, held)
+
+
+class _Made:
+    """A session of ONNX Runtime with its buffers."""
+
+    def __init__(
+        self, graph: bytes, weights: Mapping[str, np.ndarray], device: str, count: int, *, seldom: bool
+    ) -> None:
+        import onnxruntime
+
+        self._ort: Any = onnxruntime
+        kind, _, number = device.partition(":")
+        self._device, self._number = kind, int(number or 0)
+        names = check_graph(graph, weights)
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads, options.inter_op_num_threads = count, 1
+        options.log_severity_level = 4
+        arrays = {name: np.ascontiguousarray(weights[name], np.float32) for name in names.weights}
+        values = [onnxruntime.OrtValue.ortvalue_from_numpy(array) for array in arrays.values()]
+        options.add_external_initializers(list(arrays), values)  # which copies them when the session is made
+        if seldom:
+            options.add_session_config_entry("session.disable_prepacking", "1")
+        try:
+            provider = DEVICES[kind] if kind == "cpu" else (DEVICES[kind], {"device_id": self._number})
+            self._session = onnxruntime.InferenceSession(graph, options, providers=[provider])
+        except Exception as error:
+            raise _refused(error) from None
+        self._io = self._session.io_binding()
+        self._inputs, self._outputs = names.inputs, names.outputs
+        self._held: dict[str, tuple[np.ndarray, Any]] = {}
+
+    def run(self, feeds: Mapping[str, np.ndarray], held: Sequence[str]) -> list[np.ndarray]:
+        try:
+            for name in self._inputs:
+                self._io.bind_ortvalue_input(name, self._brought(name, feeds[name], name in held))
+            for name in self._outputs:
+                self._io.bind_output(name, "cpu")
+            self._session.run_with_iobinding(self._io)
+            return self._io.copy_outputs_to_cpu()
+        except Exception as error:
+            raise _refused(error) from None
+
+    def _brought(self, name: str, array: np.ndarray, held: bool) -> Any:
+        """The array as a value on the session's device."""
+        if held and name in self._held and self._held[name][0] is array:
+            return self._held[name][1]
+        value = self._ort.OrtValue.ortvalue_from_numpy(np.ascontiguousarray(array), self._device, self._number)
+        if held:
+            self._held[name] = array, value
+        return value
+
+
+def check_graph(graph: bytes, weights: Mapping[str, np.ndarray], outputs: Sequence[str] | None = None) -> Outline:
+    """The names of a graph that these weights fill; raises MotionloomError where it is none, or may not be run.
+
+    outputs: what it has to answer; None: anything.
+    """
+    try:
+        names = outline(graph)
+        if outputs is not None and names.outputs != tuple(outputs):
+            raise ValueError(f"it answers {', '.join(names.outputs) or 'nothing'}, not {', '.join(outputs)}")
+        for name, shape in names.weights.items():
+            if name not in weights or weights[name].shape != shape:
+                there = weights[name].shape if name in weights else "missing"
+                raise ValueError(f"its {name} is {shape}, and the weights' is {there}")
+    except ValueError as error:
+        raise MotionloomError(
+            f"the graph in the weights cannot be run ({error}); write another by 'motionloom weights convert'"
+        ) from None
+    return names
+
+
+def _refused(error: Exception) -> MotionloomError:
+    reason = " ".join(str(error).split())
+    return MotionloomError(
+        f"the graph in the weights does not run ({reason[:200]}); write another by 'motionloom weights convert'"
+    )

@@ -1,0 +1,122 @@
+"""Names and shapes of the weights of each network, as its settings say; what a file holds is checked against them."""
+
+from collections.abc import Iterator
+
+from motionloom.runtime.pair import PLACE, SEEN, PairConfig
+from motionloom.runtime.predictor import PredictorConfig
+from motionloom.runtime.sizes import NetConfig
+
+Shapes = dict[str, tuple[int, ...]]
+
+
+def prior_shapes(config: NetConfig) -> Shapes:
+    """Of a prior's network, without ``net.``."""
+    width, numbers = config.width, config.patch * config.features
+    found = {
+        **_linear("embed", numbers + config.patch * 4 * config.flags, width),
+        **_linear("time1", width, width),
+        **_linear("time2", width, width),
+        **_linear("text", config.text, width),
+        **_linear("out", width, numbers),
+    }
+    if config.flags:
+        found["flag.weight"] = (2, 4)
+    if config.variant == "modulated":
+        found |= _linear("words", config.text, 2 * width * config.layers)
+        found |= _linear("change", width, 6 * width) | _linear("last", width, 2 * width)
+        if config.clock:
+            found |= _linear("place", width, width) | _linear("clock", width, 2 * width)
+    for layer in range(config.layers):
+        block = _modulated(width, config.hidden) if config.variant == "modulated" else _encoder(width, config.hidden)
+        found |= _inside(f"blocks.{layer}", block)
+    return found
+
+
+def pair_shapes(config: PairConfig, prior: NetConfig) -> Shapes:
+    """Of a communication block in such a prior."""
+    modulated = prior.variant == "modulated"
+    partner = prior.patch * (PLACE + 3 * len(SEEN)) if config.aware else 0
+    found = {
+        **_linear("places", 2 * PLACE, config.width),
+        **_linear("both", 2 * prior.width + partner, config.width),
+        **_linear("place", config.width, PLACE),
+        **(_linear("out", config.width, prior.width) if modulated else {}),
+    }
+    for layer in range(config.layers):
+        found |= _inside(f"blocks.{layer}", _encoder(config.width, config.hidden))
+    return found
+
+
+def predictor_shapes(config: PredictorConfig) -> Shapes:
+    """Of a predictor's network, without ``net.``."""
+    width, (rows, channels) = config.width, config.condition_shape
+    found = {
+        "sequence_embedding": (config.kept, width),
+        **_linear("joint_embed", config.channels + config.beside * channels, width),
+        **_linear("time_embed.0", width, width),
+        **_linear("time_embed.2", width, width),
+        **_linear("cond_embed", rows * channels, width),
+        **_linear("out", width, config.channels),
+    }
+    closing = {
+        **_linear("emb_layers.1", width, 2 * width),
+        **_norm("norm", width),
+        **_linear("out_layers.2", width, width),
+    }
+    attention = {
+        **_norm("norm", width),
+        **{f"{name}.weight": (width, width) for name in ("query", "key", "value")},
+        **_inside("proj_out", closing),
+    }
+    forward = {
+        **_linear("linear1", width, 2 * width),
+        **_linear("linear2", 2 * width, width),
+        **_inside("proj_out", closing),
+    }
+    for layer in range(config.layers):
+        name = f"temporal_decoder_blocks.{layer}"
+        found |= _inside(f"{name}.sa_block", attention) | _inside(f"{name}.ffn", forward)
+    return found
+
+
+def _encoder(width: int, hidden: int) -> Shapes:
+    return {
+        **_inside("attention", _attention(width)),
+        **_linear("linear1", width, hidden),
+        **_linear("linear2", hidden, width),
+        **_norm("norm1", width),
+        **_norm("norm2", width),
+    }
+
+
+def _modulated(width: int, hidden: int) -> Shapes:
+    return {
+        **_inside("attention", _attention(width)),
+        **_linear("query", width, width),
+        **_linear("heard", width, width),
+        **_norm("norm", width),
+        **_linear("linear1", width, hidden),
+        **_linear("linear2", hidden, width),
+        "table": (6, width),
+    }
+
+
+def _attention(width: int) -> Shapes:
+    return {**_linear("project", width, 3 * width), **_linear("out", width, width)}
+
+
+def _linear(name: str, inner: int, outer: int) -> Shapes:
+    return {f"{name}.weight": (outer, inner), f"{name}.bias": (outer,)}
+
+
+def _norm(name: str, width: int) -> Shapes:
+    return {f"{name}.weight": (width,), f"{name}.bias": (width,)}
+
+
+def _inside(name: str, shapes: Shapes) -> Shapes:
+    return dict(_named(name, shapes))
+
+
+def _named(name: str, shapes: Shapes) -> Iterator[tuple[str, tuple[int, ...]]]:
+    for key, shape in shapes.items():
+        yield f"{name}.{key}", shape
