@@ -247,7 +247,7 @@ def test_a_batch_and_the_server_draw_without_torch(tmp_path: Path) -> None:
         f"folder = Path({str(tmp_path)!r})\n"
         '(folder / \'jobs.jsonl\').write_text(\'{"prompt": "a person walks", "seconds": 1}\\n\')\n'
         "import motionloom.server.worker, motionloom.server.drawing, motionloom.live.sessions\n"
-        "words = ['batch', str(folder / 'jobs.jsonl'), '--out', str(folder / 'out'), '--steps', '2', '--workers', '1']\n"
+        "words = ['batch', str(folder / 'jobs.jsonl'), '--out', str(folder / 'out'), '--steps', '2']\n"
         "sys.exit(main(words))\n"
     )
     done = run("-c", code)

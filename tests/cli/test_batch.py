@@ -126,7 +126,7 @@ def test_a_dry_run_says_how_much_and_writes_nothing(weights: str, capsys: pytest
         ["jobs.jsonl", "--shard", "2/2"], ["jobs.jsonl", "--shard-rows", "0"],
         ["jobs.jsonl", "--pair-guidance", "2"], ["jobs.jsonl", "--pair-weights", "absent"],
         ["jobs.jsonl", "--shard", "x"], ["jobs.jsonl", "--shard", "0/2", "--ray"], ["jobs.jsonl", "--workers", "0"],
-        ["jobs.jsonl", "--seed", "-1"], ["jobs.jsonl", "--bf16"], ["jobs.jsonl", "--fps", "0"],
+        ["jobs.jsonl", "--seed", "-1"], ["jobs.jsonl", "--fps", "0"],
         ["jobs.jsonl", "--skeleton", "absent.bvh"], ["jobs.jsonl", "--weights", "absent"],
     ],
     ids=lambda words: " ".join(words) or "nothing",

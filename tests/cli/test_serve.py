@@ -14,12 +14,14 @@ pytest.importorskip("uvicorn", reason="the server's packages are not installed")
 def test_a_core_is_left_to_the_page(
     monkeypatch: pytest.MonkeyPatch, command: str, cores: int, said: str | None, wanted: str
 ) -> None:
-    """OMP_NUM_THREADS when the server begins, which imports torch only then; what the user said stays."""
+    """MOTIONLOOM_THREADS when the server begins; what the user said stays."""
     seen = []
-    monkeypatch.setattr("motionloom.server.serving.serve", lambda options: seen.append(os.environ["OMP_NUM_THREADS"]))
+    monkeypatch.setattr(
+        "motionloom.server.serving.serve", lambda options: seen.append(os.environ["MOTIONLOOM_THREADS"])
+    )
     monkeypatch.setattr(os, "sched_getaffinity", lambda pid: set(range(cores)), raising=False)
-    monkeypatch.setenv("OMP_NUM_THREADS", said or "1")  # so that it is as it was behind the test
+    monkeypatch.setenv("MOTIONLOOM_THREADS", said or "1")  # so that it is as it was behind the test
     if said is None:
-        monkeypatch.delenv("OMP_NUM_THREADS")
+        monkeypatch.delenv("MOTIONLOOM_THREADS")
     main([command])
     assert seen == [wanted]

@@ -36,9 +36,9 @@ def test_the_reference_metrics_come_out() -> None:
     """Sines over the flat index; numbers of the published code."""
     recorded = sums()["metrics"]
     samples, truth = (
-        0.4 * wave(shape, *at).numpy() for shape, at in (((5, 10, 16, 3), (0.37, 0.1)), ((10, 16, 3), (0.29, 0.5)))
+        0.4 * wave(shape, *at) for shape, at in (((5, 10, 16, 3), (0.37, 0.1)), ((10, 16, 3), (0.29, 0.5)))
     )
-    futures = np.concatenate([truth[None], 0.4 * wave((2, 10, 16, 3), 0.31, 0.9).numpy()])
+    futures = np.concatenate([truth[None], 0.4 * wave((2, 10, 16, 3), 0.31, 0.9)])
     limbs = pr.Limbs(tuple(map(tuple, recorded["limbseq_used"])), pr.H36M_LIMBS.chains)
     s, tally = pr.score_window(samples, truth, futures, fps=50, limbs=limbs), pr.Tally()
     tally.add(s)

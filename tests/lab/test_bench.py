@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
@@ -14,6 +15,7 @@ from motionloom.lab import bench
 from motionloom.lab.bench import long, prediction, speed, start
 from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.runtime.text.protocol import TextEmbedding
+from motionloom.train.modules import prior_session
 from motionloom.weights.prior import Card, Prior
 from tests.tasks.small_predictor import small_predictor
 
@@ -25,23 +27,16 @@ class Words:
 
     def encode(self, texts: Sequence[str]) -> TextEmbedding:
         rows = len(texts)
-        return TextEmbedding(torch.ones(rows, 3, 8), torch.ones(rows, 3, dtype=torch.bool), torch.ones(rows, 8))
+        return TextEmbedding(
+            np.ones((rows, 3, 8), np.float32), np.ones((rows, 3), bool), np.ones((rows, 8), np.float32)
+        )
 
 
 @pytest.fixture(params=["published", "modulated"])
 def prior(request: pytest.FixtureRequest) -> Prior:
     sizes = {"features": 12, "width": 16, "layers": 2, "heads": 2, "hidden": 32, "text": 8}
-    net = PriorNet(NetConfig(variant=request.param, **sizes)).eval().requires_grad_(False)
-    return Prior(net, cosine(50), torch.zeros(12), torch.ones(12), Words(), Card("tiny"))
-
-
-@pytest.fixture(autouse=True)
-def _one_thread():
-    """Two threads that wait for each other on a busy machine take a hundred times longer on networks this small."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+    net = prior_session(PriorNet(NetConfig(variant=request.param, **sizes)))
+    return Prior(net, cosine(50), np.zeros(12, np.float32), np.ones(12, np.float32), Words(), Card("tiny"))
 
 
 def fake_process(arguments: Sequence[str]) -> bench.Process:
@@ -114,11 +109,11 @@ def test_jobs_are_timed_in_turns_after_a_warm_up() -> None:
 def test_the_long_walk_stops_after_the_timed_steps(prior: Prior) -> None:
     calls: list[int] = []
 
-    def denoise(x: torch.Tensor, level: int) -> torch.Tensor:
+    def denoise(x: np.ndarray, level: int) -> np.ndarray:
         calls.append(level)
         return x
 
-    speed._walk(prior, denoise, torch.zeros(1, 4, 12), list(range(50, -1, -1)), solver=DDPM, stop=20)
+    speed._walk(prior, denoise, np.zeros((1, 4, 12), np.float32), list(range(50, -1, -1)), solver=DDPM, stop=20)
     assert len(calls) == 20
 
 
@@ -156,7 +151,7 @@ def long_prior() -> Prior:
         NetConfig(variant="modulated", features=263, width=16, layers=1, heads=2, hidden=16, text=8, patch=4)
     )
     return Prior(
-        net.eval().requires_grad_(False), cosine(20), torch.zeros(263), torch.full((263,), 0.01), Words(), Card("tiny")
+        prior_session(net), cosine(20), np.zeros(263, np.float32), np.full(263, 0.01, np.float32), Words(), Card("tiny")
     )
 
 
@@ -189,7 +184,7 @@ def test_the_published_takes_are_those_of_the_released_code() -> None:
 
 def test_each_timed_step_of_the_published_recipe_calls_the_network_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     prior, seen = long_prior(), []
-    monkeypatch.setattr(prior.net, "forward", lambda x, level, bound: seen.append(tuple(x.shape[:2])) or x)
+    monkeypatch.setattr(type(prior.net), "__call__", lambda net, x, level, bound: seen.append(tuple(x.shape[:2])) or x)
     first, second = long.published_takes(prior, bench.Sampling(), long.prompts(3), seconds=4.0, steps=5)[1]
     assert first().shape == (3, 100, 263)
     assert seen == [(3, 100)] * 10
@@ -231,7 +226,7 @@ def test_futures_are_measured_beside_the_published_recipe(monkeypatch: pytest.Mo
     asked: list[tuple[int, int]] = []
 
     def recorded(predictor, past, *, count, steps):
-        asked.append((sum(p.numel() for p in predictor.net.parameters()), steps))
+        asked.append((sum(values.size for values in predictor.net.weights.values()), steps))
         return past
 
     monkeypatch.setattr(prediction, "published_futures", recorded)

@@ -39,7 +39,9 @@ def _bench(arguments: argparse.Namespace) -> None:
     if arguments.json:
         write_json(arguments.json, found)
     on = found["machine"]
-    print(f"{on['device']}, {on['cores']} cores, {on['threads']} threads, ONNX Runtime {on['onnxruntime']}, {on['type']}")
+    print(
+        f"{on['device']}, {on['cores']} cores, {on['threads']} threads, ONNX Runtime {on['onnxruntime']}, {on['type']}"
+    )
     print(plain(table(found)))
     if on["load"] > 0.5:
         print(f"\nthe machine was busy when this began (load {on['load']}): run it again when nothing else does")

@@ -91,8 +91,9 @@ def row_seed(seed: int, number: int, turn: int = 0) -> int:
 def row_noise(seeds: Sequence[int], lengths: Sequence[int] | None = None) -> NoiseSource:
     """Noise that belongs to rows: row i takes it from its own generator, seeded with `seeds[i]`.
 
-    So a row's noise does not depend on the other rows, on their count or order. With `lengths` (valid tokens per row) a row has noise for those tokens only and
-    gets zeros behind them, so that its noise does not depend on the padding either.
+    So a row's noise does not depend on the other rows, on their count or order. With `lengths` (valid tokens per row) a
+    row has noise for those tokens only and gets zeros behind them, so that its noise does not depend on the padding
+    either.
     """
     generators = [generator(seed) for seed in seeds]
     if lengths is not None and len(lengths) != len(generators):

@@ -57,8 +57,8 @@ def relative_pose_guidance(
     """
     if not weight or net.silent or net.places.kind != "mutual":
         return lambda state, denoised, level: denoised
-    known = mask[:, 1:, :3].all(axis=-1)
-    both = people(known).all(axis=1)
+    known = np.asarray(mask[:, 1:, :3].all(axis=-1))
+    both = np.asarray(people(known).all(axis=1))
     given = [kept or bool(row.all()) for kept, row in zip(frozen, known, strict=True)]
     past = both.cumprod(axis=1).sum(axis=1).tolist()
     places = Places.of(seeds, known.shape[1], [count + SURE if count else 0 for count in past], given)
@@ -123,10 +123,11 @@ class Places:
         levels = level if isinstance(level, int) else level[rows]
         noised = prior.schedule.noised(code.encode(now).reshape(-1, PLACE), levels, self.noise)
         crops, lengths = _crops(state[:, 1:], rows.tolist(), [frame for frame in at for _ in (0, 1)])
-        asked = Bound(*(one[rows] for one in bound))._replace(lengths=lengths)
+        asked = Bound._make(one[rows] for one in bound)._replace(lengths=lengths)
         answer, _ = part(net(join(noised, crops), levels, asked))
         lacking = _lacking(now, code.decode(people(answer))) * weight
-        return join(places, (self._moved(features, ways, lacking) - prior.mean) / prior.spread)
+        changed = (self._moved(features, ways, lacking) - prior.mean) / prior.spread
+        return join(places, changed.astype(np.float32, copy=False))
 
     def _moved(self, features: np.ndarray, ways: np.ndarray, lacking: np.ndarray) -> np.ndarray:
         """Features (rows, frames, 263) with what lacks at the anchors (all anchors, 3): facing, x and z."""

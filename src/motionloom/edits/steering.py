@@ -183,7 +183,7 @@ def _gain(covariance: Array, asked: NDArray[np.intp], noise: Array) -> Array:
     if not len(asked):
         return np.zeros((len(covariance), 0))
     inner = covariance[np.ix_(asked, asked)] + np.diag(noise**2)
-    return np.linalg.solve(inner, covariance[asked]).T
+    return np.asarray(np.linalg.solve(inner, covariance[asked]).T, dtype=np.float64)
 
 
 def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Array | None) -> _Limbs | None:
@@ -194,7 +194,7 @@ def _limb_plan(asked: NDArray[np.bool_], together: Array, body: Array, still: Ar
     if still is not None:
         inner += still[np.ix_(t, t)]
     inner[np.diag_indices_from(inner)] += EXACT**2
-    return _Limbs((t, j), np.linalg.inv(inner), together)
+    return _Limbs((t, j), np.asarray(np.linalg.inv(inner), dtype=np.float64), together)
 
 
 def _thinned(asked: NDArray[np.bool_]) -> NDArray[np.bool_]:

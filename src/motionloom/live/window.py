@@ -128,7 +128,7 @@ class Sampler:
         guided, late = guide(net, own, null, strong), guide(net, own, null, plain)
         lengths = np.arange(frames, frames - ways, -1)
         own, null = (
-            Bound(*(part.repeat(ways, axis=0) for part in one))._replace(lengths=lengths) for one in (own, null)
+            Bound._make(part.repeat(ways, axis=0) for part in one)._replace(lengths=lengths) for one in (own, null)
         )
         last = self._levels[-2]
         shifted = guide(net, own, null, strong if last in early else plain)

@@ -296,10 +296,7 @@ class _PairDenoiser:
         shown = [self._shown(row, places, level) for row, (_, places), level in zip(rows, parts, at, strict=True)]
         frames = [motion.shape[1] for motion, _ in parts]
         x = np.stack(
-            [
-                join(places, lengthened(motion, max(frames)))
-                for places, (motion, _) in zip(shown, parts, strict=True)
-            ]
+            [join(places, lengthened(motion, max(frames))) for places, (motion, _) in zip(shown, parts, strict=True)]
         )
         denoised = self._estimates(rows, x, frames, at)
         made = []
@@ -359,7 +356,8 @@ class _PairDenoiser:
     def _estimates(
         self, rows: Sequence[_PairRow], x: np.ndarray, frames: Sequence[int], at: Sequence[int]
     ) -> list[np.ndarray]:
-        """Guided estimates (2, 1 + frames, numbers) of rows x (rows, 2, 1 + frames, numbers), one network call for each set of adapters."""
+        """Guided estimates (2, 1 + frames, numbers) of rows x (rows, 2, 1 + frames, numbers), one network call for each
+        set of adapters."""
         denoised: dict[int, np.ndarray] = {}
         for places in same_net([row.people[0] for row in rows]):
             persons = [person for i in places for person in rows[i].people]

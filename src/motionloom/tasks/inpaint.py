@@ -48,9 +48,7 @@ def inpaint_motion(
     meet, reach = joining(known, mask, window.first, window.last), arrival(known, mask, window)
 
     def bent(denoise: Denoiser, _: Batch) -> Denoiser:
-        return lambda state, level: (
-            (reach(meet(denoise(state, level) * spread + prior.mean)) - prior.mean) / spread
-        )
+        return lambda state, level: (reach(meet(denoise(state, level) * spread + prior.mean)) - prior.mean) / spread
 
     def poses(states: np.ndarray) -> Array:
         return _placed(states[0] * spread + prior.mean, known[0], window, place)[None, None]

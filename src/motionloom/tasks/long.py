@@ -272,9 +272,7 @@ def _averaged(
     return cleans
 
 
-def _estimates(
-    prior: Prior, rows: list[Row], states: Sequence[np.ndarray], at: Sequence[int]
-) -> list[np.ndarray]:
+def _estimates(prior: Prior, rows: list[Row], states: Sequence[np.ndarray], at: Sequence[int]) -> list[np.ndarray]:
     """Guided estimates of rows of different lengths and levels, as one network call for each set of adapters."""
     cleans: dict[int, np.ndarray] = {}
     for numbers in same_net(rows):
@@ -292,9 +290,7 @@ def same_net(rows: Sequence[Row]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _estimates_of_one_net(
-    rows: list[Row], states: Sequence[np.ndarray], at: Sequence[int]
-) -> list[np.ndarray]:
+def _estimates_of_one_net(rows: list[Row], states: Sequence[np.ndarray], at: Sequence[int]) -> list[np.ndarray]:
     frames = [len(state) for state in states]
     x = np.stack([lengthened(state, max(frames)) for state in states])
     bound = bound_together([row.cond for row in rows] + [row.null for row in rows])

@@ -121,7 +121,9 @@ class Latest(Generic[R]):
         self.parts: dict[int, Any] = {}
         self.calls: Counter[int] = Counter()
 
-    def report(self, numbers: Sequence[int], rows: Sequence[R], states: Sequence[np.ndarray], at: Sequence[int]) -> None:
+    def report(
+        self, numbers: Sequence[int], rows: Sequence[R], states: Sequence[np.ndarray], at: Sequence[int]
+    ) -> None:
         """Take in what was predicted for some rows, and report the motions that begin with their first row."""
         if _callback.get() is None:
             return

@@ -130,7 +130,9 @@ def train_control(
         find_device(device)
     world, folder = World.join(device), Path(folder)
     prior = Prior.load(recipe.start or "default")
-    motions = restandardised(load_set(data, sources=recipe.sources, seed=recipe.seed), tensor(prior.mean), tensor(prior.std))
+    motions = restandardised(
+        load_set(data, sources=recipe.sources, seed=recipe.seed), tensor(prior.mean), tensor(prior.std)
+    )
     torch.manual_seed(recipe.seed)
     net = _trained(recipe, prior, world.device)
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)

@@ -11,6 +11,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import mask
 from motionloom.lab.papers.diffusion_blending import control_features, controlled
 from motionloom.tasks.sampling import Observed
+from motionloom.train.modules import prior_module
 from motionloom.weights.adapter import adapted
 from tests.nets import tiny
 from tests.noise import normal
@@ -26,7 +27,8 @@ def prior():
 
 @pytest.fixture(scope="module")
 def other(prior):
-    return adapted(prior.net, adapter_of(trained(prior.net), prior.net))
+    net = prior_module(prior)
+    return adapted(prior.net, adapter_of(trained(net), net))
 
 
 def given(names: str = "left_wrist,root_horizontal") -> tuple[np.ndarray, np.ndarray]:
@@ -152,7 +154,8 @@ def test_rows_do_not_depend_on_each_other_and_nothing_leaks_from_what_is_not_giv
 def test_networks_see_what_is_given_only_without_noise(prior, other):
     """MDM's inpainting tells no network what is given; algorithm 2 tells those that can be told."""
     known, flags = given()
-    full = adapter_of(trained(prior.net), prior.net)
+    net = prior_module(prior)
+    full = adapter_of(trained(net), net)
     tensors = {k: v for k, v in full.tensors.items() if not k.startswith("given.")}
     deaf = adapted(prior.net, replace(full, tensors=tensors))
 

@@ -23,6 +23,7 @@ from motionloom.lab.papers.double_take import (
     sandwiches,
     unfold,
 )
+from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.text import sample_features
 from tests.nets import tiny
 
@@ -43,7 +44,7 @@ def second_net(x: np.ndarray, level: int) -> np.ndarray:
 def noise(plan: Plan, seed: int):
     rows = plan.repetitions * len(plan.lengths)
     draws = row_noise(range(seed, seed + rows)), row_noise(range(seed + 100, seed + 100 + rows - plan.repetitions))
-    return draws[0](np.empty(rows, max(plan.lengths), CHANNELS)), draws
+    return draws[0](np.empty((rows, max(plan.lengths), CHANNELS), np.float32)), draws
 
 
 def both(plan: Plan, mode: Mode, seed: int = 0, **how) -> Takes:
@@ -114,7 +115,7 @@ def naive(plan: Plan, mode: str, seed: int) -> tuple[list[np.ndarray], np.ndarra
         for d in range(h + b):
             long[i + 1][d] = y[i, middle + d]
     pieces = [long[0], *(long[i + 1][h:] for i, h in enumerate(hands))]
-    return [row for row in x], np.concatenate(pieces)
+    return list(x), np.concatenate(pieces)
 
 
 PLANS = {
@@ -170,7 +171,7 @@ def test_the_published_mode_changes_just_the_ramps() -> None:
     plan = Plan.of([90, 80, 100], 20, 10)
     takes = both(plan, MODES["published"])
     before = unfold(takes.first, plan)[0]
-    changed = (takes.unfolded[0] != before).any(axis=-1).nonzero().flatten().tolist()
+    changed = (takes.unfolded[0] != before).any(axis=-1).nonzero()[0].tolist()
     wanted = []
     for end in plan.ends[:-1]:
         wanted += [*range(end - 30, end - 20), *range(end, end + 10)]
@@ -180,7 +181,7 @@ def test_the_published_mode_changes_just_the_ramps() -> None:
 def test_the_paper_mode_changes_ramps_and_handshakes() -> None:
     plan = Plan.of([90, 80, 100], 20, 10)
     takes = both(plan, MODES["paper"])
-    changed = (takes.unfolded[0] != unfold(takes.first, plan)[0]).any(axis=-1).nonzero().flatten().tolist()
+    changed = (takes.unfolded[0] != unfold(takes.first, plan)[0]).any(axis=-1).nonzero()[0].tolist()
     assert changed == [frame for end in plan.ends[:-1] for frame in range(end - 30, end + 10)]
 
 
@@ -226,7 +227,7 @@ def test_the_long_motion_has_every_frame_once(data: st.DataObject) -> None:
     rows = np.full((count, max(lengths), 1), -1.0)
     for row, (start, length) in enumerate(zip(starts, lengths, strict=True)):
         rows[row, :length, 0] = np.arange(start, start + length)
-    x = rows.repeat(plan.repetitions, 1, 1)
+    x = np.tile(rows, (plan.repetitions, 1, 1))
     total = sum(lengths) - sum(hands)
     assert plan.ends[-1] == total
     assert np.array_equal(unfold(x, plan)[..., 0], np.broadcast_to(np.arange(total), (plan.repetitions, total)))
@@ -332,15 +333,15 @@ def test_paper_rows_do_not_see_the_padding_and_published_rows_do() -> None:
     assert not np.allclose(first_rows("published", 75), first_rows("published", 90), atol=1e-3)
 
 
-def test_a_network_with_flags_sees_what_is_shared() -> None:
+def test_a_network_with_flags_sees_what_is_shared(monkeypatch: pytest.MonkeyPatch) -> None:
     """Handshake frames are flagged in the first take, so that another handshake changes frames far from it."""
     from dataclasses import replace
 
     prior = tiny.prior(replace(tiny.PUBLISHED, flags=True))
     made, _ = double_take_features(prior, PROMPTS[:2], [70, 75], ramp=10, steps=4, first_take_only=True)
     seen: list[np.ndarray] = []
-    bind = prior.net.bind
-    prior.net.bind = lambda cond: seen.append(cond.flags) or bind(cond)  # type: ignore[method-assign]
+    bind = PriorSession.bind
+    monkeypatch.setattr(PriorSession, "bind", lambda net, cond: seen.append(cond.flags) or bind(net, cond))
     double_take_features(prior, PROMPTS[:2], [70, 75], ramp=10, steps=4)
     assert made.shape == (125, 263)
     assert seen[0].tolist() == flags(Plan.of([70, 75], 20, 10)).tolist()

@@ -106,7 +106,9 @@ def test_part_control_holds_a_part_in_all_frames_and_shares_its_noise() -> None:
     motion = some(1, 20, 48)
     made = complete(motion[:, :5], 3, fixed=Fixed(motion, PARTS["left_arm"]))[1]
     held = slice(30, 39)  # the published channels 3 * 10 to 3 * 12 + 3
-    np.testing.assert_allclose(made[..., held], np.broadcast_to(motion, (3, -1, -1))[..., held], atol=0.05, rtol=0)
+    np.testing.assert_allclose(
+        made[..., held], np.broadcast_to(motion, (3, *motion.shape[1:]))[..., held], atol=0.05, rtol=0
+    )
     assert np.array_equal(made[0, ..., held], made[1, ..., held])
     free = np.ones((48,), dtype=np.bool_)
     free[held] = False

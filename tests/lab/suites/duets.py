@@ -7,6 +7,8 @@ import numpy as np
 
 from motionloom.data.pairs import Pair
 from motionloom.nets.pair import Talk, fitting
+from motionloom.train.export import pair_graph
+from motionloom.train.modules import arrays
 from motionloom.weights.adapter import fingerprint
 from motionloom.weights.pair import PairBlock
 from tests.kinematics.people import standing, walking
@@ -24,7 +26,8 @@ def pair_of(positions: np.ndarray, name: str = "p", split: str = "val", said: Se
 
 def block_over(prior) -> PairBlock:
     talk = Talk(fitting(prior.net.config), prior.net.config)
-    return PairBlock("b", talk.config, talk.state_dict(), "tiny", fingerprint(prior.net))
+    graph = pair_graph(talk.config, prior.net.config)
+    return PairBlock("b", talk.config, arrays(talk), "tiny", fingerprint(prior.net), graph=graph)
 
 
 @dataclass(frozen=True)

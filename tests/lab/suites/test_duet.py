@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 
 from motionloom.cli import main
 from motionloom.errors import MotionloomError
@@ -23,13 +22,16 @@ from motionloom.lab.suites.duet_ways import FRAMES, Crops
 from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.needs import NoData, pairs_of
 from motionloom.nets.pair import Talk, fitting
-from motionloom.nets.prior import condition
+from motionloom.runtime.prior_condition import condition
+from motionloom.train.export import pair_graph
+from motionloom.train.modules import arrays
 from motionloom.weights.adapter import fingerprint
 from motionloom.weights.pair import PairBlock
 from tests.kinematics.people import FPS
 from tests.lab.suites.duets import block_over, couple, pair_of
 from tests.nets import tiny
 from tests.nets.text.tiny import WIDTH as TEXT
+from tests.noise import normal
 
 
 def gliding(speed: float, seconds: float = 6.0) -> np.ndarray:
@@ -113,11 +115,11 @@ class Oracle:
     def __init__(self, crops: Crops) -> None:
         self.asked: list[dict[str, Any]] = []
         encoded = [two.encode(crop) for crop in crops.positions]
-        self.features = torch.from_numpy(np.stack([one.features for one in encoded]))
+        self.features = np.stack([one.features for one in encoded])
 
-    def __call__(self, prior, net, prompts, frames, **how) -> tuple[torch.Tensor, torch.Tensor]:
+    def __call__(self, prior, net, prompts, frames, **how) -> tuple[np.ndarray, np.ndarray]:
         self.asked.append({"prompts": prompts, "frames": frames, **how})
-        return self.features[: len(prompts) // 2], torch.zeros(len(prompts) // 2, 2, 4)
+        return self.features[: len(prompts) // 2], np.zeros((len(prompts) // 2, 2, 4))
 
 
 @pytest.mark.parametrize(("given", "slots"), [("past", 21), ("tool", 21), ("published", 20)])
@@ -133,10 +135,10 @@ def test_a_sampler_that_knows_what_came_has_no_error(given: str, slots: int) -> 
     known, mask = asked["edits"].observed.values, asked["edits"].observed.mask
     assert known.shape == (6, 1 + FRAMES, 263)
     assert mask[:, :, 0].sum(1).tolist() == [slots] * 6
-    place = net.talk.config.places.encode(two.encode(crops.positions[1]).poses)
+    place = net.places.encode(two.encode(crops.positions[1]).poses)
     np.testing.assert_allclose(known[2:4, 0, :4], place, atol=1e-5)
-    held = ((known[:2, 1:slots] * prior.std) + prior.mean).numpy()
-    local = oracle.features[0, :, : slots - 1].numpy()
+    held = (known[:2, 1:slots] * prior.std) + prior.mean
+    local = oracle.features[0, :, : slots - 1]
     np.testing.assert_allclose(held[..., 4:67], local[..., 4:67], atol=1e-4)
 
 
@@ -162,12 +164,12 @@ def test_a_real_sampler_of_random_weights_keeps_the_given_second() -> None:
 def test_layers_of_the_bare_prior_do_nothing(config) -> None:
     """What one frame says reaches no other, and words only through what all frames share."""
     prior = ways.bare(tiny.prior(config))
-    words = torch.randn(1, 5, TEXT)
+    words = normal((1, 5, TEXT))
     bound = prior.net.bind(condition(words.mean(1), tokens=words if config.variant == "modulated" else None))
-    x = torch.randn(1, 16, 263)
-    other = x.clone()
+    x = normal((1, 16, 263), 1)
+    other = x.copy()
     other[:, 4:8] += 1.0
-    apart = (prior.net(x, 3, bound) - prior.net(other, 3, bound)).abs().amax(-1)[0]
+    apart = np.abs(prior.net(x, 3, bound) - prior.net(other, 3, bound)).max(-1)[0]
     assert apart[:4].max() < 1e-5
     assert apart[8:].max() < 1e-5
     assert apart[4:8].min() > 1e-3
@@ -179,7 +181,7 @@ def test_communication_only_takes_a_block_of_the_bare_prior_alone(tmp_path: Path
     wrong = block_over(prior).save(tmp_path / "wrong.safetensors")
     silent, net = ways.only_communication(prior, right)
     assert fingerprint(silent.net) == fingerprint(ways.bare(prior).net) != fingerprint(prior.net)
-    assert net.talk.config.split == prior.net.config.layers
+    assert net.block.split == prior.net.config.layers
     with pytest.raises(MotionloomError, match="belongs to the weights"):
         ways.only_communication(prior, wrong)
 
@@ -280,7 +282,8 @@ def test_a_transformer_from_its_file_is_a_row(tmp_path: Path) -> None:
 def saved(prior, path: Path, name: str, **sizes: Any) -> Path:
     """A fresh block of other sizes, in a file."""
     talk = Talk(fitting(prior.net.config, **sizes), prior.net.config)
-    return PairBlock(name, talk.config, talk.state_dict(), "tiny", fingerprint(prior.net)).save(path)
+    graph = pair_graph(talk.config, prior.net.config)
+    return PairBlock(name, talk.config, arrays(talk), "tiny", fingerprint(prior.net), graph=graph).save(path)
 
 
 def test_other_blocks_are_rows_by_their_names_and_sizes(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.runtime.text.protocol import TextEmbedding
 from motionloom.tasks.long import compose
 from motionloom.tasks.splice import concatenated
+from motionloom.train.modules import prior_session
 from motionloom.weights.prior import Card, Prior
 from tests.kinematics.people import walking
 
@@ -26,7 +27,9 @@ class Words:
 
     def encode(self, texts: Sequence[str]) -> TextEmbedding:
         rows = len(texts)
-        return TextEmbedding(torch.ones(rows, 3, 8), torch.ones(rows, 3, dtype=torch.bool), torch.ones(rows, 8))
+        return TextEmbedding(
+            np.ones((rows, 3, 8), np.float32), np.ones((rows, 3), bool), np.ones((rows, 8), np.float32)
+        )
 
 
 @pytest.fixture
@@ -34,10 +37,8 @@ def prior() -> Prior:
     """An untrained network around the features of a walk: people that tremble."""
     torch.manual_seed(0)
     net = PriorNet(NetConfig(variant="modulated", width=16, layers=1, heads=2, hidden=16, text=8, patch=4))
-    features = torch.from_numpy(humanml.encode(walking(1.0), heading="corrected"))
-    return Prior(
-        net.eval().requires_grad_(False), cosine(50), features.mean(0), features.std(0) + 0.01, Words(), Card("tiny")
-    )
+    features = humanml.encode(walking(1.0), heading="corrected")
+    return Prior(prior_session(net), cosine(50), features.mean(0), features.std(0) + 0.01, Words(), Card("tiny"))
 
 
 def test_row_i_comes_from_seed_plus_i_and_has_the_length_asked_for(prior: Prior) -> None:

@@ -69,7 +69,7 @@ def test_networks_differ_in_what_is_said_and_finished_ones_are_found_again(small
     one = studies.network(lab(keep), "kept", 3)
     again = studies.network(lab(keep, say=pytest.fail), "kept", 3)
     assert again.basis.kept == 3
-    assert np.array_equal(one.net.out.weight.numpy(), again.net.out.weight.numpy())
+    assert np.array_equal(one.net.weights["net.out.weight"], again.net.weights["net.out.weight"])
     other = replace(lab(keep), budget=replace(SMALL, seed=1))
     with pytest.raises(MotionloomError, match="--keep"):
         studies.network(other, "kept", 3)

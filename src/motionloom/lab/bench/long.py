@@ -179,7 +179,7 @@ def in_two_calls(prior: Prior, bound: Bound, null: Bound, scale: float) -> Denoi
 
     def denoise(x: np.ndarray, level: int) -> np.ndarray:
         with_text = prior.net(x, level, bound)
-        return lerp(prior.net(x, level, null), with_text, np.float32(scale))
+        return lerp(prior.net(x, level, null), with_text, np.array(scale, np.float32))
 
     return denoise
 

@@ -91,7 +91,9 @@ def timed(jobs: Sequence[Callable[[], Any]], repeats: int, *, warm: int | None =
     return [median(kept) for kept in times]
 
 
-def _walk(prior: Prior, denoise: Denoiser, x: np.ndarray, way: Sequence[int], *, solver: Solver, stop: int | None) -> None:
+def _walk(
+    prior: Prior, denoise: Denoiser, x: np.ndarray, way: Sequence[int], *, solver: Solver, stop: int | None
+) -> None:
     walk = sample(
         denoise, x, levels=way, solver=solver, schedule=prior.schedule, noise=row_noise(range(len(x)))
     )  # fmt: skip
@@ -118,16 +120,18 @@ def speed_of_default(prior: Prior, how: Sampling, *, seconds: float, repeats: in
     return Entry("1000 steps / default", ratio, "times", ">= 40", ratio >= 40, note)
 
 
-def flops(prior: Prior, x: np.ndarray, level: int) -> int:
-    """Floating-point operations of the matrix products in a guided call, two per multiplication and addition.
+def flops(call: Callable[[], Any]) -> int:
+    """Floating-point operations of the matrix products in a call of PyTorch, two per multiplication and addition."""
+    with torch.inference_mode(), sdpa_kernel(SDPBackend.MATH), FlopCounterMode(display=False) as counter:
+        call()
+    return counter.get_total_flops()
 
-    They are counted in the module of the same network.
-    """
+
+def guided_flops(prior: Prior, x: np.ndarray, level: int) -> int:
+    """`flops` of a guided call, counted in the module of the same network."""
     net, both = prior_module(prior), tensor(np.concatenate([x, x]))
     bound = net.bind(conditions(prior.condition([PROMPT] * len(both))))
-    with torch.inference_mode(), sdpa_kernel(SDPBackend.MATH), FlopCounterMode(display=False) as counter:
-        net(both, level, bound)
-    return counter.get_total_flops()
+    return flops(lambda: net(both, level, bound))
 
 
 def efficiency(
@@ -138,7 +142,7 @@ def efficiency(
     level = max(1, prior.schedule.steps // 2)
 
     squares = [np.random.default_rng(0).standard_normal((n, n), np.float32) for n in sizes]
-    work = flops(prior, x, level)
+    work = guided_flops(prior, x, level)
     spent, *products = timed([_call(denoise, x, level), *[_product(a) for a in squares]], repeats)
     best = max(2 * n**3 / t for n, t in zip(sizes, products, strict=True))
     share = 100 * work / spent / best

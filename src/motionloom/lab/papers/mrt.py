@@ -68,7 +68,10 @@ class Mrt(nn.Module):
 
     def __init__(self, config: MrtConfig) -> None:
         super().__init__()
-        self.config, self.basis = config, Dct(config.frames, config.frames)
+        self.config = config
+        self.basis = torch.from_numpy(
+            Dct(config.frames, config.frames).matrix
+        )  # orthonormal: transposed it is the way back
         numbers = 3 * JOINTS
         self.local_in, self.global_in, self.ask = (nn.Linear(numbers, config.width) for _ in range(3))
         self.local, self.everybody, self.decoder = (
@@ -95,11 +98,11 @@ class Mrt(nn.Module):
         for layer in self.decoder:
             query = layer(query, memory)
         spectrum = self.out(F.gelu(self.expand(query)).view(len(query), frames, -1))
-        return self.basis.to_time(spectrum).view(rows, people, frames, JOINTS, 3)
+        return (self.basis.to(spectrum).mT @ spectrum).view(rows, people, frames, JOINTS, 3)
 
     def _own(self, places: Tensor) -> Tensor:
         """(rows * people, frames, 66) to (rows * people, frames - 1, width)."""
-        x = self.local_in(self.basis.to_spectrum(places).diff(dim=1))
+        x = self.local_in((self.basis.to(places) @ places).diff(dim=1))
         x = x + _times(x.shape[1], x)
         for layer in self.local:
             x = layer(x, x)

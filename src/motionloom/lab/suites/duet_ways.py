@@ -115,10 +115,7 @@ def drawn(
 
     def way(crops: Crops, sample: int) -> Array:
         known = [two.encode(seen(crop, given)) for crop in crops.positions]
-        states = [
-            known_state(prior, net, one.features, one.poses, FRAMES)
-            for one in known
-        ]
+        states = [known_state(prior, net, one.features, one.poses, FRAMES) for one in known]
         people = [person for one in known for person in one.features]
         leaving = [Past(person, GroundPose()).holder(prior, FRAMES) for person in people]
         features, _ = make(
