@@ -219,8 +219,10 @@ def bits(rows: int, ways: list[str], options: list[str]) -> bool:
     from motionloom.bulk.maker import TOGETHER, Options
 
     known = dict(zip(options[::2], options[1::2], strict=True))
-    print(f"\nthe same bits: {rows} rows of 1 to 2.5 s, every eighth of two people; metres from each row made alone "
-          f"(at most {TOLERANCE:g})")  # fmt: skip
+    print(
+        f"\nthe same bits: {rows} rows of 1 to 2.5 s, every eighth of two people; metres from each row made alone "
+        f"(at most {TOLERANCE:g})"
+    )
     with tempfile.TemporaryDirectory(prefix="motionloom-") as name:
         folder = Path(name)
         lines = job(folder / "jobs.jsonl", rows, 1.0, 1.5, 2.0, 2.5).read_text().splitlines()
@@ -271,8 +273,10 @@ def _apart(a: Any, b: Any) -> float:
 def by_way(ways: list[str], rows: int, options: list[str], arguments: argparse.Namespace) -> None:
     """The first two parts."""
     most = {n: pure_rate(n, max(rows // n, CALL), arguments.steps, arguments.weights) for n in (1, 2)}
-    print(f"\nmotions of 4 s, {arguments.steps} steps, {rows} of them; sampling and body solving alone: "
-          f"{most[1]:.1f} a minute in one process, {most[2]:.1f} in two")  # fmt: skip
+    print(
+        f"\nmotions of 4 s, {arguments.steps} steps, {rows} of them; sampling and body solving alone: "
+        f"{most[1]:.1f} a minute in one process, {most[2]:.1f} in two"
+    )
     print(
         f"{'way':<16} {'start s':>8} {'s each':>8} {'a minute':>9} {'of alone':>9} {'driver MB':>10} {'worker MB':>10}"
     )
@@ -282,8 +286,11 @@ def by_way(ways: list[str], rows: int, options: list[str], arguments: argparse.N
         name = way if lengths == (4.0,) else "mixed lengths"
         rates[name] = found.rate
         share = f"{found.rate / most[1 if way == 'one process' else 2]:.0%}" if lengths == (4.0,) else "-"
-        print(f"{name:<16} {found.start:8.1f} {found.each:8.3f} {found.rate:9.1f} {share:>9} {found.driver:10.0f} "
-              f"{found.worker:10.0f}", flush=True)  # fmt: skip
+        print(
+            f"{name:<16} {found.start:8.1f} {found.each:8.3f} {found.rate:9.1f} {share:>9} {found.driver:10.0f} "
+            f"{found.worker:10.0f}",
+            flush=True,
+        )
     for way in ways[1:]:
         print(f"{way}: {rates[way] / rates['one process']:.2f} times one process (the aim is 1.7)")
 

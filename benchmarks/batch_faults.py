@@ -172,9 +172,12 @@ class Disk:
     def __init__(self, place: Path) -> None:
         self.place = place
         place.mkdir()
-        self.mounted = subprocess.run(
-            ["mount", "-t", "tmpfs", "-o", f"size={ROOM}", "tmpfs", str(place)], check=False, capture_output=True
-        ).returncode == 0  # fmt: skip
+        self.mounted = (
+            subprocess.run(
+                ["mount", "-t", "tmpfs", "-o", f"size={ROOM}", "tmpfs", str(place)], check=False, capture_output=True
+            ).returncode
+            == 0
+        )
 
     def resize(self, size: str) -> None:
         """Make it larger, or smaller than it is but not than what it holds."""
@@ -356,10 +359,24 @@ def strike(folder: Path, disk: Disk, arguments: argparse.Namespace) -> list[str]
     out = disk.place / "out"
     job(folder / "jobs.jsonl", arguments.rows, poisoned=True)
     command = [
-        sys.executable, __file__, "--driver", str(folder / "jobs.jsonl"), "--out", str(out), "--format", "webdataset",
-        "--workers", "2", "--weights", arguments.weights, "--steps",
-        str(arguments.steps), "--filter", "obeys", "--json",
-    ]  # fmt: skip
+        sys.executable,
+        __file__,
+        "--driver",
+        str(folder / "jobs.jsonl"),
+        "--out",
+        str(out),
+        "--format",
+        "webdataset",
+        "--workers",
+        "2",
+        "--weights",
+        arguments.weights,
+        "--steps",
+        str(arguments.steps),
+        "--filter",
+        "obeys",
+        "--json",
+    ]
     command += [] if arguments.without_ray else ["--ray", f"127.0.0.1:{PORT}"]
     cluster = Alone() if arguments.without_ray else Cluster(folder)
     one = None

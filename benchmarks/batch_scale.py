@@ -46,11 +46,27 @@ def entry(row: int) -> dict[str, Any]:
     measures = dict.fromkeys(("skate", "skate_speed", "penetration", "floating", "jerk", "peak_jerk"), 12.3456)
     key = f"{row:032x}"
     return {
-        "row": row, "state": "made", "id": key, "key": key, "task": "generate",
-        "text": "a person walks forward and waves", "seed": row, "people": 1, "frames": 80, "fps": 20.0, "seconds": 4.0,
-        **measures, "travel": 4.1234, "speed": 1.0234, "turn": 12.3456, "error": None, "worst": None, "apart": None,
-        "nearest": None, "obeys": None,
-    }  # fmt: skip
+        "row": row,
+        "state": "made",
+        "id": key,
+        "key": key,
+        "task": "generate",
+        "text": "a person walks forward and waves",
+        "seed": row,
+        "people": 1,
+        "frames": 80,
+        "fps": 20.0,
+        "seconds": 4.0,
+        **measures,
+        "travel": 4.1234,
+        "speed": 1.0234,
+        "turn": 12.3456,
+        "error": None,
+        "worst": None,
+        "apart": None,
+        "nearest": None,
+        "obeys": None,
+    }
 
 
 def fill(jobs: Path, out: Path, size: int, whole: int) -> None:

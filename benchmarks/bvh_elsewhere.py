@@ -51,8 +51,12 @@ def three(files: list[Path], folder: Path) -> list[dict[str, np.ndarray]]:
     """(frames, 3) world places of each joint, by name, for each file."""
     ended = subprocess.run(
         ["node", "--input-type=module", "-e", _THREE, *map(str, files)],
-        cwd=folder, check=False, capture_output=True, text=True, timeout=600,
-    )  # fmt: skip
+        cwd=folder,
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
     if ended.returncode:
         sys.exit(f"three.js does not run: {ended.stderr.strip()[-500:]}")
     return [{k: np.array(v) for k, v in one.items()} for one in json.loads(ended.stdout)]

@@ -48,8 +48,12 @@ def validated(files: list[Path], validator: Path) -> list[Counter[str]]:
     """How often each error and warning (the validator's severities 0 and 1) is found, for each file."""
     ended = subprocess.run(
         ["node", "-e", _SCRIPT, *(str(file.resolve()) for file in files)],
-        cwd=validator, check=False, capture_output=True, text=True, timeout=600,
-    )  # fmt: skip
+        cwd=validator,
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
     if ended.returncode:
         sys.exit(f"the validator does not run: {ended.stderr.strip()[-500:]}")
     kinds = ("error", "warning")

@@ -150,11 +150,12 @@ def steering(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
         "to_running_s": {"median": statistics.median(running), "worst": max(running)},
         "to_the_new_way_s": {"median": statistics.median(turns), "worst": max(turns)},
         "planted_slide_mm_per_frame": {
-            "steered": float(np.nanmean(np.concatenate(slides))), "walking": statistics.mean(plain),
+            "steered": float(np.nanmean(np.concatenate(slides))),
+            "walking": statistics.mean(plain),
             "steered_worst": float(np.nanmax(np.concatenate(slides))),
         },
         "standing_foot_moved_mm": {"mean": statistics.mean(stood), "worst": max(stood)},
-    }  # fmt: skip
+    }
 
 
 def _stood(places: np.ndarray) -> float:
@@ -272,9 +273,12 @@ class _Client:
 def _counted(client: _Client) -> dict[str, Any]:
     late = client.late()
     return {
-        "frames": len(late), "nothing_lost": client.whole(), "late": sum(wait > LATE for wait in late),
-        "worst_s": max(late, default=0.0), "late_means_s": LATE,
-    }  # fmt: skip
+        "frames": len(late),
+        "nothing_lost": client.whole(),
+        "late": sum(wait > LATE for wait in late),
+        "worst_s": max(late, default=0.0),
+        "late_means_s": LATE,
+    }
 
 
 def latency(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
@@ -312,10 +316,14 @@ def latency(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
     if not waits:
         raise SystemExit("no command was answered in this time; give more --minutes")
     return {
-        "median_s": statistics.median(waits), "p99_s": waits[min(len(waits) - 1, int(0.99 * len(waits)))],
-        "commands": len(waits), **_counted(client), "ahead_s": health.ahead, "times_faster": health.times,
+        "median_s": statistics.median(waits),
+        "p99_s": waits[min(len(waits) - 1, int(0.99 * len(waits)))],
+        "commands": len(waits),
+        **_counted(client),
+        "ahead_s": health.ahead,
+        "times_faster": health.times,
         "problem": health.problem,
-    }  # fmt: skip
+    }
 
 
 BEHAVIOUR = ("flood", "rubbish", "slow", "silent", "comes back")
@@ -389,10 +397,16 @@ def abuse(prior: Prior, seeds: int, minutes: float) -> dict[str, Any]:
     left = len(sessions)
     sessions.close()
     return {
-        "minutes": minutes, "good": _counted(good), "bad_connections": seen, "frames_lost_by_the_bad_one": lost,
-        "flood_read_per_second": read[0] / max(read[1], 1e-9), "longest_queue": queue[0], "queue_limit": WAITING,
-        "sessions_left": left, "memory_mb": [round(mb, 1) for mb in memory[:: max(1, len(memory) // 10)]],
-    }  # fmt: skip
+        "minutes": minutes,
+        "good": _counted(good),
+        "bad_connections": seen,
+        "frames_lost_by_the_bad_one": lost,
+        "flood_read_per_second": read[0] / max(read[1], 1e-9),
+        "longest_queue": queue[0],
+        "queue_limit": WAITING,
+        "sessions_left": left,
+        "memory_mb": [round(mb, 1) for mb in memory[:: max(1, len(memory) // 10)]],
+    }
 
 
 PARTS = {"words": words, "steering": steering, "speed": speed_, "pair": pair, "latency": latency, "abuse": abuse}

@@ -166,9 +166,16 @@ def tried(name: str, folder: str, out: Path, *, steps: int, seeds: int) -> dict[
     torch.manual_seed(recipe.seed)
     net, schedule = PriorNet(NetConfig.parse(recipe.net)), SCHEDULES[recipe.schedule](recipe.levels)
     objective = Objective(
-        trial, net, schedule, batches, words(data.texts), drop_text=recipe.drop_text,
-        displacement=recipe.displacement, early=recipe.early, heights=recipe.heights,
-    )  # fmt: skip
+        trial,
+        net,
+        schedule,
+        batches,
+        words(data.texts),
+        drop_text=recipe.drop_text,
+        displacement=recipe.displacement,
+        early=recipe.early,
+        heights=recipe.heights,
+    )
     other = held_out(folder, recipe, data)
     held = CleanError(net, schedule, Batches(other), words(other.texts), drop_text=0.0)
     began = time.perf_counter()

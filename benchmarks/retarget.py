@@ -32,10 +32,22 @@ from motionloom.retarget.floor import level
 
 Array = NDArray[np.float64]
 DEFAULT = (
-    "*02/02_01.amc", "*07/07_01.amc", "*16/16_15.amc", "*35/35_01.amc", "*bvh/07_04.bvh", "*bvh/10_04.bvh",
-    "*bvh/12_01.bvh", "*1_walk_normal_001.bvh", "*1_walk_old_001.bvh", "*1_run_happy_001.bvh", "*1_dance-short_normal*",
-    "*02/02_03.amc", "*49/49_07.amc", "*01/01_03.amc", "*bvh/13_01.bvh",
-)  # fmt: skip
+    "*02/02_01.amc",
+    "*07/07_01.amc",
+    "*16/16_15.amc",
+    "*35/35_01.amc",
+    "*bvh/07_04.bvh",
+    "*bvh/10_04.bvh",
+    "*bvh/12_01.bvh",
+    "*1_walk_normal_001.bvh",
+    "*1_walk_old_001.bvh",
+    "*1_run_happy_001.bvh",
+    "*1_dance-short_normal*",
+    "*02/02_03.amc",
+    "*49/49_07.amc",
+    "*01/01_03.amc",
+    "*bvh/13_01.bvh",
+)
 ARMS, LEGS = (13, 14, 16, 17, 18, 19), (1, 2, 4, 5)
 
 

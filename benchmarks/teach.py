@@ -120,20 +120,47 @@ def flip(p: Array, fps: float) -> bool:
 
 
 ACTIONS = (
-    Action("arm_back", "a person pulls the right arm back behind the hip",
-           ("a person pulls the right arm back behind the hip", "someone pulls an arm backward and brings it forward"),
-           ("ui_m08",), r"\barms?\b.* (?:back|behind)", arm_back),
-    Action("forearm", "a person turns the forearm with the elbow lifted to the side",
-           ("a person turns the forearm with the elbow lifted to the side", "someone rotates the lifted, bent arm"),
-           ("ui_m09",), r"rotat|forearm", forearm),
-    Action("charleston", "a person dances the charleston",
-           ("a person dances the charleston", "someone does the charleston"),
-           ("93_c", "mesh2motion_dance_charleston"), r"danc|charleston", charleston),
-    Action("windows", "a person washes windows", ("a person washes windows", "someone wipes a window pane"),
-           ("14_10", "14_12"), r"wash|wip|clean|scrub", wipe),
-    Action("flip", "a person does a flip", ("a person does a flip", "someone does a somersault in the air"),
-           ("88_01", "87_b1", "90_08"), r"flip|spring|somersault", flip),
-)  # fmt: skip
+    Action(
+        "arm_back",
+        "a person pulls the right arm back behind the hip",
+        ("a person pulls the right arm back behind the hip", "someone pulls an arm backward and brings it forward"),
+        ("ui_m08",),
+        r"\barms?\b.* (?:back|behind)",
+        arm_back,
+    ),
+    Action(
+        "forearm",
+        "a person turns the forearm with the elbow lifted to the side",
+        ("a person turns the forearm with the elbow lifted to the side", "someone rotates the lifted, bent arm"),
+        ("ui_m09",),
+        r"rotat|forearm",
+        forearm,
+    ),
+    Action(
+        "charleston",
+        "a person dances the charleston",
+        ("a person dances the charleston", "someone does the charleston"),
+        ("93_c", "mesh2motion_dance_charleston"),
+        r"danc|charleston",
+        charleston,
+    ),
+    Action(
+        "windows",
+        "a person washes windows",
+        ("a person washes windows", "someone wipes a window pane"),
+        ("14_10", "14_12"),
+        r"wash|wip|clean|scrub",
+        wipe,
+    ),
+    Action(
+        "flip",
+        "a person does a flip",
+        ("a person does a flip", "someone does a somersault in the air"),
+        ("88_01", "87_b1", "90_08"),
+        r"flip|spring|somersault",
+        flip,
+    ),
+)
 """``recipes/default.toml`` leaves their clips out of the set that the default prior is trained on."""
 
 
@@ -217,9 +244,14 @@ def measure(action: Action, rows: list[dict[str, Any]], prior: Prior, arguments:
     captions = [f"{when}: {prompt}" for when in ("before", "after") for prompt in action.prompts]
     draw_sheet([*first, *last], arguments.out / f"{action.name}.png", captions=captions)
     result = {
-        "clips": [row["clip"] for row in chosen], "check": tried(action, rows), "before": before, "after": after,
-        "seeds": arguments.seeds, "teaching_seconds": round(seconds), "megabytes": round(place.stat().st_size / 1e6, 2),
-    }  # fmt: skip
+        "clips": [row["clip"] for row in chosen],
+        "check": tried(action, rows),
+        "before": before,
+        "after": after,
+        "seeds": arguments.seeds,
+        "teaching_seconds": round(seconds),
+        "megabytes": round(place.stat().st_size / 1e6, 2),
+    }
     if arguments.old:
         result |= {"old_after": old_ones(taught, arguments.old)}
     print(json.dumps(result), flush=True)

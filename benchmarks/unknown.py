@@ -35,9 +35,12 @@ def main() -> None:
         raise SystemExit(f"{arguments.weights} has no table of what it knows")
     unknown = tomllib.loads((HERE / "unknown.toml").read_text(encoding="utf-8"))
     held = [
-        text for clip in read_clips(arguments.set, splits=("val", "test")) for note in clip.notes
-        if note.kind == "human" for text in note.texts
-    ]  # fmt: skip
+        text
+        for clip in read_clips(arguments.set, splits=("val", "test"))
+        for note in clip.notes
+        if note.kind == "human"
+        for text in note.texts
+    ]
     asked = {
         "captions of clips held out": list(dict.fromkeys(held)),
         "everyday prompts": parts([check.prompt for check in EVERYDAY]),

@@ -58,39 +58,106 @@ class Case:
 CASES = (
     Case("s_curve", "a person walks", 8.0, {"path": {"curve": "s", "size": 3.0}}),
     Case("figure_eight", "a person walks", 14.0, {"path": {"curve": "eight", "size": 4.0}}),
-    Case("letter", "a person writes in the air with the right hand", 5.0, {"joints": [{
-        "joint": "right_wrist", "curve": True, "points": [
-            {"time": 1.0, "position": [-0.35, 1.5, 0.4]}, {"time": 1.8, "position": [-0.07, 1.5, 0.42]},
-            {"time": 2.8, "position": [-0.35, 1.25, 0.4]}, {"time": 3.6, "position": [-0.05, 1.25, 0.4]}]}]}),
-    Case("wrist_every_second", "a person stretches the left arm", 5.0, {"joints": [{
-        "joint": "left_wrist", "points": [
-            {"time": 1.0, "position": [0.4, 1.0, 0.3]}, {"time": 2.0, "position": [0.3, 1.5, 0.35]},
-            {"time": 3.0, "position": [0.45, 1.7, 0.1]}, {"time": 4.0, "position": [0.4, 1.0, 0.3]}]}]}),
-    Case("stop", "a person walks, stops and walks on", 6.5, {
-        "path": {"points": [[0, 0], [0, 2], [0, 2], [1.5, 3.5]], "times": [0, 2, 3.5, 6]}}),
-    Case("pose_of_another_skeleton", "a person stands up and walks", 5.0, {
-        "start": {"position": [0, 0], "facing": 0}, "poses": [{"time": 0, "from": OWN_POSE, "at": 0}]}, example=False),
-    Case("six_way_points", "a person walks", 20.0, {
-        "path": {"points": [[0, 0], [0, 4], [3, 6], [6, 4], [5, 0], [2, -2], [-1, -1]],
-                 "times": [0, 3.3, 6.6, 10.0, 13.3, 16.6, 19.5]}}, example=False),
-)  # fmt: skip
+    Case(
+        "letter",
+        "a person writes in the air with the right hand",
+        5.0,
+        {
+            "joints": [
+                {
+                    "joint": "right_wrist",
+                    "curve": True,
+                    "points": [
+                        {"time": 1.0, "position": [-0.35, 1.5, 0.4]},
+                        {"time": 1.8, "position": [-0.07, 1.5, 0.42]},
+                        {"time": 2.8, "position": [-0.35, 1.25, 0.4]},
+                        {"time": 3.6, "position": [-0.05, 1.25, 0.4]},
+                    ],
+                }
+            ]
+        },
+    ),
+    Case(
+        "wrist_every_second",
+        "a person stretches the left arm",
+        5.0,
+        {
+            "joints": [
+                {
+                    "joint": "left_wrist",
+                    "points": [
+                        {"time": 1.0, "position": [0.4, 1.0, 0.3]},
+                        {"time": 2.0, "position": [0.3, 1.5, 0.35]},
+                        {"time": 3.0, "position": [0.45, 1.7, 0.1]},
+                        {"time": 4.0, "position": [0.4, 1.0, 0.3]},
+                    ],
+                }
+            ]
+        },
+    ),
+    Case(
+        "stop",
+        "a person walks, stops and walks on",
+        6.5,
+        {"path": {"points": [[0, 0], [0, 2], [0, 2], [1.5, 3.5]], "times": [0, 2, 3.5, 6]}},
+    ),
+    Case(
+        "pose_of_another_skeleton",
+        "a person stands up and walks",
+        5.0,
+        {"start": {"position": [0, 0], "facing": 0}, "poses": [{"time": 0, "from": OWN_POSE, "at": 0}]},
+        example=False,
+    ),
+    Case(
+        "six_way_points",
+        "a person walks",
+        20.0,
+        {
+            "path": {
+                "points": [[0, 0], [0, 4], [3, 6], [6, 4], [5, 0], [2, -2], [-1, -1]],
+                "times": [0, 3.3, 6.6, 10.0, 13.3, 16.6, 19.5],
+            }
+        },
+        example=False,
+    ),
+)
 
 # A made-up person: other names than anybody's, long legs, short arms, three bones of the back, knees a little bent.
 _BONES = (
-    ("Base", "", (0.0, 1.08, 0.0)), ("Back1", "Base", (0.0, 0.16, 0.0)), ("Back2", "Back1", (0.0, 0.15, 0.0)),
-    ("Back3", "Back2", (0.0, 0.14, 0.0)), ("Throat", "Back3", (0.0, 0.12, 0.0)), ("Skull", "Throat", (0.0, 0.13, 0.0)),
-    ("L_Clav", "Back3", (0.04, 0.08, 0.0)), ("L_UpArm", "L_Clav", (0.13, 0.0, 0.0)),
-    ("L_LowArm", "L_UpArm", (0.24, 0.0, 0.0)), ("L_Palm", "L_LowArm", (0.2, 0.0, 0.0)),
-    ("R_Clav", "Back3", (-0.04, 0.08, 0.0)), ("R_UpArm", "R_Clav", (-0.13, 0.0, 0.0)),
-    ("R_LowArm", "R_UpArm", (-0.24, 0.0, 0.0)), ("R_Palm", "R_LowArm", (-0.2, 0.0, 0.0)),
-    ("L_UpLeg", "Base", (0.1, -0.06, 0.0)), ("L_LowLeg", "L_UpLeg", (0.0, -0.5, 0.0)),
-    ("L_Heel", "L_LowLeg", (0.0, -0.45, 0.0)), ("L_Ball", "L_Heel", (0.0, -0.06, 0.14)),
-    ("R_UpLeg", "Base", (-0.1, -0.06, 0.0)), ("R_LowLeg", "R_UpLeg", (0.0, -0.5, 0.0)),
-    ("R_Heel", "R_LowLeg", (0.0, -0.45, 0.0)), ("R_Ball", "R_Heel", (0.0, -0.06, 0.14)),
-)  # fmt: skip
-_BENT = {"L_UpLeg": (-0.5, 0, 0), "R_UpLeg": (-0.5, 0, 0), "L_LowLeg": (0.9, 0, 0), "R_LowLeg": (0.9, 0, 0),
-         "L_Heel": (-0.4, 0, 0), "R_Heel": (-0.4, 0, 0), "Back1": (0.2, 0, 0), "L_UpArm": (0, 0, -1.2),
-         "R_UpArm": (0, 0, 0.6)}  # fmt: skip
+    ("Base", "", (0.0, 1.08, 0.0)),
+    ("Back1", "Base", (0.0, 0.16, 0.0)),
+    ("Back2", "Back1", (0.0, 0.15, 0.0)),
+    ("Back3", "Back2", (0.0, 0.14, 0.0)),
+    ("Throat", "Back3", (0.0, 0.12, 0.0)),
+    ("Skull", "Throat", (0.0, 0.13, 0.0)),
+    ("L_Clav", "Back3", (0.04, 0.08, 0.0)),
+    ("L_UpArm", "L_Clav", (0.13, 0.0, 0.0)),
+    ("L_LowArm", "L_UpArm", (0.24, 0.0, 0.0)),
+    ("L_Palm", "L_LowArm", (0.2, 0.0, 0.0)),
+    ("R_Clav", "Back3", (-0.04, 0.08, 0.0)),
+    ("R_UpArm", "R_Clav", (-0.13, 0.0, 0.0)),
+    ("R_LowArm", "R_UpArm", (-0.24, 0.0, 0.0)),
+    ("R_Palm", "R_LowArm", (-0.2, 0.0, 0.0)),
+    ("L_UpLeg", "Base", (0.1, -0.06, 0.0)),
+    ("L_LowLeg", "L_UpLeg", (0.0, -0.5, 0.0)),
+    ("L_Heel", "L_LowLeg", (0.0, -0.45, 0.0)),
+    ("L_Ball", "L_Heel", (0.0, -0.06, 0.14)),
+    ("R_UpLeg", "Base", (-0.1, -0.06, 0.0)),
+    ("R_LowLeg", "R_UpLeg", (0.0, -0.5, 0.0)),
+    ("R_Heel", "R_LowLeg", (0.0, -0.45, 0.0)),
+    ("R_Ball", "R_Heel", (0.0, -0.06, 0.14)),
+)
+_BENT = {
+    "L_UpLeg": (-0.5, 0, 0),
+    "R_UpLeg": (-0.5, 0, 0),
+    "L_LowLeg": (0.9, 0, 0),
+    "R_LowLeg": (0.9, 0, 0),
+    "L_Heel": (-0.4, 0, 0),
+    "R_Heel": (-0.4, 0, 0),
+    "Back1": (0.2, 0, 0),
+    "L_UpArm": (0, 0, -1.2),
+    "R_UpArm": (0, 0, 0.6),
+}
 """Radians about each joint's own axes: knees bent, one arm down and the other half out."""
 
 
@@ -133,17 +200,23 @@ def measure(case: Case, prior: Prior, out: Path, seeds: Sequence[int]) -> dict[s
     sheet = out / f"{case.name}.png"
     draw_sheet([*(one.motion for one in made), plain[0]], sheet, captions=[*rows, f"no goal, seed {seeds[0]}"])
     return {
-        "name": case.name, "prompt": case.prompt, "seconds_of_motion": case.seconds, "seeds": list(seeds),
+        "name": case.name,
+        "prompt": case.prompt,
+        "seconds_of_motion": case.seconds,
+        "seeds": list(seeds),
         "from": file.name if folder == EXAMPLES else "this script",
         "asked": int(goal.asked.any(axis=-1).sum()),
         "mean_cm": 100 * float(np.mean([one.error for one in made])),
         "worst_cm": 100 * max(one.worst for one in made),
         "drawn_cm": 100 * float(np.mean([off(one.sampled, goal) for one in made])),
-        "controlled": own, "uncontrolled": base,
+        "controlled": own,
+        "uncontrolled": base,
         "ratios": {name: own[name] / base[name] if base[name] > seen else None for name, seen in NUMBERS.items()},
-        "seconds": seconds, "seconds_uncontrolled": alone,
-        "missed": [list(one.missed) for one in made], "sheet": sheet.name,
-    }  # fmt: skip
+        "seconds": seconds,
+        "seconds_uncontrolled": alone,
+        "missed": [list(one.missed) for one in made],
+        "sheet": sheet.name,
+    }
 
 
 def off(motion: Motion, goal: Any) -> float:

@@ -15,14 +15,21 @@ prior = Prior.load()
 goal = read_goal(
     {
         "path": {"points": [[0, 0], [0.5, 2.5]], "facing": 0},
-        "joints": [{"joint": "right_wrist", "frame": "root", "curve": True, "points": [
-            {"time": 1.0, "position": [-0.3, 1.2, 0.3]},
-            {"time": 2.0, "position": [-0.2, 1.6, 0.3]},
-        ]}],
+        "joints": [
+            {
+                "joint": "right_wrist",
+                "frame": "root",
+                "curve": True,
+                "points": [
+                    {"time": 1.0, "position": [-0.3, 1.2, 0.3]},
+                    {"time": 2.0, "position": [-0.2, 1.6, 0.3]},
+                ],
+            }
+        ],
     },
     frames=60,
     folder=Path(),
-)  # fmt: skip
+)
 
 
 def of_the_path(level: int) -> float:

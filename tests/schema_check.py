@@ -6,14 +6,40 @@ from pathlib import Path
 from typing import Any
 
 TYPES: dict[str, Any] = {
-    "object": dict, "array": list, "string": str, "number": int | float, "integer": int, "boolean": bool,
+    "object": dict,
+    "array": list,
+    "string": str,
+    "number": int | float,
+    "integer": int,
+    "boolean": bool,
     "null": type(None),
-}  # fmt: skip
+}
 KNOWN = {
-    "$schema", "$id", "$defs", "$ref", "title", "description", "type", "enum", "anyOf", "oneOf", "not", "minimum",
-    "maximum", "minLength", "maxLength", "pattern", "minItems", "maxItems", "items", "prefixItems", "properties",
-    "additionalProperties", "required", "minProperties",
-}  # fmt: skip
+    "$schema",
+    "$id",
+    "$defs",
+    "$ref",
+    "title",
+    "description",
+    "type",
+    "enum",
+    "anyOf",
+    "oneOf",
+    "not",
+    "minimum",
+    "maximum",
+    "minLength",
+    "maxLength",
+    "pattern",
+    "minItems",
+    "maxItems",
+    "items",
+    "prefixItems",
+    "properties",
+    "additionalProperties",
+    "required",
+    "minProperties",
+}
 
 
 def valid(file: Path, value: Any) -> bool:

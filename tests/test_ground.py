@@ -41,8 +41,12 @@ def test_tensors_and_arrays_agree() -> None:
     base, pose = numbers
     points = np.random.default_rng(1).normal(size=(3, 3))
     for function, args in (
-        (ground.compose, (base, pose)), (ground.relative, (base, pose)), (ground.to_world, (points, pose)),
-        (ground.from_world, (points, pose)), (ground.normalized, (base,)), (ground.mirrored, (base,)),
-    ):  # fmt: skip
+        (ground.compose, (base, pose)),
+        (ground.relative, (base, pose)),
+        (ground.to_world, (points, pose)),
+        (ground.from_world, (points, pose)),
+        (ground.normalized, (base,)),
+        (ground.mirrored, (base,)),
+    ):
         found = function(*map(torch.from_numpy, args))
         assert found.numpy() == pytest.approx(function(*args))

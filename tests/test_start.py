@@ -8,10 +8,24 @@ import pytest
 
 CLIP = Path(__file__).parents[1] / "examples" / "clips" / "walk.bvh"
 HEAVY = {
-    "torch._dynamo", "torch._inductor", "torch._functorch.aot_autograd", "torch._decomp.decompositions",
-    "torch.utils.tensorboard", "torch.utils.flop_counter", "scipy", "matplotlib", "roma", "transformers", "pygltflib",
-    "yaml", "PIL", "rich", "imageio_ffmpeg", "motionloom.lab", "motionloom.train",
-}  # fmt: skip
+    "torch._dynamo",
+    "torch._inductor",
+    "torch._functorch.aot_autograd",
+    "torch._decomp.decompositions",
+    "torch.utils.tensorboard",
+    "torch.utils.flop_counter",
+    "scipy",
+    "matplotlib",
+    "roma",
+    "transformers",
+    "pygltflib",
+    "yaml",
+    "PIL",
+    "rich",
+    "imageio_ffmpeg",
+    "motionloom.lab",
+    "motionloom.train",
+}
 """What no sentence needs on its way to a BVH."""
 
 COMMAND = """

@@ -25,17 +25,37 @@ CLIP, GOALS = str(ROOT / "examples" / "clips" / "walk.bvh"), ROOT / "examples" /
 SHEETS: dict[str, list[list[str]]] = {
     "walk": [["generate", "a person walks forward and waves", "--seed", "1", "--out", "{out}"]],
     "long": [
-        ["compose", "a person walks forward", "a person jumps up", "a person squats down", "a person dances",
-         "--seconds", "4", "--seed", "1", "--out", "{out}"]
+        [
+            "compose",
+            "a person walks forward",
+            "a person jumps up",
+            "a person squats down",
+            "a person dances",
+            "--seconds",
+            "4",
+            "--seed",
+            "1",
+            "--out",
+            "{out}",
+        ]
     ],
     "edit": [
-        ["edit", CLIP, "a person waves with both hands", "--keep", "lower_body", "--seed", "1",
-         "--out", "{work}/waving.bvh"],
+        [
+            "edit",
+            CLIP,
+            "a person waves with both hands",
+            "--keep",
+            "lower_body",
+            "--seed",
+            "1",
+            "--out",
+            "{work}/waving.bvh",
+        ],
         ["view", CLIP, "{work}/waving.bvh", "--out", "{out}"],
     ],
     "predict": [["predict", CLIP, "--end", "0.8", "--count", "5", "--seconds", "2", "--seed", "1", "--out", "{out}"]],
     "duet": [["duet", "two people dance salsa together", "--seconds", "6", "--seed", "1", "--out", "{out}"]],
-}  # fmt: skip
+}
 """File name -> commands; {out} is the picture. These are first draws of seed 1, not the best of many."""
 
 ASKED: draw.Colour = (240, 196, 60)

@@ -40,7 +40,7 @@ READING = {
     "onto smpl22": ("export", "{file}", "{w}/in.bvh", "--skeleton", "smpl22"),
     "edit": ("edit", "{file}", "waves", "--extend", "0.5", "--out", "{w}/edit.bvh", *PRIOR),
     "predict": ("predict", "{file}", "--count", "1", "--seconds", "0.5", "--out", "{w}/future.bvh", *PREDICTOR),
-}  # fmt: skip
+}
 """Commands that read the file."""
 WRITING = {
     "export": ("export", "{w}/walk.bvh", *ON),
@@ -50,11 +50,21 @@ WRITING = {
     "edit": ("edit", "{w}/walk.bvh", "waves", "--extend", "0.5", *ON, *PRIOR),
     "predict": ("predict", "{w}/walk.bvh", "--count", "1", "--seconds", "0.5", *ON, *PREDICTOR),
     "switch": ("switch", "{w}/walk.bvh", "{w}/walk.bvh", "--seconds", "0.5", *ON, *PREDICTOR),
-    "duet": ("duet", "two people dance", "--seconds", "1", *ON, "--out", "{w}/other{own}", *PRIOR,
-             "--pair-weights", "{w}/block.safetensors"),
+    "duet": (
+        "duet",
+        "two people dance",
+        "--seconds",
+        "1",
+        *ON,
+        "--out",
+        "{w}/other{own}",
+        *PRIOR,
+        "--pair-weights",
+        "{w}/block.safetensors",
+    ),
     "fist": ("export", "{w}/walk.bvh", *ON, "--hands", "fist"),
     "usda": ("export", "{w}/walk.bvh", "--skeleton", "{file}", "--out", "{w}/out.usda"),
-}  # fmt: skip
+}
 """Commands that put a motion on the file's skeleton; a character's own file is written."""
 
 

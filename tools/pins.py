@@ -41,11 +41,24 @@ def resolved(extras: list[str], limits: Path | None, *, upgrade: bool) -> dict[s
         if not upgrade:  # uv keeps the versions that its output file has
             made.write_text("".join(path.read_text() for path in known if path.is_file()))
         command = [
-            "uv", "pip", "compile", "pyproject.toml", "-", "--quiet", "--generate-hashes", "--no-annotate",
-            "--no-header", "--python-version", "3.11", "--python-platform", "x86_64-manylinux_2_28",
-            "--output-file", str(made),
-            *(word for extra in extras for word in ("--extra", extra)), *(("-c", str(limits)) if limits else ()),
-        ]  # fmt: skip
+            "uv",
+            "pip",
+            "compile",
+            "pyproject.toml",
+            "-",
+            "--quiet",
+            "--generate-hashes",
+            "--no-annotate",
+            "--no-header",
+            "--python-version",
+            "3.11",
+            "--python-platform",
+            "x86_64-manylinux_2_28",
+            "--output-file",
+            str(made),
+            *(word for extra in extras for word in ("--extra", extra)),
+            *(("-c", str(limits)) if limits else ()),
+        ]
         subprocess.run(command, cwd=ROOT, input=BUILD, text=True, check=True)
         return parsed(made.read_text())
 

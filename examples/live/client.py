@@ -50,8 +50,11 @@ if __name__ == "__main__":
     url = sys.argv[1] if len(sys.argv) > 1 else "ws://127.0.0.1:8765/live"
     people = 2 if sys.argv[2:] == ["2"] else 1
     live = LiveClient(url, seed=1, people=people)
-    script = {0: ("say", {"text": "a person walks forward"}), 60: ("steer", {"direction": 90, "person": people}),
-              120: ("path", {"points": [[0, 0]]})}  # fmt: skip
+    script = {
+        0: ("say", {"text": "a person walks forward"}),
+        60: ("steer", {"direction": 90, "person": people}),
+        120: ("path", {"points": [[0, 0]]}),
+    }
     for pose in live.frames():
         if pose["frame"] in script:
             kind, fields = script[pose["frame"]]

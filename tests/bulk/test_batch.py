@@ -50,8 +50,10 @@ def check_whole(out: Path, exact: dict[Any, Any]) -> None:
     assert [(one.row, one.state) for one in read_batch(out, motions=False)] == [(i, "made") for i in range(len(exact))]
     assert apart(positions(out), exact) < 3e-6
     assert {path.name for path in out.iterdir() if not path.name.startswith("shard-")} == {
-        "manifest.json", "records", _table(out),
-    }  # fmt: skip
+        "manifest.json",
+        "records",
+        _table(out),
+    }
     assert not [path for path in out.rglob("*") if path.name.startswith(".") or ".part" in path.name]
 
 
@@ -221,12 +223,16 @@ def test_results_come_without_a_folder_as_they_are_made(weights: str) -> None:
         ({"SLURM_ARRAY_TASK_ID": "3", "SLURM_ARRAY_TASK_COUNT": "4"}, (3, 4)),
         ({"SLURM_ARRAY_TASK_ID": "4", "SLURM_ARRAY_TASK_COUNT": "4", "SLURM_ARRAY_TASK_MIN": "1"}, (3, 4)),
         (
-            {"SLURM_ARRAY_TASK_ID": "20", "SLURM_ARRAY_TASK_COUNT": "3", "SLURM_ARRAY_TASK_MIN": "0",
-             "SLURM_ARRAY_TASK_STEP": "10"},
+            {
+                "SLURM_ARRAY_TASK_ID": "20",
+                "SLURM_ARRAY_TASK_COUNT": "3",
+                "SLURM_ARRAY_TASK_MIN": "0",
+                "SLURM_ARRAY_TASK_STEP": "10",
+            },
             (2, 3),
         ),
     ],
-)  # fmt: skip
+)
 def test_a_slurm_array_shares_the_shards_out(environment: dict[str, str], task: tuple[int, int] | None) -> None:
     assert array_task(environment) == task
 
@@ -347,9 +353,13 @@ def test_memory_of_the_driver_does_not_grow_with_the_job(folder: Path) -> None:
     (folder / "prompts.txt").write_text("a person walks\n" * 100)
     for variants in (100, 5000):
         done = subprocess.run(
-            [sys.executable, "-c", code, str(variants)], capture_output=True, text=True, check=True, timeout=120,
+            [sys.executable, "-c", code, str(variants)],
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=120,
             env={**os.environ},
-        )  # fmt: skip
+        )
         counts, grown = done.stdout.splitlines()
         assert counts == f"{100 * variants} {100 * variants}"
         assert int(grown) < 8_000  # kB

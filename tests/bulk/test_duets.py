@@ -59,9 +59,14 @@ def test_a_duet_is_that_of_the_single_task_whatever_is_beside_it(ready: Maker) -
 
 @pytest.mark.parametrize(
     ("kind", "files"),
-    [("npz", ["a.first.npz", "a.second.npz", "b.npz"]), ("bvh", ["a.first.bvh", "a.second.bvh", "b.bvh"]),
-     ("glb", ["a.glb", "b.glb"]), ("webdataset", None), ("parquet", None)],
-)  # fmt: skip
+    [
+        ("npz", ["a.first.npz", "a.second.npz", "b.npz"]),
+        ("bvh", ["a.first.bvh", "a.second.bvh", "b.bvh"]),
+        ("glb", ["a.glb", "b.glb"]),
+        ("webdataset", None),
+        ("parquet", None),
+    ],
+)
 def test_both_people_are_written_read_back_and_carried_over(ready: Maker, kind: str, files: list[str] | None) -> None:
     if kind == "parquet":
         pytest.importorskip("pyarrow")
@@ -76,8 +81,10 @@ def test_both_people_are_written_read_back_and_carried_over(ready: Maker, kind: 
             assert make(ready, [*found, found[1] | {"seed": 1, "id": "c"}], asked).made == 1
         duet, single = list(read_batch(OUT))[:2]
         assert (len(duet.people), len(single.people)) == (2, 1)
-        hips = [[motion.positions()[:, motion.skeleton.names.index("pelvis")] for motion in people]
-                for people in (exact, duet.people)]  # fmt: skip
+        hips = [
+            [motion.positions()[:, motion.skeleton.names.index("pelvis")] for motion in people]
+            for people in (exact, duet.people)
+        ]
         assert np.abs(np.array(hips[0]) - np.array(hips[1])).max() < 2e-3
 
 
@@ -146,9 +153,20 @@ def test_goals_and_timelines_of_two_people(ready: Maker, folder: Path) -> None:
     assert [len(one.people[0]) for one in (long, first, second)] == [40, 20, 20]
     goal = read_goal(GOAL, frames=20, folder=folder)
     for one, person in ((first, 0), (second, 1)):
-        assert apart(one.people, generate_pair(
-            ready.prior, ready._block, DUET["prompt"], goals=(None, goal) if person else (goal, None), seed=3, steps=2
-        )[0]) == 0  # fmt: skip
+        assert (
+            apart(
+                one.people,
+                generate_pair(
+                    ready.prior,
+                    ready._block,
+                    DUET["prompt"],
+                    goals=(None, goal) if person else (goal, None),
+                    seed=3,
+                    steps=2,
+                )[0],
+            )
+            == 0
+        )
         assert one.measured[person]["error"] is not None
         assert one.measured[1 - person]["error"] is None
 
@@ -160,8 +178,12 @@ def test_everything_that_determines_a_duet_changes_its_key_and_no_other(weights:
         return ask(Maker(options(weights, **{"pair_weights": pair_weights, **more}), folder=Path()), row).key
 
     assert keys(DUET) == keys(DUET)
-    changed = [DUET | {"seed": 4}, DUET | {"prompt": "a person bows :: a person waves"}, DUET | {"goal": GOAL},
-               DUET | {"goal": GOAL, "person": 2}]  # fmt: skip
+    changed = [
+        DUET | {"seed": 4},
+        DUET | {"prompt": "a person bows :: a person waves"},
+        DUET | {"goal": GOAL},
+        DUET | {"goal": GOAL, "person": 2},
+    ]
     found = {keys(DUET), keys(DUET, pair_guidance=0.5), keys(DUET, pair_weights="duet"), *map(keys, changed)}
     assert len(found) == 7
     assert keys(alone) == keys(alone, pair_guidance=0.5) == keys(alone, pair_weights="duet")

@@ -34,8 +34,9 @@ def test_an_actor_turns_columns_into_motions_and_leaves_out_what_cannot_be_made(
     }
     found = motions(columns)
     assert sorted(zip(found["text"], (len(one) for one in found["positions"]))) == [
-        ("a person sits", 40), ("a person walks", 20),
-    ]  # fmt: skip
+        ("a person sits", 40),
+        ("a person walks", 20),
+    ]
     assert found["positions"][0].shape[1:] == (22, 3)
     assert len({len(column) for column in found.values()}) == 1
 

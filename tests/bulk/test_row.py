@@ -36,8 +36,13 @@ def test_the_id_changes_with_everything_a_row_asks(change: dict[str, Any]) -> No
 
 def test_the_id_changes_with_weights_settings_and_what_rows_do_not_say() -> None:
     row = {"prompt": "a person walks"}
-    found = [key(row), key(row, common={**COMMON, "weights": "v"}), key(row, common={**COMMON, "steps": 12}),
-             key(row, seconds=4.0), key(row, seed=1)]  # fmt: skip
+    found = [
+        key(row),
+        key(row, common={**COMMON, "weights": "v"}),
+        key(row, common={**COMMON, "steps": 12}),
+        key(row, seconds=4.0),
+        key(row, seed=1),
+    ]
     assert len(set(found)) == 5
 
 
@@ -70,16 +75,28 @@ def test_the_id_changes_with_a_timeline_and_with_a_skeleton(folder: Path) -> Non
 @pytest.mark.parametrize(
     "row",
     [
-        {}, {"prompt": ""}, {"prompt": "  "}, {"prompt": 3}, {"prompt": "a", "secs": 3},
+        {},
+        {"prompt": ""},
+        {"prompt": "  "},
+        {"prompt": 3},
+        {"prompt": "a", "secs": 3},
         {"prompt": "a", "seconds": "x"},
-        {"prompt": "a", "seconds": True}, {"prompt": "a", "seed": -1}, {"prompt": "a", "seed": 1.5},
-        {"prompt": "a", "seed": 2**62}, {"prompt": "a", "id": "../b"}, {"prompt": "a", "id": "a.b"},
-        {"prompt": "a", "id": ""}, {"prompt": "a", "task": "dance"}, {"prompt": "a", "task": "control"},
-        {"prompt": "a", "timeline": "b.yaml"}, {"goal": {}, "timeline": "b.yaml"}, {"prompt": "a", "goal": 3},
+        {"prompt": "a", "seconds": True},
+        {"prompt": "a", "seed": -1},
+        {"prompt": "a", "seed": 1.5},
+        {"prompt": "a", "seed": 2**62},
+        {"prompt": "a", "id": "../b"},
+        {"prompt": "a", "id": "a.b"},
+        {"prompt": "a", "id": ""},
+        {"prompt": "a", "task": "dance"},
+        {"prompt": "a", "task": "control"},
+        {"prompt": "a", "timeline": "b.yaml"},
+        {"goal": {}, "timeline": "b.yaml"},
+        {"prompt": "a", "goal": 3},
         {"prompt": "a" * 20_001},
     ],
     ids=lambda row: str(row)[:40],
-)  # fmt: skip
+)
 def test_what_a_row_cannot_ask_is_reported_in_a_sentence(row: dict[str, Any]) -> None:
     with pytest.raises(MotionloomError):
         parse(json.dumps(row).encode())

@@ -181,13 +181,15 @@ def test_whatever_goes_wrong_with_a_row_is_its_error_once(
         old = getattr(place, name)
         monkeypatch.setattr(place, name, lambda *given, **more: (poisoned(what(*given)), old(*given, **more))[1])
 
-    before(*{
-        "parse": (row_module, "_columns", lambda raw: raw),
-        "ask": (row_module.Sources, "_ask", lambda self, row: row.seed),
-        "passes": (Made, "passes", lambda self, _: "99" if len(self.motion) == 19 else ""),
-        "add": (writers_module.Files, "add", lambda self, people, about: about["seed"]),
-        "groups": (maker_module, "groups", lambda prior, frames, most: "99" if 19 in frames else ""),
-    }[at])  # fmt: skip
+    before(
+        *{
+            "parse": (row_module, "_columns", lambda raw: raw),
+            "ask": (row_module.Sources, "_ask", lambda self, row: row.seed),
+            "passes": (Made, "passes", lambda self, _: "99" if len(self.motion) == 19 else ""),
+            "add": (writers_module.Files, "add", lambda self, people, about: about["seed"]),
+            "groups": (maker_module, "groups", lambda prior, frames, most: "99" if 19 in frames else ""),
+        }[at]
+    )
     found = [*rows(2), {"prompt": "a person walks", "seconds": 0.95, "seed": 99}, *rows(5)[3:]]
     assert make(ready, found).counts == {"made": 4, "failed": 1}
     assert [(one.row, "ZeroDivisionError: poison" in one.why) for one in results() if one.state == "failed"] == [

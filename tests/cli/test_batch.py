@@ -119,18 +119,30 @@ def test_a_dry_run_says_how_much_and_writes_nothing(weights: str, capsys: pytest
 @pytest.mark.parametrize(
     "words",
     [
-        [], ["jobs.jsonl", "--prompts", "prompts.txt"], ["absent.jsonl"], ["prompts.txt"], ["--prompts", "absent.txt"],
+        [],
+        ["jobs.jsonl", "--prompts", "prompts.txt"],
+        ["absent.jsonl"],
+        ["prompts.txt"],
+        ["--prompts", "absent.txt"],
         ["--prompts", "jobs.jsonl"],
-        ["jobs.jsonl", "--variants", "2"], ["--prompts", "prompts.txt", "--variants", "0"],
-        ["jobs.jsonl", "--filter", "speedy < 2"], ["jobs.jsonl", "--filter", "open('x')"],
-        ["jobs.jsonl", "--shard", "2/2"], ["jobs.jsonl", "--shard-rows", "0"],
-        ["jobs.jsonl", "--pair-guidance", "2"], ["jobs.jsonl", "--pair-weights", "absent"],
-        ["jobs.jsonl", "--shard", "x"], ["jobs.jsonl", "--shard", "0/2", "--ray"], ["jobs.jsonl", "--workers", "0"],
-        ["jobs.jsonl", "--seed", "-1"], ["jobs.jsonl", "--fps", "0"],
-        ["jobs.jsonl", "--skeleton", "absent.bvh"], ["jobs.jsonl", "--weights", "absent"],
+        ["jobs.jsonl", "--variants", "2"],
+        ["--prompts", "prompts.txt", "--variants", "0"],
+        ["jobs.jsonl", "--filter", "speedy < 2"],
+        ["jobs.jsonl", "--filter", "open('x')"],
+        ["jobs.jsonl", "--shard", "2/2"],
+        ["jobs.jsonl", "--shard-rows", "0"],
+        ["jobs.jsonl", "--pair-guidance", "2"],
+        ["jobs.jsonl", "--pair-weights", "absent"],
+        ["jobs.jsonl", "--shard", "x"],
+        ["jobs.jsonl", "--shard", "0/2", "--ray"],
+        ["jobs.jsonl", "--workers", "0"],
+        ["jobs.jsonl", "--seed", "-1"],
+        ["jobs.jsonl", "--fps", "0"],
+        ["jobs.jsonl", "--skeleton", "absent.bvh"],
+        ["jobs.jsonl", "--weights", "absent"],
     ],
     ids=lambda words: " ".join(words) or "nothing",
-)  # fmt: skip
+)
 def test_mistakes_are_one_sentence_and_nothing_is_written(
     weights: str, words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -67,8 +67,10 @@ def test_prompts_become_segments_of_equal_length(weights, asked, capsys):
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "wrote long.bvh: 6.00 s, 120 frames"
     assert [line.split(maxsplit=1) for line in said[1:]] == [
-        ["0.00", "walk"], ["2.00", "jump over something"], ["4.00", "sit down"],
-    ]  # fmt: skip
+        ["0.00", "walk"],
+        ["2.00", "jump over something"],
+        ["4.00", "sit down"],
+    ]
 
 
 def test_a_timeline_says_everything_and_the_line_has_the_last_word(weights, asked, capsys):
@@ -156,8 +158,13 @@ def test_check_reads_and_makes_nothing(weights, asked, capsys):
 def test_the_schema_is_printed_as_json(capsys):
     assert main(["compose", "--schema"]) == 0
     assert set(json.loads(capsys.readouterr().out)["$defs"]) == {
-        "text", "guidance", "transition", "adapter", "goal", "segment",
-    }  # fmt: skip
+        "text",
+        "guidance",
+        "transition",
+        "adapter",
+        "goal",
+        "segment",
+    }
 
 
 @pytest.mark.parametrize(

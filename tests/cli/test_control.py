@@ -35,8 +35,10 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list:
     calls = []
 
     def fake(prior, prompt, goal, *, count, fit, foot_lock, progress, adapters="none", **settings):
-        calls.append({"prompt": prompt, "goal": goal, "count": count, "fit": fit, "foot_lock": foot_lock,
-                      "adapters": adapters} | settings)  # fmt: skip
+        calls.append(
+            {"prompt": prompt, "goal": goal, "count": count, "fit": fit, "foot_lock": foot_lock, "adapters": adapters}
+            | settings
+        )
         progress(1, 1)
         motion = Motion(SMPL22, 20.0, np.tile([0.0, 0.9, 0], (len(goal), 1)), np.tile(IDENTITY, (len(goal), 22, 1)))
         return [task.Controlled(motion, motion, 0.01, 0.43, ("head at 1.20 s is 0.43 m away from its goal",))] * count
@@ -66,8 +68,17 @@ def test_options_reach_the_task(weights: str, asked: list, capsys: pytest.Captur
     assert control(weights, *words, "--steps", "7", "--no-fit", "--no-foot-lock", "--out", "a.npz") == 0
     call = asked[0]
     goal = call.pop("goal")
-    assert call == {"prompt": "a person walks", "count": 2, "first": 0, "seed": 5, "guidance": 3.0, "steps": 7,
-                    "fit": False, "foot_lock": False, "adapters": "none"}  # fmt: skip
+    assert call == {
+        "prompt": "a person walks",
+        "count": 2,
+        "first": 0,
+        "seed": 5,
+        "guidance": 3.0,
+        "steps": 7,
+        "fit": False,
+        "foot_lock": False,
+        "adapters": "none",
+    }
     assert len(goal) == 40
     assert goal.positions[39, 0, ::2].tolist() == [1, 1.2]
     said = capsys.readouterr()
@@ -111,9 +122,14 @@ def test_the_report_is_json_when_asked(weights: str, asked: list, capsys: pytest
     assert control(weights, "walk", "--goal", "goal.json", "--json", "--out", "a.npz", "--fps", "30") == 0
     about = json.loads(capsys.readouterr().out)
     assert about["motions"] == [
-        {"prompt": "walk", "seed": 0, "error_cm": 1.0, "worst_cm": 43.0,
-         "missed": ["head at 1.20 s is 0.43 m away from its goal"]}
-    ]  # fmt: skip
+        {
+            "prompt": "walk",
+            "seed": 0,
+            "error_cm": 1.0,
+            "worst_cm": 43.0,
+            "missed": ["head at 1.20 s is 0.43 m away from its goal"],
+        }
+    ]
     assert (about["files"], about["seconds"]) == (["a.npz"], 5.0)
     assert io.load("a.npz").fps == 30
 
@@ -134,19 +150,30 @@ def test_the_schema_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        ["walk"], ["--goal", "goal.json"], ["  ", "--goal", "goal.json"], ["walk", "--goal", "absent.json"],
-        ["walk", "--goal", "line.svg"], ["walk", "--path", "goal.json"], ["walk", "--path", "absent.svg"],
-        ["walk", "--follow", "head"], ["walk", "--from", "clip.bvh"], ["walk", "--width", "3", "--goal", "goal.json"],
-        ["walk", "--follow", "tail", "--from", "clip.bvh"], ["walk", "--follow", "head", "--from", "goal.json"],
-        ["walk", "--goal", "goal.json", "--seconds", "61"], ["walk", "--goal", "goal.json", "--seconds", "0"],
-        ["walk", "--goal", "goal.json", "--seconds", "nan"], ["walk", "--goal", "goal.json", "--count", "0"],
-        ["walk", "--goal", "goal.json", "--seed", "-1"], ["walk", "--goal", "goal.json", "--out", "a.xyz"],
+        ["walk"],
+        ["--goal", "goal.json"],
+        ["  ", "--goal", "goal.json"],
+        ["walk", "--goal", "absent.json"],
+        ["walk", "--goal", "line.svg"],
+        ["walk", "--path", "goal.json"],
+        ["walk", "--path", "absent.svg"],
+        ["walk", "--follow", "head"],
+        ["walk", "--from", "clip.bvh"],
+        ["walk", "--width", "3", "--goal", "goal.json"],
+        ["walk", "--follow", "tail", "--from", "clip.bvh"],
+        ["walk", "--follow", "head", "--from", "goal.json"],
+        ["walk", "--goal", "goal.json", "--seconds", "61"],
+        ["walk", "--goal", "goal.json", "--seconds", "0"],
+        ["walk", "--goal", "goal.json", "--seconds", "nan"],
+        ["walk", "--goal", "goal.json", "--count", "0"],
+        ["walk", "--goal", "goal.json", "--seed", "-1"],
+        ["walk", "--goal", "goal.json", "--out", "a.xyz"],
         ["walk", "--goal", "goal.json", "--adapters", "none", "--adapters", "x"],
         ["walk", "--goal", "goal.json", "--path", "line.svg"],
         ["walk", "--goal", "goal.json", "--follow", "hands", "--from", "clip.bvh", "--seconds", "5", "--fps", "0"],
     ],
     ids=lambda words: " ".join(words),
-)  # fmt: skip
+)
 def test_mistakes_are_one_sentence_and_nothing_is_written(
     weights: str, asked: list, words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

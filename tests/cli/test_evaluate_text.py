@@ -50,8 +50,12 @@ def test_a_run_prints_a_table_writes_a_report_and_goes_on(
     assert "--data SET" in found["command"]
     assert built not in found["command"]
     assert {row["name"] for row in found["rows"] if not row["measured_on"]} == {
-        "real", "real, captions shuffled", "chance", "tiny, 2 steps", "tiny, 3 steps",
-    }  # fmt: skip
+        "real",
+        "real, captions shuffled",
+        "chance",
+        "tiny, 2 steps",
+        "tiny, 3 steps",
+    }
     assert "Protocol" in (tmp_path / "out" / "report.md").read_text()
     monkeypatch.setattr("motionloom.lab.suites.text.sample_features", lambda *a, **k: pytest.fail("drawn twice"))
     assert main([*command, "--json"]) == 0

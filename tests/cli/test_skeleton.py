@@ -215,9 +215,11 @@ def test_several_motions_become_clips_of_one_file() -> None:
 def test_what_one_of_our_clips_moves_is_held_in_the_others(tmp_path: Path) -> None:
     character = load_character("hero.glb")
     still = Motion(
-        character.skeleton, 20.0, np.tile(character.skeleton.offsets[0], (5, 1)),
+        character.skeleton,
+        20.0,
+        np.tile(character.skeleton.offsets[0], (5, 1)),
         np.tile([1.0, 0, 0, 0], (5, len(character.skeleton), 1)),
-    )  # fmt: skip
+    )
     turns = still.rotations.copy()
     finger = character.skeleton.index("finger")
     turns[:, finger] = [0.5, 0.5, 0.5, 0.5]

@@ -39,8 +39,12 @@ def test_blended_guesses_and_whole_runs_are_the_published_ones(recorded):
     compare(recorded, "forward", to_motion(denoise(x, config["timesteps"][0] + 1)))
     known, rng = to_state(normal(stream(config["seed"], KNOWN), shape)), stream(config["seed"], NOISE)
     sample = controlled(
-        denoise, Observed(known, np.broadcast_to(np.asarray(mask(config["mask"])), known.shape), noise_free=True),
-        levels=range(config["steps"], -1, -1), solver=DDPM, schedule=cosine(config["steps"]),
-        noise=lambda like: to_state(normal(rng, shape)), start=known,
-    )  # fmt: skip
+        denoise,
+        Observed(known, np.broadcast_to(np.asarray(mask(config["mask"])), known.shape), noise_free=True),
+        levels=range(config["steps"], -1, -1),
+        solver=DDPM,
+        schedule=cosine(config["steps"]),
+        noise=lambda like: to_state(normal(rng, shape)),
+        start=known,
+    )
     compare(recorded, "sample", to_motion(sample))

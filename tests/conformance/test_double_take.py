@@ -44,9 +44,16 @@ def taken(recorded: Case) -> tuple[Takes, int]:
     schedule = cosine(config["steps"])
     assert round(MODES["published"].restart * config["steps"]) == config["steps"] - config["skip"]
     takes = double_take(
-        first, second, x, plan, mode=MODES["published"], way=range(config["steps"], -1, -1), schedule=schedule,
-        noise=(draw, draw), second_take_only=config["second_take_only"],
-    )  # fmt: skip
+        first,
+        second,
+        x,
+        plan,
+        mode=MODES["published"],
+        way=range(config["steps"], -1, -1),
+        schedule=schedule,
+        noise=(draw, draw),
+        second_take_only=config["second_take_only"],
+    )
     return takes, count
 
 

@@ -102,9 +102,18 @@ def test_whole_runs_give_the_published_motions(recorded: Case) -> None:
     fixed = Fixed(motion, list(PARTS.values())[int(mode[-1])]) if control else None
     target = Target(motion[:1, -2 * h :], relax=20) if mode == "switch" else None
     state, result = published_completion(
-        from_noise(noise, schedule), motion[:, :h], n, basis=basis, schedule=schedule, noise=draw,
-        steps=config["ddim_steps"], padding=padding, complete=config["completion"], fixed=fixed, target=target,
-    )  # fmt: skip
+        from_noise(noise, schedule),
+        motion[:, :h],
+        n,
+        basis=basis,
+        schedule=schedule,
+        noise=draw,
+        steps=config["ddim_steps"],
+        padding=padding,
+        complete=config["completion"],
+        fixed=fixed,
+        target=target,
+    )
     assert len(shapes) == config["noise_draws"]
     compare(recorded, "coefficients", state)
     compare(recorded, "motion", result)
@@ -221,10 +230,15 @@ def oracle(name: str, case: str) -> tuple[np.ndarray, np.ndarray, int]:
     motion, clean = 0.3 * wave(shape, 0.013, 0.4), basis.to_spectrum(0.3 * wave(shape, 0.017, 1.1))
     control = case == "control_lower"
     state, result = published_completion(
-        lambda x, level: clean, motion[:1, :h] if control else motion[:, :h], 2, basis=basis, schedule=schedule,
-        noise=draw, fixed=Fixed(motion[:1], PARTS["lower"]) if control else None,
+        lambda x, level: clean,
+        motion[:1, :h] if control else motion[:, :h],
+        2,
+        basis=basis,
+        schedule=schedule,
+        noise=draw,
+        fixed=Fixed(motion[:1], PARTS["lower"]) if control else None,
         target=Target(motion[:1, -2 * h :]) if case == "switch" else None,
-    )  # fmt: skip
+    )
     return state, result, calls
 
 

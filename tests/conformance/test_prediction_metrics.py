@@ -23,11 +23,18 @@ def test_every_recorded_metric_of_the_published_code_comes_out(case: Case) -> No
     cmd = pr.CmdTally()
     cmd.add("walk", samples)
     values = {
-        "apd": found.apd, "ade": found.ade, "fde": found.fde, "mmade": found.mmade, "mmfde": found.mmfde,
-        "cmd": cmd.result(c["cmd_reference"]), "stretch_mean_percent": found.stretch,
-        "stretch_rmse_percent": found.stretch_rmse, "jitter_mean_percent": found.jitter,
-        "jitter_rmse_percent": found.jitter_rmse, "angle_error_degrees": found.mae,
-    }  # fmt: skip
+        "apd": found.apd,
+        "ade": found.ade,
+        "fde": found.fde,
+        "mmade": found.mmade,
+        "mmfde": found.mmfde,
+        "cmd": cmd.result(c["cmd_reference"]),
+        "stretch_mean_percent": found.stretch,
+        "stretch_rmse_percent": found.stretch_rmse,
+        "jitter_mean_percent": found.jitter,
+        "jitter_rmse_percent": found.jitter_rmse,
+        "angle_error_degrees": found.mae,
+    }
     for name, value in values.items():
         compare(case, name, value)
 
@@ -43,11 +50,18 @@ def test_the_reference_metrics_come_out() -> None:
     s, tally = pr.score_window(samples, truth, futures, fps=50, limbs=limbs), pr.Tally()
     tally.add(s)
     found = {
-        "APD": s.apd, "ADE": s.ade, "FDE": s.fde, "MMADE": s.mmade, "MMFDE": s.mmfde,
-        "CMD_oneclass_ref0.1": tally.cmd.result(0.1), "stretch_mean_x100": s.stretch,
-        "stretch_rmse_x100": s.stretch_rmse, "jitter_mean_x100": s.jitter, "jitter_rmse_x100": s.jitter_rmse,
+        "APD": s.apd,
+        "ADE": s.ade,
+        "FDE": s.fde,
+        "MMADE": s.mmade,
+        "MMFDE": s.mmfde,
+        "CMD_oneclass_ref0.1": tally.cmd.result(0.1),
+        "stretch_mean_x100": s.stretch,
+        "stretch_rmse_x100": s.stretch_rmse,
+        "jitter_mean_x100": s.jitter,
+        "jitter_rmse_x100": s.jitter_rmse,
         "MAE_deg": s.mae,
-    }  # fmt: skip
+    }
     again = recorded["recomputed"]
     assert recorded.keys() | again.keys() == found.keys() | {"limbseq_used", "recomputed"}
     for numbers in (recorded, again):

@@ -42,9 +42,38 @@ def test_captions_name_the_action_that_people_read_in_them(captions: tuple[str, 
     assert found.name == name
 
 
-WORDS = ["a person", "walks", "walk", "walking", "runs", "jogs", "then", "slowly", "to", "and", "stops", "stop",
-         "sits down", "stands up", "starts", "picks", "back", "forward", "turns around", "jumps", "left", "right",
-         "lying", "gets up", "floor", "puts", "down", "skips", "crouches", "knee,"]  # fmt: skip
+WORDS = [
+    "a person",
+    "walks",
+    "walk",
+    "walking",
+    "runs",
+    "jogs",
+    "then",
+    "slowly",
+    "to",
+    "and",
+    "stops",
+    "stop",
+    "sits down",
+    "stands up",
+    "starts",
+    "picks",
+    "back",
+    "forward",
+    "turns around",
+    "jumps",
+    "left",
+    "right",
+    "lying",
+    "gets up",
+    "floor",
+    "puts",
+    "down",
+    "skips",
+    "crouches",
+    "knee,",
+]
 
 
 @given(st.lists(st.sampled_from(WORDS), max_size=12).map(" ".join))

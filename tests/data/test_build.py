@@ -290,10 +290,13 @@ def test_a_cmu_download_is_recognised(tmp_path: Path) -> None:
     (tmp_path / "07" / "07.asf").write_text("")
     (tmp_path / "cmu-mocap-index-text.txt").write_text("Subject #7 (walk)\n07_01\tslow walk\n07_02   forward jump\n")
     row = {
-        "amass_path": "./pose_data/CMU/07/07_01_poses.npy", "mirrored": False, "start_s": 1.0, "end_s": None,
+        "amass_path": "./pose_data/CMU/07/07_01_poses.npy",
+        "mirrored": False,
+        "start_s": 1.0,
+        "end_s": None,
         "split": "test",
         "captions": [{"text": "a man strolls", "from_s": 0, "to_s": 0}, {"text": "part", "from_s": 1, "to_s": 2}],
-    }  # fmt: skip
+    }
     captions = tmp_path / "captions.jsonl"
     captions.write_text(json.dumps(row) + "\n" + json.dumps(row | {"mirrored": True}))
     takes = {take.name: take for take in find_takes(tmp_path, captions=captions)}

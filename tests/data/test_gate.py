@@ -30,8 +30,14 @@ def folded(positions: np.ndarray) -> np.ndarray:
 def take(name: str) -> Take:
     own = hml.uniform(people.walking(1.2))
     made = folded(own) if FOLDED[name] else own
-    return Take(name, name.split("_")[0], "CC0", "train", (Span(0.0, 4.0, ("a person walks",), "human"),),
-                lambda: Places(made, own, people.FPS))  # fmt: skip
+    return Take(
+        name,
+        name.split("_")[0],
+        "CC0",
+        "train",
+        (Span(0.0, 4.0, ("a person walks",), "human"),),
+        lambda: Places(made, own, people.FPS),
+    )
 
 
 def find(folder: Path | str, *, captions: Path | str | None = None) -> list[Take]:
@@ -51,8 +57,13 @@ def test_a_body_that_does_not_do_what_was_recorded_stays_out(tmp_path: Path) -> 
     assert any(line.startswith("dropped bent_1: its body") for line in said)
     assert not list((tmp_path / "set" / "clips").glob("*bent_[12]*"))
     assert about["fidelity"]["bent"] | {"degrees": 0, "cm": 0, "cm by legs alone": 0} == {
-        "clips": 0, "refused": 2, "allowed": 0, "degrees": 0, "cm": 0, "cm by legs alone": 0
-    }  # fmt: skip
+        "clips": 0,
+        "refused": 2,
+        "allowed": 0,
+        "degrees": 0,
+        "cm": 0,
+        "cm by legs alone": 0,
+    }
     sound = about["fidelity"]["sound"]
     assert (sound["clips"], sound["refused"]) == (1, 0)
     assert sound["degrees"]["trunk"][0] < 1

@@ -14,8 +14,14 @@ from motionloom.errors import MotionloomError
 from motionloom.lab.suites.items import read_items
 from motionloom.lab.suites.protocol import Selection
 
-ROW = {"amass_path": "x/CMU/02/02_01_poses.npy", "mirrored": False, "start_s": 0.0, "end_s": 2.0, "split": "train",
-       "captions": [{"text": "a man walks", "from_s": 0, "to_s": 0}]}  # fmt: skip
+ROW = {
+    "amass_path": "x/CMU/02/02_01_poses.npy",
+    "mirrored": False,
+    "start_s": 0.0,
+    "end_s": 2.0,
+    "split": "train",
+    "captions": [{"text": "a man walks", "from_s": 0, "to_s": 0}],
+}
 
 
 def folder(root: Path) -> Path:
@@ -34,11 +40,14 @@ def test_times_that_are_no_seconds_are_refused_before_a_set_is_begun(tmp_path: P
 
 PACKED = gzip.compress((json.dumps(ROW) + "\n").encode() * 2000, mtime=0)
 DAMAGED = {
-    "cut short": PACKED[: len(PACKED) // 2], "turned over": PACKED[:60] + b"\xff" * 20 + PACKED[80:],
-    "not packed": b"{}", "deep": gzip.compress(b"[" * 100_000),
+    "cut short": PACKED[: len(PACKED) // 2],
+    "turned over": PACKED[:60] + b"\xff" * 20 + PACKED[80:],
+    "not packed": b"{}",
+    "deep": gzip.compress(b"[" * 100_000),
     "latin-1": gzip.compress(b'{"amass_path": "\xe9"}'),
-    "a long line": gzip.compress(b" " * (2 << 20)), "unfolds far": gzip.compress((b" " * 500_000 + b"\n") * 400),
-}  # fmt: skip
+    "a long line": gzip.compress(b" " * (2 << 20)),
+    "unfolds far": gzip.compress((b" " * 500_000 + b"\n") * 400),
+}
 
 
 @pytest.mark.parametrize("what", list(DAMAGED))

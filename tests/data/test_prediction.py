@@ -36,10 +36,17 @@ def protocol(*recordings: Recording, **changes: object) -> Protocol:
 @pytest.mark.parametrize(
     ("frames", "strict", "starts"),
     [
-        (9, True, []), (10, True, []), (10, False, [0]), (11, True, [0]), (14, True, [0]), (14, False, [0, 4]),
-        (15, True, [0, 4]), (22, True, [0, 4, 8]), (22, False, [0, 4, 8, 12]),
+        (9, True, []),
+        (10, True, []),
+        (10, False, [0]),
+        (11, True, [0]),
+        (14, True, [0]),
+        (14, False, [0, 4]),
+        (15, True, [0, 4]),
+        (22, True, [0, 4, 8]),
+        (22, False, [0, 4, 8, 12]),
     ],
-)  # fmt: skip
+)
 def test_windows_start_every_observed_length(frames: int, strict: bool, starts: list[int]) -> None:
     """Counted by hand: 0, 4, 8 ... while start + 10 < frames, or <= where it is not strict."""
     found = protocol(recording("a", frames), strict=strict).windows()

@@ -74,9 +74,13 @@ def test_it_is_one_batch_with_handshakes_and_shared_noise(kind: str) -> None:
 def test_one_row_is_plain_sampling(kind: str) -> None:
     draw = row_noise([7])
     expected = run(
-        near, draw(np.empty((1, 9, FEATURES), np.float32)), levels=levels(SCHEDULE, 5), solver=SOLVERS[kind],
-        schedule=SCHEDULE, noise=draw,
-    )  # fmt: skip
+        near,
+        draw(np.empty((1, 9, FEATURES), np.float32)),
+        levels=levels(SCHEDULE, 5),
+        solver=SOLVERS[kind],
+        schedule=SCHEDULE,
+        noise=draw,
+    )
     denoise: RowsDenoiser = lambda numbers, states, at: [near(states[0][None], at[0])[0]]  # noqa: E731
     made = list(walk([Link(9, 400, 7)], denoise=denoise, kind=kind, steps=5))
     assert len(made) == 1
@@ -186,9 +190,14 @@ def test_overlaps_that_do_not_fit_are_reported(links: list[Link], row: int) -> N
 def test_a_walk_that_would_never_end_is_refused(way: list[int], together: int) -> None:
     with pytest.raises(ValueError, match="a walk needs falling levels"):
         staggered(
-            repeat(Link(6, 2, 1)), alone, levels=way, solver=SOLVERS["ddpm"], schedule=SCHEDULE, features=FEATURES,
+            repeat(Link(6, 2, 1)),
+            alone,
+            levels=way,
+            solver=SOLVERS["ddpm"],
+            schedule=SCHEDULE,
+            features=FEATURES,
             batch_size=together,
-        )  # fmt: skip
+        )
 
 
 def test_noise_keeps_its_spread_in_the_middle_of_an_overlap() -> None:

@@ -61,8 +61,14 @@ def led(prior: Prior, block: PairBlock, places: Places, weight: float = 1.0) -> 
     told, code, before = Told(net), net.places, drifting(prior)
     denoised = join(code.encode(BESIDE), (before - prior.mean) / spread)
     made = places.guided(
-        prior, told, net.bind(prior.condition(SAID)), state=denoised, denoised=denoised, level=25, weight=weight  # type: ignore
-    )  # fmt: skip
+        prior,
+        told,
+        net.bind(prior.condition(SAID)),
+        state=denoised,
+        denoised=denoised,
+        level=25,
+        weight=weight,  # type: ignore
+    )
     assert np.array_equal(made[:, 0], denoised[:, 0])
     after = made[:, 1:] * spread + prior.mean
     np.testing.assert_allclose(after[..., 3:], before[..., 3:], rtol=0, atol=1e-5)
@@ -223,9 +229,14 @@ def test_every_question_is_of_its_own_pair_at_its_own_level_and_given_the_noised
         alone = Places.of([[1, 2], [3, 4]][pair], FRAMES, [begin], [False] * 2)
         assert np.array_equal(alone.noise, places.noise[kept])
         one = alone.guided(
-            prior, Told(net), net.bind(prior.condition(said[rows])), state=state[rows], denoised=denoised[rows],  # type: ignore
-            level=level[rows], weight=1.0,
-        )  # fmt: skip
+            prior,
+            Told(net),
+            net.bind(prior.condition(said[rows])),
+            state=state[rows],
+            denoised=denoised[rows],  # type: ignore
+            level=level[rows],
+            weight=1.0,
+        )
         np.testing.assert_allclose(made[rows], one, rtol=0, atol=1e-5)
     assert np.unique(places.noise).size == places.noise.size  # nothing is drawn twice
 
@@ -236,8 +247,14 @@ def test_who_is_moved_differs_from_pair_to_pair(prior: Prior, block: PairBlock) 
     denoised = join(net.places.encode(BESIDE)[[0, 1, 0, 1]], ((drift - prior.mean) / spread)[[0, 1, 0, 1]])
     places = Places.of([1, 2, 3, 4], FRAMES, [0, 0], [True, False, False, True])
     made = places.guided(
-        prior, Told(net), net.bind(prior.condition(SAID * 2)), state=denoised, denoised=denoised, level=25, weight=1.0  # type: ignore
-    )  # fmt: skip
+        prior,
+        Told(net),
+        net.bind(prior.condition(SAID * 2)),
+        state=denoised,
+        denoised=denoised,
+        level=25,
+        weight=1.0,  # type: ignore
+    )
     moved = np.abs(made - denoised).max((1, 2))
     assert moved[[0, 3]].max() < 1e-5
     assert moved[[1, 2]].min() > 0.1
@@ -245,9 +262,19 @@ def test_who_is_moved_differs_from_pair_to_pair(prior: Prior, block: PairBlock) 
 
 @pytest.mark.parametrize(
     ("begin", "frames", "anchors"),
-    [(0, 39, ()), (0, 40, (20,)), (0, 60, (40,)), (0, 61, (20, 41)), (0, 100, (40, 80)), (10, 100, (45, 80)),
-     (0, 120, (33, 67, 100)), (10, 110, (50, 90)), (60, 99, ()), (60, 100, (80,))],
-)  # fmt: skip
+    [
+        (0, 39, ()),
+        (0, 40, (20,)),
+        (0, 60, (40,)),
+        (0, 61, (20, 41)),
+        (0, 100, (40, 80)),
+        (10, 100, (45, 80)),
+        (0, 120, (33, 67, 100)),
+        (10, 110, (50, 90)),
+        (60, 99, ()),
+        (60, 100, (80,)),
+    ],
+)
 def test_anchors_stand_evenly_up_to_twenty_frames_before_the_end(
     begin: int, frames: int, anchors: tuple[int, ...]
 ) -> None:

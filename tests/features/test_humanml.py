@@ -94,9 +94,7 @@ def test_both_decoders_agree_on_rotations_made_for_the_second_one() -> None:
     features[:, LAYOUT["ric"]] = (positions - positions[:, :1] * [1, 0, 1])[:-1, 1:].reshape(-1, 63)
     features[:, LAYOUT["rot6d"]] = humanml.rotations6d(positions, still)[:-1].reshape(-1, 126)
     features[:, LAYOUT["root_velocity"]] = np.diff(positions[:, 0], axis=0)[:, [0, 2]]
-    np.testing.assert_allclose(
-        humanml.positions_from_rot6d(features), humanml.decode_positions(features), atol=1e-5
-    )  # fmt: skip
+    np.testing.assert_allclose(humanml.positions_from_rot6d(features), humanml.decode_positions(features), atol=1e-5)
 
 
 def test_a_walk_forward_has_forward_velocity_only() -> None:

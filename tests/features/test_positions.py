@@ -169,12 +169,23 @@ def test_benchmarks_have_the_published_channels_and_sides() -> None:
 
 @pytest.mark.parametrize(
     "change",
-    [{"names": ()}, {"names": ("a",)}, {"parents": (-1, 0, 1, 2)}, {"parents": (0,) * 15},
-     {"parents": (-1, 1, *(0,) * 13)}, {"parents": (-1, -1, *(0,) * 13)}, {"pairs": (1,) * 15},
-     {"pairs": (*range(14), 15)}, {"pairs": (-1, *range(1, 15))}, {"pairs": (*range(1, 15), 0)}, {"across": ((0, 15),)},
-     {"across": ((-1, 2),)}, {"across": ((2, 5),)}],
+    [
+        {"names": ()},
+        {"names": ("a",)},
+        {"parents": (-1, 0, 1, 2)},
+        {"parents": (0,) * 15},
+        {"parents": (-1, 1, *(0,) * 13)},
+        {"parents": (-1, -1, *(0,) * 13)},
+        {"pairs": (1,) * 15},
+        {"pairs": (*range(14), 15)},
+        {"pairs": (-1, *range(1, 15))},
+        {"pairs": (*range(1, 15), 0)},
+        {"across": ((0, 15),)},
+        {"across": ((-1, 2),)},
+        {"across": ((2, 5),)},
+    ],
     ids=str,
-)  # fmt: skip
+)
 def test_layouts_that_do_not_fit_together_are_refused(change: dict) -> None:
     """The last one alone would do, but not together with +Z up."""
     with pytest.raises(MotionloomError):

@@ -125,8 +125,24 @@ def npy(data: bytes, rng: random.Random) -> bytes:
             ("<f4", "<f8", ">f8", "<f2", "|O", "|V8", "<U4", "|S3", "<c16", "<M8[s]", "|b1", "<i8", "<f16", "x")
         )
         some = f"({max(len(body) // 8, 1)},)"
-        shape = rng.choice(("()", "(0,)", "(1,)", "(-1,)", "(3, 0, 10**9)", "(2**62, 4)", "(len('a'),)", "(1.0,)", some,
-                            "(True,)", "(1,)*40", "(" * 300 + ")" * 300, "[1]", "(1, 263)"))  # fmt: skip
+        shape = rng.choice(
+            (
+                "()",
+                "(0,)",
+                "(1,)",
+                "(-1,)",
+                "(3, 0, 10**9)",
+                "(2**62, 4)",
+                "(len('a'),)",
+                "(1.0,)",
+                some,
+                "(True,)",
+                "(1,)*40",
+                "(" * 300 + ")" * 300,
+                "[1]",
+                "(1, 263)",
+            )
+        )
         return npy_head(kind, shape, rng.choice(("False", "True", "1", "None"))) + body
     head = rng.choice(TEXT)(head, rng)
     return b"\x93NUMPY" + bytes((rng.choice((1, 1, 2, 3)), 0)) + struct.pack("<H", len(head) % 65536) + head + body
@@ -135,8 +151,15 @@ def npy(data: bytes, rng: random.Random) -> bytes:
 def special(data: bytes, rng: random.Random) -> bytes:
     """Numbers that are none among those of an array's body."""
     at = rng.randrange(80, max(81, len(data) - 8))
-    value = rng.choice((struct.pack("<d", float("nan")), struct.pack("<f", float("inf")), struct.pack("<d", 1e300),
-                        b"\xff" * 8, struct.pack("<d", -1.0)))  # fmt: skip
+    value = rng.choice(
+        (
+            struct.pack("<d", float("nan")),
+            struct.pack("<f", float("inf")),
+            struct.pack("<d", 1e300),
+            b"\xff" * 8,
+            struct.pack("<d", -1.0),
+        )
+    )
     return data[:at] + value + data[at + len(value) :]
 
 
@@ -192,11 +215,25 @@ def glb(data: bytes, rng: random.Random) -> bytes:
 
 OPERATIONS = [
     *(bytes([code]) for code in b"]}(N02tleasuRbQ\x93\x94"),
-    b"h\0", b"q\0", b"h\x01", b"h\x02", b"K\xff", b"J\xff\xff\xff\x7f", b"\x8a\xff" + b"\xff" * 20, b"(h\0h\0e",
-    b"]" * 3000, b"(" * 3000, b"(" + b"]" * 500_000 + b"e",
-    b"]q\0(h\0h\0e" * 30, b"cos\nsystem\n", b"c__builtin__\nbytearray\nJ\0\0\0\x40\x85R",
-    b"I" + b"9" * 6000 + b"\n", b"F1e999\n", b"\x8e" + b"\xff" * 8, b"\x8d" + b"\0" * 6 + b"\x10\0",
-]  # fmt: skip
+    b"h\0",
+    b"q\0",
+    b"h\x01",
+    b"h\x02",
+    b"K\xff",
+    b"J\xff\xff\xff\x7f",
+    b"\x8a\xff" + b"\xff" * 20,
+    b"(h\0h\0e",
+    b"]" * 3000,
+    b"(" * 3000,
+    b"(" + b"]" * 500_000 + b"e",
+    b"]q\0(h\0h\0e" * 30,
+    b"cos\nsystem\n",
+    b"c__builtin__\nbytearray\nJ\0\0\0\x40\x85R",
+    b"I" + b"9" * 6000 + b"\n",
+    b"F1e999\n",
+    b"\x8e" + b"\xff" * 8,
+    b"\x8d" + b"\0" * 6 + b"\x10\0",
+]
 
 
 def pickled(data: bytes, rng: random.Random) -> bytes:

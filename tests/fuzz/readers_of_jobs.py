@@ -97,20 +97,29 @@ CONTROL = {
     "goals": {"path": {"points": [[0, 0], [1, 2]]}},
 }
 TIMELINE = {
-    "task": "compose", "seed": 1,
-    "timeline": {"segments": [{"text": "a person walks", "seconds": 2}, {"text": "sit", "transition": 0.5}],
-                 "path": {"path": {"points": [[0, 0], [1, 2]]}}},
-}  # fmt: skip
+    "task": "compose",
+    "seed": 1,
+    "timeline": {
+        "segments": [{"text": "a person walks", "seconds": 2}, {"text": "sit", "transition": 0.5}],
+        "path": {"path": {"points": [[0, 0], [1, 2]]}},
+    },
+}
 EDIT = {"task": "edit", "motion": NAME, "prompt": "a person waves", "keep": ["lower_body"], "redraw": [[0, 0.1]]}
 MESSAGES: list[dict[str, Any]] = [
-    {"type": "hello", "seed": 3, "fps": 30, "people": 2, "session": "",
-     "skeleton": {"names": ["a", "b"], "parents": [-1, 0], "offsets": [[0, 1, 0], [0, 0.5, 0]]}},
+    {
+        "type": "hello",
+        "seed": 3,
+        "fps": 30,
+        "people": 2,
+        "session": "",
+        "skeleton": {"names": ["a", "b"], "parents": [-1, 0], "offsets": [[0, 1, 0], [0, 0.5, 0]]},
+    },
     {"type": "say", "text": "a person walks", "person": 1},
     {"type": "steer", "direction": 90, "speed": 1.4, "facing": -10},
     {"type": "path", "points": [[2, 3], [4, 0]], "speed": 1},
     {"type": "reach", "joint": "left_wrist", "position": [0, 1, 2], "within": 0.5},
     {"type": "ping", "id": "a"},
-]  # fmt: skip
+]
 
 
 def project(folder: Path) -> None:
@@ -196,8 +205,12 @@ def read_messages(folder: Path) -> None:
         raise problems[0]
 
 
-PROJECT = {"project.json": "json", f"motions/{NAME}.json": "json", f"characters/{NAME}.json": "json",
-           f"motions/{NAME}.npz": "npz"}  # fmt: skip
+PROJECT = {
+    "project.json": "json",
+    f"motions/{NAME}.json": "json",
+    f"characters/{NAME}.json": "json",
+    f"motions/{NAME}.npz": "npz",
+}
 reader("project", project, PROJECT, read_project, weight=10)
 reader("request", project, {"request.json": "json"}, read_request("request.json"), weight=10)
 reader("request of a goal", project, {"control.json": "json"}, read_request("control.json"), weight=10)

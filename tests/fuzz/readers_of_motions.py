@@ -118,10 +118,16 @@ segments:
 GOAL = {
     "start": {"position": [0, 0], "facing": 30},
     "path": {"points": [[0, 0], [0.5, 1], [0, 2.2]], "times": [0, 1, 2], "facing": "along", "smooth": True},
-    "joints": [{"joint": "left_wrist", "frame": "root", "curve": True,
-                "points": [{"time": 0.5, "position": [0.4, 1.2, 0.1]}, {"time": 1, "position": [0.3, 1.3, 0.2]}]},
-               {"joint": "head", "every_frame": [[None, 1.5, None], None, [0, 1.5, 0.1]]}],
-}  # fmt: skip
+    "joints": [
+        {
+            "joint": "left_wrist",
+            "frame": "root",
+            "curve": True,
+            "points": [{"time": 0.5, "position": [0.4, 1.2, 0.1]}, {"time": 1, "position": [0.3, 1.3, 0.2]}],
+        },
+        {"joint": "head", "every_frame": [[None, 1.5, None], None, [0, 1.5, 0.1]]},
+    ],
+}
 OTHERS = {
     "poses": [{"time": 2, "from": "pose.npz", "at": 0.05, "position": [0, 2.2], "facing": 0}],
     "follow": [{"from": "pose.npz", "joints": ["right_wrist"], "times": [0, 0.1]}],

@@ -105,8 +105,14 @@ reader("training state", state, {"state.safetensors": "safetensors"}, read_state
 
 def captions(number: str) -> str:
     path = f"./pose_data/CMU/{number[:2]}/{number}_poses.npy"
-    row = {"amass_path": path, "mirrored": False, "start_s": 0.0, "end_s": 2.5,
-           "split": "train", "captions": [{"text": "a man walks", "from_s": 0.0, "to_s": 0.0}]}  # fmt: skip
+    row = {
+        "amass_path": path,
+        "mirrored": False,
+        "start_s": 0.0,
+        "end_s": 2.5,
+        "split": "train",
+        "captions": [{"text": "a man walks", "from_s": 0.0, "to_s": 0.0}],
+    }
     return json.dumps(row) + "\n" + json.dumps(row | {"end_s": None, "split": "test"}) + "\n"
 
 

@@ -199,6 +199,16 @@ reader("old checkpoint", published, {"old.pt": "old torch"}, read_checkpoint("ol
 reader("humanmac", humanmac, {"a.pt": "torch"}, read_humanmac, weight=3)
 reader("guo's evaluators", guo, {"finest.tar": "torch"}, read_guo, weight=3)
 reader("text model", hub, {"pytorch_model.bin": "torch"}, read_hub, weight=6)
-reader("guo's words", words, {"our_vab_data.npy": "npy", "our_vab_words.pkl": "pickle", "our_vab_idx.pkl": "pickle",
-                              "word_vectorizer.py": "text", "special.json": "json"}, read_words)  # fmt: skip
+reader(
+    "guo's words",
+    words,
+    {
+        "our_vab_data.npy": "npy",
+        "our_vab_words.pkl": "pickle",
+        "our_vab_idx.pkl": "pickle",
+        "word_vectorizer.py": "text",
+        "special.json": "json",
+    },
+    read_words,
+)
 reader("glove", words, {"glove.txt": "text"}, read_glove)

@@ -98,12 +98,26 @@ def test_what_is_not_drawn_is_not_walked(draw) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "", "no xml", "<html/>", "<svg>", "<svg/>", '<svg><path d=""/></svg>', '<svg><path d="M0 0"/></svg>',
-        '<svg><path d="L1 1"/></svg>', '<svg><path d="M0 0L1"/></svg>', '<svg><path d="M0 0Lx 1"/></svg>',
-        '<svg><path d="M0 0L1 1M5 5L6 6"/></svg>', '<svg><path d="M0 0A1 1 0 2 0 3 3"/></svg>',
-        '<svg><path d="M0 0L1e99 1"/></svg>', '<svg><path d="M0 0Z1 1"/></svg>', '<svg><path d="M0 0L0 0"/></svg>',
-        '<svg><circle r="-1"/></svg>', '<svg><circle r="50%"/></svg>', '<svg><polyline points="1 2 3"/></svg>',
-        '<svg transform="spin(3)"><line x2="1"/></svg>', '<svg transform="rotate(1 2)"><line x2="1"/></svg>',
+        "",
+        "no xml",
+        "<html/>",
+        "<svg>",
+        "<svg/>",
+        '<svg><path d=""/></svg>',
+        '<svg><path d="M0 0"/></svg>',
+        '<svg><path d="L1 1"/></svg>',
+        '<svg><path d="M0 0L1"/></svg>',
+        '<svg><path d="M0 0Lx 1"/></svg>',
+        '<svg><path d="M0 0L1 1M5 5L6 6"/></svg>',
+        '<svg><path d="M0 0A1 1 0 2 0 3 3"/></svg>',
+        '<svg><path d="M0 0L1e99 1"/></svg>',
+        '<svg><path d="M0 0Z1 1"/></svg>',
+        '<svg><path d="M0 0L0 0"/></svg>',
+        '<svg><circle r="-1"/></svg>',
+        '<svg><circle r="50%"/></svg>',
+        '<svg><polyline points="1 2 3"/></svg>',
+        '<svg transform="spin(3)"><line x2="1"/></svg>',
+        '<svg transform="rotate(1 2)"><line x2="1"/></svg>',
         '<svg transform="scale(0)"><line x2="1"/></svg>',
         '<!DOCTYPE svg [<!ENTITY a "M0 0">]><svg><path d="&a;L1 1"/></svg>',
         '<!DOCTYPE svg SYSTEM "file:///etc/passwd"><svg><line x2="1"/></svg>',
@@ -112,7 +126,7 @@ def test_what_is_not_drawn_is_not_walked(draw) -> None:
         f'<svg><path d="M0 0{"l1 1" * (MAX_PIECES + 1)}"/></svg>',
     ],
     ids=range(26),
-)  # fmt: skip
+)
 def test_bad_drawings_are_one_sentence(text: str, tmp_path: Path) -> None:
     (tmp_path / "d.svg").write_text(text)
     with pytest.raises(MotionloomError) as error:

@@ -172,8 +172,10 @@ def test_of_overlaid_goals_the_first_one_counts() -> None:
     assert (both.facing[2], both.facing[5], both.asked.sum(), both.facing_asked.sum()) == (1.5, 0.25, 6, 2)
     here, there = (replace(goal, start=GroundPose(x)) for goal, x in ((first, 1.0), (second, 2.0)))
     assert [overlaid(*pair).start for pair in ((here, there), (first, there), (here, second))] == [
-        GroundPose(1.0), GroundPose(2.0), GroundPose(1.0),
-    ]  # fmt: skip
+        GroundPose(1.0),
+        GroundPose(2.0),
+        GroundPose(1.0),
+    ]
 
 
 def test_placing_a_goal_turns_and_moves_it() -> None:

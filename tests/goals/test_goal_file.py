@@ -231,13 +231,20 @@ def test_mistakes_are_reported_by_their_key(name: str, read, folder: Path) -> No
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "is empty"), ("{", "line 1: this is not JSON"), ("[]", "must be a mapping"), ("NaN", "NaN is not"),
-        ('{"path": {"points": [[0, Infinity]]}}', "Infinity is not"), ('{"start": 1, "start": 2}', "'start' .* twice"),
-        ('{"path": {"points": [[0, 1e999]]}}', "must be -1000 to 1000"), ("[" * 100_000, "too deep"),
-        ("1" * 10_000, "too many digits"), ("\udcff", "UTF-8"), ("\0", "binary"),
+        ("", "is empty"),
+        ("{", "line 1: this is not JSON"),
+        ("[]", "must be a mapping"),
+        ("NaN", "NaN is not"),
+        ('{"path": {"points": [[0, Infinity]]}}', "Infinity is not"),
+        ('{"start": 1, "start": 2}', "'start' .* twice"),
+        ('{"path": {"points": [[0, 1e999]]}}', "must be -1000 to 1000"),
+        ("[" * 100_000, "too deep"),
+        ("1" * 10_000, "too many digits"),
+        ("\udcff", "UTF-8"),
+        ("\0", "binary"),
     ],
     ids=range(11),
-)  # fmt: skip
+)
 def test_files_that_are_no_goals(tmp_path: Path, text: str, said: str) -> None:
     file = tmp_path / "goal.json"
     file.write_bytes(text.encode("utf-8", "surrogateescape"))
@@ -259,9 +266,25 @@ def test_a_large_file_and_a_link_outwards_are_not_read(folder: Path, tmp_path: P
 
 WHOLE = json.loads(SCHEMA.read_text())
 STRUCTURE = {  # mistakes that the schema can see; the others are about times, reach and files
-    "paths", "nothing", "kinds", "times", "word", "flag", "bool", "far", "huge", "curve", "size", "joint", "neither",
-    "half", "high", "start", "list", "empty",
-} - {"high"}  # fmt: skip
+    "paths",
+    "nothing",
+    "kinds",
+    "times",
+    "word",
+    "flag",
+    "bool",
+    "far",
+    "huge",
+    "curve",
+    "size",
+    "joint",
+    "neither",
+    "half",
+    "high",
+    "start",
+    "list",
+    "empty",
+} - {"high"}
 GOOD = [
     {"path": LINE | {"times": [0, 2], "closed": False, "smooth": False, "facing": "free"}, "start": {"facing": 0}},
     {"path": {"points": [[0, 0], [0, 2]], "closed": True, "facing": [0, 10, 20]}},

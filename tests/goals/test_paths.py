@@ -112,10 +112,16 @@ def test_nobody_runs_faster_than_twelve_metres_a_second() -> None:
 
 @pytest.mark.parametrize(
     ("points", "times"),
-    [([], None), ([[0, 0, 0]], None), ([[0, np.nan]], None), ([[0, 0], [1, 1]], [0.0]), ([[0, 0], [1, 1]], [1.0, 1.0]),
-     ([[0, 0], [1, 1]], [7.0, 8.0])],
+    [
+        ([], None),
+        ([[0, 0, 0]], None),
+        ([[0, np.nan]], None),
+        ([[0, 0], [1, 1]], [0.0]),
+        ([[0, 0], [1, 1]], [1.0, 1.0]),
+        ([[0, 0], [1, 1]], [7.0, 8.0]),
+    ],
     ids=["none", "three", "nan", "times", "same", "late"],
-)  # fmt: skip
+)
 def test_points_that_are_no_path_are_refused(points: list, times: list[float] | None) -> None:
     with pytest.raises(MotionloomError):
         root_path(points, times, frames=41)

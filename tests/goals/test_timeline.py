@@ -59,8 +59,11 @@ def test_every_key_arrives_where_it_belongs(read, tmp_path):
     assert (timeline.seed, timeline.guidance, timeline.start) == (7, 3, tmp_path / "clip.bvh")
     said = [(s.text, s.seconds, s.guidance, s.transition) for s in timeline.segments]
     assert said == [
-        ("a person walks", 5, None, 0.5), ("jumps", 2.5, 4, 1.25), ("waves", 3, None, 0.5), ("sits", 5, None, 1),
-    ]  # fmt: skip
+        ("a person walks", 5, None, 0.5),
+        ("jumps", 2.5, 4, 1.25),
+        ("waves", 3, None, 0.5),
+        ("sits", 5, None, 1),
+    ]
     assert (timeline.frames, timeline.seconds, timeline.begins) == (310, 15.5, (0, 100, 150, 210, 310))
     assert timeline.path is not None
     assert (len(timeline.path), timeline.path.joints) == (310, ("pelvis",))

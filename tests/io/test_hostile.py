@@ -21,10 +21,37 @@ from tests.io.test_bvh import ARM
 from tests.work import work
 
 JUNK = [
-    b"nan", b"-inf", b"1e999", b"9" * 400, b"-1", b"0", b"{", b"}", b"\n", b"\r", b"\0", b"\xff\xfe", b"ROOT x",
-    b"End Site", b"MOTION", b"Frames: 1000000000000", b"CHANNELS 6", b"OFFSET", b":hierarchy", b"begin", b"end",
-    b"root root", b"#", b":", b"1_0", b"0x10", "\u0661\u0662".encode(), b"\x1c", b"1" * 30, b"PK\x03\x04",
-]  # fmt: skip
+    b"nan",
+    b"-inf",
+    b"1e999",
+    b"9" * 400,
+    b"-1",
+    b"0",
+    b"{",
+    b"}",
+    b"\n",
+    b"\r",
+    b"\0",
+    b"\xff\xfe",
+    b"ROOT x",
+    b"End Site",
+    b"MOTION",
+    b"Frames: 1000000000000",
+    b"CHANNELS 6",
+    b"OFFSET",
+    b":hierarchy",
+    b"begin",
+    b"end",
+    b"root root",
+    b"#",
+    b":",
+    b"1_0",
+    b"0x10",
+    "\u0661\u0662".encode(),
+    b"\x1c",
+    b"1" * 30,
+    b"PK\x03\x04",
+]
 QUICK = settings(deadline=None, max_examples=120, suppress_health_check=[HealthCheck.too_slow])
 
 

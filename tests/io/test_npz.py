@@ -46,8 +46,16 @@ def test_numpy_reads_the_documented_arrays_without_pickle(tmp_path):
         assert tuple(arrays["names"]) == SMPL22.names
         np.testing.assert_allclose(arrays["positions"], motion.positions(), atol=1e-6)
         assert set(arrays) == {
-            "version", "names", "parents", "offsets", "ends", "fps", "root", "rotations", "positions"
-        }  # fmt: skip
+            "version",
+            "names",
+            "parents",
+            "offsets",
+            "ends",
+            "fps",
+            "root",
+            "rotations",
+            "positions",
+        }
 
 
 def test_plain_positions_are_read_where_they_say_their_rate(tmp_path):

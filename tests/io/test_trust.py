@@ -185,9 +185,10 @@ def steps(call) -> int:
 def bvh(ends: int) -> str:
     tips = "End Site\n{\nOFFSET 0 1 0\n}\n" * ends
     return (
-        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n" + tips
+        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
+        + tips
         + "}\nMOTION\nFrames: 1\nFrame Time: 0.05\n0 0 0\n"
-    )  # fmt: skip
+    )
 
 
 def test_many_ends_of_one_joint_take_work_in_proportion(tmp_path: Path) -> None:

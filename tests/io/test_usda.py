@@ -137,9 +137,12 @@ def test_names_become_paths_that_usd_takes(tmp_path: Path) -> None:
     names = ("Hüfte 1", "2:spine", "2 spine", 'quo"te\\', "Hüfte 1 ")
     skeleton = Skeleton(names, (-1, 0, 0, 2, 2), np.full((5, 3), 0.1))
     assert joint_paths(skeleton) == [
-        "H_fte_1", "H_fte_1/_2_spine", "H_fte_1/_2_spine_2", "H_fte_1/_2_spine_2/quo_te_",
+        "H_fte_1",
+        "H_fte_1/_2_spine",
+        "H_fte_1/_2_spine_2",
+        "H_fte_1/_2_spine_2/quo_te_",
         "H_fte_1/_2_spine_2/H_fte_1_",
-    ]  # fmt: skip
+    ]
     motion = Motion(skeleton, FPS, np.zeros((2, 3)), np.tile(rot.IDENTITY, (2, 5, 1)))
     ((query, _),) = queries(opened(save(motion, tmp_path / "odd.usda")))
     assert list(query.GetSkeleton().GetJointNamesAttr().Get()) == list(names)

@@ -24,8 +24,14 @@ needs_signals = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs forks 
 SEED = 7
 """Of the moments that are drawn."""
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGKILL]
-PRELOADED = ["tests.kills.programs", "motionloom.cli.generate", "motionloom.tasks.long", "motionloom.tasks.text",
-             "motionloom.data.build", "tests.train.runs"]  # fmt: skip
+PRELOADED = [
+    "tests.kills.programs",
+    "motionloom.cli.generate",
+    "motionloom.tasks.long",
+    "motionloom.tasks.text",
+    "motionloom.data.build",
+    "tests.train.runs",
+]
 
 
 @dataclass(frozen=True)

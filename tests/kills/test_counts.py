@@ -43,11 +43,28 @@ COUNTED = {
     "control": (12, "a person walks", "--goal", "@goal.json", "--seconds", "0.5"),
     "edit": (3, "@past.npz", "a person walks", "--between", "0.3", "0.7"),
     "predict": (18, "@past.npz", "--seconds", "0.3", "--weights", "@predictor.safetensors", "--no-foot-lock"),
-    "switch": (18, "@past.npz", "@kick.npz", "--seconds", "0.3", "--weights", "@predictor.safetensors",
-               "--no-foot-lock"),
-    "duet": (10, "two people walk", "--seconds", "0.5", "--pair-weights", "@block.safetensors",
-             "--weights", "@pair.safetensors", "--no-foot-lock"),
-}  # fmt: skip
+    "switch": (
+        18,
+        "@past.npz",
+        "@kick.npz",
+        "--seconds",
+        "0.3",
+        "--weights",
+        "@predictor.safetensors",
+        "--no-foot-lock",
+    ),
+    "duet": (
+        10,
+        "two people walk",
+        "--seconds",
+        "0.5",
+        "--pair-weights",
+        "@block.safetensors",
+        "--weights",
+        "@pair.safetensors",
+        "--no-foot-lock",
+    ),
+}
 """Commands with a count, how many, and the other words."""
 
 

@@ -24,8 +24,20 @@ pytestmark = needs_signals
 @pytest.mark.parametrize("number", SIGNALS, ids=lambda number: number.name)
 def test_compose_keeps_what_was_finished_and_shows_nothing_half_written(weights: str, tmp_path: Path, number) -> None:
     """SIGINT and SIGTERM end it alike: the file has the frames that were finished, the same as without them."""
-    words = ["compose", *["walk", "jump", "sit"] * 6, "--seconds", "1", "--steps", "3", "--weights", weights,
-             "--out", "a.bvh", "--out", "b.npz"]  # fmt: skip
+    words = [
+        "compose",
+        *["walk", "jump", "sit"] * 6,
+        "--seconds",
+        "1",
+        "--steps",
+        "3",
+        "--weights",
+        weights,
+        "--out",
+        "a.bvh",
+        "--out",
+        "b.npz",
+    ]
     _, chosen = moments(words, tmp_path / "whole", kills(10), seed=SEED)
     right = {name: io.load(tmp_path / "whole" / name) for name in ("a.bvh", "b.npz")}
     some = 0

@@ -148,8 +148,16 @@ def test_somebody_goes_on_from_a_motion_in_its_place(prior: Prior) -> None:
 def test_joints_never_jump_when_something_is_asked(real: Prior) -> None:
     """Between frames nothing moves faster than in runs that nobody interrupts: 12 m/s is a foot that runs."""
     live = Live(real, seed=2)
-    script = {0: [Say(WALK)], 31: [Say(RUN)], 66: [Say("a person stands still")], 83: [Say(WALK)], 95: [Steer(2.5)],
-              104: [Steer(-1.5, 2.0)], 131: [Say("")], 140: [Path(((0.0, 0.0),))]}  # fmt: skip
+    script = {
+        0: [Say(WALK)],
+        31: [Say(RUN)],
+        66: [Say("a person stands still")],
+        83: [Say(WALK)],
+        95: [Steer(2.5)],
+        104: [Steer(-1.5, 2.0)],
+        131: [Say("")],
+        140: [Path(((0.0, 0.0),))],
+    }
     motion = motion_of(played(live, script, 200), 20)
     steps = np.diff(motion.positions(), axis=0)
     assert np.linalg.norm(steps, axis=-1).max() * 20 < 12.0

@@ -43,9 +43,12 @@ def test_what_is_asked_of_both_or_one_is_taken_and_makes_the_same_again() -> Non
     frames += [next(pair) for _ in range(6)]
     asked = pair.taken
     assert asked == [
-        (0, Say("a person walks"), 0), (0, Say("a person waves"), 1),
-        (9, Say("a person jumps"), 0), (9, Steer(1.0, 1.0), 1), (9, Say("a person jumps"), 1),
-    ]  # fmt: skip
+        (0, Say("a person walks"), 0),
+        (0, Say("a person waves"), 1),
+        (9, Say("a person jumps"), 0),
+        (9, Steer(1.0, 1.0), 1),
+        (9, Say("a person jumps"), 1),
+    ]
     again = LivePair(made, block(made), seed=2, settings=QUICK)
     for old in frames:
         for one in asked:

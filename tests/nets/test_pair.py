@@ -243,11 +243,12 @@ def test_states_are_put_together_and_taken_apart():
 @pytest.mark.parametrize(
     "config",
     [
-        PairConfig(width=32, split=3), PairConfig(width=64, split=1), PairConfig(width=32, split=1, aware=True,
-                                                                              places=PUBLISHED_CODE),
+        PairConfig(width=32, split=3),
+        PairConfig(width=64, split=1),
+        PairConfig(width=32, split=1, aware=True, places=PUBLISHED_CODE),
     ],
     ids=["split", "width", "aware"],
-)  # fmt: skip
+)
 def test_a_block_that_does_not_fit_a_prior_is_refused(config):
     with pytest.raises(MotionloomError):
         Talk(config, tiny.PUBLISHED)
@@ -258,8 +259,18 @@ def test_other_blocks_that_do_not_fit():
         Talk(PairConfig(width=32, split=1, adds="condition"), tiny.MODULATED)
     with pytest.raises(MotionloomError, match="flags"):
         Talk(PairConfig(width=32, split=1), NetConfig(width=32, layers=2, flags=True))
-    for odd in ({"layers": 0}, {"width": 30}, {"split": -1}, {"dropout": 2}, {"adds": "no"}, {"aware": 1}, {"x": 1},
-                {"places": {"kind": "no"}}, {"places": 3}, {"layers": True}):  # fmt: skip
+    for odd in (
+        {"layers": 0},
+        {"width": 30},
+        {"split": -1},
+        {"dropout": 2},
+        {"adds": "no"},
+        {"aware": 1},
+        {"x": 1},
+        {"places": {"kind": "no"}},
+        {"places": 3},
+        {"layers": True},
+    ):
         with pytest.raises(MotionloomError):
             PairConfig.parse(odd)
 
@@ -313,8 +324,11 @@ def test_hostile_files_are_refused(tmp_path, monkeypatch):
     graph = graph_tensors({"pair": made.graph})
     first = sorted(good)[0]
     cases = {
-        "nothing": (None, good), "list": ([1], good), "newer": (about | {"format": 2, "config": sizes}, good),
-        "no sizes": (about, good), "odd sizes": (about | {"config": sizes | {"width": -1}}, good),
+        "nothing": (None, good),
+        "list": ([1], good),
+        "newer": (about | {"format": 2, "config": sizes}, good),
+        "no sizes": (about, good),
+        "odd sizes": (about | {"config": sizes | {"width": -1}}, good),
         "huge": (about | {"config": sizes | {"width": 8192, "heads": 4}}, good),
         "number for text": (about | {"config": sizes, "licence": 3}, good),
         "missing": (about | {"config": sizes}, {k: v for k, v in good.items() if k != first}),
@@ -325,7 +339,7 @@ def test_hostile_files_are_refused(tmp_path, monkeypatch):
         "no graph": (about | {"config": sizes}, good),
         "another graph": (about | {"config": sizes}, good | graph_tensors({"pair": prior.net.graphs["bind"]})),
         "bytes": (about | {"config": sizes}, good | graph_tensors({"pair": b"no graph"})),
-    }  # fmt: skip
+    }
     for number, (said, tensors) in enumerate(cases.values()):
         bad = tmp_path / f"{number}.safetensors"
         save_file(tensors, bad, metadata={} if said is None else {KEY: json.dumps(said)})
@@ -365,10 +379,13 @@ def published(layers: int = 2, split: int = 3, width: int = 16) -> dict[str, Ten
             if n < layers:
                 shapes[f"multi_person.model.layers.{n}.{leaf}"] = shape
     shapes |= {
-        "multi_person.canon_agg.weight": (width, 8), "multi_person.canon_agg.bias": (width,),
-        "multi_person.canon_out.weight": (4, width), "multi_person.canon_out.bias": (4,),
-        "multi_person.aggregation.weight": (width, 2 * width), "multi_person.aggregation.bias": (width,),
-    }  # fmt: skip
+        "multi_person.canon_agg.weight": (width, 8),
+        "multi_person.canon_agg.bias": (width,),
+        "multi_person.canon_out.weight": (4, width),
+        "multi_person.canon_out.bias": (4,),
+        "multi_person.aggregation.weight": (width, 2 * width),
+        "multi_person.aggregation.bias": (width,),
+    }
     rng = torch.Generator().manual_seed(0)
     return {key: torch.randn(shape, generator=rng) * 0.2 for key, shape in shapes.items()}
 
@@ -395,10 +412,12 @@ def test_published_checkpoints_that_do_not_fit_are_refused():
     good = published()
     one = "multi_person.canon_out.weight"
     for change in (
-        {one: torch.zeros(5, 16)}, {one: torch.full((4, 16), float("nan"))},
-        {"multi_person.else.weight": torch.zeros(1)}, {"seqTransEncoder_end.layers.x.norm1.bias": torch.zeros(16)},
+        {one: torch.zeros(5, 16)},
+        {one: torch.full((4, 16), float("nan"))},
+        {"multi_person.else.weight": torch.zeros(1)},
+        {"seqTransEncoder_end.layers.x.norm1.bias": torch.zeros(16)},
         {"multi_person.model.layers.7.norm1.bias": torch.zeros(16)},
-    ):  # fmt: skip
+    ):
         with pytest.raises(MotionloomError):
             from_published_pair(good | change)
     for gone in (one, "multi_person.model.layers.0.linear1.weight", "seqTransEncoder_start.layers.1.norm1.bias"):

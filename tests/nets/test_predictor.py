@@ -156,12 +156,27 @@ def test_beside_every_token_sees_its_own_row() -> None:
 
 @pytest.mark.parametrize(
     "values",
-    [{"channels": 0}, {"channels": 1 << 20}, {"layers": 1 << 10}, {"width": 33}, {"heads": 7}, {"kept": 2.0},
-     {"kept": True}, {"dropout": 1.0}, {"dropout": float("nan")}, {"dropout": "x"},
-     {"condition": 5}, {"condition": "ab"}, {"condition": [1]}, {"condition": [3, 8], "beside": True}, {"beside": 1000},
-     {"breadth": 3}, {"width": None}],
+    [
+        {"channels": 0},
+        {"channels": 1 << 20},
+        {"layers": 1 << 10},
+        {"width": 33},
+        {"heads": 7},
+        {"kept": 2.0},
+        {"kept": True},
+        {"dropout": 1.0},
+        {"dropout": float("nan")},
+        {"dropout": "x"},
+        {"condition": 5},
+        {"condition": "ab"},
+        {"condition": [1]},
+        {"condition": [3, 8], "beside": True},
+        {"beside": 1000},
+        {"breadth": 3},
+        {"width": None},
+    ],
     ids=str,
-)  # fmt: skip
+)
 def test_sizes_that_cannot_be_are_refused(values: dict) -> None:
     with pytest.raises(MotionloomError):
         PredictorConfig.parse(values)

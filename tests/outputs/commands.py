@@ -28,7 +28,10 @@ TIMELINES = {
         "segments": [
             {"text": WALK, "seconds": 1.5},
             {
-                "text": "a person raises the left hand", "seconds": 1.5, "transition": 0.5, "guidance": 3,
+                "text": "a person raises the left hand",
+                "seconds": 1.5,
+                "transition": 0.5,
+                "guidance": 3,
                 "goal": {"joints": [{"joint": "left_wrist", "points": [{"time": 1, "position": [None, 1.7, None]}]}]},
             },
         ],
@@ -59,7 +62,7 @@ TIMELINES = {
             {"at": 2.3, "reach": {"joint": "left_wrist", "position": [0.5, 1.2, 3], "within": 0.5}},
         ],
     },
-}  # fmt: skip
+}
 """Written beside the outputs as NAME.yaml (JSON is YAML)."""
 
 FEW = ("--steps", "4")
@@ -97,12 +100,57 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "predict raw": ("predict", CLIP, "--count", "1", "--raw", "--temperature", "0.8", "--no-picture", *FEW),
     "predict larger": ("predict", "{work}/larger.bvh", "--count", "1", "--no-picture", *FEW),
     "predict no root": ("predict", CLIP, "--count", "1", "--no-root", "--no-picture", *FEW),
-    "predict hold": ("predict", CLIP, "--end", "0.6", "--count", "1", "--hold", "left_arm", "--from", CLIP,
-                     "--from-time", "0.6", "--seconds", "1", "--no-picture", *FEW),
-    "predict mask": ("predict", CLIP, "--end", "0.6", "--count", "1", "--mask", str(MASKS / "legs_then_arms.json"),
-                     "--from", CLIP, "--seconds", "2", "--no-picture", *FEW),
-    "predict retarget": ("predict", "{work}/larger.bvh", "--end", "0.6", "--count", "1", "--hold", "upper_body",
-                         "--from", CLIP, "--retarget", "--seconds", "1", "--no-picture", *FEW),
+    "predict hold": (
+        "predict",
+        CLIP,
+        "--end",
+        "0.6",
+        "--count",
+        "1",
+        "--hold",
+        "left_arm",
+        "--from",
+        CLIP,
+        "--from-time",
+        "0.6",
+        "--seconds",
+        "1",
+        "--no-picture",
+        *FEW,
+    ),
+    "predict mask": (
+        "predict",
+        CLIP,
+        "--end",
+        "0.6",
+        "--count",
+        "1",
+        "--mask",
+        str(MASKS / "legs_then_arms.json"),
+        "--from",
+        CLIP,
+        "--seconds",
+        "2",
+        "--no-picture",
+        *FEW,
+    ),
+    "predict retarget": (
+        "predict",
+        "{work}/larger.bvh",
+        "--end",
+        "0.6",
+        "--count",
+        "1",
+        "--hold",
+        "upper_body",
+        "--from",
+        CLIP,
+        "--retarget",
+        "--seconds",
+        "1",
+        "--no-picture",
+        *FEW,
+    ),
     "switch": ("switch", CLIP, "{work}/beside.bvh", "--count", "2", *FEW),
     "switch kept": ("switch", CLIP, "{work}/beside.bvh", "--facing", "kept", "--seconds", "1.8", *FEW),
     "duet": ("duet", "two people dance", "--seconds", "1.5", "--count", "2", *FEW),
@@ -111,7 +159,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "duet given": ("duet", "a person waves", "--given", CLIP, *FEW),
     "duet timeline": ("duet", "--timeline", "{work}/duet.yaml", *FEW),
     "duet path": ("duet", WALK, "--path", str(GOALS / "s_curve.json"), "--person", "2", "--seconds", "2", *FEW),
-}  # fmt: skip
+}
 """Name -> what is typed; {work} is a folder with the files of `write_inputs`."""
 
 

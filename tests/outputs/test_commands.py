@@ -43,8 +43,15 @@ def test_every_recorded_command_is_compared() -> None:
 def test_every_command_that_draws_is_recorded() -> None:
     """Eight commands draw motion; each is there."""
     assert {words[0] for words in COMMANDS.values()} == {
-        "generate", "compose", "live", "control", "edit", "predict", "switch", "duet"
-    }  # fmt: skip
+        "generate",
+        "compose",
+        "live",
+        "control",
+        "edit",
+        "predict",
+        "switch",
+        "duet",
+    }
 
 
 def compared(*words: str) -> subprocess.CompletedProcess[str]:

@@ -120,8 +120,18 @@ def test_the_command_poses_hands(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "goes with a --skeleton" in capsys.readouterr().err
 
 
-RIGS = ("sophia.glb", "gdbot.glb", "robot_expressive.glb", "rpm_walk.glb", "m2m_mixamo.glb", "ue_m2m_skel.glb", 
-        "vroid.vrm", "vrm1_example.vrm", "daz_cmu_mocapnet.bvh", "cmu_iclone.bvh")  # fmt: skip
+RIGS = (
+    "sophia.glb",
+    "gdbot.glb",
+    "robot_expressive.glb",
+    "rpm_walk.glb",
+    "m2m_mixamo.glb",
+    "ue_m2m_skel.glb",
+    "vroid.vrm",
+    "vrm1_example.vrm",
+    "daz_cmu_mocapnet.bvh",
+    "cmu_iclone.bvh",
+)
 
 
 @pytest.mark.parametrize("name", RIGS)

@@ -264,8 +264,10 @@ def test_joints22_agree_with_the_floor_heights_recorded_for_the_real_clips(path:
 def test_a_generated_rigify_rig_in_pieces_is_refused_with_the_way_to_join_it() -> None:
     """Blender exports its limbs beside its spine, each on the armature."""
     names = ("rig", *named_skeleton("rigify").names)
-    parents = [0 if p < 0 or p == 0 or name.startswith("DEF-shoulder") else p + 1
-               for name, p in zip(names[1:], named_skeleton("rigify").parents)]  # fmt: skip
+    parents = [
+        0 if p < 0 or p == 0 or name.startswith("DEF-shoulder") else p + 1
+        for name, p in zip(names[1:], named_skeleton("rigify").parents)
+    ]
     rest = np.vstack([np.zeros(3), named_skeleton("rigify").rest_positions()])
     parents[names.index("DEF-spine.001") - 1] = names.index("DEF-spine")
     offsets = rest - np.vstack([np.zeros(3), rest[parents]])

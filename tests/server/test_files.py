@@ -140,12 +140,21 @@ def test_a_character_without_a_person_in_it_is_refused(server: Server) -> None:
 @pytest.mark.parametrize(
     "path",
     [
-        "/motions/../project.json", "/motions/..%2fproject.json", "/motions/%2e%2e%2fproject.json",
-        "/motions/....//project.json", "/motions//etc/passwd", "/motions/%00", "/motions/.json", "/characters/..",
-        "/characters/..%2f..%2fetc%2fpasswd", "/page/../app.py", "/..%2fserver%2fapp.py", "/motions/%c0%ae%c0%ae/x",
+        "/motions/../project.json",
+        "/motions/..%2fproject.json",
+        "/motions/%2e%2e%2fproject.json",
+        "/motions/....//project.json",
+        "/motions//etc/passwd",
+        "/motions/%00",
+        "/motions/.json",
+        "/characters/..",
+        "/characters/..%2f..%2fetc%2fpasswd",
+        "/page/../app.py",
+        "/..%2fserver%2fapp.py",
+        "/motions/%c0%ae%c0%ae/x",
         "/motions/" + "a" * 3000,
     ],
-)  # fmt: skip
+)
 def test_no_path_leads_out_of_the_project(server: Server, path: str) -> None:
     status, _, data = server.ask("GET", path)
     assert status in (400, 404)

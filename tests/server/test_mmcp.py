@@ -112,8 +112,12 @@ def test_constraints_alone_are_enough(server: Server, model: dict[str, Any]) -> 
 def test_a_pose_with_a_place_is_taken_there(server: Server, model: dict[str, Any]) -> None:
     (source,) = draw(server, model, segments=[text("a person raises both arms")])
     turns = xyzw(source["local_rot_mats"][20])
-    pose = {"type": "pose_keyframe", "frame": 30, "joint_rotations": dict(zip(source["joint_names"], turns)),
-            "root_position": [0.5, float(place(source, "pelvis")[20, 1]), 1.0]}  # fmt: skip
+    pose = {
+        "type": "pose_keyframe",
+        "frame": 30,
+        "joint_rotations": dict(zip(source["joint_names"], turns)),
+        "root_position": [0.5, float(place(source, "pelvis")[20, 1]), 1.0],
+    }
     (made,) = draw(server, model, segments=[text(frames=60)], constraints=[pose])
     own = source["places"][20] - place(source, "pelvis")[20]
     there = made["places"][30] - [0.5, place(source, "pelvis")[20, 1], 1.0]
@@ -158,10 +162,13 @@ def test_planted_feet_stand_on_the_ground_under_them(server: Server, model: dict
 def test_a_performance_is_like_its_reference_but_no_copy(server: Server, model: dict[str, Any]) -> None:
     (source,) = draw(server, model, segments=[text("a person jumps")])
     like = {
-        "type": "motion_reference", "duration_frames": 50, "joint_names": list(source["joint_names"]), "fps": 20,
+        "type": "motion_reference",
+        "duration_frames": 50,
+        "joint_names": list(source["joint_names"]),
+        "fps": 20,
         "rotations": [xyzw(frame) for frame in source["local_rot_mats"]],
         "root_positions": place(source, "pelvis").tolist(),
-    }  # fmt: skip
+    }
     (made,) = draw(server, model, segments=[like, text(frames=30)])
     assert made["num_frames"] == 80
     apart = made["places"][:40] - source["places"]
@@ -181,10 +188,12 @@ def other_rig(size: float = 1.2) -> dict[str, Any]:
         offset = size * rot.rotate(rot.inverse(above), skeleton.offsets[joint])
         joints.append(
             {
-                "name": name, "parent": None if parent < 0 else skeleton.names[parent],
-                "rest_translation": offset.tolist(), "rest_rotation": np.roll(local, -1).tolist(),
+                "name": name,
+                "parent": None if parent < 0 else skeleton.names[parent],
+                "rest_translation": offset.tolist(),
+                "rest_rotation": np.roll(local, -1).tolist(),
             }
-        )  # fmt: skip
+        )
     return {"joints": joints}
 
 

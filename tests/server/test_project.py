@@ -218,11 +218,14 @@ def test_a_mistake_in_a_timeline_is_reported_with_its_line(server: Server) -> No
     [
         ({"seconds": "x"}, None, "segments[1].seconds"),
         ({"text": " "}, None, "segments[1].text"),
-        ({"goal": {"joints": [{"joint": "head", "points": [{"time": 9, "position": [0, 1, 0]}]}]}}, None,
-         "segments[1].goal.joints[0].points[0].time"),
+        (
+            {"goal": {"joints": [{"joint": "head", "points": [{"time": 9, "position": [0, 1, 0]}]}]}},
+            None,
+            "segments[1].goal.joints[0].points[0].time",
+        ),
         ({}, {"path": {"points": [[0, 0], [0, 99]], "times": [0, 1]}}, "path.path"),
     ],
-)  # fmt: skip
+)
 def test_a_mistake_says_which_keys_are_its_cause(server: Server, segment: dict, path: dict | None, where: str) -> None:
     segments = [{"text": "a person walks", "seconds": 2.0}, {"text": "a person sits", "seconds": 2.0} | segment]
     timeline = {"segments": segments} | ({"path": path} if path else {})
@@ -258,8 +261,13 @@ def test_a_body_that_does_not_say_its_length_is_cut_off_at_the_limit(server: Ser
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
     piece = b"x" * (1 << 20)
     try:
-        connection.request("POST", "/jobs", body=(piece for _ in range(100)), encode_chunked=True,
-                           headers={"Transfer-Encoding": "chunked"})  # fmt: skip
+        connection.request(
+            "POST",
+            "/jobs",
+            body=(piece for _ in range(100)),
+            encode_chunked=True,
+            headers={"Transfer-Encoding": "chunked"},
+        )
         status = connection.getresponse().status
     except (BrokenPipeError, ConnectionResetError):
         status = 413  # it closed the door while we were still talking

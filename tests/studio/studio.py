@@ -15,9 +15,19 @@ SLOW = 240_000
 LOOK = 20
 """Milliseconds between two looks at the page."""
 PROJECT = {
-    "version": 2, "name": "Test", "seed": 3, "count": 1, "kept": 0, "drawn": "", "takes": [], "clips": [],
-    "frozen": [], "base": None, "reactTo": None, "character": None,
-}  # fmt: skip
+    "version": 2,
+    "name": "Test",
+    "seed": 3,
+    "count": 1,
+    "kept": 0,
+    "drawn": "",
+    "takes": [],
+    "clips": [],
+    "frozen": [],
+    "base": None,
+    "reactTo": None,
+    "character": None,
+}
 FORGET = "if (location.protocol === 'http:' && name !== 'kept') { localStorage.clear(); name = 'kept' }"
 """What the page of an earlier test kept in the browser is gone; what this one keeps stays."""
 NOTHING: dict[str, Any] = {"path": None, "targets": [], "poses": []}

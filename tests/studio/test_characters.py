@@ -30,8 +30,16 @@ def skeleton() -> str:
     text = [*f"{head}|  axis XYZ|  position 0 0 0|  orientation 0 0 0|:bonedata".split("|")]
     for number, (name, _, (x, y, z, size)) in enumerate(bones, start=1):
         x, y, z = np.array([x, y, z], float) / np.linalg.norm(np.array([x, y, z], float))
-        text += ["  begin", f"    id {number}", f"    name {name}", f"    direction {x:.6f} {y:.6f} {z:.6f}",
-                 f"    length {size}", "    axis 0 0 0 XYZ", "    dof rx ry rz", "  end"]  # fmt: skip
+        text += [
+            "  begin",
+            f"    id {number}",
+            f"    name {name}",
+            f"    direction {x:.6f} {y:.6f} {z:.6f}",
+            f"    length {size}",
+            "    axis 0 0 0 XYZ",
+            "    dof rx ry rz",
+            "  end",
+        ]
     text += [":hierarchy", "  begin"]
     for parent in dict.fromkeys(parent for _, parent, _ in bones):
         text.append(f"    {parent} {' '.join(name for name, above, _ in bones if above == parent)}")
@@ -56,8 +64,16 @@ def as_vrm(hero: Hero) -> Hero:
         "neck": "neck",
         "head": "head",
     }
-    sides = {"hip": "UpperLeg", "knee": "LowerLeg", "ankle": "Foot", "foot": "Toes", "collar": "Shoulder",
-             "shoulder": "UpperArm", "elbow": "LowerArm", "wrist": "Hand"}  # fmt: skip
+    sides = {
+        "hip": "UpperLeg",
+        "knee": "LowerLeg",
+        "ankle": "Foot",
+        "foot": "Toes",
+        "collar": "Shoulder",
+        "shoulder": "UpperArm",
+        "elbow": "LowerArm",
+        "wrist": "Hand",
+    }
     names |= {f"{side}_{part}": f"{side}{bone}" for side in ("left", "right") for part, bone in sides.items()}
     bones = {names[node["name"]]: {"node": n} for n, node in enumerate(hero.json["nodes"]) if node["name"] in names}
     hero.json["extensions"] = {"VRMC_vrm": {"specVersion": "1.0", "humanoid": {"humanBones": bones}}}

@@ -136,9 +136,10 @@ NEWER = {**PROJECT, "version": 99, "id": "film-c", "revision": 3, "layers": [1],
 
 
 @pytest.mark.parametrize(
-    ("data", "why"), [(json.dumps(NEWER).encode(), "has version 99"), (b'{"version": 2, "se', "is not JSON")],
+    ("data", "why"),
+    [(json.dumps(NEWER).encode(), "has version 99"), (b'{"version": 2, "se', "is not JSON")],
     ids=["newer", "damaged"],
-)  # fmt: skip
+)
 def test_a_project_that_cannot_be_read_is_kept_aside_and_told(
     studio: Studio, folder: Path, data: bytes, why: str
 ) -> None:

@@ -335,12 +335,16 @@ def test_pasts_of_no_pair_are_refused_in_a_sentence(prior: Prior, block: PairBlo
 
 def test_what_nothing_can_be_made_of_is_refused(prior: Prior, block: PairBlock) -> None:
     wrong = [
-        ({"seconds": 0.0}, "cannot be made"), ({"seconds": float("nan")}, "cannot be made"),
+        ({"seconds": 0.0}, "cannot be made"),
+        ({"seconds": float("nan")}, "cannot be made"),
         ({"count": 0}, "1 or more"),
         ({"count": 10_000}, "10000 duets"),
-        ({"seed": -1}, "seed"), ({"seed": (1, 2**62)}, "seed"), ({"steps": 0}, "steps"),
-        ({"guidance": float("nan")}, "guidance"), ({"goals": (Goal.nothing(3), None)}, "goal of 3"),
-    ]  # fmt: skip
+        ({"seed": -1}, "seed"),
+        ({"seed": (1, 2**62)}, "seed"),
+        ({"steps": 0}, "steps"),
+        ({"guidance": float("nan")}, "guidance"),
+        ({"goals": (Goal.nothing(3), None)}, "goal of 3"),
+    ]
     for given, message in wrong:
         with pytest.raises(MotionloomError, match=message):
             generate_pair(prior, block, "a person walks", **given)

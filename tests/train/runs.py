@@ -33,8 +33,20 @@ NET = {
 
 
 def recipe(**changes) -> Recipe:
-    values = {"name": "small", "steps": 60, "batch": 4, "windows": [20, 32], "shares": [0.5, 0.5], "save_every": 7,
-              "warmup": 5, "rate": 3e-3, "levels": 50, "net": NET, "seed": 3, "amp": "float32"}  # fmt: skip
+    values = {
+        "name": "small",
+        "steps": 60,
+        "batch": 4,
+        "windows": [20, 32],
+        "shares": [0.5, 0.5],
+        "save_every": 7,
+        "warmup": 5,
+        "rate": 3e-3,
+        "levels": 50,
+        "net": NET,
+        "seed": 3,
+        "amp": "float32",
+    }
     return Recipe(**(values | changes))
 
 

@@ -131,9 +131,19 @@ def test_a_stopped_run_goes_on_to_the_same_file(data, start, tmp_path):
 def test_training_brings_the_given_numbers_nearer(data, start, tmp_path):
     """On the windows it is trained on, the told adapter answers the given numbers better than the prior."""
     place, _ = trained(
-        data, tmp_path, start, steps=60, warmup=5, rate=1e-2, ema=0.9, control="trajectory", save_every=60,
-        windows=[32], shares=[1.0], batch=16,
-    )  # fmt: skip
+        data,
+        tmp_path,
+        start,
+        steps=60,
+        warmup=5,
+        rate=1e-2,
+        ema=0.9,
+        control="trajectory",
+        save_every=60,
+        windows=[32],
+        shares=[1.0],
+        batch=16,
+    )
     prior = Prior.load(start)
     motions = load_set(data)
     clean = (motions.features[:64].reshape(2, 32, 263) * motions.std + motions.mean - tensor(prior.mean)) / tensor(

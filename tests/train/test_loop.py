@@ -40,8 +40,12 @@ def start(data: Path, out: Path, steps: int, *, processes: int = 1) -> subproces
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": f"{ROOT / 'src'}{os.pathsep}{ROOT}"}
     return subprocess.Popen(
         [*program, "tests.train.runs", str(data), str(out), str(steps)],
-        cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
-    )  # fmt: skip
+        cwd=ROOT,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
 
 
 def read(running: subprocess.Popen, count: int) -> dict[int, str]:
@@ -182,9 +186,12 @@ def test_weights_are_written_though_the_run_was_stopped_just_before(tmp_path: Pa
     saved: list[int] = []
     steps: list[int] = []
     loop.train(
-        Sum(), runs.recipe(steps=5), tmp_path,
-        on_save=lambda net, average, step: saved.append(step), on_step=lambda step, loss, s: steps.append(step),
-    )  # fmt: skip
+        Sum(),
+        runs.recipe(steps=5),
+        tmp_path,
+        on_save=lambda net, average, step: saved.append(step),
+        on_step=lambda step, loss, s: steps.append(step),
+    )
     assert saved == [5]
     assert steps == []
 

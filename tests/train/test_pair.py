@@ -38,8 +38,19 @@ def pair(name: str = "walk", split: str = "train", captions: tuple[str, ...] = (
 
 
 def recipe(**changes):
-    plan = {"name": "two", "steps": 8, "batch": 3, "windows": [20, 32], "shares": [0.5, 0.5], "save_every": 4,
-            "net": {}, "amp": "none", "displacement": 0.3, "warmup": 1, "cooldown": 0.0}  # fmt: skip
+    plan = {
+        "name": "two",
+        "steps": 8,
+        "batch": 3,
+        "windows": [20, 32],
+        "shares": [0.5, 0.5],
+        "save_every": 4,
+        "net": {},
+        "amp": "none",
+        "displacement": 0.3,
+        "warmup": 1,
+        "cooldown": 0.0,
+    }
     return runs.recipe(**(plan | changes))
 
 
@@ -331,9 +342,12 @@ def test_texts_are_dropped_of_who_reacts_too_and_of_whom_nobody_described():
     made = objective(settings=Settings(prefix=0.0, react=1.0, silent=1.0), windows=[20], shares=[1.0])
     assert made.drawn(0, 0, 20).cond.pooled.abs().sum() == 0
     undescribed = PairError(
-        made.net, tiny.prior(), Duets([pair(captions=()), pair("b", turn=2.0)]), settings=Settings(prefix=0, react=0),
+        made.net,
+        tiny.prior(),
+        Duets([pair(captions=()), pair("b", turn=2.0)]),
+        settings=Settings(prefix=0, react=0),
         recipe=recipe(drop_text=0.0),
-    )  # fmt: skip
+    )
     crops = undescribed.duets.crops(np.array([0, 1]), np.zeros(2, int), 20)
     drawn = undescribed.noised(np.random.default_rng(0), crops)
     silent = drawn.cond.pooled.abs().sum(-1) == 0

@@ -81,8 +81,10 @@ def test_a_run_takes_it_says_so_and_goes_on_with_it(
     assert not [line for line in loop.changed(tmp_path, runs.recipe(steps=6, amp="auto")) if "amp" in line]
 
 
-@pytest.mark.parametrize(("said", "kind"), [("bf16", torch.bfloat16), ("float32", torch.float32),
-                                            ("off", torch.float32), ("none", torch.float32)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("said", "kind"),
+    [("bf16", torch.bfloat16), ("float32", torch.float32), ("off", torch.float32), ("none", torch.float32)],
+)
 def test_what_a_recipe_says_is_not_measured(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: str, kind: torch.dtype
 ) -> None:

@@ -27,8 +27,18 @@ def protocol(layout=SMPL_LAYOUT, *, seconds: float = 3.0) -> Protocol:
 
 
 def recipe(**changes) -> Recipe:
-    values = {"name": "tiny", "steps": 12, "batch": 8, "warmup": 2, "rate": 3e-3, "levels": 40, "save_every": 4,
-              "amp": "none", "predictor": SMALL, "seed": 5}  # fmt: skip
+    values = {
+        "name": "tiny",
+        "steps": 12,
+        "batch": 8,
+        "warmup": 2,
+        "rate": 3e-3,
+        "levels": 40,
+        "save_every": 4,
+        "amp": "none",
+        "predictor": SMALL,
+        "seed": 5,
+    }
     return Recipe(**(values | changes))
 
 

@@ -111,11 +111,23 @@ def test_any_values_give_a_recipe_or_one_kind_of_error(tmp_path_factory: pytest.
 
 
 @pytest.mark.parametrize(
-    "said", ["a." * 200_000 + "a = 1", "steps = " + "9" * 5000, "favour.walk = nan", "favour.walk = -1",
-             "rate = " + "9" * 400, "ema = " + "9" * 400, "favour.walk = true", "favour.walk = 'x'", "x" * 70_000,
-             "[pair]\nprefix = " + "9" * 400, "[predictor]\nuntold = " + "9" * 400, "[net]\na = [[9" + "9" * 30 + "]]"],
+    "said",
+    [
+        "a." * 200_000 + "a = 1",
+        "steps = " + "9" * 5000,
+        "favour.walk = nan",
+        "favour.walk = -1",
+        "rate = " + "9" * 400,
+        "ema = " + "9" * 400,
+        "favour.walk = true",
+        "favour.walk = 'x'",
+        "x" * 70_000,
+        "[pair]\nprefix = " + "9" * 400,
+        "[predictor]\nuntold = " + "9" * 400,
+        "[net]\na = [[9" + "9" * 30 + "]]",
+    ],
     ids=lambda said: said[:20],
-)  # fmt: skip
+)
 def test_hostile_recipes_are_refused_at_once(tmp_path, said):
     (tmp_path / "a.toml").write_text(said)
     with pytest.raises(MotionloomError) as caught:

@@ -134,8 +134,12 @@ def test_a_saved_predictor_comes_back(tmp_path: Path, variant: str, half: bool) 
     made = predictor(variant)
     back = Predictor.load(save_predictor(made, tmp_path / "a.safetensors", half=half))
     assert (back.layout, back.basis, back.observed, back.fps, back.variant) == (
-        made.layout, made.basis, made.observed, made.fps, made.variant,
-    )  # fmt: skip
+        made.layout,
+        made.basis,
+        made.observed,
+        made.fps,
+        made.variant,
+    )
     assert (back.card, back.net.config, back.schedule.name) == (made.card, made.net.config, made.schedule.name)
     x, told = some(2, 8, made.layout.channels), some(2, *made.net.config.condition_shape)
     apart = 2e-2 if half else 0
@@ -202,15 +206,32 @@ def test_descriptions_that_make_no_sense_are_refused(tmp_path: Path, key: str, v
 
 @pytest.mark.parametrize(
     ("part", "key", "value"),
-    [("net", "layers", 4), ("net", "width", 8192), ("net", "channels", 8190), ("net", "kept", 7),
-     ("net", "condition", None), ("net", "beside", False), ("net", "extra", 1), ("schedule", "steps", 10**9),
-     ("schedule", "steps", 0), ("schedule", "name", "x"), ("schedule", "name", []),
-     ("layout", "parents", [-1, 0, 0, 5]),
-     ("layout", "parents", [-1, 1, 0, 0]), ("layout", "names", ["a"] * 300), ("layout", "pairs", [0, 1, 2, 9]),
-     ("layout", "root", False), ("layout", "across", [[1, 9]]), ("layout", "z_up", True), ("card", "name", 3),
-     ("card", "licence", None), ("card", "notes", 3), ("card", "extra", 3)],
+    [
+        ("net", "layers", 4),
+        ("net", "width", 8192),
+        ("net", "channels", 8190),
+        ("net", "kept", 7),
+        ("net", "condition", None),
+        ("net", "beside", False),
+        ("net", "extra", 1),
+        ("schedule", "steps", 10**9),
+        ("schedule", "steps", 0),
+        ("schedule", "name", "x"),
+        ("schedule", "name", []),
+        ("layout", "parents", [-1, 0, 0, 5]),
+        ("layout", "parents", [-1, 1, 0, 0]),
+        ("layout", "names", ["a"] * 300),
+        ("layout", "pairs", [0, 1, 2, 9]),
+        ("layout", "root", False),
+        ("layout", "across", [[1, 9]]),
+        ("layout", "z_up", True),
+        ("card", "name", 3),
+        ("card", "licence", None),
+        ("card", "notes", 3),
+        ("card", "extra", 3),
+    ],
     ids=lambda value: str(value)[:20],
-)  # fmt: skip
+)
 def test_descriptions_that_do_not_fit_the_weights_are_refused(
     tmp_path: Path, part: str, key: str, value: object
 ) -> None:
@@ -293,8 +314,12 @@ def test_a_published_checkpoint_is_a_predictor_of_its_data_set(
     path = checkpoint(tmp_path, channels, kept)
     made = import_humanmac(path, licence="research only")
     assert (made.layout, made.fps, made.observed, made.frames, made.variant) == (
-        layout, fps, observed, frames, "published",
-    )  # fmt: skip
+        layout,
+        fps,
+        observed,
+        frames,
+        "published",
+    )
     assert (made.card.name, made.card.licence) == ("ckpt_ema_550", "research only")
     assert (made.schedule.name, made.schedule.steps) == ("cosine", 1000)
     state = torch.load(path, weights_only=True)

@@ -79,9 +79,13 @@ class Options:
         """What determines every motion of the batch; ``weights``: `hash_weights`."""
         later = {"hands": (self.hands, "as-is"), "unit": (self.unit, 1.0)}  # left out as they always were: old ids hold
         return {name: value for name, (value, usual) in later.items() if value != usual} | {
-            "weights": weights, "steps": self.steps, "guidance": self.guidance, "solver": self.solver,
-            "raw": self.raw, "fps": self.fps,
-        }  # fmt: skip
+            "weights": weights,
+            "steps": self.steps,
+            "guidance": self.guidance,
+            "solver": self.solver,
+            "raw": self.raw,
+            "fps": self.fps,
+        }
 
     def of_duets(self) -> dict[str, Any]:
         """What else determines motions of two people; raises `MotionloomError` for a file that is not there."""
@@ -146,9 +150,14 @@ class Maker:
         check(self.prior, [], steps=options.steps, guidance=options.guidance, solver=options.solver)
         check_features(self.prior)
         self.sources = Sources(
-            folder, options.of_motions(found), pair=duets, fps=self.prior.fps, seconds=options.seconds,
-            seed=options.seed, skeleton=options.skeleton,
-        )  # fmt: skip
+            folder,
+            options.of_motions(found),
+            pair=duets,
+            fps=self.prior.fps,
+            seconds=options.seconds,
+            seed=options.seed,
+            skeleton=options.skeleton,
+        )
         self.judge: Judge | None = find_judge(options.judge) if options.judge else None
         self.together = TOGETHER.get(options.device.partition(":")[0], TOGETHER["cpu"])
 
@@ -203,9 +212,14 @@ class Maker:
             ]
         options = self.options
         drawn = draw_group(
-            self.prior, [one.row.prompt for one in rows], [one.frames for one in rows],
-            seeds=[one.seed for one in rows], guidance=options.guidance, steps=options.steps, solver=options.solver,
-        )  # fmt: skip
+            self.prior,
+            [one.row.prompt for one in rows],
+            [one.frames for one in rows],
+            seeds=[one.seed for one in rows],
+            guidance=options.guidance,
+            steps=options.steps,
+            solver=options.solver,
+        )
         return [
             self._alone(one, finish(self.prior, features, foot_lock=not options.raw))
             for one, features in zip(rows, drawn, strict=True)
@@ -218,9 +232,13 @@ class Maker:
         self._only_ddpm(rows[0])
         place = start_of(goal)
         drawn = steered_features(
-            self.prior, [one.row.prompt for one in rows], goal.seen_from(place), seeds=[one.seed for one in rows],
-            guidance=self.options.guidance, steps=self.options.steps,
-        )  # fmt: skip
+            self.prior,
+            [one.row.prompt for one in rows],
+            goal.seen_from(place),
+            seeds=[one.seed for one in rows],
+            guidance=self.options.guidance,
+            steps=self.options.steps,
+        )
         foot_lock = not self.options.raw
         placed = [
             moved(to_motion(features.astype(np.float64), self.prior.fps, foot_lock=foot_lock), place)
@@ -234,9 +252,15 @@ class Maker:
         self._only_ddpm(asked)
         guidance = self.options.guidance if timeline.guidance is None else timeline.guidance
         pieces = compose(
-            self.prior, timeline.segments, seed=asked.seed, guidance=guidance, steps=self.options.steps,
-            start=asked.start, path=timeline.path, foot_lock=not self.options.raw,
-        )  # fmt: skip
+            self.prior,
+            timeline.segments,
+            seed=asked.seed,
+            guidance=guidance,
+            steps=self.options.steps,
+            start=asked.start,
+            path=timeline.path,
+            foot_lock=not self.options.raw,
+        )
         return self._alone(asked, joined(list(pieces)))
 
     @cached_property
@@ -256,24 +280,37 @@ class Maker:
     def _two(self, asked: Asked) -> Duet:
         options, person = self.options, asked.row.person - 1
         how = {
-            "guidance": options.guidance, "steps": options.steps, "solver": options.solver, "seed": asked.seed,
+            "guidance": options.guidance,
+            "steps": options.steps,
+            "solver": options.solver,
+            "seed": asked.seed,
             "pair_guidance": options.pair_guidance,
-        }  # fmt: skip
+        }
         if (timeline := asked.timeline) is not None:
             how |= {} if timeline.guidance is None else {"guidance": timeline.guidance}
             segments = with_loaded(self.prior, timeline.segments)
             blocks = list(
                 compose_pair(
-                    self.prior, self._block, segments, path=timeline.path, person=person,
-                    foot_lock=not options.raw, **how,
+                    self.prior,
+                    self._block,
+                    segments,
+                    path=timeline.path,
+                    person=person,
+                    foot_lock=not options.raw,
+                    **how,
                 )
-            )  # fmt: skip
+            )
             return joined([block[0] for block in blocks]), joined([block[1] for block in blocks])
         goals = (None, asked.goal) if person else (asked.goal, None)
         (duet,) = generate_pair(
-            self.prior, self._block, asked.row.prompt, seconds=asked.frames / self.prior.fps, goals=goals,
-            foot_lock=not options.raw, **how,
-        )  # fmt: skip
+            self.prior,
+            self._block,
+            asked.row.prompt,
+            seconds=asked.frames / self.prior.fps,
+            goals=goals,
+            foot_lock=not options.raw,
+            **how,
+        )
         return duet
 
     def _only_ddpm(self, asked: Asked) -> None:

@@ -100,8 +100,10 @@ def _start(address: str | None) -> Any:
     known = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     known |= {"PYTHONPATH": search_path()} if address is None else {}
     options: dict[str, Any] = {
-        "log_to_driver": False, "logging_level": logging.CRITICAL, "runtime_env": {"env_vars": known},
-    }  # fmt: skip
+        "log_to_driver": False,
+        "logging_level": logging.CRITICAL,
+        "runtime_env": {"env_vars": known},
+    }
     try:
         if address is None:
             ray.init(address="local", include_dashboard=False, **options)

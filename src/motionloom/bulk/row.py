@@ -276,10 +276,15 @@ class Sources:
         if row.skeleton is None and self.skeleton is not None:
             target = self._skeleton(self.skeleton, None)
         said = {
-            "common": self._common, "task": row.task, "prompt": row.prompt, "frames": frames, "seed": seed,
-            "goal": goal and digest_goal(goal), "timeline": timeline and digest_timeline(timeline, start),
+            "common": self._common,
+            "task": row.task,
+            "prompt": row.prompt,
+            "frames": frames,
+            "seed": seed,
+            "goal": goal and digest_goal(goal),
+            "timeline": timeline and digest_timeline(timeline, start),
             "skeleton": target and digest_skeleton(target),
-        }  # fmt: skip
+        }
         if row.task == "duet":
             said |= {"pair": self._pair, "person": row.person}
         key = hashlib.sha256(json.dumps(said, sort_keys=True).encode("utf-8", "surrogatepass")).hexdigest()[:32]

@@ -296,6 +296,13 @@ def problems(entries: Iterable[Entry]) -> list[str]:
 def entry_of(one: Asked, made: Made) -> dict[str, Any]:
     """What goes with a motion wherever it is kept; nothing of it depends on where the row stood in the job."""
     return {
-        "id": one.id, "key": one.key, "task": one.row.task, "text": one.text, "seed": one.seed,
-        "people": len(made.people), "frames": len(made.motion), "fps": made.motion.fps, **made.measures,
-    }  # fmt: skip
+        "id": one.id,
+        "key": one.key,
+        "task": one.row.task,
+        "text": one.text,
+        "seed": one.seed,
+        "people": len(made.people),
+        "frames": len(made.motion),
+        "fps": made.motion.fps,
+        **made.measures,
+    }

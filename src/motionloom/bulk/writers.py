@@ -166,13 +166,20 @@ def parquet_schema() -> Any:
     return pa.schema(
         [
             *((name, pa.string()) for name in ("id", "key", "task", "text")),
-            ("seed", pa.int64()), ("fps", pa.float64()), ("people", pa.int32()), ("frames", pa.int32()),
+            ("seed", pa.int64()),
+            ("fps", pa.float64()),
+            ("people", pa.int32()),
+            ("frames", pa.int32()),
             ("joints", pa.int32()),
-            ("positions", floats), ("rotations", floats), ("root", floats),
-            ("names", pa.list_(pa.string())), ("parents", pa.list_(pa.int32())), ("offsets", floats),
+            ("positions", floats),
+            ("rotations", floats),
+            ("root", floats),
+            ("names", pa.list_(pa.string())),
+            ("parents", pa.list_(pa.int32())),
+            ("offsets", floats),
             *((name, pa.bool_() if name.endswith("obeys") else pa.float64()) for name in measures),
         ]
-    )  # fmt: skip
+    )
 
 
 def parquet_row(people: Sequence[Motion], about: dict[str, Any]) -> dict[str, Any]:
@@ -185,10 +192,14 @@ def parquet_row(people: Sequence[Motion], about: dict[str, Any]) -> dict[str, An
     return {
         **about,
         "text": about["text"].encode("utf-8", "replace").decode(),
-        "joints": len(skeleton), "positions": flat(*(motion.positions() for motion in people)),
-        "rotations": flat(*(motion.rotations for motion in people)), "root": flat(*(motion.root for motion in people)),
-        "names": list(skeleton.names), "parents": list(skeleton.parents), "offsets": flat(skeleton.offsets),
-    }  # fmt: skip
+        "joints": len(skeleton),
+        "positions": flat(*(motion.positions() for motion in people)),
+        "rotations": flat(*(motion.rotations for motion in people)),
+        "root": flat(*(motion.root for motion in people)),
+        "names": list(skeleton.names),
+        "parents": list(skeleton.parents),
+        "offsets": flat(skeleton.offsets),
+    }
 
 
 def json_line(value: dict[str, Any]) -> bytes:

@@ -46,9 +46,11 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "--verify", type=Path, metavar="FOLDER", help="only say whether a batch's files are still as they were written"
     )
     parser.add_argument(
-        "--format", default="npz", choices=("npz", "bvh", "glb", "webdataset", "parquet"),
+        "--format",
+        default="npz",
+        choices=("npz", "bvh", "glb", "webdataset", "parquet"),
         help="single files, or shards that hold many (default npz)",
-    )  # fmt: skip
+    )
     parser.add_argument("--shard-rows", type=int, metavar="N", help="rows of a shard (default: by the job, up to 1000)")
     parser.add_argument("--filter", metavar="CONDITION", help="keep what passes, such as 'skate < 0.2 and obeys'")
     parser.add_argument("--seconds", type=float, default=5.0, help="length of rows that do not say (default 5)")
@@ -74,9 +76,12 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "--pair-weights", default="duet", metavar="NAME|PATH", help="what makes two people of one (default duet)"
     )
     parser.add_argument(
-        "--pair-guidance", type=float, default=1.0, metavar="SHARE",
+        "--pair-guidance",
+        type=float,
+        default=1.0,
+        metavar="SHARE",
         help="how firmly two people keep to where that wants them, 0 to 1 (default)",
-    )  # fmt: skip
+    )
     add_adapters(parser)
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one per core, or per GPU)")
@@ -162,14 +167,24 @@ def _options(arguments: argparse.Namespace) -> "Options":
     given = {name: getattr(arguments, name) for name in ("steps", "guidance", "solver")}
     obeys = arguments.filter is not None and "obeys" in Filter(arguments.filter).names
     return Options(
-        weights=arguments.weights, adapters=arguments.adapter, device=arguments.device,
-        raw=arguments.raw, fps=arguments.fps, pair_weights=arguments.pair_weights,
-        pair_guidance=arguments.pair_guidance, shard_rows=arguments.shard_rows,
-        hands=arguments.hands, unit=arguments.out_unit,
-        seconds=arguments.seconds, seed=arguments.seed, skeleton=arguments.skeleton, format=arguments.format,
-        filter=arguments.filter, judge=JUDGE if obeys else None,
+        weights=arguments.weights,
+        adapters=arguments.adapter,
+        device=arguments.device,
+        raw=arguments.raw,
+        fps=arguments.fps,
+        pair_weights=arguments.pair_weights,
+        pair_guidance=arguments.pair_guidance,
+        shard_rows=arguments.shard_rows,
+        hands=arguments.hands,
+        unit=arguments.out_unit,
+        seconds=arguments.seconds,
+        seed=arguments.seed,
+        skeleton=arguments.skeleton,
+        format=arguments.format,
+        filter=arguments.filter,
+        judge=JUDGE if obeys else None,
         **{name: value for name, value in given.items() if value is not None},
-    )  # fmt: skip
+    )
 
 
 def _where(arguments: argparse.Namespace) -> "Where":

@@ -70,9 +70,13 @@ def _generated(arguments: argparse.Namespace) -> dict[str, Any]:
 
     weights = arguments.weights or "default"
     return bench(
-        Prior.load(weights, device=arguments.device), defaults(compose if arguments.long else generate),
-        what="long" if arguments.long else "short", quick=arguments.quick, weights=weights, progress=say,
-    )  # fmt: skip
+        Prior.load(weights, device=arguments.device),
+        defaults(compose if arguments.long else generate),
+        what="long" if arguments.long else "short",
+        quick=arguments.quick,
+        weights=weights,
+        progress=say,
+    )
 
 
 def _predicted(arguments: argparse.Namespace) -> dict[str, Any]:

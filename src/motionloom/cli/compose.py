@@ -176,9 +176,14 @@ def _pieces(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline")
     settings: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
     with bar("composing") as move:
         pieces = long.compose(
-            prior, timeline.segments, start=start, path=timeline.path, foot_lock=arguments.foot_lock,
-            progress=moves(move, arguments.steps, len(timeline.segments)), **(settings | sampling_of(arguments)),
-        )  # fmt: skip
+            prior,
+            timeline.segments,
+            start=start,
+            path=timeline.path,
+            foot_lock=arguments.foot_lock,
+            progress=moves(move, arguments.steps, len(timeline.segments)),
+            **(settings | sampling_of(arguments)),
+        )
         if not arguments.loop:
             yield from pieces
             return

@@ -44,13 +44,20 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     )
     parser.add_argument("prompt", nargs="*", metavar="PROMPT", help="what the person does, such as 'a person walks'")
     parser.add_argument(
-        "--goal", type=Path, action="append", default=[], metavar="FILE",
+        "--goal",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
         help="a JSON file of paths, joints and poses, repeatable",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--follow", action="append", default=[], metavar="JOINT",
+        "--follow",
+        action="append",
+        default=[],
+        metavar="JOINT",
         help="joint or group that goes where that of --from goes, repeatable",
-    )  # fmt: skip
+    )
     parser.add_argument("--from", dest="clip", type=Path, metavar="CLIP", help="the motion file that --follow follows")
     parser.add_argument("--path", type=Path, metavar="SVG", help="a drawn line to walk along, seen from above")
     parser.add_argument(
@@ -67,9 +74,12 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "--no-fit", dest="fit", action="store_false", help="leave the motion as sampled, near the goals"
     )
     parser.add_argument(
-        "--adapters", action="append", default=[], metavar="NAME|FILE",
+        "--adapters",
+        action="append",
+        default=[],
+        metavar="NAME|FILE",
         help="none (the default), fitting (the shipped ones for these goals), or names of adapters, repeatable",
-    )  # fmt: skip
+    )
     parser.add_argument("--schema", action="store_true", help="print what a goal file may hold as JSON Schema and end")
     add_loop(parser)
     add_one_file(parser)
@@ -170,9 +180,15 @@ def _made(
     with bar("controlling") as progress:
         for some, moved in groups(arguments.count, BATCH, progress):
             made = control(
-                prior, arguments.prompt, goal, adapters=adapters, fit=arguments.fit, foot_lock=arguments.foot_lock,
-                progress=moved, **sampling_of(arguments) | some,
-            )  # fmt: skip
+                prior,
+                arguments.prompt,
+                goal,
+                adapters=adapters,
+                fit=arguments.fit,
+                foot_lock=arguments.foot_lock,
+                progress=moved,
+                **sampling_of(arguments) | some,
+            )
             judged += made
             yield [
                 looped(arguments, prior, one.motion, arguments.prompt, seed=arguments.seed + some["first"] + number)
@@ -208,11 +224,14 @@ def _report(
     if arguments.json:
         motions = [
             {
-                "prompt": arguments.prompt, "seed": arguments.seed + number,
-                "error_cm": round(100 * one.error, 3), "worst_cm": round(100 * one.worst, 3), "missed": one.missed,
+                "prompt": arguments.prompt,
+                "seed": arguments.seed + number,
+                "error_cm": round(100 * one.error, 3),
+                "worst_cm": round(100 * one.worst, 3),
+                "missed": one.missed,
             }
             for number, one in enumerate(made)
-        ]  # fmt: skip
+        ]
         about = {
             "motions": motions,
             "seconds": len(made[0].motion) / made[0].motion.fps,

@@ -25,14 +25,20 @@ def add(subparsers) -> None:
         "(default 700)",
     )
     build.add_argument(
-        "--exclude", action="append", default=[], metavar="NAME",
+        "--exclude",
+        action="append",
+        default=[],
+        metavar="NAME",
         help="leave out the takes whose names begin so, and all that would be made of them; may be given again",
-    )  # fmt: skip
+    )
     build.add_argument(
-        "--allow", action="append", default=[], metavar="NAME[=REASON]",
+        "--allow",
+        action="append",
+        default=[],
+        metavar="NAME[=REASON]",
         help="let in the takes whose names begin so though their bodies do not do what was recorded; the reason stands "
         "in set.json; may be given again",
-    )  # fmt: skip
+    )
     build.set_defaults(run=_build)
     look = commands.add_parser("look", help="a page of pictures: recordings beside the clips that were made of them")
     look.add_argument("set", type=Path, metavar="SET", help="folder of a built set")
@@ -48,9 +54,15 @@ def _build(arguments: argparse.Namespace) -> None:
     from motionloom.lab.papers.readers import find_takes
 
     build(
-        arguments.folders, arguments.out, captions=arguments.captions, workers=arguments.workers, mixed=arguments.mixed,
-        exclude=arguments.exclude, allow=_reasons(arguments.allow), find=find_takes,
-    )  # fmt: skip
+        arguments.folders,
+        arguments.out,
+        captions=arguments.captions,
+        workers=arguments.workers,
+        mixed=arguments.mixed,
+        exclude=arguments.exclude,
+        allow=_reasons(arguments.allow),
+        find=find_takes,
+    )
 
 
 def _reasons(said: list[str]) -> dict[str, str]:

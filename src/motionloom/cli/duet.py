@@ -67,9 +67,11 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--count", type=int, default=1, help="duets to make (default 1)")
     parser.add_argument("--guidance", type=float, help="strength of the text (default 2.5, or the timeline's)")
     parser.add_argument(
-        "--pair-guidance", type=float, metavar="SHARE",
+        "--pair-guidance",
+        type=float,
+        metavar="SHARE",
         help="how firmly the two keep to where the block wants them, 0 (they may drift apart) to 1 (default)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--pair-weights", default="duet", metavar="NAME|PATH", help="what makes two of one (default duet)"
     )
@@ -82,10 +84,13 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
 
 def _add_sampling(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--out", type=Path, action="append", metavar="NAME",
+        "--out",
+        type=Path,
+        action="append",
+        metavar="NAME",
         help="file to write, repeatable: both people in a .glb .mp4 .gif .png, or two .bvh or .npz, one for each "
         "(default duet.glb)",
-    )  # fmt: skip
+    )
     parser.add_argument("--steps", type=int, help="network calls per duet: fewer is faster (default 24)")
     parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="the prior (default: default)")
     add_adapters(parser)
@@ -170,7 +175,7 @@ def _make(
         length = SECONDS if arguments.seconds is None else arguments.seconds
         made = pair.generate_pair(
             prior, block, text, seconds=length, goals=(goal, None) if arguments.person == 1 else (None, goal), **shared
-        )  # fmt: skip
+        )
     return [list(one) for one in made]
 
 
@@ -191,10 +196,15 @@ def _composed(
     segments = with_loaded(prior, timeline.segments)
     blocks = list(
         compose_pair(
-            prior, block, segments, path=timeline.path, person=arguments.person - 1,
-            progress=moves(progress, arguments.steps, len(segments)), **shared,
+            prior,
+            block,
+            segments,
+            path=timeline.path,
+            person=arguments.person - 1,
+            progress=moves(progress, arguments.steps, len(segments)),
+            **shared,
         )
-    )  # fmt: skip
+    )
     return [concatenated(*[one[i] for one in blocks]) for i in (0, 1)]
 
 

@@ -41,13 +41,21 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("clip", type=Path, metavar="CLIP")
     parser.add_argument("text", nargs="?", metavar="TEXT", help="what the person is to do, such as 'waves'")
     parser.add_argument(
-        "--keep", action="append", default=[], metavar="PART",
+        "--keep",
+        action="append",
+        default=[],
+        metavar="PART",
         help="part that stays, repeatable: a joint, a group such as lower_body, root",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--between", nargs=2, type=float, action="append", default=[], metavar=("FROM", "TO"),
+        "--between",
+        nargs=2,
+        type=float,
+        action="append",
+        default=[],
+        metavar=("FROM", "TO"),
         help="change only these seconds, repeatable",
-    )  # fmt: skip
+    )
     add_loop(parser)
     add_one_file(parser)
     parser.add_argument("--extend", type=float, default=0.0, metavar="SECONDS", help="go on behind the clip")
@@ -81,9 +89,11 @@ def run_edit(arguments: argparse.Namespace) -> int:
     remarks = remark_unknown(prior, [arguments.text or ""])
     unit, orders = (None, {}) if uniform else (unit, orders)
     made = Finished(
-        files, arguments.count, _writer(captions, target, arguments.out_unit or unit, orders),
+        files,
+        arguments.count,
+        _writer(captions, target, arguments.out_unit or unit, orders),
         put=lambda motions: put_all(target, motions),
-    )  # fmt: skip
+    )
     interrupted = made.take(_made(arguments, prior, crop(clip, arguments), "smpl" if uniform else "own"))
     about = {
         "clip": str(arguments.clip),
@@ -105,16 +115,26 @@ def _made(
 
     text = arguments.text or ""
     changes = changes_asked(
-        text, keep=[name.strip() for part in arguments.keep for name in part.split(",")], loop=arguments.loop,
-        between=[tuple(span) for span in arguments.between], blend=arguments.blend, extend=arguments.extend,
+        text,
+        keep=[name.strip() for part in arguments.keep for name in part.split(",")],
+        loop=arguments.loop,
+        between=[tuple(span) for span in arguments.between],
+        blend=arguments.blend,
+        extend=arguments.extend,
         strength=arguments.strength,
-    )  # fmt: skip
+    )
     with bar("editing") as progress:
         for some, moved in groups(arguments.count, 1, progress):
             motions = edit(
-                prior, clip, text, changes, skeleton=skeleton, foot_lock=arguments.foot_lock, progress=moved,
+                prior,
+                clip,
+                text,
+                changes,
+                skeleton=skeleton,
+                foot_lock=arguments.foot_lock,
+                progress=moved,
                 **sampling_of(arguments) | some,
-            )  # fmt: skip
+            )
             yield at_rate(motions, arguments.fps)
 
 

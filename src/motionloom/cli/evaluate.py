@@ -9,9 +9,15 @@ from motionloom.cli.measuring import say
 from motionloom.cli.writing import add_force, check_overwriting
 
 PARTS = (
-    "evaluate_checks", "evaluate_text", "evaluate_transitions", "evaluate_control", "evaluate_prediction",
-    "evaluate_duet", "evaluate_evaluator", "evaluate_all",
-)  # fmt: skip
+    "evaluate_checks",
+    "evaluate_text",
+    "evaluate_transitions",
+    "evaluate_control",
+    "evaluate_prediction",
+    "evaluate_duet",
+    "evaluate_evaluator",
+    "evaluate_all",
+)
 """Modules beside this one that register further commands."""
 
 
@@ -47,9 +53,12 @@ def _physical(commands) -> None:
     obedience = commands.add_parser("obedience", help="everyday prompts, each with a physical check, on several seeds")
     _sampling(obedience, seeds="default 0 for the basic set, 100 for the others")
     obedience.add_argument(
-        "--set", default="basic", metavar="basic|everyday|all", dest="prompts",
+        "--set",
+        default="basic",
+        metavar="basic|everyday|all",
+        dest="prompts",
         help="the twenty prompts of old, those of everyday life, or both (default basic)",
-    )  # fmt: skip
+    )
     obedience.add_argument("--seeds", type=int, default=10, help="seeds per prompt (default 10)")
     obedience.add_argument(
         "--best-of", type=int, default=1, metavar="N", help="as of generate, where a prompt is one action"
@@ -71,9 +80,12 @@ def _physical(commands) -> None:
     )
     realism.add_argument("--count", type=int, default=64, help="motions to compare (default 64)")
     realism.add_argument(
-        "--recordings", type=Path, action="append", metavar="FOLDER",
+        "--recordings",
+        type=Path,
+        action="append",
+        metavar="FOLDER",
         help="recordings whose own skeletons bodies are compared with (repeatable; default: shipped percentiles)",
-    )  # fmt: skip
+    )
     realism.set_defaults(run=_realism)
 
     reach = commands.add_parser(
@@ -114,9 +126,13 @@ def _generator(arguments: argparse.Namespace):
 
     prior = Prior.load(arguments.weights, device=arguments.device)
     return generator(
-        prior, steps=arguments.steps, guidance=arguments.guidance, solver=arguments.solver, finished=arguments.finished,
+        prior,
+        steps=arguments.steps,
+        guidance=arguments.guidance,
+        solver=arguments.solver,
+        finished=arguments.finished,
         best_of=getattr(arguments, "best_of", 1),
-    )  # fmt: skip
+    )
 
 
 def _run(arguments: argparse.Namespace):
@@ -157,9 +173,14 @@ def _obedience(arguments: argparse.Namespace) -> None:
     settings = _settings(arguments) | ({"best_of": arguments.best_of} if arguments.best_of > 1 else {})
     generate = everyday.FirstDraws(_generator(arguments))
     results = obey.run(
-        _run(arguments), checks, generate=generate, seeds=arguments.seeds, first_seed=seed,
-        paraphrases=arguments.paraphrases, settings=settings,
-    )  # fmt: skip
+        _run(arguments),
+        checks,
+        generate=generate,
+        seeds=arguments.seeds,
+        first_seed=seed,
+        paraphrases=arguments.paraphrases,
+        settings=settings,
+    )
     rows = obey.table(results, checks, real=known()["checks"] if arguments.prompts != "everyday" else None)
     themes = everyday.themes(results)
     found = obey.totals(results, checks)

@@ -68,9 +68,13 @@ def _all(arguments: argparse.Namespace) -> int:
     if arguments.results:
         results.check_page(arguments.results)
     job = suites.Job(
-        arguments.weights, _tools(arguments), data=arguments.data, evaluator=arguments.evaluator, quick=arguments.quick,
+        arguments.weights,
+        _tools(arguments),
+        data=arguments.data,
+        evaluator=arguments.evaluator,
+        quick=arguments.quick,
         device=arguments.device,
-    )  # fmt: skip
+    )
     outcomes = everything.run_all(job, out, wanted, keep=arguments.keep, again=arguments.again)
     made = [outcome.report for outcome in outcomes if outcome.report]
     for one in made:

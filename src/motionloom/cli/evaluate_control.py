@@ -15,10 +15,12 @@ def add(commands) -> None:
     )
     add_judged(control, data="; goals are taken out of its held-out motions")
     control.add_argument(
-        "--kinds", type=words, metavar="trajectory,left_wrist,...",
+        "--kinds",
+        type=words,
+        metavar="trajectory,left_wrist,...",
         help="goals: trajectory, left_wrist, right_wrist, left_foot, right_foot, head, several with + between them, "
         "keyframes, in_between (default: the paper's and more, 14)",
-    )  # fmt: skip
+    )
     control.add_argument("--method", action="append", metavar="ROW", help="only this row, such as 'ours' (repeatable)")
     control.add_argument("--count", type=int, help="real motions, spread evenly (default 32)")
     control.add_argument("--replications", type=int, help="(default 3)")
@@ -39,9 +41,12 @@ def _control(arguments: argparse.Namespace) -> None:
     usual = control_kinds.QUICK if arguments.quick else control_kinds.DEFAULT
     kinds = usual if arguments.kinds is None else arguments.kinds
     found = control.run(
-        prepared(arguments, _command(arguments), arguments.out), kinds=kinds,
-        methods=arguments.method or control.METHODS, selection=selected(arguments), protocol=_protocol(arguments),
-    )  # fmt: skip
+        prepared(arguments, _command(arguments), arguments.out),
+        kinds=kinds,
+        methods=arguments.method or control.METHODS,
+        selection=selected(arguments),
+        protocol=_protocol(arguments),
+    )
     show(found, arguments)
 
 

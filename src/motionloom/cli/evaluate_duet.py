@@ -25,10 +25,12 @@ def add(commands) -> None:
     duet.add_argument("--duets", type=int, metavar="N", help="duets of each other part (default 24)")
     duet.add_argument("--steps", type=int, help="sampler steps (default: as duet)")
     duet.add_argument(
-        "--given", choices=("past", "tool", "published"), default="past",
+        "--given",
+        choices=("past", "tool", "published"),
+        default="past",
         help="what completions know: 20 frames (default); 20 with the true velocity into the next, as the published "
         "tool; 19, as the published evaluation",
-    )  # fmt: skip
+    )
     duet.add_argument("--communication-only", type=Path, metavar="FILE", help="block trained over --write-bare's prior")
     duet.add_argument(
         "--mrt", type=Path, metavar="FILE", help="multi-range transformer (default: OUT/mrt/mrt.safetensors, if there)"
@@ -37,9 +39,13 @@ def add(commands) -> None:
         "--train-mrt", type=int, metavar="STEPS", help="first train one on the train pairs, where OUT/mrt has none"
     )
     duet.add_argument(
-        "--beside", type=Path, nargs="+", default=[], metavar="FILE",
+        "--beside",
+        type=Path,
+        nargs="+",
+        default=[],
+        metavar="FILE",
         help="other blocks for the same prior, each a row of the completions",
-    )  # fmt: skip
+    )
     duet.add_argument("--rows-without-published", action="store_true", help="leave out what others published")
     duet.add_argument("--seed", type=int, default=0, help="first seed (default 0)")
     duet.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
@@ -53,9 +59,11 @@ def add(commands) -> None:
     duet.add_argument("--quick", action="store_true", help="six crops, two samples, two or four duets, few steps")
     duet.add_argument("--json", action="store_true", help="print JSON instead of tables")
     duet.add_argument(
-        "--write-bare", type=Path, metavar="FILE",
+        "--write-bare",
+        type=Path,
+        metavar="FILE",
         help="only write the prior with layers that do nothing; `train duet` over it gives communication only",
-    )  # fmt: skip
+    )
     duet.set_defaults(run=_duet)
 
 
@@ -103,9 +111,14 @@ def _completion(arguments: argparse.Namespace):
     said = {name: value for name in ("crops", "samples", "steps") if (value := getattr(arguments, name)) is not None}
     how = replace(duet.QUICK if arguments.quick else duet.How(), given=arguments.given, seed=arguments.seed, **said)
     return duet.run(
-        _run(arguments, "completion"), block=arguments.block, communication=arguments.communication_only,
-        mrt=_mrt(arguments), beside=arguments.beside, how=how, with_published=not arguments.rows_without_published,
-    )  # fmt: skip
+        _run(arguments, "completion"),
+        block=arguments.block,
+        communication=arguments.communication_only,
+        mrt=_mrt(arguments),
+        beside=arguments.beside,
+        how=how,
+        with_published=not arguments.rows_without_published,
+    )
 
 
 def _run(arguments: argparse.Namespace, part: str):

@@ -8,8 +8,16 @@ from motionloom.cli.measuring import prepared, set_threads
 SINGLES = ("all", "skip", "skip-multimodal")
 ROWS = ("real", "zero", "constant", "ours", "ours-many", "published")
 STUDIES = (
-    "coefficients", "layers", "schedules", "noising", "dct", "steps", "horizon", "hold", "switch",
-)  # fmt: skip
+    "coefficients",
+    "layers",
+    "schedules",
+    "noising",
+    "dct",
+    "steps",
+    "horizon",
+    "hold",
+    "switch",
+)
 """As in `motionloom.lab.suites.prediction_studies`, which takes its time to import."""
 DATA = ("cmu", "h36m", "humaneva", "amass", "own")
 
@@ -24,9 +32,11 @@ def add(commands) -> None:
     prediction.add_argument("--steps", type=int, help="sampler steps (default: as predict)")
     prediction.add_argument("--guidance", type=float, metavar="W", help="how strictly the past is heeded (default 1)")
     prediction.add_argument(
-        "--singles", choices=SINGLES, default="all",
+        "--singles",
+        choices=SINGLES,
+        default="all",
         help="windows with a single future: count them (default), skip them, or skip them for MMADE, MMFDE and APDE",
-    )  # fmt: skip
+    )
     prediction.add_argument(
         "--published-steps", type=int, metavar="N", help="steps of the published sampler, and of ours with many (100)"
     )
@@ -77,9 +87,12 @@ def _prediction(arguments: argparse.Namespace) -> None:
     how = _how(arguments)
     set_threads(arguments)
     found = prediction.run(
-        prepared(arguments, _command(arguments, "prediction"), arguments.out), name=arguments.protocol, how=how,
-        kinds=arguments.row or prediction.KINDS, with_published=not arguments.rows_without_published,
-    )  # fmt: skip
+        prepared(arguments, _command(arguments, "prediction"), arguments.out),
+        name=arguments.protocol,
+        how=how,
+        kinds=arguments.row or prediction.KINDS,
+        with_published=not arguments.rows_without_published,
+    )
     if arguments.out:
         report.write(found, arguments.out)
     print(json.dumps(report.encode(found), indent=1) if arguments.json else prediction.printed(found))
@@ -102,13 +115,20 @@ def _study(arguments: argparse.Namespace) -> None:
 
     set_threads(arguments)
     budget = studies.budget(
-        arguments.name, quick=arguments.quick, windows=arguments.windows, samples=arguments.samples,
-        train_steps=arguments.train_steps, seed=arguments.seed,
-    )  # fmt: skip
+        arguments.name,
+        quick=arguments.quick,
+        windows=arguments.windows,
+        samples=arguments.samples,
+        train_steps=arguments.train_steps,
+        seed=arguments.seed,
+    )
     found = studies.run(
-        arguments.name, prepared(arguments, _command(arguments, "study"), arguments.out), protocol=arguments.protocol,
-        keep=arguments.keep or arguments.out / "networks", budget=budget,
-    )  # fmt: skip
+        arguments.name,
+        prepared(arguments, _command(arguments, "study"), arguments.out),
+        protocol=arguments.protocol,
+        keep=arguments.keep or arguments.out / "networks",
+        budget=budget,
+    )
     print(report.plain(found))
     print(f"\nwritten: {arguments.out / arguments.name}.md, .json, .png")
 

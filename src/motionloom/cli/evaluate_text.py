@@ -103,9 +103,23 @@ def _memory(arguments: argparse.Namespace, steps: int) -> float:
 
     with tempfile.TemporaryDirectory() as folder:
         return process(
-            ["generate", PROMPT, "--weights", arguments.weights, "--steps", str(steps), "--seconds", "9.8",
-             "--count", "8", "--device", arguments.device, "--out", str(Path(folder) / "motion.npz")]
-        ).peak_mb  # fmt: skip
+            [
+                "generate",
+                PROMPT,
+                "--weights",
+                arguments.weights,
+                "--steps",
+                str(steps),
+                "--seconds",
+                "9.8",
+                "--count",
+                "8",
+                "--device",
+                arguments.device,
+                "--out",
+                str(Path(folder) / "motion.npz"),
+            ]
+        ).peak_mb
 
 
 def _command(arguments: argparse.Namespace) -> str:

@@ -15,9 +15,11 @@ def add(commands) -> None:
     )
     add_judged(seams, data=" (default: the shipped numbers of held-out CMU recordings)")
     seams.add_argument(
-        "--methods", type=words, metavar="ours,ours-exported,published,paper,first-take,concatenation,slerp",
+        "--methods",
+        type=words,
+        metavar="ours,ours-exported,published,paper,first-take,concatenation,slerp",
         help="rows (default: these); also second-take, published-1000, paper-1000: the last two take hours",
-    )  # fmt: skip
+    )
     seams.add_argument("--intervals", type=int, help="captions of one long motion (default 32)")
     seams.add_argument("--unfoldings", type=int, help="long motions of a replication (default 2)")
     seams.add_argument("--replications", type=int, help="(default 3)")

@@ -32,9 +32,12 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "the name of OUT picks the format.",
     )
     export.add_argument(
-        "inputs", metavar="IN", type=Path, nargs="+",
+        "inputs",
+        metavar="IN",
+        type=Path,
+        nargs="+",
         help="the motion, and OUT behind it; several become animations of one --skeleton character",
-    )  # fmt: skip
+    )
     export.add_argument("--out", type=Path, metavar="NAME", help="the file to write, instead of OUT")
     add_reading(export)
     export.add_argument("--fps", type=as_rate, metavar="N", help="resample to this frame rate")

@@ -208,9 +208,14 @@ class Long:
                     found.append((target.folder / names[number], stream))
                     continue
                 stream = open_stream(
-                    folder / names[number], total=self.frames, fps=piece.fps, joints=len(piece.skeleton),
-                    caption=Path(names[number]).stem, order=self.writing.orders, unit=self.writing.unit,
-                )  # fmt: skip
+                    folder / names[number],
+                    total=self.frames,
+                    fps=piece.fps,
+                    joints=len(piece.skeleton),
+                    caption=Path(names[number]).stem,
+                    order=self.writing.orders,
+                    unit=self.writing.unit,
+                )
                 found.append((target.folder / names[number], stream))
         return sorted(found, key=lambda pair: pair[0].suffix.lower() == ".bvh")
 

@@ -49,9 +49,10 @@ def add(subparsers) -> None:
         "--from", dest="file", type=Path, metavar="FILE", help="a text file with one prompt per line, - for stdin"
     )
     parser.add_argument(
-        "--seconds", type=float,
+        "--seconds",
+        type=float,
         help="length of each motion (default 5; of several actions in a sentence what they take)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--as-one", action="store_true", help="do not part 'A, then B' into actions that follow each other"
     )
@@ -60,9 +61,12 @@ def add(subparsers) -> None:
     )
     parser.add_argument("--count", type=int, default=1, help="motions per prompt (default 1)")
     parser.add_argument(
-        "--best-of", type=int, default=1, metavar="N",
+        "--best-of",
+        type=int,
+        default=1,
+        metavar="N",
         help="of each motion begin N and keep the one nearest to what the words usually look like (default 1)",
-    )  # fmt: skip
+    )
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
     parser.add_argument("--solver", help="ddim, ddpm (the default), dpm2m or dpm2m-sde")
     add_loop(parser)
@@ -97,10 +101,14 @@ def _generate(arguments: argparse.Namespace) -> int:
     seated: list[list[Seat]] = []
     interrupted = made.take([motion] for motion in _noting(seated, drawn, target))
     motions = [
-        {"prompt": caption, "seed": arguments.seed + i, "segments": _segments(timelines[caption]),
-         "seats": [asdict(seat) for seat in seats]}
+        {
+            "prompt": caption,
+            "seed": arguments.seed + i,
+            "segments": _segments(timelines[caption]),
+            "seats": [asdict(seat) for seat in seats],
+        }
         for i, (caption, seats) in enumerate(zip(captions[: made.count], seated))
-    ]  # fmt: skip
+    ]
     _remark_seats(seated[: made.count])
     length = SECONDS if arguments.seconds is None else arguments.seconds
     about = {"motions": motions, "seconds": length, "weights": str(arguments.weights), "remarks": remarks}

@@ -26,16 +26,22 @@ def add(subparsers) -> None:
     )
     parser.add_argument("script", type=Path, metavar="SCRIPT", help="a .yaml file: seconds, seed, commands")
     parser.add_argument(
-        "--out", type=Path, action="append", metavar="NAME",
+        "--out",
+        type=Path,
+        action="append",
+        metavar="NAME",
         help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default motion.bvh); of two people a .bvh or "
         ".npz holds one each: give two (default duet.glb)",
-    )  # fmt: skip
+    )
     parser.add_argument("--seed", type=int, help="the same seed makes the same motion (default: the script's, else 0)")
     parser.add_argument("--fps", type=float, help="frames per second that are shown (default: the model's 20)")
     parser.add_argument(
-        "--start", type=Path, action="append", metavar="FILE",
+        "--start",
+        type=Path,
+        action="append",
+        metavar="FILE",
         help="a motion to go on from, in its place; with two people one for each",
-    )  # fmt: skip
+    )
     parser.add_argument("--steps", type=int, default=8, help="network calls per window (default 8)")
     parser.add_argument("--guidance", type=float, default=2.5, help="strength of the words (default 2.5)")
     parser.add_argument(

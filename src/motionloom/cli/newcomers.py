@@ -7,8 +7,13 @@ from collections.abc import Iterable, Sequence
 
 COMMANDS = {"gen": "generate", "convert": "export", "play": "view", "show": "view", "draw": "view", "join": "compose"}
 OPTIONS = {"--length": "--seconds", "--duration": "--seconds", "-o": "--out", "--output": "--out", "-n": "--count"}
-RENAMED = {"--raw": "--no-foot-lock", "--loose": "--no-fit", "--given": "--react-to", "--block": "--pair-weights",
-           "--together": "--pair-guidance"}  # fmt: skip
+RENAMED = {
+    "--raw": "--no-foot-lock",
+    "--loose": "--no-fit",
+    "--given": "--react-to",
+    "--block": "--pair-weights",
+    "--together": "--pair-guidance",
+}
 """Options under the names they had, for one release."""
 _SEVERAL = {"-s": ("--seconds", "--seed"), "-f": ("--fps", "--from")}
 _PROMPTS = ("prompts", "prompt", "text", "segments")

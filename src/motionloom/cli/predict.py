@@ -53,17 +53,23 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     )
     predict.add_argument("--count", type=int, default=10, help="futures to make (default 10)")
     predict.add_argument(
-        "--out", type=Path, action="append", metavar="FOLDER|NAME",
+        "--out",
+        type=Path,
+        action="append",
+        metavar="FOLDER|NAME",
         help="folder of the files, or a name as of other commands, repeatable (default futures)",
-    )  # fmt: skip
+    )
     predict.add_argument(
         "--format", action="append", choices=FORMATS, help="of the files in the folder, repeatable (default bvh)"
     )
     predict.add_argument("--no-picture", action="store_true", help="no overview.png and overlay.mp4 in the folder")
     predict.add_argument(
-        "--hold", action="append", default=[], metavar="PART",
+        "--hold",
+        action="append",
+        default=[],
+        metavar="PART",
         help="part that moves as in --from, repeatable: a joint, a group such as lower_body, root",
-    )  # fmt: skip
+    )
     predict.add_argument("--mask", type=Path, metavar="FILE", help="a JSON file of parts and when they are held")
     predict.add_argument("--from", dest="source", type=Path, metavar="MOTION", help="what held parts move as")
     predict.add_argument(
@@ -87,13 +93,18 @@ def _add_switch(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]
     switch.add_argument("--seconds", type=float, default=1.0, metavar="S", help="of the transition (default 1)")
     switch.add_argument("--count", type=int, default=1, help="versions to make (default 1)")
     switch.add_argument(
-        "--facing", choices=("turned", "kept"), default="turned",
+        "--facing",
+        choices=("turned", "kept"),
+        default="turned",
         help="turn TARGET to go on as PAST faces, or keep its own direction (default turned)",
-    )  # fmt: skip
+    )
     switch.add_argument(
-        "--out", type=Path, action="append", metavar="NAME",
+        "--out",
+        type=Path,
+        action="append",
+        metavar="NAME",
         help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default switch.bvh)",
-    )  # fmt: skip
+    )
     _add_sampling(switch, "TARGET")
     switch.set_defaults(run=run_switch)
 
@@ -146,9 +157,15 @@ def run_predict(arguments: argparse.Namespace) -> int:
         with bar("predicting") as progress:
             for some, moved in groups(arguments.count, TOGETHER, progress):
                 yield predict(
-                    predictor, past, seconds=arguments.seconds, hold=hold, root=not arguments.no_root,
-                    foot_lock=arguments.foot_lock, progress=moved, **sampling_of(arguments) | some,
-                )  # fmt: skip
+                    predictor,
+                    past,
+                    seconds=arguments.seconds,
+                    hold=hold,
+                    root=not arguments.no_root,
+                    foot_lock=arguments.foot_lock,
+                    progress=moved,
+                    **sampling_of(arguments) | some,
+                )
 
     return _written(arguments, drawn(), wanted, writing, past, note=lambda: _note_seen(predictor, past))
 
@@ -170,9 +187,12 @@ def _written(
         written.extend(write_futures(wanted, motions, given, writing, caption=_caption(arguments)))
 
     made = Finished(
-        [[target.folder] for target in wanted[:1]], arguments.count, write,
-        put=lambda motions: at_rate(motions, arguments.fps), what="futures",
-    )  # fmt: skip
+        [[target.folder] for target in wanted[:1]],
+        arguments.count,
+        write,
+        put=lambda motions: at_rate(motions, arguments.fps),
+        what="futures",
+    )
     interrupted = made.take(drawn)
     _report(arguments, [str(file) for file in written], made.count)
     note()
@@ -204,11 +224,16 @@ def run_switch(arguments: argparse.Namespace) -> int:
 
     drawn = (
         switch(
-            predictor, past, target, seconds=arguments.seconds, facing=arguments.facing,
-            foot_lock=arguments.foot_lock, **sampling_of(arguments) | some,
+            predictor,
+            past,
+            target,
+            seconds=arguments.seconds,
+            facing=arguments.facing,
+            foot_lock=arguments.foot_lock,
+            **sampling_of(arguments) | some,
         )
         for some, _ in groups(arguments.count, TOGETHER, lambda done, total: None)
-    )  # fmt: skip
+    )
     return _written(arguments, drawn, wanted, writing, past)
 
 
@@ -258,9 +283,15 @@ def _pieces(
         settings: dict[str, Any] = sampling_of(arguments) | {"count": 1}
         for number in range(arguments.count):
             pieces = predict_pieces(
-                predictor, past, seconds=arguments.seconds, number=number, hold=hold, root=not arguments.no_root,
-                foot_lock=arguments.foot_lock, **settings,
-            )  # fmt: skip
+                predictor,
+                past,
+                seconds=arguments.seconds,
+                number=number,
+                hold=hold,
+                root=not arguments.no_root,
+                foot_lock=arguments.foot_lock,
+                **settings,
+            )
             pieces = pieces if arguments.fps is None else resampled(pieces, arguments.fps)
             yield moved(pieces, number * frames)
 

@@ -37,9 +37,11 @@ def add_blender(command: argparse.ArgumentParser) -> None:
     """``--blender``, once."""
     if "--blender" not in command._option_string_actions:
         command.add_argument(
-            "--blender", type=Path, metavar="PROGRAM",
+            "--blender",
+            type=Path,
+            metavar="PROGRAM",
             help="Blender, or a Python with bpy, for .fbx files (default: the one on the path)",
-        )  # fmt: skip
+        )
 
 
 def _number(text: str) -> float:

@@ -33,10 +33,13 @@ def add_sampling(
     ``--out-unit``, in words.
     """
     parser.add_argument(
-        "--out", type=Path, action="append", metavar="NAME",
+        "--out",
+        type=Path,
+        action="append",
+        metavar="NAME",
         help="file to write, repeatable; .bvh .glb .vrma .usda .npz .mp4 .gif .png (default motion.bvh; motion.glb "
         "for a character)",
-    )  # fmt: skip
+    )
     parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 24)")
     parser.add_argument(
         "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
@@ -104,9 +107,12 @@ def moves(progress: Callable[[int, int], None], steps: int | None, rows: int) ->
 def add_adapters(parser: argparse.ArgumentParser) -> None:
     """``--adapter``: what was taught from clips."""
     parser.add_argument(
-        "--adapter", action="append", default=[], metavar="FILE[:FACTOR]",
+        "--adapter",
+        action="append",
+        default=[],
+        metavar="FILE[:FACTOR]",
         help="what 'motionloom teach' made of clips, repeatable; a factor says how much of it (default 1)",
-    )  # fmt: skip
+    )
 
 
 def load_prior(arguments: argparse.Namespace) -> "Prior":

@@ -45,17 +45,23 @@ def _options(parser: argparse.ArgumentParser) -> None:
         "--allow-host", action="append", default=[], metavar="NAME", help="a further name of this server, repeatable"
     )
     parser.add_argument(
-        "--allow-origin", action="append", default=[], metavar="URL",
+        "--allow-origin",
+        action="append",
+        default=[],
+        metavar="URL",
         help="a page's origin, such as http://localhost:5173, that may ask too, repeatable",
-    )  # fmt: skip
+    )
     _model(parser)
 
 
 def _project(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--project", type=Path, default=PROJECT, metavar="FOLDER",
+        "--project",
+        type=Path,
+        default=PROJECT,
+        metavar="FOLDER",
         help="the only folder that is read and written, made if missing (default motionloom-project)",
-    )  # fmt: skip
+    )
 
 
 def _model(parser: argparse.ArgumentParser) -> None:
@@ -83,10 +89,18 @@ def run_serve(arguments: argparse.Namespace) -> None:
         _leave_a_core()
     serve(
         Options(
-            arguments.project, arguments.host, arguments.port, arguments.token, tuple(arguments.allow_host),
-            tuple(arguments.allow_origin), arguments.weights, arguments.device, adapters, arguments.show,
+            arguments.project,
+            arguments.host,
+            arguments.port,
+            arguments.token,
+            tuple(arguments.allow_host),
+            tuple(arguments.allow_origin),
+            arguments.weights,
+            arguments.device,
+            adapters,
+            arguments.show,
         )
-    )  # fmt: skip
+    )
 
 
 def run_mcp(arguments: argparse.Namespace) -> None:

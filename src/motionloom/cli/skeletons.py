@@ -28,27 +28,32 @@ HANDS = ("relaxed", "fist", "flat", "as-is")
 def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform person's") -> None:
     """``--skeleton`` and what goes with it; ``own`` is whose skeleton motions have without it, in words."""
     parser.add_argument(
-        "--skeleton", metavar="FILE|NAME",
+        "--skeleton",
+        metavar="FILE|NAME",
         help="put motions on this skeleton, or on smpl22, mixamo, unreal, vrm or rigify; a .glb or .vrm character is "
         f"written as that file with one more animation (default: {own})",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--root", choices=ROOTS,
+        "--root",
+        choices=ROOTS,
         help="what carries the way over the ground on a skeleton with a root bone: that bone (motion, the default), "
         "the hips, or nothing",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--hands", choices=HANDS, help="pose of the hands on a skeleton with fingers (default as-is: its rest pose)"
     )
     parser.add_argument(
-        "--at", choices=PLACES,
+        "--at",
+        choices=PLACES,
         help="where motions of a .glb, .gltf or .vrm character start: where it stands and faces (character, the "
         "default of one that stands elsewhere), or at the origin, facing +Z",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--clip-name", metavar="NAME", action="append",
+        "--clip-name",
+        metavar="NAME",
+        action="append",
         help="name of the animation in the character's file; repeatable, one for each motion",
-    )  # fmt: skip
+    )
     parser.add_argument("--replace", action="store_true", help="leave only this animation in the character's file")
     parser.add_argument("--target-map", type=Path, metavar="JSON", help="which joints are which, of the --skeleton")
 
@@ -320,11 +325,14 @@ def _find(arguments: argparse.Namespace) -> Target:
     name, path = arguments.skeleton, Path(arguments.skeleton)
     suffix = path.suffix.lower()
     options = {
-        "root": arguments.root or "motion", "at": arguments.at, "hands": arguments.hands or "as-is",
+        "root": arguments.root or "motion",
+        "at": arguments.at,
+        "hands": arguments.hands or "as-is",
         "joint_map": arguments.target_map,
-        "clip_names": tuple(arguments.clip_name or ()), "replace": arguments.replace,
+        "clip_names": tuple(arguments.clip_name or ()),
+        "replace": arguments.replace,
         "one_file": getattr(arguments, "one_file", False),
-    }  # fmt: skip
+    }
     if name.lower() in NAMED and not path.exists():
         return Target(name, named_skeleton(name.lower()), **options)
     if suffix == ".bvh":

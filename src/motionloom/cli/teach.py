@@ -26,9 +26,11 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "that is written goes with --adapter into generate, compose, control, edit and duet.",
     )
     parser.add_argument(
-        "words", nargs="+", metavar="TEXT|CLIP",
+        "words",
+        nargs="+",
+        metavar="TEXT|CLIP",
         help="what the clips show, such as 'a zombie walks', and motion files or folders of them",
-    )  # fmt: skip
+    )
     parser.add_argument("--out", type=Path, metavar="FILE", help="the adapter (default taught.safetensors)")
     parser.add_argument("--check", action="store_true", help="only say what is wrong with the clips")
     parser.add_argument("--name", help="name on the adapter's card (default: that of the file)")
@@ -36,18 +38,22 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--steps", type=int, help="training steps (default 1300; more clips may need more)")
     parser.add_argument("--rank", type=int, help="size of the change: 16 (default) makes a file of 1.5 MB")
     parser.add_argument(
-        "--keep", type=float, metavar="SHARE",
+        "--keep",
+        type=float,
+        metavar="SHARE",
         help="share of the training on what the weights know already, 0 to 0.9 (default 0.5)",
-    )  # fmt: skip
+    )
     parser.add_argument("--no-mirror", action="store_true", help="do not learn from the clips' mirror images")
     parser.add_argument("--seed", type=int, default=0, help="the same seed teaches the same (default 0)")
     parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="what is taught (default: default)")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--threads", type=int, help="CPU threads")
     parser.add_argument(
-        "--amp", choices=("auto", "bf16", "float32"), default="auto",
+        "--amp",
+        choices=("auto", "bf16", "float32"),
+        default="auto",
         help="what is multiplied in; auto takes what is quicker on this machine (default)",
-    )  # fmt: skip
+    )
     parser.add_argument("--unit", type=as_unit, metavar="UNIT", help="unit of a BVH or ASF: m, cm, inch, or metres")
     parser.add_argument("--up", choices=("y", "z"), default="y", help="the axis that is up in the files (default y)")
     parser.add_argument("--source-fps", type=as_rate, metavar="N", help="take this rate for the files' (AMC: 120)")
@@ -122,11 +128,13 @@ def _report_check(arguments: argparse.Namespace, captioned: "list[CaptionedClip]
     if arguments.json:
         rows = [
             {
-                "clip": str(one.path), "captions": list(one.captions),
-                "wrong": [f.sentence for f in found if f.fatal], "remarks": [f.sentence for f in found if not f.fatal],
+                "clip": str(one.path),
+                "captions": list(one.captions),
+                "wrong": [f.sentence for f in found if f.fatal],
+                "remarks": [f.sentence for f in found if not f.fatal],
             }
             for one, found in zip(captioned, findings, strict=True)
-        ]  # fmt: skip
+        ]
         print(json.dumps({"clips": rows, "usable": len(captioned) - fatal}, indent=1, ensure_ascii=False))
         return 2 if fatal else 0
     for one, found in zip(captioned, findings, strict=True):
@@ -164,16 +172,20 @@ def _teach(
         fail(f"--seed must be 0 or more and below 2**31; got {arguments.seed}")
     lesson = Lesson(
         name=arguments.name or out.stem, licence=arguments.licence, seed=arguments.seed, amp=arguments.amp, **given
-    )  # fmt: skip
+    )
     prior = Prior.load(arguments.weights, device=arguments.device)
     began = time.perf_counter()
     adapter = teach(prior, examples, lesson, device=arguments.device, say=lambda line: print(line, file=sys.stderr))
     adapter.save(out)
     about = {
-        "file": str(out), "megabytes": round(out.stat().st_size / 1e6, 2), "captions": list(adapter.captions),
-        "clips": [str(one.path) for one in captioned], "licence": adapter.licence, "base": adapter.base,
+        "file": str(out),
+        "megabytes": round(out.stat().st_size / 1e6, 2),
+        "captions": list(adapter.captions),
+        "clips": [str(one.path) for one in captioned],
+        "licence": adapter.licence,
+        "base": adapter.base,
         "seconds": round(time.perf_counter() - began, 1),
-    }  # fmt: skip
+    }
     if arguments.json:
         print(json.dumps(about, indent=1, ensure_ascii=False))
         return

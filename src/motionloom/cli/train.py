@@ -95,9 +95,13 @@ def _train(arguments: argparse.Namespace, make: Callable[..., Path]) -> None:
 
     recipe = _recipe(arguments)
     place = make(
-        recipe, arguments.data, arguments.out,
-        text=text_encoder(arguments.text), device=arguments.device, stop=arguments.stop,
-    )  # fmt: skip
+        recipe,
+        arguments.data,
+        arguments.out,
+        text=text_encoder(arguments.text),
+        device=arguments.device,
+        stop=arguments.stop,
+    )
     print(f"wrote {place}")
 
 

@@ -86,9 +86,13 @@ def _import(arguments: argparse.Namespace) -> None:
         )
     second = check_place(arguments.out.with_name(f"{arguments.out.stem}-pair.safetensors")) if is_pair(state) else None
     prior = import_published(
-        arguments.checkpoint, mean=_numbers(arguments.mean), std=_numbers(arguments.std),
-        name=arguments.name, licence=arguments.licence, warn=lambda line: print(f"motionloom: {line}", file=sys.stderr),
-    )  # fmt: skip
+        arguments.checkpoint,
+        mean=_numbers(arguments.mean),
+        std=_numbers(arguments.std),
+        name=arguments.name,
+        licence=arguments.licence,
+        warn=lambda line: print(f"motionloom: {line}", file=sys.stderr),
+    )
     block = None if second is None else _imported_block(arguments, prior)
     print(f"wrote {save_prior(prior, arguments.out, half=arguments.half)}")
     if block is not None and second is not None:
@@ -121,9 +125,13 @@ def _import_evaluator(arguments: argparse.Namespace) -> None:
         raise MotionloomError("an evaluator is kept as float32, so that its numbers are the published ones: no --half")
     card = {"name": arguments.name, "licence": arguments.licence}
     made = read_published(
-        arguments.checkpoint, mean=arguments.mean, std=arguments.std, glove=arguments.glove, lists=arguments.vip,
+        arguments.checkpoint,
+        mean=arguments.mean,
+        std=arguments.std,
+        glove=arguments.glove,
+        lists=arguments.vip,
         card={key: value for key, value in card.items() if value},
-    )  # fmt: skip
+    )
     print(f"wrote {save_guo(made, arguments.out)}")
     for key, value in made.about.items():
         print(f"  {key:<14} {value}")

@@ -108,10 +108,17 @@ def core(positions: Array, fps: float, *, tail: float = 0.12) -> tuple[int, int]
     """
     p = ph.smooth(positions, 3)
     spine = p[:, 12] - p[:, 0]
-    measures = np.stack([
-        p[:, 0, 1] / 0.2, ph.speed(p, fps) / 0.7, ph.heading(p) / 1.2, np.linalg.norm(spine[:, [0, 2]], axis=-1) / 0.25,
-        p[:, 20, 1] / 0.4, p[:, 21, 1] / 0.4,
-    ], axis=-1)  # fmt: skip
+    measures = np.stack(
+        [
+            p[:, 0, 1] / 0.2,
+            ph.speed(p, fps) / 0.7,
+            ph.heading(p) / 1.2,
+            np.linalg.norm(spine[:, [0, 2]], axis=-1) / 0.25,
+            p[:, 20, 1] / 0.4,
+            p[:, 21, 1] / 0.4,
+        ],
+        axis=-1,
+    )
     change = np.abs(np.diff(ph.smooth(measures, ph.odd(fps / 2)), axis=0)).sum(-1)
     total = np.cumsum(change)
     if total[-1] < 0.5:
@@ -152,6 +159,7 @@ def rests(positions: Array, fps: float) -> list[int]:
     score = p[:, 0, 1] - 0.5 * p[:, [20, 21], 1].max(axis=1) - 0.5 * p[:, [7, 8], 1].max(axis=1)
     enough, reach = score.max() - 0.25 * np.ptp(score), round(0.8 * fps)
     return [
-        i for i, value in enumerate(score)
+        i
+        for i, value in enumerate(score)
         if value >= enough and value == score[max(0, i - reach) : i + reach + 1].max()
-    ]  # fmt: skip
+    ]

@@ -84,8 +84,19 @@ def clips_of(take: Take, *, check: Callable[[Places, Clip], None] | None = None)
 
 
 def _more(take: Take, clip: Clip, positions: Array) -> Iterator[Clip]:
-    gait = {"walk", "walk slow", "walk fast", "jog", "run", "circle left", "circle right", "walk left turn",
-            "walk right turn", "sidestep left", "sidestep right"}  # fmt: skip
+    gait = {
+        "walk",
+        "walk slow",
+        "walk fast",
+        "jog",
+        "run",
+        "circle left",
+        "circle right",
+        "walk left turn",
+        "walk right turn",
+        "sidestep left",
+        "sidestep right",
+    }
     moves = [note.kind for note in clip.notes if note.kind in gait]
     if not moves:
         return
@@ -158,11 +169,15 @@ def join_spans(spans: Sequence[tuple[int, int, str]]) -> list[tuple[int, int, st
 
 
 _OTHER_LABEL = {
-    "sidestep left": "sidestep right", "turn left": "turn right", "walk left turn": "walk right turn",
-    "circle left": "circle right", "turn around": "turn around right", "walk turn back": "walk turn back right",
+    "sidestep left": "sidestep right",
+    "turn left": "turn right",
+    "walk left turn": "walk right turn",
+    "circle left": "circle right",
+    "turn around": "turn around right",
+    "walk turn back": "walk turn back right",
     "punch left": "punch right",
     "kick left": "kick right",
-}  # fmt: skip
+}
 _OTHER_LABEL |= {b: a for a, b in _OTHER_LABEL.items()}
 
 

@@ -21,9 +21,24 @@ SHORTEST = 20
 THEN, MADE = "then", "made "
 """Groups of notes besides those of `data.actions`: one action and then another; gestures of `data.made`."""
 KINDS = ("capture", "keyed", "made")
-STATES = ("walk", "walk slow", "walk fast", "jog", "run", "walk backward", "jog backward", "stand", "dance",
-          "circle left", "circle right", "run circle", "balance", "sidestep left", "sidestep right",
-          "sit")  # fmt: skip
+STATES = (
+    "walk",
+    "walk slow",
+    "walk fast",
+    "jog",
+    "run",
+    "walk backward",
+    "jog backward",
+    "stand",
+    "dance",
+    "circle left",
+    "circle right",
+    "run circle",
+    "balance",
+    "sidestep left",
+    "sidestep right",
+    "sit",
+)
 """Labels that stay true however long a window of them is: neighbouring windows join."""
 
 

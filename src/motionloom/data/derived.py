@@ -21,9 +21,18 @@ from motionloom.kinematics.physics import Array
 LOOPED = 200
 """Frames that a cycle is repeated to."""
 POSTURES = (
-    "sit down", "stand up", "sit down and stand up", "lie down", "get up", "crouch to lie", "lie to crouch", "kneel",
-    "crouch", "bow", "fall",
-)  # fmt: skip
+    "sit down",
+    "stand up",
+    "sit down and stand up",
+    "lie down",
+    "get up",
+    "crouch to lie",
+    "lie to crouch",
+    "kneel",
+    "crouch",
+    "bow",
+    "fall",
+)
 """Actions that end (and begin) in a posture which people keep, though many a recording is cut a moment before."""
 BRIEFLY = 20
 """Frames for which a pose is held in which nobody stays."""
@@ -249,9 +258,14 @@ def mixed_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = a
             note.first : note.first + len(features), LAYOUT["root_height"]
         ]
         yield Clip(
-            f"mixed_{seed}_{number:04d}", below.source, below.licence, "train", "mixed",
-            (Note(0, len(features), f"{body_label}+{gesture}"),), features,
-        )  # fmt: skip
+            f"mixed_{seed}_{number:04d}",
+            below.source,
+            below.licence,
+            "train",
+            "mixed",
+            (Note(0, len(features), f"{body_label}+{gesture}"),),
+            features,
+        )
 
 
 def _labelled(clips: Sequence[Clip], labels: Sequence[str]) -> dict[str, list[tuple[Clip, Note]]]:

@@ -44,34 +44,83 @@ FAVOUR: dict[str, float] = {
             8.0: ("made punch", "made hands on hips", "made open door", "made swing arms", "lie down"),
             7.0: ("get up", "walk turn around", "kick"),
             5.0: (
-                "sit down", "stand up", "push-up", "lunge", "duck", "sway", "crouch", "touch toes", "punch",
-                "balance with arms out", "hop", "made drink", "throw", "high step", "slow down", "stop running", "bow",
-                "pick up", "cartwheel", "run and jump",
+                "sit down",
+                "stand up",
+                "push-up",
+                "lunge",
+                "duck",
+                "sway",
+                "crouch",
+                "touch toes",
+                "punch",
+                "balance with arms out",
+                "hop",
+                "made drink",
+                "throw",
+                "high step",
+                "slow down",
+                "stop running",
+                "bow",
+                "pick up",
+                "cartwheel",
+                "run and jump",
             ),
             4.0: (
-                "kneel", "sit down and stand up", "stop walking", "crawl", "then", "squat", "made arm up twice",
+                "kneel",
+                "sit down and stand up",
+                "stop walking",
+                "crawl",
+                "then",
+                "squat",
+                "made arm up twice",
             ),
             2.5: (
-                "climb ladder", "start running", "walk and pick up", "made clap", "made arms out", "made arms up twice",
-                "raise arm", "made arm up", "kneel and rise", "bend over", "stairs", "fall", "leg raise", "side lunge",
-                "dance", "jump forward", "jump up", "start walking", "made point", "one squat",
-                "two squats", "three squats",
+                "climb ladder",
+                "start running",
+                "walk and pick up",
+                "made clap",
+                "made arms out",
+                "made arms up twice",
+                "raise arm",
+                "made arm up",
+                "kneel and rise",
+                "bend over",
+                "stairs",
+                "fall",
+                "leg raise",
+                "side lunge",
+                "dance",
+                "jump forward",
+                "jump up",
+                "start walking",
+                "made point",
+                "one squat",
+                "two squats",
+                "three squats",
             ),
             0.5: ("sword", "basketball", "laugh", "wash", "arm back", "rotate arm", "soccer", "carry", "drink"),
         }.items()
         for name in names
     },
-}  # fmt: skip
+}
 """Groups drawn more or less often than the others: what came out last, and what is asked for most. A mixture of two
 labels is drawn 0.4 times as often, a made gesture `MADE_SHARE` times."""
 MADE_SHARE = 0.6
 
 EVENTS = {
-    "kick": "kick", "kick ball": "kick", "punch": "punch|box", "jump": "jump|leap", "jump forward": "jump|leap",
-    "jump repeatedly": "jump|leap", "hop": r"\bhop", "climb": "climb|stairs|ladder", "wave": r"\bwav",
-    "sit down": r"\bsits? down|takes a seat|sitting down", "stand up": r"stands? up|gets? up|rises",
+    "kick": "kick",
+    "kick ball": "kick",
+    "punch": "punch|box",
+    "jump": "jump|leap",
+    "jump forward": "jump|leap",
+    "jump repeatedly": "jump|leap",
+    "hop": r"\bhop",
+    "climb": "climb|stairs|ladder",
+    "wave": r"\bwav",
+    "sit down": r"\bsits? down|takes a seat|sitting down",
+    "stand up": r"stands? up|gets? up|rises",
     "cartwheel": "cartwheel",
-}  # fmt: skip
+}
 """Measured labels of something that happens at one moment, and how captions speak of it."""
 STRIKES = {"kick": "foot", "punch": "hand"}
 """How the measured labels begin that name a strike, and the limb that strikes."""
@@ -162,9 +211,14 @@ def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, 
     features = (features - torch.from_numpy(mean)) / torch.from_numpy(std)
     recorded = sum(len(c.features) for c in clips if c.way == "plain" and not c.name.startswith("M")) / 20 / 60
     return MotionSet(
-        features, torch.from_numpy(mean), torch.from_numpy(std), tuple(items), tuple(texts),
-        tuple(sorted({c.licence for c in clips})), recorded,
-    )  # fmt: skip
+        features,
+        torch.from_numpy(mean),
+        torch.from_numpy(std),
+        tuple(items),
+        tuple(texts),
+        tuple(sorted({c.licence for c in clips})),
+        recorded,
+    )
 
 
 def _worded(
@@ -224,11 +278,17 @@ def _moments(clip: Clip, note: Note) -> list[tuple[int, int]]:
         return []
     said = " ".join(note.texts).lower()
     named = {label for label, words in EVENTS.items() if re.search(words, said)}
-    spans = sorted({
-        (n.first, n.last) for n in clip.notes
-        if n.kind in named and _is_event(n) and note.first <= n.first and n.last <= note.last
-        and (n.first, n.last) != (note.first, note.last)
-    })  # fmt: skip
+    spans = sorted(
+        {
+            (n.first, n.last)
+            for n in clip.notes
+            if n.kind in named
+            and _is_event(n)
+            and note.first <= n.first
+            and n.last <= note.last
+            and (n.first, n.last) != (note.first, note.last)
+        }
+    )
     return [spans[round(k)] for k in np.linspace(0, len(spans) - 1, min(MOMENTS, len(spans)))]
 
 

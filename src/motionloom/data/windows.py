@@ -205,15 +205,19 @@ GESTURES = (
     Rule("squat twice", "dips >= 2, dips < 3", (r"squat",), choice="squat"),
     Rule("squat three times", "dips >= 3, dips <= 3", (r"squat",), choice="squat"),
     Rule(
-        "crouch", "pelvis_low < 0.72, knees > 80, height_first > 0.85",
-        without=r"climb|danc|snake|fish|whale|ladder|crawl|sit", choice="crouch",
+        "crouch",
+        "pelvis_low < 0.72, knees > 80, height_first > 0.85",
+        without=r"climb|danc|snake|fish|whale|ladder|crawl|sit",
+        choice="crouch",
     ),
     Rule(
-        "bend", "bend > 60, pelvis_low > 0.6, tilt_first < 35, tilt_last < 35",
-        without=r"danc|climb|cartwheel|dive|snake|fish|whale|crawl|flip|roll", choice="bend",
+        "bend",
+        "bend > 60, pelvis_low > 0.6, tilt_first < 35, tilt_last < 35",
+        without=r"danc|climb|cartwheel|dive|snake|fish|whale|crawl|flip|roll",
+        choice="bend",
     ),
     Rule("arms up", "hands_up > 0.6, both_over_head > 0.05", without=r"climb|ladder|danc|hang"),
-)  # fmt: skip
+)
 """Every choice among these may give labels to one window."""
 
 _ON_THE_SPOT = "speed < 0.25, travel < 0.8, pelvis_low > 0.85"

@@ -44,10 +44,29 @@ _WORDS = tomllib.loads((resources.files("motionloom.data") / "phrases.toml").rea
 LABELS: dict[str, tuple[str, ...]] = {label: tuple(said) for label, said in _WORDS["labels"].items()}
 """Verb phrases for what a window measurably shows; see `data.windows`."""
 _PEOPLE = (
-    *["a person"] * 12, *["someone", "a man", "a woman", "he", "she"] * 3, *["the person"] * 2, "a figure", "somebody",
-    "the man", "the woman", "a guy", "a boy", "a girl", "a child", "a kid", "an old man", "a young woman", "a lady",
-    "a dancer", "an athlete", "a fighter", "a soldier", "a worker", "a player", "a character",
-)  # fmt: skip
+    *["a person"] * 12,
+    *["someone", "a man", "a woman", "he", "she"] * 3,
+    *["the person"] * 2,
+    "a figure",
+    "somebody",
+    "the man",
+    "the woman",
+    "a guy",
+    "a boy",
+    "a girl",
+    "a child",
+    "a kid",
+    "an old man",
+    "a young woman",
+    "a lady",
+    "a dancer",
+    "an athlete",
+    "a fighter",
+    "a soldier",
+    "a worker",
+    "a player",
+    "a character",
+)
 
 
 def sentence(verb_phrase: str, rng: np.random.Generator) -> str:

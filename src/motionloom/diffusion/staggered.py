@@ -89,9 +89,16 @@ def staggered(
 
 class _Chain:
     def __init__(
-        self, links: Iterable[Link], denoise: RowsDenoiser, levels: Sequence[int], solver: Solver, schedule: Schedule,
-        features: int, batch_size: int, moved: Callable[[int], None],
-    ) -> None:  # fmt: skip
+        self,
+        links: Iterable[Link],
+        denoise: RowsDenoiser,
+        levels: Sequence[int],
+        solver: Solver,
+        schedule: Schedule,
+        features: int,
+        batch_size: int,
+        moved: Callable[[int], None],
+    ) -> None:
         self.links, self.denoise, self.levels = iter(links), denoise, levels
         self.solver, self.schedule = solver, schedule
         self.features, self.batch_size, self.moved = features, batch_size, moved

@@ -150,10 +150,18 @@ def _plan(goal: Goal, first: int, width: float) -> _Plan:
     same = np.array_equal(goal.asked[..., 0], goal.asked[..., 2])
     z = x if same else _limb_plan(goal.asked[..., 2], _TOGETHER[2], body, still)
     return _Plan(
-        goal, first, moving, _gain(_PACE**2 * pace, moving, noise),
-        turning, _gain(_YAW**2 * pace, turning, np.full(len(turning), 0.02)),
-        lifting, _gain(_LIFT**2 * body, lifting, np.full(len(lifting), FEW)), (x, y, z), body, still[:, :frames],
-    )  # fmt: skip
+        goal,
+        first,
+        moving,
+        _gain(_PACE**2 * pace, moving, noise),
+        turning,
+        _gain(_YAW**2 * pace, turning, np.full(len(turning), 0.02)),
+        lifting,
+        _gain(_LIFT**2 * body, lifting, np.full(len(lifting), FEW)),
+        (x, y, z),
+        body,
+        still[:, :frames],
+    )
 
 
 def product(matrix: Array, values: NDArray[Any]) -> NDArray[Any]:

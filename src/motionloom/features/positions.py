@@ -102,9 +102,13 @@ class Layout:
         """From plain data out of a weight file; raises MotionloomError."""
         try:
             return Layout(
-                tuple(map(str, values["names"])), tuple(map(int, values["parents"])), tuple(map(int, values["pairs"])),
-                tuple((int(a), int(b)) for a, b in values["across"]), values["root"] is True, values["z_up"] is True,
-            )  # fmt: skip
+                tuple(map(str, values["names"])),
+                tuple(map(int, values["parents"])),
+                tuple(map(int, values["pairs"])),
+                tuple((int(a), int(b)) for a, b in values["across"]),
+                values["root"] is True,
+                values["z_up"] is True,
+            )
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise MotionloomError(f"the layout of the joints is not usable: {error!r}") from None
 

@@ -191,9 +191,14 @@ class _Reader:
         smooth = given["smooth"].flag() if "smooth" in given else True
         try:
             goal = root_path(
-                points, times, frames=self.frames, facing=facing, fps=self.fps, span=span,
+                points,
+                times,
+                frames=self.frames,
+                facing=facing,
+                fps=self.fps,
+                span=span,
                 smooth=smooth and "points" in given,
-            )  # fmt: skip
+            )
         except MotionloomError as error:
             found.fail(f"cannot be walked: {error}")
         return self.begun(found, goal, start)

@@ -43,9 +43,17 @@ class Part:
 
 
 _SECONDS = {
-    "locomotion": 4.0, "gesture": 3.0, "state": 3.0, "change": 3.0, "event": 2.5, "jump": 2.5, "turn": 2.5,
-    "fight": 3.0, "dance": 5.0, "other": 4.0,
-}  # fmt: skip
+    "locomotion": 4.0,
+    "gesture": 3.0,
+    "state": 3.0,
+    "change": 3.0,
+    "event": 2.5,
+    "jump": 2.5,
+    "turn": 2.5,
+    "fight": 3.0,
+    "dance": 5.0,
+    "other": 4.0,
+}
 """Kinds of verbs, and the seconds such an action takes."""
 
 _THEN = re.compile(
@@ -58,8 +66,22 @@ _KEPT = re.compile(
 )
 _JOIN = re.compile(r"(\s*,\s*and\s+|\s*,\s*|\s+and\s+)", re.IGNORECASE)
 _AT_ONCE = re.compile(r"\b(?:while|whilst|as (?:he|she|they|it|if)|at the same time|simultaneously)\b", re.IGNORECASE)
-_NUMBER = {"once": 1, "twice": 2, "thrice": 3, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7,
-           "eight": 8, "nine": 9, "ten": 10, "several": 4, "few": 3}  # fmt: skip
+_NUMBER = {
+    "once": 1,
+    "twice": 2,
+    "thrice": 3,
+    "two": 2,
+    "three": 3,
+    "four": 4,
+    "five": 5,
+    "six": 6,
+    "seven": 7,
+    "eight": 8,
+    "nine": 9,
+    "ten": 10,
+    "several": 4,
+    "few": 3,
+}
 
 
 def split_actions(text: str) -> tuple[Part, ...]:
@@ -169,8 +191,9 @@ def _named_alike(clauses: list[str], main: str) -> list[str]:
     result = []
     for clause in clauses:
         rest = PRONOUN.sub("", clause)
-        result.append(clause if clause == main else _sentence(subject, finite(rest, mood)) if subject else
-                      finite(rest, mood))  # fmt: skip
+        result.append(
+            clause if clause == main else _sentence(subject, finite(rest, mood)) if subject else finite(rest, mood)
+        )
     return result
 
 
@@ -178,9 +201,10 @@ def _by_then(text: str) -> list[str]:
     """Clauses parted by "then" and its like."""
     kept = [(found.start(), found.end()) for found in _KEPT.finditer(text)]
     cuts = [
-        found for found in _THEN.finditer(text)
+        found
+        for found in _THEN.finditer(text)
         if not any(begin < found.end() and found.start() < end for begin, end in kept)
-    ]  # fmt: skip
+    ]
     pieces, at = [], 0
     for cut in cuts:
         pieces.append(text[at : cut.start()])

@@ -113,9 +113,13 @@ def _convert(source: Path, made: Path, *, fps: float) -> None:
         try:
             ended = subprocess.run(
                 [*words, str(source.resolve()), str(made.resolve()), repr(fps)],
-                check=False, capture_output=True, text=True, timeout=SECONDS, errors="replace",
+                check=False,
+                capture_output=True,
+                text=True,
+                timeout=SECONDS,
+                errors="replace",
                 stdin=subprocess.DEVNULL,
-            )  # fmt: skip
+            )
         except subprocess.TimeoutExpired:
             raise MotionloomError(f"Blender took more than {SECONDS:.0f} s for {source}; convert it by hand") from None
         except OSError as error:

@@ -19,8 +19,12 @@ _LIFT = np.array([-90.0, -50.0, 0.0, 0.0, 50.0, 90.0]) * np.pi / 180  # rings fr
 MAX_FRAMES = 400
 DEEPEST = 0.04
 """Body heights by which a foot's piece is in the floor at most, where the floor is the one it stands on."""
-MATERIALS = {1: ("left", (0.82, 0.17, 0.05)), -1: ("right", (0.03, 0.17, 0.60)), 0: ("middle", (0.16, 0.19, 0.24)),
-             2: ("skin", (0.76, 0.51, 0.35))}  # fmt: skip
+MATERIALS = {
+    1: ("left", (0.82, 0.17, 0.05)),
+    -1: ("right", (0.03, 0.17, 0.60)),
+    0: ("middle", (0.16, 0.19, 0.24)),
+    2: ("skin", (0.76, 0.51, 0.35)),
+}
 """Name and linear colour for each `Piece.side`."""
 
 

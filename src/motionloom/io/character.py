@@ -172,12 +172,13 @@ class Character:
         inside = set(self.rig.nodes)
         rest = {
             (n, path): {
-                "translation": self.nodes[n].place, "rotation": np.roll(self.nodes[n].turn, -1),
+                "translation": self.nodes[n].place,
+                "rotation": np.roll(self.nodes[n].turn, -1),
                 "scale": self.nodes[n].scale,
             }[path]
             for n, path in moved
             if n in inside
-        }  # fmt: skip
+        }
         return [(n, path, value[None]) for (n, path), value in sorted(rest.items(), key=lambda item: item[0])]
 
     def _free(self, motion: Motion, body: set[int]) -> set[int]:
@@ -309,9 +310,12 @@ class _Insertion:
         array = np.ascontiguousarray(values, dtype="<f4")
         kind = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}[array.shape[1]]
         accessor: dict[str, Any] = {
-            "bufferView": self.view, "byteOffset": len(self.data),
-            "componentType": 5126, "count": len(array), "type": kind,
-        }  # fmt: skip
+            "bufferView": self.view,
+            "byteOffset": len(self.data),
+            "componentType": 5126,
+            "count": len(array),
+            "type": kind,
+        }
         if bounds:
             accessor |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
         self.data += array.tobytes()

@@ -261,16 +261,27 @@ def humanoid_nodes(document: Document, count: int) -> dict[str, int]:
 
 
 VRM_BONES = {
-    "hips": "pelvis", "spine": "spine1", "chest": "spine2", "upperChest": "spine3", "neck": "neck", "head": "head",
+    "hips": "pelvis",
+    "spine": "spine1",
+    "chest": "spine2",
+    "upperChest": "spine3",
+    "neck": "neck",
+    "head": "head",
     **{
         f"{side}{bone}": f"{side}_{part}"
         for side in ("left", "right")
         for bone, part in (
-            ("UpperLeg", "hip"), ("LowerLeg", "knee"), ("Foot", "ankle"), ("Toes", "foot"), ("Shoulder", "collar"),
-            ("UpperArm", "shoulder"), ("LowerArm", "elbow"), ("Hand", "wrist"),
+            ("UpperLeg", "hip"),
+            ("LowerLeg", "knee"),
+            ("Foot", "ankle"),
+            ("Toes", "foot"),
+            ("Shoulder", "collar"),
+            ("UpperArm", "shoulder"),
+            ("LowerArm", "elbow"),
+            ("Hand", "wrist"),
         )
     },
-}  # fmt: skip
+}
 """VRM's names of the bones that are driven, and the joints of SMPL that they are."""
 
 

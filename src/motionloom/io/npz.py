@@ -45,9 +45,22 @@ SPARE_NUMBERS, NUMBERS_PER_BYTE = 8_000_000, 16
 """What a packed file may unfold to: so many numbers, or so many for each byte of the file, if that is more. Motion that
 people make packs to a byte for each number or two; somebody who does not move at all, for forty minutes, is let in."""
 BROKEN = (
-    zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, SyntaxError, ValueError, TypeError, KeyError,
-    OSError, EOFError, NotImplementedError, RuntimeError, OverflowError, MemoryError, IndexError,
-)  # fmt: skip
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    tokenize.TokenError,
+    SyntaxError,
+    ValueError,
+    TypeError,
+    KeyError,
+    OSError,
+    EOFError,
+    NotImplementedError,
+    RuntimeError,
+    OverflowError,
+    MemoryError,
+    IndexError,
+)
 """What damaged archives and arrays raise in zipfile and NumPy."""
 
 

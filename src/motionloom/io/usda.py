@@ -112,10 +112,16 @@ def _simple(motion: Motion) -> list[Surface]:
         count = len(piece.points)
         found.append(
             Surface(
-                f"body_{motion.skeleton.names[piece.joint]}", piece.points + rest[piece.joint], piece.normals, None,
-                piece.triangles, np.full((count, 1), piece.joint), np.ones((count, 1)), MATERIALS[piece.side][1],
+                f"body_{motion.skeleton.names[piece.joint]}",
+                piece.points + rest[piece.joint],
+                piece.normals,
+                None,
+                piece.triangles,
+                np.full((count, 1), piece.joint),
+                np.ones((count, 1)),
+                MATERIALS[piece.side][1],
             )
-        )  # fmt: skip
+        )
     return found
 
 

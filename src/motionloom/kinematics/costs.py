@@ -12,28 +12,57 @@ from motionloom.skeleton import SMPL22
 T = TypeVar("T")
 
 BALL_TURN: Mapping[str, float] = {
-    "pelvis": 0.15, "hip": 0.5, "spine1": 0.15, "spine2": 0.15, "spine3": 0.15, "neck": 0.2, "collar": 0.1,
-    "shoulder": 0.6, "ankle": 0.3,
-}  # fmt: skip
+    "pelvis": 0.15,
+    "hip": 0.5,
+    "spine1": 0.15,
+    "spine2": 0.15,
+    "spine3": 0.15,
+    "neck": 0.2,
+    "collar": 0.1,
+    "shoulder": 0.6,
+    "ankle": 0.3,
+}
 """Radians by which joints that turn freely usually may, when a pose is fitted."""
 HINGE_TURN: Mapping[str, float] = {"knee": 0.6, "elbow": 0.8}
 """The same of joints that bend about one axis."""
 BONE_SWING: Mapping[str, float] = {
-    "spine1": 0.05, "spine2": 0.05, "spine3": 0.05, "neck": 0.2, "collar": 0.15, "shoulder": 0.5, "elbow": 0.5,
-    "hip": 0.35, "knee": 0.5, "ankle": 0.3, "pelvis": 0.02,
-}  # fmt: skip
+    "spine1": 0.05,
+    "spine2": 0.05,
+    "spine3": 0.05,
+    "neck": 0.2,
+    "collar": 0.15,
+    "shoulder": 0.5,
+    "elbow": 0.5,
+    "hip": 0.35,
+    "knee": 0.5,
+    "ankle": 0.3,
+    "pelvis": 0.02,
+}
 """Radians by which the bones beyond a joint may be off in what is sampled."""
 SLACK: Mapping[str, float] = {"elbow": 0.15, "wrist": 0.25, "knee": 0.15, "ankle": 0.3, "foot": 0.3}
 """Metres that a joint can go before the root must come along; `TRUNK_SLACK` for all others."""
 TRUNK_SLACK = 0.1
 REACH: Mapping[str, tuple[str, float]] = {
-    "wrist": ("shoulder", 0.48), "elbow": ("shoulder", 0.25), "ankle": ("hip", 0.79), "foot": ("hip", 0.85),
-}  # fmt: skip
+    "wrist": ("shoulder", 0.48),
+    "elbow": ("shoulder", 0.25),
+    "ankle": ("hip", 0.79),
+    "foot": ("hip", 0.85),
+}
 """Where limbs begin, and metres that they reach without being quite straight."""
 BASE: Mapping[str, str] = {
-    "spine1": "pelvis", "spine2": "pelvis", "spine3": "pelvis", "neck": "pelvis", "head": "pelvis", "collar": "pelvis",
-    "shoulder": "pelvis", "knee": "hip", "ankle": "hip", "foot": "hip", "elbow": "shoulder", "wrist": "shoulder",
-}  # fmt: skip
+    "spine1": "pelvis",
+    "spine2": "pelvis",
+    "spine3": "pelvis",
+    "neck": "pelvis",
+    "head": "pelvis",
+    "collar": "pelvis",
+    "shoulder": "pelvis",
+    "knee": "hip",
+    "ankle": "hip",
+    "foot": "hip",
+    "elbow": "shoulder",
+    "wrist": "shoulder",
+}
 """The joint from which another's reach is measured."""
 LEG = ("knee", "ankle", "foot")
 

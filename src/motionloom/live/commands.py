@@ -183,10 +183,13 @@ _KINDS: Mapping[str, tuple[set[str], set[str], Callable[[Mapping[str, Any]], Com
     "say": ({"text"}, set(), lambda said: Say(said["text"])),
     "steer": (set(), {"direction", "speed", "facing"}, _steer),
     "path": ({"points"}, {"speed"}, lambda said: Path(said["points"], said.get("speed"))),
-    "reach": ({"joint", "position"}, {"within"},
-              lambda said: Reach(said["joint"], said["position"], said.get("within", 0.6))),
+    "reach": (
+        {"joint", "position"},
+        {"within"},
+        lambda said: Reach(said["joint"], said["position"], said.get("within", 0.6)),
+    ),
     "pose": ({"places"}, {"within"}, lambda said: Pose(said["places"], said.get("within", 0.6))),
-}  # fmt: skip
+}
 """By their "type": the fields that there must be, those that there may be, and what makes the command of them."""
 
 

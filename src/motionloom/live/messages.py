@@ -87,10 +87,17 @@ def welcome(begun: Hello, key: str, number: int) -> dict[str, Any]:
     """The answer to hello; ``number``: of the frame that comes first."""
     bones = begun.skeleton
     return {
-        "type": "welcome", "version": VERSION, "session": key, "fps": begun.fps, "seed": begun.seed,
-        "people": begun.people, "frame": number,
-        "joints": list(bones.names), "parents": list(bones.parents), "offsets": bones.offsets.round(6).tolist(),
-    }  # fmt: skip
+        "type": "welcome",
+        "version": VERSION,
+        "session": key,
+        "fps": begun.fps,
+        "seed": begun.seed,
+        "people": begun.people,
+        "frame": number,
+        "joints": list(bones.names),
+        "parents": list(bones.parents),
+        "offsets": bones.offsets.round(6).tolist(),
+    }
 
 
 def frame(shown: Frame | tuple[Frame, Frame], late: float) -> dict[str, Any]:
@@ -108,10 +115,15 @@ def frame(shown: Frame | tuple[Frame, Frame], late: float) -> dict[str, Any]:
 def health(state: Health) -> dict[str, Any]:
     """How the server keeps up."""
     return {
-        "type": "health", "late": state.late, "worst": round(state.worst, 4), "ahead": round(state.ahead, 4),
-        "dropped": state.dropped, "times": round(state.times, 2), "rate": round(state.rate, 3),
+        "type": "health",
+        "late": state.late,
+        "worst": round(state.worst, 4),
+        "ahead": round(state.ahead, 4),
+        "dropped": state.dropped,
+        "times": round(state.times, 2),
+        "rate": round(state.rate, 3),
         "problem": state.problem,
-    }  # fmt: skip
+    }
 
 
 def recorded(begun: Hello, taken: list[Taken], number: int) -> dict[str, Any]:
@@ -121,6 +133,10 @@ def recorded(begun: Hello, taken: list[Taken], number: int) -> dict[str, Any]:
         for one in taken[-10_000:]
     ]
     return {
-        "type": "recorded", "seed": begun.seed, "fps": begun.fps, "people": begun.people, "frames": number,
+        "type": "recorded",
+        "seed": begun.seed,
+        "fps": begun.fps,
+        "people": begun.people,
+        "frames": number,
         "commands": commands,
-    }  # fmt: skip
+    }

@@ -92,11 +92,14 @@ class LivePair(Stage[tuple[Frame, Frame]]):
                 changes[i] = leaving(prior, known[i], frames, edits=request.edits, turns=request.turns)
         frozen = [bool(request.edits or request.turns) for request in requests]
         features, sampled = pair_features(
-            prior, self._net, [request.words for request in requests], count + frames,
+            prior,
+            self._net,
+            [request.words for request in requests],
+            count + frames,
             seeds=[row_seed(self._seed, i, self._next) for i in (0, 1)],
             edits=PairEdits(observed, changes, frozen=frozen),
             sampling=PairSampling(guidance=self.settings.guidance, steps=self.settings.steps),
-        )  # fmt: skip
+        )
         self._calls += self.settings.steps
         made = features[0].astype(np.float64)
         begins = [None if count else GroundPose.of_numbers(pose) for pose in sampled[0]]

@@ -166,9 +166,16 @@ class Person(Asked):
     def state(self) -> State:
         """What `restore` brings back."""
         return State(
-            self._plan, self._words, self._steer, copy(self._trail), tuple(self._targets), self._goes_to, self._stands,
-            tuple(self._due), tuple(self._asked),
-        )  # fmt: skip
+            self._plan,
+            self._words,
+            self._steer,
+            copy(self._trail),
+            tuple(self._targets),
+            self._goes_to,
+            self._stands,
+            tuple(self._due),
+            tuple(self._asked),
+        )
 
     def restore(self, state: State) -> None:
         """Be as in a state; what was asked since is forgotten."""

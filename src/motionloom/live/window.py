@@ -102,9 +102,14 @@ class Sampler:
         hold = observe(data, mask, prior.schedule, noise)
         state = hold(noise(data), self._levels[0])
         walk = sample(
-            denoise, state, levels=self._levels, solver=SOLVERS[self.settings.solver], schedule=prior.schedule,
-            noise=noise, constrain=hold,
-        )  # fmt: skip
+            denoise,
+            state,
+            levels=self._levels,
+            solver=SOLVERS[self.settings.solver],
+            schedule=prior.schedule,
+            noise=noise,
+            constrain=hold,
+        )
         for done, snapshot in enumerate(walk, start=1):
             state = snapshot.state
             report(done, len(self._levels) - 1, [0], lambda clean=snapshot.clean: poses(clean))

@@ -360,9 +360,12 @@ def move_feet(motion: Motion, shift: Array) -> Motion:
         out = out - (out * line).sum(-1, keepdims=True) * line
         lack = (0.01 - np.linalg.norm(out, axis=-1, keepdims=True)).clip(0)
         middle, end = bend(
-            places[:, hip], places[:, ankle] + shift[:, side], out + lack * (places[:, TOES[side]] - places[:, ankle]),
-            upper=body.bone(hip), lower=body.bone(knee),
-        )  # fmt: skip
+            places[:, hip],
+            places[:, ankle] + shift[:, side],
+            out + lack * (places[:, TOES[side]] - places[:, ankle]),
+            upper=body.bone(hip),
+            lower=body.bone(knee),
+        )
         world = aim(world, body, hip, places[:, knee] - places[:, hip], middle - places[:, hip])
         world = aim(world, body, knee, places[:, ankle] - places[:, knee], end - middle)
     return replace(motion, rotations=_locals(motion.skeleton, world))

@@ -69,12 +69,17 @@ def build(project: Project, worker: Worker, door: Door, *, more: Sequence[BaseRo
         worker.stop()
 
     app = Starlette(
-        routes=[*more, *routes()], lifespan=lifespan, middleware=[Middleware(Guard, door=door, limits=studio.limits)],
+        routes=[*more, *routes()],
+        lifespan=lifespan,
+        middleware=[Middleware(Guard, door=door, limits=studio.limits)],
         exception_handlers={
-            Refusal: _refused, MotionloomError: _mistaken, OSError: _unwritten, HTTPException: _no_route,
+            Refusal: _refused,
+            MotionloomError: _mistaken,
+            OSError: _unwritten,
+            HTTPException: _no_route,
             Exception: _failed,
         },
-    )  # fmt: skip
+    )
     app.state.studio = studio
     return app
 
@@ -119,13 +124,18 @@ async def capabilities(request: Request) -> Response:
     studio = studio_of(request)
     return JSONResponse(
         {
-            "fps": 20, "joints": list(SMPL22.names), "parents": list(SMPL22.parents),
-            "offsets": SMPL22.offsets.tolist(), "groups": {name: list(at) for name, at in SMPL22.groups.items()},
-            "tasks": list(asking.TASKS), "limits": studio.limits.public(), "formats": list(FORMATS),
+            "fps": 20,
+            "joints": list(SMPL22.names),
+            "parents": list(SMPL22.parents),
+            "offsets": SMPL22.offsets.tolist(),
+            "groups": {name: list(at) for name, at in SMPL22.groups.items()},
+            "tasks": list(asking.TASKS),
+            "limits": studio.limits.public(),
+            "formats": list(FORMATS),
             "skeletons": list(NAMED),
         }
         | await capabilities_of(request.app)
-    )  # fmt: skip
+    )
 
 
 async def openapi(request: Request) -> Response:

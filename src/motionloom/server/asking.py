@@ -97,20 +97,31 @@ class _Reader:
 
     def request(self, task: str) -> Request:
         options = {
-            "prompt": self.prompt(), "seconds": self.seconds(task),
-            "as_one": self.flag("as_one"), "keep": self.words("keep"), "redraw": self.spans(),
-            "loop": self.flag("loop"), "blend": self.number("blend", 0.0, 60.0),
-            "extend": self.number("extend", 0.0, self.limits.seconds), "strength": self.number("strength", 0.0, 1.0),
-            "person": self.whole("person", 0, self.limits.people - 1), "start": self.number("start", 0.0, 1e6),
-            "end": self.number("end", 0.0, 1e6), "temperature": self.number("temperature", 0.0, 2.0),
-            "together": self.number("together", 0.0, 1.0), "facing": self.facing(),
-        }  # fmt: skip
+            "prompt": self.prompt(),
+            "seconds": self.seconds(task),
+            "as_one": self.flag("as_one"),
+            "keep": self.words("keep"),
+            "redraw": self.spans(),
+            "loop": self.flag("loop"),
+            "blend": self.number("blend", 0.0, 60.0),
+            "extend": self.number("extend", 0.0, self.limits.seconds),
+            "strength": self.number("strength", 0.0, 1.0),
+            "person": self.whole("person", 0, self.limits.people - 1),
+            "start": self.number("start", 0.0, 1e6),
+            "end": self.number("end", 0.0, 1e6),
+            "temperature": self.number("temperature", 0.0, 2.0),
+            "together": self.number("together", 0.0, 1.0),
+            "facing": self.facing(),
+        }
         common: dict[str, Any] = {
-            "task": task, "seed": self.whole("seed", 0, MAX_SEED) or 0,
+            "task": task,
+            "seed": self.whole("seed", 0, MAX_SEED) or 0,
             "count": self.whole("count", 1, self.limits.count) or 1,
-            "steps": self.whole("steps", 1, self.limits.steps), "guidance": self.number("guidance", -100.0, 100.0),
-            "levels": self.levels(), "options": options,
-        }  # fmt: skip
+            "steps": self.whole("steps", 1, self.limits.steps),
+            "guidance": self.number("guidance", -100.0, 100.0),
+            "levels": self.levels(),
+            "options": options,
+        }
         return getattr(self, task)(common, options)
 
     # -- the tasks

@@ -140,18 +140,38 @@ def _timelines() -> dict[str, Schema]:
 def _jobs() -> dict[str, Schema]:
     result = _object(
         {
-            "id": ID, "number": WHOLE, "seed": WHOLE, "seconds": _number(), "frames": WHOLE, "people": WHOLE,
+            "id": ID,
+            "number": WHOLE,
+            "seed": WHOLE,
+            "seconds": _number(),
+            "frames": WHOLE,
+            "people": WHOLE,
             "measures": ref("Measures"),
         },
-        "id", "number", "seed", "seconds", "frames", "people", "measures",
-    )  # fmt: skip
+        "id",
+        "number",
+        "seed",
+        "seconds",
+        "frames",
+        "people",
+        "measures",
+    )
     job = _object(
         {
-            "id": ID, "task": ref("Task"), "state": ref("JobState"), "progress": _number(minimum=0, maximum=1),
-            "error": {"anyOf": [TEXT, _NULL]}, "results": _list(ref("Result")),
+            "id": ID,
+            "task": ref("Task"),
+            "state": ref("JobState"),
+            "progress": _number(minimum=0, maximum=1),
+            "error": {"anyOf": [TEXT, _NULL]},
+            "results": _list(ref("Result")),
         },
-        "id", "task", "state", "progress", "error", "results",
-    )  # fmt: skip
+        "id",
+        "task",
+        "state",
+        "progress",
+        "error",
+        "results",
+    )
     return {
         "Task": {"enum": list(TASKS)},
         "JobState": {"enum": ["queued", "running", *FINAL]},
@@ -170,12 +190,16 @@ def _stored() -> dict[str, Schema]:
             "rotations": _FLOATS | {"description": "(frames, 22, 4) w, x, y, z, in the parent's frame; the same"},
             "root": _FLOATS | {"description": "(frames, 3) metres; the same"},
         },
-        "root", "rotations",
-    )  # fmt: skip
+        "root",
+        "rotations",
+    )
     motion = _object(
         {"id": ID, **length, "people": _list(ref("MotionPerson")), "about": ref("About")},
-        "id", "fps", "frames", "people",
-    )  # fmt: skip
+        "id",
+        "fps",
+        "frames",
+        "people",
+    )
     sent = _object({"id": ID, **length, "people": WHOLE, "name": TEXT, "skeleton": FLAG}, "id", "name")
     character = _object({"id": ID, "name": TEXT, "joints": ref("JointMap")}, "id", "name", "joints")
     return {
@@ -193,11 +217,22 @@ def _server() -> dict[str, Schema]:
     lists = {key: _list(TEXT) for key in ("joints", "tasks", "formats", "skeletons")}
     capabilities = _object(
         {
-            "fps": _number(), **lists, "parents": _list(WHOLE), "offsets": _list(_list(_number())),
-            "groups": ref("Groups"), "limits": ref("ServerLimits"),
+            "fps": _number(),
+            **lists,
+            "parents": _list(WHOLE),
+            "offsets": _list(_list(_number())),
+            "groups": ref("Groups"),
+            "limits": ref("ServerLimits"),
         },
-        "fps", "joints", "parents", "offsets", "tasks", "limits", "formats", "skeletons",
-    )  # fmt: skip
+        "fps",
+        "joints",
+        "parents",
+        "offsets",
+        "tasks",
+        "limits",
+        "formats",
+        "skeletons",
+    )
     error = _object({"error": TEXT | {"description": "one sentence"}, "where": TEXT}, "error")
     return {
         "Health": _object({"ok": FLAG, "version": TEXT, "warm": FLAG, "error": TEXT}, "ok", "version", "warm"),

@@ -93,9 +93,13 @@ def draw_together(models: Models, requests: Sequence[Request], progress: Progres
     rows = [(index, number) for index, request in enumerate(requests) for number in range(request.count)]
     frames = text.frames_in(requests[0].options["seconds"], models.prior.fps)
     made = text.sample_features(
-        models.prior, [requests[index].options["prompt"] for index, _ in rows], [frames] * len(rows),
-        seeds=[requests[index].seed + number for index, number in rows], progress=progress, **shared(requests[0]),
-    )  # fmt: skip
+        models.prior,
+        [requests[index].options["prompt"] for index, _ in rows],
+        [frames] * len(rows),
+        seeds=[requests[index].seed + number for index, number in rows],
+        progress=progress,
+        **shared(requests[0]),
+    )
     for (index, number), features in zip(rows, made, strict=True):
         motion = text.finish(models.prior, features)
         yield index, Result(number, (motion,), requests[index].seed + number)
@@ -106,9 +110,15 @@ def _composed(models: Models, request: Request, progress: Progress) -> Iterator[
     assert timeline is not None
     start = None if timeline.start is None else _loaded(timeline.start)
     made = long.compose_takes(
-        models.prior, timeline.segments, count=request.count, seed=request.seed, start=start, path=timeline.path,
-        progress=_moves(progress, request, len(timeline.segments), 0), **shared(request),
-    )  # fmt: skip
+        models.prior,
+        timeline.segments,
+        count=request.count,
+        seed=request.seed,
+        start=start,
+        path=timeline.path,
+        progress=_moves(progress, request, len(timeline.segments), 0),
+        **shared(request),
+    )
     for number, motion in enumerate(made):
         yield Result(number, (motion,), request.seed + number, measured(motion, request.parts))
 
@@ -116,9 +126,14 @@ def _composed(models: Models, request: Request, progress: Progress) -> Iterator[
 def _controlled(models: Models, request: Request, progress: Progress) -> Iterator[Result]:
     assert request.goal is not None
     made = control(
-        models.prior, request.options["prompt"], request.goal, count=request.count, seed=request.seed,
-        progress=progress, **shared(request),
-    )  # fmt: skip
+        models.prior,
+        request.options["prompt"],
+        request.goal,
+        count=request.count,
+        seed=request.seed,
+        progress=progress,
+        **shared(request),
+    )
     for number, one in enumerate(made):
         measures = measured(one.motion, request.parts) | {"missed": list(one.missed)}
         yield Result(number, (one.motion,), request.seed + number, measures)
@@ -130,13 +145,23 @@ def _edited(models: Models, request: Request, progress: Progress) -> Iterator[Re
     given = {name: options[name] for name in ("blend", "strength") if options[name] is not None}
     prompt = options["prompt"] or ""
     changes = changes_asked(
-        prompt, keep=options["keep"], between=options["redraw"], loop=options["loop"],
-        extend=options["extend"] or 0.0, **given,
-    )  # fmt: skip
+        prompt,
+        keep=options["keep"],
+        between=options["redraw"],
+        loop=options["loop"],
+        extend=options["extend"] or 0.0,
+        **given,
+    )
     made = edit(
-        models.prior, people[options["person"]], prompt, changes, count=request.count, seed=request.seed,
-        progress=progress, **shared(request),
-    )  # fmt: skip
+        models.prior,
+        people[options["person"]],
+        prompt,
+        changes,
+        count=request.count,
+        seed=request.seed,
+        progress=progress,
+        **shared(request),
+    )
     for number, motion in enumerate(made):
         all_people = list(people)
         all_people[options["person"]] = motion
@@ -149,9 +174,15 @@ def _predicted(models: Models, request: Request, progress: Progress) -> Iterator
     options = request.options
     given = {"temperature": options["temperature"]} if options["temperature"] is not None else {}
     made = predict(
-        models.predictor, cropped(request.motion.people[options["person"]], options), count=request.count,
-        seconds=options["seconds"], seed=request.seed, progress=progress, **given, **shared(request),
-    )  # fmt: skip
+        models.predictor,
+        cropped(request.motion.people[options["person"]], options),
+        count=request.count,
+        seconds=options["seconds"],
+        seed=request.seed,
+        progress=progress,
+        **given,
+        **shared(request),
+    )
     for number, motion in enumerate(made):
         yield Result(number, (motion,), request.seed)
 
@@ -163,9 +194,15 @@ def _switched(models: Models, request: Request, progress: Progress) -> Iterator[
     if past.skeleton != target.skeleton:
         past, target = to_smpl22(past), to_smpl22(target)
     made = switch(
-        models.predictor, past, target.resample(past.fps), count=request.count, seconds=request.options["seconds"],
-        seed=request.seed, facing=request.options["facing"], **shared(request),
-    )  # fmt: skip
+        models.predictor,
+        past,
+        target.resample(past.fps),
+        count=request.count,
+        seconds=request.options["seconds"],
+        seed=request.seed,
+        facing=request.options["facing"],
+        **shared(request),
+    )
     for number, motion in enumerate(made):
         yield Result(number, (motion,), request.seed)
 
@@ -201,17 +238,28 @@ def _composed_pair(models: Models, request: Request, progress: Progress) -> Iter
         moves = _moves(progress, request, len(timeline.segments), number)
         blocks = list(
             duet.compose_pair(
-                models.prior, models.block, timeline.segments, seed=request.seed + number, path=timeline.path,
-                person=person, progress=moves, **given, **shared(request),
+                models.prior,
+                models.block,
+                timeline.segments,
+                seed=request.seed + number,
+                path=timeline.path,
+                person=person,
+                progress=moves,
+                **given,
+                **shared(request),
             )
-        )  # fmt: skip
+        )
         two = (concatenated(*[one for one, _ in blocks]), concatenated(*[other for _, other in blocks]))
         yield Result(number, two, request.seed + number, measured(two[person], request.parts))
 
 
 _TASKS: dict[str, Callable[[Models, Request, Progress], Iterator[Result]]] = {
-    "control": _controlled, "edit": _edited, "predict": _predicted, "switch": _switched, "duet": _duet,
-}  # fmt: skip
+    "control": _controlled,
+    "edit": _edited,
+    "predict": _predicted,
+    "switch": _switched,
+    "duet": _duet,
+}
 
 
 def _moves(progress: Progress, request: Request, segments: int, number: int) -> Callable[[int], None]:
@@ -252,9 +300,10 @@ def measured(motion: Motion, parts: Iterable[tuple[str, Goal]]) -> dict[str, Any
         away = np.linalg.norm(np.where(goal.asked, positions - goal.positions, 0.0), axis=-1)
         worst = int(away.max(axis=1).argmax())
         found[name] = {
-            "mean_cm": round(100 * float(away[asked].mean()), 2), "worst_cm": round(100 * float(away.max()), 2),
+            "mean_cm": round(100 * float(away[asked].mean()), 2),
+            "worst_cm": round(100 * float(away.max()), 2),
             "worst_at": round(worst / motion.fps, 3),
-        }  # fmt: skip
+        }
     return {"goals": found} if found else {}
 
 

@@ -43,10 +43,11 @@ def as_json(stored: Stored, encode: Any) -> dict[str, Any]:
         uniform = person if person.skeleton == SMPL22 else to_smpl22(person)
         people.append(
             {
-                "positions": encode(uniform.positions()), "rotations": encode(uniform.rotations),
+                "positions": encode(uniform.positions()),
+                "rotations": encode(uniform.rotations),
                 "root": encode(uniform.root),
             }
-        )  # fmt: skip
+        )
     first = stored.people[0]
     about = {"id": stored.id, "fps": first.fps, "frames": len(first), "seconds": round(first.seconds, 4)}
     return about | {"people": people, "about": stored.about}

@@ -66,9 +66,13 @@ class Job:
         with self._lock:
             share = 1.0 if self.state == "done" else self.done / self.of if self.of else 0.0
             return {
-                "id": self.id, "task": self.request.task, "state": self.state, "progress": round(min(share, 1.0), 4),
-                "error": self.error, "results": list(self.results),
-            }  # fmt: skip
+                "id": self.id,
+                "task": self.request.task,
+                "state": self.state,
+                "progress": round(min(share, 1.0), 4),
+                "error": self.error,
+                "results": list(self.results),
+            }
 
     # -- what the worker reports
 

@@ -58,6 +58,17 @@ class Limits:
 
     def public(self) -> dict[str, float]:
         """What `/capabilities` says of them."""
-        names = ("seconds", "total_seconds", "count", "steps", "prompt", "body_bytes", "upload_bytes", "project_bytes",
-                 "queue", "queue_per_client", "people")  # fmt: skip
+        names = (
+            "seconds",
+            "total_seconds",
+            "count",
+            "steps",
+            "prompt",
+            "body_bytes",
+            "upload_bytes",
+            "project_bytes",
+            "queue",
+            "queue_per_client",
+            "people",
+        )
         return {name: value for name, value in asdict(self).items() if name in names}

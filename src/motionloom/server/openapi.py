@@ -88,7 +88,9 @@ def _about_motions() -> dict[str, dict[str, dict[str, Any]]]:
         },
         "/motions/{id}": {
             "get": _operation(
-                "get_motion", "Places, rotations and root, as base64 of little-endian float32", motion,
+                "get_motion",
+                "Places, rotations and root, as base64 of little-endian float32",
+                motion,
                 parameters=(one,),
             )
         },
@@ -102,10 +104,8 @@ def _about_motions() -> dict[str, dict[str, dict[str, Any]]]:
                 "upload_character", "Send a GLB, VRM, glTF or BVH character", body, known, parameters=(required,)
             )
         },
-        "/characters/{id}": {
-            "get": _operation("get_character", "The character's file", file, parameters=(character,))
-        },
-    }  # fmt: skip
+        "/characters/{id}": {"get": _operation("get_character", "The character's file", file, parameters=(character,))},
+    }
 
 
 def _about_the_rest() -> dict[str, dict[str, dict[str, Any]]]:

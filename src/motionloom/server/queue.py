@@ -33,9 +33,10 @@ class Queue:
                 raise Refusal(503, f"{self.limits.clients} clients wait already; try again in a moment", headers=AGAIN)
             if own is not None and len(own) >= self.limits.queue_per_client:
                 raise Refusal(
-                    429, f"{self.limits.queue_per_client} of your jobs wait already; wait for some or cancel them",
+                    429,
+                    f"{self.limits.queue_per_client} of your jobs wait already; wait for some or cancel them",
                     headers=AGAIN,
-                )  # fmt: skip
+                )
             self._waiting.setdefault(job.client, deque()).append(job)
             self._changed.notify()
 

@@ -188,10 +188,15 @@ class Worker:
         motion = result.people[0]
         job.add_result(
             {
-                "id": stored.id, "number": result.number, "seed": result.seed, "seconds": round(motion.seconds, 4),
-                "frames": len(motion), "people": len(result.people), "measures": result.measures,
+                "id": stored.id,
+                "number": result.number,
+                "seed": result.seed,
+                "seconds": round(motion.seconds, 4),
+                "frames": len(motion),
+                "people": len(result.people),
+                "measures": result.measures,
             }
-        )  # fmt: skip
+        )
 
     def _progress(self, jobs: Sequence[Job]) -> Callable[[int, int], None]:
         def progress(done: int, of: int) -> None:

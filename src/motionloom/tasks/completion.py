@@ -72,9 +72,13 @@ def complete(
     made = chosen.temperature * noise(np.empty((len(condition), *predictor.mean.shape), np.float32))
     way = chosen.levels(predictor.schedule)
     walk = sample(
-        guide(net, (condition, yes), (condition, no), chosen.guidance), made,
-        levels=way, solver=SOLVERS[chosen.solver], schedule=predictor.schedule, noise=noise,
-    )  # fmt: skip
+        guide(net, (condition, yes), (condition, no), chosen.guidance),
+        made,
+        levels=way,
+        solver=SOLVERS[chosen.solver],
+        schedule=predictor.schedule,
+        noise=noise,
+    )
     if poses is not None:
         view = View(lambda states: poses(predictor.to_features(states, pose)))
         walk = view.reported(walk, len(way) - 1, range(len(condition)))
@@ -162,10 +166,14 @@ def next_frames(
         return layout.decode(windows[:, h : h + frames], place)
 
     made = complete(
-        predictor, features, masks, features[:, h - 1],
-        seeds=seeds, sampling=PredictionSampling.of(sampling, settings),
+        predictor,
+        features,
+        masks,
+        features[:, h - 1],
+        seeds=seeds,
+        sampling=PredictionSampling.of(sampling, settings),
         poses=lambda windows: placed(windows)[:, None],
-    )  # fmt: skip
+    )
     places = placed(made)
     return with_bones(places, layout.parents, bone_lengths(past, layout.parents)) if exact else places
 
@@ -219,10 +227,14 @@ def futures(
     seeds = [row_seed(seed, i) for _ in range(len(past)) for i in range(count)]
     parts = [
         next_frames(
-            predictor, many[first : first + rows], seeds=seeds[first : first + rows], frames=frames, exact=exact,
+            predictor,
+            many[first : first + rows],
+            seeds=seeds[first : first + rows],
+            frames=frames,
+            exact=exact,
             sampling=chosen,
         )
         for first in range(0, len(many), rows)
-    ]  # fmt: skip
+    ]
     made = np.concatenate(parts)
     return made.reshape(len(past), count, *made.shape[1:])

@@ -92,9 +92,14 @@ def control(
     place = start_of(goal)
     nets = fitting_adapters(prior, goal) if adapters == "fitting" else () if adapters == "none" else adapters
     made = steered_features(
-        prior, [prompt] * chosen.number(), goal.seen_from(place), seeds=chosen.seeds(chosen.number()), adapters=nets,
-        sampling=chosen, progress=progress,
-    )  # fmt: skip
+        prior,
+        [prompt] * chosen.number(),
+        goal.seen_from(place),
+        seeds=chosen.seeds(chosen.number()),
+        adapters=nets,
+        sampling=chosen,
+        progress=progress,
+    )
     sampled = [moved(to_motion(row.astype(np.float64), prior.fps, foot_lock=foot_lock), place) for row in made]
     return [judged(fitting.fit(motion, goal) if fit else motion, motion, goal) for motion in sampled]
 

@@ -101,9 +101,15 @@ def react(
     observed = known_state(prior, net, known, poses, known.shape[1])
     observed.mask[:, 0] = observed.mask[1] = False
     features, sampled = pair_features(
-        prior, net, said * chosen.number(), known.shape[1], seeds=pair_seeds(chosen),
-        edits=PairEdits(stacked([observed] * chosen.number())), sampling=chosen, progress=progress,
-    )  # fmt: skip
+        prior,
+        net,
+        said * chosen.number(),
+        known.shape[1],
+        seeds=pair_seeds(chosen),
+        edits=PairEdits(stacked([observed] * chosen.number())),
+        sampling=chosen,
+        progress=progress,
+    )
     floor, made = _floor(given), []
     at = np.arange(len(given)) / given.fps * FPS
     for numbers, standing in zip(features, sampled.astype(np.float64), strict=True):
@@ -170,13 +176,17 @@ def compose_pair(
     people = [
         solve_stream(
             in_world(
-                prior, _of(pieces[i], i), deque(segment.goal for segment in asked[i]), GroundPose.of_numbers(poses[i]),
+                prior,
+                _of(pieces[i], i),
+                deque(segment.goal for segment in asked[i]),
+                GroundPose.of_numbers(poses[i]),
                 track if i == person else None,
             ),
-            prior.fps, foot_lock=foot_lock,
+            prior.fps,
+            foot_lock=foot_lock,
         )
         for i in (0, 1)
-    ]  # fmt: skip
+    ]
     yield from zip(*people, strict=True)
 
 
@@ -215,9 +225,15 @@ def duet_features(
     both = (chain_rows(prior, one, chosen.guidance, None) for one in segments)
     rows = denoise.rows(zip(*both, strict=True), segments, chosen.seeds(1)[0])
     made = sample_chain(
-        prior, rows, denoise, chosen, features=2 * (WIDTH + PLACE), batch_size=BATCH, progress=progress,
+        prior,
+        rows,
+        denoise,
+        chosen,
+        features=2 * (WIDTH + PLACE),
+        batch_size=BATCH,
+        progress=progress,
         view=ChainView(denoise.kept, denoise.poses),
-    )  # fmt: skip
+    )
     for row, state in made:
         row.before = None  # what a finished row began with is needed no more
         motion, places = _parted(state)
@@ -285,9 +301,14 @@ class _PairDenoiser:
             net = self._net(both_of[0].net, before)
             mask = np.zeros((2, 1 + both_of[0].length, WIDTH), np.bool_)
             guidance = relative_pose_guidance(
-                self.prior, net, bound_together([one.cond for one in both_of]), seeds=person_seeds(seed + number, 0),
-                mask=mask, frozen=[goal is not None and not goal.empty for goal in goals], weight=self.pair_guidance,
-            )  # fmt: skip
+                self.prior,
+                net,
+                bound_together([one.cond for one in both_of]),
+                seeds=person_seeds(seed + number, 0),
+                mask=mask,
+                frozen=[goal is not None and not goal.empty for goal in goals],
+                weight=self.pair_guidance,
+            )
             before = _PairRow(both_of, net, guidance, before)
             yield before
 

@@ -57,7 +57,7 @@ def inpaint_motion(
     rows = Rows([text], [known.shape[1]], [seed])
     [(_, state)] = sample(
         prior, rows, sampling, edits=[bent], observed=observed, progress=progress, view=View(poses, begin=window.begin)
-    )  # fmt: skip
+    )
     made = state[None] * spread + prior.mean
     made = reach(meet(np.where(mask, known, smooth(made) if prior.net.config.patch > 1 else made)))
     contacts = made[0, :, LAYOUT["contacts"]].astype(np.float64)

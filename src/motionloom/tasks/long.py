@@ -187,9 +187,15 @@ def long_features(
         return decoded(np.concatenate(pieces).astype(np.float64), place)[0][None]
 
     made = sample_chain(
-        prior, rows, denoise, chosen, features=len(prior.mean), batch_size=BATCH, progress=progress,
+        prior,
+        rows,
+        denoise,
+        chosen,
+        features=len(prior.mean),
+        batch_size=BATCH,
+        progress=progress,
         view=ChainView(features, poses, each),
-    )  # fmt: skip
+    )
     for row, state in made:
         yield features(row, state)
 

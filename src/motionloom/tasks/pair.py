@@ -119,9 +119,14 @@ def pair_features(
 
     def edit(denoise: Denoiser, batch: Batch) -> Denoiser:
         guided = relative_pose_guidance(
-            prior, net, net.bind(batch.cond), seeds=batch.seeds, mask=mask[batch.rows],
-            frozen=[frozen[i] for i in batch.rows], weight=chosen.pair_guidance,
-        )  # fmt: skip
+            prior,
+            net,
+            net.bind(batch.cond),
+            seeds=batch.seeds,
+            mask=mask[batch.rows],
+            frozen=[frozen[i] for i in batch.rows],
+            weight=chosen.pair_guidance,
+        )
         return lambda state, level: guided(state, corrected(denoise(state, level), batch.rows, level), level)
 
     silent = not any(prompt.strip() for prompt in prompts)
@@ -129,7 +134,7 @@ def pair_features(
     asked = Rows(prompts, [1 + frames] * rows, seeds, pair_noise)
     walk = sample(
         prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress, view=_view(prior, net)
-    )  # fmt: skip
+    )
     made = dict(walk)
     state = np.stack([made[row] for row in range(rows)])
     if prior.net.config.patch > 1:
@@ -243,9 +248,15 @@ def generate_pair(
         change[person] = toward(goal.seen_from(place), prior)
     count = chosen.number()
     features, poses = pair_features(
-        prior, block.net(prior), said * count, frames, seeds=pair_seeds(chosen),
-        edits=PairEdits(corrections=change * count), sampling=chosen, progress=progress,
-    )  # fmt: skip
+        prior,
+        block.net(prior),
+        said * count,
+        frames,
+        seeds=pair_seeds(chosen),
+        edits=PairEdits(corrections=change * count),
+        sampling=chosen,
+        progress=progress,
+    )
     made = []
     for numbers, beside in zip(features, poses.astype(np.float64), strict=True):
         if goal:

@@ -119,9 +119,11 @@ def predict_pieces(
     total = max(round(seconds * past.fps), 1)
     parts = given(predictor, seen, hold, seconds) if hold else None
     windows = WindowSampler(predictor, chosen, root).windows(
-        seen.person[None], [(chosen.seeds(1)[0], number)], parts and parts.known,
+        seen.person[None],
+        [(chosen.seeds(1)[0], number)],
+        parts and parts.known,
         windows_for(predictor, total / past.fps),
-    )  # fmt: skip
+    )
     yield from chain([past], _on_past(seen, (window[0] for window in windows), total, hold=parts, foot_lock=foot_lock))
 
 

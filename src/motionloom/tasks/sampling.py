@@ -300,9 +300,14 @@ def sample(
         for edit in edits:
             denoise = edit(denoise, batch)
         walk = denoising(
-            denoise, state, levels=way, solver=SOLVERS[sampling.solver], schedule=prior.schedule, noise=noise,
+            denoise,
+            state,
+            levels=way,
+            solver=SOLVERS[sampling.solver],
+            schedule=prior.schedule,
+            noise=noise,
             constrain=constrain,
-        )  # fmt: skip
+        )
         for snapshot in view.reported(walk, len(way) - 1, numbers) if view else walk:
             state, done = snapshot.clean if halfway else snapshot.state, done + 1
             if progress:
@@ -383,8 +388,14 @@ def sample_chain(
         return denoised
 
     made = staggered(
-        links(), reported, levels=way, solver=SOLVERS[sampling.solver], schedule=prior.schedule, features=features,
-        batch_size=sampling.batch(batch_size), moved=progress or (lambda count: None),
-    )  # fmt: skip
+        links(),
+        reported,
+        levels=way,
+        solver=SOLVERS[sampling.solver],
+        schedule=prior.schedule,
+        features=features,
+        batch_size=sampling.batch(batch_size),
+        moved=progress or (lambda count: None),
+    )
     for number, state in enumerate(made):
         yield waiting.pop(number), state

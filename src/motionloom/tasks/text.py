@@ -123,9 +123,15 @@ def generate(
         MotionloomError: for what cannot be asked.
     """
     made = generate_each(
-        prior, prompts, seconds=seconds, foot_lock=foot_lock, best_of=best_of, sampling=sampling,
-        progress=progress, **settings,
-    )  # fmt: skip
+        prior,
+        prompts,
+        seconds=seconds,
+        foot_lock=foot_lock,
+        best_of=best_of,
+        sampling=sampling,
+        progress=progress,
+        **settings,
+    )
     return [motion for _, motion in sorted(made, key=lambda numbered: numbered[0])]
 
 

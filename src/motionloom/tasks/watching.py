@@ -137,9 +137,11 @@ class Latest(Generic[R]):
             if own and own[0] == motion * (self.each or 0):
                 parts = [self.parts[number] for number in own]
                 report(
-                    min(self.calls[number] for number in own), self.steps, [motion],
+                    min(self.calls[number] for number in own),
+                    self.steps,
+                    [motion],
                     lambda parts=parts: self.view.poses(parts)[None],
-                )  # fmt: skip
+                )
 
     def _motion(self, number: int) -> int:
         return number // self.each if self.each else 0

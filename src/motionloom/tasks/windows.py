@@ -88,9 +88,13 @@ class WindowSampler:
     ) -> Array:
         """(rows, frames, 22, 3): window ``number`` behind ``person`` (rows, h, 22, 3)."""
         made = next_frames(
-            self.predictor, person, seeds=[row_seed(*seed, number) for seed in seeds], known=known, frames=frames,
+            self.predictor,
+            person,
+            seeds=[row_seed(*seed, number) for seed in seeds],
+            known=known,
+            frames=frames,
             sampling=replace(self.sampling, temperature=min(self.sampling.temperature * livelier, 2.0)),
-        )  # fmt: skip
+        )
         made = made + _lift(person, made, self.predictor.fps)[..., None, None] * [0, 1, 0]
         return made if self.root else made + (person[:, -1:, :1] - made[:, :, :1]) * [1, 0, 1]
 

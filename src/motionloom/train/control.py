@@ -138,9 +138,14 @@ def train_control(
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
     words = WordBank(text, motions.texts, progress=say if world.rank == 0 else lambda line: None)
     objective = ControlledError(
-        net, prior.schedule, batches, words,
-        drop_text=recipe.drop_text, displacement=recipe.displacement, device=world.device,
-    )  # fmt: skip
+        net,
+        prior.schedule,
+        batches,
+        words,
+        drop_text=recipe.drop_text,
+        displacement=recipe.displacement,
+        device=world.device,
+    )
     objective.control, objective.early = recipe.control, recipe.spacing == "early"
     held, place = held_out(data, prior, recipe), folder / f"{recipe.name}.safetensors"
     say(f"{sum(p.numel() for p in net.parameters()):,} trained parameters, {len(motions.items):,} described stretches")
@@ -201,9 +206,16 @@ def _notes(recipe: Recipe, motions: MotionSet, step: int) -> dict:
 def _adapter(recipe: Recipe, prior: Prior, motions: MotionSet, weights: dict[str, Tensor], step: int) -> Adapter:
     licences = "; ".join(motions.licences)
     return Adapter(
-        recipe.name, recipe.control, recipe.rank, tensors_of(weights), prior.card.name, fingerprint(prior.net),
-        recipe.licence or licences, licences, _notes(recipe, motions, step),
-    )  # fmt: skip
+        recipe.name,
+        recipe.control,
+        recipe.rank,
+        tensors_of(weights),
+        prior.card.name,
+        fingerprint(prior.net),
+        recipe.licence or licences,
+        licences,
+        _notes(recipe, motions, step),
+    )
 
 
 def _full(recipe: Recipe, prior: Prior, motions: MotionSet, weights: dict[str, Tensor], step: int) -> Prior:

@@ -28,9 +28,11 @@ def known_table(motions: MotionSet, encoder: TextEncoder) -> Known:
     listed = sorted(seconds, key=lambda group: (group in WRITTEN, -seconds[group], group))
     numbers = dict.fromkeys(number for group in listed for number in texts[group])
     return known_sentences(
-        [motions.texts[number] for number in numbers], {WRITTEN.get(g, g): seconds[g] for g in listed}, encoder,
+        [motions.texts[number] for number in numbers],
+        {WRITTEN.get(g, g): seconds[g] for g in listed},
+        encoder,
         first=[motions.texts[next(iter(texts[group]))] for group in listed if texts[group]],
-    )  # fmt: skip
+    )
 
 
 def _covered(spans: list[tuple[int, int]]) -> int:

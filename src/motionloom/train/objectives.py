@@ -93,10 +93,19 @@ class CleanError:
     """
 
     def __init__(
-        self, net: nn.Module, schedule: Schedule, batches: Batches, words: WordBank, *, drop_text: float = 0.1,
-        weights: dict[str, float] = WEIGHTS, displacement: float = 0.0, early: float = 0.0, heights: float = 1.0,
+        self,
+        net: nn.Module,
+        schedule: Schedule,
+        batches: Batches,
+        words: WordBank,
+        *,
+        drop_text: float = 0.1,
+        weights: dict[str, float] = WEIGHTS,
+        displacement: float = 0.0,
+        early: float = 0.0,
+        heights: float = 1.0,
         device: str = "cpu",
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.net, self.schedule, self.batches, self.words = net, schedule, batches, words
         self.drop_text, self.displacement, self.early_share, self.device = drop_text, displacement, early, device
         self.mean, self.std = batches.data.mean.to(device), batches.data.std.to(device)

@@ -337,9 +337,16 @@ class _Export:
     """Writes the weights at every save, and those that do best on the held-out pairs under the run's name."""
 
     def __init__(
-        self, recipe: Recipe, prior: Prior, config: PairConfig, held: Held | None, pairs: Sequence[Pair], *,
-        folder: Path, say: Callable[[str], None],
-    ) -> None:  # fmt: skip
+        self,
+        recipe: Recipe,
+        prior: Prior,
+        config: PairConfig,
+        held: Held | None,
+        pairs: Sequence[Pair],
+        *,
+        folder: Path,
+        say: Callable[[str], None],
+    ) -> None:
         self.recipe, self.prior, self.config, self.held, self.say = recipe, prior, config, held, say
         self.place, self.last = folder / f"{recipe.name}.safetensors", folder / "last.safetensors"
         self.licences = "; ".join(sorted({pair.licence for pair in pairs}))
@@ -369,9 +376,16 @@ class _Export:
         weights = weights or arrays(Talk(self.config, self.prior.net.config))
         notes = {"steps": step, "batch": recipe.batch, "seed": recipe.seed, "pairs": self.names}
         return PairBlock(
-            recipe.name, self.config, weights, self.prior.card.name, self.digest,
-            recipe.licence or self.licences, self.licences, notes, pair_graph(self.config, self.prior.net.config),
-        )  # fmt: skip
+            recipe.name,
+            self.config,
+            weights,
+            self.prior.card.name,
+            self.digest,
+            recipe.licence or self.licences,
+            self.licences,
+            notes,
+            pair_graph(self.config, self.prior.net.config),
+        )
 
 
 def _loss_of(block: PairBlock) -> float:

@@ -231,9 +231,18 @@ def new_predictor(protocol: Protocol, settings: Settings, windows: Windows, *, s
     pose = np.stack([drawn.pose.mean(0), drawn.pose.std(0, ddof=1).clip(min=1e-3)])
     plain = np.zeros((kept, layout.channels), np.float32)
     predictor = Predictor(
-        predictor_session(TransLinear(config)), SCHEDULES[schedule](levels), layout, basis, protocol.observed,
-        protocol.fps, settings.variant, plain, np.ones_like(plain), pose, Card("predictor"),
-    )  # fmt: skip
+        predictor_session(TransLinear(config)),
+        SCHEDULES[schedule](levels),
+        layout,
+        basis,
+        protocol.observed,
+        protocol.fps,
+        settings.variant,
+        plain,
+        np.ones_like(plain),
+        pose,
+        Card("predictor"),
+    )
     if settings.variant == "published":
         return predictor
     state = predictor.to_state(drawn.features, drawn.pose)

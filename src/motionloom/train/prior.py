@@ -59,12 +59,20 @@ def train_prior(
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
     words = WordBank(text, motions.texts, progress=say if world.rank == 0 else lambda line: None)
     objective = CleanError(
-        net, schedule, batches, words,
-        drop_text=recipe.drop_text, displacement=recipe.displacement, early=recipe.early,
-        heights=recipe.heights, device=world.device,
-    )  # fmt: skip
-    say(f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(motions.items):,} described stretches, "
-        f"{len(motions.texts):,} sentences, {motions.minutes:.0f} minutes recorded")  # fmt: skip
+        net,
+        schedule,
+        batches,
+        words,
+        drop_text=recipe.drop_text,
+        displacement=recipe.displacement,
+        early=recipe.early,
+        heights=recipe.heights,
+        device=world.device,
+    )
+    say(
+        f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(motions.items):,} described stretches, "
+        f"{len(motions.texts):,} sentences, {motions.minutes:.0f} minutes recorded"
+    )
     for line in changed(folder, recipe) if world.rank == 0 else ():
         say(f"going on with another recipe than before: {line}")
     place, known = folder / f"{recipe.name}.safetensors", known_table(motions, text)

@@ -124,7 +124,7 @@ def teach(
     say(f"drawing {len(kept)} motions that are known already")
     drawn = sample_features(
         prior, kept, [DRAWN_FRAMES] * len(kept), seeds=[lesson.seed + i for i in range(len(kept))], steps=DRAWN_STEPS
-    )  # fmt: skip
+    )
     torch.manual_seed(lesson.seed)
     net = AdapterNet(prior_module(prior), lesson.rank, given_rank=0, taught=True)
     amp = lesson.amp
@@ -134,14 +134,21 @@ def teach(
     known = list(zip(kept, drawn, strict=True))
     objective = Teaching(net, prior, examples, known, others, keep=lesson.keep, device=device)
     recipe = Recipe(
-        name=lesson.name, steps=lesson.steps, batch=lesson.batch, rate=lesson.rate, seed=lesson.seed, warmup=40,
-        cooldown=0.5, ema=0.99, decay=0.0, save_every=lesson.steps, amp=amp,
-    )  # fmt: skip
+        name=lesson.name,
+        steps=lesson.steps,
+        batch=lesson.batch,
+        rate=lesson.rate,
+        seed=lesson.seed,
+        warmup=40,
+        cooldown=0.5,
+        ema=0.99,
+        decay=0.0,
+        save_every=lesson.steps,
+        amp=amp,
+    )
     with TemporaryDirectory(prefix="motionloom-teach-") as folder:
         progress = _progress(lesson, say)
-        average = train(
-            objective, recipe, folder, world=World(device=device), wrap=_wrap, on_step=progress, say=say
-        )  # fmt: skip
+        average = train(objective, recipe, folder, world=World(device=device), wrap=_wrap, on_step=progress, say=say)
     return _adapter(prior, examples, captions, replace(lesson, amp=amp), average)
 
 
@@ -318,9 +325,16 @@ def _adapter(
     recorded = [e for e in examples if not e.name.startswith("M")]
     seconds = sum(e.shown[1] - e.shown[0] for e in recorded if not e.looped) / FPS
     notes = {
-        "captions": captions[:64], "clips": len(recorded), "seconds": round(seconds, 1), "steps": lesson.steps,
-        "batch": lesson.batch, "rate": lesson.rate, "keep": lesson.keep, "seed": lesson.seed, "amp": lesson.amp,
-    }  # fmt: skip
+        "captions": captions[:64],
+        "clips": len(recorded),
+        "seconds": round(seconds, 1),
+        "steps": lesson.steps,
+        "batch": lesson.batch,
+        "rate": lesson.rate,
+        "keep": lesson.keep,
+        "seed": lesson.seed,
+        "amp": lesson.amp,
+    }
     licence = lesson.licence or f"as the owner of the clips allows, and as the prior's: {prior.card.licence}"
     data = f"{len(recorded)} clips of the user's own: {'; '.join(captions)[:500]}"
     tensors = tensors_of({key: value.cpu() for key, value in average.weights.items()})

@@ -31,9 +31,17 @@ from motionloom.viz.film import (
 from motionloom.viz.scene import Actor, Shot, Stage, azimuth_of, extent, follow, needed_span
 
 PALETTE: tuple[Colour, ...] = (
-    (0, 114, 178), (230, 159, 0), (0, 158, 115), (213, 94, 0), (204, 121, 167),
-    (86, 180, 233), (105, 20, 245), (175, 25, 45), (175, 215, 135), (115, 115, 255),
-)  # fmt: skip
+    (0, 114, 178),
+    (230, 159, 0),
+    (0, 158, 115),
+    (213, 94, 0),
+    (204, 121, 167),
+    (86, 180, 233),
+    (105, 20, 245),
+    (175, 25, 45),
+    (175, 215, 135),
+    (115, 115, 255),
+)
 """The first six are Okabe and Ito's (2008), which people of every colour vision can tell apart."""
 PAST: Colour = (98, 105, 120)
 TRUTH: Colour = (40, 46, 58)

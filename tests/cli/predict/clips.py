@@ -28,9 +28,18 @@ def tiny_predictor() -> Predictor:
     zeros = torch.zeros(KEPT, 66)
     pose = torch.stack([torch.zeros(66), torch.ones(66)])
     return Predictor(
-        net.requires_grad_(False), linear(100), SMPL_LAYOUT, Dct(FRAMES, KEPT), OBSERVED, FPS, "masked",
-        zeros, zeros + 0.01, pose, Card("tiny"),
-    )  # fmt: skip
+        net.requires_grad_(False),
+        linear(100),
+        SMPL_LAYOUT,
+        Dct(FRAMES, KEPT),
+        OBSERVED,
+        FPS,
+        "masked",
+        zeros,
+        zeros + 0.01,
+        pose,
+        Card("tiny"),
+    )
 
 
 def larger() -> Skeleton:

@@ -28,8 +28,9 @@ def test_a_long_horizon_is_written_while_it_is_made(weights, asked, drawn, capsy
     assert (len(past), [len(one) for one in several], caption) == (30, [300, 300], "past")
     np.testing.assert_allclose(several[1].root[0] - past.root[-1], [0, 0, 2 / 30], atol=1e-5)
     assert capsys.readouterr().out.splitlines()[:2] == [
-        "wrote futures/future_00.bvh: 41.00 s", "wrote futures/future_01.bvh: 41.00 s",
-    ]  # fmt: skip
+        "wrote futures/future_00.bvh: 41.00 s",
+        "wrote futures/future_01.bvh: 41.00 s",
+    ]
 
 
 def test_pictures_of_a_long_past_show_its_end(weights, asked, drawn):

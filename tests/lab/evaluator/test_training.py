@@ -58,9 +58,15 @@ def batch_of(texts: list[int], groups: list[int], takes: list[int]) -> PairBatch
     none = torch.zeros(0, dtype=torch.long)
     rows = len(texts)
     return PairBatch(
-        torch.zeros(rows, 4, WIDTH), torch.full((rows,), 4), torch.tensor(texts), rows, none, none,
-        torch.tensor(groups), torch.tensor(takes),
-    )  # fmt: skip
+        torch.zeros(rows, 4, WIDTH),
+        torch.full((rows,), 4),
+        torch.tensor(texts),
+        rows,
+        none,
+        none,
+        torch.tensor(groups),
+        torch.tensor(takes),
+    )
 
 
 def test_the_same_action_in_other_words_is_no_negative() -> None:

@@ -61,9 +61,17 @@ def test_the_head_is_as_high_as_the_person_is_tall_whoever_was_recorded() -> Non
 
 def test_a_folded_person_has_a_low_head_and_a_pelvis_that_nobody_has() -> None:
     """Beside percentiles of people who walk, the pose that early weights drew."""
-    reach = {name: (low, low, 0.0, high, high) for name, (low, high) in
-             {"pelvis": (0, 35), "spine": (0, 40), "neck": (0, 60), "knees": (-5, 150), "elbows": (0, 150),
-              "head": (140, 160)}.items()}  # fmt: skip
+    reach = {
+        name: (low, low, 0.0, high, high)
+        for name, (low, high) in {
+            "pelvis": (0, 35),
+            "spine": (0, 40),
+            "neck": (0, 60),
+            "knees": (-5, 150),
+            "elbows": (0, 150),
+            "head": (140, 160),
+        }.items()
+    }
     found = suite.judge([np.repeat(DRAWN, 40, axis=0)], reach)["numbers"]
     assert not any(found[name]["passes"] for name in ("pelvis", "head", "whole"))
     assert found["pelvis"]["outside"] == 1.0

@@ -144,9 +144,10 @@ PEOPLE = {
     "walk, then sit": after(walking(1.0, 3), lowered(0.45 * ramp(1, 2, 4), 0.35 * ramp(1, 2, 4))),
     "stand up and walk": after(SEATED[::-1][:80], walking(1.0, 3)),
     "back, then forward": after(walking(1.0, 3.0)[::-1], walking(1.0, 3)),
-    "right, then left arm": np.concatenate([arm_up("right", ramp(0.5, 1, 3) - ramp(2, 2.5, 3)),
-                                            arm_up("left", ramp(0.5, 1, 3) - ramp(2, 2.5, 3))]),
-}  # fmt: skip
+    "right, then left arm": np.concatenate(
+        [arm_up("right", ramp(0.5, 1, 3) - ramp(2, 2.5, 3)), arm_up("left", ramp(0.5, 1, 3) - ramp(2, 2.5, 3))]
+    ),
+}
 """Who does what: by the name of the check that the person must pass."""
 BOTH_RIGHT = {
     "walk and stop": {"start walking"},

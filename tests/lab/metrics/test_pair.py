@@ -241,10 +241,15 @@ def quarters() -> np.ndarray:
 def test_the_numbers_of_a_duet_are_means_over_its_frames_and_people():
     found, far = mp.pair_stats(quarters()), mp.hand_distance(quarters())[40:]
     expected = {
-        "distance": 1.5, "distance_range": 0.5, "facing": np.pi - np.radians(56.25),
-        "looking_away": np.radians(56.25) / 2, "mutual": 0.5, "hand_contact": 0.5, "touch": 0.25,
+        "distance": 1.5,
+        "distance_range": 0.5,
+        "facing": np.pi - np.radians(56.25),
+        "looking_away": np.radians(56.25) / 2,
+        "mutual": 0.5,
+        "hand_contact": 0.5,
+        "touch": 0.25,
         "hand_distance": (0.05 + 0.2) / 4 + far.mean() / 2,
-    }  # fmt: skip
+    }
     assert {name: getattr(found, name) for name in expected} == pytest.approx(expected, abs=1e-9)
 
 

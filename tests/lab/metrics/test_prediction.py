@@ -30,12 +30,15 @@ def naive(samples: np.ndarray, truth: np.ndarray, futures: np.ndarray) -> dict[s
     ranked = sorted(ades(truth))
     half = len(ranked) // 2
     return {
-        "apd": apd(samples), "ade": ranked[0], "fde": fde(truth), "ade_worst": ranked[-1],
+        "apd": apd(samples),
+        "ade": ranked[0],
+        "fde": fde(truth),
+        "ade_worst": ranked[-1],
         "ade_median": ranked[half] if len(ranked) % 2 else (ranked[half - 1] + ranked[half]) / 2,
         "mmade": sum(min(ades(y)) for y in futures) / len(futures),
         "mmfde": sum(fde(y) for y in futures) / len(futures),
         "apde": abs(apd(samples) - apd(futures)) if len(futures) > 1 else None,
-    }  # fmt: skip
+    }
 
 
 @settings(max_examples=30, deadline=None)
@@ -45,10 +48,15 @@ def test_distances_are_the_written_out_ones(size: tuple[int, ...]) -> None:
     samples, truth, futures, _ = drawn(*size)
     scores = pr.score_window(samples, truth, futures, fps=30)
     single = {
-        "apd": pr.apd(samples), "ade": pr.ade(samples, truth), "fde": pr.fde(samples, truth),
-        "ade_worst": pr.ade_worst(samples, truth), "ade_median": pr.ade_median(samples, truth),
-        "mmade": pr.mmade(samples, futures), "mmfde": pr.mmfde(samples, futures), "apde": pr.apde(samples, futures),
-    }  # fmt: skip
+        "apd": pr.apd(samples),
+        "ade": pr.ade(samples, truth),
+        "fde": pr.fde(samples, truth),
+        "ade_worst": pr.ade_worst(samples, truth),
+        "ade_median": pr.ade_median(samples, truth),
+        "mmade": pr.mmade(samples, futures),
+        "mmfde": pr.mmfde(samples, futures),
+        "apde": pr.apde(samples, futures),
+    }
     for name, value in naive(samples, truth, futures).items():
         assert single[name] == pytest.approx(value, abs=1e-9), name
         assert getattr(scores, name) == pytest.approx(value, abs=1e-9), name
@@ -149,8 +157,12 @@ def test_chunks_do_not_change_the_answer_and_single_precision_hardly(monkeypatch
     whole = pr.score_window(samples, truth, futures, fps=30, past=past, limbs=SMALL)
     assert all((a == b).all() for a, b in zip(kept, (samples, truth, futures, past)))
     monkeypatch.setattr(pr, "_CELLS", 20)
-    assert_same(whole, pr.score_window(*(x.astype(float) for x in (samples, truth, futures)), fps=30,
-                                       past=past.astype(float), limbs=SMALL))  # fmt: skip
+    assert_same(
+        whole,
+        pr.score_window(
+            *(x.astype(float) for x in (samples, truth, futures)), fps=30, past=past.astype(float), limbs=SMALL
+        ),
+    )
 
 
 def test_similar_windows_of_six_thousand_poses_take_little_memory() -> None:
@@ -196,8 +208,16 @@ def test_windows_of_one_future_count_as_the_option_says(singles: pr.Singles, all
     assert (tally.windows, tally.single) == (3, 1)
     assert list(found) == [m.name for m in pr.METRICS]
     assert found == pr.averages(scores, singles)
-    for name, n in {"ade": all_of, "apd": all_of, "jerk": all_of, "mae": all_of, "mmade": multimodal,
-                    "mmfde": multimodal, "apde": 2, "seam_velocity": 2}.items():  # fmt: skip
+    for name, n in {
+        "ade": all_of,
+        "apd": all_of,
+        "jerk": all_of,
+        "mae": all_of,
+        "mmade": multimodal,
+        "mmfde": multimodal,
+        "apde": 2,
+        "seam_velocity": 2,
+    }.items():
         told = [getattr(s, name) for s in scores[3 - n :]]
         assert found[name] == (pytest.approx(np.mean(told)), n), name
     assert tally.cmd.counts == {"walk": all_of}

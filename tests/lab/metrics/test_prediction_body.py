@@ -24,12 +24,14 @@ def test_limbs_are_measured_as_written_out(size: tuple[int, ...]) -> None:
             real = sum(pose_distance(p[a], p[b]) for p in truth) / len(truth)
             long = [pose_distance(p[a], p[b]) for p in sample]
             steps = [abs(y - x) for x, y in pairwise(long)]
-            shares.append([
-                abs(sum(long) / len(long) - real) / real,
-                math.sqrt(sum((x - real) ** 2 for x in long) / len(long)) / real,
-                sum(steps) / len(steps) / real,
-                math.sqrt(sum(x * x for x in steps) / len(steps)) / real,
-            ])  # fmt: skip
+            shares.append(
+                [
+                    abs(sum(long) / len(long) - real) / real,
+                    math.sqrt(sum((x - real) ** 2 for x in long) / len(long)) / real,
+                    sum(steps) / len(steps) / real,
+                    math.sqrt(sum(x * x for x in steps) / len(steps)) / real,
+                ]
+            )
         off = [abs(bend(p, i, j) - bend(q, i, j)) for p, q in zip(sample, truth) for i, j in ((0, 1), (0, 2))]
         errors.append(sum(off) / len(off))
     assert pr.stretch(samples, truth, SMALL) == pytest.approx(100 * np.mean(shares, axis=0))
@@ -47,13 +49,17 @@ def bend(pose: np.ndarray, i: int, j: int) -> float:
 def test_jerk_speeds_and_seams_are_the_written_out_ones(size: tuple[int, ...], fps: float) -> None:
     """Differences by their coefficients; a seam takes the largest that has frames on both sides."""
     samples, _, _, past = drawn(*size)
-    third = [[np.linalg.norm(s[f + 3] - 3 * s[f + 2] + 3 * s[f + 1] - s[f], axis=-1) for f in range(len(s) - 3)]
-             for s in samples]  # fmt: skip
+    third = [
+        [np.linalg.norm(s[f + 3] - 3 * s[f + 2] + 3 * s[f + 1] - s[f], axis=-1) for f in range(len(s) - 3)]
+        for s in samples
+    ]
     jerk = pr.jerk(samples, fps)
     assert jerk.mean == pytest.approx(fps**3 * np.mean(third))
     assert jerk.peak == pytest.approx(fps**3 * np.mean([np.max(t) for t in third]))
-    steps = [np.mean([pose_distance(s[f + 1, j], s[f, j]) for s in samples for j in range(s.shape[1])])
-             for f in range(samples.shape[1] - 1)]  # fmt: skip
+    steps = [
+        np.mean([pose_distance(s[f + 1, j], s[f, j]) for s in samples for j in range(s.shape[1])])
+        for f in range(samples.shape[1] - 1)
+    ]
     assert pr.speeds(samples) == pytest.approx(steps)
     each = []
     for s in samples:
@@ -61,8 +67,9 @@ def test_jerk_speeds_and_seams_are_the_written_out_ones(size: tuple[int, ...], f
         velocity = np.max([np.linalg.norm(v, axis=-1) for v in (x - 2 * c + b, y - 2 * x + c)], axis=0)
         jolts = (x - 3 * c + 3 * b - a, y - 3 * x + 3 * c - b)
         acceleration = np.max([np.linalg.norm(v, axis=-1) for v in jolts], axis=0)
-        each.append([velocity.mean() * fps, velocity.max() * fps,
-                     acceleration.mean() * fps**2, acceleration.max() * fps**2])  # fmt: skip
+        each.append(
+            [velocity.mean() * fps, velocity.max() * fps, acceleration.mean() * fps**2, acceleration.max() * fps**2]
+        )
     assert pr.seam(np.concatenate([past[:1], past]), samples, fps) == pytest.approx(np.mean(each, axis=0))
 
 

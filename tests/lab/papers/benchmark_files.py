@@ -31,8 +31,9 @@ def humaneva(folder: Path, **changes: dict[str, np.ndarray]) -> Path:
     chunks = {"Walking 1 chunk0": 80, "Walking 1 chunk2": 80, "Walking 1 chunk4": 80, "Box 1 chunk0": 75, "Jog 2": 74}
     table = {
         f"{part}/S{n}": {name: person(frames, 15) for name, frames in chunks.items()}
-        for part in ("Train", "Validate") for n in (1, 2, 3)
-    }  # fmt: skip
+        for part in ("Train", "Validate")
+        for n in (1, 2, 3)
+    }
     return write(folder / "data_3d_humaneva15.npz", table | changes | {"Unlabeled/S4": {"x": person(90, 15)}})
 
 
@@ -49,8 +50,15 @@ def z_up(frames: int) -> np.ndarray:
 
 def amass_folder(root: Path) -> Path:
     """Places of several data sets, old and new names, as .npy at 60 Hz."""
-    frames = {"CMU/01/a_poses": 200, "SFU/x/b_poses": 160, "SSM_synced/p/c_poses": 421, "DanceDB/q/d_poses": 420,
-              "GRAB/s1/lift_poses": 301, "GRAB/s2/lift_poses": 540, "Unknown/z/e": 900}  # fmt: skip
+    frames = {
+        "CMU/01/a_poses": 200,
+        "SFU/x/b_poses": 160,
+        "SSM_synced/p/c_poses": 421,
+        "DanceDB/q/d_poses": 420,
+        "GRAB/s1/lift_poses": 301,
+        "GRAB/s2/lift_poses": 540,
+        "Unknown/z/e": 900,
+    }
     for name, count in frames.items():
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         np.save(root / f"{name}.npy", z_up(count))

@@ -19,12 +19,18 @@ def test_amass_windows_and_data_sets(tmp_path: Path) -> None:
     """By hand: from 150 on every 120, so 421 frames give 150 and 270, 420 only 150, 301 one, 540 three."""
     read = read_amass(amass_folder(tmp_path))
     assert starts(read) == {
-        "SSM/p/c_poses": [150, 270], "DanceDB/q/d_poses": [150], "GRAB/s1/lift_poses": [150],
+        "SSM/p/c_poses": [150, 270],
+        "DanceDB/q/d_poses": [150],
+        "GRAB/s1/lift_poses": [150],
         "GRAB/s2/lift_poses": [150, 270],
-    }  # fmt: skip
+    }
     assert {r.action: r.split for r in read.recordings} == {
-        "CMU": "train", "SFU": "val", "SSM": "test", "DanceDB": "test", "GRAB": "test",
-    }  # fmt: skip
+        "CMU": "train",
+        "SFU": "val",
+        "SSM": "test",
+        "DanceDB": "test",
+        "GRAB": "test",
+    }
     assert (read.fps, read.observed, read.future, read.threshold, read.layout.channels) == (60.0, 30, 120, 0.4, 63)
     assert UNIFORM not in read.licence
     assert set(read.speeds) == set(AMASS_SETS["test"]) == set(AMASS_SPEEDS)
@@ -35,9 +41,17 @@ def test_amass_data_sets_are_disjoint_and_known_by_their_old_names() -> None:
     """No data set is in two splits, and the archive's first names are the same ones."""
     every = [name for names in AMASS_SETS.values() for name in names]
     assert len(set(every)) == len(every) == 22
-    old = {"BioMotionLab_NTroje": "BMLrub", "MPI_Limits": "PosePrior", "TCD_handMocap": "TCDHands", "MPI_mosh": "MoSh",
-           "MPI_HDM05": "HDM05", "Eyes_Japan_Dataset": "EyesJapanDataset", "DFaust_67": "DFaust",
-           "SSM_synced": "SSM", "Transitions_mocap": "Transitions"}  # fmt: skip
+    old = {
+        "BioMotionLab_NTroje": "BMLrub",
+        "MPI_Limits": "PosePrior",
+        "TCD_handMocap": "TCDHands",
+        "MPI_mosh": "MoSh",
+        "MPI_HDM05": "HDM05",
+        "Eyes_Japan_Dataset": "EyesJapanDataset",
+        "DFaust_67": "DFaust",
+        "SSM_synced": "SSM",
+        "Transitions_mocap": "Transitions",
+    }
     assert {name: set_name(name) for name in old} == old
     assert set_name("WEIZMANN") is None
 
@@ -96,14 +110,23 @@ def test_broken_recordings_are_reported_and_left_out(tmp_path: Path) -> None:
 def test_a_published_list_names_the_windows(tmp_path: Path) -> None:
     """pred_init is the first predicted frame; recordings of one name take the rows they are long enough for."""
     folder = amass_folder(tmp_path / "data")
-    rows = ["dataset,file,file_idx,pred_init,pred_end", "SSM,c_poses,4,300,419", "GRAB,lift_poses,0,180,299",
-            "GRAB,lift_poses,7,180,299", "GRAB,lift_poses,7,300,419", "SSM,gone_poses,5,180,299"]  # fmt: skip
+    rows = [
+        "dataset,file,file_idx,pred_init,pred_end",
+        "SSM,c_poses,4,300,419",
+        "GRAB,lift_poses,0,180,299",
+        "GRAB,lift_poses,7,180,299",
+        "GRAB,lift_poses,7,300,419",
+        "SSM,gone_poses,5,180,299",
+    ]
     (tmp_path / "list.csv").write_text("\n".join(rows))
     told: list[str] = []
     read = read_amass(folder, segments=tmp_path / "list.csv", say=told.append)
     assert read.listed == (
-        ("SSM/p/c_poses", 270), ("GRAB/s1/lift_poses", 150), ("GRAB/s2/lift_poses", 150), ("GRAB/s2/lift_poses", 270),
-    )  # fmt: skip
+        ("SSM/p/c_poses", 270),
+        ("GRAB/s1/lift_poses", 150),
+        ("GRAB/s2/lift_poses", 150),
+        ("GRAB/s2/lift_poses", 270),
+    )
     assert [(r.name, s) for r, s in read.windows()] == list(read.listed)
     assert any("1 of the 5 windows of list.csv are not there" in line for line in told)
 
@@ -123,10 +146,15 @@ def test_a_list_of_ones_own_names_files_and_first_frames(tmp_path: Path) -> None
     [
         ("a.csv", "dataset,file,pred_init\nSSM,c_poses,20\n"),  # begins at -10
         ("b.csv", "dataset,file,file_idx,pred_init,pred_end\nSSM,c_poses,4,180,659\n"),  # another length
-        ("c.csv", "who,when\nme,now\n"), ("d.csv", "file,first\n"), ("e.json", "[[1]]"), ("f.json", "{"),
-        ("g.json", "[" * 100_000), ("h.csv", "file,first\nSSM/p/none,0\n"), ("i.json", "7"),
+        ("c.csv", "who,when\nme,now\n"),
+        ("d.csv", "file,first\n"),
+        ("e.json", "[[1]]"),
+        ("f.json", "{"),
+        ("g.json", "[" * 100_000),
+        ("h.csv", "file,first\nSSM/p/none,0\n"),
+        ("i.json", "7"),
     ],
-)  # fmt: skip
+)
 def test_unusable_lists_are_refused(tmp_path: Path, name: str, content: str) -> None:
     """Each with one short sentence that names the list."""
     (tmp_path / name).write_text(content)

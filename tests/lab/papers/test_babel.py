@@ -22,16 +22,28 @@ PLACE = "CMU/CMU/01/01_01_poses.npz"
 
 def label(text: str, start: float, end: float, acts: list[str] | None = None) -> dict[str, Any]:
     """One entry of ``frame_ann``, as distributed."""
-    return {"raw_label": f"{text}s", "proc_label": text, "seg_id": "x", "act_cat": acts or [text],
-            "start_t": start, "end_t": end}  # fmt: skip
+    return {
+        "raw_label": f"{text}s",
+        "proc_label": text,
+        "seg_id": "x",
+        "act_cat": acts or [text],
+        "start_t": start,
+        "end_t": end,
+    }
 
 
 def entry(labels: list[dict[str, Any]] | None, place: str = PLACE) -> dict[str, Any]:
     """One sequence of ``train.json``; None: nobody labelled its parts."""
     whole = {"raw_label": "walking around", "proc_label": "walk around", "seg_id": "y", "act_cat": ["walk"]}
     parts = None if labels is None else {"babel_lid": "l", "anntr_id": "a", "mul_act": True, "labels": labels}
-    return {"babel_sid": 12, "url": "https://x", "feat_p": place, "dur": 10.0, "frame_ann": parts,
-            "seq_ann": {"babel_lid": "m", "anntr_id": "b", "mul_act": True, "labels": [whole]}}  # fmt: skip
+    return {
+        "babel_sid": 12,
+        "url": "https://x",
+        "feat_p": place,
+        "dur": 10.0,
+        "frame_ann": parts,
+        "seq_ann": {"babel_lid": "m", "anntr_id": "b", "mul_act": True, "labels": [whole]},
+    }
 
 
 def amass(path: Path, *, frames: int = 1200, fps: float = 120.0, speed: float = 1.0, **changes: Any) -> Path:
@@ -40,8 +52,14 @@ def amass(path: Path, *, frames: int = 1200, fps: float = 120.0, speed: float = 
     poses, trans = np.zeros((frames, 156)), np.zeros((frames, 3))
     poses[:, 0] = np.pi / 2
     trans[:, 1], trans[:, 2] = -np.arange(frames) * speed / fps, 0.95
-    arrays = {"poses": poses, "trans": trans, "mocap_framerate": np.array(fps), "gender": np.array("male"),
-              "betas": np.zeros(16), "dmpls": np.zeros((frames, 8))} | changes  # fmt: skip
+    arrays = {
+        "poses": poses,
+        "trans": trans,
+        "mocap_framerate": np.array(fps),
+        "gender": np.array("male"),
+        "betas": np.zeros(16),
+        "dmpls": np.zeros((frames, 8)),
+    } | changes
     np.savez(path, **{key: value for key, value in arrays.items() if value is not None})
     return path
 
@@ -81,11 +99,15 @@ def test_labels_are_read_as_processed_in_order_of_time(tmp_path: Path) -> None:
     found = babel.find_recordings(folder(tmp_path, labels))
     assert len(found) == 1
     assert (found[0].name, found[0].split, found[0].place, found[0].whole) == (
-        "babel_12", "train", PLACE, ("walk around",),
-    )  # fmt: skip
+        "babel_12",
+        "train",
+        PLACE,
+        ("walk around",),
+    )
     assert [(s.text, s.acts, s.start, s.end) for s in found[0].segments] == [
-        ("walk", ("walk",), 0, 4.5), ("turn left", ("turn",), 4, 6),
-    ]  # fmt: skip
+        ("walk", ("walk",), 0, 4.5),
+        ("turn left", ("turn",), 4, 6),
+    ]
 
 
 def test_both_splits_and_the_releases_own_folder_are_found(tmp_path: Path) -> None:
@@ -101,17 +123,26 @@ def test_both_splits_and_the_releases_own_folder_are_found(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     "damage",
     [
-        "[]", "{", "\xff", "[" * 100_000, '{"1": 3}', '{"1": {}}',
-        json.dumps({"1": entry(None, place="x.exe")}), json.dumps({"1": entry(None, place="x\0.npz")}),
-        json.dumps({"../1": entry(None)}), json.dumps({"1": entry([label("walk", float("nan"), 2)])}),
-        json.dumps({"1": entry([label("walk", -1, 2)])}), json.dumps({"1": entry([{"proc_label": "walk"}])}),
+        "[]",
+        "{",
+        "\xff",
+        "[" * 100_000,
+        '{"1": 3}',
+        '{"1": {}}',
+        json.dumps({"1": entry(None, place="x.exe")}),
+        json.dumps({"1": entry(None, place="x\0.npz")}),
+        json.dumps({"../1": entry(None)}),
+        json.dumps({"1": entry([label("walk", float("nan"), 2)])}),
+        json.dumps({"1": entry([label("walk", -1, 2)])}),
+        json.dumps({"1": entry([{"proc_label": "walk"}])}),
         json.dumps({"1": entry(None) | {"frame_ann": {"labels": 3}}}),
         json.dumps({"1": entry([label("walk", 0, 2) | {"act_cat": "walk"}])}),
-        json.dumps({"1": entry([label("walk", 0, 2) | {"proc_label": 3}])}), json.dumps({"1": entry([{}] * 1001)}),
+        json.dumps({"1": entry([label("walk", 0, 2) | {"proc_label": 3}])}),
+        json.dumps({"1": entry([{}] * 1001)}),
         json.dumps({"1": entry([label("walk " * 500, 0, 2)])}),
     ],
     ids=range(17),
-)  # fmt: skip
+)
 def test_other_json_is_refused_in_one_sentence_with_the_files_name(tmp_path: Path, damage: str) -> None:
     (tmp_path / "train.json").write_bytes(damage.encode("latin-1"))
     with pytest.raises(MotionloomError, match=r"train\.json") as caught:
@@ -156,15 +187,23 @@ def test_arrays_nobody_needs_may_be_objects(tmp_path: Path) -> None:
     "changes",
     [
         {"poses": np.array([None] * 40, dtype=object)},
-        {"poses": None}, {"trans": None}, {"mocap_framerate": None},
-        {"poses": np.zeros((40, 63))}, {"poses": np.zeros((39, 156))}, {"poses": np.zeros(40)},
-        {"trans": np.full((40, 3), np.nan)}, {"trans": np.full((40, 3), 1e6)}, {"poses": np.full((40, 156), np.inf)},
-        {"mocap_framerate": np.array(0.0)}, {"mocap_framerate": np.array(np.nan)},
-        {"mocap_framerate": np.array([30.0, 30.0])}, {"mocap_framerate": np.array("fast")},
+        {"poses": None},
+        {"trans": None},
+        {"mocap_framerate": None},
+        {"poses": np.zeros((40, 63))},
+        {"poses": np.zeros((39, 156))},
+        {"poses": np.zeros(40)},
+        {"trans": np.full((40, 3), np.nan)},
+        {"trans": np.full((40, 3), 1e6)},
+        {"poses": np.full((40, 156), np.inf)},
+        {"mocap_framerate": np.array(0.0)},
+        {"mocap_framerate": np.array(np.nan)},
+        {"mocap_framerate": np.array([30.0, 30.0])},
+        {"mocap_framerate": np.array("fast")},
         {"poses": np.zeros((0, 156)), "trans": np.zeros((0, 3))},
     ],
     ids=range(15),
-)  # fmt: skip
+)
 def test_broken_recordings_are_refused_in_one_sentence_with_the_files_name(tmp_path: Path, changes: dict) -> None:
     with pytest.raises(MotionloomError, match=r"a\.npz") as caught:
         babel.read_amass(amass(tmp_path / "a.npz", frames=40, **changes))
@@ -255,9 +294,11 @@ def test_calibration_poses_make_no_pair(pose: str) -> None:
 def test_a_category_tells_too() -> None:
     """What is called 'stand still' and categorised as a T-pose, and a renamed transition."""
     parts = (
-        Segment("walk", ("walk",), 0, 4), Segment("move on", ("transition",), 4, 5), Segment("sit", ("sit",), 5, 9),
+        Segment("walk", ("walk",), 0, 4),
+        Segment("move on", ("transition",), 4, 5),
+        Segment("sit", ("sit",), 5, 9),
         Segment("stand still", ("stand", "t pose"), 9, 12),
-    )  # fmt: skip
+    )
     made = babel.pairs(parts)
     assert [(p.texts, p.between) for p in made] == [(("walk", "sit"), (4, 5))]
 
@@ -271,9 +312,11 @@ def test_a_pair_makes_four_items_with_flags_in_the_transition() -> None:
     made = list(babel.items(one, still(300)))
     found = [(i.text, *shown(i), np.flatnonzero(i.flags).tolist()) for i in made]
     assert found == [
-        ("walk", 0, 120, []), ("sit", 150, 270, []),
-        ("walk", 0, 150, list(range(120, 150))), ("sit", 120, 270, list(range(30))),
-    ]  # fmt: skip
+        ("walk", 0, 120, []),
+        ("sit", 150, 270, []),
+        ("walk", 0, 150, list(range(120, 150))),
+        ("sit", 120, 270, list(range(30))),
+    ]
     assert len({i.name for i in made}) == 4
     assert all(len(i.flags) == len(i) for i in made)
 

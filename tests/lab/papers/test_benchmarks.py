@@ -93,8 +93,11 @@ def test_a_tenth_of_each_persons_actions_is_held_out() -> None:
     assert [len(k) for k in kept] == [3] * 5
     assert sorted(i // 2 for k in kept for i in k) == list(range(15))
     assert held_out(1, 0) == held_out(0, 3) == set()
-    assert all(len(held_out(n, s)) == max(1, n // 10) and held_out(n, s) <= set(range(n))
-               for n in range(2, 60) for s in range(6))  # fmt: skip
+    assert all(
+        len(held_out(n, s)) == max(1, n // 10) and held_out(n, s) <= set(range(n))
+        for n in range(2, 60)
+        for s in range(6)
+    )
 
 
 def test_missing_subjects_are_reported(tmp_path: Path) -> None:
@@ -115,8 +118,9 @@ def test_humaneva_drops_three_chunks_and_short_ones(tmp_path: Path) -> None:
     names = {r.name for r in read.recordings}
     all_names = {"Walking 1 chunk0", "Walking 1 chunk2", "Walking 1 chunk4", "Box 1 chunk0"}
     assert {n.removeprefix("Train/S3/") for n in names if n.startswith("Train/S3")} == {
-        "Walking 1 chunk4", "Box 1 chunk0",
-    }  # fmt: skip
+        "Walking 1 chunk4",
+        "Box 1 chunk0",
+    }
     assert {n.removeprefix("Validate/S3/") for n in names if n.startswith("Validate/S3")} == all_names - {
         "Walking 1 chunk4"
     }
@@ -141,13 +145,16 @@ def test_humaneva_windows_and_exactly_75_frames(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("array", "said"),
     [
-        (np.zeros((130, 17, 3), np.float32), r"\(130, 17, 3\)"), (np.zeros((130, 96), np.float32), r"\(130, 96\)"),
-        (np.zeros((0, 32, 3), np.float32), r"\(0, 32, 3\)"), (np.zeros((130, 32, 3), np.int32), "int32"),
-        (np.full((130, 32, 3), np.nan, np.float32), "not finite"), (np.full((130, 32, 3), np.inf), "not finite"),
+        (np.zeros((130, 17, 3), np.float32), r"\(130, 17, 3\)"),
+        (np.zeros((130, 96), np.float32), r"\(130, 96\)"),
+        (np.zeros((0, 32, 3), np.float32), r"\(0, 32, 3\)"),
+        (np.zeros((130, 32, 3), np.int32), "int32"),
+        (np.full((130, 32, 3), np.nan, np.float32), "not finite"),
+        (np.full((130, 32, 3), np.inf), "not finite"),
         (np.full((130, 32, 3), 900.0), "in metres"),
     ],
     ids=["17 joints", "flat", "empty", "whole numbers", "nan", "inf", "millimetres"],
-)  # fmt: skip
+)
 def test_arrays_of_another_form_are_named(tmp_path: Path, array: np.ndarray, said: str) -> None:
     """The message has the subject, the action and what was there."""
     path = write(tmp_path / "data_3d_h36m.npz", {"S9": {"Waiting": array}})

@@ -56,9 +56,13 @@ def test_the_walk_is_the_published_loop(seed, noise_free):
         return np.tanh(x) + 0.1 * np.roll(x, 1, 1) + 0.01 * level
 
     got = controlled(
-        guess, Observed(known, flags, noise_free), levels=range(steps, -1, -1), solver=SOLVERS["ddpm"],
-        schedule=schedule, noise=lambda like: next(drawn),
-    )  # fmt: skip
+        guess,
+        Observed(known, flags, noise_free),
+        levels=range(steps, -1, -1),
+        solver=SOLVERS["ddpm"],
+        schedule=schedule,
+        noise=lambda like: next(drawn),
+    )
     bars = [1.0, *np.cumprod(1 - schedule.betas).tolist()]
     free = (~flags).astype(np.float32) if noise_free else np.ones_like(known)
     x = math.sqrt(1 - bars[steps]) * noises[0] * free
@@ -134,9 +138,13 @@ def test_an_empty_mask_is_plain_sampling(prior):
     cond = prior.condition(PROMPTS)
     draw = row_noise([5, 6])
     plain = run(
-        guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), 2.5), draw(known),
-        levels=levels(prior.schedule, 6, spacing="early"), solver=SOLVERS["ddpm"], schedule=prior.schedule, noise=draw,
-    )  # fmt: skip
+        guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), 2.5),
+        draw(known),
+        levels=levels(prior.schedule, 6, spacing="early"),
+        solver=SOLVERS["ddpm"],
+        schedule=prior.schedule,
+        noise=draw,
+    )
     for noise_free in (True, False):
         empty = draw_of(prior, [prior.net], np.full_like(known, np.nan), flags & False, noise_free=noise_free)
         np.testing.assert_allclose(empty, plain, rtol=1e-4, atol=1e-4)

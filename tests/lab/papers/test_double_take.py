@@ -249,9 +249,7 @@ def test_repetitions_are_rows_of_their_own() -> None:
     def taken(plan: Plan, seeds: list[int], later: list[int]) -> np.ndarray:
         draws = row_noise(seeds), row_noise(later)
         x = draws[0](np.empty((len(seeds), 60, CHANNELS), np.float32))
-        return double_take(
-            net, net, x, plan, mode=MODES["paper"], way=WAY, schedule=SCHEDULE, noise=draws
-        ).unfolded  # fmt: skip
+        return double_take(net, net, x, plan, mode=MODES["paper"], way=WAY, schedule=SCHEDULE, noise=draws).unfolded
 
     together = taken(plan, [1, 2, 3, 4, 5, 6], [7, 8, 9, 10])
     alone = np.concatenate([taken(one, [1, 2, 3], [7, 8]), taken(one, [4, 5, 6], [9, 10])])

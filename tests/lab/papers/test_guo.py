@@ -32,8 +32,15 @@ CAPTIONS = (
 def statistics() -> tuple[np.ndarray, np.ndarray]:
     """Of the evaluator's form: groups as in HumanML3D's Std, the root and the contacts divided by 25."""
     rng = np.random.default_rng(3)
-    groups = {(0, 1): 0.012826, (1, 3): 0.016927, (3, 4): 0.153766, (4, 67): 0.122244, (67, 193): 0.299692,
-              (193, 259): 0.019470, (259, 263): 0.355933}  # fmt: skip
+    groups = {
+        (0, 1): 0.012826,
+        (1, 3): 0.016927,
+        (3, 4): 0.153766,
+        (4, 67): 0.122244,
+        (67, 193): 0.299692,
+        (193, 259): 0.019470,
+        (259, 263): 0.355933,
+    }
     std = np.concatenate([np.full(last - first, value) for (first, last), value in groups.items()])
     std[[0, 1, 2, 3, 259, 260, 261, 262]] /= 25
     return rng.normal(size=263) * 0.1, std

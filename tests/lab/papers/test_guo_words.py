@@ -117,9 +117,15 @@ def test_plain_glove_text_is_read_too(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "reason"),
-    [("walk 1 2\nrun 1\n", "GloVe"), ("walk a b\n", "GloVe"), ("", "GloVe"), ("walk 1 2\n", "sos"),
-     ("sos 1 nan\neos 1 1\nunk 1 1\n", "finite"), ("\x00\n", "sos")],
-)  # fmt: skip
+    [
+        ("walk 1 2\nrun 1\n", "GloVe"),
+        ("walk a b\n", "GloVe"),
+        ("", "GloVe"),
+        ("walk 1 2\n", "sos"),
+        ("sos 1 nan\neos 1 1\nunk 1 1\n", "finite"),
+        ("\x00\n", "sos"),
+    ],
+)
 def test_other_text_is_not_taken_for_glove(tmp_path: Path, text: str, reason: str) -> None:
     (tmp_path / "glove.txt").write_text(text)
     with pytest.raises(MotionloomError, match=reason):
@@ -204,11 +210,30 @@ def itself() -> list:
 
 @pytest.mark.parametrize(
     "value",
-    [Bomb(Path("was run")), [Bomb(Path("was run"))], {"a": Bomb(Path("was run"))}, print, [["a"]], {"a": ["b"]},
-     itself(), collections.OrderedDict(a=1), {1, 2}, ("a",), {"a": True}, {1.5: 2}, np.ones(2),
-     [1.5], [b"a"], [None], "a", 7, np.int64(3), [np.int64(3)]],
+    [
+        Bomb(Path("was run")),
+        [Bomb(Path("was run"))],
+        {"a": Bomb(Path("was run"))},
+        print,
+        [["a"]],
+        {"a": ["b"]},
+        itself(),
+        collections.OrderedDict(a=1),
+        {1, 2},
+        ("a",),
+        {"a": True},
+        {1.5: 2},
+        np.ones(2),
+        [1.5],
+        [b"a"],
+        [None],
+        "a",
+        7,
+        np.int64(3),
+        [np.int64(3)],
+    ],
     ids=lambda value: type(value).__name__,
-)  # fmt: skip
+)
 @pytest.mark.parametrize("protocol", [2, 4])
 def test_anything_that_is_not_plain_is_refused_and_not_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, value, protocol: int

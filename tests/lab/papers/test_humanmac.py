@@ -78,9 +78,15 @@ def complete(observed: np.ndarray, rows: int, *, basis: Dct | None = None, steps
     """With a perfect guess of a motion that stands still at 0, and 48 channels."""
     basis = basis or Dct(20, 20)
     return published_completion(
-        lambda x, level: np.zeros_like(x), observed, rows, basis=basis, schedule=SCHEDULE,
-        noise=row_noise(range(seed, seed + rows)) if len(observed) == rows else _any_draw(seed), steps=steps, **how,
-    )  # fmt: skip
+        lambda x, level: np.zeros_like(x),
+        observed,
+        rows,
+        basis=basis,
+        schedule=SCHEDULE,
+        noise=row_noise(range(seed, seed + rows)) if len(observed) == rows else _any_draw(seed),
+        steps=steps,
+        **how,
+    )
 
 
 def _any_draw(seed: int) -> Callable[[np.ndarray], np.ndarray]:
@@ -132,9 +138,15 @@ def test_a_target_is_imposed_until_the_relaxed_steps(relax: float) -> None:
 
     target = Target(np.ones((1, 4, 48), np.float32), relax)
     _, motion = published_completion(
-        lambda x, level: np.zeros_like(x), np.zeros((2, 5, 48), np.float32), 2, basis=Dct(20, 20), schedule=SCHEDULE,
-        noise=draw, steps=10, target=target,
-    )  # fmt: skip
+        lambda x, level: np.zeros_like(x),
+        np.zeros((2, 5, 48), np.float32),
+        2,
+        basis=Dct(20, 20),
+        schedule=SCHEDULE,
+        noise=draw,
+        steps=10,
+        target=target,
+    )
     imposed = max(10 - (relax if isinstance(relax, int) else round(10 * relax)), 0)
     assert drawn == 1 + 10 + imposed
     assert bool(imposed) == (float(motion[:, -4:].mean()) > 1e-3)

@@ -108,9 +108,16 @@ def test_a_missing_or_misshapen_weight_fails(key: str) -> None:
 
 @pytest.mark.parametrize(
     "key",
-    ["embed_action.action_embedding", "seqTransDecoder.layers.0.linear1.weight", "seqTransEncoder.layers.x",
-     "seqTransEncoder.layers.2.linear1.weight", "embed_text.scale", "weight", ""],
-)  # fmt: skip
+    [
+        "embed_action.action_embedding",
+        "seqTransDecoder.layers.0.linear1.weight",
+        "seqTransEncoder.layers.x",
+        "seqTransEncoder.layers.2.linear1.weight",
+        "embed_text.scale",
+        "weight",
+        "",
+    ],
+)
 def test_an_unexpected_weight_fails(key: str) -> None:
     with pytest.raises(MotionloomError):
         from_published(state() | {key: torch.zeros(2, 2)})
@@ -187,7 +194,7 @@ def test_mutated_files_give_one_kind_of_error(tmp_path_factory: pytest.TempPathF
     "value",
     [torch.zeros(1).expand(1 << 20, 1 << 20), torch.zeros(4, 4, dtype=torch.long), torch.zeros(4, 4).to_sparse()],
     ids=["one number spread over a tebibyte", "integers", "sparse"],
-)  # fmt: skip
+)
 def test_tensors_that_are_not_plain_are_refused(tmp_path: Path, value: Tensor) -> None:
     with pytest.raises(MotionloomError):
         read_published(write(tmp_path, {"embed_text.weight": value}))
@@ -218,10 +225,18 @@ def test_without_options_the_published_defaults_hold(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "options",
-    [{"arch": "trans_dec"}, {"noise_schedule": "sigmoid"}, {"noise_schedule": []}, {"diffusion_steps": 0},
-     {"diffusion_steps": 1e3}, {"diffusion_steps": 10**12}, {"layers": 8}, {"latent_dim": 512}],
+    [
+        {"arch": "trans_dec"},
+        {"noise_schedule": "sigmoid"},
+        {"noise_schedule": []},
+        {"diffusion_steps": 0},
+        {"diffusion_steps": 1e3},
+        {"diffusion_steps": 10**12},
+        {"layers": 8},
+        {"latent_dim": 512},
+    ],
     ids=str,
-)  # fmt: skip
+)
 def test_options_that_contradict_the_weights_are_refused(tmp_path: Path, options: dict) -> None:
     read = read_published(write(tmp_path, state(), options))
     with pytest.raises(MotionloomError):

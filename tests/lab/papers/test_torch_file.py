@@ -17,8 +17,18 @@ from torch import Tensor
 from motionloom.errors import MotionloomError
 from motionloom.lab.papers.torch_file import read_torch_file
 
-KINDS = [torch.float32, torch.float64, torch.float16, torch.bfloat16, torch.int64, torch.int32, torch.int16, torch.int8,
-         torch.uint8, torch.bool]  # fmt: skip
+KINDS = [
+    torch.float32,
+    torch.float64,
+    torch.float16,
+    torch.bfloat16,
+    torch.int64,
+    torch.int32,
+    torch.int16,
+    torch.int8,
+    torch.uint8,
+    torch.bool,
+]
 
 
 def saved(path: Path, value: object, *, zipped: bool = True) -> Path:
@@ -59,9 +69,11 @@ def test_what_torch_wrote_is_what_torch_would_read(tmp_path: Path, zipped: bool)
     value = {
         "kinds": [torch.arange(6).reshape(2, 3).to(kind) for kind in KINDS],
         "views": (base.mT, base[:, 1:], base[0, 0, 0], base[:0], base.expand(2, 2, 3, 4)),
-        "net": layer.state_dict(), "weight": layer.weight, "optimizer": optimizer.state_dict(),
+        "net": layer.state_dict(),
+        "weight": layer.weight,
+        "optimizer": optimizer.state_dict(),
         "plain": OrderedDict(a=[1, -2.5, None, True, "text"], b=(2**40, b"bytes")),
-    }  # fmt: skip
+    }
     path = saved(tmp_path / "a.pt", value, zipped=zipped)
     assert same(read_torch_file(path), torch.load(path, weights_only=True))
 
@@ -118,22 +130,36 @@ def tensor_pickle(
 
     storage = b"(X\x07\0\0\0storagectorch\n" + kind.encode() + b"Storage\nX\x01\0\0\0" + b"0X\x03\0\0\0cpu"
     return (
-        b"\x80\x02ctorch._utils\n_rebuild_tensor_v2\n(" + storage + number(count) + b"tQ" + number(first) + row(shape)
-        + row(strides) + b"\x89ccollections\nOrderedDict\n)RtR."
-    )  # fmt: skip
+        b"\x80\x02ctorch._utils\n_rebuild_tensor_v2\n("
+        + storage
+        + number(count)
+        + b"tQ"
+        + number(first)
+        + row(shape)
+        + row(strides)
+        + b"\x89ccollections\nOrderedDict\n)RtR."
+    )
 
 
 @pytest.mark.parametrize(
     "pickled",
     [
-        tensor_pickle(1 << 40), tensor_pickle(3), tensor_pickle(-2), tensor_pickle(2, first=1),
-        tensor_pickle(2, first=-1), tensor_pickle(2, shape=(3,)), tensor_pickle(2, shape=(1 << 50,)),
+        tensor_pickle(1 << 40),
+        tensor_pickle(3),
+        tensor_pickle(-2),
+        tensor_pickle(2, first=1),
+        tensor_pickle(2, first=-1),
+        tensor_pickle(2, shape=(3,)),
+        tensor_pickle(2, shape=(1 << 50,)),
         tensor_pickle(2, shape=(-1,)),
-        tensor_pickle(2, strides=(2,)), tensor_pickle(2, strides=(-1,)), tensor_pickle(2, strides=()),
-        tensor_pickle(2, shape=(1,) * 17, strides=(1,) * 17), tensor_pickle(2, kind="Untyped"),
+        tensor_pickle(2, strides=(2,)),
+        tensor_pickle(2, strides=(-1,)),
+        tensor_pickle(2, strides=()),
+        tensor_pickle(2, shape=(1,) * 17, strides=(1,) * 17),
+        tensor_pickle(2, kind="Untyped"),
         tensor_pickle(2, kind="Double"),
     ],
-)  # fmt: skip
+)
 def test_a_tensor_beyond_the_bytes_that_are_there_is_refused(tmp_path: Path, pickled: bytes) -> None:
     good = saved(tmp_path / "a.pt", torch.zeros(2)).read_bytes()
 

@@ -14,11 +14,31 @@ from motionloom.weights.prior import Card
 
 FPS, SEEN, AHEAD = 30.0, 10, 14
 OFFSETS = np.array(
-    [[0, 0.9, 0], [0.1, -0.1, 0], [-0.1, -0.1, 0], [0, 0.12, 0], [0, -0.4, 0], [0, -0.4, 0], [0, 0.13, 0],
-     [0, -0.4, 0], [0, -0.4, 0], [0, 0.1, 0], [0, -0.05, 0.12], [0, -0.05, 0.12], [0, 0.2, 0], [0.07, 0.1, 0],
-     [-0.07, 0.1, 0], [0, 0.1, 0.05], [0.12, 0, 0], [-0.12, 0, 0], [0.27, 0, 0], [-0.27, 0, 0], [0.25, 0, 0],
-     [-0.25, 0, 0]]
-)  # fmt: skip
+    [
+        [0, 0.9, 0],
+        [0.1, -0.1, 0],
+        [-0.1, -0.1, 0],
+        [0, 0.12, 0],
+        [0, -0.4, 0],
+        [0, -0.4, 0],
+        [0, 0.13, 0],
+        [0, -0.4, 0],
+        [0, -0.4, 0],
+        [0, 0.1, 0],
+        [0, -0.05, 0.12],
+        [0, -0.05, 0.12],
+        [0, 0.2, 0],
+        [0.07, 0.1, 0],
+        [-0.07, 0.1, 0],
+        [0, 0.1, 0.05],
+        [0.12, 0, 0],
+        [-0.12, 0, 0],
+        [0.27, 0, 0],
+        [-0.27, 0, 0],
+        [0.25, 0, 0],
+        [-0.25, 0, 0],
+    ]
+)
 
 
 def waving(frames: int, speed: float = 1.0, phase: float = 0.0) -> np.ndarray:
@@ -41,10 +61,16 @@ def protocol(takes: int = 3, frames: int = 60, *, name: str = "own") -> Protocol
     """A data set of people who wave at other speeds; all splits have some."""
     splits = ("train", "val", "test")
     found = tuple(
-        Recording(f"{split}{k}", f"s{k}", "wave" if k % 2 else "swing", split,
-                  waving(frames, 0.6 + 0.4 * k + 0.1 * n, 0.9 * k).astype(np.float32))
-        for n, split in enumerate(splits) for k in range(takes)
-    )  # fmt: skip
+        Recording(
+            f"{split}{k}",
+            f"s{k}",
+            "wave" if k % 2 else "swing",
+            split,
+            waving(frames, 0.6 + 0.4 * k + 0.1 * n, 0.9 * k).astype(np.float32),
+        )
+        for n, split in enumerate(splits)
+        for k in range(takes)
+    )
     return Protocol(name, FPS, SEEN, AHEAD, SMPL_LAYOUT, found, "made up")
 
 
@@ -67,6 +93,15 @@ def predictor(
     nothing = torch.zeros(kept, layout.channels)
     pose = torch.stack([nothing[0], torch.ones(layout.channels)])
     return Predictor(
-        net.eval().requires_grad_(False), SCHEDULES["cosine"](1000), layout, Dct(seen + ahead, kept), seen, fps,
-        "masked", nothing, 0.1 + torch.ones_like(nothing), pose, Card("tiny", data="made up"),
-    )  # fmt: skip
+        net.eval().requires_grad_(False),
+        SCHEDULES["cosine"](1000),
+        layout,
+        Dct(seen + ahead, kept),
+        seen,
+        fps,
+        "masked",
+        nothing,
+        0.1 + torch.ones_like(nothing),
+        pose,
+        Card("tiny", data="made up"),
+    )

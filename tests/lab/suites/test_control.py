@@ -188,8 +188,10 @@ def test_real_motions_stand_beside_and_ratios_are_to_the_uncontrolled_row() -> N
     for name in ("skate_share", "skate_speed", "skate_slide", "jerk", "penetration", "diversity", "fid", "r3"):
         assert ours[name] == pytest.approx(real[name]), name
     assert plain["jerk_ratio"] == plain["slide_ratio"] == 1
-    clips = [humanml.decode_positions(item.features) for item in control.prepare(
-        ITEMS, Judge(), Fakes(), SMALL, scale=np.ones(263), selection=Selection()).items]  # fmt: skip
+    clips = [
+        humanml.decode_positions(item.features)
+        for item in control.prepare(ITEMS, Judge(), Fakes(), SMALL, scale=np.ones(263), selection=Selection()).items
+    ]
     jerks = np.average([physics.jerk(c, FPS).mean for c in clips], weights=[len(c) for c in clips])
     assert ours["jerk"] == pytest.approx(jerks)
     assert ours["jerk_ratio"] == pytest.approx(ours["jerk"] / plain["jerk"], rel=0.05)

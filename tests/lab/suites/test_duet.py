@@ -215,10 +215,15 @@ def test_the_report_has_every_row_and_the_papers_table() -> None:
     made = duet.measure(crops, found, how)
     here = [row for row in made.rows if not row.measured_on]
     assert [row.name for row in here] == [
-        "real", "zero velocity", "constant velocity", "prior without communication, one sample",
-        "prior without communication, mean of 2 samples", "ours, one sample", "ours, mean of 2 samples",
+        "real",
+        "zero velocity",
+        "constant velocity",
+        "prior without communication, one sample",
+        "prior without communication, mean of 2 samples",
+        "ours, one sample",
+        "ours, mean of 2 samples",
         "multi-range transformer",
-    ]  # fmt: skip
+    ]
     assert {row.name: row.values["root_3"].mean for row in here if row.name != REAL} == pytest.approx(
         {row.name: {"z": 1.525, "c": 0, "p": 0.1, "o": 0.1, "m": 0}[row.name[0]] for row in here if row.name != REAL}
     )
@@ -294,8 +299,9 @@ def test_other_blocks_are_rows_by_their_names_and_sizes(tmp_path: Path) -> None:
     ]
     found = duet_blocks.beside(prior, files, {"steps": 2})
     assert [one.row for one in found] == [
-        "layers2: 2 layers after layer 1, not aware", f"known: 1 layer after layer {last}"
-    ]  # fmt: skip
+        "layers2: 2 layers after layer 1, not aware",
+        f"known: 1 layer after layer {last}",
+    ]
     assert found[0].digest == hashlib.sha256(files[0].read_bytes()).hexdigest()[:12]
     silent = ways.drawn(prior, ways.no_communication_net(prior), steps=2)
     made, alone = (way(crops_of(couple(6.0), 2), 0) for way in (found[0].way, silent))

@@ -50,9 +50,13 @@ def test_partners_are_within_the_spread_and_people_far_apart_are_not() -> None:
     asked: list[tuple[str, int, int]] = []
     found = duet_text.measure(RECORDED, made_at(1.0, asked), made_at(4.0), TEXT_HOW, table=TABLE)
     assert [row.name for row in found.rows] == [
-        "real", "real, held-out pairs", "real, partners shuffled", "ours", "ours, partners shuffled",
+        "real",
+        "real, held-out pairs",
+        "real, partners shuffled",
+        "ours",
+        "ours, partners shuffled",
         "prior without communication",
-    ]  # fmt: skip
+    ]
     assert asked == [("two people dance", 3, 0), ("a couple dances", 2, 1)]
     ours, far = found.row("ours"), found.row("prior without communication")
     assert ours is not None
@@ -192,9 +196,13 @@ def test_the_real_partner_is_the_best_answer_and_distances_are_from_them() -> No
     )
     assert found.suite == "duet-answers"
     assert [row.name for row in found.rows] == [
-        "real", "real, held-out pairs", "real, partners shuffled", "ours", "ours, partners shuffled",
+        "real",
+        "real, held-out pairs",
+        "real, partners shuffled",
+        "ours",
+        "ours, partners shuffled",
         "prior without communication",
-    ]  # fmt: skip
+    ]
     ours, aside = found.row("ours"), found.row("prior without communication")
     assert ours is not None
     assert aside is not None
@@ -251,9 +259,11 @@ def test_partners_who_drift_apart_are_seen_in_the_last_seconds() -> None:
     table = duet_long.table(TABLE.captions, how)
     found = duet_text.measure(RECORDED, drifting(0.1), drifting(0.0), how, table=table)
     assert [row.name for row in found.rows[3:]] == [
-        "ours, last 6 s", "ours, last 6 s, partners shuffled", "ours, first 6 s",
+        "ours, last 6 s",
+        "ours, last 6 s, partners shuffled",
+        "ours, first 6 s",
         "prior without communication, last 6 s",
-    ]  # fmt: skip
+    ]
     apart = {row.name: row.values["distance"].mean for row in found.rows}
     middle = 119 / 2 / FPS  # of six seconds
     assert apart["ours, first 6 s"] == pytest.approx(1.0 + 0.1 * middle)

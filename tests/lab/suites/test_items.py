@@ -101,9 +101,12 @@ def built(tmp_path: Path) -> Path:
         Note(80, 110, "human", ("too short",)),
     )
     for name, source, split, way in (
-        ("a", "cmu", "test", "plain"), ("Ma", "cmu", "test", "plain"), ("b", "cmu", "train", "plain"),
-        ("c", "bandai-1", "val", "plain"), ("d_looped", "cmu", "test", "looped"),
-    ):  # fmt: skip
+        ("a", "cmu", "test", "plain"),
+        ("Ma", "cmu", "test", "plain"),
+        ("b", "cmu", "train", "plain"),
+        ("c", "bandai-1", "val", "plain"),
+        ("d_looped", "cmu", "test", "looped"),
+    ):
         write_clip(tmp_path / "clips", Clip(name, source, "free", split, way, notes, features))
     return tmp_path
 

@@ -106,14 +106,31 @@ def test_the_table_has_every_row_and_everything_that_must_be_said(trial: trials.
     made = prediction.measure(predictor(), trial, how, run=Run("predictor", folder=tmp_path, progress=lines.append))
     here = [row for row in made.rows if not row.measured_on]
     assert [row.name for row in here] == [
-        REAL, prediction.ZERO, prediction.CONSTANT, "predictor, 2 steps", "predictor, 3 steps",
+        REAL,
+        prediction.ZERO,
+        prediction.CONSTANT,
+        "predictor, 2 steps",
+        "predictor, 3 steps",
         "predictor, published sampler, 3 steps",
-    ]  # fmt: skip
+    ]
     assert here[3].values["ade"].count == 2
     assert here[1].values["ade"].count == 1
-    for key in ("data", "split", "windows measured", "windows with more than one future", "frames per second",
-                "representation", "statistics", "windows with one future", "samples", "sampler", "steps", "guidance",
-                "seed", "replications"):  # fmt: skip
+    for key in (
+        "data",
+        "split",
+        "windows measured",
+        "windows with more than one future",
+        "frames per second",
+        "representation",
+        "statistics",
+        "windows with one future",
+        "samples",
+        "sampler",
+        "steps",
+        "guidance",
+        "seed",
+        "replications",
+    ):
         assert key in made.protocol
     assert report.decode(json.loads(json.dumps(report.encode(made))))
     again = prediction.measure(
@@ -147,9 +164,10 @@ def test_published_rows_are_marked_as_of_other_data_unless_all_of_it_is_here(tri
     assert f"Published, measured on {SAME}HumanEva-I" in report.markdown(marked)
     few = replace(same, windows=same.windows[:2], alike=same.alike[:2])
     assert not [
-        row for row in prediction.measure(predictor(), few, replace(FEW, samples=50), kinds).rows
+        row
+        for row in prediction.measure(predictor(), few, replace(FEW, samples=50), kinds).rows
         if row.measured_on.startswith(SAME)
-    ]  # fmt: skip
+    ]
     assert len(prediction.measure(predictor(), trial, FEW, kinds, with_published=False).rows) == 1
 
 
@@ -212,9 +230,26 @@ def test_the_command_measures_and_writes(files: tuple[Path, Path], tmp_path: Pat
     from motionloom.cli import main
 
     data, weights = files
-    words = ["evaluate", "prediction", "--data", str(data), "--weights", str(weights), "--out", str(tmp_path / "out"),
-             "--quick", "--windows", "3", "--steps", "2", "--published-steps", "3", "--singles", "skip-multimodal",
-             "--rows-without-published"]  # fmt: skip
+    words = [
+        "evaluate",
+        "prediction",
+        "--data",
+        str(data),
+        "--weights",
+        str(weights),
+        "--out",
+        str(tmp_path / "out"),
+        "--quick",
+        "--windows",
+        "3",
+        "--steps",
+        "2",
+        "--published-steps",
+        "3",
+        "--singles",
+        "skip-multimodal",
+        "--rows-without-published",
+    ]
     assert main(words) == 0
     said = capsys.readouterr().out
     assert "tiny, published sampler, 3 steps" in said

@@ -32,11 +32,17 @@ def keep(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Networks of 16 numbers, windows for statistics as few."""
     monkeypatch.setattr(studies, "BASE", {"kept": 5, "layers": 2, "width": 16, "heads": 2, "dropout": 0.0})
-    monkeypatch.setattr(studies, "STUDIED", {
-        "coefficients": ("kept", (3, 5, 45)), "layers": ("layers", (2, 4)),
-        "schedules": ("schedule", ("cosine", "sqrt")),
-        "noising": ("levels", (100, 1000)), "dct": ("dct", (True, False)),
-    })  # fmt: skip
+    monkeypatch.setattr(
+        studies,
+        "STUDIED",
+        {
+            "coefficients": ("kept", (3, 5, 45)),
+            "layers": ("layers", (2, 4)),
+            "schedules": ("schedule", ("cosine", "sqrt")),
+            "noising": ("levels", (100, 1000)),
+            "dct": ("dct", (True, False)),
+        },
+    )
     monkeypatch.setattr("motionloom.train.predictor.STATISTICS", 64)
 
 
@@ -203,8 +209,14 @@ def test_what_comes_of_holding_a_group_is_told_of_the_other_joints(monkeypatch: 
     assert sorted(behaviour.SMPL22.groups["left_arm"]) == held
     assert all(np.array_equal(np.flatnonzero(mask.all(axis=0)), held) and mask.sum() == 4 * AHEAD for mask in told)
     wide = 17**0.5  # of 17 joints, each as far off
-    expected = {"free": 0.1 * wide, "given": 0.02 * wide, "apd_free": 0.001 * wide * AHEAD**0.5,
-                "apd_given": 0.004 * wide * AHEAD**0.5, "held": 0.001, "rotations": 0.25}  # fmt: skip
+    expected = {
+        "free": 0.1 * wide,
+        "given": 0.02 * wide,
+        "apd_free": 0.001 * wide * AHEAD**0.5,
+        "apd_given": 0.004 * wide * AHEAD**0.5,
+        "held": 0.001,
+        "rotations": 0.25,
+    }
     assert found == pytest.approx(expected, rel=1e-6)
 
 
@@ -213,8 +225,13 @@ def test_jumps_and_speed_of_a_way_in_between_in_closed_form() -> None:
     places = np.repeat(gliding(1), 40, axis=0)
     places[:, 20, 1] += np.cumsum(np.repeat([1.0, 2.0, 5.0], [10, 10, 20])) / 30
     found = behaviour._ends(places, 10, 20, 30.0)
-    expected = {"start_velocity": 1 / 21, "start_acceleration": 30 / 21, "end_velocity": 3 / 21,
-                "end_acceleration": 90 / 21, "speed": (10 * 2 + 5) / 11 / 21}  # fmt: skip
+    expected = {
+        "start_velocity": 1 / 21,
+        "start_acceleration": 30 / 21,
+        "end_velocity": 3 / 21,
+        "end_acceleration": 90 / 21,
+        "speed": (10 * 2 + 5) / 11 / 21,
+    }
     assert found == pytest.approx(expected, rel=1e-6)
 
 
@@ -251,8 +268,20 @@ def test_the_command_does_a_study(tmp_path: Path, capsys) -> None:
     weights = save_predictor(
         predictor(layout=HUMANEVA_LAYOUT, seen=15, ahead=60, fps=60.0), tmp_path / "tiny.safetensors"
     )
-    words = ["evaluate", "study", "horizon", "--data", str(humaneva(tmp_path)), "--weights", str(weights), "--quick",
-             "--threads", "1", "--windows", "2"]  # fmt: skip
+    words = [
+        "evaluate",
+        "study",
+        "horizon",
+        "--data",
+        str(humaneva(tmp_path)),
+        "--weights",
+        str(weights),
+        "--quick",
+        "--threads",
+        "1",
+        "--windows",
+        "2",
+    ]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
     assert "second 4" in capsys.readouterr().out
     said = (tmp_path / "out" / "horizon.md").read_text()

@@ -55,17 +55,34 @@ def test_no_seed_is_drawn_twice_in_a_run(seed: int, replications: int, rows: int
 
 def test_described_says_whatever_changes_a_number() -> None:
     """Two protocols that differ in anything but how long they run differ in print, as plain JSON."""
-    changes = {"lengths": "padded", "caption_length": "published", "batch": None, "replications": 3, "seed": 1,
-               "multimodality": (2, 2), "multimodal_replications": 1, "steps": (7,), "solver": "ddim", "guidance": 1.0,
-               "spacing": "logsnr"}  # fmt: skip
+    changes = {
+        "lengths": "padded",
+        "caption_length": "published",
+        "batch": None,
+        "replications": 3,
+        "seed": 1,
+        "multimodality": (2, 2),
+        "multimodal_replications": 1,
+        "steps": (7,),
+        "solver": "ddim",
+        "guidance": 1.0,
+        "spacing": "logsnr",
+    }
 
     def said(protocol: Protocol, selection: Selection) -> str:
         return json.dumps(protocol.described(selection, data="made up", items=40, evaluator="judge"))
 
     plain = said(Protocol(), Selection())
     assert all(said(replace(Protocol(), **{k: v}), Selection()) != plain for k, v in changes.items())
-    others = {"splits": ("val",), "sources": (), "mirrored": False, "shortest": 60, "longest": 100, "unit": 1,
-              "shorter_third": True}  # fmt: skip
+    others = {
+        "splits": ("val",),
+        "sources": (),
+        "mirrored": False,
+        "shortest": 60,
+        "longest": 100,
+        "unit": 1,
+        "shorter_third": True,
+    }
     assert all(said(Protocol(), replace(Selection(), **{k: v})) != plain for k, v in others.items())
 
 

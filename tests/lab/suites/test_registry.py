@@ -142,8 +142,10 @@ def test_a_suite_without_its_data_is_skipped_and_a_failing_one_stops_no_other(jo
     bad, good = replace(Counted("bad").suite(), run=fails), Counted("good")
     outcomes = run_all(job, tmp_path / "out", [Counted("hungry").suite("needed"), bad, good.suite()])
     assert [(one.said.split(":")[0], one.failed) for one in outcomes] == [
-        ("skipped", False), ("failed", True), ("measured", False)
-    ]  # fmt: skip
+        ("skipped", False),
+        ("failed", True),
+        ("measured", False),
+    ]
 
 
 def test_a_suite_whose_kind_of_data_is_not_there_is_skipped_and_asked_again(job: Job, tmp_path: Path) -> None:
@@ -197,10 +199,16 @@ def test_a_set_without_test_subjects_or_captions_lacks_them(tmp_path: Path, monk
 
 def test_every_suite_that_reads_data_asks_what_it_needs(tmp_path: Path) -> None:
     assert {s.name: s.needs.__name__ for s in SUITES if s.data and s.name != "realism"} == {
-        "text": "need_captions", "transitions": "need_captions", "control": "need_captions",
-        "evaluator": "need_captions", "prediction": "need_recordings", "duet-completion": "need_pairs",
-        "duet-text": "need_pairs", "duet-answers": "need_pairs", "duet-long": "need_pairs",
-    }  # fmt: skip
+        "text": "need_captions",
+        "transitions": "need_captions",
+        "control": "need_captions",
+        "evaluator": "need_captions",
+        "prediction": "need_recordings",
+        "duet-completion": "need_pairs",
+        "duet-text": "need_pairs",
+        "duet-answers": "need_pairs",
+        "duet-long": "need_pairs",
+    }
 
 
 def test_the_command_ends_well_where_suites_were_only_skipped(

@@ -232,8 +232,23 @@ def test_published_rows_are_marked_and_possible() -> None:
 def test_numbers_say_what_was_measured_and_how_small_samples_bias_them() -> None:
     found = text.measure(trial(Painter()))
     assert found.protocol["items"] == 32
-    wanted = {"data", "split", "items", "frames per second", "representation", "statistics", "caption length", "seed",
-              "generated lengths", "sampler", "steps", "guidance", "replications", "interval", "evaluator"}  # fmt: skip
+    wanted = {
+        "data",
+        "split",
+        "items",
+        "frames per second",
+        "representation",
+        "statistics",
+        "caption length",
+        "seed",
+        "generated lengths",
+        "sampler",
+        "steps",
+        "guidance",
+        "replications",
+        "interval",
+        "evaluator",
+    }
     assert wanted <= found.protocol.keys()
     assert "16 each" in " ".join(found.notes)
 

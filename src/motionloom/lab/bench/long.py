@@ -28,10 +28,22 @@ from motionloom.tasks.text import SOLVER, SPACING
 from motionloom.weights.prior import Prior
 
 ACTIONS = (
-    "walks forward", "runs", "jumps", "turns around", "walks in a circle", "waves with the right hand", "dances",
-    "sits down and stands up", "kicks with the left leg", "crouches", "throws a ball", "claps", "walks backwards",
-    "raises both arms", "picks something up",
-)  # fmt: skip
+    "walks forward",
+    "runs",
+    "jumps",
+    "turns around",
+    "walks in a circle",
+    "waves with the right hand",
+    "dances",
+    "sits down and stands up",
+    "kicks with the left leg",
+    "crouches",
+    "throws a ball",
+    "claps",
+    "walks backwards",
+    "raises both arms",
+    "picks something up",
+)
 MANNERS = ("", " slowly", " quickly", " carefully")
 
 
@@ -116,10 +128,18 @@ def long_motion(
             peaks.append(run(["compose", *some, *make, "--weights", weights, "--out", str(out)]).peak_mb)
             progress(f"{len(some)} prompts: {peaks[-1]:.0f} MB")
     settings = {
-        "prompts": len(texts[-1]), "seconds_each": course.each, "transition_s": TRANSITION, "steps": how.steps,
-        "guidance": how.guidance, "solver": SOLVER, "spacing": SPACING, "together": BATCH,
-        "repeats": course.repeats, "published_mode": "published", "published_handshake": HANDSHAKE,
-    }  # fmt: skip
+        "prompts": len(texts[-1]),
+        "seconds_each": course.each,
+        "transition_s": TRANSITION,
+        "steps": how.steps,
+        "guidance": how.guidance,
+        "solver": SOLVER,
+        "spacing": SPACING,
+        "together": BATCH,
+        "repeats": course.repeats,
+        "published_mode": "published",
+        "published_handshake": HANDSHAKE,
+    }
     done = takes(first / course.steps, second / course.steps)
     return Measured(course.lengths, tuple(times), tuple(peaks), done, settings)
 

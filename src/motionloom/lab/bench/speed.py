@@ -94,9 +94,7 @@ def timed(jobs: Sequence[Callable[[], Any]], repeats: int, *, warm: int | None =
 def _walk(
     prior: Prior, denoise: Denoiser, x: np.ndarray, way: Sequence[int], *, solver: Solver, stop: int | None
 ) -> None:
-    walk = sample(
-        denoise, x, levels=way, solver=solver, schedule=prior.schedule, noise=row_noise(range(len(x)))
-    )  # fmt: skip
+    walk = sample(denoise, x, levels=way, solver=solver, schedule=prior.schedule, noise=row_noise(range(len(x))))
     for number, _ in enumerate(walk, start=1):
         if number == stop:
             return

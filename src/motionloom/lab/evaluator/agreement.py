@@ -106,10 +106,14 @@ def agreement(
     rows.append(Row("all ways together", {"auc": within_prompts(list(scored.values()))}))
     about = {"evaluator": evaluator.name, "weights": prior.card.name, "seeds": seeds, "prompts": len(checks)}
     return Report(
-        "agreement", f"The evaluator {evaluator.name} beside physical obedience",
-        "motionloom evaluate evaluator --data SET", {**about, "settings": settings}, COLUMNS, tuple(rows),
+        "agreement",
+        f"The evaluator {evaluator.name} beside physical obedience",
+        "motionloom evaluate evaluator --data SET",
+        {**about, "settings": settings},
+        COLUMNS,
+        tuple(rows),
         tuple(_notes(rows)),
-    )  # fmt: skip
+    )
 
 
 def _row(name: str, scored: Scored) -> Row:

@@ -324,13 +324,24 @@ def validate(
     if held.turns:
         rows.append(Row("mirrored, measured turns to a side", {"noticed": judge.sides()}))
     about = {
-        "evaluator": evaluator.name, "splits": list(SPLITS), "sources": list(sources), "repeats": repeats, "seed": seed,
-        "captioned motions": len(held.captioned), "captions": len(judge.said), "windows": len(held.windows),
-    }  # fmt: skip
+        "evaluator": evaluator.name,
+        "splits": list(SPLITS),
+        "sources": list(sources),
+        "repeats": repeats,
+        "seed": seed,
+        "captioned motions": len(held.captioned),
+        "captions": len(judge.said),
+        "windows": len(held.windows),
+    }
     return Report(
-        "evaluator", f"What the evaluator {evaluator.name} notices on held-out real motions",
-        "motionloom evaluate evaluator --data SET", about, COLUMNS, tuple(rows), tuple(notes(rows, judge)),
-    )  # fmt: skip
+        "evaluator",
+        f"What the evaluator {evaluator.name} notices on held-out real motions",
+        "motionloom evaluate evaluator --data SET",
+        about,
+        COLUMNS,
+        tuple(rows),
+        tuple(notes(rows, judge)),
+    )
 
 
 def _real(judge: Judge) -> Row:

@@ -31,10 +31,17 @@ _ONWARD = {"forward": "backward", "forwards": "backwards", "backward": "forward"
 _ONWARD_WORD = re.compile(r"\b(forwards?|backwards?)\b", re.IGNORECASE)
 _SENSES = tuple(
     re.compile(pattern, re.IGNORECASE)
-    for pattern in (r"\bleft", r"\bright(?! now| away)", r"(?<!counter)(?<!counter )(?<!counter-)\bclockwise",
-                    r"\b(counter|anti)[ -]?clockwise", r"\bforwards?\b", r"\bback(wards?)?\b",
-                    r"\bup(wards?)?\b", r"\bdown(wards?)?\b")
-)  # fmt: skip
+    for pattern in (
+        r"\bleft",
+        r"\bright(?! now| away)",
+        r"(?<!counter)(?<!counter )(?<!counter-)\bclockwise",
+        r"\b(counter|anti)[ -]?clockwise",
+        r"\bforwards?\b",
+        r"\bback(wards?)?\b",
+        r"\bup(wards?)?\b",
+        r"\bdown(wards?)?\b",
+    )
+)
 """Directions in opposite pairs: words that pooled sentence vectors hardly tell apart."""
 TIMED = re.compile(
     r"\b(walk|run|ran|jog|step|climb|stairs|sit|sits|sat|stand(s|ing)? up|jump(s|ed|ing)? (forward|down|over)|forward|"
@@ -157,11 +164,15 @@ class Pairs:
             features[row, : len(motion)] = torch.from_numpy(motion)
         alone = ("human", "index")  # captions: each its own group
         return PairBatch(
-            features, lengths, torch.tensor([*texts, *(self.contrary[texts[row]] for row in text_rows)]), rows,
-            torch.tensor(motion_rows, dtype=torch.long), torch.tensor(text_rows, dtype=torch.long),
+            features,
+            lengths,
+            torch.tensor([*texts, *(self.contrary[texts[row]] for row in text_rows)]),
+            rows,
+            torch.tensor(motion_rows, dtype=torch.long),
+            torch.tensor(text_rows, dtype=torch.long),
             torch.tensor([-1 - row if i.group in alone else self._group[i.group] for row, i in enumerate(items)]),
             torch.tensor([self.takes[n] for n in numbers]),
-        )  # fmt: skip
+        )
 
     def _hard_motions(
         self, shown: Sequence[np.ndarray], texts: Sequence[int], rng: np.random.Generator

@@ -121,8 +121,10 @@ def train_evaluator(
     mean, std = input_statistics(pairs, seed=recipe.seed)
     words = WordBank(text, pairs.texts, room=64, progress=say if world.rank == 0 else lambda line: None)
     objective = Contrast(net, pairs, words, mean, std, device=world.device)
-    say(f"{sum(p.numel() for p in net.parameters()):,} parameters of {INPUTS} inputs, {len(pairs.data.items):,} "
-        f"described stretches, {len(pairs.texts):,} sentences, {pairs.data.minutes:.0f} minutes recorded")  # fmt: skip
+    say(
+        f"{sum(p.numel() for p in net.parameters()):,} parameters of {INPUTS} inputs, {len(pairs.data.items):,} "
+        f"described stretches, {len(pairs.texts):,} sentences, {pairs.data.minutes:.0f} minutes recorded"
+    )
     place = folder / f"{recipe.name}.safetensors"
 
     def export(_: nn.Module, average: Average, step: int) -> None:

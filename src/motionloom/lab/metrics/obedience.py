@@ -96,7 +96,9 @@ _LOCOMOTION = r"walk|\brun|jog|sprint|dash|strid|step|march|stroll|dribbl|danc|s
 
 CHECKS: tuple[Check, ...] = (
     Check(
-        "walk forward", "a person walks forward", 4.0,
+        "walk forward",
+        "a person walks forward",
+        4.0,
         ("someone is walking straight ahead", "a man strolls forwards"),
         (
             Bound("advance", "a few steps cover more than a metre", low=1.2),
@@ -110,7 +112,9 @@ CHECKS: tuple[Check, ...] = (
         related=_LOCOMOTION,
     ),
     Check(
-        "walk backward", "a person walks backwards", 4.0,
+        "walk backward",
+        "a person walks backwards",
+        4.0,
         ("someone steps back several times", "a man is walking in reverse"),
         (
             Bound("advance", "a few steps back cover most of a metre", high=-0.8),
@@ -121,17 +125,22 @@ CHECKS: tuple[Check, ...] = (
         related=r"back|salsa|danc",
     ),
     Check(
-        "walk sideways", "a person walks sideways", 4.0,
+        "walk sideways",
+        "a person walks sideways",
+        4.0,
         ("someone side steps to the left", "a man shuffles to the side"),
         (
             Bound("sidestep", "a few side steps cover most of a metre", low=0.7),
             Bound("side_share", "most of the way is across the chest", low=0.6),
         ),
         words=r"sideways",
-        unless=r"danc|arabesque|up to the|angle|then|^walks sideways to", related=r"walk (left|right)|side|danc|salsa",
+        unless=r"danc|arabesque|up to the|angle|then|^walks sideways to",
+        related=r"walk (left|right)|side|danc|salsa",
     ),
     Check(
-        "run", "a person runs forward", 3.0,
+        "run",
+        "a person runs forward",
+        3.0,
         ("someone sprints ahead", "a man is running fast"),
         (
             Bound("top_pace", "people walk at less than 2 m/s", low=2.0),
@@ -143,7 +152,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"\brun|jog|sprint|dash|leap|skip|dart|race|roll",
     ),
     Check(
-        "jog", "a person jogs slowly", 3.0,
+        "jog",
+        "a person jogs slowly",
+        3.0,
         ("someone is jogging along", "a man goes for an easy jog forward"),
         (
             Bound("top_pace", "a jog is faster than a walk and slower than a sprint", low=1.9, high=4.2),
@@ -155,7 +166,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"\brun|jog|sprint|dash|leap|skip|dart|race|roll",
     ),
     Check(
-        "jump", "a person jumps up", 3.0,
+        "jump",
+        "a person jumps up",
+        3.0,
         ("someone leaps into the air with both feet", "a man jumps up and down"),
         (
             Bound("jump_rise", "the body leaves its usual height by a hand's length", low=0.15),
@@ -166,7 +179,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"jump|\bhop|leap|jete|skip|cartwheel",
     ),
     Check(
-        "hop", "a person hops on one leg", 4.0,
+        "hop",
+        "a person hops on one leg",
+        4.0,
         ("someone is hopping on the left foot", "a man jumps several times on his right leg"),
         (Bound("hops", "the same foot takes off and lands at least twice while the other is held up", low=2),),
         words=r"(hop|jump)[a-z]* .*\b(one|left|right|each) (foot|leg)",
@@ -174,7 +189,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"\bhop|jump",
     ),
     Check(
-        "turn left", "a person turns to the left", 4.0,
+        "turn left",
+        "a person turns to the left",
+        4.0,
         ("someone makes a left turn", "a man walks and turns left"),
         (Bound("turn", "half of a quarter turn or more, to the left", low=45.0, high=300.0),),
         words=r"turn[- ]left|left turn|turns? (to (the|his|their|her) )?left",
@@ -182,7 +199,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"turn|circle|clockwise|spin|twirl|twist|rotat|danc|salsa|ballet|pirouette|around|left|pivot",
     ),
     Check(
-        "turn right", "a person turns to the right", 4.0,
+        "turn right",
+        "a person turns to the right",
+        4.0,
         ("someone makes a right turn", "a man walks and turns right"),
         (Bound("turn", "half of a quarter turn or more, to the right", low=-300.0, high=-45.0),),
         words=r"turn[- ]right|right turn|turns? (to (the|his|their|her) )?right",
@@ -190,7 +209,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"turn|circle|clockwise|spin|twirl|twist|rotat|danc|salsa|ballet|pirouette|around|right|pivot",
     ),
     Check(
-        "walk in a circle", "a person walks in a circle", 8.0,
+        "walk in a circle",
+        "a person walks in a circle",
+        8.0,
         ("someone walks around in a big circle", "a man is going round in a circle"),
         (
             Bound("winding", "the path bends round by three quarters of a circle or more", low=270.0),
@@ -202,7 +223,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"circle|around|turn|danc|salsa",
     ),
     Check(
-        "punch", "a person punches", 4.0,
+        "punch",
+        "a person punches",
+        4.0,
         ("someone throws a punch", "a man is boxing"),
         (
             Bound("punch_speed", "a fist shoots away from the body at chest height", low=1.4),
@@ -213,7 +236,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"punch|box|strik|karate|martial|fight|oiduki|heian|syutouuke",
     ),
     Check(
-        "kick", "a person kicks", 4.0,
+        "kick",
+        "a person kicks",
+        4.0,
         ("someone kicks a ball", "a man does a karate kick"),
         (
             Bound("kick", "a foot in front or at the side is well above the other", low=0.18),
@@ -224,7 +249,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"kick|karate|martial|fight|heian|soccer",
     ),
     Check(
-        "wave", "a person waves with one hand", 4.0,
+        "wave",
+        "a person waves with one hand",
+        4.0,
         ("someone waves hello", "a man raises his hand and waves goodbye"),
         (
             Bound("wave_swings", "a raised hand goes to and fro twice", low=4),
@@ -236,7 +263,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"wav|\bbye|traffic|flap|swing|shak",
     ),
     Check(
-        "raise both arms", "a person raises both arms", 3.0,
+        "raise both arms",
+        "a person raises both arms",
+        3.0,
         ("someone lifts both hands up", "a man puts his arms in the air"),
         (
             Bound("arms_raised", "both wrists stay up at the shoulders or above for a third of a second", low=0.3),
@@ -247,7 +276,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"rais|arms|both hands|hands (up|in the air|over|above)|climb|hang|reach|jack|jumpshot|shoot",
     ),
     Check(
-        "bend down", "a person bends down", 4.0,
+        "bend down",
+        "a person bends down",
+        4.0,
         ("someone bends over", "a man bows forward"),
         (
             Bound("bend", "the back leans forward by more than a quarter of a right angle", low=26.0),
@@ -258,7 +289,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"\bbend|\bbow|pick|squat|crouch|roll|duck|cartwheel|fold|curl|hunch|mop|stretch|kneel",
     ),
     Check(
-        "sit down", "a person sits down", 5.0,
+        "sit down",
+        "a person sits down",
+        5.0,
         ("someone takes a seat on a chair", "a man sits down and stays seated"),
         (
             Bound("pelvis_low", "on a seat the hips are clearly lower than standing", high=0.85),
@@ -272,7 +305,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"\bsit|seat|squat|crouch|curl",
     ),
     Check(
-        "dance", "a person dances", 6.0,
+        "dance",
+        "a person dances",
+        6.0,
         ("someone is dancing to music", "a man dances the salsa"),
         (
             Bound("leg_energy", "the feet keep moving", low=0.3),
@@ -286,7 +321,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"danc|salsa|ballet|ballerina|twirl|pirouette|arabesque|jete",
     ),
     Check(
-        "climb", "a person climbs up a ladder", 6.0,
+        "climb",
+        "a person climbs up a ladder",
+        6.0,
         ("someone climbs up the stairs", "a man is climbing up steps"),
         (Bound("rise", "both feet end up clearly higher than they were", low=0.35),),
         words=r"climb",
@@ -294,7 +331,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"climb|stair|ladder|steps? up|upstairs|hang|playground|acrobatics",
     ),
     Check(
-        "stand still", "a person stands still", 4.0,
+        "stand still",
+        "a person stands still",
+        4.0,
         ("someone is standing and not moving", "a man stands in place"),
         (
             Bound("mean_stir", "the joints hardly move", high=0.1),
@@ -308,7 +347,9 @@ CHECKS: tuple[Check, ...] = (
         related=r"stand|still|pose|balanc",
     ),
     Check(
-        "crouch", "a person squats down", 4.0,
+        "crouch",
+        "a person squats down",
+        4.0,
         ("someone crouches low", "a man goes down into a squat and comes up again"),
         (
             Bound("pelvis_low", "the hips come well down towards the heels", high=0.8),
@@ -319,7 +360,7 @@ CHECKS: tuple[Check, ...] = (
         unless=r"danc|fight|while|karate|stance",
         related=r"crouch|squat|\bsit|duck|roll|curl",
     ),
-)  # fmt: skip
+)
 
 
 def check(name: str) -> Check:

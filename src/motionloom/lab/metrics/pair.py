@@ -170,8 +170,13 @@ def _limb(start: str, end: str, first: float, last: float) -> tuple:
 
 
 def _side(side: str) -> tuple[tuple, ...]:
-    bones = (("hip", "knee", 0.0738), ("knee", "ankle", 0.0561), ("ankle", "foot", 0.0337),
-             ("shoulder", "elbow", 0.0481), ("elbow", "wrist", 0.0366))  # fmt: skip
+    bones = (
+        ("hip", "knee", 0.0738),
+        ("knee", "ankle", 0.0561),
+        ("ankle", "foot", 0.0337),
+        ("shoulder", "elbow", 0.0481),
+        ("elbow", "wrist", 0.0366),
+    )
     return tuple(_limb(f"{side}_{a}", f"{side}_{b}", thick, 0.74 * thick) for a, b, thick in bones)
 
 
@@ -185,9 +190,13 @@ CAPSULES: tuple[tuple, ...] = (
     # the trunk is wider than deep: pelvis and chest lie across, the belly stands; radii are the drawn half depths
     (_at(left_hip=1.0), _at(right_hip=1.0), 0.050 * _HEIGHT, 0.050 * _HEIGHT),
     (_at(pelvis=1.0), _at(spine3=1.0), 0.055 * _HEIGHT, 0.055 * _HEIGHT),
-    (_at(spine3=0.5, left_shoulder=0.4, right_shoulder=0.1),
-     _at(spine3=0.5, left_shoulder=0.1, right_shoulder=0.4), 0.050 * _HEIGHT, 0.050 * _HEIGHT),
-)  # fmt: skip
+    (
+        _at(spine3=0.5, left_shoulder=0.4, right_shoulder=0.1),
+        _at(spine3=0.5, left_shoulder=0.1, right_shoulder=0.4),
+        0.050 * _HEIGHT,
+        0.050 * _HEIGHT,
+    ),
+)
 """The body that the project draws (`viz.figure`, `io.body`) as capsules: ends as weighted joints, radii in metres."""
 RADII: Array = np.array([capsule[2:] for capsule in CAPSULES])
 """(capsules, 2) metres at both ends, for the uniform person."""

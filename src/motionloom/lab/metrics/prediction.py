@@ -309,10 +309,19 @@ def score_window(
         measured |= {f"seam_{name}": value for name, value in seam(past, s, fps)._asdict().items()}
     variety = apd(s)
     return WindowScores(
-        len(y), speeds(s), variety, float(mean.min()), float(errors[:, -1].min()), *mm,
-        abs(variety - apd(y)) if len(y) > 1 else None, float(np.median(mean)), float(mean.max()),
-        jolt.mean, jolt.peak, **measured,
-    )  # fmt: skip
+        len(y),
+        speeds(s),
+        variety,
+        float(mean.min()),
+        float(errors[:, -1].min()),
+        *mm,
+        abs(variety - apd(y)) if len(y) > 1 else None,
+        float(np.median(mean)),
+        float(mean.max()),
+        jolt.mean,
+        jolt.peak,
+        **measured,
+    )
 
 
 class Average(NamedTuple):

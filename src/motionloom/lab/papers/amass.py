@@ -29,22 +29,42 @@ AMASS_LICENCE = "AMASS: non-commercial research, under its own licence and those
 UNIFORM = "joint places are those of the uniform person's bones, not of the body model"
 AMASS_SETS = {
     "train": (
-        "ACCAD", "BMLhandball", "BMLmovi", "BMLrub", "CMU", "EKUT", "EyesJapanDataset", "KIT", "PosePrior", "TCDHands",
+        "ACCAD",
+        "BMLhandball",
+        "BMLmovi",
+        "BMLrub",
+        "CMU",
+        "EKUT",
+        "EyesJapanDataset",
+        "KIT",
+        "PosePrior",
+        "TCDHands",
         "TotalCapture",
     ),
     "val": ("HumanEva", "HDM05", "SFU", "MoSh"),
     "test": ("DFaust", "DanceDB", "GRAB", "HUMAN4D", "SOMA", "SSM", "Transitions"),
-}  # fmt: skip
+}
 """Whole data sets by split."""
 AMASS_SPEEDS = {
-    "DFaust": 0.0048603, "DanceDB": 0.0081590, "GRAB": 0.0017740, "HUMAN4D": 0.0043917, "SOMA": 0.0075961,
-    "SSM": 0.0057579, "Transitions": 0.0085301,
-}  # fmt: skip
+    "DFaust": 0.0048603,
+    "DanceDB": 0.0081590,
+    "GRAB": 0.0017740,
+    "HUMAN4D": 0.0043917,
+    "SOMA": 0.0075961,
+    "SSM": 0.0057579,
+    "Transitions": 0.0085301,
+}
 """Mean displacement of a joint by data set, metres per frame at 60 fps: what CMD compares with (BeLFusion)."""
 _OLD_NAMES = {
-    "biomotionlabntroje": "BMLrub", "mpilimits": "PosePrior", "tcdhandmocap": "TCDHands", "mpihdm05": "HDM05",
-    "mpimosh": "MoSh", "dfaust67": "DFaust", "ssmsynced": "SSM", "transitionsmocap": "Transitions",
-}  # fmt: skip
+    "biomotionlabntroje": "BMLrub",
+    "mpilimits": "PosePrior",
+    "tcdhandmocap": "TCDHands",
+    "mpihdm05": "HDM05",
+    "mpimosh": "MoSh",
+    "dfaust67": "DFaust",
+    "ssmsynced": "SSM",
+    "transitionsmocap": "Transitions",
+}
 _SETS = {name.lower(): name for names in AMASS_SETS.values() for name in names} | _OLD_NAMES
 _SPLITS = {name: split for split, names in AMASS_SETS.items() for name in names}
 _FARTHEST = 1e3
@@ -104,9 +124,19 @@ def read_amass(
     test = [r for r in recordings if r.split == "test"]
     listed = _listed(Path(segments), test, say) if segments is not None and "test" in splits else ()
     protocol = Protocol(
-        "amass", AMASS_FPS, OBSERVED, FUTURE, AMASS_LAYOUT, tuple(recordings), licence,
-        threshold=0.4, first=150, stride=120, listed=listed, speeds=dict(AMASS_SPEEDS),
-    )  # fmt: skip
+        "amass",
+        AMASS_FPS,
+        OBSERVED,
+        FUTURE,
+        AMASS_LAYOUT,
+        tuple(recordings),
+        licence,
+        threshold=0.4,
+        first=150,
+        stride=120,
+        listed=listed,
+        speeds=dict(AMASS_SPEEDS),
+    )
     return checked(folder, protocol)
 
 

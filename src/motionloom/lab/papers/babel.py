@@ -264,11 +264,15 @@ def pairs(segments: Sequence[Segment]) -> list[Pair]:
     known = [s for s in segments if not s.is_calibration]
     actions = [s for s in known if not s.is_transition]
     made = [
-        Pair((a.text, b.text), (a.start, min(b.start, a.end)), (b.start, max(a.end, b.start)),
-             (max(a.end, b.start), b.end))
+        Pair(
+            (a.text, b.text),
+            (a.start, min(b.start, a.end)),
+            (b.start, max(a.end, b.start)),
+            (max(a.end, b.start), b.end),
+        )
         for a, b in permutations(actions, 2)
         if a.start < b.start <= a.end + TOUCH and a.end < b.end
-    ]  # fmt: skip
+    ]
     for t in (s for s in known if s.is_transition):
         before = [a for a in actions if a.start < t.start <= a.end + TOUCH and a.end <= t.end]
         after = [b for b in actions if t.start <= b.start <= t.end + TOUCH and b.end > t.end]
@@ -282,9 +286,13 @@ def pairs(segments: Sequence[Segment]) -> list[Pair]:
 
 
 def items(
-    recording: Recording, motion: Motion, *, shortest: int = SHORTEST, longest: int = LONGEST,
+    recording: Recording,
+    motion: Motion,
+    *,
+    shortest: int = SHORTEST,
+    longest: int = LONGEST,
     crop: np.random.Generator | None = None,
-) -> Iterator[Item]:  # fmt: skip
+) -> Iterator[Item]:
     """The examples of one recording, up to four per pair: A; A and transition; B; transition and B; each once.
 
     ``motion`` at 30 fps. Kept are ``shortest`` to ``longest`` + 4 frames (`trimmed` takes the rest off); with ``crop``
@@ -328,9 +336,15 @@ def trimmed(item: Item, rng: np.random.Generator, *, shortest: int = SHORTEST, l
 
 
 def load_items(
-    folder: Path | str, split: str = "train", *, shortest: int = SHORTEST, longest: int = LONGEST, crop: bool = False,
-    seed: int = 0, dropped: Callable[[str], None] | None = None,
-) -> list[Item]:  # fmt: skip
+    folder: Path | str,
+    split: str = "train",
+    *,
+    shortest: int = SHORTEST,
+    longest: int = LONGEST,
+    crop: bool = False,
+    seed: int = 0,
+    dropped: Callable[[str], None] | None = None,
+) -> list[Item]:
     """All examples of one split of a BABEL folder. ``crop``: cut longer ones at random, by ``seed`` (see `items`).
 
     ``dropped`` is called with a sentence for each recording that is missing, broken or under half a second; without it

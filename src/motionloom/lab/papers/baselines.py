@@ -34,9 +34,10 @@ def slerp_joined(motions: Sequence[Motion], *, blank: int = BLANK) -> Motion:
         last, first = joined.rotations[-1], following.rotations[0]
         shape = (blank, *last.shape[:-1])
         between = rot.slerp(
-            np.broadcast_to(last, (*shape, 4)), np.broadcast_to(first, (*shape, 4)),
+            np.broadcast_to(last, (*shape, 4)),
+            np.broadcast_to(first, (*shape, 4)),
             np.broadcast_to(amount[:, None], shape),
-        )  # fmt: skip
+        )
         way = joined.root[-1] * (1 - amount[:, None]) + following.root[0] * amount[:, None]
         joined = replace(
             joined,

@@ -83,9 +83,13 @@ def control_features(
     if corrections is not None:
         denoise = corrected(denoise, corrections)
     return controlled(
-        denoise, Observed(known, mask, observed.noise_free), levels=chosen.levels(prior.schedule),
-        solver=SOLVERS[chosen.solver], schedule=prior.schedule, noise=row_noise(seeds),
-    )  # fmt: skip
+        denoise,
+        Observed(known, mask, observed.noise_free),
+        levels=chosen.levels(prior.schedule),
+        solver=SOLVERS[chosen.solver],
+        schedule=prior.schedule,
+        noise=row_noise(seeds),
+    )
 
 
 def controlled(
@@ -108,9 +112,14 @@ def controlled(
     x = schedule.noised(start, levels[0], noise(known))
     hold = observe(known, mask, schedule, np.zeros_like) if observed.noise_free else chain()
     return run(
-        inpaint(denoise, known, mask), hold(x, levels[0]), levels=levels,
-        solver=solver, schedule=schedule, noise=noise, constrain=hold,
-    )  # fmt: skip
+        inpaint(denoise, known, mask),
+        hold(x, levels[0]),
+        levels=levels,
+        solver=solver,
+        schedule=schedule,
+        noise=noise,
+        constrain=hold,
+    )
 
 
 def _given(prior: Prior, known: np.ndarray, mask: np.ndarray) -> np.ndarray:

@@ -402,9 +402,17 @@ def double_take_features(
     else:
         second = _without_text(prior, joins, known[1])
         made = double_take(
-            first, second, x, plan, mode=chosen, way=way, schedule=prior.schedule, noise=noise, solver=walker,
+            first,
+            second,
+            x,
+            plan,
+            mode=chosen,
+            way=way,
+            schedule=prior.schedule,
+            noise=noise,
+            solver=walker,
             second_take_only=second_take_only,
-        ).unfolded  # fmt: skip
+        ).unfolded
     finished = made[0] * prior.std + prior.mean
     return smooth(finished) if prior.net.config.patch > 1 else finished, plan.ends
 

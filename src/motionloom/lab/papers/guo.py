@@ -178,9 +178,14 @@ def tokens_of(line: str) -> tuple[str, ...]:
 
 
 def read_published(
-    path: Path | str, *, mean: Path | str | None = None, std: Path | str | None = None,
-    glove: Path | str | None = None, lists: Path | str | None = None, card: Mapping[str, str] | None = None,
-) -> GuoEvaluator:  # fmt: skip
+    path: Path | str,
+    *,
+    mean: Path | str | None = None,
+    std: Path | str | None = None,
+    glove: Path | str | None = None,
+    lists: Path | str | None = None,
+    card: Mapping[str, str] | None = None,
+) -> GuoEvaluator:
     """The evaluator of a published ``finest.tar`` with the user's statistics and word files.
 
     What is not named is taken from beside the checkpoint where it lies there under its published name: ``t2m_mean.npy``

@@ -22,9 +22,22 @@ from motionloom.lab.papers.plain_pickle import read_plain_file
 from motionloom.reading import read_bytes
 
 TAGS = (
-    "VERB", "NOUN", "DET", "ADP", "NUM", "AUX", "PRON", "ADJ", "ADV",
-    "Loc_VIP", "Body_VIP", "Obj_VIP", "Act_VIP", "Desc_VIP", "OTHER",
-)  # fmt: skip
+    "VERB",
+    "NOUN",
+    "DET",
+    "ADP",
+    "NUM",
+    "AUX",
+    "PRON",
+    "ADJ",
+    "ADV",
+    "Loc_VIP",
+    "Body_VIP",
+    "Obj_VIP",
+    "Act_VIP",
+    "Desc_VIP",
+    "OTHER",
+)
 """The 15 parts of speech, in the order of the network's one-hot input."""
 SPECIAL = TAGS[9:14]
 """Those given by word lists, not by a tagger."""

@@ -37,9 +37,14 @@ Padding = Literal["last", "zero", "repeat"]
 Way = Callable[[np.ndarray], np.ndarray]
 
 PARTS = {
-    "right_leg": (0, 3), "left_leg": (3, 6), "torso": (6, 10), "left_arm": (10, 13), "right_arm": (13, 16),
-    "lower": (0, 6), "upper": (6, 16),
-}  # fmt: skip
+    "right_leg": (0, 3),
+    "left_leg": (3, 6),
+    "torso": (6, 10),
+    "left_arm": (10, 13),
+    "right_arm": (13, 16),
+    "lower": (0, 6),
+    "upper": (6, 16),
+}
 """Joints [first, end) of the 16 told joints of Human3.6M, for part control (`fix_0` to `fix_6` in this order)."""
 
 
@@ -102,9 +107,15 @@ class Options(TypedDict, total=False):
 
 
 def published_completion(
-    denoise: Denoiser, observed: np.ndarray, rows: int, *, basis: Basis, schedule: Schedule, noise: NoiseSource,
+    denoise: Denoiser,
+    observed: np.ndarray,
+    rows: int,
+    *,
+    basis: Basis,
+    schedule: Schedule,
+    noise: NoiseSource,
     **options: Unpack[Options],
-) -> tuple[State, np.ndarray]:  # fmt: skip
+) -> tuple[State, np.ndarray]:
     """DCT-Completion.
 
     Args:
@@ -241,9 +252,12 @@ def _complete(
     condition = predictor.condition(window, mask[..., ::3], pose) if bool(keep.any()) else None
     denoise = predictor.denoiser(condition, None if bool(keep.all()) else keep)
     constrain = mixed_in_time(
-        [Held(known, mask > 0)], lambda x: predictor.to_features(x, pose), lambda x: predictor.to_state(x, pose),
-        schedule, noise,
-    )  # fmt: skip
+        [Held(known, mask > 0)],
+        lambda x: predictor.to_features(x, pose),
+        lambda x: predictor.to_state(x, pose),
+        schedule,
+        noise,
+    )
     walk, start = published_levels(schedule, steps), noise(known)
     state = run(denoise, start, levels=walk, solver=Ddim(), schedule=schedule, noise=noise, constrain=constrain)
     return predictor.to_features(state, pose)

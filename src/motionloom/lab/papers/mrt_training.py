@@ -25,9 +25,17 @@ from motionloom.weights.prior import find_device
 SECONDS = 3
 """Seconds that are predicted after the first."""
 RECIPE = Recipe(
-    name="mrt", steps=1500, batch=16, rate=3e-4, warmup=30, cooldown=0.5, decay=0.0, ema=0.995, amp="float32",
+    name="mrt",
+    steps=1500,
+    batch=16,
+    rate=3e-4,
+    warmup=30,
+    cooldown=0.5,
+    decay=0.0,
+    ema=0.995,
+    amp="float32",
     save_every=250,
-)  # fmt: skip
+)
 """Of a CPU's sitting; the paper: rate 3e-4, batches of 64, 100 epochs."""
 
 

@@ -19,9 +19,14 @@ from motionloom.weights.prior import Card, Prior
 
 
 def import_published(
-    path: Path | str, *, mean: np.ndarray, std: np.ndarray, name: str | None = None, licence: str | None = None,
+    path: Path | str,
+    *,
+    mean: np.ndarray,
+    std: np.ndarray,
+    name: str | None = None,
+    licence: str | None = None,
     warn: Callable[[str], None] = lambda line: None,
-) -> Prior:  # fmt: skip
+) -> Prior:
     """A published MDM or PriorMDM checkpoint (``model*.pt``, with ``args.json`` beside it) as a `Prior`.
 
     Of a checkpoint of two people (ComMDM) it is the network of each; `import_block` reads the rest.

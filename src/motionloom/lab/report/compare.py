@@ -212,14 +212,17 @@ def encode(found: Sequence[Difference]) -> list[dict[str, Any]]:
     """Plain data for JSON; an interval or number that is not finite is null."""
     return [
         {
-            "suite": one.suite, "row": one.row, "column": one.column.name, "verdict": one.verdict,
+            "suite": one.suite,
+            "row": one.row,
+            "column": one.column.name,
+            "verdict": one.verdict,
             **{
                 name: {"mean": _or_none(v.mean), "interval": _or_none(v.interval), "count": v.count}
                 for name, v in (("before", one.before), ("after", one.after))
             },
         }
         for one in found
-    ]  # fmt: skip
+    ]
 
 
 def _or_none(value: float) -> float | None:

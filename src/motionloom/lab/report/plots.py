@@ -127,9 +127,17 @@ def _point(axis: "Axes", place: float, row: Row, value: Value, *, share: bool = 
     colour, mark = (OTHERS, "D") if row.measured_on else (REALITY, "s") if row.name == REAL else (OURS, "o")
     colour = CONTROL if colour == OURS and is_control(row.name) else colour
     axis.errorbar(
-        value.mean, place, xerr=_spread(value, share=share), fmt=mark, color=colour, markersize=5, capsize=3,
-        elinewidth=1.2, zorder=3, markerfacecolor="white" if row.measured_on else colour,
-    )  # fmt: skip
+        value.mean,
+        place,
+        xerr=_spread(value, share=share),
+        fmt=mark,
+        color=colour,
+        markersize=5,
+        capsize=3,
+        elinewidth=1.2,
+        zorder=3,
+        markerfacecolor="white" if row.measured_on else colour,
+    )
     if share:
         axis.set_xlim(-0.04, 1.04)
 
@@ -155,9 +163,16 @@ def _lines(report: Report, columns: Sequence[Column], lines: dict[str, list[tupl
                 continue
             spread = [value.interval if math.isfinite(value.interval) else 0.0 for _, value in found]
             axis.errorbar(
-                [steps for steps, _ in found], [value.mean for _, value in found], yerr=spread, color=colour,
-                marker="o", markersize=4, capsize=2, linewidth=1.2, label=_plain(name, 30) or "measured",
-            )  # fmt: skip
+                [steps for steps, _ in found],
+                [value.mean for _, value in found],
+                yerr=spread,
+                color=colour,
+                marker="o",
+                markersize=4,
+                capsize=2,
+                linewidth=1.2,
+                label=_plain(name, 30) or "measured",
+            )
         if real and column.name in real.values and math.isfinite(real.values[column.name].mean):
             axis.axhline(real.values[column.name].mean, color=REALITY, linewidth=0.8, linestyle="--", label=REAL)
         ticks = sorted({steps for points in lines.values() for steps, _ in points})

@@ -39,8 +39,12 @@ from motionloom.tasks.text import GUIDANCE, STEPS
 from motionloom.weights.adapter import adapters
 
 COUNT, REPLICATIONS = 32, 3
-RATIOS = {"share_ratio": "skate_share", "speed_ratio": "skate_speed", "slide_ratio": "skate_slide",
-          "jerk_ratio": "jerk"}  # fmt: skip
+RATIOS = {
+    "share_ratio": "skate_share",
+    "speed_ratio": "skate_speed",
+    "slide_ratio": "skate_slide",
+    "jerk_ratio": "jerk",
+}
 """Columns that hold a number against that of the uncontrolled row of the same kind and finish (`BASE`)."""
 SEEN = {"skate_share": 0.1, "skate_speed": 0.1, "skate_slide": 0.01, "jerk": 0.1}
 """Of uncontrolled motions: what is smaller is nothing, and nothing is held against it."""
@@ -54,12 +58,22 @@ COLUMNS: tuple[Column, ...] = (
     Column("worst", "worst cm", "down", "the largest of both", 1),
     Column("beyond_20", "beyond 20 cm", "down", "location failure: share of asked joint-frames more than 20 cm off"),
     Column("beyond_50", "beyond 50 cm", "down", "location failure: share of asked joint-frames more than 50 cm off"),
-    Column("root_sequences", "root failed", "down", "trajectory failure: share of motions whose pelvis is anywhere "
-           "more than 50 cm off"),
+    Column(
+        "root_sequences",
+        "root failed",
+        "down",
+        "trajectory failure: share of motions whose pelvis is anywhere more than 50 cm off",
+    ),
     Column("joint_sequences", "joints failed", "down", "the same for the other joints"),
     Column("facing", "facing °", "down", "between the ways the body and the real one face, where it is asked", 1),
-    Column("feature_error", "features", "down", "controlled numbers of the representation from the real ones, mean in "
-           "standard deviations; ways that write them have 0, and what they miss in the world is decoding drift", 3),
+    Column(
+        "feature_error",
+        "features",
+        "down",
+        "controlled numbers of the representation from the real ones, mean in "
+        "standard deviations; ways that write them have 0, and what they miss in the world is decoding drift",
+        3,
+    ),
     Column("skate_share", "skate %", "down", "frames in which a toe below 5 cm moves more than 2.5 cm (GMD)", 2),
     Column("skate_speed", "skate cm/s", "down", "mean speed of the toes below 5 cm (Kimodo)", 2),
     Column("skate_slide", "skate mm/frame", "down", "step of a toe at contact (Motius)", 2),
@@ -70,7 +84,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("slide_ratio", "skate mm/frame ×", "down", "against the uncontrolled row of the same finish", 2),
     Column("jerk_ratio", "jerk ×", "down", "against the uncontrolled row of the same finish", 2),
     Column("seconds", "s per motion", "", "wall time from the goal to the motion, on the machine that measured", 2),
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +121,14 @@ class Trial:
 
 
 def prepare(
-    items: Sequence[Item], evaluator: Evaluator, make: Maker, protocol: Protocol, *, scale: np.ndarray,
+    items: Sequence[Item],
+    evaluator: Evaluator,
+    make: Maker,
+    protocol: Protocol,
+    *,
+    scale: np.ndarray,
     selection: Selection,
-) -> Trial:  # fmt: skip
+) -> Trial:
     """Choose the items, spread evenly, and embed them; MotionloomError where they do not fill a batch."""
     real = text_reference.measure(items, evaluator, selection)
     rows = spread(protocol.count or len(items), len(items))
@@ -121,9 +140,17 @@ def prepare(
     cuts = np.cumsum([len(item.captions) for item in chosen])[:-1]
     texts = tuple(np.split(evaluator.texts(flat), cuts))
     return Trial(
-        chosen, texts, real.motions[rows], real.motions, evaluator, make, protocol,
-        np.asarray(scale, dtype=np.float64), real.data, selection,
-    )  # fmt: skip
+        chosen,
+        texts,
+        real.motions[rows],
+        real.motions,
+        evaluator,
+        make,
+        protocol,
+        np.asarray(scale, dtype=np.float64),
+        real.data,
+        selection,
+    )
 
 
 # ---- the numbers of one replication ----------------------------------------------------------------------------------
@@ -159,7 +186,7 @@ def met(made: Sequence[Made], targets: Sequence[Target], scale: np.ndarray) -> d
         found |= {"worst": both.worst, "beyond_20": both.beyond_20, "beyond_50": both.beyond_50}
     turns = [
         metrics.facing_error(one.positions, target.goal.positions, target.goal.facing_asked) for one, target in pairs
-    ]  # fmt: skip
+    ]
     found["facing"] = float(np.mean(every)) if (every := np.concatenate(turns)).size else math.nan
     found["feature_error"] = metrics.feature_error(
         [one.features / scale for one in made],
@@ -255,10 +282,14 @@ def measure(
         "fid": f"of {len(trial.items)} motions to all {len(trial.everyone)} real ones",
     }
     return Report(
-        "control", f"Control: {label}", command, described, COLUMNS,
+        "control",
+        f"Control: {label}",
+        command,
+        described,
+        COLUMNS,
         (*rows, *published_rows.published("control", [column.name for column in COLUMNS])),
         (*_notes(trial), *missing),
-    )  # fmt: skip
+    )
 
 
 def _new(
@@ -274,9 +305,7 @@ def _new(
     return found
 
 
-def against(
-    numbers: Sequence[dict[str, float]], base: Sequence[dict[str, float]] | None
-) -> list[dict[str, float]]:  # fmt: skip
+def against(numbers: Sequence[dict[str, float]], base: Sequence[dict[str, float]] | None) -> list[dict[str, float]]:
     """The numbers of each replication with their `RATIOS` to the uncontrolled row's, if there is one."""
     if base is None:
         return list(numbers)
@@ -331,9 +360,13 @@ def run(
     judge, selection = run.judge(), fitting(run.data, selection)
     how = Sampling(protocol.steps[0], protocol.guidance, protocol.solver, protocol.spacing)
     trial = prepare(
-        read_items(run.data, selection), judge, maker(prior, how), protocol,
-        scale=prior.std, selection=selection,
-    )  # fmt: skip
+        read_items(run.data, selection),
+        judge,
+        maker(prior, how),
+        protocol,
+        scale=prior.std,
+        selection=selection,
+    )
     files = {name: digest(path) for name, path in adapters().items()}
     said = {**protocol.drawn(), "steps": list(protocol.steps), "adapters": files, "items": identity(trial.items)}
     parts = run.parts({**said, **run.settings(judge)})
@@ -350,9 +383,14 @@ def settings(
 ) -> Protocol:
     """How it is measured unless asked otherwise; fewer motions than 32 are one batch."""
     return Protocol(
-        count=count, batch=min(32, max(count, 4)), replications=replications, multimodality=(0, 0), steps=(steps,),
-        guidance=guidance, seed=seed,
-    )  # fmt: skip
+        count=count,
+        batch=min(32, max(count, 4)),
+        replications=replications,
+        multimodality=(0, 0),
+        steps=(steps,),
+        guidance=guidance,
+        seed=seed,
+    )
 
 
 def quick() -> Protocol:

@@ -25,8 +25,15 @@ INPAINTING, TUNED, BLENDING = "MDM inpainting", "fine-tuned", "DiffusionBlending
 LOOSE, OURS = "ours without exact fit", "ours"
 METHODS = (UNCONTROLLED, EXPORTED, INPAINTING, TUNED, BLENDING, LOOSE, OURS)
 """In the order of the table."""
-BASE = {UNCONTROLLED: UNCONTROLLED, INPAINTING: UNCONTROLLED, TUNED: UNCONTROLLED, BLENDING: UNCONTROLLED,
-        EXPORTED: EXPORTED, LOOSE: EXPORTED, OURS: EXPORTED}  # fmt: skip
+BASE = {
+    UNCONTROLLED: UNCONTROLLED,
+    INPAINTING: UNCONTROLLED,
+    TUNED: UNCONTROLLED,
+    BLENDING: UNCONTROLLED,
+    EXPORTED: EXPORTED,
+    LOOSE: EXPORTED,
+    OURS: EXPORTED,
+}
 """The uncontrolled row that each is a ratio to: of motions as drawn, or of exported ones."""
 
 
@@ -92,9 +99,15 @@ def uncontrolled(prior: Prior, how: Sampling, *, exported: bool) -> Method:
 
     def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
         drawn = sample_features(
-            prior, [target.prompt for target in targets], [len(target) for target in targets], seeds=seeds,
-            guidance=how.guidance, steps=how.steps, solver=how.solver, spacing=how.spacing,
-        )  # fmt: skip
+            prior,
+            [target.prompt for target in targets],
+            [len(target) for target in targets],
+            seeds=seeds,
+            guidance=how.guidance,
+            steps=how.steps,
+            solver=how.solver,
+            spacing=how.spacing,
+        )
         features = [one.astype(np.float64) for one in drawn]
         return [of_motion(to_motion(one, prior.fps)) if exported else of_features(one) for one in features]
 
@@ -117,17 +130,28 @@ def published(prior: Prior, how: Sampling, nets: Sequence[PriorSession], *, nois
 
 
 def _controlled(
-    prior: Prior, how: Sampling, nets: Sequence[PriorSession], targets: Sequence[Target], seeds: Sequence[int],
+    prior: Prior,
+    how: Sampling,
+    nets: Sequence[PriorSession],
+    targets: Sequence[Target],
+    seeds: Sequence[int],
     noise_free: bool,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """(rows, frames, 263) not standardised, of targets of one length."""
     mask = np.stack([target.mask for target in targets])
     given = np.stack([target.known for target in targets]).astype(np.float32)
     known = (given - prior.mean) / prior.std
     state = control_features(
-        prior, nets, [target.prompt for target in targets], Observed(known, mask, noise_free), seeds=seeds,
-        guidance=how.guidance, steps=how.steps, solver=how.solver, spacing=how.spacing,
-    )  # fmt: skip
+        prior,
+        nets,
+        [target.prompt for target in targets],
+        Observed(known, mask, noise_free),
+        seeds=seeds,
+        guidance=how.guidance,
+        steps=how.steps,
+        solver=how.solver,
+        spacing=how.spacing,
+    )
     drawn = state * prior.std + prior.mean
     if prior.net.config.patch > 1:
         drawn = smooth(drawn)  # as everything that such a network draws

@@ -39,19 +39,24 @@ LOOKS = ("speed", "hand_contact", "penetration", "skate")
 CHUNK = 16
 """Crops of a piece that is kept."""
 ZERO, CONSTANT, SILENT, ALONE, MRT = (
-    "zero velocity", "constant velocity", "prior without communication", "communication only",
+    "zero velocity",
+    "constant velocity",
+    "prior without communication",
+    "communication only",
     "multi-range transformer",
-)  # fmt: skip
+)
 COLUMNS = (
     *(Column(f"root_{k}", f"root m, {k} s", "down", f"distance of the roots, first {k} s") for k in mp.HORIZONS),
-    *(Column(f"joint_{k}", f"joints m, {k} s", "down", f"the same of joints, each from its root, first {k} s")
-      for k in mp.HORIZONS),
+    *(
+        Column(f"joint_{k}", f"joints m, {k} s", "down", f"the same of joints, each from its root, first {k} s")
+        for k in mp.HORIZONS
+    ),
     Column("speed", "m/s", "real", "how fast the joints go, mean: a completion that stands still has small errors"),
     Column("hand_contact", "hands", "real", "share of frames with a wrist nearer than 25 cm to one of the other"),
     Column("penetration", "inside cm", "down", "deepest overlap of the two bodies (capsules), mean over frames", 2),
     Column("skate", "skate cm/s", "real", "speed of toes below 5 cm (Kimodo), mean of both", 1),
     Column("seconds", "s per crop", "", "wall time of one completion, on the machine that measured", 3),
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True)
@@ -113,10 +118,12 @@ def run(
     others = duet_blocks.beside(prior, beside, _asked(how))
     crops = draw(held_out(pairs_of(run.data, captions=False, say=run.progress)), how)
     about = {
-        "weights": run.label, "block": found.name if found else None, "device": run.device,
+        "weights": run.label,
+        "block": found.name if found else None,
+        "device": run.device,
         "files": {str(k): _digest(v) for k, v in (("communication", communication), ("mrt", mrt)) if v},
         "block file": _digest_of(found) if found else None,
-    }  # fmt: skip
+    }
     return measure(crops, made, how, run=run, kinds=kinds, beside=others, with_published=with_published, about=about)
 
 
@@ -175,9 +182,7 @@ def ways_of(
 
 def _asked(how: How) -> dict[str, Any]:
     """What `duet_ways.drawn` takes."""
-    return {
-        "given": how.given, "seed": how.seed, "steps": how.steps, "guidance": how.guidance, "prompt": how.prompt
-    }  # fmt: skip
+    return {"given": how.given, "seed": how.seed, "steps": how.steps, "guidance": how.guidance, "prompt": how.prompt}
 
 
 def measure(
@@ -218,9 +223,14 @@ def measure(
     said |= {"blocks beside": {one.row: one.digest for one in beside}} if beside else {}
     others = published("duet-completion", [column.name for column in COLUMNS]) if with_published else ()
     return Report(
-        "duet-completion", "Two people: three seconds after one", run.command, said, COLUMNS, (*rows, *others),
+        "duet-completion",
+        "Two people: three seconds after one",
+        run.command,
+        said,
+        COLUMNS,
+        (*rows, *others),
         (*verdicts(errors), *NOTES),
-    )  # fmt: skip
+    )
 
 
 NOTES = (
@@ -313,15 +323,21 @@ def protocol_of(crops: Crops, how: How) -> dict[str, Any]:
     known, true = GIVEN[how.given]
     last = "of the real next frame" if true else "as between the last two given ones"
     return {
-        "split": "validation and test pairs", "crops": len(crops.numbers), "frames per second": mp.FPS,
+        "split": "validation and test pairs",
+        "crops": len(crops.numbers),
+        "frames per second": mp.FPS,
         "frames": f"{mp.PREFIX} given, {FRAMES - mp.PREFIX} said, errors from frame {mp.PREFIX} on",
         "known slots": f"{known + 1}: D and {known} frames, the velocity out of the last {last} ({how.given})",
         "representation": "263 HumanML3D features a person; zero, constant and transformer: positions",
-        "frame of reference": "person 0 at frame 0; people of one size", "prompt": how.prompt or "none",
-        "samples": how.samples, "steps": how.steps, "guidance": how.guidance, "seed": how.seed,
+        "frame of reference": "person 0 at frame 0; people of one size",
+        "prompt": how.prompt or "none",
+        "samples": how.samples,
+        "steps": how.steps,
+        "guidance": how.guidance,
+        "seed": how.seed,
         "interval": "1.96 sigma / sqrt(crops)",
         "crops chosen": hashlib.sha256(np.round(crops.positions, 4).astype(np.float32).tobytes()).hexdigest()[:12],
-    }  # fmt: skip
+    }
 
 
 def _digest(path: Path) -> str:

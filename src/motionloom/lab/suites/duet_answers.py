@@ -81,18 +81,28 @@ def run(run: Run, *, block: str | Path | None = None, how: How | None = None, ki
     prior, found, pairs, about = judged.opened(run, block, kinds)
     given = Windows.of(pairs, how)
     return judged.measure(
-        pairs, answers(prior, found, given, how), alone(prior, given, how), how, table=table(given, how), run=run,
-        kinds=kinds, about=about | {"given": "one of the two in random windows of validation and test pairs"},
-    )  # fmt: skip
+        pairs,
+        answers(prior, found, given, how),
+        alone(prior, given, how),
+        how,
+        table=table(given, how),
+        run=run,
+        kinds=kinds,
+        about=about | {"given": "one of the two in random windows of validation and test pairs"},
+    )
 
 
 def table(given: Windows, how: How) -> Table:
     """The columns of duets from words, and how far partners are from the real ones."""
     silent = "The prior without communication does not know who is given; it begins where the real partner does."
     return Table(
-        "duet-answers", "Two people: answers to somebody", given.captions(), (*NOTES, silent), columns=COLUMNS,
+        "duet-answers",
+        "Two people: answers to somebody",
+        given.captions(),
+        (*NOTES, silent),
+        columns=COLUMNS,
         more=lambda duets: apart(duets, given.all(how)),
-    )  # fmt: skip
+    )
 
 
 def apart(duets: Sequence[Array], real: Sequence[Array]) -> Mapping[str, Value]:
@@ -109,9 +119,15 @@ def answers(prior: Prior, block: PairBlock, given: Windows, how: How) -> Make:
         made = []
         for number, window in enumerate(given.draw(caption, count, seed)):
             made += react(
-                prior, block, motion_from_positions(window[0], mp.FPS), caption, seed=own_seed(seed, number),
-                guidance=how.guidance, steps=how.steps, foot_lock=how.clean,
-            )  # fmt: skip
+                prior,
+                block,
+                motion_from_positions(window[0], mp.FPS),
+                caption,
+                seed=own_seed(seed, number),
+                guidance=how.guidance,
+                steps=how.steps,
+                foot_lock=how.clean,
+            )
         return made
 
     return make
@@ -124,9 +140,14 @@ def alone(prior: Prior, given: Windows, how: How) -> Make:
         made = []
         for number, window in enumerate(given.draw(caption, count, seed)):
             (partner,) = generate(
-                prior, caption, seconds=how.seconds, seed=own_seed(seed, number), guidance=how.guidance,
-                steps=how.steps, foot_lock=how.clean,
-            )  # fmt: skip
+                prior,
+                caption,
+                seconds=how.seconds,
+                seed=own_seed(seed, number),
+                guidance=how.guidance,
+                steps=how.steps,
+                foot_lock=how.clean,
+            )
             begins = GroundPose.of_numbers(two.encode(window).poses[1])
             made.append((motion_from_positions(window[0], mp.FPS), moved(partner, begins)))
         return made

@@ -52,9 +52,15 @@ def run(run: Run, *, block: str | Path | None = None, how: How | None = None, ki
     prior, found, pairs, about = judged.opened(run, block, kinds)
     said = judged.captions_of(pairs)
     return judged.measure(
-        pairs, ours(prior, found, said, how), alone(prior, pairs, said, how), how, table=table(said, how), run=run,
-        kinds=kinds, about=about | {"segments": how.segments, "whole": f"{how.segments * how.seconds:g} s"},
-    )  # fmt: skip
+        pairs,
+        ours(prior, found, said, how),
+        alone(prior, pairs, said, how),
+        how,
+        table=table(said, how),
+        run=run,
+        kinds=kinds,
+        about=about | {"segments": how.segments, "whole": f"{how.segments * how.seconds:g} s"},
+    )
 
 
 def table(captions: tuple[str, ...], how: How) -> Table:
@@ -76,10 +82,15 @@ def ours(prior: Prior, block: PairBlock, captions: Sequence[str], how: How) -> M
         for number in range(count):
             pieces = list(
                 compose_pair(
-                    prior, block, timeline(captions, caption, how), seed=own_seed(seed, number),
-                    guidance=how.guidance, steps=how.steps, foot_lock=how.clean,
+                    prior,
+                    block,
+                    timeline(captions, caption, how),
+                    seed=own_seed(seed, number),
+                    guidance=how.guidance,
+                    steps=how.steps,
+                    foot_lock=how.clean,
                 )
-            )  # fmt: skip
+            )
             made.append((_whole(first for first, _ in pieces), _whole(second for _, second in pieces)))
         return made
 
@@ -93,10 +104,14 @@ def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: How
     def one(caption: str, seed: int) -> Motion:
         return _whole(
             compose(
-                prior, timeline(captions, caption, how), seed=seed, guidance=how.guidance, steps=how.steps,
+                prior,
+                timeline(captions, caption, how),
+                seed=seed,
+                guidance=how.guidance,
+                steps=how.steps,
                 foot_lock=how.clean,
             )
-        )  # fmt: skip
+        )
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
         made = []

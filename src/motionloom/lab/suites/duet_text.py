@@ -46,32 +46,46 @@ DEEP = 3.0
 FEW = 24
 """Duets whose synchrony is held against all their shuffles."""
 _STATS = {
-    "distance": ("distance", 1.0), "looking_away": ("looking_away", 180 / np.pi), "hand_contact": ("hand_contact", 1.0),
-    "touch": ("touch", 1.0), "penetration": ("penetration", 100.0), "skate_share": ("skate_share", 100.0),
-    "skate_speed": ("skate_speed", 1.0), "skate_slide": ("skate_slide", 1.0),
-}  # fmt: skip
+    "distance": ("distance", 1.0),
+    "looking_away": ("looking_away", 180 / np.pi),
+    "hand_contact": ("hand_contact", 1.0),
+    "touch": ("touch", 1.0),
+    "penetration": ("penetration", 100.0),
+    "skate_share": ("skate_share", 100.0),
+    "skate_speed": ("skate_speed", 1.0),
+    "skate_slide": ("skate_slide", 1.0),
+}
 """Columns out of `PairStats`: which number, and times what."""
 COLUMNS = (
     Column("distance", "apart m", "real", "from pelvis to pelvis on the ground"),
     Column("looking_away", "away °", "real", "how far each is turned from the direction to the other", 1),
     Column("hand_contact", "hands", "real", "share of frames with a wrist nearer than 25 cm to one of the other"),
     *(
-        Column(f"ratio_{name}", f"{said}, x spread", "down",
-               f"{said}: distance of the distributions over frames from real ones, over that of a real recording from "
-               "the others; partners stay below 1.5")
+        Column(
+            f"ratio_{name}",
+            f"{said}, x spread",
+            "down",
+            f"{said}: distance of the distributions over frames from real ones, over that of a real recording from "
+            "the others; partners stay below 1.5",
+        )
         for name, said in (("distance", "apart"), ("looking_away", "away"), ("hand_contact", "hands"))
     ),
     Column("within", "within 1.5", "up", "how many of the three are within 1.5 times of the real spread", 2, True),
     Column("touch", "touch", "real", "share of frames with a wrist nearer than 10 cm to the body of the other"),
     Column("penetration", "inside cm", "down", "deepest overlap of the two bodies (capsules), mean over frames", 2),
     Column("synchrony", "synchrony", "real", "correlation of the root speeds of the two"),
-    Column("over_strangers", "over strangers", "up",
-           "synchrony less that of everybody with everybody else's partner, in standard deviations of the latter", 2),
+    Column(
+        "over_strangers",
+        "over strangers",
+        "up",
+        "synchrony less that of everybody with everybody else's partner, in standard deviations of the latter",
+        2,
+    ),
     Column("skate_share", "skate %", "real", "frames in which a toe below 5 cm moves more than 2.5 cm (GMD)", 1),
     Column("skate_speed", "skate cm/s", "real", "speed of toes below 5 cm (Kimodo)", 1),
     Column("skate_slide", "skate mm/frame", "real", "step of toes at contact (Motius)", 2),
     Column("seconds", "s per duet", "", "wall time of one duet, on the machine that measured", 2),
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True)
@@ -139,12 +153,19 @@ def run(run: Run, *, block: str | Path | None = None, how: How | None = None, ki
     how = how or How()
     prior, found, pairs, about = opened(run, block, kinds)
     ours: Make = lambda caption, count, seed: generate_pair(  # noqa: E731
-        prior, found, caption, seconds=how.seconds, count=count, seed=seed, guidance=how.guidance, steps=how.steps,
+        prior,
+        found,
+        caption,
+        seconds=how.seconds,
+        count=count,
+        seed=seed,
+        guidance=how.guidance,
+        steps=how.steps,
         foot_lock=how.clean,
-    )  # fmt: skip
+    )
     return measure(
         pairs, ours, beside(prior, pairs, how), how, table=text_table(pairs), run=run, kinds=kinds, about=about
-    )  # fmt: skip
+    )
 
 
 def opened(
@@ -172,10 +193,15 @@ def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
         nothing = np.zeros((2, 0, len(prior.mean)), np.float32)
         known = [known_state(prior, net, nothing, poses, frames) for poses in begun(count, seed)]
         features, poses = pair_features(
-            prior, net, [caption] * (2 * count), frames,
+            prior,
+            net,
+            [caption] * (2 * count),
+            frames,
             seeds=[s for number in range(count) for s in person_seeds(seed, number)],
-            edits=PairEdits(stacked(known)), guidance=how.guidance, steps=how.steps,
-        )  # fmt: skip
+            edits=PairEdits(stacked(known)),
+            guidance=how.guidance,
+            steps=how.steps,
+        )
         made = []
         for numbers, standing in zip(features, poses.astype(np.float64), strict=True):
             first, second = (
@@ -230,7 +256,7 @@ def measure(
     said = protocol_of(recorded, table.captions, how) | (about or {})
     return Report(
         table.suite, table.title, run.command, said, table.columns, tuple(rows), (*verdicts(rows), *table.notes)
-    )  # fmt: skip
+    )
 
 
 def _recorded(pairs: Sequence[Pair], frames: int) -> dict[str, list[Array]]:
@@ -276,9 +302,7 @@ def turns(captions: Sequence[str], how: How) -> list[tuple[str, int, int]]:
     ]
 
 
-def _made(
-    make: Make, captions: Sequence[str], how: How, say: Say
-) -> tuple[list[Array], float]:  # fmt: skip
+def _made(make: Make, captions: Sequence[str], how: How, say: Say) -> tuple[list[Array], float]:
     """Positions of all duets, in the order of `turns`, and seconds for one."""
     made, began = [], time.perf_counter()
     for caption, count, seed in turns(captions, how):
@@ -334,10 +358,17 @@ def verdicts(rows: Sequence[Row]) -> tuple[str, ...]:
 def protocol_of(recorded: dict[str, list[Array]], captions: Sequence[str], how: How) -> dict[str, Any]:
     """The notes under the table."""
     return {
-        "recordings": len(recorded), "real windows": sum(map(len, recorded.values())),
-        "frames per second": mp.FPS, "seconds": how.seconds, "duets": how.duets, "captions": list(captions),
+        "recordings": len(recorded),
+        "real windows": sum(map(len, recorded.values())),
+        "frames per second": mp.FPS,
+        "seconds": how.seconds,
+        "duets": how.duets,
+        "captions": list(captions),
         "representation": "263 HumanML3D features a person; numbers from positions of people of one size",
-        "steps": how.steps, "guidance": how.guidance, "feet": "cleaned up" if how.clean else "as drawn",
-        "seed": how.seed, "interval": "1.96 sigma / sqrt(duets or windows)",
+        "steps": how.steps,
+        "guidance": how.guidance,
+        "feet": "cleaned up" if how.clean else "as drawn",
+        "seed": how.seed,
+        "interval": "1.96 sigma / sqrt(duets or windows)",
         "spread": "Wasserstein-1 of a real recording from all others, mean over recordings",
-    }  # fmt: skip
+    }

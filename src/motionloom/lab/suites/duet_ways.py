@@ -119,11 +119,15 @@ def drawn(
         people = [person for one in known for person in one.features]
         leaving = [Past(person, GroundPose()).holder(prior, FRAMES) for person in people]
         features, _ = make(
-            prior, net, [prompt] * len(people), FRAMES,
+            prior,
+            net,
+            [prompt] * len(people),
+            FRAMES,
             seeds=[s for number in crops.numbers for s in person_seeds(row_seed(seed, sample), number)],
             edits=PairEdits(stacked(states), leaving if given == "past" else None, frozen=[False] * len(people)),
-            guidance=guidance, steps=steps,
-        )  # fmt: skip
+            guidance=guidance,
+            steps=steps,
+        )
         poses, floors = np.stack([one.poses for one in known]), np.stack([one.floors for one in known])
         return two.decode(features.astype(np.float64), poses) + floors[..., None, None, None] * _UP
 

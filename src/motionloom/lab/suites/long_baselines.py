@@ -90,13 +90,30 @@ def _exported(prior: Prior, how: Transitions, prompts: Sequence[str], frames: Se
 
 
 def _double_take(
-    prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequence[int], seed: int, *,
-    mode: Literal["published", "paper"], steps: int | None = None, first: bool = False, second: bool = False,
-) -> Long:  # fmt: skip
+    prior: Prior,
+    how: Transitions,
+    prompts: Sequence[str],
+    frames: Sequence[int],
+    seed: int,
+    *,
+    mode: Literal["published", "paper"],
+    steps: int | None = None,
+    first: bool = False,
+    second: bool = False,
+) -> Long:
     made, _ = double_take_features(
-        prior, prompts, rows_of(frames, how.handshake), mode=mode, handshake=how.handshake, ramp=how.blend,
-        steps=steps or how.steps, seed=seed, guidance=how.guidance, first_take_only=first, second_take_only=second,
-    )  # fmt: skip
+        prior,
+        prompts,
+        rows_of(frames, how.handshake),
+        mode=mode,
+        handshake=how.handshake,
+        ramp=how.blend,
+        steps=steps or how.steps,
+        seed=seed,
+        guidance=how.guidance,
+        first_take_only=first,
+        second_take_only=second,
+    )
     return from_features(made)
 
 

@@ -75,9 +75,13 @@ def realism_value(clips: Sequence[Array], fps: float) -> dict[str, Value]:
 
 
 def realism_report(
-    made: Mapping[str, Sequence[Array]], fps: float, real: Sequence[Array] | Mapping[str, float], *, command: str,
+    made: Mapping[str, Sequence[Array]],
+    fps: float,
+    real: Sequence[Array] | Mapping[str, float],
+    *,
+    command: str,
     protocol: Mapping[str, Any],
-) -> Report:  # fmt: skip
+) -> Report:
     """A row of real motion (clips at 20 frames per second, or finished averages) and one per group of motions."""
     columns = [
         Column(n.name, n.name.replace("_", " "), "real" if n.both_ways else "down", n.meaning, _digits(n.unseen))

@@ -28,8 +28,24 @@ from motionloom.weights.predictor import Predictor, find_predictor
 ZERO, CONSTANT = "zero velocity", "constant velocity"
 KINDS = ("real", "zero", "constant", "ours", "ours-many", "published")
 """Rows of the table."""
-SHOWN = ("apd", "ade", "fde", "mmade", "mmfde", "cmd", "apde", "mae", "stretch", "jitter", "jerk", "seam_velocity",
-         "seam_acceleration", "root_ade", "root_fde", "seconds")  # fmt: skip
+SHOWN = (
+    "apd",
+    "ade",
+    "fde",
+    "mmade",
+    "mmfde",
+    "cmd",
+    "apde",
+    "mae",
+    "stretch",
+    "jitter",
+    "jerk",
+    "seam_velocity",
+    "seam_acceleration",
+    "root_ade",
+    "root_fde",
+    "seconds",
+)
 MEANINGS = {
     "apd": "variety: mean distance of two futures of one past; of the real row: of the futures of similar pasts",
     "ade": "mean distance of the flattened pose from what came, of the nearest future",
@@ -50,8 +66,15 @@ FURTHER = (
     Column("root_fde", "root FDE m", "down", "the same in the last frame", 3),
     Column("seconds", "s per past", "", "wall time of all futures of one past, on the machine that measured", 3),
 )
-SHORT = {"seam_velocity": "seam m/s", "seam_acceleration": "seam m/s²", "jerk": "jerk m/s³", "stretch": "stretch %",
-         "jitter": "jitter %", "mae": "MAE °", "apd": "APD"}  # fmt: skip
+SHORT = {
+    "seam_velocity": "seam m/s",
+    "seam_acceleration": "seam m/s²",
+    "jerk": "jerk m/s³",
+    "stretch": "stretch %",
+    "jitter": "jitter %",
+    "mae": "MAE °",
+    "apd": "APD",
+}
 WHOLE = {"h36m": ("Human3.6M", 5168), "humaneva": ("HumanEva-I", None), "amass": ("AMASS", 12727)}
 """Data sets whose published figures share our data if all of it is there: their names there and test windows."""
 
@@ -72,8 +95,12 @@ class How:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        whole = {"samples": self.samples, "steps": self.steps, "published_steps": self.published_steps,
-                 "replications": self.replications}  # fmt: skip
+        whole = {
+            "samples": self.samples,
+            "steps": self.steps,
+            "published_steps": self.published_steps,
+            "replications": self.replications,
+        }
         for name, value in whole.items():
             if not 1 <= value <= 1000:
                 raise MotionloomError(f"{name.replace('_', ' ')} must be from 1 to 1000; got {value}")
@@ -111,10 +138,14 @@ def run(
     protocol = trials.read_test(run.data, name, say=run.progress)
     trials.check_fit(predictor, protocol)
     return measure(
-        predictor, trials.prepare(protocol, count=how.windows, singles=how.singles), how, kinds, run=run,
+        predictor,
+        trials.prepare(protocol, count=how.windows, singles=how.singles),
+        how,
+        kinds,
+        run=run,
         with_published=with_published,
         about={"weights file": digest(find_predictor(run.weights))[:12], "device": run.device},
-    )  # fmt: skip
+    )
 
 
 def measure(
@@ -139,19 +170,26 @@ def measure(
             def scored(k: int = k, title: str = title, way: Callable[[int], Way] | None = way) -> dict[str, float]:
                 run.progress(f"{title}: {len(trial.windows)} windows")
                 return trials.score(
-                    trial, way(how.seed + k) if way else None, samples=how.samples,
+                    trial,
+                    way(how.seed + k) if way else None,
+                    samples=how.samples,
                     root=predictor.layout.root or title in (ZERO, CONSTANT),
                     say=lambda line: run.progress(f"{title}: {line}"),
-                )  # fmt: skip
+                )
 
             numbers.append(parts.once(f"{title} {k}", scored))
         rows.append(Row(title, {c: Value.of([n[c] for n in numbers]) for c in SHOWN if c in numbers[0]}))
     shown = columns()
     others = _published(trial, how, [c.name for c in shown]) if with_published else ()
     return Report(
-        "prediction", "Prediction: many futures of what was seen", run.command, said, shown, (*rows, *others),
+        "prediction",
+        "Prediction: many futures of what was seen",
+        run.command,
+        said,
+        shown,
+        (*rows, *others),
         _notes(trial),
-    )  # fmt: skip
+    )
 
 
 def columns() -> tuple[Column, ...]:
@@ -176,9 +214,16 @@ def drawn(
 ) -> Way:
     """Our own way of predicting."""
     return lambda past: futures(
-        predictor, past, count=samples, seed=seed, steps=steps, guidance=guidance, batch_size=trials.ROWS,
-        solver=solver, spacing=spacing,
-    )  # fmt: skip
+        predictor,
+        past,
+        count=samples,
+        seed=seed,
+        steps=steps,
+        guidance=guidance,
+        batch_size=trials.ROWS,
+        solver=solver,
+        spacing=spacing,
+    )
 
 
 def as_published(predictor: Predictor, seed: int, *, samples: int, steps: int) -> Way:
@@ -206,9 +251,10 @@ def _ways(
         "ours-many": (f"{label}, {many} steps", lambda s: drawn(predictor, s, steps=many, **few), again),
         "published": (
             f"{label}, published sampler, {many} steps",
-            lambda s: as_published(predictor, s, samples=how.samples, steps=many), again,
+            lambda s: as_published(predictor, s, samples=how.samples, steps=many),
+            again,
         ),
-    }  # fmt: skip
+    }
     same = how.steps == many
     return [found[kind] for kind in KINDS if kind in kinds and not (same and kind == "ours-many" and "ours" in kinds)]
 
@@ -218,20 +264,32 @@ def protocol_of(trial: Trial, how: How, predictor: Predictor) -> dict[str, Any]:
     p = trial.protocol
     classes = {recording.action for recording, _ in trial.windows}
     return {
-        "data": p.name, "licence": p.licence, "split": "test", "recordings": len(p.split("test")),
-        "test windows": len(trial.every), "windows measured": len(trial.windows),
+        "data": p.name,
+        "licence": p.licence,
+        "split": "test",
+        "recordings": len(p.split("test")),
+        "test windows": len(trial.every),
+        "windows measured": len(trial.windows),
         "windows with more than one future": trial.several,
         "similar pasts": f"last poses nearer than {p.threshold:g} m",
-        "windows with one future": how.singles.replace("_", " "), "frames per second": p.fps,
+        "windows with one future": how.singles.replace("_", " "),
+        "frames per second": p.fps,
         "frames": f"{p.observed} seen, {p.future} predicted",
         "representation": f"places of {p.layout.joints - 1} joints from the root, metres, axes of the world",
-        "statistics": "those of the weights", "trained on": predictor.card.data, "variant": predictor.variant,
+        "statistics": "those of the weights",
+        "trained on": predictor.card.data,
+        "variant": predictor.variant,
         "bones": "ours: as long as the past's; published sampler: as drawn",
         "CMD": f"{len(classes)} classes, speeds {'published' if classes <= p.speeds.keys() else 'of the real futures'}",
-        "samples": how.samples, "sampler": f"{SOLVER}, {SPACING} spacing", "steps": how.steps,
-        "many steps": how.published_steps, "guidance": how.guidance, "seed": how.seed,
-        "replications": how.replications, "interval": "1.96 sigma / sqrt(replications)",
-    }  # fmt: skip
+        "samples": how.samples,
+        "sampler": f"{SOLVER}, {SPACING} spacing",
+        "steps": how.steps,
+        "many steps": how.published_steps,
+        "guidance": how.guidance,
+        "seed": how.seed,
+        "replications": how.replications,
+        "interval": "1.96 sigma / sqrt(replications)",
+    }
 
 
 def _identity(trial: Trial) -> str:

@@ -140,9 +140,14 @@ def hold(
         Column("apd_free", "APD without m", "", "variety of the free joints, nothing given"),
         Column("apd_given", "APD with m", "up", "the same with the group given"),
         Column("held", "held error m", "down", "largest error of a given place, as the network's window comes out", 6),
-        Column("rotations", "held rotations off", "down", "largest difference of a held local rotation (quaternion) in"
-               " what is written, 3 windows", 9),
-    ]  # fmt: skip
+        Column(
+            "rotations",
+            "held rotations off",
+            "down",
+            "largest difference of a held local rotation (quaternion) in what is written, 3 windows",
+            9,
+        ),
+    ]
     return columns, rows, {"weights": predictor.card.name, "given": "as in the real future"}
 
 
@@ -161,11 +166,16 @@ def held_numbers(predictor: Predictor, trial: Trial, group: str, *, samples: int
         real, a, b = from_root(truth), from_root(without), from_root(given)
         off = np.abs(b - real)[:, :, [j - 1 for j in joints if j]].max(initial=0.0)
         off = max(off, np.abs(given[:, :, 0] - truth[:, 0]).max() if 0 in joints else 0.0)
-        rows.append((
-            metrics.ade(a[:, :, free], real[:, free]), metrics.ade(b[:, :, free], real[:, free]),
-            metrics.apd(a[:, :, free]), metrics.apd(b[:, :, free]), float(off),
-            held_rotations(predictor, trial, number, group, seed=seed) if number < 3 else 0.0,
-        ))  # fmt: skip
+        rows.append(
+            (
+                metrics.ade(a[:, :, free], real[:, free]),
+                metrics.ade(b[:, :, free], real[:, free]),
+                metrics.apd(a[:, :, free]),
+                metrics.apd(b[:, :, free]),
+                float(off),
+                held_rotations(predictor, trial, number, group, seed=seed) if number < 3 else 0.0,
+            )
+        )
     means, most = np.mean(rows, axis=0), np.max(rows, axis=0)
     return dict(zip(("free", "given", "apd_free", "apd_given"), means.tolist())) | {
         "held": float(most[4]),
@@ -206,8 +216,10 @@ def arrive(
     count = len(trial.windows)
     if count < 2:
         raise MotionloomError("a switch leads from one window to another; measure two or more")
-    clips = [motion_from_positions(np.concatenate([trial.pasts(k, k + 1)[0], trial.future(k)]), predictor.fps)
-             for k in range(count)]  # fmt: skip
+    clips = [
+        motion_from_positions(np.concatenate([trial.pasts(k, k + 1)[0], trial.future(k)]), predictor.fps)
+        for k in range(count)
+    ]
     seen, pairs = protocol.observed, [(k, (k + count // 2) % count) for k in range(count)]
     middle = seen + protocol.future // 2
     rows = [plain_row(REAL, _mean([_ends(c.positions(), seen, middle, predictor.fps) for c in clips]))]
@@ -220,10 +232,12 @@ def arrive(
     for length in TRANSITIONS:
         say(f"switch in {length:g} s: {len(pairs)} pairs")
         found = [
-            switched(predictor, clips[a].frames(0, seen), clips[b].frames(seen, len(clips[b])), seconds=length,
-                     seed=seed + i)
-            for a, b in pairs for i in range(samples)
-        ]  # fmt: skip
+            switched(
+                predictor, clips[a].frames(0, seen), clips[b].frames(seen, len(clips[b])), seconds=length, seed=seed + i
+            )
+            for a, b in pairs
+            for i in range(samples)
+        ]
         rows.append(plain_row(f"{length:g} s", _mean(found)))
     return list(SWITCHED), rows, {"weights": predictor.card.name, "pairs": len(pairs)}
 

@@ -38,11 +38,16 @@ STUDIED: dict[str, tuple[str, tuple[Any, ...]]] = {
 }
 """What each training study changes, and to what."""
 TITLES = {
-    "coefficients": "Number of cosine coefficients", "layers": "Layers", "schedules": "Noise schedules",
-    "noising": "Noise levels in training, and sampling steps", "dct": "With and without the cosine transform",
-    "steps": "Sampling steps, solvers and spacings", "horizon": "A long horizon: window after window",
-    "hold": "Parts of the body held", "switch": "Arriving at another motion",
-}  # fmt: skip
+    "coefficients": "Number of cosine coefficients",
+    "layers": "Layers",
+    "schedules": "Noise schedules",
+    "noising": "Noise levels in training, and sampling steps",
+    "dct": "With and without the cosine transform",
+    "steps": "Sampling steps, solvers and spacings",
+    "horizon": "A long horizon: window after window",
+    "hold": "Parts of the body held",
+    "switch": "Arriving at another motion",
+}
 WALKS = (2, 3, 4, 5, 8, 10, 20, 50, 100)
 SPREADS = ("index", "early", "snr")
 SHOWN = ("apd", "ade", "fde", "mmade", "mmfde", "jerk", "seam_velocity", "seconds")
@@ -114,16 +119,21 @@ def run(name: str, run: Run, *, protocol: str | None = None, keep: Path, budget:
     trained = name in STUDIED
     predictor = None if trained else Predictor.load(run.weights, device=run.device)
     if trained or name == "horizon":
-        read = find_protocol(run.data, name=protocol, say=run.progress,
-                             splits=("train", "val", "test") if trained else ("train", "test"))  # fmt: skip
+        read = find_protocol(
+            run.data, name=protocol, say=run.progress, splits=("train", "val", "test") if trained else ("train", "test")
+        )
     else:
         read = trials.read_test(run.data, protocol, say=run.progress)
     if predictor is not None:
         trials.check_fit(predictor, read)
     lab = Lab(
-        read, budget, lambda: predictor or Predictor.load(run.weights, device=run.device), keep, run.device,
+        read,
+        budget,
+        lambda: predictor or Predictor.load(run.weights, device=run.device),
+        keep,
+        run.device,
         run.progress,
-    )  # fmt: skip
+    )
     found = replace(study(name, lab), command=run.command)
     write(found, name, run.folder)
     return found
@@ -134,18 +144,30 @@ def study(name: str, lab: Lab) -> Report:
     if name in prediction_behaviour.STUDIES:
         b = lab.budget
         columns, rows, said = prediction_behaviour.STUDIES[name](
-            lab.weights(), lab.protocol, windows=b.windows, samples=b.samples, seed=b.seed, seconds=b.seconds,
+            lab.weights(),
+            lab.protocol,
+            windows=b.windows,
+            samples=b.samples,
+            seed=b.seed,
+            seconds=b.seconds,
             say=lab.progress,
-        )  # fmt: skip
+        )
     elif name == "steps":
         columns, rows, said = _steps(lab)
     else:
         columns, rows, said = _trained(name, lab)
     p, b = lab.protocol, lab.budget
     about = {
-        "data": p.name, "licence": p.licence, "split": "test", "frames": f"{p.observed} seen, {p.future} predicted",
-        "frames per second": p.fps, "windows": b.windows, "samples": b.samples, "seed": b.seed, **said,
-    }  # fmt: skip
+        "data": p.name,
+        "licence": p.licence,
+        "split": "test",
+        "frames": f"{p.observed} seen, {p.future} predicted",
+        "frames per second": p.fps,
+        "windows": b.windows,
+        "samples": b.samples,
+        "seed": b.seed,
+        **said,
+    }
     return Report(f"study-{name}", TITLES[name], "", about, tuple(columns), tuple(rows))
 
 
@@ -176,9 +198,11 @@ def _trained(name: str, lab: Lab) -> tuple[list[Column], list[Row], dict[str, An
             scored = trials.score(trial, way, samples=lab.budget.samples, say=lab.progress)
             rows.append(_row(trial, label, scored | {"parameters": size / 1e6}))
     size = Column("parameters", "M parameters", "", "millions", 2)
-    about = {"networks": f"width {BASE['width']}, {BASE['layers']} layers, {BASE['kept']} coefficients unless said",
-             "training": f"{lab.budget.train_steps} steps of 64 windows, seed {lab.budget.seed}",
-             "sampler": f"{SOLVER}, {SPACING} spacing, {STEPS} steps unless said"}  # fmt: skip
+    about = {
+        "networks": f"width {BASE['width']}, {BASE['layers']} layers, {BASE['kept']} coefficients unless said",
+        "training": f"{lab.budget.train_steps} steps of 64 windows, seed {lab.budget.seed}",
+        "sampler": f"{SOLVER}, {SPACING} spacing, {STEPS} steps unless said",
+    }
     return [*_columns(SHOWN), size], rows, about
 
 
@@ -196,9 +220,18 @@ def network(lab: Lab, setting: str, value: Any) -> Predictor:
     name = f"{dct}{net['kept']}-layers{net['layers']}-{schedule}-{levels}-steps{lab.budget.train_steps}"
     steps = lab.budget.train_steps
     recipe = Recipe(
-        name=name, steps=steps, batch=64, warmup=min(100, steps // 5), cooldown=0.4, ema=0.99, schedule=schedule,
-        levels=levels, seed=lab.budget.seed, save_every=200, predictor=net,
-    )  # fmt: skip
+        name=name,
+        steps=steps,
+        batch=64,
+        warmup=min(100, steps // 5),
+        cooldown=0.4,
+        ema=0.99,
+        schedule=schedule,
+        levels=levels,
+        seed=lab.budget.seed,
+        save_every=200,
+        predictor=net,
+    )
     folder = lab.keep / name
     if changed(folder, recipe):
         raise MotionloomError(f"{folder} holds a network of other settings; name another folder with --keep")

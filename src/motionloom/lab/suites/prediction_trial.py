@@ -28,8 +28,18 @@ Way = Callable[[Array], Array]
 
 ROWS = 512
 """Futures made and scored at once: 33 MB of 60 frames of 22 joints."""
-OF_REAL = ("jerk", "jerk_peak", "stretch", "stretch_rmse", "jitter", "jitter_rmse", "seam_velocity",
-           "seam_velocity_worst", "seam_acceleration", "seam_acceleration_worst")  # fmt: skip
+OF_REAL = (
+    "jerk",
+    "jerk_peak",
+    "stretch",
+    "stretch_rmse",
+    "jitter",
+    "jitter_rmse",
+    "seam_velocity",
+    "seam_velocity_worst",
+    "seam_acceleration",
+    "seam_acceleration_worst",
+)
 """What real futures have numbers of; their errors would be 0."""
 KNOWN = {m.name for m in metrics.METRICS} | {"cmd", "root_ade", "root_fde", "seconds"}
 """Names of everything that `score` gives."""
@@ -112,9 +122,7 @@ def prepare(protocol: Protocol, *, count: int | None = None, singles: metrics.Si
     chosen = [usable[k] for k in places]
     h36m = protocol.name == "h36m"
     limbs = metrics.H36M_LIMBS if h36m else metrics.limbs_of(protocol.layout.parents)
-    trial = Trial(
-        protocol, tuple(every[k] for k in chosen), every, tuple(near[k] for k in chosen), limbs, singles, {}
-    )  # fmt: skip
+    trial = Trial(protocol, tuple(every[k] for k in chosen), every, tuple(near[k] for k in chosen), limbs, singles, {})
     return replace(trial, speeds=_speeds(trial) | protocol.speeds)
 
 
@@ -135,8 +143,10 @@ def check_fit(predictor: Predictor, protocol: Protocol) -> None:
     mine = predictor.layout.joints, predictor.fps, predictor.observed, predictor.frames
     its = protocol.layout.joints, protocol.fps, protocol.observed, protocol.frames
     if mine != its or predictor.layout.names != protocol.layout.names:
-        sizes = [f"{joints} joints at {fps:g} fps, {seen} of {frames} frames seen" for joints, fps, seen, frames in
-                (mine, its)]  # fmt: skip
+        sizes = [
+            f"{joints} joints at {fps:g} fps, {seen} of {frames} frames seen"
+            for joints, fps, seen, frames in (mine, its)
+        ]
         raise MotionloomError(
             f"these weights are for {sizes[0]}, and {protocol.name} has {sizes[1]}; name weights trained on such data"
         )
@@ -162,7 +172,7 @@ def score(
         near = trial.futures(number)
         scores = metrics.score_window(
             from_root(made), from_root(truth), near, fps=trial.protocol.fps, past=from_root(past), limbs=trial.limbs
-        )  # fmt: skip
+        )
         tally.add(scores, trial.windows[number][0].action)
         ways.append(_way_errors(made, truth))
         seconds += took

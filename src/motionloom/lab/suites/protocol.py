@@ -216,8 +216,18 @@ class Protocol:
 
     def drawn(self) -> dict[str, Any]:
         """Everything that changes the motions of one replication or their numbers: what a resumed run must agree in."""
-        kept = ("lengths", "caption_length", "batch", "multimodality", "solver", "spacing", "guidance", "seed", "count",
-                "multimodal_replications")  # fmt: skip
+        kept = (
+            "lengths",
+            "caption_length",
+            "batch",
+            "multimodality",
+            "solver",
+            "spacing",
+            "guidance",
+            "seed",
+            "count",
+            "multimodal_replications",
+        )
         return {name: getattr(self, name) for name in kept}
 
     def described(self, selection: Selection, *, data: str, items: int, evaluator: str) -> dict[str, Any]:

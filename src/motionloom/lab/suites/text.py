@@ -40,8 +40,12 @@ COLUMNS: tuple[Column, ...] = (
     Column("r1", "R@1", "up", "share of captions whose own motion is the nearest in its batch"),
     Column("r2", "R@2", "up", "among the two nearest"),
     Column("r3", "R@3", "up", "among the three nearest: the papers' R-precision"),
-    Column("r3_same", "R@3, same words", "up", "the same where any motion of a caption with the same words is a hit; "
-           "the published count takes it for a miss"),
+    Column(
+        "r3_same",
+        "R@3, same words",
+        "up",
+        "the same where any motion of a caption with the same words is a hit; the published count takes it for a miss",
+    ),
     Column("fid", "FID", "down", "Fréchet distance of the motion embeddings to the real ones", 4),
     Column("mm_dist", "MM-Dist", "down", "mean distance between a caption and its motion"),
     Column("diversity", "Diversity", "real", "mean distance of random pairs of motions, at most 300"),
@@ -55,7 +59,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("ms", "ms per motion", "", "wall time of sampling alone, on the machine that measured", 0),
     Column("per_second", "motions/s", "", "its inverse", 2),
     Column("memory", "peak MB", "", "resident memory of a process that generates eight motions of 9.8 s", 0),
-)  # fmt: skip
+)
 
 
 class Draw(Interface):
@@ -197,9 +201,12 @@ def _several(trial: Trial, replication: int, steps: int, *, captions: int, sampl
     said, frames = trial.said(chosen), trial.real.frames
     seeds = trial.protocol.seeds(replication, len(items) * samples, after=len(said))
     drawn = _drawn(
-        trial, [said[k] for k in items for _ in range(samples)], [frames[k] for k in items for _ in range(samples)],
-        seeds=seeds, steps=steps,
-    )  # fmt: skip
+        trial,
+        [said[k] for k in items for _ in range(samples)],
+        [frames[k] for k in items for _ in range(samples)],
+        seeds=seeds,
+        steps=steps,
+    )
     motions = embedded(trial.evaluator, drawn).reshape(len(items), samples, -1)
     pairs = min(MULTIMODAL_PAIRS, samples // 2)
     mixed = rng.permutation(samples)
@@ -238,11 +245,16 @@ def measure(
     for steps in protocol.steps:
         found = [
             parts.once(
-                f"{steps} steps {r}", lambda r=r, steps=steps: of_generated(trial, r, steps),
-                lambda n, r=r, steps=steps: f"{steps} steps, replication {r + 1} of {protocol.replications}: "
-                f"R@3 {n['r3']:.3f}, FID {n['fid']:.3f}, {n['ms']:.0f} ms per motion", progress,
-            ) for r in count
-        ]  # fmt: skip
+                f"{steps} steps {r}",
+                lambda r=r, steps=steps: of_generated(trial, r, steps),
+                lambda n, r=r, steps=steps: (
+                    f"{steps} steps, replication {r + 1} of {protocol.replications}: "
+                    f"R@3 {n['r3']:.3f}, FID {n['fid']:.3f}, {n['ms']:.0f} ms per motion"
+                ),
+                progress,
+            )
+            for r in count
+        ]
         values = dict(row_of("", found, COLUMNS).values)
         if memory is not None:
             peak = parts.once(f"{steps} steps memory", lambda steps=steps: {"memory": memory(steps)})
@@ -306,9 +318,7 @@ def run(
         _as_published(judge, [text_reference.SENTENCE])
     trial = prepare(draw, judge, reference(judge, run.data, selection, run.progress), protocol)
     parts = run.parts({**protocol.drawn(), **run.settings(judge), "real": identity(trial.real)})
-    return measure(
-        trial, label=run.label, parts=parts, memory=memory, command=run.command, progress=run.progress
-    )  # fmt: skip
+    return measure(trial, label=run.label, parts=parts, memory=memory, command=run.command, progress=run.progress)
 
 
 def reference(
@@ -327,9 +337,15 @@ def drawer(prior: Prior, protocol: Protocol) -> Draw:
 
     def draw(prompts: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int) -> list[np.ndarray]:
         drawn = sample_features(
-            prior, prompts, frames, seeds=seeds, guidance=protocol.guidance, steps=steps, solver=protocol.solver,
+            prior,
+            prompts,
+            frames,
+            seeds=seeds,
+            guidance=protocol.guidance,
+            steps=steps,
+            solver=protocol.solver,
             spacing=protocol.spacing,
-        )  # fmt: skip
+        )
         return [features.astype(np.float64) for features in drawn]
 
     return draw

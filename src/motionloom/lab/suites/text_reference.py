@@ -68,9 +68,13 @@ class TextReference:
             tuple(several[k] for k in rows) for several in (self.names, self.captions, self.frames)
         )
         return replace(
-            self, names=names, captions=captions, frames=frames,
-            motions=self.motions[rows], physical=self.physical[rows],
-        )  # fmt: skip
+            self,
+            names=names,
+            captions=captions,
+            frames=frames,
+            motions=self.motions[rows],
+            physical=self.physical[rows],
+        )
 
     @property
     def data(self) -> str:
@@ -143,8 +147,12 @@ def save(reference: TextReference, path: Path | str) -> Path:
     path = Path(path)
     if path.suffix != ".safetensors":
         raise MotionloomError(f"a reference is written as .safetensors; {path.name} has another suffix")
-    values = {"motions": reference.motions, "frames": np.array(reference.frames), "physical": reference.physical,
-              "probe": reference.probe}  # fmt: skip
+    values = {
+        "motions": reference.motions,
+        "frames": np.array(reference.frames),
+        "physical": reference.physical,
+        "probe": reference.probe,
+    }
     tensors = {name: np.ascontiguousarray(value, dtype=_KINDS[name]) for name, value in values.items()}
     if not all(np.isfinite(tensor).all() for tensor in tensors.values()):
         raise MotionloomError("the evaluator gives numbers that float16 cannot hold; a reference cannot be made of it")

@@ -50,8 +50,14 @@ COLUMNS: tuple[Column, ...] = (
     Column("pj", "peak jerk m/frame³", "real", "the largest value of the mean jerk curve of the windows (FlowMDM)", 4),
     Column("auj", "AUJ m/frame³", "down", "area between that curve and the mean jerk of the real windows here", 3),
     Column("auj_humanml3d", "AUJ, HumanML3D", "down", "the same against the published mean of HumanML3D's", 3),
-    Column("auj_own", "AUJ, own", "down", "the same against the mean of the same motions outside the windows: what the "
-           "seams alone add, however smooth the rest", 3),
+    Column(
+        "auj_own",
+        "AUJ, own",
+        "down",
+        "the same against the mean of the same motions outside the windows: what the "
+        "seams alone add, however smooth the rest",
+        3,
+    ),
     Column("step", "step mm", "real", "mean over joints of the step across the seam; real: across any two frames", 1),
     Column("seam_share", "skate %, transitions", "down", "frames with a sliding toe (GMD), in the windows", 2),
     Column("inside_share", "skate %, inside", "down", "the same outside the windows", 2),
@@ -62,7 +68,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("seam_jerk", "jerk m/s³, transitions", "real", "third derivative of the places, in the windows", 1),
     Column("inside_jerk", "jerk m/s³, inside", "real", "the same outside the windows", 1),
     Column("cost", "s per s", "", "seconds of computing for a second of motion, on the machine that measured", 3),
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,11 +234,16 @@ def measure(
     for name, method in ways.items():
         found = [
             parts.once(
-                f"{name} {r}", lambda r=r, method=method: of_method(trial, method, r),
-                lambda n, r=r, name=name: f"{name}, replication {r + 1} of {how.replications}: AUJ {n['auj']:.3f}, "
-                f"peak jerk {n['pj']:.4f}, FID {n['fid']:.3f}, {n['cost']:.2f} s per second", progress,
-            ) for r in range(how.replications)
-        ]  # fmt: skip
+                f"{name} {r}",
+                lambda r=r, method=method: of_method(trial, method, r),
+                lambda n, r=r, name=name: (
+                    f"{name}, replication {r + 1} of {how.replications}: AUJ {n['auj']:.3f}, "
+                    f"peak jerk {n['pj']:.4f}, FID {n['fid']:.3f}, {n['cost']:.2f} s per second"
+                ),
+                progress,
+            )
+            for r in range(how.replications)
+        ]
         rows.append(row_of(titled(name, how.steps), found, COLUMNS))
     said = {
         "data": trial.real.data,
@@ -243,9 +254,14 @@ def measure(
         **how.described(),
     }
     return Report(
-        "transitions", f"Long motion and its transitions: {label}", command, said, COLUMNS,
-        (*rows, *published_rows.published("long", [column.name for column in COLUMNS])), _notes(trial),
-    )  # fmt: skip
+        "transitions",
+        f"Long motion and its transitions: {label}",
+        command,
+        said,
+        COLUMNS,
+        (*rows, *published_rows.published("long", [column.name for column in COLUMNS])),
+        _notes(trial),
+    )
 
 
 def _notes(trial: Trial) -> tuple[str, ...]:

@@ -33,16 +33,28 @@ class MotionloomBackbone(Backbone):
         self.worker = worker
         limits = worker.limits
         self.spec = ModelSpec(
-            id=MODEL, fps=20.0, canonical_skeleton=Skeleton.model_validate({"joints": canonical()}),
-            supports_retargeting=True, supports_joint_translation=True, supports_loop=True,
-            supported_constraints=CONSTRAINTS, supported_segments=SEGMENTS, native_clip_seconds=10.0,
-            chunking="stitched", recommended_max_duration_seconds=30.0,
+            id=MODEL,
+            fps=20.0,
+            canonical_skeleton=Skeleton.model_validate({"joints": canonical()}),
+            supports_retargeting=True,
+            supports_joint_translation=True,
+            supports_loop=True,
+            supported_constraints=CONSTRAINTS,
+            supported_segments=SEGMENTS,
+            native_clip_seconds=10.0,
+            chunking="stitched",
+            recommended_max_duration_seconds=30.0,
             limits=ModelLimits(
-                max_duration_seconds=SECONDS, max_num_samples=limits.count, max_prompt_length=limits.prompt,
-                max_request_bytes=limits.body_bytes, max_batch_size=8, max_reference_frames=3600,
-                max_video_bytes=None, max_video_seconds=None,
+                max_duration_seconds=SECONDS,
+                max_num_samples=limits.count,
+                max_prompt_length=limits.prompt,
+                max_request_bytes=limits.body_bytes,
+                max_batch_size=8,
+                max_reference_frames=3600,
+                max_video_bytes=None,
+                max_video_seconds=None,
             ),
-        )  # fmt: skip
+        )
 
     def capabilities(self) -> ModelSpec:
         """What is served at ``/capabilities``."""
@@ -76,11 +88,14 @@ class MotionloomBackbone(Backbone):
             )
         (made,) = found
         return MotionResult(
-            rotations=made.rotations.astype(np.float32), root_translations=made.root.astype(np.float32),
+            rotations=made.rotations.astype(np.float32),
+            root_translations=made.root.astype(np.float32),
             translations=None if made.translations is None else made.translations.astype(np.float32),
             trajectories=[None] * len(made.root) if made.root.shape[1] == 1 else None,  # a pose goes nowhere
-            chunk_boundaries=made.boundaries, canonical_to_request=made.names or None, notes=made.notes,
-        )  # fmt: skip
+            chunk_boundaries=made.boundaries,
+            canonical_to_request=made.names or None,
+            notes=made.notes,
+        )
 
 
 async def ended(job: Job) -> None:

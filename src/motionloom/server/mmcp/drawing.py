@@ -68,10 +68,13 @@ def answer(models: Models, request: Any, progress: Progress) -> Iterator[Answer]
     places = [rig.places_of(motion) for motion in motions]
     free = [one for one in places if one is not None]
     yield Answer(
-        np.stack([rig.rotations_of(motion) for motion in motions]), np.stack([motion.root for motion in motions]),
+        np.stack([rig.rotations_of(motion) for motion in motions]),
+        np.stack([motion.root for motion in motions]),
         np.stack(free) if len(free) == count else None,
-        [_boundaries(request)] * count, {} if rig.uniform else rig.joints(), list(asked.notes),
-    )  # fmt: skip
+        [_boundaries(request)] * count,
+        {} if rig.uniform else rig.joints(),
+        list(asked.notes),
+    )
 
 
 def _seed(request: Any) -> int:

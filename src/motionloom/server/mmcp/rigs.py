@@ -117,8 +117,10 @@ def canonical() -> list[dict[str, Any]]:
     """The uniform person as MMCP's joints."""
     return [
         {
-            "name": name, "parent": None if parent < 0 else SMPL22.names[parent],
-            "rest_translation": tuple(offset), "rest_rotation": (0.0, 0.0, 0.0, 1.0),
+            "name": name,
+            "parent": None if parent < 0 else SMPL22.names[parent],
+            "rest_translation": tuple(offset),
+            "rest_rotation": (0.0, 0.0, 0.0, 1.0),
         }
         for name, parent, offset in zip(SMPL22.names, SMPL22.parents, SMPL22.offsets.tolist(), strict=True)
-    ]  # fmt: skip
+    ]

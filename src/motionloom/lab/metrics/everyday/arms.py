@@ -72,8 +72,13 @@ def hands_on_hips(body: Body) -> Measures:
 
 def arms_to_the_sides(body: Body) -> Measures:
     """``held``: seconds both wrists are within 25 cm of shoulder height and 40 cm or more out from their shoulders."""
-    side = np.stack([body.own[:, WRISTS[0], 0] - body.own[:, SHOULDERS[0], 0],
-                     body.own[:, SHOULDERS[1], 0] - body.own[:, WRISTS[1], 0]], axis=-1)  # fmt: skip
+    side = np.stack(
+        [
+            body.own[:, WRISTS[0], 0] - body.own[:, SHOULDERS[0], 0],
+            body.own[:, SHOULDERS[1], 0] - body.own[:, WRISTS[1], 0],
+        ],
+        axis=-1,
+    )
     level = np.abs(body.reach_up) < 0.25
     return {"held": body.held(((side > 0.35) & level).all(axis=1)), "wander": body.wander}
 
@@ -199,15 +204,24 @@ CHECKS = (
     Everyday("raise the left arm", "a student raises her left arm", 3.0, lambda b: raises(b, 0), _raising(0)),
     Everyday("raise the right hand", "someone puts up their right hand", 3.0, lambda b: raises(b, 1), _raising(1)),
     Everyday(
-        "raise the right arm twice", "a person lifts the right arm twice", 6.0, lambda b: raises(b, 1),
+        "raise the right arm twice",
+        "a person lifts the right arm twice",
+        6.0,
+        lambda b: raises(b, 1),
         (*_raising(1), between("times", 2, 2, "twice, neither once nor three times")),
     ),
     Everyday(
-        "both hands over the head", "a man lifts both hands high above his head", 3.0, both_up,
+        "both hands over the head",
+        "a man lifts both hands high above his head",
+        3.0,
+        both_up,
         (at_least("held", 0.3, "both wrists are above the head"), at_most("wander", 1.5, "more or less on the spot")),
     ),
     Everyday(
-        "clap", "somebody claps their hands", 4.0, claps,
+        "clap",
+        "somebody claps their hands",
+        4.0,
+        claps,
         (
             at_least("claps", 2, "again and again"),
             at_most("closest", 0.25, "the hands meet"),
@@ -216,22 +230,39 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "point", "a person points straight ahead with the right hand", 4.0, lambda b: points(b, 1),
+        "point",
+        "a person points straight ahead with the right hand",
+        4.0,
+        lambda b: points(b, 1),
         (at_least("held", 0.4, "the right arm stays stretched out"), at_most("other", 0.3, "the left one does not")),
     ),
     Everyday(
-        "hands on the hips", "a woman stands with her hands on her hips", 4.0, hands_on_hips,
+        "hands on the hips",
+        "a woman stands with her hands on her hips",
+        4.0,
+        hands_on_hips,
         (at_least("held", 0.8, "both hands rest there"), at_most("travel", 1.5, "she stands")),
     ),
     Everyday(
-        "arms to the sides", "someone holds both arms straight out to the sides", 4.0, arms_to_the_sides,
+        "arms to the sides",
+        "someone holds both arms straight out to the sides",
+        4.0,
+        arms_to_the_sides,
         (at_least("held", 0.5, "both arms are out, level"), at_most("wander", 1.5, "more or less on the spot")),
     ),
     Everyday("wave with the left hand", "a girl waves with her left hand", 4.0, lambda b: waves(b, 0), _waving(0)),
-    Everyday("wave with the right hand", "somebody waves hello, using the right hand", 4.0,
-        lambda b: waves(b, 1), _waving(1),),
     Everyday(
-        "swing the arms", "a man stands there swinging his arms back and forth", 5.0, swings_arms,
+        "wave with the right hand",
+        "somebody waves hello, using the right hand",
+        4.0,
+        lambda b: waves(b, 1),
+        _waving(1),
+    ),
+    Everyday(
+        "swing the arms",
+        "a man stands there swinging his arms back and forth",
+        5.0,
+        swings_arms,
         (
             at_least("swings", 4, "to and fro, twice"),
             at_most("feet", 0.3, "the feet stay"),
@@ -240,7 +271,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "drink", "a person takes a sip from a bottle", 5.0, drinks,
+        "drink",
+        "a person takes a sip from a bottle",
+        5.0,
+        drinks,
         (
             at_least("held", 0.35, "a hand stays at the mouth"),
             at_least("from", 0.2, "it comes from below"),
@@ -249,7 +283,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "pick up", "someone picks something up off the floor", 5.0, picks_up,
+        "pick up",
+        "someone picks something up off the floor",
+        5.0,
+        picks_up,
         (
             at_least("start", 0.95, "it begins standing"),
             at_most("hand", 0.35, "a hand gets to the floor"),
@@ -259,7 +296,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "throw", "a boy throws a ball", 3.0, throws,
+        "throw",
+        "a boy throws a ball",
+        3.0,
+        throws,
         (
             at_least("speed", 2.4, "faster than a hand is moved without need"),
             at_least("back", 0.22, "the arm is drawn back before"),
@@ -269,7 +309,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "open a door", "he opens a door", 4.0, opens,
+        "open a door",
+        "he opens a door",
+        4.0,
+        opens,
         (
             at_least("reach", 0.38, "a hand goes to the handle"),
             at_least("moved", 0.15, "and moves the door"),
@@ -279,4 +322,4 @@ CHECKS = (
             at_most("stroke", 3.0, "it is no blow"),
         ),
     ),
-)  # fmt: skip
+)

@@ -184,7 +184,10 @@ def _punch(side: int):
 
 CHECKS = (
     Everyday(
-        "push-ups", "a soldier does push-ups", 6.0, pushups,
+        "push-ups",
+        "a soldier does push-ups",
+        6.0,
+        pushups,
         (
             at_least("times", 2, "again and again"),
             at_least("plank", 0.8, "the body is stretched out face down"),
@@ -194,7 +197,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "jumping jacks", "a person is doing jumping jacks", 5.0, jumping_jacks,
+        "jumping jacks",
+        "a person is doing jumping jacks",
+        5.0,
+        jumping_jacks,
         (
             at_least("arms", 2, "the arms go up again and again"),
             at_least("legs", 2, "so the legs apart"),
@@ -203,7 +209,10 @@ CHECKS = (
         grounded=False,
     ),
     Everyday(
-        "lunges", "a woman doing lunges", 6.0, lunges,
+        "lunges",
+        "a woman doing lunges",
+        6.0,
+        lunges,
         (
             at_least("lunges", 1, "a knee goes down close to the floor"),
             at_least("split", 0.5, "one foot is far ahead of the other"),
@@ -212,7 +221,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "side lunge right", "someone does a side lunge to the right", 4.0, lambda b: side_lunge(b, 1),
+        "side lunge right",
+        "someone does a side lunge to the right",
+        4.0,
+        lambda b: side_lunge(b, 1),
         (
             at_least("held", 0.2, "the right knee bends, the left leg is straighter, the feet are wide apart"),
             at_most("feet", 1.0, "a step at the most"),
@@ -220,7 +232,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "left leg raise", "a person slowly lifts the straight left leg up to the front", 5.0, lambda b: leg_raise(b, 0),
+        "left leg raise",
+        "a person slowly lifts the straight left leg up to the front",
+        5.0,
+        lambda b: leg_raise(b, 0),
         (
             at_least("height", 0.28, "the left foot is far above the floor in front"),
             at_most("other", 0.2, "the right one is not"),
@@ -229,7 +244,9 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "right knee up", "standing on the left leg, he pulls his right knee up to hip height", 4.0,
+        "right knee up",
+        "standing on the left leg, he pulls his right knee up to hip height",
+        4.0,
         lambda b: knee_raise(b, 1),
         (
             at_least("knee", -0.12, "the right knee is about level with the hip"),
@@ -244,7 +261,10 @@ CHECKS = (
     Everyday("punch left", "a boxer throws a left punch", 3.0, lambda b: punches(b, 0), _punch(0)),
     Everyday("punch right", "he punches with his right fist", 3.0, lambda b: punches(b, 1), _punch(1)),
     Everyday(
-        "guard", "a fighter holds up both fists to protect the face", 4.0, guards,
+        "guard",
+        "a fighter holds up both fists to protect the face",
+        4.0,
+        guards,
         (
             at_least("held", 1.0, "both hands stay in front of face and chest"),
             at_least("upright", 0.85, "standing"),
@@ -252,7 +272,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "duck", "a person quickly ducks and straightens up again", 3.0, ducks,
+        "duck",
+        "a person quickly ducks and straightens up again",
+        3.0,
+        ducks,
         (
             at_least("drop", 0.25, "the head goes down by more than a hand's length"),
             at_most("back", 0.15, "and comes back up"),
@@ -261,4 +284,4 @@ CHECKS = (
             at_least("hand", 0.2, "nothing is picked up"),
         ),
     ),
-)  # fmt: skip
+)

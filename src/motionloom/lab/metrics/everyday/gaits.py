@@ -106,9 +106,12 @@ def changes_pace(body: Body) -> Measures:
     first, last = float(body.pace[:n].mean()), float(body.pace[-n:].mean())
     strolls = (body.pace > 0.4) & (body.pace < 1.9)
     return {
-        "first": first, "last": last, "gain": last - first, "ahead": body.ahead,
+        "first": first,
+        "last": last,
+        "gain": last - first,
+        "ahead": body.ahead,
         "walks": float(strolls.mean() * body.seconds),
-    }  # fmt: skip
+    }
 
 
 _FORWARD = at_least("ahead", 0.75, "the way gone is where the chest points")
@@ -127,38 +130,59 @@ def _side(side: int) -> tuple[Bound, ...]:
 
 CHECKS = (
     Everyday(
-        "walk slowly", "an old man is walking slowly", 5.0, gait,
+        "walk slowly",
+        "an old man is walking slowly",
+        5.0,
+        gait,
         (
             between("pace", 0.25, 1.0, "a slow walk is below a metre per second"),
-            at_least("advance", 0.9, "it goes somewhere"), _FORWARD, _UPRIGHT,
+            at_least("advance", 0.9, "it goes somewhere"),
+            _FORWARD,
+            _UPRIGHT,
         ),
     ),
     Everyday(
-        "walk fast", "a woman walks very fast, she is in a hurry", 4.0, gait,
+        "walk fast",
+        "a woman walks very fast, she is in a hurry",
+        4.0,
+        gait,
         (
             between("pace", 1.4, 2.4, "faster than people stroll, slower than they run"),
             at_most("flights", 2, "walking keeps a foot on the floor"),
-            at_most("top", 2.7, "nobody runs"), _FORWARD,
+            at_most("top", 2.7, "nobody runs"),
+            _FORWARD,
         ),
     ),
     Everyday(
-        "run fast", "he sprints as fast as he can", 3.0, gait,
+        "run fast",
+        "he sprints as fast as he can",
+        3.0,
+        gait,
         (
             at_least("top", 3.0, "a sprint is faster than a jog"),
-            at_least("half", 2.2, "and it lasts"), _FORWARD,
+            at_least("half", 2.2, "and it lasts"),
+            _FORWARD,
         ),
     ),
     Everyday(
-        "run backwards", "someone runs backwards", 3.0, gait,
+        "run backwards",
+        "someone runs backwards",
+        3.0,
+        gait,
         (
             at_least("top", 1.4, "faster than people walk backwards"),
-            at_most("advance", -1.2, "it goes somewhere"), _BACKWARD,
+            at_most("advance", -1.2, "it goes somewhere"),
+            _BACKWARD,
         ),
     ),
     Everyday(
-        "steps back", "a man takes a few steps back", 4.0, gait,
+        "steps back",
+        "a man takes a few steps back",
+        4.0,
+        gait,
         (
-            at_most("advance", -0.4, "a few steps back cover half a metre"), _BACKWARD,
+            at_most("advance", -0.4, "a few steps back cover half a metre"),
+            _BACKWARD,
             at_most("top", 1.6, "steps, not running"),
             at_least("lowest_pelvis", 0.8, "on the feet"),
             at_most("turn", 70, "the chest keeps facing the same way"),
@@ -167,7 +191,10 @@ CHECKS = (
     Everyday("sidestep left", "somebody sidesteps to the left", 4.0, lambda b: sidestep(b, 0), _side(0)),
     Everyday("sidestep right", "a girl steps sideways to the right", 4.0, lambda b: sidestep(b, 1), _side(1)),
     Everyday(
-        "skip", "a child skips along happily", 4.0, skips,
+        "skip",
+        "a child skips along happily",
+        4.0,
+        skips,
         (
             at_least("advance", 1.5, "skipping goes somewhere"),
             at_least("flights", 2, "every skip leaves the floor"),
@@ -177,14 +204,20 @@ CHECKS = (
         grounded=False,
     ),
     Everyday(
-        "zombie", "walking like a zombie with both arms stretched out in front", 5.0, arms_ahead,
+        "zombie",
+        "walking like a zombie with both arms stretched out in front",
+        5.0,
+        arms_ahead,
         (
             at_least("advance", 0.8, "the zombie walks"),
             at_least("arms_ahead", 0.5, "the arms stay stretched out to the front"),
         ),
     ),
     Everyday(
-        "carry a box", "a man carries a heavy box across the room", 5.0, carries,
+        "carry a box",
+        "a man carries a heavy box across the room",
+        5.0,
+        carries,
         (
             at_least("advance", 1.2, "he gets across"),
             at_least("hands_kept", 0.7, "both hands stay in front, where the box is"),
@@ -192,7 +225,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "walk and stop", "a guy walks a few steps and then stops", 5.0, stops,
+        "walk and stop",
+        "a guy walks a few steps and then stops",
+        5.0,
+        stops,
         (
             between("top", 0.5, 2.0, "there is walking"),
             at_least("travel", 0.8, "a few steps cover most of a metre"),
@@ -203,7 +239,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "run and stop", "she runs and then comes to a halt", 4.0, stops,
+        "run and stop",
+        "she runs and then comes to a halt",
+        4.0,
+        stops,
         (
             at_least("top", 1.8, "there is running"),
             at_least("travel", 1.8, "the run covers two metres"),
@@ -212,7 +251,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "start walking", "a person is standing and then starts to walk", 5.0, starts,
+        "start walking",
+        "a person is standing and then starts to walk",
+        5.0,
+        starts,
         (
             at_most("pace_start", 0.25, "it begins at rest"),
             at_least("pace_end", 0.55, "at the end there is walking"),
@@ -223,20 +265,28 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "walk then run", "a person starts out walking and breaks into a run", 5.0, changes_pace,
+        "walk then run",
+        "a person starts out walking and breaks into a run",
+        5.0,
+        changes_pace,
         (
             at_most("first", 1.9, "it does not begin with running"),
             at_least("walks", 0.5, "it begins with walking"),
             at_least("last", 2.0, "it ends with running"),
-            at_least("gain", 0.8, "the run is clearly faster"), _FORWARD,
+            at_least("gain", 0.8, "the run is clearly faster"),
+            _FORWARD,
         ),
     ),
     Everyday(
-        "run then walk", "the runner slows down to a walk", 5.0, changes_pace,
+        "run then walk",
+        "the runner slows down to a walk",
+        5.0,
+        changes_pace,
         (
             at_least("first", 1.8, "it begins with running"),
             between("last", 0.2, 1.75, "it ends with walking"),
-            at_most("gain", -0.6, "the walk is clearly slower"), _FORWARD,
+            at_most("gain", -0.6, "the walk is clearly slower"),
+            _FORWARD,
         ),
     ),
-)  # fmt: skip
+)

@@ -233,7 +233,10 @@ _LIES = (
 CHECKS = (
     Everyday("sit down from standing", "a person sits down on a chair", 5.0, sits_down, (_STANDS, *_SEAT)),
     Everyday(
-        "stand up", "someone gets up from a chair", 4.0, stands_up,
+        "stand up",
+        "someone gets up from a chair",
+        4.0,
+        stands_up,
         (
             *_SEAT,
             at_most("rest", 0.3, "they sit first"),
@@ -243,7 +246,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "sit and stand up", "a man takes a seat and stands up again", 7.0, sits_and_stands,
+        "sit and stand up",
+        "a man takes a seat and stands up again",
+        7.0,
+        sits_and_stands,
         (
             _STANDS,
             between("seat", 0.4, 0.9, "in between the hips are at the height of a seat"),
@@ -252,15 +258,26 @@ CHECKS = (
             at_least("end", 0.98, "it ends standing"),
         ),
     ),
-    Everyday("sit", "a woman is sitting on a chair", 4.0, lambda b: {**seat(b), "start": b.start(b.height)}, (
-        *_SEAT, at_most("start", 0.95, "she sits from the start"))),
     Everyday(
-        "sit on the floor", "a child sits on the floor", 4.0, sits_on_the_floor,
+        "sit",
+        "a woman is sitting on a chair",
+        4.0,
+        lambda b: {**seat(b), "start": b.start(b.height)},
+        (*_SEAT, at_most("start", 0.95, "she sits from the start")),
+    ),
+    Everyday(
+        "sit on the floor",
+        "a child sits on the floor",
+        4.0,
+        sits_on_the_floor,
         (at_most("pelvis", 0.35, "the hips are on the floor"), at_least("held", 1.0, "and the trunk is upright")),
     ),
     Everyday("lie down", "somebody lies down on the floor", 7.0, lies_down, (_STANDS, *_LIES)),
     Everyday(
-        "fall", "a man stumbles and falls to the ground", 4.0, lies_down,
+        "fall",
+        "a man stumbles and falls to the ground",
+        4.0,
+        lies_down,
         (
             at_least("start", 0.8, "it begins on the feet"),
             at_most("pelvis", 0.35, "the hips end on the floor"),
@@ -269,7 +286,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "get up", "a person who is lying on the ground gets back on their feet", 6.0, gets_up,
+        "get up",
+        "a person who is lying on the ground gets back on their feet",
+        6.0,
+        gets_up,
         (
             at_most("pelvis", 0.35, "the hips begin on the floor"),
             at_most("chest", 0.5, "the chest begins near the floor"),
@@ -279,11 +299,17 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "lie on the back", "someone is lying flat on their back", 4.0, lies_on_the_back,
+        "lie on the back",
+        "someone is lying flat on their back",
+        4.0,
+        lies_on_the_back,
         (*_LIES, at_least("face_up", 0.6, "the chest faces up"), at_most("rest", 0.4, "nobody wriggles")),
     ),
     Everyday(
-        "kneel down", "he kneels down", 5.0, kneels_down,
+        "kneel down",
+        "he kneels down",
+        5.0,
+        kneels_down,
         (
             at_least("start", 0.8, "it begins on the feet"),
             at_most("knee", 0.2, "a knee is on the floor"),
@@ -292,7 +318,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "crouch down", "a person crouches down low and stays there", 4.0, goes_low,
+        "crouch down",
+        "a person crouches down low and stays there",
+        4.0,
+        goes_low,
         (
             at_least("start", 0.8, "it begins on the feet"),
             at_most("end", 0.75, "it stays down"),
@@ -302,7 +331,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "bow", "a gentleman bows politely", 4.0, bows,
+        "bow",
+        "a gentleman bows politely",
+        4.0,
+        bows,
         (
             between("bend", 25, 115, "the trunk leans forward"),
             at_most("start", 25, "it begins upright"),
@@ -315,7 +347,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "touch the toes", "someone bends over and touches their toes", 5.0, bows,
+        "touch the toes",
+        "someone bends over and touches their toes",
+        5.0,
+        bows,
         (
             at_least("bend", 60, "the trunk hangs"),
             at_most("hands", 0.35, "a hand is at the feet"),
@@ -324,21 +359,30 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "crawl", "a baby crawls forward on hands and knees", 6.0, crawls,
+        "crawl",
+        "a baby crawls forward on hands and knees",
+        6.0,
+        crawls,
         (
             at_least("all_fours", 0.6, "on hands and knees for most of the time"),
             at_least("way", 0.5, "forward, half a metre or more"),
         ),
     ),
     Everyday(
-        "crawl backwards", "crawling backwards on all fours", 6.0, crawls,
+        "crawl backwards",
+        "crawling backwards on all fours",
+        6.0,
+        crawls,
         (
             at_least("all_fours", 0.6, "on hands and knees for most of the time"),
             at_most("way", -0.4, "backwards, almost half a metre or more"),
         ),
     ),
     Everyday(
-        "forward roll", "a person does a forward roll on the ground", 3.0, rolls,
+        "forward roll",
+        "a person does a forward roll on the ground",
+        3.0,
+        rolls,
         (
             at_least("rolled", 240, "the body goes over forwards"),
             at_most("head", 0.45, "the head comes down to the floor"),
@@ -346,7 +390,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "up the stairs", "a man walks up a flight of stairs", 5.0, climbs,
+        "up the stairs",
+        "a man walks up a flight of stairs",
+        5.0,
+        climbs,
         (
             at_least("rise", 0.35, "both feet end up higher"),
             at_least("way", 0.8, "stairs lead somewhere"),
@@ -356,7 +403,10 @@ CHECKS = (
         grounded=False,
     ),
     Everyday(
-        "down the stairs", "someone walks down the stairs", 5.0, descends,
+        "down the stairs",
+        "someone walks down the stairs",
+        5.0,
+        descends,
         (
             at_least("fall", 0.35, "both feet end up lower"),
             at_least("way", 0.8, "stairs lead somewhere"),
@@ -367,7 +417,10 @@ CHECKS = (
         grounded=False,
     ),
     Everyday(
-        "climb a ladder", "a worker climbs a ladder", 6.0, climbs,
+        "climb a ladder",
+        "a worker climbs a ladder",
+        6.0,
+        climbs,
         (
             at_least("rise", 0.4, "both feet end up higher"),
             at_least("steepness", 1.2, "a ladder is steep"),
@@ -377,7 +430,10 @@ CHECKS = (
         grounded=False,
     ),
     Everyday(
-        "three squats", "an athlete does three squats", 9.0, repeats,
+        "three squats",
+        "an athlete does three squats",
+        9.0,
+        repeats,
         (
             between("squats", 3, 3, "three, neither two nor four"),
             at_least("start", 0.95, "it begins standing"),
@@ -386,7 +442,9 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "one squat", "a person squats down once and comes back up", 5.0,
+        "one squat",
+        "a person squats down once and comes back up",
+        5.0,
         lambda b: {**goes_low(b), **repeats(b)},
         (
             between("squats", 1, 1, "once"),
@@ -396,4 +454,4 @@ CHECKS = (
             at_most("wander", 0.8, "on the spot"),
         ),
     ),
-)  # fmt: skip
+)

@@ -120,11 +120,17 @@ _SEATED = (
 
 CHECKS = (
     Everyday(
-        "walk, then sit", "a person walks forward, then sits down", 7.0, walks_then_sits,
+        "walk, then sit",
+        "a person walks forward, then sits down",
+        7.0,
+        walks_then_sits,
         (at_least("walked", 0.8, "first a few steps"), *_SEATED),
     ),
     Everyday(
-        "stand up and walk", "a man stands up from his chair and walks away", 6.0, stands_then_walks,
+        "stand up and walk",
+        "a man stands up from his chair and walks away",
+        6.0,
+        stands_then_walks,
         (
             *_SEATED,
             at_most("rest", 0.3, "he sits first"),
@@ -133,7 +139,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "walk, then wave", "someone walks up, stops and waves", 7.0, walks_then_waves,
+        "walk, then wave",
+        "someone walks up, stops and waves",
+        7.0,
+        walks_then_waves,
         (
             at_least("walked", 0.7, "first a few steps"),
             at_least("swings", 3, "then a raised hand goes to and fro"),
@@ -141,7 +150,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "pick up and walk", "she bends down, picks up a bag and walks on", 7.0, picks_up_then_walks,
+        "pick up and walk",
+        "she bends down, picks up a bag and walks on",
+        7.0,
+        picks_up_then_walks,
         (
             at_least("start", 0.95, "it begins standing"),
             at_most("hand", 0.35, "a hand gets to the floor"),
@@ -152,7 +164,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "back, then forward", "a person walks backwards, stops, and then walks forward", 8.0, back_and_forth,
+        "back, then forward",
+        "a person walks backwards, stops, and then walks forward",
+        8.0,
+        back_and_forth,
         (
             at_least("back", 0.6, "first backwards"),
             at_least("forth", 0.6, "then forwards"),
@@ -160,7 +175,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "squat, then jump", "someone squats down and then jumps up", 5.0, squats_then_jumps,
+        "squat, then jump",
+        "someone squats down and then jumps up",
+        5.0,
+        squats_then_jumps,
         (
             at_most("low", 0.8, "first the hips come down"),
             at_least("rise", 0.1, "then the body flies"),
@@ -169,7 +187,10 @@ CHECKS = (
         grounded=False,
     ),
     Everyday(
-        "kick, then punch", "a karate fighter kicks and then punches", 4.0, kick_then_punch,
+        "kick, then punch",
+        "a karate fighter kicks and then punches",
+        4.0,
+        kick_then_punch,
         (
             at_least("kick", 0.3, "first a foot goes up"),
             at_least("speed", 2.8, "fast"),
@@ -177,7 +198,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "right, then left arm", "a person raises the right arm, then the left arm", 6.0, right_then_left,
+        "right, then left arm",
+        "a person raises the right arm, then the left arm",
+        6.0,
+        right_then_left,
         (
             at_least("right", 0.3, "the right hand alone"),
             at_least("left", 0.3, "the left hand alone"),
@@ -185,7 +209,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "jump, then walk", "a kid jumps once and then walks away", 6.0, jump_then_walk,
+        "jump, then walk",
+        "a kid jumps once and then walks away",
+        6.0,
+        jump_then_walk,
         (
             at_least("rise", 0.1, "first a jump"),
             at_least("clearance", 0.06, "with both feet"),
@@ -193,4 +220,4 @@ CHECKS = (
         ),
         grounded=False,
     ),
-)  # fmt: skip
+)

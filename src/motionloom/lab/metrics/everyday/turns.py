@@ -173,11 +173,17 @@ def _turning(side: int):
 CHECKS = (
     Everyday("walk and turn left", "a man walks and then turns left", 5.0, lambda b: turns(b, 0), _turning(0)),
     Everyday(
-        "walk and turn right", "someone is walking and makes a turn to the right", 5.0,
-        lambda b: turns(b, 1), _turning(1),
+        "walk and turn right",
+        "someone is walking and makes a turn to the right",
+        5.0,
+        lambda b: turns(b, 1),
+        _turning(1),
     ),
     Everyday(
-        "there and back", "a person walks forward, turns around and walks back again", 8.0, turns_round,
+        "there and back",
+        "a person walks forward, turns around and walks back again",
+        8.0,
+        turns_round,
         (
             between("turn", 130, 235, "half a circle"),
             at_least("before", 0.7, "a few steps there"),
@@ -186,14 +192,20 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "turn around", "she turns around to face the other way", 4.0, turns_round,
+        "turn around",
+        "she turns around to face the other way",
+        4.0,
+        turns_round,
         (
             between("turn", 115, 245, "half a circle"),
             at_most("travel", 3.0, "it is a turn and not a walk"),
         ),
     ),
     Everyday(
-        "spin", "a kid spins around on the spot", 4.0, spins,
+        "spin",
+        "a kid spins around on the spot",
+        4.0,
+        spins,
         (
             at_least("turned", 300, "nearly once round or more"),
             at_most("wander", 1.6, "more or less on the spot"),
@@ -201,7 +213,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "jump forward", "a person jumps forward as far as possible", 3.0, hops_forward,
+        "jump forward",
+        "a person jumps forward as far as possible",
+        3.0,
+        hops_forward,
         (
             _OFF,
             at_least("leap", 0.6, "the leap covers more than half a metre"),
@@ -210,7 +225,10 @@ CHECKS = (
         grounded=False,
     ),
     Everyday(
-        "run and leap", "somebody takes a run-up and leaps", 4.0, hops_forward,
+        "run and leap",
+        "somebody takes a run-up and leaps",
+        4.0,
+        hops_forward,
         (
             _OFF,
             at_least("leap", 0.9, "the leap covers about a metre"),
@@ -219,12 +237,18 @@ CHECKS = (
         grounded=False,
     ),
     Everyday(
-        "jump up and down", "a boy keeps jumping up and down", 4.0, jumps_often,
+        "jump up and down",
+        "a boy keeps jumping up and down",
+        4.0,
+        jumps_often,
         (at_least("jumps", 3, "again and again"), at_most("wander", 1.2, "more or less on the spot")),
         grounded=False,
     ),
     Everyday(
-        "cartwheel", "a gymnast does a cartwheel", 4.0, somersaults,
+        "cartwheel",
+        "a gymnast does a cartwheel",
+        4.0,
+        somersaults,
         (
             at_least("tumbled", 200, "the body goes over to the side"),
             at_least("over", 120, "the head is below the hips"),
@@ -233,7 +257,10 @@ CHECKS = (
         grounded=False,
     ),
     Everyday(
-        "backflip", "he does a backflip", 3.0, somersaults,
+        "backflip",
+        "he does a backflip",
+        3.0,
+        somersaults,
         (
             at_most("rolled", -220, "the body goes over backwards"),
             at_least("over", 120, "the head is below the hips"),
@@ -242,11 +269,16 @@ CHECKS = (
         grounded=False,
     ),
     Everyday(
-        "stand on one leg", "someone balances on one leg", 5.0, one_leg,
+        "stand on one leg",
+        "someone balances on one leg",
+        5.0,
+        one_leg,
         (at_least("held", 1.5, "a foot stays up"), at_most("wander", 0.8, "on the spot")),
     ),
     Everyday(
-        "balance on the left leg", "a woman stands on her left leg with her arms spread out", 5.0,
+        "balance on the left leg",
+        "a woman stands on her left leg with her arms spread out",
+        5.0,
         lambda b: one_leg(b, 0),
         (
             at_least("held", 1.5, "the right foot stays up"),
@@ -256,7 +288,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "sway", "a person sways from side to side", 5.0, sways,
+        "sway",
+        "a person sways from side to side",
+        5.0,
+        sways,
         (
             at_least("swings", 3, "to and fro, and again"),
             at_most("feet", 0.3, "the feet stay"),
@@ -267,7 +302,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "salsa", "a woman dances salsa", 6.0, dances,
+        "salsa",
+        "a woman dances salsa",
+        6.0,
+        dances,
         (
             between("feet", 0.35, 1.3, "the feet keep moving"),
             at_least("hands", 0.3, "the hands keep moving"),
@@ -280,7 +318,10 @@ CHECKS = (
         ),
     ),
     Everyday(
-        "ballet", "a ballerina dancing gracefully", 6.0, ballet,
+        "ballet",
+        "a ballerina dancing gracefully",
+        6.0,
+        ballet,
         (
             at_least("figure", 1.0, "a leg is raised high, or the body pirouettes"),
             at_least("wide", 0.45, "the arms are held out or up"),
@@ -289,4 +330,4 @@ CHECKS = (
         ),
         grounded=False,
     ),
-)  # fmt: skip
+)
