@@ -10,8 +10,9 @@ import time
 
 import torch
 
+from motionloom.lab.suites.harness import weight_marks
 from motionloom.tasks.text import generate
-from motionloom.weights.prior import Prior
+from motionloom.weights.prior import Prior, find_weights
 
 TIMES = 5
 
@@ -33,6 +34,8 @@ def main() -> None:
             pairs = [(seconds(prior, count, 1), seconds(prior, count, best_of)) for _ in range(TIMES)]
             usual, best = (statistics.median(times) for times in zip(*pairs, strict=True))
             print(f"{count} motion(s), best of {best_of}: {best:.2f} s, {best / usual:.2f} times")
+    [(name, mark)] = weight_marks([find_weights("default")]).items()
+    print(f"\nWeights: {name} {mark}")
 
 
 if __name__ == "__main__":

@@ -30,13 +30,14 @@ from motionloom.io import save
 from motionloom.io.atomic import atomic_path
 from motionloom.kinematics import physics
 from motionloom.lab.metrics.skate import skate
+from motionloom.lab.suites.harness import weight_marks
 from motionloom.motion import Motion
 from motionloom.rotations import rotvec_to_quat
 from motionloom.skeleton import Skeleton
 from motionloom.tasks.control import Controlled, control
 from motionloom.tasks.text import generate
 from motionloom.viz.video import draw_sheet
-from motionloom.weights.prior import Prior
+from motionloom.weights.prior import Prior, find_weights
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "goals"
 OWN_POSE = "other_person.bvh"
@@ -262,6 +263,8 @@ def main() -> int:
         print(line(results[-1]), flush=True)
         with atomic_path(said.out / "user_goals.json") as temp:
             temp.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    [(name, mark)] = weight_marks([find_weights(said.weights)]).items()
+    print(f"\nWeights: {name} {mark}")
     return 1 if failed else 0
 
 

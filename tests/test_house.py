@@ -2,6 +2,7 @@
 
 import ast
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -17,8 +18,37 @@ ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "motionloom"
 FILES = sorted(SOURCE.rglob("*.py"))
 WEIGHTS = sorted((SOURCE / "weights").glob("*.safetensors"))
-MAX_FUNCTION_LINES = 70
-MAX_FILE_LINES = 450
+MAX_FUNCTION_LINES = 75
+MAX_FILE_LINES = 480
+BUDGETS = {
+    "(top)": 1_258,
+    "bulk": 4_119,
+    "cli": 8_640,
+    "data": 5_319,
+    "diffusion": 1_088,
+    "edits": 1_617,
+    "features": 1_170,
+    "goals": 3_150,
+    "io": 6_658,
+    "kinematics": 1_618,
+    "lab/bench": 966,
+    "lab/evaluator": 1_573,
+    "lab/metrics": 5_459,
+    "lab/papers": 5_232,
+    "lab/report": 1_278,
+    "lab/suites": 9_084,
+    "live": 3_054,
+    "nets": 1_242,
+    "retarget": 3_248,
+    "runtime": 1_983,
+    "server": 5_394,
+    "tasks": 4_700,
+    "train": 4_284,
+    "viz": 2_040,
+    "weights": 1_268,
+}
+"""Canonical lines per room (`tools/measure_house.py`), of 2026-11-24. They only go down: a room that needs more says
+why in docs/architecture.md, and its number is raised there and then."""
 
 
 def run(*command: str) -> subprocess.CompletedProcess[str]:
@@ -85,6 +115,27 @@ def test_sizes_and_docstrings(path: Path) -> None:
         and (length := (node.end_lineno or node.lineno) - node.lineno + 1) > MAX_FUNCTION_LINES
     ]
     assert not long, "; ".join(long)
+
+
+def test_no_room_is_over_its_budget() -> None:
+    """Lines are counted as most projects would write them, so that packing them tighter gains nothing."""
+    found = runpy.run_path(str(ROOT / "tools" / "measure_house.py"))["lines"]()
+    found.pop("lab", None)
+    assert found.keys() == BUDGETS.keys(), "a room is new or gone: give it a budget or take it out"
+    over = {room: f"{count} of {BUDGETS[room]}" for room, count in found.items() if count > BUDGETS[room]}
+    assert not over
+
+
+def test_no_line_is_held_together() -> None:
+    """The formatter alone decides about lines."""
+    held = [
+        f"{path.relative_to(ROOT)}:{number}"
+        for folder in ("src", "tests", "tools", "benchmarks", "examples")
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for number, line in enumerate(path.read_text().splitlines(), 1)
+        if re.search(r"# fmt: (skip|off|on)\s*$", line)
+    ]
+    assert not held
 
 
 def forbidden_calls(tree: ast.AST) -> list[str]:

@@ -166,6 +166,20 @@ def test_every_suite_of_the_results_says_of_which_weights_it_is() -> None:
     assert not [one for one in openings if not re.search(r"; of [\w-]+ [0-9a-f]{12}", one)]
 
 
+WITHOUT_WEIGHTS = {
+    *("batch.txt", "studio.txt", "blender_vertices.txt", "bvh_elsewhere.txt", "characters.txt"),
+    *("everyday_checks/checks.md", "releases/README.md"),
+}
+"""Tables of speed, files and recordings: nothing in them depends on what weights have learned."""
+
+
+def test_every_measured_table_names_its_weights() -> None:
+    folder = ROOT / "benchmarks"
+    tables = {p.relative_to(folder).as_posix(): p for p in folder.rglob("*") if p.suffix in (".md", ".txt")}
+    unnamed = {name for name, path in tables.items() if not FILLER["MEASURED"].search(path.read_text())}
+    assert unnamed == WITHOUT_WEIGHTS
+
+
 def test_no_figure_of_the_readme_stands_outside_of_a_marked_place() -> None:
     """Shares, counts of seeds and intervals are filled in; whoever types one here has to mark it."""
     plain = FILLER["PLACE"].sub("", README)
