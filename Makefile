@@ -93,7 +93,7 @@ pins: $(VENV)/.dev  ## renew versions and hashes in constraints*.txt (UPGRADE=1:
 pictures: $(VENV)/.runtime  ## draw the README's pictures anew, with the shipped weights
 	$(BIN)/python tools/make_pictures.py
 
-measure: $(VENV)/.runtime  ## measure the shipped weights anew (DATA=built set); fills README, docs/results.md, benchmarks/
+measure: $(VENV)/.dev  ## measure the shipped weights anew (DATA=built set); fills README, docs/results.md, benchmarks/
 	rm -rf benchmarks/obedience benchmarks/everyday benchmarks/realism benchmarks/realism_finished
 	$(BIN)/motionloom evaluate obedience --out benchmarks/obedience
 	$(BIN)/motionloom evaluate obedience --set everyday --paraphrases --out benchmarks/everyday
@@ -107,7 +107,7 @@ measure: $(VENV)/.runtime  ## measure the shipped weights anew (DATA=built set);
 	$(BIN)/motionloom evaluate all $(if $(DATA),--data $(DATA)) --keep $(RELEASE) --results docs/results.md
 	$(BIN)/python tools/fill_readme.py
 
-compare: $(VENV)/.runtime  ## which numbers of this release differ from those of an earlier one (BEFORE=benchmarks/releases/...)
+compare: $(VENV)/.dev  ## which numbers of this release differ from those of an earlier one (BEFORE=benchmarks/releases/...)
 	$(BIN)/motionloom evaluate compare $(BEFORE) $(RELEASE)
 
 tables: $(VENV)/.runtime  ## fill the figures of README and docs, and mark those of weights that no longer ship
@@ -120,22 +120,22 @@ sdist: $(VENV)/.runtime $(PAGE)  ## build dist/motionloom-*.tar.gz: sources, tes
 	$(BIN)/python -c "from setuptools import build_meta; print(build_meta.build_sdist('dist'))"
 
 # The stamps make a second `make` free; the package is installed in place, so edits to src/ need no reinstall.
-$(VENV)/.runtime: pyproject.toml constraints-runtime.txt constraints-cuda.txt
+$(VENV)/.runtime: pyproject.toml constraints-runtime.txt
 	@test -n "$(PYTHON)" || { echo "No python3.11 found; say where it is: make $(MAKECMDGOALS) PYTHON=/path/to/python3.11" >&2; exit 2; }
-	@echo "Installing the pinned packages into $(VENV) (PyTorch is large; this happens once) ..."
+	@echo "Installing the pinned packages into $(VENV) ..."
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@# A build of torch that pip is pointed to (find-links), such as one for the CPU, goes before the index's.
-	@sed -n '/^torch==/,/[^\\]$$/p' constraints-runtime.txt > $(VENV)/torch.txt
-	@$(LOCKED) $(VENV)/torch.txt --no-index 2>/dev/null || true
 	@$(LOCKED) constraints-runtime.txt
-	@if $(BIN)/python -c "import importlib.metadata as m; exit(not any(r.startswith('nvidia') for r in m.requires('torch')))"; \
-	then $(LOCKED) constraints-cuda.txt; fi
 	@$(PIP) --no-build-isolation -e .
 	@touch $@
 
-$(VENV)/.dev: $(VENV)/.runtime constraints.txt
-	@echo "Installing the test tools into $(VENV) ..."
+$(VENV)/.dev: $(VENV)/.runtime constraints.txt constraints-cuda.txt
+	@echo "Installing PyTorch and the test tools into $(VENV) (PyTorch is large; this happens once) ..."
+	@# A build of torch that pip is pointed to (find-links), such as one for the CPU, goes before the index's.
+	@sed -n '/^torch==/,/[^\\]$$/p' constraints.txt > $(VENV)/torch.txt
+	@$(LOCKED) $(VENV)/torch.txt --no-index 2>/dev/null || true
 	@$(LOCKED) constraints.txt
+	@if $(BIN)/python -c "import importlib.metadata as m; exit(not any(r.startswith('nvidia') for r in m.requires('torch')))"; \
+	then $(LOCKED) constraints-cuda.txt; fi
 	@touch $@
 
 clean:  ## remove the environment, the outputs and every cache

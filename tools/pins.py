@@ -104,7 +104,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as place:
         limits = Path(place) / "limits.txt"
         limits.write_text("".join(f"{lines[0]}\n" for lines in everything.values()))
-        runtime = resolved([], limits, upgrade=upgrade)
+        runtime = resolved(["film"], limits, upgrade=upgrade)
     write("constraints.txt", {name: lines for name, lines in everything.items() if not CUDA.match(name)})
     write("constraints-runtime.txt", {name: everything[name] for name in runtime if not CUDA.match(name)})
     write("constraints-cuda.txt", {name: lines for name, lines in everything.items() if CUDA.match(name)})

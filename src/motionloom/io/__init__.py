@@ -103,6 +103,10 @@ def check_output(path: Path | str, *, own: str | None = None) -> Path:
         from motionloom.io.blender import find_blender
 
         find_blender()
+    if suffix == ".mp4":
+        from motionloom.viz.film import find_ffmpeg
+
+        find_ffmpeg()
     return path
 
 

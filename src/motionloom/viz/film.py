@@ -1,6 +1,7 @@
 """Films from pictures: MP4 through ffmpeg, GIF through Pillow; rates, sizes and lengths that are sane; lettering."""
 
 import itertools
+import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
@@ -50,24 +51,42 @@ def write_film(
     """
     if _is_gif(path) and count > MAX_GIF_FRAMES:
         raise MotionloomError(f"a GIF of {count} frames is too long (at most {MAX_GIF_FRAMES}); write an .mp4 instead")
-    with atomic_path(suffixed(path, (".mp4", ".gif"))) as temp:
+    target = suffixed(path, (".mp4", ".gif"))
+    ffmpeg = "" if _is_gif(path) else find_ffmpeg()
+    with atomic_path(target) as temp:
         if _is_gif(path):
             _write_gif(frames(), temp, rate, sample() if sample else None)
         else:
-            _write_mp4(frames(), temp, size, rate)
+            _write_mp4(frames(), temp, size, rate, ffmpeg=ffmpeg)
     return Path(path)
+
+
+def find_ffmpeg() -> str:
+    """The program that encodes .mp4: the one that comes with imageio-ffmpeg, or the system's.
+
+    Raises `MotionloomError` where there is neither.
+    """
+    try:
+        import imageio_ffmpeg
+
+        return str(imageio_ffmpeg.get_ffmpeg_exe())
+    except (ImportError, RuntimeError):
+        found = shutil.which("ffmpeg")
+    if found is None:
+        raise MotionloomError(
+            "there is no ffmpeg to write .mp4 with; install it (pip install 'motionloom[film]' brings one), or write a .gif"
+        )
+    return found
 
 
 def _is_gif(path: str | Path) -> bool:
     return Path(path).suffix.lower() == ".gif"
 
 
-def _write_mp4(frames: Iterator[Image.Image], path: Path, size: tuple[int, int], fps: float) -> None:
+def _write_mp4(frames: Iterator[Image.Image], path: Path, size: tuple[int, int], fps: float, *, ffmpeg: str) -> None:
     """Pipe raw pictures into ffmpeg: an argument list, no shell, an absolute path."""
-    import imageio_ffmpeg
-
     command = [
-        imageio_ffmpeg.get_ffmpeg_exe(),
+        ffmpeg,
         "-y",
         "-loglevel",
         "error",

@@ -180,9 +180,16 @@ def load_predictor(path: Path) -> Predictor:
     check_graphs(path, graphs, ["predictor"])
     check_graph(graphs["predictor"], weights, PredictorSession.outputs)
     return Predictor(
-        PredictorSession(config, weights, graphs["predictor"]), schedule, layout, basis, observed, fps, variant,
-        *_statistics(path, tensors, config), card,
-    )  # fmt: skip
+        PredictorSession(config, weights, graphs["predictor"]),
+        schedule,
+        layout,
+        basis,
+        observed,
+        fps,
+        variant,
+        *_statistics(path, tensors, config),
+        card,
+    )
 
 
 def _schedule(about: dict[str, Any]) -> Schedule:

@@ -182,10 +182,15 @@ def load_prior(path: Path, device: str = "cpu") -> Prior:
     net = PriorSession(config, weights, {name: graphs[name] for name in GRAPHS}, device)
     net.check()
     prior = Prior(
-        net, schedule, tensors["mean"].astype(np.float32), tensors["std"].astype(np.float32),
-        _text(path, about["text"], tensors, graphs), Card(**about["card"]), float(about["fps"]),
+        net,
+        schedule,
+        tensors["mean"].astype(np.float32),
+        tensors["std"].astype(np.float32),
+        _text(path, about["text"], tensors, graphs),
+        Card(**about["card"]),
+        float(about["fps"]),
         _known(path, about.get("known"), tensors, config.text),
-    )  # fmt: skip
+    )
     if prior.text.width != config.text:
         raise MotionloomError(
             f"{path} reads texts of width {config.text} and its text encoder gives {prior.text.width}; fetch it again"
