@@ -74,7 +74,7 @@ def find_ffmpeg() -> str:
         found = shutil.which("ffmpeg")
     if found is None:
         raise MotionloomError(
-            "there is no ffmpeg to write .mp4 with; install it (pip install 'motionloom[film]' brings one), or write a .gif"
+            "there is no ffmpeg to write .mp4 with; pip install 'motionloom[film]' brings one; or write a .gif"
         )
     return found
 
