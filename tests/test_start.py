@@ -8,12 +8,7 @@ import pytest
 
 CLIP = Path(__file__).parents[1] / "examples" / "clips" / "walk.bvh"
 HEAVY = {
-    "torch._dynamo",
-    "torch._inductor",
-    "torch._functorch.aot_autograd",
-    "torch._decomp.decompositions",
-    "torch.utils.tensorboard",
-    "torch.utils.flop_counter",
+    "torch",
     "scipy",
     "matplotlib",
     "roma",

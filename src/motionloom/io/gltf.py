@@ -6,17 +6,17 @@ quaternions are (x, y, z, w) there.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import pygltflib
 from numpy.typing import NDArray
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io.atomic import atomic_path
 from motionloom.io.body import MATERIALS, Piece, body
+from motionloom.io.glb import pack_glb
 from motionloom.io.gltf_read import load_glb, load_glb_people
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
@@ -30,28 +30,44 @@ _TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 _VERTICES, _INDICES = 34962, 34963  # what a buffer view is for
 
 
-@dataclass
 class _File:
     """A glTF document under construction, with its binary data."""
 
-    document: pygltflib.GLTF2
-    data: bytearray = field(default_factory=bytearray)
+    def __init__(self, fps: float) -> None:
+        self.data = bytearray()
+        self.scene: list[int] = []
+        self.animation: dict[str, Any] = {"name": "motion", "channels": [], "samplers": [], "extras": {"fps": fps}}
+        self.lists: dict[str, list[dict[str, Any]]] = {
+            part: [] for part in ("nodes", "skins", "meshes", "materials", "accessors", "bufferViews")
+        }
+
+    def append(self, part: str, **entry: Any) -> int:
+        """Append to a list of the document; gives the entry's number."""
+        self.lists[part].append(entry)
+        return len(self.lists[part]) - 1
 
     def add(self, values: np.ndarray, kind: int, *, target: int | None = None, bounds: bool = False) -> int:
         """Append an array (count, width) and describe it; gives the accessor's number."""
         array = np.ascontiguousarray(values, dtype=_NUMPY[kind]).reshape(len(values), -1)
-        self.data.extend(b"\0" * (-len(self.data) % 4))
-        document = self.document
-        view = pygltflib.BufferView(buffer=0, byteOffset=len(self.data), byteLength=array.nbytes, target=target)
-        document.bufferViews.append(view)
+        self.data.extend(bytes(-len(self.data) % 4))
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": array.nbytes}
+        number = self.append("bufferViews", **view, **({} if target is None else {"target": target}))
         self.data.extend(array.tobytes())
-        accessor = pygltflib.Accessor(
-            bufferView=len(document.bufferViews) - 1, componentType=kind, count=len(array), type=_TYPES[array.shape[1]]
-        )
-        if bounds:
-            accessor.min, accessor.max = array.min(axis=0).tolist(), array.max(axis=0).tolist()
-        document.accessors.append(accessor)
-        return len(document.accessors) - 1
+        ends = {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()} if bounds else {}
+        about = {"bufferView": number, "componentType": kind, "count": len(array), "type": _TYPES[array.shape[1]]}
+        return self.append("accessors", **about, **ends)
+
+    def packed(self) -> bytes:
+        """The whole file."""
+        self.data.extend(bytes(-len(self.data) % 4))
+        document: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": "motionloom"},
+            "scene": 0,
+            "scenes": [{"nodes": self.scene}],
+            "animations": [self.animation],
+            "buffers": [{"byteLength": len(self.data)}],
+        }
+        return pack_glb(document | {part: entries for part, entries in self.lists.items() if entries}, bytes(self.data))
 
 
 def save_glb(
@@ -80,60 +96,46 @@ def glb_bytes(motions: Sequence[Motion], *, body: bool = True, names: Sequence[s
 
 
 def _assemble(motions: Sequence[Motion], with_body: bool, names: Sequence[str] | None) -> bytes:
-    asset = pygltflib.Asset(version="2.0", generator="motionloom")
-    animation = pygltflib.Animation(name="motion", extras={"fps": motions[0].fps})
-    tops: list[int] = []
-    scene = pygltflib.Scene(nodes=tops)
-    document = pygltflib.GLTF2(asset=asset, scene=0, scenes=[scene], animations=[animation])
-    file = _File(document)
+    file = _File(motions[0].fps)
     clocks: dict[tuple[float, int], int] = {}
     for number, motion in enumerate(motions):
         tail = "" if len(motions) == 1 else f"_{number + 1}"
-        tops.append(len(document.nodes))
-        first = tops[-1] + 1
+        first = len(file.lists["nodes"]) + 1
         # A node of one's own over each tree: Blender makes one armature of all trees that stand side by side.
         name = f"person{tail}" if names is None else names[number]
-        document.nodes.append(pygltflib.Node(name=name, children=[first]))
-        document.nodes.extend(_nodes(motion.skeleton, first))
+        file.scene.append(file.append("nodes", name=name, children=[first]))
+        _add_nodes(file, motion.skeleton, first)
         clock = (motion.fps, len(motion))
         if clock not in clocks:
             clocks[clock] = file.add(np.arange(len(motion))[:, None] / motion.fps, _FLOAT, bounds=True)
-        _animate(file, animation, motion, first=first, clock=clocks[clock])
+        _animate(file, motion, first=first, clock=clocks[clock])
         if with_body:
-            tops += _dress(file, motion, first, name=f"body{tail}")
-    file.data.extend(b"\0" * (-len(file.data) % 4))
-    document.buffers = [pygltflib.Buffer(byteLength=len(file.data))]
-    document.set_binary_blob(bytes(file.data))
-    return b"".join(document.save_to_bytes())
+            file.scene += _dress(file, motion, first, name=f"body{tail}")
+    return file.packed()
 
 
-def _nodes(skeleton: Skeleton, first: int) -> list[pygltflib.Node]:
-    return [
-        pygltflib.Node(
-            name=name,
-            translation=skeleton.offsets[j].astype("f4").astype(float).tolist(),
-            children=[first + c for c in skeleton.children(j)],
-        )
-        for j, name in enumerate(skeleton.names)
-    ]
+def _add_nodes(file: _File, skeleton: Skeleton, first: int) -> None:
+    for j, name in enumerate(skeleton.names):
+        children = [first + c for c in skeleton.children(j)]
+        place = skeleton.offsets[j].astype("f4").astype(float).tolist()
+        file.append("nodes", name=name, translation=place, **({"children": children} if children else {}))
 
 
-def _animate(file: _File, animation: pygltflib.Animation, motion: Motion, *, first: int, clock: int) -> None:
+def _animate(file: _File, motion: Motion, *, first: int, clock: int) -> None:
     turns = np.roll(rot.unroll(rot.normalize(motion.rotations)), -1, axis=-1)
     for j in range(len(motion.skeleton)):
         if j not in motion.skeleton.ends:
-            _channel(animation, first + j, "rotation", clock, file.add(turns[:, j], _FLOAT))
+            _channel(file, first + j, "rotation", clock, file.add(turns[:, j], _FLOAT))
         if j == 0:
-            _channel(animation, first, "translation", clock, file.add(motion.root, _FLOAT))
+            _channel(file, first, "translation", clock, file.add(motion.root, _FLOAT))
         elif motion.translations is not None:
-            _channel(animation, first + j, "translation", clock, file.add(motion.translations[:, j], _FLOAT))
+            _channel(file, first + j, "translation", clock, file.add(motion.translations[:, j], _FLOAT))
 
 
-def _channel(animation: pygltflib.Animation, node: int, path: str, clock: int, values: int) -> None:
-    sampler = pygltflib.AnimationSampler(input=clock, output=values, interpolation="LINEAR")
-    animation.samplers.append(sampler)
-    target = pygltflib.AnimationChannelTarget(node=node, path=path)
-    animation.channels.append(pygltflib.AnimationChannel(sampler=len(animation.samplers) - 1, target=target))
+def _channel(file: _File, node: int, path: str, clock: int, values: int) -> None:
+    samplers = file.animation["samplers"]
+    samplers.append({"input": clock, "output": values, "interpolation": "LINEAR"})
+    file.animation["channels"].append({"sampler": len(samplers) - 1, "target": {"node": node, "path": path}})
 
 
 def _dress(file: _File, motion: Motion, first: int, name: str) -> list[int]:
@@ -141,47 +143,45 @@ def _dress(file: _File, motion: Motion, first: int, name: str) -> list[int]:
     pieces = body(motion)
     if not pieces:
         return []
-    document, skeleton = file.document, motion.skeleton
+    skeleton = motion.skeleton
     rest = skeleton.rest_positions()
     binds = np.tile(np.eye(4), (len(skeleton), 1, 1))
     binds[:, 3, :3] = -rest  # column-major: the last column lies in the last row
-    skin = pygltflib.Skin(
+    skin = file.append(
+        "skins",
         name=name,
         joints=list(range(first, first + len(skeleton))),
         skeleton=first,
         inverseBindMatrices=file.add(binds.reshape(-1, 16), _FLOAT),
     )
-    document.skins.append(skin)
     sides = sorted({p.side for p in pieces})
     primitives = [_primitive(file, [p for p in pieces if p.side == side], rest, side) for side in sides]
-    document.meshes.append(pygltflib.Mesh(name=name, primitives=primitives))
-    document.nodes.append(pygltflib.Node(name=name, mesh=len(document.meshes) - 1, skin=len(document.skins) - 1))
-    return [len(document.nodes) - 1]
+    mesh = file.append("meshes", name=name, primitives=primitives)
+    return [file.append("nodes", name=name, mesh=mesh, skin=skin)]
 
 
-def _primitive(file: _File, pieces: list[Piece], rest: Array, side: int) -> pygltflib.Primitive:
+def _primitive(file: _File, pieces: list[Piece], rest: Array, side: int) -> dict[str, Any]:
     points = np.concatenate([p.points + rest[p.joint] for p in pieces])
     starts = np.cumsum([0, *(len(p.points) for p in pieces)])
     indices = np.concatenate([p.triangles.ravel() + start for p, start in zip(pieces, starts)])
     joints = np.zeros((len(points), 4), dtype=int)
     joints[:, 0] = np.repeat([p.joint for p in pieces], [len(p.points) for p in pieces])
     weights = np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))
-    attributes = pygltflib.Attributes(
-        POSITION=file.add(points, _FLOAT, target=_VERTICES, bounds=True),
-        NORMAL=file.add(np.concatenate([p.normals for p in pieces]), _FLOAT, target=_VERTICES),
-        JOINTS_0=file.add(joints, _U8 if len(rest) <= 256 else _U16, target=_VERTICES),
-        WEIGHTS_0=file.add(weights, _FLOAT, target=_VERTICES),
-    )
+    attributes = {
+        "POSITION": file.add(points, _FLOAT, target=_VERTICES, bounds=True),
+        "NORMAL": file.add(np.concatenate([p.normals for p in pieces]), _FLOAT, target=_VERTICES),
+        "JOINTS_0": file.add(joints, _U8 if len(rest) <= 256 else _U16, target=_VERTICES),
+        "WEIGHTS_0": file.add(weights, _FLOAT, target=_VERTICES),
+    }
     kind = _U16 if len(points) < 65535 else _U32
     faces = file.add(indices[:, None], kind, target=_INDICES)
-    return pygltflib.Primitive(attributes=attributes, indices=faces, material=_material(file.document, side))
+    return {"attributes": attributes, "indices": faces, "material": _material(file, side)}
 
 
-def _material(document: pygltflib.GLTF2, side: int) -> int:
+def _material(file: _File, side: int) -> int:
     name, colour = MATERIALS[side]
-    for number, material in enumerate(document.materials):
-        if material.name == name:
+    for number, material in enumerate(file.lists["materials"]):
+        if material["name"] == name:
             return number
-    surface = pygltflib.PbrMetallicRoughness(baseColorFactor=[*colour, 1.0], metallicFactor=0.0, roughnessFactor=0.75)
-    document.materials.append(pygltflib.Material(name=name, pbrMetallicRoughness=surface))
-    return len(document.materials) - 1
+    surface = {"baseColorFactor": [*colour, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.75}
+    return file.append("materials", name=name, pbrMetallicRoughness=surface)
