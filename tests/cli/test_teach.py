@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from motionloom import io
 from motionloom.cli import main
@@ -28,7 +27,7 @@ def knowing(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The file of a tiny prior around a walking person that says what it knows."""
     features = humanml.motion_to_features(person(2.0))
     std = np.full(263, 0.02, np.float32)
-    made = replace(tiny.prior(), mean=torch.from_numpy(features.mean(0)), std=torch.from_numpy(std))
+    made = replace(tiny.prior(), mean=features.mean(0), std=std)
     known = known_sentences(["a person walks", "a person turns left"], {"walk": 90.0, "turn left": 4.0}, made.text)
     return str(save_prior(replace(made, known=known), tmp_path_factory.mktemp("weights") / "tiny.safetensors"))
 
@@ -173,7 +172,7 @@ def test_actions_are_listed_with_their_seconds(knowing: str, weights: str, capsy
 
 def test_what_is_unknown_is_remarked_on(knowing: str, capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
     """The random encoder finds everything near, so what counts as near is set between two sentences."""
-    from motionloom.nets.text import known
+    from motionloom.runtime.text import known
 
     monkeypatch.setattr(known, "NEAR", 2.0)
     monkeypatch.setattr(known, "SAME", 0.9999)

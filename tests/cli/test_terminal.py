@@ -10,11 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from motionloom.nets.text.known import known_sentences
 
 from motionloom.cli import main, parser
 from motionloom.cli.terminal import escaping, unescaped
 from motionloom.errors import one_line, printable
+from motionloom.runtime.text.known import known_sentences
 from motionloom.weights.prior import save_prior
 from tests.nets import tiny
 
@@ -82,8 +82,8 @@ def test_a_remark_on_an_unknown_prompt_is_escaped(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where the weights themselves hold such a sentence."""
-    monkeypatch.setattr("motionloom.nets.text.known.SAME", 2.0)
-    monkeypatch.setattr("motionloom.nets.text.known.NEAR", 2.0)
+    monkeypatch.setattr("motionloom.runtime.text.known.SAME", 2.0)
+    monkeypatch.setattr("motionloom.runtime.text.known.NEAR", 2.0)
     prior = tiny.prior()
     known = known_sentences(["a person walks", HOSTILE], {"walk": 9.0}, prior.text)
     place = save_prior(replace(prior, known=known), tmp_path / "a.safetensors")

@@ -35,9 +35,10 @@ def read_prior(folder: Path) -> object:
 
 
 def adapter(folder: Path) -> None:
+    from motionloom.train.modules import prior_module
     from tests.weights.test_adapter import adapter_of, trained
 
-    net = tiny_prior().net
+    net = prior_module(tiny_prior())
     adapter_of(trained(net), net).save(folder / "a.safetensors")
 
 

@@ -13,6 +13,8 @@ from motionloom.features.layout import WIDTH
 from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22
 from motionloom.retarget.onto import match_root
+from motionloom.runtime.prior import PriorSession
+from motionloom.runtime.prior_condition import Bound
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.edit import Extend, Loop, Redraw, changes_asked, edit, kept_numbers
 from motionloom.tasks.inpaint import inpaint_motion
@@ -178,7 +180,13 @@ def test_known_frames_come_back_in_the_world(prior: Prior, first: int, last: int
     assert np.abs(drawn.positions[first + 3 : last - 3] - positions[first + 3 : last - 3]).max() > 1e-3
 
 
-def test_little_strength_stays_nearer_to_the_clip(prior: Prior) -> None:
+def test_little_strength_stays_nearer_to_the_clip(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the best estimate where all that is known is that numbers are standard normal."""
+
+    def shrunk(net: PriorSession, state: np.ndarray, level: int, bound: Bound) -> np.ndarray:
+        return (prior.schedule.signal[level] * state).astype(np.float32)
+
+    monkeypatch.setattr(PriorSession, "__call__", shrunk)
     clip = person(3.0)
     near, far = (
         np.mean([np.abs(made.positions() - clip.positions()).mean() for made in several])
@@ -186,7 +194,7 @@ def test_little_strength_stays_nearer_to_the_clip(prior: Prior) -> None:
             edit(prior, clip, "a person jumps", Redraw(strength=s), seed=1, count=4, **FEW) for s in (0.02, 1.0)
         )
     )
-    assert near < 0.8 * far
+    assert near < 0.5 * far
 
 
 def speeds(motion: Motion) -> np.ndarray:

@@ -7,6 +7,7 @@ import pytest
 
 from motionloom.diffusion import levels
 from motionloom.errors import MotionloomError
+from motionloom.features import humanml
 from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
 from motionloom.features.pair import one_world
@@ -33,6 +34,7 @@ from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from tests.nets import tiny
 from tests.noise import normal
+from tests.tasks.test_edit import person as one_person
 from tests.tasks.two_people import block as block_of
 from tests.tasks.two_people import walkers
 
@@ -201,7 +203,9 @@ def test_the_other_one_stands_as_drawn_beside_who_follows_a_path(
     drawn = []
     real = pair.pair_features
     monkeypatch.setattr(pair, "pair_features", lambda *a, **k: drawn.append(real(*a, **k)) or drawn[-1])
-    [duet] = generate_pair(prior, block, SAID[0], goals=(None, walk(40)), steps=3, foot_lock=False)
+    numbers = humanml.motion_to_features(one_person(2.0))
+    human = replace(prior, mean=numbers.mean(0), std=np.full(263, 0.02, np.float32))  # whom a body can be fitted to
+    [duet] = generate_pair(human, block, SAID[0], goals=(None, walk(40)), steps=3, foot_lock=False)
     stands = drawn[0][1][0].astype(np.float64)
     there = np.array([np.cos(np.pi / 2), np.sin(np.pi / 2), 1.0, 2.0])
     other = GroundPose.of_numbers(two.compose(there, two.relative(stands[1], stands[0])))

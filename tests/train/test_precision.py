@@ -10,9 +10,10 @@ from torch import nn
 
 from motionloom.errors import MotionloomError
 from motionloom.train import loop, precision
+from motionloom.train.low_rank import AdapterNet
+from motionloom.train.modules import prior_module
 from motionloom.train.precision import choose, product_seconds, product_size
 from motionloom.train.teach import Lesson
-from motionloom.weights.adapter import AdapterNet
 from tests.nets import tiny
 from tests.train import runs
 
@@ -58,7 +59,7 @@ def test_the_quicker_one_is_chosen_and_told(
     monkeypatch: pytest.MonkeyPatch, half: float, full: float, chosen: str
 ) -> None:
     times(monkeypatch, half=half, full=full)
-    name, why = choose(tiny.prior().net, "cpu")
+    name, why = choose(prior_module(tiny.prior()), "cpu")
     assert name == chosen
     assert f"{half * 1e3:.1f} ms in bfloat16 and {full * 1e3:.1f} ms in float32" in why
 
@@ -100,7 +101,7 @@ def test_a_run_that_goes_on_obeys_what_the_recipe_says_now(tmp_path: Path) -> No
 
 def test_the_sizes_are_those_of_the_largest_layer() -> None:
     """Of an adapter's frozen network too, which is no part of it."""
-    net = tiny.prior().net
+    net = prior_module(tiny.prior())
     assert product_size(nn.Sequential(nn.Linear(3, 5), nn.Linear(5, 7), nn.Conv1d(99, 99, 9))) == (5, 7)
     assert product_size(AdapterNet(net, 2, given_rank=0)) == product_size(net)
     assert product_size(nn.ReLU()) == (1, 1)

@@ -292,7 +292,9 @@ def _odd_frames(rest: Array) -> Array:
         if np.linalg.norm(bone) < 1e-6:
             frames[j] = frames[max(k for k, c in enumerate(CHILD) if c == j)]
             continue
-        across = {3: hips, 6: shoulders, 9: shoulders, 12: shoulders}.get(j, np.eye(3)[np.argmin(np.abs(bone))])
+        lines: dict[int, Array] = {3: hips, 6: shoulders, 9: shoulders, 12: shoulders}
+        axis: Array = np.eye(3)[int(np.argmin(np.abs(bone)))]
+        across = lines.get(j, axis)
         frames[j] = frame(bone, across)
     person = SMPL22.rest_positions()
     lean = rot.multiply(rot.inverse(_pelvis(person)), frame(np.eye(3)[1], np.eye(3)[0]))

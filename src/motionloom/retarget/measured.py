@@ -95,7 +95,8 @@ def measure_sole(places: Array, world: Array, driver: int | None, *, rest: Array
     """
     if driver is None or stands_on_flat_feet(rest, foot):
         return None
-    stands, length = _stands(places, foot), np.linalg.norm(rest[foot + 3] - rest[foot])
+    stands = _stands(places, foot)
+    length = np.linalg.norm(rest[foot + 3] - rest[foot])
     if stands.sum() >= 3:
         world_soles = _level_sole(places, foot)
     elif length > _FOOT * np.linalg.norm(rest[foot] - rest[foot - 3]):
@@ -112,7 +113,7 @@ def stands_on_flat_feet(rest: Array, foot: int) -> bool:
     return bool(_SLOPES[0] < slope < _SLOPES[1])
 
 
-def _stands(places: Array, foot: int) -> Array:
+def _stands(places: Array, foot: int) -> NDArray[np.bool_]:
     """(frames,) bool: ankle and toe are as low as they get, below an upright shin and a body that is up."""
     shin, bone = places[:, foot - 3] - places[:, foot], places[:, foot + 3] - places[:, foot]
     low = [places[:, j, 1] < np.percentile(places[:, j, 1], 20) + 0.01 for j in (foot, foot + 3)]

@@ -109,7 +109,7 @@ class Container:
         if path.suffix != ".safetensors":
             raise MotionloomError(f"weights are written as .safetensors; {path.name} has another suffix")
         about = {"format": FORMAT, **({"kind": self.kind} if self.kind else {}), **about}
-        kept = {key: np.ascontiguousarray(value) for key, value in tensors.items()}
+        kept = {key: np.asarray(value, order="C") for key, value in tensors.items()}
         return save_tensors(kept, path, metadata={self.key: json.dumps(about, default=dict)})
 
 

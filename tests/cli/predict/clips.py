@@ -12,6 +12,7 @@ from motionloom.motion import Motion
 from motionloom.nets.predictor import TransLinear
 from motionloom.runtime.predictor import PredictorConfig
 from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.train.modules import predictor_session
 from motionloom.weights.predictor import Predictor, condition_shape
 from motionloom.weights.prior import Card
 
@@ -25,10 +26,10 @@ def tiny_predictor() -> Predictor:
     net = TransLinear(
         PredictorConfig(channels=66, kept=KEPT, layers=2, width=32, heads=2, condition=shape, beside=True)
     ).eval()
-    zeros = torch.zeros(KEPT, 66)
-    pose = torch.stack([torch.zeros(66), torch.ones(66)])
+    zeros = np.zeros((KEPT, 66), np.float32)
+    pose = np.stack([np.zeros(66, np.float32), np.ones(66, np.float32)])
     return Predictor(
-        net.requires_grad_(False),
+        predictor_session(net.requires_grad_(False)),
         linear(100),
         SMPL_LAYOUT,
         Dct(FRAMES, KEPT),
@@ -36,7 +37,7 @@ def tiny_predictor() -> Predictor:
         FPS,
         "masked",
         zeros,
-        zeros + 0.01,
+        zeros + np.float32(0.01),
         pose,
         Card("tiny"),
     )

@@ -23,7 +23,8 @@ from motionloom.lab.evaluator.net import (
     load_embedder,
     save_embedder,
 )
-from motionloom.runtime.text.minilm import MiniLM, pack
+from motionloom.runtime.text.minilm import pack
+from motionloom.train.modules import text_encoder
 from tests.kinematics import people
 from tests.nets import tiny
 from tests.nets.text import tiny as tiny_text
@@ -130,7 +131,7 @@ def test_a_file_gives_the_evaluator_back(tmp_path: Path, motions: list[np.ndarra
 def test_another_text_encoder_is_refused(tmp_path: Path) -> None:
     """One changed number in the encoder is enough."""
     path = save_embedder(embedder(), tmp_path / "a.safetensors")
-    other = MiniLM.from_tensors(pack(tiny_text.weights(seed=1), tiny_text.VOCABULARY))
+    other = text_encoder(pack({k: v.numpy() for k, v in tiny_text.weights(seed=1).items()}, tiny_text.VOCABULARY))
     with pytest.raises(MotionloomError, match="another text encoder"):
         load_embedder(path, other)
 

@@ -9,6 +9,7 @@ from motionloom.features.positions import SMPL_LAYOUT, Layout
 from motionloom.nets.predictor import TransLinear
 from motionloom.runtime.predictor import PredictorConfig
 from motionloom.skeleton import SMPL22
+from motionloom.train.modules import predictor_session
 from motionloom.weights.predictor import Predictor, condition_shape
 from motionloom.weights.prior import Card
 
@@ -90,10 +91,10 @@ def predictor(
         net = TransLinear(config)
         for value in net.parameters():
             value.data.add_(0.05 * torch.randn_like(value))
-    nothing = torch.zeros(kept, layout.channels)
-    pose = torch.stack([nothing[0], torch.ones(layout.channels)])
+    nothing = np.zeros((kept, layout.channels), dtype=np.float32)
+    pose = np.stack([nothing[0], np.ones_like(nothing[0])])
     return Predictor(
-        net.eval().requires_grad_(False),
+        predictor_session(net.eval().requires_grad_(False)),
         SCHEDULES["cosine"](1000),
         layout,
         Dct(seen + ahead, kept),
@@ -101,7 +102,7 @@ def predictor(
         fps,
         "masked",
         nothing,
-        0.1 + torch.ones_like(nothing),
+        0.1 + np.ones_like(nothing),
         pose,
         Card("tiny", data="made up"),
     )
