@@ -39,7 +39,7 @@ print(f"answer.glb: somebody for {first.seconds:.1f} s of a recorded walk")
 assert first is given
 
 goal = read_goal({"path": {"points": [[0, 0], [0.5, 1.5], [0, 3]]}}, frames=80, folder=here)
-[led] = generate_pair(prior, block, "two people walk", goal=goal, person=0, seed=3)
+[led] = generate_pair(prior, block, "two people walk", goals=(goal, None), seed=3)
 off = np.linalg.norm((led[0].root - goal.positions[:, 0])[:, [0, 2]], axis=-1).mean()
 save_scene(led, "led.glb")
 print(f"led.glb: the first is {100 * off:.1f} cm from the path in the mean")

@@ -168,6 +168,7 @@ def test_every_suite_of_the_results_says_of_which_weights_it_is() -> None:
 
 WITHOUT_WEIGHTS = {
     *("batch.txt", "studio.txt", "blender_vertices.txt", "bvh_elsewhere.txt", "characters.txt"),
+    "runtime.txt",
     *("everyday_checks/checks.md", "releases/README.md"),
 }
 """Tables of speed, files and recordings: nothing in them depends on what weights have learned."""

@@ -16,11 +16,12 @@ file which ships, the place begins with a sentence that says so; this program pu
     python tools/fill_readme.py [--check]        # --check changes nothing; exit code 1 where something would change
 """
 
-import hashlib
 import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+
+from motionloom.weights.container import weights_digest
 
 ROOT = Path(__file__).resolve().parents[1]
 WEIGHTS = ROOT / "src" / "motionloom" / "weights"
@@ -39,12 +40,8 @@ def documents(root: Path = ROOT) -> list[Path]:
 
 
 def shipped(folder: Path = WEIGHTS) -> dict[str, str]:
-    """The first twelve digits of the SHA-256 of every weight file that ships, by its name."""
-    found = {}
-    for path in sorted(folder.rglob("*.safetensors")):
-        with path.open("rb") as file:
-            found[path.stem] = hashlib.file_digest(file, "sha256").hexdigest()[:12]
-    return found
+    """The first twelve digits of the digest of every weight file that ships, by its name; graphs do not count."""
+    return {path.stem: weights_digest(path)[:12] for path in sorted(folder.rglob("*.safetensors"))}
 
 
 def parse_weights(text: str) -> dict[str, str]:

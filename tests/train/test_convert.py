@@ -116,7 +116,7 @@ def test_without_the_training_package_one_sentence_names_it(
     old = without_graphs(save_prior(tiny.prior(), Path("tiny.safetensors")))
     monkeypatch.setitem(sys.modules, "motionloom.train.convert", None)
     said = refused(capsys, "weights", "convert", str(old), "new.safetensors")
-    assert "graphs are written by the training package" in said
+    assert "graphs are written by the training half" in said
 
 
 def test_reading_and_writing_one_file_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

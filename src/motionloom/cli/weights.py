@@ -201,8 +201,8 @@ def _convert(arguments: argparse.Namespace) -> None:
         from motionloom.train.convert import convert
     except ImportError as error:
         raise MotionloomError(
-            f"graphs are written by the training package, and {error.name or 'it'} is not installed: "
-            "pip install motionloom-train"
+            f"graphs are written by the training half, and {error.name or 'PyTorch'} is not installed: "
+            "pip install 'motionloom[train]'"
         ) from None
     print(f"wrote {convert(old, new, prior=arguments.prior)}")
 
