@@ -153,3 +153,20 @@ def test_the_best_of_several_is_kept_for_single_actions_and_the_rest_is_told(
         assert main(["generate", words, "--weights", weights, "--out", "d.npz", "--best-of", "99"]) == 2
         assert complaint(capsys).startswith("motionloom: the best is chosen of 1 to 16 motions; got 99")
     assert not Path("d.npz").exists()
+
+
+def test_numbers_in_the_words_are_goals(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """What was read is said once and measured; the seed decides; `--literal` reads nothing."""
+    for out in ("a.npz", "b.npz"):
+        assert generate(weights, "turn left 90 degrees", "--json", "--out", out) == 0
+    output, said = capsys.readouterr()
+    assert "read as: a turn of 90 degrees to the left, 1 s" in said
+    assert '"asked": 90.0' in output
+    assert largest_distance(io.load("a.npz"), io.load("b.npz")) == 0
+    assert generate(weights, "turn left 90 degrees", "--literal", "--out", "c.npz") == 0
+    assert "read as" not in capsys.readouterr().err
+
+
+def test_other_languages_are_told(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert generate(weights, "eine Person geht vorwärts") == 0
+    assert "does not look like English" in capsys.readouterr().err

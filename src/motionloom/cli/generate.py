@@ -7,6 +7,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from motionloom.cli.amounts import controlled, measuring_amounts, read_amounts
 from motionloom.cli.finished import finished_motions
 from motionloom.cli.newcomers import one_sentence
 from motionloom.cli.sampling import (
@@ -57,6 +58,9 @@ def add(subparsers) -> None:
         "--as-one", action="store_true", help="do not part 'A, then B' into actions that follow each other"
     )
     parser.add_argument(
+        "--literal", action="store_true", help="do not read numbers as goals: '3 meters', 'turns left 90 degrees'"
+    )
+    parser.add_argument(
         "--seed", type=int, default=0, help="the first motion's seed, the next have the next (default 0)"
     )
     parser.add_argument("--count", type=int, default=1, help="motions per prompt (default 1)")
@@ -99,13 +103,16 @@ def _generate(arguments: argparse.Namespace) -> int:
         for number, motion in enumerate(_drawn(arguments, prior, asked))
     )
     seated: list[list[Seat]] = []
-    interrupted = made.take([motion] for motion in _noting(seated, drawn, target))
+    amounts: list[list[dict[str, object]]] = []
+    checked = measuring_amounts(amounts, drawn, asked)
+    interrupted = made.take([motion] for motion in _noting(seated, checked, target))
     motions = [
         {
             "prompt": caption,
             "seed": arguments.seed + i,
             "segments": _segments(timelines[caption]),
             "seats": [asdict(seat) for seat in seats],
+            "amounts": amounts[i],
         }
         for i, (caption, seats) in enumerate(zip(captions[: made.count], seated))
     ]
@@ -156,7 +163,12 @@ def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str) -> "Ti
     parted = not arguments.as_one and seconds >= timeline.SHORTEST
     if not parted or (len(prior.mean), prior.fps) != (WIDTH, FPS):  # other weights make no long motion
         return timeline.whole(prompt, seconds)
-    found = timeline.timeline_of(prompt, arguments.seconds)
+    found = timeline.timeline_of(prompt, arguments.seconds, amounts=not arguments.literal)
+    read = [f"{amount}, {segment.seconds:g} s" for segment, amount in read_amounts(found)]
+    if read:
+        if arguments.best_of > 1 and len(found.segments) == 1:
+            print("motionloom: --best-of is not for numbers that are kept; this is drawn as it comes", file=sys.stderr)
+        print(f"motionloom: read as: {'; '.join(read)}; --literal leaves numbers to the network", file=sys.stderr)
     if len(found.segments) > 1:
         if arguments.solver is not None:
             fail("--solver is for one action at a time; give --as-one to leave the sentence whole")
@@ -219,11 +231,11 @@ def _drawn(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timel
     options: dict[str, Any] = {"foot_lock": arguments.foot_lock, **settings}
     count = 0
     with bar("generating") as progress:
-        for single, run in groupby(timelines, lambda timeline: len(timeline.segments) == 1):
+        for kind, run in groupby(timelines, _way_of_drawing):
             segments = [timeline.segments for timeline in run]
             seed = arguments.seed + count
             count += len(segments)
-            if single:
+            if kind == "free":
                 yield from _in_order(
                     generate_each(
                         prior,
@@ -237,8 +249,19 @@ def _drawn(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timel
                 )
                 continue
             for number, several in enumerate(segments):
+                if kind == "goal":
+                    yield controlled(prior, several[0], seed=seed + number, **options)
+                    progress(seed - arguments.seed + number + 1, len(timelines))
+                    continue
                 yield concatenated(*compose(prior, several, seed=seed + number, **options))
                 progress(seed - arguments.seed + number + 1, len(timelines))
+
+
+def _way_of_drawing(timeline: "Timeline") -> str:
+    """One action as it comes or with a goal, or several."""
+    if len(timeline.segments) > 1:
+        return "several"
+    return "free" if all(one.goal is None for one in timeline.segments) else "goal"
 
 
 def _in_order(made: "Iterator[tuple[int, Motion]]") -> "Iterator[Motion]":

@@ -57,7 +57,8 @@ _SECONDS = {
 """Kinds of verbs, and the seconds such an action takes."""
 
 _THEN = re.compile(
-    r"(?:\s*[.;]\s*|\s*,\s*|\s+)(?:and\s+|but\s+)?(?:then|afterwards?|after\s+(?:that|this|which)|next|subsequently"
+    r"(?:\s*[.;]\s*|\s*,\s*|\s+)(?:and\s+|but\s+)?(?:then|afterwards?|after\s+(?:that|this"
+    r"|which)|next(?! to\b)|subsequently"
     r"|finally|lastly|followed\s+by)\b\s*,?\s*(?:and\s+)?(?:also\s+)?|\s*[.;]\s+(?=\S)",
     re.IGNORECASE,
 )
@@ -66,6 +67,24 @@ _KEPT = re.compile(
 )
 _JOIN = re.compile(r"(\s*,\s*and\s+|\s*,\s*|\s+and\s+)", re.IGNORECASE)
 _AT_ONCE = re.compile(r"\b(?:while|whilst|as (?:he|she|they|it|if)|at the same time|simultaneously)\b", re.IGNORECASE)
+_SUBORDINATE = re.compile(
+    r"\b(?:who|that|which|because|until|till|when|where|since|so that|as if|as though|if|unless|although|whenever)\b",
+    re.IGNORECASE,
+)
+"""Words with which a clause of time, place or reason begins: what "and" joins behind one may belong to it."""
+_COUNTED = re.compile(
+    r"\b(?:a|one|two|three|four|five|six|seven|eight|nine|ten|\d+) (?:\w+ ){0,2}(?:steps?|paces|strides?)\b",
+    re.IGNORECASE,
+)
+_STOPS = re.compile(r"(?:stop|halt|pause)s?(?: (?:there|again|walking|moving))?", re.IGNORECASE)
+_REPEATED = re.compile(
+    r"\b(two|three|four|five|six|seven|eight|nine|ten|\d+) (?:\w+ )?"
+    r"(?:squats|jumps|kicks|punches|push-?ups|sit-?ups|pull-?ups|jumping jacks|jacks|lunges"
+    r"|burpees|crunches|claps|nods|bows|hops"
+    r"|skips|spins|turns|circles|cartwheels|flips|rolls|somersaults|pirouettes|waves|stretches"
+    r"|laps|reps|repetitions|jabs"
+    r"|swings|throws|leaps|knocks|strikes|sets|rounds|bends|dips|twirls)\b"
+)
 _NUMBER = {
     "once": 1,
     "twice": 2,
@@ -107,7 +126,8 @@ def split_actions(text: str) -> tuple[Part, ...]:
             rest = lasting if lasting != rest or not own else finite(rest)
         if not named and mood_of(rest) == "gerund":
             named = "a person"
-        parts += [_sentence(named, finite(item)) for item in _list(rest)]
+        items = [rest] if _SUBORDINATE.search(named) else _list(rest)  # "a guard who walks and stops is bored"
+        parts += [_sentence(named, finite(item)) for item in items]
     parts = completed(parts)
     if not 1 < len(parts) <= MOST_PARTS:
         return (Part(text, natural_seconds(text)),)
@@ -148,7 +168,7 @@ def natural_seconds(text: str) -> float:
         seconds *= 0.4 + 0.6 * (_count(found[1]) or 2)
     elif re.search(r"\b(twice|thrice)\b", said):
         seconds *= 1.6 if "twice" in said else 2.2
-    elif found := re.search(r"\b(two|three|four|five|six|seven|eight|nine|ten|\d+) \w+s\b", said):
+    elif found := _REPEATED.search(said):
         seconds *= 0.4 + 0.6 * (_count(found[1]) or 2)
     if re.search(r"\bin (?:a )?(?:full |big |large |small )?circles?\b", said):
         seconds = max(seconds, 6.0)
@@ -223,7 +243,7 @@ def _list(clause: str) -> list[str]:
     mood = mood_of(tokens[0])
     for join, piece in zip(tokens[1::2], tokens[2::2], strict=True):
         piece = PRONOUN.sub("", piece)
-        if mood and verb_of(piece, mood) and not _is_thing(items[-1], join):
+        if mood and verb_of(piece, mood) and not _is_thing(items[-1], join) and not _belongs(items[-1], join, piece):
             items.append(piece)
             joins.append(join)
         else:
@@ -264,6 +284,8 @@ def _is_clause(phrase: str) -> bool:
     if verb_of(phrase, "gerund"):
         return True
     subject = subject_of(phrase)
+    if mood_of(phrase) == "base" and not re.match(r"(?:they|we|you|i)\b", phrase, re.IGNORECASE):
+        return False  # "after a long march", "before the big jump"
     return bool(subject) and bool(mood_of(phrase)) and bool(verb_of(phrase[len(subject) :].strip(), mood_of(phrase)))
 
 
@@ -272,6 +294,13 @@ def _is_thing(item: str, join: str) -> bool:
     rest = item[len(subject_of(item)) :].strip()
     base = next((verb_of(rest, mood) for mood in MOODS if verb_of(rest, mood)), "")
     return base in NOUNS_AFTER and "," not in join and bool(re.search(r"\w+s$", item)) and len(rest.split(" ")) <= 4
+
+
+def _belongs(item: str, join: str, piece: str) -> bool:
+    """Whether what follows is of the clause of time, place or reason before, or the end of counted steps."""
+    if _COUNTED.search(item) and _STOPS.fullmatch(piece.strip()):
+        return True
+    return "," not in join and bool(_SUBORDINATE.search(item))
 
 
 def _count(word: str) -> int:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from motionloom.io.lined_yaml import MAX_ITEMS, Lined, read_lined
 if TYPE_CHECKING:
     from motionloom.goals.goal import Goal
     from motionloom.goals.segment import Segment
+    from motionloom.goals.sequence import Part
 
 SCHEMA = Path(__file__).parents[1] / "schemas" / "timeline.schema.json"
 KEYS = ("segments", "seed", "guidance", "transition", "start", "path")
@@ -106,18 +107,48 @@ def whole(text: str, seconds: float) -> Timeline:
     return Timeline((Segment(text, seconds),))
 
 
-def timeline_of(text: str, seconds: float | None = None) -> Timeline:
+def timeline_of(text: str, seconds: float | None = None, *, amounts: bool = False) -> Timeline:
     """One sentence as segments, one for each action that follows another (`motionloom.goals.sequence`).
 
     seconds: of the whole, shared out as the actions' own lengths are; None: those lengths. A sentence that says one
-    thing, or several at once, is one segment of 5 s. Raises `MotionloomError` for what cannot be asked.
+    thing, or several at once, is one segment of 5 s. amounts: numbers with units in the words become lengths and goals
+    of their segments (`motionloom.goals.amounts`). Raises `MotionloomError` for what cannot be asked.
     """
-    from motionloom.goals.segment import Segment
-    from motionloom.goals.sequence import lengths, split_actions
+    from motionloom.goals.sequence import split_actions
 
     if problem := _text_problem(text):
         raise MotionloomError(problem)
     parts = split_actions(text)
+    if amounts:
+        return _with_amounts(text, parts, seconds)
+    return _of_parts(text, parts, seconds)
+
+
+def _with_amounts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeline:
+    """As long as the numbers in the words need, with their goals; without one as `_of_parts`."""
+    from motionloom.goals.amount_goal import goal_for, seconds_for
+    from motionloom.goals.amounts import read_amount, read_seconds
+
+    read = [read_amount(part.text) for part in parts]
+    found = [one if one is not None and seconds_for(one) <= LONGEST else None for one in read]
+    own = [read_seconds(part.text) or (one and seconds_for(one)) for part, one in zip(parts, found, strict=True)]
+    if not any(own):
+        return _of_parts(text, parts, seconds)
+    natural = [replace(part, seconds=length or part.seconds) for part, length in zip(parts, own, strict=True)]
+    if seconds is None and len(parts) == 1:
+        seconds = min(natural[0].seconds, LONGEST)
+    made = _of_parts(text, natural, seconds)
+    segments = [
+        segment if one is None else replace(segment, goal=goal_for(one, segment.seconds))
+        for segment, one in zip(made.segments, found, strict=True)
+    ]
+    return replace(made, segments=tuple(segments))
+
+
+def _of_parts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeline:
+    from motionloom.goals.segment import Segment
+    from motionloom.goals.sequence import lengths
+
     if len(parts) == 1:
         return plain_timeline([text], seconds=SECONDS if seconds is None else seconds)
     if seconds is not None and not SHORTEST * len(parts) <= seconds <= LONGEST:

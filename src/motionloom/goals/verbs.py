@@ -12,7 +12,7 @@ _VERBS = {
     "state": "sit stand lie lay rest wait pause balance pose remain stay sleep lean",
     "change": "kneel crouch bend fall stop rise collapse duck freeze halt straighten",
     "event": "throw catch pick put place bow roll grab drop take toss pitch stoop cartwheel flip dive trip squat "
-    "lunge curtsy sneeze open close shoot",
+    "lunge curtsy sneeze open close shoot notice discover hear",
     "jump": "jump leap bound",
     "turn": "turn spin twist rotate pivot circle twirl",
     "fight": "kick punch box strike hit block dodge slash fight swipe chop jab",
@@ -56,6 +56,7 @@ _PAST = {
     "leave": "left",
     "sleep": "slept",
     "shoot": "shot",
+    "hear": "heard",
 }
 _DOUBLED = {
     "run",

@@ -1,0 +1,250 @@
+"""Numbers with units in a sentence: how far, how many steps, how much of a turn, how long, how often.
+
+"turns left 90 degrees", "walks 3 meters forward", "takes three steps back", "walks in a half circle to the right",
+"for ten seconds", "jumps twice". Plain text work by written rules (docs/words.md); what could mean something else,
+"a man of 25 years", "turns his head 45 degrees", "throws a ball 10 meters", is not read.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from motionloom.goals.verbs import base_of, kind_of_verb
+
+Kind = Literal["turn", "way", "steps", "arc"]
+Direction = Literal["forward", "backward", "left", "right"]
+
+MOST_DEGREES = 720.0
+MOST_STEPS = 40
+MOST_METRES = 200.0
+MOST_SECONDS = 60.0
+
+
+@dataclass(frozen=True)
+class Amount:
+    """What the words of one action say in numbers."""
+
+    kind: Kind
+    size: float
+    """Degrees of a turn or an arc, metres of a way, number of steps."""
+    direction: Direction
+    """Where somebody goes; of turns and arcs the side, left or right."""
+    stride: float = 0.0
+    """Metres of one step."""
+    speed: float = 0.0
+    """Metres per second."""
+    backward: bool = False
+    """Whether an arc is walked backwards."""
+
+    def __str__(self) -> str:
+        if self.kind == "turn":
+            return f"a turn of {self.size:g} degrees to the {self.direction}"
+        if self.kind == "arc":
+            how = "backwards " if self.backward else ""
+            return f"an arc of {self.size:g} degrees {how}to the {self.direction}"
+        way = {"left": "to the left", "right": "to the right"}.get(self.direction, self.direction)
+        if self.kind == "steps":
+            return f"{self.size:g} step{'s' if self.size > 1 else ''} {way}"
+        return f"{self.size:g} m {way}"
+
+    @property
+    def metres(self) -> float:
+        """The length of the way; 0 for a turn."""
+        if self.kind == "steps":
+            return self.size * self.stride
+        if self.kind == "arc":
+            return RADIUS * math.radians(self.size)
+        return self.size if self.kind == "way" else 0.0
+
+
+RADIUS = 1.0
+"""Metres: of a half circle that is walked where its size is not said."""
+
+_NUMBERS = {
+    word: number
+    for number, word in enumerate(
+        ["one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"], start=1
+    )
+} | {
+    "fifteen": 15,
+    "twenty": 20,
+    "thirty": 30,
+    "forty": 40,
+    "forty-five": 45,
+    "sixty": 60,
+    "ninety": 90,
+    "hundred": 100,
+}
+_NUMBER = r"(\d+(?:\.\d+)?|" + "|".join(sorted(_NUMBERS, key=len, reverse=True)) + ")"
+_UNITS = {"m": 1.0, "meter": 1.0, "metre": 1.0, "cm": 0.01, "centimeter": 0.01, "centimetre": 0.01, "yard": 0.9144}
+_UNITS |= {"foot": 0.3048, "feet": 0.3048, "ft": 0.3048}
+_WAY = re.compile(
+    rf"(?<![\w.])(?<!\bon )(?<!\bwith ){_NUMBER}[\s-]?(m|cm|ft|feet|foot|(?:centi)?met(?:er|re)s?|yards?)\b"
+    r"(?!\s*(?:tall|high|wide|long|deep|away|apart|from|below|above|of|behind|wall|pole|rope|board|line|race|dash))"
+)
+_DEGREES = re.compile(rf"(?<![\w.]){_NUMBER}[\s-]?(?:degrees?\b|deg\b|°)")
+_PART_OF_TURN = re.compile(r"\b(?:a )?(half|quarter|full|three[- ]quarter)(?: an?)?[ -]turn\b")
+_ARC = re.compile(r"\b(?:in |along )?(?:a |an )?(half|quarter|semi)(?: of a)?[ -]?circles?\b")
+_STEPS = re.compile(
+    rf"\b(?:{_NUMBER}|(?:(?<=takes )|(?<=take )|(?<=taking )|(?<=took ))a(?:n)?(?: single)?)"
+    r"(?: (small|tiny|short|baby|little|big|large|long|giant|huge|quick|slow|careful))?(?: (side|backward|forward))?"
+    r"[ -]?(?:steps?|paces|strides?|sidesteps?)\b"
+)
+_SECONDS = re.compile(
+    rf"\bfor (?:about |around |exactly )?(?:{_NUMBER}|(half a|an?))[ -]?(s|secs?|seconds?|mins?|minutes?)\b"
+)
+_BODY = re.compile(
+    r"\b(?:arms?|hands?|heads?|legs?|foot|knees?|wrists?|elbows?|hips?|waist|torso|shoulders?"
+    r"|neck|palms?|body|trunk)\b"
+)
+_ELSE = re.compile(
+    r"\b(?:stairs?|staircase|ladder|hill|back and forth|to and fro|zig-?zags?|in circles?|in a"
+    r" (?:\w+ )?circle|around|dances?"
+    r"|danc(?:e|ing)|ballet|salsa|waltz(?:es)?|tango|cha-cha|climb(?:s|ing)?|up (?:the |\w+"
+    r" )?steps|down (?:the |\w+ )?steps"
+    r"|while|figure (?:of )?(?:eight|8)|pirouette|diagonally|apart|every)\b"
+)
+"""Words with which a number is no plain way: what is done then is left to the network."""
+_TURNS = {"turn", "rotate", "spin", "pivot", "twirl"}
+_PACES = {
+    "run": 2.8,
+    "jog": 2.2,
+    "sprint": 4.5,
+    "rush": 2.5,
+    "race": 4.0,
+    "march": 1.3,
+    "crawl": 0.45,
+    "sneak": 0.6,
+    "creep": 0.5,
+    "tiptoe": 0.6,
+    "limp": 0.6,
+    "shuffle": 0.5,
+    "stagger": 0.7,
+    "stumble": 0.8,
+    "sidestep": 0.6,
+    "skip": 1.6,
+}
+_WALKING = 1.1
+_GOING = {"walk", "stroll", "step", "go", "move", "pace", "stride", "wander", "back", *_PACES}
+_STEPPING = {"take", "make", "walk", "go", "move", "step", "march", "run", "sidestep", "stroll", "back"}
+
+
+def read_amount(text: str) -> Amount | None:
+    """The turn, way, steps or arc that the words of one action ask for in numbers; None where they ask for none.
+
+    text: one action (`motionloom.goals.sequence.split_actions`).
+    """
+    said = " ".join(text.lower().replace(",", " ").split())
+    verbs = [base for word in re.findall(r"[a-z]+", said) if word != "left" and (base := base_of(word))]
+    if not verbs or {kind_of_verb(verb, said) for verb in verbs} & {"jump", "fight", "dance"}:
+        return None
+    return _turn(said, verbs) or _arc(said, verbs) or _steps(said, verbs) or _way(said, verbs)
+
+
+def read_seconds(text: str) -> float | None:
+    """The seconds that "for ten seconds", "for half a minute" ask for; None without, and beyond a minute."""
+    found = _SECONDS.search(text.lower())
+    if not found:
+        return None
+    number = _value(found[1]) if found[1] else 0.5 if found[2] == "half a" else 1.0
+    seconds = number * (60.0 if found[3].startswith("min") else 1.0)
+    return seconds if 0.2 <= seconds <= MOST_SECONDS else None
+
+
+def _turn(said: str, verbs: list[str]) -> Amount | None:
+    if not _TURNS & set(verbs) or _BODY.search(said) or set(verbs) & {"throw", "look"}:
+        return None
+    found, part = list(_DEGREES.finditer(said)), _PART_OF_TURN.search(said)
+    if len(found) > 1 or bool(found) == bool(part):
+        return None
+    degrees = _value(found[0][1]) if found else {"half": 180.0, "quarter": 90.0, "full": 360.0}.get(part[1], 270.0)  # type: ignore[index]
+    side = _side(said) or ("left" if degrees % 180 == 0 and not re.search(r"\b(?:left|right)\b", said) else "")
+    if not side or not 5 <= degrees <= MOST_DEGREES or set(verbs) & (_GOING - {"step", "back"}):
+        return None
+    return Amount("turn", degrees, "left" if side == "left" else "right")
+
+
+def _arc(said: str, verbs: list[str]) -> Amount | None:
+    found, side = _ARC.search(said), _side(said)
+    if not found or not side or not set(verbs) & _GOING or _BODY.search(said):
+        return None
+    backward = _backward(said)
+    degrees = 90.0 if found[1] == "quarter" else 180.0
+    return Amount("arc", degrees, "left" if side == "left" else "right", speed=_pace(said, verbs), backward=backward)
+
+
+def _steps(said: str, verbs: list[str]) -> Amount | None:
+    found = list(_STEPS.finditer(said))
+    if len(found) != 1 or not set(verbs) & _STEPPING or _ELSE.search(said):
+        return None
+    size, direction = found[0][2] or "", _direction(said, aside=True)
+    count = _value(found[0][1]) if found[0][1] else 1.0
+    if direction is None or count != int(count) or not 1 <= count <= MOST_STEPS:
+        return None
+    stride = {"forward": 0.62, "backward": 0.4}.get(direction, 0.4)
+    if size in ("small", "tiny", "short", "baby", "little"):
+        stride *= 0.6
+    elif size in ("big", "large", "long", "giant", "huge"):
+        stride *= 1.3
+    seconds = 0.5 if direction != "forward" or _slow(said) else 0.4 if "run" in verbs else 0.45
+    return Amount("steps", count, direction, stride=stride, speed=stride / seconds)
+
+
+def _way(said: str, verbs: list[str]) -> Amount | None:
+    found, direction = list(_WAY.finditer(said)), _direction(said, aside=False)
+    going = [verb for verb in verbs if verb in _GOING]
+    if len(found) != 1 or direction is None or not going or _ELSE.search(said):
+        return None
+    if set(verbs) - set(going) - {"stop", "halt", "track", "return", "keep", "continue"} - {"open", "place"}:
+        return None
+    unit = found[0][2]
+    metres = _value(found[0][1]) * _UNITS[unit if unit in _UNITS else unit.removesuffix("s")]
+    if not 0.2 <= metres <= MOST_METRES:
+        return None
+    return Amount("way", round(metres, 3), direction, speed=_pace(said, verbs))
+
+
+def _pace(said: str, verbs: list[str]) -> float:
+    pace = next((_PACES[verb] for verb in verbs if verb in _PACES), _WALKING)
+    if _backward(said):
+        pace *= 0.65
+    elif _direction(said, aside=False) in ("left", "right"):
+        pace = min(pace, 0.7)
+    if _slow(said):
+        return 0.65 * pace
+    return 1.35 * pace if re.search(r"\b(?:quickly|quick|fast|briskly|rapidly|hastily)\b", said) else pace
+
+
+def _slow(said: str) -> bool:
+    return bool(re.search(r"\b(?:slowly|slow|carefully|careful|cautiously|gently)\b", said))
+
+
+def _backward(said: str) -> bool:
+    return bool(re.search(r"\b(?:backwards?|back|in reverse|rearwards?)\b", said))
+
+
+def _side(said: str) -> str:
+    """The one side that is said, seen from above for clockwise; empty for none and for both."""
+    if re.search(r"\b(?:counter|anti)[ -]?clockwise\b", said):
+        return "left"
+    if re.search(r"\bclockwise\b", said):
+        return "right"
+    sides = set(re.findall(r"\b(left|right)(?!(?:[ -]handed| after| before| away| in front))(?:wards?)?\b", said))
+    return sides.pop() if len(sides) == 1 else ""
+
+
+def _direction(said: str, *, aside: bool) -> Direction | None:
+    """Where a way leads; None where that is not clear. ``aside``: a side alone is enough for a step to it."""
+    back, side = _backward(said), _side(said)
+    named = bool(re.search(r"\b(?:left|right)\b", said))
+    sideways = bool(re.search(r"\b(?:sideways?|side[ -]?steps?|sidestepping|side steps?|laterally)\b", said))
+    if sideways or (aside and named):
+        return None if not side or back else "left" if side == "left" else "right"
+    if named or (back and re.search(r"\bforwards?\b", said)):
+        return None
+    return "backward" if back else "forward"
+
+
+def _value(word: str) -> float:
+    return float(_NUMBERS[word]) if word in _NUMBERS else float(word)
