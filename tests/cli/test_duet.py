@@ -208,3 +208,26 @@ def test_a_wrong_timeline_is_reported_with_its_line(files: Path, capsys: pytest.
     assert place in said
     assert len(said.splitlines()) == 1
     assert written() == {"t.yaml", "a.bvh"}
+
+
+def test_bodies_that_are_in_each_other_are_measured_and_told(
+    files: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    person = walkers(1.0)[0]
+    aside = replace(person, root=person.root + np.array([3.0, 0.0, 0.0]))
+    monkeypatch.setattr(pair, "generate_pair", lambda *_, **__: [(person, person), (person, aside)])
+    words = "two people walk", "--count", "2", "--out", "d.glb"
+    assert duet(files, *words, "--json") == 0
+    told = capsys.readouterr()
+    found = json.loads(told.out)
+    inside, apart = found["measures"]
+    assert inside["least_trunk_distance"] == 0
+    assert inside["overlapping_frames"] == len(person)
+    assert inside["deepest_overlap"] > 0.15
+    assert apart["deepest_overlap"] == apart["overlapping_frames"] == 0
+    assert apart["least_trunk_distance"] > 2
+    assert len(found["remarks"]) == 1
+    assert found["remarks"][0] == (
+        f"duet 1: the two are in each other by {100 * inside['deepest_overlap']:.0f} cm in {len(person)} frames"
+    )
+    assert found["remarks"][0] in told.err

@@ -1,6 +1,7 @@
 """`motionloom duet`: two people from words, going on from their past, reacting to somebody, or through a timeline."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -39,6 +40,8 @@ SECONDS, ADDED = 6.0, 3.0
 """Length of a duet, and what is added to a past, unless asked otherwise."""
 PAIRS = 8
 """Duets that are drawn together: those of a group that is finished stay where the next one is interrupted."""
+DEEP = 0.02
+"""Metres of overlap that are no touch any more: skin and cloth give way as much."""
 SINGLE = (".bvh", ".npz", ".vrma")
 """Files of one person each."""
 
@@ -126,6 +129,7 @@ def run_duet(arguments: argparse.Namespace) -> int:
 
     made = Finished(files, arguments.count, write, put, what="duets")
     seconds = 0.0
+    measures: list[dict[str, float]] = []
 
     def drawn() -> "Iterator[list[list[Motion]]]":
         nonlocal seconds
@@ -136,13 +140,19 @@ def run_duet(arguments: argparse.Namespace) -> int:
                 )
                 seconds = duets[0][0].seconds
                 seed = (arguments.seed or 0) + some["first"]
-                yield [
+                duets = [
                     [looped(arguments, prior, person, "", seed=seed + number) for person in duet]
                     for number, duet in enumerate(duets)
                 ]
+                measures.extend(_measures(duet) for duet in duets)
+                yield duets
 
     interrupted = made.take(drawn())
-    report(arguments, _about(arguments, made.count, seconds), made.written, made.sampling)
+    about = _about(arguments, made.count, seconds)
+    about |= {"measures": measures[: made.count], "remarks": _remarks(measures[: made.count])}
+    for line in about["remarks"]:
+        print(f"motionloom: {line}", file=sys.stderr)
+    report(arguments, about, made.written, made.sampling)
     note_rate(arguments, _inputs(arguments))
     return made.ended(interrupted)
 
@@ -420,3 +430,28 @@ def _about(arguments: argparse.Namespace, count: int, seconds: float) -> dict[st
         "weights": str(arguments.weights),
         "block": str(arguments.pair_weights),
     }
+
+
+def _measures(duet: "Sequence[Motion]") -> dict[str, float]:
+    """How near the two bodies come, and how deep and in how many frames they are in each other."""
+    from motionloom.kinematics.capsules import overlap, trunk_distance
+    from motionloom.retarget import joints22
+
+    first, second = (joints22(person) for person in duet)
+    apart, depth = trunk_distance(first, second), overlap(first, second)
+    return {
+        "least_trunk_distance": round(float(apart.min()), 4),
+        "trunk_distance": round(float(sorted(apart)[len(apart) // 2]), 4),
+        "deepest_overlap": round(float(depth.max()), 4),
+        "overlapping_frames": int((depth > DEEP).sum()),
+    }
+
+
+def _remarks(measures: "Sequence[dict[str, float]]") -> list[str]:
+    """A sentence for each duet whose bodies are in each other."""
+    return [
+        f"{f'duet {number}: ' if len(measures) > 1 else ''}the two are in each other by "
+        f"{100 * one['deepest_overlap']:.0f} cm in {one['overlapping_frames']} frames"
+        for number, one in enumerate(measures, 1)
+        if one["overlapping_frames"]
+    ]

@@ -5,6 +5,7 @@ import pytest
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
+from motionloom.kinematics import capsules
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import J
 from motionloom.lab.metrics import pair as mp
@@ -148,9 +149,9 @@ def test_shins_that_cross_penetrate_by_their_radii_less_the_gap():
     radius = 0.0366 * 0.87
     depth = mp.penetration_depth(pair)
     np.testing.assert_allclose(depth[:8], 2 * radius - 0.04, atol=0.02)
-    forearm = [number for number, c in enumerate(mp.CAPSULES) if c[0][0][0] == J["left_elbow"]]
-    ends = [mp.capsule_ends(person)[:8, forearm] for person in pair]
-    s, t, apart = mp.closest(ends[0], ends[1])
+    forearm = [number for number, c in enumerate(capsules.CAPSULES) if c[0][0][0] == J["left_elbow"]]
+    ends = [capsules.capsule_ends(person)[:8, forearm] for person in pair]
+    s, t, apart = capsules.closest(ends[0], ends[1])
     np.testing.assert_allclose((s, t, apart), [np.full((8, 1), v) for v in (0.5, 0.5, 0.04)])
     assert (depth[8:] == 0).all()
     assert mp.penetration(pair) == pytest.approx(depth[:8].mean() / 10)
@@ -158,7 +159,7 @@ def test_shins_that_cross_penetrate_by_their_radii_less_the_gap():
 
 def test_two_people_in_one_place_are_as_deep_as_their_thickest_part():
     pair = couple(0.0, turn=0.0)
-    np.testing.assert_allclose(mp.penetration_depth(pair), 2 * mp.RADII.max(), atol=1e-9)
+    np.testing.assert_allclose(mp.penetration_depth(pair), 2 * capsules.RADII.max(), atol=1e-9)
     assert mp.penetration(couple(0.6)) == 0
     assert mp.penetration(couple(0.15)) > 0.02
 
@@ -170,7 +171,7 @@ def test_the_nearest_points_of_segments_equal_a_fine_search():
     share = np.linspace(0, 1, 201)
     on = [e[:, None, 0] + share[:, None] * (e[:, None, 1] - e[:, None, 0]) for e in (a, b)]
     searched = np.linalg.norm(on[0][:, :, None] - on[1][:, None], axis=-1).min(axis=(1, 2))
-    found = mp.closest(a, b)[2]
+    found = capsules.closest(a, b)[2]
     assert (found <= searched + 1e-9).all()
     np.testing.assert_allclose(found, searched, atol=0.02)
 
@@ -179,14 +180,14 @@ def test_the_capsules_of_limbs_have_the_radii_of_the_drawn_figure():
     still = Motion(SMPL22, 20.0, SMPL22.offsets[:1].repeat(2, 0), np.tile(rot.IDENTITY, (2, 22, 1)))
     drawn = figure(still)
     radii = {bone: r for bone, r in zip(drawn.bones, drawn.radii, strict=True) if bone[1] not in drawn.trunk}
-    found = {(c[0][0][0], c[1][0][0]): c[2:] for c in mp.CAPSULES if len(c[0]) == 1 and len(c[1]) == 1}
+    found = {(c[0][0][0], c[1][0][0]): c[2:] for c in capsules.CAPSULES if len(c[0]) == 1 and len(c[1]) == 1}
     assert set(radii) <= set(found)
     for bone, expected in radii.items():
         np.testing.assert_allclose(found[bone], expected, atol=1e-3)
 
 
 def test_every_capsule_end_is_a_place_of_the_body():
-    np.testing.assert_allclose(mp._WEIGHTS.sum(axis=-1), 1)
+    np.testing.assert_allclose(capsules._WEIGHTS.sum(axis=-1), 1)
 
 
 # Together ------------------------------------------------------------------------------------------------------------
@@ -282,7 +283,7 @@ def test_speeds_and_skate_are_measured_at_the_rate_of_the_frames_and_of_both_peo
 def test_a_capsule_is_as_thick_as_told_at_either_end():
     points = np.array([[0.3, 0.0, 0.0], [0.3, 0.5, 0.0], [0.3, 1.0, 0.0]])
     limb = np.array([[[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]])
-    gaps = mp._gaps(np.stack([points, points], axis=1)[None], np.zeros((3, 2)), limb, np.array([[0.1, 0.05]]))
+    gaps = capsules.gaps(np.stack([points, points], axis=1)[None], np.zeros((3, 2)), limb, np.array([[0.1, 0.05]]))
     np.testing.assert_allclose(gaps[0, :, 0], [0.2, 0.225, 0.25])
 
 

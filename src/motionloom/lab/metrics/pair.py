@@ -12,7 +12,8 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.kinematics import physics as ph
-from motionloom.kinematics.physics import Array, J
+from motionloom.kinematics.capsules import RADII, capsule_ends, gaps, overlap
+from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics.skate import skate
 
 FPS = 20.0
@@ -130,12 +131,12 @@ def hand_contact(positions: np.ndarray, *, within: float = HOLD) -> float:
 def hand_to_body(positions: np.ndarray) -> Array:
     """(frames,) metres from a wrist of one to the surface of the other's `CAPSULES`, the nearest; below 0 inside."""
     p = _pair(positions)
-    gaps = []
+    apart = []
     for person, other in ((0, 1), (1, 0)):
         points = p[person][:, list(ph.WRISTS)]
         ends = capsule_ends(p[other])
-        gaps.append(_gaps(np.stack([points, points], axis=2), np.zeros((2, 2)), ends, RADII).min(axis=(1, 2)))
-    return np.minimum(*gaps)
+        apart.append(gaps(np.stack([points, points], axis=2), np.zeros((2, 2)), ends, RADII).min(axis=(1, 2)))
+    return np.minimum(*apart)
 
 
 def touch(positions: np.ndarray, *, within: float = TOUCH) -> float:
@@ -145,106 +146,12 @@ def touch(positions: np.ndarray, *, within: float = TOUCH) -> float:
 
 def penetration_depth(positions: np.ndarray) -> Array:
     """(frames,) metres: how deep the deepest capsule of one is in a capsule of the other; 0 where none touch."""
-    p = _pair(positions)
-    gaps = _gaps(capsule_ends(p[0]), RADII, capsule_ends(p[1]), RADII)
-    return np.maximum(-gaps.min(axis=(1, 2)), 0.0)
+    return overlap(*_pair(positions))
 
 
 def penetration(positions: np.ndarray) -> float:
     """Metres: `penetration_depth` averaged over all frames."""
     return float(penetration_depth(positions).mean())
-
-
-# The body as capsules ------------------------------------------------------------------------------------------------
-
-_HEIGHT = 1.6038
-"""Metres: the uniform person as the project draws it."""
-
-
-def _at(**weights: float) -> tuple[tuple[int, float], ...]:
-    return tuple((J[name], weight) for name, weight in weights.items())
-
-
-def _limb(start: str, end: str, first: float, last: float) -> tuple:
-    return _at(**{start: 1.0}), _at(**{end: 1.0}), first, last
-
-
-def _side(side: str) -> tuple[tuple, ...]:
-    bones = (
-        ("hip", "knee", 0.0738),
-        ("knee", "ankle", 0.0561),
-        ("ankle", "foot", 0.0337),
-        ("shoulder", "elbow", 0.0481),
-        ("elbow", "wrist", 0.0366),
-    )
-    return tuple(_limb(f"{side}_{a}", f"{side}_{b}", thick, 0.74 * thick) for a, b, thick in bones)
-
-
-CAPSULES: tuple[tuple, ...] = (
-    *_side("left"),
-    *_side("right"),
-    _limb("spine3", "neck", 0.0417, 0.0309),
-    _limb("neck", "head", 0.0237, 0.0175),
-    # the head of the drawn figure: a ball of 5.5 % of the height over the head's joint
-    (_at(head=1.47, neck=-0.47), _at(head=1.99, neck=-0.99), 0.052 * _HEIGHT, 0.052 * _HEIGHT),
-    # the trunk is wider than deep: pelvis and chest lie across, the belly stands; radii are the drawn half depths
-    (_at(left_hip=1.0), _at(right_hip=1.0), 0.050 * _HEIGHT, 0.050 * _HEIGHT),
-    (_at(pelvis=1.0), _at(spine3=1.0), 0.055 * _HEIGHT, 0.055 * _HEIGHT),
-    (
-        _at(spine3=0.5, left_shoulder=0.4, right_shoulder=0.1),
-        _at(spine3=0.5, left_shoulder=0.1, right_shoulder=0.4),
-        0.050 * _HEIGHT,
-        0.050 * _HEIGHT,
-    ),
-)
-"""The body that the project draws (`viz.figure`, `io.body`) as capsules: ends as weighted joints, radii in metres."""
-RADII: Array = np.array([capsule[2:] for capsule in CAPSULES])
-"""(capsules, 2) metres at both ends, for the uniform person."""
-
-
-def _weights() -> Array:
-    weights = np.zeros((len(CAPSULES), 2, 22))
-    for number, capsule in enumerate(CAPSULES):
-        for end in (0, 1):
-            for joint, weight in capsule[end]:
-                weights[number, end, joint] = weight
-    return weights
-
-
-_WEIGHTS = _weights()
-
-
-def capsule_ends(positions: np.ndarray) -> Array:
-    """(frames, capsules, 2, 3) metres: both ends of one person's `CAPSULES` from (frames, 22, 3)."""
-    return np.einsum("cej,fjx->fcex", _WEIGHTS, np.asarray(positions, dtype=np.float64))
-
-
-def _gaps(a: Array, radii_a: Array, b: Array, radii_b: Array) -> Array:
-    """(frames, n, m) metres between surfaces of capsules (frames, n, 2, 3) and (frames, m, 2, 3); below 0 they overlap.
-
-    Between the closest points of the axes, with the radii there: exact for capsules of one radius, within a
-    millimetre or two for these, which taper slowly.
-    """
-    s, t, apart = closest(a[:, :, None], b[:, None])
-    thick = [r[..., 0] + share * (r[..., 1] - r[..., 0]) for r, share in ((radii_a[:, None], s), (radii_b[None], t))]
-    return apart - thick[0] - thick[1]
-
-
-def closest(a: np.ndarray, b: np.ndarray) -> tuple[Array, Array, Array]:
-    """Where two line segments (..., 2, 3) are nearest: shares (...) along each and the distance (...).
-
-    Ericson, Real-Time Collision Detection, 2005, section 5.1.9; a segment may be a point.
-    """
-    d1, d2, r = a[..., 1, :] - a[..., 0, :], b[..., 1, :] - b[..., 0, :], a[..., 0, :] - b[..., 0, :]
-    aa, ee, bb = (d1 * d1).sum(-1), (d2 * d2).sum(-1), (d1 * d2).sum(-1)
-    c, f = (d1 * r).sum(-1), (d2 * r).sum(-1)
-    tiny = 1e-12
-    across = aa * ee - bb * bb
-    s = np.where(across > tiny, np.clip((bb * f - c * ee) / np.maximum(across, tiny), 0.0, 1.0), 0.0)
-    t = np.clip((bb * s + f) / np.maximum(ee, tiny), 0.0, 1.0)
-    s = np.where(aa > tiny, np.clip((bb * t - c) / np.maximum(aa, tiny), 0.0, 1.0), 0.0)
-    gap = r + s[..., None] * d1 - t[..., None] * d2
-    return s, t, np.linalg.norm(gap, axis=-1)
 
 
 # Together ------------------------------------------------------------------------------------------------------------
