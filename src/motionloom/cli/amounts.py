@@ -1,7 +1,7 @@
 """Numbers in the words of `generate`: what was read of them, and whether a motion does it."""
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -20,8 +20,8 @@ def read_amounts(timeline: "Timeline") -> "list[tuple[Segment, Amount]]":
     return [(segment, amount) for segment, amount in found if amount is not None]
 
 
-def controlled(prior: "Prior", segment: "Segment", *, seed: int, **options: Any) -> "Motion":
-    """The motion of one segment with a goal, from one seed."""
+def controlled(prior: "Prior", segment: "Segment", *, seed: int, options: Mapping[str, Any]) -> "Motion":
+    """The motion of one segment with a goal, from one seed; ``options`` are those of `control`."""
     from motionloom.tasks.control import control
 
     assert segment.goal is not None

@@ -250,7 +250,7 @@ def _drawn(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timel
                 continue
             for number, several in enumerate(segments):
                 if kind == "goal":
-                    yield controlled(prior, several[0], seed=seed + number, **options)
+                    yield controlled(prior, several[0], seed=seed + number, options=options)
                     progress(seed - arguments.seed + number + 1, len(timelines))
                     continue
                 yield concatenated(*compose(prior, several, seed=seed + number, **options))

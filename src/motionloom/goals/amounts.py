@@ -80,10 +80,10 @@ _NUMBER = r"(\d+(?:\.\d+)?|" + "|".join(sorted(_NUMBERS, key=len, reverse=True))
 _UNITS = {"m": 1.0, "meter": 1.0, "metre": 1.0, "cm": 0.01, "centimeter": 0.01, "centimetre": 0.01, "yard": 0.9144}
 _UNITS |= {"foot": 0.3048, "feet": 0.3048, "ft": 0.3048}
 _WAY = re.compile(
-    rf"(?<![\w.])(?<!\bon )(?<!\bwith ){_NUMBER}[\s-]?(m|cm|ft|feet|foot|(?:centi)?met(?:er|re)s?|yards?)\b"
+    rf"(?<![^\s(\"'])(?<!\bon )(?<!\bwith ){_NUMBER}[\s-]?(m|cm|ft|feet|foot|(?:centi)?met(?:er|re)s?|yards?)\b"
     r"(?!\s*(?:tall|high|wide|long|deep|away|apart|from|below|above|of|behind|wall|pole|rope|board|line|race|dash))"
 )
-_DEGREES = re.compile(rf"(?<![\w.]){_NUMBER}[\s-]?(?:degrees?\b|deg\b|°)")
+_DEGREES = re.compile(rf"(?<![^\s(\"']){_NUMBER}[\s-]?(?:degrees?\b|deg\b|°)")
 _PART_OF_TURN = re.compile(r"\b(?:a )?(half|quarter|full|three[- ]quarter)(?: an?)?[ -]turn\b")
 _ARC = re.compile(r"\b(?:in |along )?(?:a |an )?(half|quarter|semi)(?: of a)?[ -]?circles?\b")
 _STEPS = re.compile(

@@ -41,7 +41,7 @@ class _File:
             part: [] for part in ("nodes", "skins", "meshes", "materials", "accessors", "bufferViews")
         }
 
-    def append(self, part: str, **entry: Any) -> int:
+    def append(self, part: str, entry: dict[str, Any]) -> int:
         """Append to a list of the document; gives the entry's number."""
         self.lists[part].append(entry)
         return len(self.lists[part]) - 1
@@ -51,11 +51,11 @@ class _File:
         array = np.ascontiguousarray(values, dtype=_NUMPY[kind]).reshape(len(values), -1)
         self.data.extend(bytes(-len(self.data) % 4))
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": array.nbytes}
-        number = self.append("bufferViews", **view, **({} if target is None else {"target": target}))
+        number = self.append("bufferViews", view | ({} if target is None else {"target": target}))
         self.data.extend(array.tobytes())
         ends = {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()} if bounds else {}
         about = {"bufferView": number, "componentType": kind, "count": len(array), "type": _TYPES[array.shape[1]]}
-        return self.append("accessors", **about, **ends)
+        return self.append("accessors", about | ends)
 
     def packed(self) -> bytes:
         """The whole file."""
@@ -103,7 +103,7 @@ def _assemble(motions: Sequence[Motion], with_body: bool, names: Sequence[str] |
         first = len(file.lists["nodes"]) + 1
         # A node of one's own over each tree: Blender makes one armature of all trees that stand side by side.
         name = f"person{tail}" if names is None else names[number]
-        file.scene.append(file.append("nodes", name=name, children=[first]))
+        file.scene.append(file.append("nodes", {"name": name, "children": [first]}))
         _add_nodes(file, motion.skeleton, first)
         clock = (motion.fps, len(motion))
         if clock not in clocks:
@@ -118,7 +118,7 @@ def _add_nodes(file: _File, skeleton: Skeleton, first: int) -> None:
     for j, name in enumerate(skeleton.names):
         children = [first + c for c in skeleton.children(j)]
         place = skeleton.offsets[j].astype("f4").astype(float).tolist()
-        file.append("nodes", name=name, translation=place, **({"children": children} if children else {}))
+        file.append("nodes", {"name": name, "translation": place} | ({"children": children} if children else {}))
 
 
 def _animate(file: _File, motion: Motion, *, first: int, clock: int) -> None:
@@ -149,15 +149,17 @@ def _dress(file: _File, motion: Motion, first: int, name: str) -> list[int]:
     binds[:, 3, :3] = -rest  # column-major: the last column lies in the last row
     skin = file.append(
         "skins",
-        name=name,
-        joints=list(range(first, first + len(skeleton))),
-        skeleton=first,
-        inverseBindMatrices=file.add(binds.reshape(-1, 16), _FLOAT),
+        {
+            "name": name,
+            "joints": list(range(first, first + len(skeleton))),
+            "skeleton": first,
+            "inverseBindMatrices": file.add(binds.reshape(-1, 16), _FLOAT),
+        },
     )
     sides = sorted({p.side for p in pieces})
     primitives = [_primitive(file, [p for p in pieces if p.side == side], rest, side) for side in sides]
-    mesh = file.append("meshes", name=name, primitives=primitives)
-    return [file.append("nodes", name=name, mesh=mesh, skin=skin)]
+    mesh = file.append("meshes", {"name": name, "primitives": primitives})
+    return [file.append("nodes", {"name": name, "mesh": mesh, "skin": skin})]
 
 
 def _primitive(file: _File, pieces: list[Piece], rest: Array, side: int) -> dict[str, Any]:
@@ -184,4 +186,4 @@ def _material(file: _File, side: int) -> int:
         if material["name"] == name:
             return number
     surface = {"baseColorFactor": [*colour, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.75}
-    return file.append("materials", name=name, pbrMetallicRoughness=surface)
+    return file.append("materials", {"name": name, "pbrMetallicRoughness": surface})
