@@ -8,8 +8,6 @@ Medians of five, each beside the usual one in the same turn, on an idle machine.
 import statistics
 import time
 
-import torch
-
 from motionloom.lab.suites.harness import weight_marks
 from motionloom.tasks.text import generate
 from motionloom.weights.prior import Prior, find_weights
@@ -28,7 +26,7 @@ def main() -> None:
     """Print a line for each."""
     prior = Prior.load()
     seconds(prior, 1, 1)
-    print(f"{torch.get_num_threads()} threads; motions of 9.8 s, seconds in all, as a multiple of best_of=1")
+    print("motions of 9.8 s, seconds in all, as a multiple of best_of=1")
     for count in (1, 8):
         for best_of in (2, 4, 8):
             pairs = [(seconds(prior, count, 1), seconds(prior, count, best_of)) for _ in range(TIMES)]

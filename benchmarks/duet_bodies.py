@@ -10,6 +10,7 @@ from motionloom.kinematics.capsules import overlap, trunk_distance
 from motionloom.kinematics.physics import WRISTS
 from motionloom.retarget import joints22
 from motionloom.tasks.pair import generate_pair
+from motionloom.weights.container import PAIRS, PRIORS, weights_digest
 from motionloom.weights.pair import PairBlock
 
 PROMPTS = ("fight", "dance salsa together", "shake hands", "hug", "walk side by side")
@@ -36,6 +37,9 @@ def main() -> None:
             f"{words:<22}{np.median(trunk):>14.0f}{trunk.min():>7.0f}{depth.max():>9.1f}"
             f"{100 * (depth > 2).mean():>10.0f}{hand.min():>14.0f}"
         )
+    files = {"default": PRIORS.shipped()["default"], "duet": PAIRS.shipped()["duet"]}
+    marks = [f"{name} {weights_digest(path)[:12]}" for name, path in files.items()]
+    print(f"\nWeights: {', '.join(marks)}")
 
 
 if __name__ == "__main__":

@@ -8,9 +8,10 @@ import numpy as np
 from motionloom.goals.amount_goal import measured
 from motionloom.goals.amounts import Amount, read_amount
 from motionloom.goals.timeline import timeline_of
+from motionloom.lab.suites.harness import weight_marks
 from motionloom.tasks.control import control
 from motionloom.tasks.text import generate
-from motionloom.weights.prior import Prior
+from motionloom.weights.prior import Prior, find_weights
 
 SENTENCES = (
     "turn left 90 degrees",
@@ -70,6 +71,8 @@ def main() -> None:
             cells.append(", ".join(f"{value:.{digits}f} ({steps})" for value, steps in got))
             cells.append(f"{sum(kept(amount, size, *one) for one in got)} of {len(got)}")
         print(f"{text} | {amount}: {size:.2f}, {segment.seconds:g} s | {' | '.join(cells)}", flush=True)
+    [(name, mark)] = weight_marks([find_weights("default")]).items()
+    print(f"\nWeights: {name} {mark}")
 
 
 if __name__ == "__main__":
