@@ -67,6 +67,10 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     return top
 
 
+EXTRAS = {"torch": "train", "onnx": "train", "matplotlib": "lab"}
+"""Packages that only training and measuring need, and the extra that brings each."""
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; 0 done, 2 a mistake in what was asked or given, 130 interrupted (also by SIGTERM, SIGHUP)."""
     try:  # from here on: a Ctrl-C while the commands are still being imported is one too
@@ -83,6 +87,14 @@ def _told(argv: Sequence[str] | None) -> int:
         return _run(argv)
     except MotionloomError as error:
         problem = str(error)
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package not in EXTRAS:
+            raise
+        problem = (
+            f"this command needs {package}, which is not installed; pip install 'motionloom[{EXTRAS[package]}]', or "
+            "'make dev' in a clone, brings it"
+        )
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
