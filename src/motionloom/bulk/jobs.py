@@ -7,6 +7,7 @@ keeps more rows than one shard has.
 import csv
 import importlib
 import json
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
@@ -16,6 +17,8 @@ from typing import Any
 from motionloom.errors import MotionloomError
 
 READS = (".jsonl", ".ndjson", ".csv", ".parquet")
+MAX_COLUMNS = 200
+"""Columns of a table of jobs."""
 MAX_LINE = 4_000_000
 """Bytes of one row."""
 LARGEST = 1000
@@ -148,6 +151,8 @@ def _lines(path: Path) -> Iterator[bytes]:
                 raise MotionloomError(f"{path} has a line of more than {MAX_LINE:,} bytes; a row is one short line")
             line = (line.removeprefix(b"\xef\xbb\xbf") if first else line).strip()
             first = False
+            if b"\0" in line:
+                raise MotionloomError(f"{path} is not text in UTF-8: a line of it holds zero bytes")
             if line:
                 yield line
 
@@ -161,7 +166,9 @@ def _csv(path: Path) -> Iterator[bytes]:
             between = max(",;\t", key=head.count)  # a table of a country with decimal commas has semicolons
             table = csv.DictReader(file, strict=True, delimiter=between)
             names = [name.strip() for name in table.fieldnames or ()]
-            if twice := [name for name in names if names.count(name) > 1]:
+            if len(names) > MAX_COLUMNS:
+                raise MotionloomError(f"{path} has {len(names):,} columns; at most {MAX_COLUMNS} are read")
+            if twice := [name for name, count in Counter(names).items() if count > 1]:
                 raise MotionloomError(f"{path} has the column {twice[0]!r} twice; name each once")
             for row in table:
                 if None in row or None in row.values():
