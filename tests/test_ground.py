@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -34,19 +33,3 @@ def test_the_four_numbers_say_the_same(first: GroundPose, second: GroundPose) ->
 def test_the_inverse_leads_back(pose: GroundPose) -> None:
     both = ground.compose(pose.numbers(), pose.inverse().numbers())
     assert both == pytest.approx([1, 0, 0, 0], abs=1e-9)
-
-
-def test_tensors_and_arrays_agree() -> None:
-    numbers = np.random.default_rng(0).normal(size=(2, 3, 4))
-    base, pose = numbers
-    points = np.random.default_rng(1).normal(size=(3, 3))
-    for function, args in (
-        (ground.compose, (base, pose)),
-        (ground.relative, (base, pose)),
-        (ground.to_world, (points, pose)),
-        (ground.from_world, (points, pose)),
-        (ground.normalized, (base,)),
-        (ground.mirrored, (base,)),
-    ):
-        found = function(*map(torch.from_numpy, args))
-        assert found.numpy() == pytest.approx(function(*args))

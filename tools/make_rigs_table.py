@@ -25,7 +25,7 @@ from motionloom.skeleton import SMPL22
 from motionloom.weights.predictor import save_predictor
 from motionloom.weights.prior import save_prior
 from tests.cli.predict.clips import tiny_predictor
-from tests.nets import tiny
+from tests.recorded import tiny
 from tests.tasks.two_people import block
 
 ROOT = Path(__file__).parents[1]

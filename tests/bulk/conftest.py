@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from motionloom.weights.prior import Prior, save_prior
-from tests.nets import tiny
+from tests.recorded import tiny
 from tests.tasks.two_people import block
 
 

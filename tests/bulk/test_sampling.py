@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from motionloom.bulk.sampling import draw_group, groups
 from motionloom.tasks.text import generate, sample_features
 from motionloom.weights.prior import Prior, shipped
-from tests.nets import tiny
+from tests.recorded import tiny
 
 PROMPTS = (
     "a person walks",

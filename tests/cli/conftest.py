@@ -8,7 +8,7 @@ import pytest
 from motionloom.io import stream
 from motionloom.motion import Motion
 from motionloom.weights.prior import save_prior
-from tests.nets import tiny
+from tests.recorded import tiny
 
 
 @pytest.fixture(scope="session")

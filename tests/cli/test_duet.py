@@ -12,7 +12,7 @@ from motionloom.cli import main
 from motionloom.tasks import pair
 from motionloom.weights.prior import save_prior
 from tests.io.motions import largest_distance
-from tests.nets import tiny
+from tests.recorded import tiny
 from tests.tasks.two_people import block, walkers
 
 

@@ -19,6 +19,7 @@ CLIP = "examples/clips/walk.bvh"
         ("teach", "a person flips", CLIP, "--out", "{out}/a.safetensors"),
         ("weights", "convert", "{out}/a.safetensors", "{out}/b.safetensors"),
         ("bench",),
+        ("import", "model.pt", "--out", "{out}/a.safetensors"),
     ],
     ids=lambda words: words[0],
 )

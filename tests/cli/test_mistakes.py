@@ -6,9 +6,6 @@ from pathlib import Path
 import pytest
 
 from motionloom.cli import generate, main, parser
-from motionloom.errors import MotionloomError
-from motionloom.lab.suites import obey
-from motionloom.lab.suites.harness import Run
 
 
 @pytest.fixture(autouse=True)
@@ -22,7 +19,7 @@ def folder(tmp_path, monkeypatch) -> Path:
     [
         (["info", "walk.bvh", "--fps", "3"], "motionloom info --help"),
         (["generate", "a person walks", "--bogus"], "motionloom generate --help"),
-        (["data", "build", "here", "--out", "there", "--bogus"], "motionloom data build --help"),
+        (["weights", "convert", "a", "b", "--bogus"], "motionloom weights convert --help"),
         (["--bogus"], "motionloom --help"),
     ],
 )
@@ -97,24 +94,3 @@ def test_a_warning_is_one_line_without_a_place_in_the_source(monkeypatch, capsys
     monkeypatch.setattr(generate, "_generate", lambda arguments: warnings.warn("mind the\n gap", stacklevel=1))
     assert main(["generate", "a person walks"]) == 0
     assert capsys.readouterr().err == "motionloom: mind the gap\n"
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [(None, "motionloom: there is no caption file said.jsonl"), (b"\xff" * 5000, "line 1 is not JSON")],
-)
-def test_captions_that_are_none_are_reported_in_one_short_sentence(folder, content, message, capsys):
-    (folder / "walk.bvh").write_text("HIERARCHY")
-    if content:
-        (folder / "said.jsonl").write_bytes(content)
-    assert main(["data", "build", ".", "--out", "set", "--captions", "said.jsonl"]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("motionloom: ")
-    assert message in said
-    assert len(said) < 300
-
-
-def test_a_report_with_no_place_is_refused_before_any_motion_is_made(folder, capsys):
-    (folder / "taken").write_text("")
-    with pytest.raises(MotionloomError, match=r"cannot write '?taken"):
-        obey.run(Run(folder=Path("taken")), generate=lambda *_, **__: pytest.fail("a motion was made"))

@@ -16,7 +16,7 @@ from motionloom.cli.terminal import escaping, unescaped
 from motionloom.errors import one_line, printable
 from motionloom.runtime.text.known import known_sentences
 from motionloom.weights.prior import save_prior
-from tests.nets import tiny
+from tests.recorded import tiny
 
 HOSTILE = "a man\x1b[31m\x1b]0;title\x07 \x9b2J walks\u202e\x7f\r back"
 """Colours, a title for the window, a cleared screen, text that runs to the left, a line written over."""

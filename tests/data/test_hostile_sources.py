@@ -11,8 +11,10 @@ from motionloom.data.build import build
 from motionloom.data.clips import Clip, Note, read_clip, write_clip
 from motionloom.data.sources import Span, find_takes
 from motionloom.errors import MotionloomError
+from motionloom.io.tensors import MAX_TENSORS
 from motionloom.lab.suites.items import read_items
 from motionloom.lab.suites.protocol import Selection
+from tests.io.test_tensors import empty_tensors
 
 ROW = {
     "amass_path": "x/CMU/02/02_01_poses.npy",
@@ -123,3 +125,9 @@ def test_spans_are_seconds() -> None:
     for start, end in ((float("nan"), 1.0), (0.0, float("nan")), (-1.0, 1.0), (1e300, 1e301), (0.0, -1.0)):
         with pytest.raises(ValueError, match="seconds"):
             Span(start, end, ("x",), "human")
+
+
+def test_a_clip_of_very_many_tensors_is_refused_before_it_is_parsed(tmp_path: Path) -> None:
+    path = empty_tensors(tmp_path / "a.safetensors", MAX_TENSORS + 1)
+    with pytest.raises(MotionloomError, match="more than 10,000 tensors"):
+        read_clip(path)

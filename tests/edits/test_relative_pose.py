@@ -15,8 +15,8 @@ from motionloom.runtime.pair import PairSession, join
 from motionloom.tasks.pair import PairEdits, generate_pair, known_state, pair_features, pair_noise
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
-from tests.nets import tiny
 from tests.noise import normal
+from tests.recorded import tiny
 from tests.tasks.two_people import block as block_of
 
 FRAMES = 100

@@ -12,8 +12,8 @@ from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import heading
 from motionloom.skeleton import SMPL22
 from motionloom.weights.prior import Prior
-from tests.nets import tiny
 from tests.noise import normal
+from tests.recorded import tiny
 
 WRIST, HEAD = SMPL22.index("right_wrist"), SMPL22.index("head")
 LEVELS = (50, 25, 1)

@@ -1,8 +1,7 @@
-"""Features mean what they say: round trips, symmetries and gradients."""
+"""Features mean what they say: round trips and symmetries."""
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -56,7 +55,7 @@ def test_corrected_heading_goes_on_when_somebody_turns_past_where_they_started(r
 def test_displacements_of_decoded_places_are_the_stored_ones(heading: humanml.Heading) -> None:
     features = humanml.encode(person(5), heading=heading).astype(np.float64)
     stored = features[:-1, LAYOUT["joint_velocity"]].reshape(-1, 22, 3)
-    np.testing.assert_allclose(humanml.displacements(torch.from_numpy(features)).numpy(), stored, atol=2e-6)
+    np.testing.assert_allclose(humanml.displacements(features), stored, atol=2e-6)
 
 
 @settings(max_examples=5, deadline=None)
@@ -104,12 +103,6 @@ def test_a_walk_forward_has_forward_velocity_only() -> None:
     np.testing.assert_allclose(features[:, LAYOUT["root_velocity"]], np.tile([0, 0.05], (29, 1)), atol=2e-4)
     np.testing.assert_allclose(features[1:, LAYOUT["yaw_velocity"]], 0, atol=1e-6)
     assert (features[:, LAYOUT["contacts"]] == 0).all()  # 5 cm a frame is faster than the threshold
-
-
-def test_decoding_is_differentiable() -> None:
-    features = torch.from_numpy(humanml.encode(person(2))[:6]).double()[None].requires_grad_()
-    assert torch.autograd.gradcheck(humanml.decode_positions, (features,), fast_mode=True)
-    assert torch.autograd.gradcheck(lambda f: humanml.positions_from_rot6d(f), (features,), fast_mode=True)
 
 
 def test_resampling_keeps_circles_round() -> None:

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -149,21 +148,9 @@ def test_the_published_drawing_is_right_where_the_first_person_faces_ahead_and_o
     np.testing.assert_allclose(pair.to_world(point, pair.as_published(turned)[1]), expected, atol=1e-12)
 
 
-def test_tensors_and_arrays_agree():
-    made = pair.encode(people(13))
-    features, stands = made.features.astype(np.float64), made.poses
-    there = pair.decode(torch.from_numpy(features), torch.from_numpy(stands))
-    np.testing.assert_allclose(there.numpy(), pair.decode(features, stands), atol=1e-12)
-    for code in CODES:
-        numbers = code.encode(torch.from_numpy(stands))
-        np.testing.assert_allclose(numbers.numpy(), code.encode(stands), atol=1e-12)
-        np.testing.assert_allclose(code.decode(numbers).numpy(), code.decode(code.encode(stands)), atol=1e-12)
-
-
 def test_no_direction_at_all_is_ahead():
     nothing = np.array([0.0, 0.0, 1.0, 2.0])
     np.testing.assert_array_equal(pair.normalized(nothing), [1.0, 0.0, 1.0, 2.0])
-    np.testing.assert_array_equal(pair.normalized(torch.from_numpy(nothing)).numpy(), [1.0, 0.0, 1.0, 2.0])
 
 
 @pytest.mark.parametrize("shape", [(1, 9, 22, 3), (2, 1, 22, 3), (2, 9, 21, 3), (9, 22, 3)], ids=str)

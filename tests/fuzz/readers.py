@@ -4,8 +4,7 @@ A new reader gets a place in one of the files imported here; their order is that
 """
 
 # isort: off
-from tests.fuzz import readers_of_motions, readers_of_recordings, readers_of_weights, readers_of_measurements
-from tests.fuzz import readers_of_jobs
+from tests.fuzz import readers_of_jobs, readers_of_motions, readers_of_weights
 from tests.fuzz.reader import READERS, Reader
 # isort: on
 
@@ -13,8 +12,6 @@ __all__ = [
     "READERS",
     "Reader",
     "readers_of_jobs",
-    "readers_of_measurements",
     "readers_of_motions",
-    "readers_of_recordings",
     "readers_of_weights",
 ]

@@ -62,7 +62,7 @@ def batch(kind: str) -> Callable[[Path], None]:
         from motionloom.bulk.batch import Where, batch
         from motionloom.bulk.maker import Options
         from motionloom.weights.prior import save_prior
-        from tests.nets import tiny
+        from tests.recorded import tiny
 
         weights = save_prior(tiny.prior(), folder / "tiny.safetensors")
         rows = [{"prompt": "a person walks", "seconds": 0.6, "seed": seed} for seed in range(3)]

@@ -1,11 +1,12 @@
 """Files appear whole or not at all."""
 
 import os
+from pathlib import Path
 
 import pytest
 
 from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path
+from motionloom.io.atomic import atomic_path, check_place
 
 
 def test_the_file_appears_when_the_block_ends_and_not_before(tmp_path):
@@ -77,3 +78,30 @@ def test_a_folder_without_write_permission_is_refused(tmp_path):
 def test_a_full_disk_names_the_file_that_was_asked_for(tmp_path):
     with pytest.raises(MotionloomError, match=r"cannot write .*a\.txt: No space left"), atomic_path(tmp_path / "a.txt"):
         raise OSError(28, "No space left on device")
+
+
+def test_folders_are_made_for_what_is_written_and_go_where_it_fails(tmp_path: Path) -> None:
+    place = tmp_path / "a" / "b" / "c.txt"
+    with pytest.raises(MotionloomError, match="No space"), atomic_path(place, folders=True):
+        raise OSError(28, "No space left on device")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "a").mkdir()
+    with pytest.raises(ZeroDivisionError), atomic_path(place, folders=True):
+        raise ZeroDivisionError
+    assert list(tmp_path.rglob("*")) == [tmp_path / "a"]  # it was there before
+    with atomic_path(place, folders=True) as temp:
+        temp.write_text("whole")
+    assert place.read_text() == "whole"
+
+
+@pytest.mark.parametrize("name", ["file/x/y.json", "x/" + "n" * 300 + "/y.json", "x/" + "n" * 300, "x/\0/y", "l/x/y"])
+def test_places_that_can_never_be_are_refused_before_work(tmp_path: Path, name: str) -> None:
+    (tmp_path / "file").write_text("")
+    (tmp_path / "l").symlink_to("l")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(MotionloomError, match="cannot write"):
+        check_place(tmp_path / name, folders=True)
+    assert sorted(tmp_path.rglob("*")) == before
+    check_place(tmp_path / "x" / "y" / "z.json", folders=True)
+    with pytest.raises(MotionloomError, match="does not exist"):
+        check_place(tmp_path / "x" / "y.json")

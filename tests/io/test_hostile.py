@@ -261,11 +261,11 @@ def test_a_file_that_says_it_is_empty_is_left_at_the_limit():
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no devices here")
 def test_nothing_is_read_out_of_a_device(tmp_path):
-    """By whoever reads what a user names: motions, maps of joints, weights, jobs, recipes, captions, timelines."""
+    """By whoever reads what a user names: motions, maps of joints, weights, jobs, timelines."""
     from motionloom.cli import main
 
     io.save(Motion(SMPL22, 30, np.zeros((2, 3)), np.tile(IDENTITY, (2, 22, 1))), tmp_path / "a.bvh")
-    for suffix in (".bvh", ".glb", ".npz", ".json", ".toml", ".yaml", ".jsonl", ".safetensors", ".svg", ".txt"):
+    for suffix in (".bvh", ".glb", ".npz", ".json", ".yaml", ".jsonl", ".safetensors", ".svg", ".txt"):
         (tmp_path / f"zero{suffix}").symlink_to("/dev/zero")
     zero, out = str(tmp_path / "zero"), str(tmp_path / "out.bvh")
     for words in (
@@ -281,8 +281,6 @@ def test_nothing_is_read_out_of_a_device(tmp_path):
         ["generate", "walk", "--weights", f"{zero}.safetensors", "--out", out],
         ["generate", "walk", "--adapter", f"{zero}.safetensors", "--out", out],
         ["batch", f"{zero}.jsonl", "--out", str(tmp_path / "made")],
-        ["train", "prior", "--recipe", f"{zero}.toml", "--data", str(tmp_path), "--out", str(tmp_path / "run")],
-        ["teach", "a walk", f"{zero}.bvh", "--out", str(tmp_path / "b.safetensors")],
         ["weights", f"{zero}.safetensors"],
     ):
         assert main(words) == 2, words

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.data.clips import read_clip
 from motionloom.errors import MotionloomError
 from motionloom.io.tensors import MAX_HEAD, MAX_TENSORS, check_head, save_tensors
 from motionloom.weights.container import PRIORS, read_tensors
@@ -33,7 +32,7 @@ def test_a_usual_file_is_read(tmp_path: Path) -> None:
     assert about == {"b": "{}" * 100}
 
 
-@pytest.mark.parametrize("read", [read_tensors, read_clip, read_card], ids=lambda read: read.__name__)
+@pytest.mark.parametrize("read", [read_tensors, read_card], ids=lambda read: read.__name__)
 def test_very_many_tensors_are_refused_before_they_are_parsed(tmp_path: Path, read) -> None:
     path = empty_tensors(tmp_path / "a.safetensors", MAX_TENSORS + 1)
     with pytest.raises(MotionloomError, match="more than 10,000 tensors"):

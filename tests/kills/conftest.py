@@ -3,7 +3,7 @@
 import pytest
 
 from motionloom.weights.prior import save_prior
-from tests.nets import tiny
+from tests.recorded import tiny
 
 
 @pytest.fixture(scope="module")

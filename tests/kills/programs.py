@@ -6,6 +6,7 @@ a command at the same moments as any other. Half of the moments that are drawn a
 """
 
 import contextlib
+import importlib
 import multiprocessing
 import os
 import random
@@ -20,6 +21,8 @@ from types import FrameType
 
 import pytest
 
+from motionloom.interruption import interruptible
+
 needs_signals = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs forks and signals")
 SEED = 7
 """Of the moments that are drawn."""
@@ -29,8 +32,6 @@ PRELOADED = [
     "motionloom.cli.generate",
     "motionloom.tasks.long",
     "motionloom.tasks.text",
-    "motionloom.data.build",
-    "tests.train.runs",
 ]
 
 
@@ -50,7 +51,10 @@ class Ended:
 
 
 def run(words: Sequence[str], folder: Path, *, at: int = 0, number: int = 0) -> Ended:
-    """Run a command (`motionloom`'s, or ``losses SET OUT STEPS``) that gets a signal at mark ``at``; 0: never."""
+    """Run a command that gets a signal at mark ``at``; 0: never.
+
+    words: of a command of `motionloom`'s, or ``MODULE:FUNCTION`` and what that function is called with.
+    """
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # of the server, which is started by the first of these calls
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(PRELOADED)
@@ -169,12 +173,9 @@ def _work(words: list[str], folder: str, log: str, at: int, number: int) -> None
         os.dup2(os.open(os.path.join(log, name), os.O_CREAT | os.O_TRUNC | os.O_WRONLY), stream)
     sys.stdout = open(1, "w", buffering=1, closefd=False)  # noqa: SIM115
     sys.stderr = open(2, "w", buffering=1, closefd=False)  # noqa: SIM115
-    import torch
-
-    torch.set_num_threads(1)
     marks = _Marks(at, number)
     marks.install()
-    code = _losses(words[1:], marks) if words[0] == "losses" else _command(words, marks)
+    code = _function(words, marks) if ":" in words[0] else _command(words, marks)
     with open(os.path.join(log, "marks"), "w") as file:
         file.write(" ".join(map(str, [marks.passed, *marks.files])))
     os._exit(code)
@@ -196,13 +197,11 @@ def _command(words: list[str], marks: _Marks) -> int:
         return int(error.code or 0)
 
 
-def _losses(words: list[str], marks: _Marks) -> int:
-    """A small training run, begun or gone on with; its losses on stdout."""
-    from motionloom.interruption import interruptible
-    from tests.train import runs
-
-    data, out, steps = words
+def _function(words: list[str], marks: _Marks) -> int:
+    """Call a function, which ends as commands do where it is interrupted."""
+    module, _, name = words[0].partition(":")
+    work = getattr(importlib.import_module(module), name)
     with contextlib.suppress(KeyboardInterrupt), interruptible(), marks.watching():
-        runs.losses(Path(data), Path(out), runs.recipe(steps=int(steps), save_every=3))
+        work(*words[1:])
         return 0
     return 130

@@ -17,7 +17,7 @@ from motionloom.weights.predictor import save_predictor
 from motionloom.weights.prior import save_prior
 from tests.cli.predict.clips import tiny_predictor
 from tests.kills.programs import SEED, SIGNALS, ended_by, kills, moments, needs_signals, parts, run
-from tests.nets import tiny
+from tests.recorded import tiny
 from tests.tasks.test_edit import person
 from tests.tasks.two_people import block
 

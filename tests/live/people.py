@@ -7,7 +7,7 @@ import numpy as np
 from motionloom.features import humanml
 from motionloom.live.settings import Settings
 from motionloom.weights.prior import Prior
-from tests.nets import tiny
+from tests.recorded import tiny
 from tests.tasks.test_edit import person
 
 QUICK = Settings(steps=2, known=6, ahead=24, used=14)

@@ -27,8 +27,9 @@ from motionloom.weights.adapter import fingerprint
 from motionloom.weights.container import graph_tensors
 from motionloom.weights.pair import KEY, PairBlock, blocks
 from tests.lab.papers.test_mdm import table
-from tests.nets import tiny
-from tests.nets.text.tiny import WIDTH as TEXT
+from tests.nets.modules import tiny_net
+from tests.recorded import tiny
+from tests.recorded.tiny import WIDTH as TEXT
 
 VARIANTS = {"modulated": tiny.MODULATED, "published": tiny.PUBLISHED}
 variants = pytest.mark.parametrize("variant", sorted(VARIANTS))
@@ -52,7 +53,7 @@ def net_of(variant: str, **given) -> PairNet:
     prior = tiny.prior(VARIANTS[variant])
     talk = talk_of(VARIANTS[variant], **given)
     mean, std = torch.from_numpy(prior.mean), torch.from_numpy(prior.std)
-    return PairNet(tiny.net(VARIANTS[variant]), talk, prior.schedule, mean=mean, std=std).eval()
+    return PairNet(tiny_net(VARIANTS[variant]), talk, prior.schedule, mean=mean, std=std).eval()
 
 
 def bound_of(net: PairNet, rows: int, seed: int = 1, lengths: list[int] | None = None) -> Bound:
@@ -72,7 +73,7 @@ def chosen(bound: Bound, rows: Tensor) -> Bound:
 
 @variants
 def test_the_prior_in_three_parts_is_the_prior(variant):
-    prior = tiny.net(VARIANTS[variant])
+    prior = tiny_net(VARIANTS[variant])
     words = torch.randn(4, 5, TEXT)
     bound = prior.bind(condition(words.mean(1), tokens=words if prior.modulated else None, lengths=[18, 7, 11, -1]))
     x, level = state_of(4)[:, 1:], torch.tensor([3, 9, 20, 50])
@@ -87,7 +88,7 @@ def test_a_fresh_block_leaves_both_priors_exactly_as_they_are(variant, split):
     net = net_of(variant, fresh=True, split=split)
     x, bound = state_of(4), bound_of(net, 4)
     places, motion = part(net(x, 7, bound))
-    assert torch.equal(motion, tiny.net(VARIANTS[variant])(x[:, 1:], 7, bound))
+    assert torch.equal(motion, tiny_net(VARIANTS[variant])(x[:, 1:], 7, bound))
     assert not places.any()
 
 
@@ -167,7 +168,7 @@ def test_an_aware_block_sees_where_the_others_head_and_wrists_are():
 @variants
 def test_only_the_block_is_trained_and_nothing_is_dropped_in_the_prior(variant):
     config = replace(VARIANTS[variant], dropout=0.5)
-    prior = tiny.net(config).requires_grad_(True).train()
+    prior = tiny_net(config).requires_grad_(True).train()
     talk = Talk(replace(fitting(config), dropout=0.0), config)
     net = PairNet(prior, talk, tiny.prior().schedule, mean=torch.zeros(263), std=torch.ones(263)).train()
     bound = bound_of(net, 2)

@@ -5,23 +5,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import MOST_FACTOR, parse_adapter
 from motionloom.goals.segment import Segment
-from motionloom.nets.prior import Condition
 from motionloom.tasks.adapting import KEPT, AdaptedPriors, adapt
 from motionloom.tasks.long import long_features, with_loaded
 from motionloom.tasks.text import sample_features
-from motionloom.train.low_rank import AdapterNet, tensors_of
-from motionloom.train.modules import prior_module
-from motionloom.weights.adapter import TAUGHT, Adapter, fingerprint, origin
+from motionloom.weights.adapter import Adapter, fingerprint, origin
 from motionloom.weights.prior import Prior
-from tests.nets import tiny
-from tests.noise import normal
+from tests.recorded import tiny
+from tests.recorded.tiny import adapter
 
 
 @pytest.fixture(scope="module")
@@ -29,20 +25,8 @@ def prior() -> Prior:
     return tiny.prior()
 
 
-def adapter(prior: Prior, seed: int = 1, *, control: str = TAUGHT, size: float = 0.2) -> Adapter:
-    """One whose every number matters."""
-    made = AdapterNet(prior_module(prior), 2, given_rank=0, taught=control == TAUGHT)
-    rng = np.random.default_rng(seed)
-    with torch.no_grad():
-        for value in made.parameters():
-            value.copy_(torch.from_numpy(size * rng.standard_normal(tuple(value.shape))))
-    notes = {"captions": [f"caption {seed}"]}
-    tensors = tensors_of(made.state_dict())
-    return Adapter(f"a{seed}", control, 2, tensors, "tiny", fingerprint(prior.net), "free", "numbers", notes)
-
-
 def weights(prior: Prior) -> np.ndarray:
-    return np.concatenate([value.flatten() for value in prior_module(prior).state_dict().values()])
+    return np.concatenate([value.flatten() for value in prior.net.weights.values()])
 
 
 @pytest.mark.parametrize(
@@ -77,7 +61,7 @@ def test_every_word_is_read_or_refused(word: str) -> None:
 
 def test_adapters_add_up(prior: Prior) -> None:
     """W + 0.5 A + 2 B, in whatever order, and A - A is nothing."""
-    one, two = adapter(prior, 1), adapter(prior, 2)
+    one, two = adapter(prior), adapter(prior, seed=2)
     base, a, b = weights(prior), weights(adapt(prior, [(one, 1.0)])), weights(adapt(prior, [(two, 1.0)]))
     both = weights(adapt(prior, [(one, 0.5), (two, 2.0)]))
     np.testing.assert_allclose(both, base + 0.5 * (a - base) + 2 * (b - base), rtol=0, atol=1e-5)
@@ -89,29 +73,13 @@ def test_no_adapter_is_the_prior_itself(prior: Prior) -> None:
     assert adapt(prior, []) is prior
 
 
-def test_merged_is_as_trained(prior: Prior) -> None:
-    """The network in training, with its change kept apart, guesses what the merged one guesses."""
-    made = AdapterNet(prior_module(prior), 2, given_rank=0, taught=True)
-    with torch.no_grad():
-        for value in made.parameters():
-            value.copy_(torch.from_numpy(0.2 * normal(value.shape, 3)))
-    file = replace(adapter(prior), tensors=tensors_of(made.state_dict()))
-    merged = prior.with_adapters([(file, 1.0)]).net
-    x = normal((2, 10, 263), 4)
-    cond = prior.condition(["a person walks", "a person turns"])
-    with torch.no_grad():
-        bound = made.bind(Condition(*map(torch.from_numpy, cond)))
-        wanted = made(torch.from_numpy(x), 9, bound).numpy()
-    np.testing.assert_allclose(merged(x, 9, merged.bind(cond)), wanted, rtol=0, atol=1e-4)
-
-
 def test_more_adapters_go_onto_an_adapted_prior(prior: Prior) -> None:
     """Files belong to the weights as they were before adapters; so does everything else that names them."""
-    once = adapt(prior, [(adapter(prior, 1), 1.0)])
+    once = adapt(prior, [(adapter(prior), 1.0)])
     assert origin(once) == fingerprint(prior.net) != fingerprint(once.net)
-    twice = adapt(once, [(adapter(prior, 2), 1.0)])
+    twice = adapt(once, [(adapter(prior, seed=2), 1.0)])
     np.testing.assert_allclose(
-        weights(twice), weights(adapt(prior, [(adapter(prior, 1), 1.0), (adapter(prior, 2), 1.0)])), rtol=0, atol=1e-5
+        weights(twice), weights(adapt(prior, [(adapter(prior), 1.0), (adapter(prior, seed=2), 1.0)])), rtol=0, atol=1e-5
     )
 
 
@@ -152,7 +120,7 @@ def test_an_adapter_of_one_segment_leaves_far_ones_alone(prior: Prior) -> None:
 
 
 def test_how_many_rows_go_together_changes_nothing(prior: Prior) -> None:
-    segments = [replace(WALK, adapters=((adapter(prior, i % 3), 1.0),) if i % 3 else ()) for i in range(5)]
+    segments = [replace(WALK, adapters=((adapter(prior, seed=i % 3), 1.0),) if i % 3 else ()) for i in range(5)]
     together, apart = (np.concatenate(features(prior, segments, batch_size=count)) for count in (8, 1))
     np.testing.assert_allclose(together, apart, rtol=0, atol=2e-4)
 

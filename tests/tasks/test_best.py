@@ -9,8 +9,8 @@ from motionloom.tasks.best import with_best_seeds
 from motionloom.tasks.sampling import Rows, Sampling, sample
 from motionloom.tasks.text import finish, generate, sample_features
 from motionloom.weights.prior import Prior
-from tests.nets import tiny
 from tests.noise import normal
+from tests.recorded import tiny
 
 WALK, TURN = "a person walks", "a person turns left"
 SAMPLING = Sampling(steps=5)

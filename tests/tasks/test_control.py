@@ -12,11 +12,9 @@ from motionloom.ground import GroundPose
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.control import control, controlled_numbers, fitting_adapters, judged
 from motionloom.tasks.text import generate
-from motionloom.train.low_rank import linears
-from motionloom.train.modules import prior_module
-from motionloom.weights.adapter import Adapter, fingerprint
+from motionloom.weights.adapter import Adapter
 from motionloom.weights.prior import Prior
-from tests.nets import tiny
+from tests.recorded import tiny
 
 WRIST = SMPL22.index("right_wrist")
 
@@ -107,14 +105,6 @@ def test_adapters_see_the_last_steered_estimate_and_none_that_change_nothing_cha
     np.testing.assert_allclose(same.motion.positions(), plain.motion.positions(), atol=1e-5)
 
 
-def adapter(prior: Prior) -> Adapter:
-    """Of rank 1 and zeros."""
-    layers = linears(prior_module(prior))
-    tensors = {f"{name}.down": np.zeros((1, layer.in_features), np.float32) for name, layer in layers.items()}
-    tensors |= {f"{name}.up": np.zeros((layer.out_features, 1), np.float32) for name, layer in layers.items()}
-    return Adapter("blank", "any", 1, tensors, "tiny", fingerprint(prior.net))
-
-
 def test_shipped_adapters_of_other_weights_and_damaged_ones_are_said(
     prior: Prior, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -173,3 +163,9 @@ def test_a_hand_that_is_asked_too_high_lifts_nobody_but_who_jumps(words: str, le
     assert made.worst > 0.3
     assert made.missed[0].startswith("right_wrist at 1.50 s")
     assert places[30, wrist, 1] > 1.8
+
+
+def adapter(prior: Prior) -> Adapter:
+    """One of zeros."""
+    found = tiny.adapter(prior, control="any")
+    return replace(found, name="blank", tensors={name: 0 * value for name, value in found.tensors.items()})

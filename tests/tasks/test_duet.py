@@ -20,8 +20,8 @@ from motionloom.tasks.duet import compose_pair, duet_features, react
 from motionloom.tasks.splice import concatenated, person_at_20
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
-from tests.nets import tiny
 from tests.noise import normal
+from tests.recorded import tiny
 from tests.tasks.two_people import block as block_of
 from tests.tasks.two_people import walkers
 

@@ -20,7 +20,7 @@ from motionloom.tasks.splice import carried
 from motionloom.tasks.text import sample_features
 from motionloom.tasks.watching import Denoised, watching
 from motionloom.weights.prior import Prior
-from tests.nets import tiny
+from tests.recorded import tiny
 from tests.tasks.test_edit import person
 
 WALK, TURN = "a person walks", "a person turns left"

@@ -32,8 +32,8 @@ from motionloom.tasks.sampling import Observed
 from motionloom.tasks.text import finish, sample_features
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
-from tests.nets import tiny
 from tests.noise import normal
+from tests.recorded import tiny
 from tests.tasks.test_edit import person as one_person
 from tests.tasks.two_people import block as block_of
 from tests.tasks.two_people import walkers

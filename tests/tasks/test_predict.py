@@ -15,7 +15,7 @@ from motionloom.tasks.predict import predict, predict_pieces, switch
 from motionloom.tasks.sampling import PredictionSampling
 from motionloom.tasks.splice import concatenated, standing
 from motionloom.tasks.windows import Past, WindowSampler
-from tests.nets import tiny_predictor
+from tests.recorded import tiny_predictor
 from tests.shared import shared
 from tests.tasks.small_predictor import small_predictor
 from tests.tasks.test_edit import floating, person, rig

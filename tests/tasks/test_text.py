@@ -9,15 +9,15 @@ import pytest
 
 from motionloom.errors import MotionloomError
 from motionloom.features.babel import decode, facing
-from motionloom.lab.papers.published_priors import import_published
 from motionloom.motion import Motion
 from motionloom.runtime.text.protocol import TextEmbedding
+from motionloom.runtime.text.published import PublishedText
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.text import finish, generate, sample_features, to_motion
 from motionloom.weights.prior import Prior, load_prior, save_prior
-from tests.lab.papers.test_mdm import state, write
-from tests.nets import tiny
 from tests.noise import normal
+from tests.recorded import tiny
+from tests.recorded.graphs import BABEL
 
 FEW = {"seconds": 1.0, "steps": 3}
 
@@ -110,10 +110,9 @@ def test_what_cannot_be_asked_is_refused(prior: Prior, asked: dict) -> None:
 
 
 def babel_prior(folder: Path, *, flags: bool) -> Prior:
-    """A checkpoint of the published BABEL form, imported, saved and read back, with a text encoder that is there."""
-    made = import_published(
-        write(folder, state(135, flags=flags)), mean=np.zeros(135, np.float32), std=np.ones(135, np.float32)
-    )
+    """A prior of the published BABEL form, saved and read back, with a text encoder that is there."""
+    mean, text = np.zeros(135, np.float32), PublishedText("clip-77")
+    made = replace(tiny.prior(replace(BABEL, flags=flags)), mean=mean, std=mean + 1, text=text, fps=30.0)
     again = load_prior(save_prior(made, folder / "babel.safetensors", half=False))
     assert again.text.name == "clip-77"
     return replace(again, text=Words())
@@ -132,7 +131,7 @@ class Words:
 
 @pytest.mark.parametrize("flags", [False, True], ids=["plain", "transitions"])
 def test_babel_weights_make_motions(tmp_path: Path, flags: bool) -> None:
-    """Imported, saved, read: 30 fps, the asked lengths, from over the origin, facing +Z, as the seed says."""
+    """Saved and read: 30 fps, the asked lengths, from over the origin, facing +Z, as the seed says."""
     prior = babel_prior(tmp_path, flags=flags)
     assert prior.net.config.flags is flags
     made = generate(prior, ["walk", "turn left"], seconds=[0.5, 1.0], steps=3)
@@ -162,8 +161,7 @@ def test_cleaning_holds_a_babel_foot_that_slides() -> None:
     numbers = np.zeros((45, 135))
     numbers[:, 3:9], numbers[:, 9:] = [1, 0, 0, 0, 0, -1], np.tile([1, 0, 0, 0, 1, 0], 21)
     numbers[:, 0], numbers[:, 1] = SMPL22.offsets[0, 1] - 0.02, 0.002  # a leg at full reach could not give way
-    config = replace(tiny.PUBLISHED, features=135)
-    prior = replace(tiny.prior(config), fps=30.0)
+    prior = replace(tiny.prior(BABEL), fps=30.0)
     raw, clean = (finish(prior, numbers, foot_lock=c).positions()[10:35, [7, 8, 10, 11]] for c in (False, True))
     assert np.linalg.norm(raw[-1] - raw[0], axis=-1).min() > 0.045
     assert np.linalg.norm(clean[-1] - clean[0], axis=-1).max() < 0.005
@@ -179,6 +177,6 @@ def test_a_walk_of_263_numbers_is_finished_as_before() -> None:
 
 def test_other_features_are_refused_before_anything_is_drawn() -> None:
     """KIT's 251 numbers (21 joints, millimetres) are read as weights and not decoded."""
-    config = tiny.NetConfig(features=251, width=32, layers=1, heads=4, hidden=16, text=tiny.PUBLISHED.text)
+    kit = replace(tiny.prior(), mean=np.zeros(251, np.float32), std=np.ones(251, np.float32))
     with pytest.raises(MotionloomError, match="251"):
-        generate(tiny.prior(config), "walk", progress=lambda *_: pytest.fail("drawn"))
+        generate(kit, "walk", progress=lambda *_: pytest.fail("drawn"))

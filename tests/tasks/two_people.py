@@ -4,32 +4,29 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from motionloom import rotations as rot
 from motionloom.io import load
 from motionloom.motion import Motion
-from motionloom.nets.pair import Talk, fitting
+from motionloom.runtime.shapes import pair_shapes
 from motionloom.tasks.splice import carried
-from motionloom.train.export import pair_graph
-from motionloom.train.modules import arrays
 from motionloom.weights.adapter import fingerprint
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
+from tests.recorded.graphs import block_of, graph, random_weights
 
 CLIP = Path(__file__).parents[2] / "examples" / "clips" / "walk.bvh"
 
 
 def block(prior: Prior, *, fresh: bool = False) -> PairBlock:
     """A block for a prior; unless ``fresh`` it has much to say."""
-    with torch.random.fork_rng():
-        torch.manual_seed(5)
-        talk = Talk(fitting(prior.net.config), prior.net.config)
-        with torch.no_grad():
-            for value in () if fresh else talk.parameters():
-                value.add_(torch.randn(value.shape) * 0.3)
-    graph = pair_graph(talk.config, prior.net.config)
-    return PairBlock("tiny", talk.config, arrays(talk), prior.card.name, fingerprint(prior.net), graph=graph)
+    config = block_of(prior.net.config)
+    weights = random_weights(pair_shapes(config, prior.net.config), 5)
+    for name, value in weights.items():
+        if fresh and name.split(".")[0] in ("out", "place"):
+            value[:] = 0
+    graphs = graph("pair", config, prior.net.config)
+    return PairBlock("tiny", config, weights, prior.card.name, fingerprint(prior.net), graph=graphs)
 
 
 def walkers(seconds: float, *, larger: float = 1.2, beside: float = 1.5, later: int = 5) -> tuple[Motion, Motion]:

@@ -17,8 +17,8 @@ from motionloom.train.loop import World, train
 from motionloom.train.objectives import CleanError, Conditioned, WordBank
 from motionloom.train.recipe import Recipe
 from tests.kinematics import people
-from tests.nets import tiny
-from tests.nets.text.tiny import WIDTH
+from tests.recorded import tiny
+from tests.recorded.tiny import WIDTH
 
 NET = {
     "variant": "modulated",

@@ -8,7 +8,7 @@ import pytest
 from motionloom.errors import MotionloomError
 from motionloom.train.average import averaged
 from motionloom.weights.prior import Prior
-from tests.nets import tiny
+from tests.recorded import tiny
 
 
 def stages() -> tuple[Prior, Prior]:

@@ -21,7 +21,7 @@ from motionloom.train.objectives import WordBank
 from motionloom.train.tensors import conditions, noised, tensor
 from motionloom.weights.adapter import Adapter
 from motionloom.weights.prior import Prior, read_tensors, save_prior
-from tests.nets import tiny
+from tests.recorded import tiny
 from tests.train import runs
 
 PLAN = {"name": "wrist", "control": "left_wrist", "rank": 2, "given_rank": 4, "steps": 8, "save_every": 4, "net": {}}

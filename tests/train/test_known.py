@@ -4,7 +4,7 @@ import torch
 
 from motionloom.data.sets import Item, MotionSet
 from motionloom.train.known import known_table
-from tests.nets import tiny
+from tests.recorded import tiny
 
 
 def motions(*items: Item, texts: tuple[str, ...]) -> MotionSet:

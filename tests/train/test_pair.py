@@ -19,7 +19,7 @@ from motionloom.train.pair import BEGUN, Drawn, Held, PairError, Parts, Settings
 from motionloom.train.tensors import noised, tensor
 from motionloom.weights.prior import Prior
 from tests.kinematics import people
-from tests.nets import tiny
+from tests.recorded import tiny
 from tests.train import runs
 
 TEXT = "a person walks left"

@@ -14,7 +14,7 @@ from motionloom.weights.adapter import fingerprint
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior, read_tensors, save_prior
 from tests.data.test_pairs import write_pair
-from tests.nets import tiny
+from tests.recorded import tiny
 from tests.train.test_pair import TEXT, objective, pair, recipe, walkers
 
 

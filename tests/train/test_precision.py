@@ -14,7 +14,7 @@ from motionloom.train.low_rank import AdapterNet
 from motionloom.train.modules import prior_module
 from motionloom.train.precision import choose, product_seconds, product_size
 from motionloom.train.teach import Lesson
-from tests.nets import tiny
+from tests.recorded import tiny
 from tests.train import runs
 
 

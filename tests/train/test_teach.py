@@ -22,8 +22,8 @@ from motionloom.train.teach import Lesson, Teaching, known_prompts, teach, wordi
 from motionloom.weights.adapter import Adapter
 from motionloom.weights.prior import Prior
 from tests.kinematics import people
-from tests.nets import tiny
 from tests.noise import normal
+from tests.recorded import tiny
 from tests.tasks.test_edit import person
 
 KNOWN = ["a person walks", "a person turns left", "a person turns right", "a person stands"]

@@ -1,6 +1,8 @@
 """Weight files: what is written comes back, and a hostile file gives one sentence."""
 
 import json
+import pickle
+import zipfile
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from safetensors import safe_open
@@ -17,9 +18,9 @@ from safetensors.numpy import save_file
 from motionloom.errors import MotionloomError
 from motionloom.runtime.text.known import Known, known_sentences
 from motionloom.runtime.text.published import PublishedText
-from motionloom.train.modules import prior_session
 from motionloom.weights.prior import Prior, find_weights, load_prior, save_prior
-from tests.nets import tiny
+from tests.recorded import tiny
+from tests.recorded.graphs import BABEL
 
 
 @pytest.fixture(scope="module")
@@ -72,10 +73,9 @@ def test_an_empty_prompt_asks_for_nothing() -> None:
 
 def test_published_text_is_saved_without_clip(tmp_path: Path) -> None:
     """A prior that wants CLIP is written and read where CLIP is not there; only encoding needs it."""
-    config = replace(tiny.PUBLISHED, text=512, features=135)
     mean = np.zeros(135, np.float32)
     prior = Prior(
-        prior_session(tiny.net(config)),
+        tiny.net(BABEL),
         tiny.prior().schedule,
         mean,
         mean + 1,
@@ -105,8 +105,13 @@ def test_other_files_under_this_name_are_refused(tmp_path: Path, content: bytes)
 
 
 def test_a_pickle_under_this_name_is_refused_and_import_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "a.safetensors"
-    torch.save({"a": torch.zeros(3)}, path)
+    """As old PyTorch wrote it, and as newer ones do: in a ZIP file."""
+    content, path = pickle.dumps({"a": [0.0] * 3}, protocol=2), tmp_path / "a.safetensors"
+    path.write_bytes(content)
+    with pytest.raises(MotionloomError, match="motionloom import"):
+        load_prior(path)
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("a/data.pkl", content)
     with pytest.raises(MotionloomError, match="motionloom import"):
         load_prior(path)
 
@@ -246,7 +251,7 @@ def test_graphs_that_are_none_are_refused_when_the_file_is_read(
 
 def test_the_graph_of_other_sizes_is_refused(file: Path, tmp_path: Path) -> None:
     tensors, about = parts(file)
-    other = prior_session(tiny.net(replace(tiny.MODULATED, hidden=40)))
+    other = tiny.net(replace(tiny.MODULATED, hidden=40))
     tensors["graph.prior"] = np.frombuffer(other.graphs["prior"], np.uint8)
     with pytest.raises(MotionloomError, match=r"linear1.* is .*, and the weights' is"):
         load_prior(write(tmp_path / "a.safetensors", tensors, about))

@@ -2,7 +2,6 @@
 
 import argparse
 import gc
-import importlib
 import os
 import sys
 import warnings
@@ -11,30 +10,11 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
+from motionloom.cli.commands import absence, add_commands
 from motionloom.cli.newcomers import COMMANDS, suggestion, with_command, with_options
 from motionloom.cli.terminal import escaping
 from motionloom.errors import MotionloomError, one_line
 from motionloom.interruption import interruptible, was_interrupted
-
-FAMILIES = (
-    "generate",
-    "compose",
-    "live",
-    "control",
-    "edit",
-    "predict",
-    "duet",
-    "batch",
-    "serve",
-    "files",
-    "data",
-    "teach",
-    "train",
-    "evaluate",
-    "bench",
-    "weights",
-    "completion",
-)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -60,15 +40,8 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="store_true", help="print the version and end")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", parser_class=_Parser)
-    for family in FAMILIES:
-        importlib.import_module(f"motionloom.cli.{family}").add(commands)
-        if command in commands.choices:
-            break
+    add_commands(commands, command)
     return top
-
-
-EXTRAS = {"torch": "train", "onnx": "train", "matplotlib": "lab"}
-"""Packages that only training and measuring need, and the extra that brings each."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -88,13 +61,9 @@ def _told(argv: Sequence[str] | None) -> int:
     except MotionloomError as error:
         problem = str(error)
     except ModuleNotFoundError as error:
-        package = (error.name or "").partition(".")[0]
-        if package not in EXTRAS:
+        problem = absence(error)
+        if problem is None:
             raise
-        problem = (
-            f"this command needs {package}, which is not installed; pip install 'motionloom[{EXTRAS[package]}]', or "
-            "'make dev' in a clone, brings it"
-        )
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0

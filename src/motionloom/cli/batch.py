@@ -3,6 +3,7 @@
 import argparse
 import sys
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -166,6 +167,8 @@ def _options(arguments: argparse.Namespace) -> "Options":
         fail(f"--variants must be 1 or more; got {arguments.variants}")
     given = {name: getattr(arguments, name) for name in ("steps", "guidance", "solver")}
     obeys = arguments.filter is not None and "obeys" in Filter(arguments.filter).names
+    if obeys:
+        import_module(JUDGE.partition(":")[0])  # before any work: without the laboratory nobody judges
     return Options(
         weights=arguments.weights,
         adapters=arguments.adapter,

@@ -1,9 +1,13 @@
 """`motionloom data`: recordings to training sets."""
 
 import argparse
+from importlib import import_module
 from pathlib import Path
 
 from motionloom.cli.writing import add_force, check_overwriting
+
+READERS = "motionloom.lab.papers.readers"
+"""The module of the laboratory that knows the data sets that others published."""
 
 
 def add(subparsers) -> None:
@@ -51,7 +55,6 @@ def add(subparsers) -> None:
 
 def _build(arguments: argparse.Namespace) -> None:
     from motionloom.data.build import build
-    from motionloom.lab.papers.readers import find_takes
 
     build(
         arguments.folders,
@@ -61,7 +64,7 @@ def _build(arguments: argparse.Namespace) -> None:
         mixed=arguments.mixed,
         exclude=arguments.exclude,
         allow=_reasons(arguments.allow),
-        find=find_takes,
+        find=import_module(READERS).find_takes,
     )
 
 
@@ -72,7 +75,10 @@ def _reasons(said: list[str]) -> dict[str, str]:
 
 def _look(arguments: argparse.Namespace) -> None:
     from motionloom.data.look import draw_look
-    from motionloom.lab.papers.readers import find_takes
 
     check_overwriting(arguments, [arguments.out])
-    print(draw_look(arguments.set, arguments.folders, arguments.out, each=arguments.each, find=find_takes))
+    print(
+        draw_look(
+            arguments.set, arguments.folders, arguments.out, each=arguments.each, find=import_module(READERS).find_takes
+        )
+    )

@@ -2,11 +2,15 @@
 
 import argparse
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from motionloom.train.recipe import Recipe
+
+LABORATORY = "motionloom.lab"
+"""Reads the data sets and protocols that others published, and has the evaluator; opened where one is asked for."""
 
 
 def add(subparsers) -> None:
@@ -58,9 +62,7 @@ def _prior(arguments: argparse.Namespace) -> None:
 
 
 def _evaluator(arguments: argparse.Namespace) -> None:
-    from motionloom.lab.evaluator.training import train_evaluator
-
-    _train(arguments, train_evaluator)
+    _train(arguments, import_module(f"{LABORATORY}.evaluator.training").train_evaluator)
 
 
 def _control(arguments: argparse.Namespace) -> None:
@@ -70,22 +72,22 @@ def _control(arguments: argparse.Namespace) -> None:
 
 
 def _predictor(arguments: argparse.Namespace) -> None:
-    from motionloom.lab.papers.benchmarks import find_protocol
     from motionloom.train.predictor import train_predictor
 
     recipe = _recipe(arguments)
-    protocol = find_protocol(arguments.data, name=arguments.protocol, splits=("train", "val"), say=print)
+    benchmarks = import_module(f"{LABORATORY}.papers.benchmarks")
+    protocol = benchmarks.find_protocol(arguments.data, name=arguments.protocol, splits=("train", "val"), say=print)
     place = train_predictor(recipe, protocol, arguments.out, device=arguments.device, stop=arguments.stop)
     print(f"wrote {place}")
 
 
 def _duet(arguments: argparse.Namespace) -> None:
-    from motionloom.lab.papers.readers import find_pairs
     from motionloom.train.pair import Settings, train_pair
 
     recipe = _recipe(arguments)
     settings = Settings.parse(recipe.pair)
-    pairs = find_pairs(arguments.pairs, captions=settings.prefix + settings.react < 1, say=print)
+    readers = import_module(f"{LABORATORY}.papers.readers")
+    pairs = readers.find_pairs(arguments.pairs, captions=settings.prefix + settings.react < 1, say=print)
     place = train_pair(recipe, pairs, arguments.out, device=arguments.device, stop=arguments.stop)
     print(f"wrote {place}")
 

@@ -3,33 +3,26 @@
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from motionloom.cli import main
 from motionloom.diffusion import Dct, linear
 from motionloom.features.positions import SMPL_LAYOUT
 from motionloom.motion import Motion
-from motionloom.nets.predictor import TransLinear
-from motionloom.runtime.predictor import PredictorConfig
 from motionloom.skeleton import SMPL22, Skeleton
-from motionloom.train.modules import predictor_session
-from motionloom.weights.predictor import Predictor, condition_shape
+from motionloom.weights.predictor import Predictor
 from motionloom.weights.prior import Card
+from tests.recorded.graphs import PREDICTORS
+from tests.recorded.tiny_predictor import network
 
 KEPT, OBSERVED, FRAMES, FPS = 24, 15, 75, 30.0
 
 
 def tiny_predictor() -> Predictor:
     """Random weights that move a person a little: half a second seen, two seconds made."""
-    torch.manual_seed(3)
-    shape = condition_shape(SMPL_LAYOUT, KEPT)
-    net = TransLinear(
-        PredictorConfig(channels=66, kept=KEPT, layers=2, width=32, heads=2, condition=shape, beside=True)
-    ).eval()
     zeros = np.zeros((KEPT, 66), np.float32)
     pose = np.stack([np.zeros(66, np.float32), np.ones(66, np.float32)])
     return Predictor(
-        predictor_session(net.requires_grad_(False)),
+        network(PREDICTORS["larger"], 3),
         linear(100),
         SMPL_LAYOUT,
         Dct(FRAMES, KEPT),

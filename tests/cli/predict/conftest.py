@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from motionloom import cli
 from motionloom.io import stream
 from motionloom.io.bvh_writer import save_bvh
 from motionloom.motion import Motion
@@ -24,8 +23,6 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> str:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Each test runs beside two clips in centimetres with angles in another order, one of which is on another body."""
     monkeypatch.chdir(tmp_path)
-    if "predict" not in cli.FAMILIES:
-        monkeypatch.setattr(cli, "FAMILIES", (*cli.FAMILIES, "predict"))
     save_bvh(person(1.0, 30.0), "past.bvh", order="XYZ", unit=0.01)
     save_bvh(person(1.5, 30.0), "kick.bvh", order="XYZ", unit=0.01)
     other = person(1.0, 30.0)

@@ -10,7 +10,7 @@ from motionloom.io.bvh_writer import save_bvh
 from motionloom.weights.prior import save_prior
 from tests.cli.predict.clips import written
 from tests.cli.said import complaint
-from tests.nets import tiny
+from tests.recorded import tiny
 from tests.tasks.test_edit import person
 
 HOLD = ["--hold", "head", "--from", "kick.bvh"]

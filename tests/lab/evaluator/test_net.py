@@ -26,10 +26,9 @@ from motionloom.lab.evaluator.net import (
 from motionloom.runtime.text.minilm import pack
 from motionloom.train.modules import text_encoder
 from tests.kinematics import people
-from tests.nets import tiny
-from tests.nets.text import tiny as tiny_text
+from tests.recorded import tiny
 
-CONFIG = EvaluatorConfig(width=32, layers=2, heads=2, hidden=48, text=tiny_text.WIDTH, embed=16, dropout=0.1)
+CONFIG = EvaluatorConfig(width=32, layers=2, heads=2, hidden=48, text=tiny.WIDTH, embed=16, dropout=0.1)
 
 
 def embedder(seed: int = 0) -> Embedder:
@@ -131,7 +130,7 @@ def test_a_file_gives_the_evaluator_back(tmp_path: Path, motions: list[np.ndarra
 def test_another_text_encoder_is_refused(tmp_path: Path) -> None:
     """One changed number in the encoder is enough."""
     path = save_embedder(embedder(), tmp_path / "a.safetensors")
-    other = text_encoder(pack({k: v.numpy() for k, v in tiny_text.weights(seed=1).items()}, tiny_text.VOCABULARY))
+    other = text_encoder(pack(tiny.text_weights(seed=1), tiny.VOCABULARY))
     with pytest.raises(MotionloomError, match="another text encoder"):
         load_embedder(path, other)
 

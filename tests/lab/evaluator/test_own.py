@@ -15,7 +15,7 @@ from motionloom.lab.evaluator.evaluators import Caption, load_evaluator
 from motionloom.lab.metrics.obedience import CHECKS
 from motionloom.lab.report.report import Value
 from tests.kinematics import people
-from tests.nets import tiny
+from tests.recorded import tiny
 
 SHIPPED = own.SHIPPED in own.evaluators()
 

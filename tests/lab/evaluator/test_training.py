@@ -17,8 +17,8 @@ from motionloom.lab.evaluator.training import config_of, contrast, train_evaluat
 from motionloom.train.recipe import Recipe
 from motionloom.weights.prior import save_prior
 from tests.kinematics import people
-from tests.nets import tiny
-from tests.nets.text.tiny import WIDTH as TEXT
+from tests.recorded import tiny
+from tests.recorded.tiny import WIDTH as TEXT
 from tests.train import runs
 
 

@@ -1,15 +1,20 @@
 """The everyday checks on made-up people whose answer is known: who does it passes, the opposite and deceivers fail."""
 
+import tomllib
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from motionloom.errors import MotionloomError
+from motionloom.goals.english import is_english
 from motionloom.kinematics.physics import J
 from motionloom.lab.metrics.everyday.body import Body, times
 from motionloom.lab.metrics.everyday.sets import EVERYDAY, SETS, THEMES, chosen
 from motionloom.skeleton import SMPL22
 from tests.kinematics.people import FPS, jumping, moved, spun, standing, walking
 
+UNSEEN = Path(__file__).parents[3] / "benchmarks" / "everyday_unseen.toml"
 BY_NAME = {check.name: check for check in EVERYDAY}
 UPPER = [j for j in range(22) if j not in (1, 2, 4, 5, 7, 8, 10, 11)]
 
@@ -269,3 +274,11 @@ def test_sets_are_chosen_by_name() -> None:
         chosen("weekend")
     with pytest.raises(MotionloomError, match="no check called 'fly'"):
         chosen("everyday", ["fly"])
+
+
+def test_no_everyday_prompt_is_taken_for_another_language() -> None:
+    unseen = tomllib.loads(UNSEEN.read_text())
+    own = [text for check in EVERYDAY for text in (check.prompt, *check.paraphrases)]
+    prompts = [*own, *unseen.values()]
+    assert len(prompts) > 190
+    assert not [text for text in prompts if not is_english(text)]

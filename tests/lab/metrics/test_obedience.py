@@ -1,10 +1,16 @@
 """The checks as data: complete, consistent, and reading captions as people mean them."""
 
+import numpy as np
 import pytest
 
+from motionloom.bulk.measures import find_judge
 from motionloom.errors import MotionloomError
 from motionloom.lab.metrics.actions import MEANING
 from motionloom.lab.metrics.obedience import CHECKS, Bound, check
+from motionloom.motion import Motion
+from motionloom.runtime.text.known import nearest
+from motionloom.skeleton import SMPL22
+from motionloom.weights.prior import Prior
 
 
 def test_there_are_twenty_checks_with_different_names_and_prompts() -> None:
@@ -56,3 +62,20 @@ def test_captions_make_a_clip_an_example_or_not(name: str, captions: list[str], 
 def test_an_unknown_check_is_answered_with_the_list() -> None:
     with pytest.raises(MotionloomError, match="walk forward, walk backward"):
         check("fly")
+
+
+def test_the_judge_of_prompts_knows_some_and_says_so_of_others() -> None:
+    judge = find_judge("motionloom.lab.metrics.obedience:obeys")
+    turns = np.tile([1.0, 0, 0, 0], (80, 22, 1))
+    still = Motion(SMPL22, 20.0, np.tile([0.0, 0.95, 0.0], (80, 1)), turns).positions()
+    assert judge("a person stands still", still, 20.0) is True
+    assert judge("A person walks forward.", still, 20.0) is False
+    assert judge("a person plays the violin", still, 20.0) is None
+
+
+def test_the_weights_that_ship_know_most_of_the_prompts() -> None:
+    """docs/words.md has the shares."""
+    prior = Prior.load("default")
+    assert prior.known is not None
+    prompts = [check.prompt for check in CHECKS]
+    assert sum(found.near for found in nearest(prior.known, prompts, prior.text)) >= 0.9 * len(prompts)

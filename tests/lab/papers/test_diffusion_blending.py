@@ -13,8 +13,8 @@ from motionloom.lab.papers.diffusion_blending import control_features, controlle
 from motionloom.tasks.sampling import Observed
 from motionloom.train.modules import prior_module
 from motionloom.weights.adapter import adapted
-from tests.nets import tiny
 from tests.noise import normal
+from tests.recorded import tiny
 from tests.weights.test_adapter import adapter_of, trained
 
 PROMPTS, FRAMES = ["a person walks", "a person waves"], 10

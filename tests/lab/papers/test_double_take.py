@@ -25,7 +25,7 @@ from motionloom.lab.papers.double_take import (
 )
 from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.text import sample_features
-from tests.nets import tiny
+from tests.recorded import tiny
 
 SCHEDULE, CHANNELS = cosine(20), 3
 WAY = range(20, -1, -1)

@@ -22,8 +22,8 @@ from motionloom.lab.papers.humanmac import (
 )
 from motionloom.nets.predictor import TransLinear
 from motionloom.weights.predictor import Predictor
-from tests.nets.tiny_predictor import predictor
 from tests.noise import normal
+from tests.recorded.tiny_predictor import predictor
 
 SCHEDULE = cosine(1000)
 VARIANTS = ["masked", "published"]

@@ -29,9 +29,9 @@ from motionloom.weights.container import weights_digest
 from motionloom.weights.pair import PairBlock
 from tests.kinematics.people import FPS
 from tests.lab.suites.duets import block_over, couple, pair_of
-from tests.nets import tiny
-from tests.nets.text.tiny import WIDTH as TEXT
 from tests.noise import normal
+from tests.recorded import tiny
+from tests.recorded.tiny import WIDTH as TEXT
 
 
 def gliding(speed: float, seconds: float = 6.0) -> np.ndarray:

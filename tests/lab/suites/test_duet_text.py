@@ -17,7 +17,7 @@ from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.needs import NoData
 from tests.kinematics.people import FPS, standing
 from tests.lab.suites.duets import RECORDED, Person, block_over, couple, pair_of, partners
-from tests.nets import tiny
+from tests.recorded import tiny
 
 # From words ----------------------------------------------------------------------------------------------------------
 

@@ -157,3 +157,12 @@ def test_a_made_up_person_obeys_its_own_check_and_no_opposite(action: str) -> No
         c.name for c in CHECKS if c.obeyed(measure(PEOPLE[action], FPS))
     }
     assert passed - allowed == {action}
+
+
+def test_a_report_with_no_place_is_refused_before_any_motion_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(MotionloomError, match=r"cannot write '?taken"):
+        obey.run(Run(folder=Path("taken")), generate=lambda *_, **__: pytest.fail("a motion was made"))

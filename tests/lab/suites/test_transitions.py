@@ -22,7 +22,7 @@ from motionloom.lab.suites.protocol import Selection, Transitions, quick_transit
 from motionloom.lab.suites.registry import chosen
 from motionloom.skeleton import SMPL22
 from tests.lab.suites.judged import HIDDEN, Judge, features, item, number_in, place
-from tests.nets import tiny
+from tests.recorded import tiny
 
 HOW = Transitions(intervals=8, unfoldings=2, replications=2)
 SPREAD = np.linspace(0.0, 1.7, 22)[:, None] * np.array([0.0, 1.0, 0.0])

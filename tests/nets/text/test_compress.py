@@ -8,7 +8,7 @@ import pytest
 
 from motionloom.errors import MotionloomError
 from motionloom.runtime.text.wordpiece import SPECIALS
-from tests.nets.text.tiny import VOCABULARY
+from tests.recorded.tiny import VOCABULARY
 from tools import compress_text_encoder as compress
 
 

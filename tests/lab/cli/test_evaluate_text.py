@@ -11,7 +11,7 @@ from motionloom.lab.suites import text_reference
 from motionloom.lab.suites.protocol import Selection
 from motionloom.weights.prior import save_prior
 from tests.lab.suites.judged import Judge, features, item, place
-from tests.nets import tiny
+from tests.recorded import tiny
 
 FEW = ["--batch", "4", "--replications", "2", "--steps", "2,3", "--multimodality", "0"]
 

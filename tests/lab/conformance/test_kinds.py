@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tests.conformance import runner
 
-TESTS = Path(__file__).parent
+FOLDERS = Path(__file__).parent, Path(runner.__file__).parent
 Kind = tuple[str, str]
 
 
@@ -45,7 +45,12 @@ def compared_by(sources: Mapping[str, str], kinds: set[Kind]) -> dict[Kind, list
 
 
 def test_every_recorded_kind_is_compared_by_some_module() -> None:
-    sources = {path.name: path.read_text() for path in TESTS.glob("test_*.py") if path.stem != "test_runner"}
+    sources = {
+        path.name: path.read_text()
+        for folder in FOLDERS
+        for path in folder.glob("test_*.py")
+        if path.stem != "test_runner"
+    }
     kinds = recorded_kinds(runner.FOLDER)
     modules = compared_by(sources, kinds)
     assert kinds, f"nothing is recorded in {runner.FOLDER}"

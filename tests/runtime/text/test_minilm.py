@@ -1,4 +1,4 @@
-"""The embedded encoder against naive BERT, transformers' BERT, its own padding, hostile texts and hostile tensors."""
+"""The embedded encoder against naive BERT, its own padding, hostile texts and hostile tensors."""
 
 import math
 import warnings
@@ -6,30 +6,32 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from safetensors.numpy import load_file, save_file
 
 from motionloom.errors import MotionloomError
-from motionloom.nets.text.bert import Bert, from_huggingface
-from motionloom.runtime.text.minilm import MiniLM, pack, read_vocabulary, write_vocabulary
+from motionloom.runtime.text.minilm import WORDS, MiniLM, read_vocabulary, unpacked, write_vocabulary
 from motionloom.runtime.text.protocol import TextEncoder
-from motionloom.train.modules import text_encoder, text_module
+from motionloom.runtime.text.quantise import dequantise
 from motionloom.weights.container import split_graphs
-from tests.nets.text.tiny import HIDDEN, LAYERS, PLACES, VOCABULARY, WIDTH, weights
+from tests.recorded import tiny
+from tests.recorded.tiny import PLACES, TEXT, VOCABULARY, WIDTH
 from tests.work import work
 
 SENTENCES = ["a person walks.", "", "a person turns left, turns right, jumping and walking unaffably", "left"]
 
 
-def packed() -> dict[str, np.ndarray]:
-    return pack({name: value.numpy() for name, value in weights().items()}, VOCABULARY)
-
-
 @pytest.fixture(scope="module")
 def encoder() -> MiniLM:
-    return text_encoder(packed())
+    return tiny.text()
+
+
+def floats(encoder: MiniLM) -> dict[str, np.ndarray]:
+    """What its packed weights are in float32."""
+    tensors = encoder.to_tensors()
+    weights = unpacked(tensors) | {WORDS: dequantise(tensors[WORDS], tensors[f"{WORDS}.scale"])}
+    return {name: value.astype(np.float32) for name, value in weights.items()}
 
 
 def naive_bert(state: dict[str, np.ndarray], ids: list[int]) -> np.ndarray:
@@ -43,7 +45,7 @@ def naive_bert(state: dict[str, np.ndarray], ids: list[int]) -> np.ndarray:
         return x @ state[f"{name}.weight"].T + state[f"{name}.bias"]
 
     x = norm(state["words.weight"][ids] + state["places.weight"][: len(ids)], "norm")
-    for layer in range(LAYERS):
+    for layer in range(TEXT["layers"]):
         query, key, value = np.split(linear(x, f"layers.{layer}.attention_in"), 3, axis=1)
         mixed = np.zeros_like(x)
         for head in range(WIDTH // 32):
@@ -59,28 +61,10 @@ def naive_bert(state: dict[str, np.ndarray], ids: list[int]) -> np.ndarray:
 
 
 def test_tokens_are_those_of_a_naive_bert(encoder: MiniLM) -> None:
-    state = {name: value.double().numpy() for name, value in text_module(encoder).state_dict().items()}
-    for text in SENTENCES:
-        expected = naive_bert(state, encoder.ids(text))
-        np.testing.assert_allclose(encoder.encode(text).tokens[0], expected, atol=2e-5)
-
-
-def test_renamed_weights_give_what_transformers_gives() -> None:
-    transformers = pytest.importorskip("transformers", reason="the extra 'clip' is not installed")
-    torch.manual_seed(0)
-    config = transformers.BertConfig(
-        vocab_size=50, hidden_size=64, num_hidden_layers=2, num_attention_heads=2, intermediate_size=96
-    )
-    theirs = transformers.BertModel(config).eval()
-    for value in theirs.parameters():
-        torch.nn.init.normal_(value, std=0.2)
-    ours = Bert(vocabulary=50, places=16, width=64, heads=2, hidden=96, layers=2)
-    ours.load_state_dict(from_huggingface(theirs.state_dict(), places=16))
-    ids = torch.randint(0, 50, (3, 9))
-    mask = torch.arange(9) < torch.tensor([9, 5, 2])[:, None]
-    with torch.no_grad():
-        expected = theirs(input_ids=ids, attention_mask=mask.long()).last_hidden_state
-        torch.testing.assert_close(ours(ids, mask)[mask], expected[mask], atol=2e-5, rtol=0)
+    state = {name: value.astype(np.float64) for name, value in floats(encoder).items()}
+    for sentence in SENTENCES:
+        expected = naive_bert(state, encoder.ids(sentence))
+        np.testing.assert_allclose(encoder.encode(sentence).tokens[0], expected, atol=2e-5)
 
 
 def test_a_row_does_not_depend_on_its_batch(encoder: MiniLM) -> None:
@@ -131,8 +115,7 @@ def test_every_text_encodes_to_finite_numbers(encoder: MiniLM, text: str) -> Non
 
 
 def test_recent_texts_are_not_computed_again_and_the_cache_stays_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    graph = text_encoder(packed()).graph
-    encoder = MiniLM.from_tensors(packed(), graph, cache=2)
+    encoder = MiniLM.from_tensors(tiny.text().to_tensors(), tiny.text().graph, cache=2)
     seen: list[int] = []
     run = encoder._session.run
 
@@ -164,9 +147,9 @@ def test_tensors_survive_a_file(encoder: MiniLM, tmp_path: Path) -> None:
 
 
 def test_packed_weights_stay_close_to_the_float_ones(encoder: MiniLM) -> None:
-    exact = weights()
-    for name, value in text_module(encoder).state_dict().items():
-        assert (value - exact[name]).abs().max() < 0.006, name
+    exact = tiny.text_weights()
+    for name, value in floats(encoder).items():
+        assert np.abs(value - exact[name]).max() < 0.006, name
 
 
 def without(tensors: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
@@ -193,7 +176,7 @@ def test_a_missing_tensor_is_named_in_one_sentence(encoder: MiniLM, name: str) -
         {"vocabulary": write_vocabulary(["x", *VOCABULARY[1:]])},
         {"vocabulary": np.full(40, 255, np.uint8)},
         {"vocabulary": np.zeros((3, 3), np.float32)},
-        {"layers.0.attention_in.weight": np.zeros((3, WIDTH, HIDDEN), np.float32)},
+        {"layers.0.attention_in.weight": np.zeros((3, WIDTH, TEXT["hidden"]), np.float32)},
         {"extra": np.zeros(3, np.float32)},
     ],
     ids=lambda change: next(iter(change)),

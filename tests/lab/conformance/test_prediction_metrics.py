@@ -5,7 +5,7 @@ import pytest
 
 from motionloom.lab.metrics import prediction as pr
 from tests.conformance.runner import MOTION, Case, cases, compare, normal, stream
-from tests.conformance.test_humanmac import sums, wave
+from tests.lab.conformance.test_humanmac import sums, wave
 
 
 @pytest.mark.parametrize("case", cases("humanmac", kind="hmp_metrics"))

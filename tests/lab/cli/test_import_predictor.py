@@ -8,8 +8,8 @@ import torch
 
 from motionloom.cli import main
 from motionloom.weights.predictor import Predictor
+from tests.lab.papers.test_humanmac_checkpoint import checkpoint
 from tests.lab.papers.test_mdm import Bomb
-from tests.weights.test_predictor import checkpoint
 
 START = ["import", "ckpt_ema_550.pt", "--out", "a.safetensors"]
 

@@ -6,8 +6,6 @@ from pathlib import Path
 import pytest
 
 from motionloom.cli import evaluate, main
-from motionloom.errors import MotionloomError
-from motionloom.io.atomic import atomic_path, check_place
 
 SUFFIXES = {"--sheet": ".png", "--make-reference": ".safetensors", "--write-bare": ".safetensors", "--results": ".md"}
 """Of options that name a file; the others name a folder, but for `evaluate reference`."""
@@ -56,30 +54,3 @@ def test_a_refusal_leaves_no_folders(
     problems = [line for line in capsys.readouterr().err.splitlines() if line.startswith("motionloom: ")]
     assert name == "all" or len(problems) == 1  # `all` says it of every suite
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.safetensors", "recordings"]
-
-
-def test_folders_are_made_for_what_is_written_and_go_where_it_fails(tmp_path: Path) -> None:
-    place = tmp_path / "a" / "b" / "c.txt"
-    with pytest.raises(MotionloomError, match="No space"), atomic_path(place, folders=True):
-        raise OSError(28, "No space left on device")
-    assert list(tmp_path.iterdir()) == []
-    (tmp_path / "a").mkdir()
-    with pytest.raises(ZeroDivisionError), atomic_path(place, folders=True):
-        raise ZeroDivisionError
-    assert list(tmp_path.rglob("*")) == [tmp_path / "a"]  # it was there before
-    with atomic_path(place, folders=True) as temp:
-        temp.write_text("whole")
-    assert place.read_text() == "whole"
-
-
-@pytest.mark.parametrize("name", ["file/x/y.json", "x/" + "n" * 300 + "/y.json", "x/" + "n" * 300, "x/\0/y", "l/x/y"])
-def test_places_that_can_never_be_are_refused_before_work(tmp_path: Path, name: str) -> None:
-    (tmp_path / "file").write_text("")
-    (tmp_path / "l").symlink_to("l")
-    before = sorted(tmp_path.rglob("*"))
-    with pytest.raises(MotionloomError, match="cannot write"):
-        check_place(tmp_path / name, folders=True)
-    assert sorted(tmp_path.rglob("*")) == before
-    check_place(tmp_path / "x" / "y" / "z.json", folders=True)
-    with pytest.raises(MotionloomError, match="does not exist"):
-        check_place(tmp_path / "x" / "y.json")

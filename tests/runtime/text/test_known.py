@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from motionloom.arrays import unit
 from motionloom.errors import MotionloomError
-from motionloom.lab.metrics.obedience import CHECKS as BASIC
 from motionloom.runtime.text.known import (
     Known,
     bare,
@@ -116,8 +115,8 @@ def test_the_weights_that_ship_know_everyday_actions_and_no_golf() -> None:
     assert prior.known is not None
     unknown = ["a man plays golf", "a woman rides a bicycle", "a woman irons a shirt", "he drives a car"]
     assert not any(found.near for found in nearest(prior.known, unknown, prior.text))
-    prompts = [check.prompt for check in BASIC]
-    assert sum(found.near for found in nearest(prior.known, prompts, prior.text)) >= 0.9 * len(prompts)
+    everyday = ["a person walks forward", "someone jumps", "a person sits down", "a man waves with the right hand"]
+    assert all(found.near for found in nearest(prior.known, everyday, prior.text))
 
 
 def table() -> Known:

@@ -8,7 +8,7 @@ import pytest
 from motionloom.diffusion import cosine, guide
 from motionloom.lab.papers.double_take import MODES, Plan, Takes, double_take, flags
 from tests.conformance.runner import Case, cases, compare
-from tests.conformance.test_sampling import dummy, published_network, recorded_draw, to_motion
+from tests.lab.conformance.test_sampling import dummy, published_network, recorded_draw, to_motion
 
 
 def as_sampling(recorded: Case, shape: tuple[int, ...]):

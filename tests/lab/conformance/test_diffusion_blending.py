@@ -13,7 +13,7 @@ from motionloom.tasks.control import blended
 from motionloom.tasks.sampling import Observed
 from motionloom.train.modules import prior_session
 from tests.conformance.runner import KNOWN, MOTION, NOISE, TEXT, Case, case, cases, compare, normal, stream, weights
-from tests.conformance.test_sampling import to_motion, to_state
+from tests.lab.conformance.test_sampling import to_motion, to_state
 
 
 def recorded_denoiser(recorded: Case) -> Denoiser:

@@ -8,7 +8,7 @@ import pytest
 
 from motionloom.cli import main
 from motionloom.weights.prior import load_prior, save_prior
-from tests.nets import tiny
+from tests.recorded import tiny
 from tests.train import runs
 
 RECIPE = """
@@ -92,3 +92,13 @@ def test_the_card_of_a_run_without_a_licence_lists_those_of_the_data(capsys: pyt
     capsys.readouterr()
     assert main(["weights", "run/mine.safetensors", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["licence"] == "free"
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no devices here")
+def test_nothing_is_read_out_of_a_device() -> None:
+    for suffix in (".toml", ".bvh"):
+        Path(f"zero{suffix}").symlink_to("/dev/zero")
+    assert main(["train", "prior", "--recipe", "zero.toml", "--data", "set", "--out", "run"]) == 2
+    assert main(["teach", "a walk", "zero.bvh", "--out", "b.safetensors"]) == 2
+    assert not Path("run").exists()
+    assert not Path("b.safetensors").exists()

@@ -1,7 +1,7 @@
 """Splitting into word pieces against splits known from the BERT paper and its published tokenizer."""
 
 from motionloom.runtime.text.wordpiece import make_tokenizer
-from tests.nets.text.tiny import VOCABULARY
+from tests.recorded.tiny import VOCABULARY
 
 
 def split(text: str) -> list[str]:

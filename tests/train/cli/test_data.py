@@ -28,3 +28,19 @@ def test_mistakes_are_one_sentence(
     assert main(["data", "build", *words]) == 2
     assert capsys.readouterr().err.strip().count("\n") == 0
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(None, "motionloom: there is no caption file said.jsonl"), (b"\xff" * 5000, "line 1 is not JSON")],
+)
+def test_captions_that_are_none_are_reported_in_one_short_sentence(content, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "walk.bvh").write_text("HIERARCHY")
+    if content:
+        (tmp_path / "said.jsonl").write_bytes(content)
+    assert main(["data", "build", ".", "--out", "set", "--captions", "said.jsonl"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("motionloom: ")
+    assert message in said
+    assert len(said) < 300
