@@ -36,7 +36,7 @@ BUDGETS = {
     "lab/metrics": 5_347,
     "lab/papers": 5_232,
     "lab/report": 1_278,
-    "lab/suites": 9_084,
+    "lab/suites": 9_097,
     "live": 3_054,
     "nets": 1_242,
     "retarget": 3_249,

@@ -166,6 +166,14 @@ def test_every_suite_of_the_results_says_of_which_weights_it_is() -> None:
     assert not [one for one in openings if not re.search(r"; of [\w-]+ [0-9a-f]{12}", one)]
 
 
+def test_every_study_is_as_the_command_writes_it() -> None:
+    """A study of given weights is one marked place, which names them as its protocol does; others train their own."""
+    for page in sorted((ROOT / "docs" / "studies").glob("*.md")):
+        found = re.findall(r"<!-- figures; of ([^\n]+) -->", page.read_text())
+        assert found == re.findall(r"^- files: (.+)$", page.read_text(), re.MULTILINE), page.name
+        assert bool(found) == (page.stem in ("hold", "horizon", "steps", "switch")), page.name
+
+
 WITHOUT_WEIGHTS = {
     *("batch.txt", "studio.txt", "blender_vertices.txt", "bvh_elsewhere.txt", "characters.txt"),
     "runtime.txt",

@@ -5,7 +5,7 @@ first twelve digits of their SHA-256:
 
     <!-- filled from benchmarks/NAME: COLUMN, COLUMN; of default 0123456789ab -->  replaced by that file
     <!-- suite NAME; of default 0123456789ab, duet 0123456789ab -->                written by `motionloom evaluate all`
-    <!-- figures; of default 0123456789ab -->                                      kept by hand
+    <!-- figures; of default 0123456789ab -->                                      a study's, or kept by hand
     <!-- end -->
 
 A file that fills a place ends with the line ``Weights: default 0123456789ab``, from which the opening line is made; it

@@ -32,6 +32,18 @@ def test_a_usual_file_is_read(tmp_path: Path) -> None:
     assert about == {"b": "{}" * 100}
 
 
+@pytest.mark.parametrize("kind", ["BF16", "F8_E4M3"])
+def test_numbers_that_numpy_has_not_are_refused(tmp_path: Path, kind: str) -> None:
+    """Where a package that gives NumPy such numbers is imported too."""
+    pytest.importorskip("ml_dtypes")
+    size = 2 if kind == "BF16" else 1
+    head = json.dumps({"a": {"dtype": kind, "shape": [3], "data_offsets": [0, 3 * size]}}).encode()
+    path = tmp_path / "a.safetensors"
+    path.write_bytes(len(head).to_bytes(8, "little") + head + bytes(3 * size))
+    with pytest.raises(MotionloomError, match="is not a whole safetensors file"):
+        read_tensors(path)
+
+
 @pytest.mark.parametrize("read", [read_tensors, read_card], ids=lambda read: read.__name__)
 def test_very_many_tensors_are_refused_before_they_are_parsed(tmp_path: Path, read) -> None:
     path = empty_tensors(tmp_path / "a.safetensors", MAX_TENSORS + 1)

@@ -6,19 +6,8 @@ from collections.abc import Generator, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionloom.cli.sampling import (
-    add_loop,
-    add_sampling,
-    bar,
-    check_loop,
-    check_outs,
-    fail,
-    load_prior,
-    looped,
-    moves,
-    remark_unknown,
-    sampling_of,
-)
+from motionloom.cli.looping import add_loop, check_loop, looped
+from motionloom.cli.sampling import add_sampling, bar, check_outs, fail, load_prior, moves, remark_unknown, sampling_of
 from motionloom.cli.skeletons import Target, open_target
 from motionloom.cli.writing import check_overwriting
 

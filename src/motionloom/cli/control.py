@@ -6,18 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.cli.finished import finished_motions, groups
+from motionloom.cli.looping import add_loop, check_loop, looped, note_loop
 from motionloom.cli.newcomers import one_sentence
 from motionloom.cli.sampling import (
-    add_loop,
     add_sampling,
     bar,
     check_count,
-    check_loop,
     check_outs,
     check_prompt,
     fail,
     load_prior,
-    looped,
     places,
     remark_unknown,
     report,
@@ -108,9 +106,7 @@ def run_control(arguments: argparse.Namespace) -> int:
         from motionloom.goals.goal import FPS
 
         check_loop(arguments, len(goal.positions) / FPS)
-        print(
-            f"note: the last {arguments.blend:g} s are drawn anew for --loop; goals there are not kept", file=sys.stderr
-        )
+        note_loop(arguments, "goals there are not kept")
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
     remarks = remark_unknown(prior, [arguments.prompt])

@@ -6,16 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from motionloom.cli.finished import Finished, groups
+from motionloom.cli.looping import add_loop, looped
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
     add_adapters,
-    add_loop,
     bar,
     check_count,
     check_prompt,
     fail,
     load_prior,
-    looped,
     moves,
     places,
     report,

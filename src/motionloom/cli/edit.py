@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from motionloom.cli.finished import Finished, groups
+from motionloom.cli.looping import add_loop
 from motionloom.cli.reading import add_reading, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
-    add_loop,
     add_sampling,
     bar,
     check_count,

@@ -9,18 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.amounts import controlled, measuring_amounts, read_amounts
 from motionloom.cli.finished import finished_motions
+from motionloom.cli.looping import add_loop, check_loop, looped
 from motionloom.cli.newcomers import one_sentence
 from motionloom.cli.sampling import (
-    add_loop,
     add_sampling,
     bar,
     check_count,
-    check_loop,
     check_outs,
     check_prompt,
     fail,
     load_prior,
-    looped,
     places,
     remark_unknown,
     report,

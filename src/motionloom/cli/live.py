@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.duet import check_pair_outs, write_pairs
+from motionloom.cli.looping import add_loop, check_loop, looped
 from motionloom.cli.sampling import add_adapters, check_outs, fail, load_prior
 from motionloom.cli.sampling import write as write_files
 from motionloom.cli.skeletons import Target, add_skeleton
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from motionloom.live.clock import Health
     from motionloom.live.live import Frame, Stage
     from motionloom.live.script import Script
+    from motionloom.motion import Motion
+    from motionloom.weights.prior import Prior
 
 
 def add(subparsers) -> None:
@@ -54,6 +57,7 @@ def add(subparsers) -> None:
     parser.add_argument("--clock", action="store_true", help="play it against the time and say how that went")
     parser.add_argument("--check", action="store_true", help="only say what would be made")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
+    add_loop(parser)
     add_adapters(parser)
     add_skeleton(parser)
     add_writing(parser)
@@ -61,9 +65,12 @@ def add(subparsers) -> None:
 
 
 def _live(arguments: argparse.Namespace) -> int:
+    from motionloom.live.live import motion_of
     from motionloom.live.script import read_script
+    from motionloom.runtime import set_threads
 
     script = read_script(arguments.script)
+    check_loop(arguments, script.seconds)
     if arguments.check:
         _report(arguments, script, [], None, {})
         return 0
@@ -76,30 +83,30 @@ def _live(arguments: argparse.Namespace) -> int:
     check_overwriting(arguments, outs)
     if len(arguments.start or ()) not in (0, script.people):
         fail(f"--start is given {len(arguments.start)} times; the script has {script.people} people: give one for each")
-    live = _made(arguments, script)
+    set_threads(1)  # a window's matrices are small: two threads would wait for each other at every layer
+    prior = load_prior(arguments)
+    seed = script.seed if arguments.seed is None else arguments.seed
+    live = _made(arguments, script, prior, seed)
     frames, health = _against_time(script, live) if arguments.clock else (list(script.run(live)), None)
-    if script.people == 1:
-        written = _written([one for (one,) in frames], live.fps, outs, target, arguments.out_unit)
-    else:
-        written = _written_pair(frames, live.fps, outs, target, arguments.out_unit)
+    words = [[one.words for one in shown] for shown in frames]
+    motions = [motion_of([shown[i] for shown in frames], live.fps) for i in range(script.people)]
+    motions = [looped(arguments, prior, one, said, seed=seed) for one, said in zip(motions, words[-1], strict=True)]
+    write = _write if script.people == 1 else _write_pair
+    written = write(motions, words, outs, target, arguments.out_unit)
     _report(arguments, script, written, health, {"calls": live.calls, "frames": len(frames)})
     return 0
 
 
-def _made(arguments: argparse.Namespace, script: "Script") -> "Stage":
+def _made(arguments: argparse.Namespace, script: "Script", prior: "Prior", seed: int) -> "Stage":
     from motionloom.io import load
     from motionloom.live.live import Live
     from motionloom.live.pair import LivePair
     from motionloom.live.settings import Settings
-    from motionloom.runtime import set_threads
     from motionloom.weights.pair import PairBlock
 
     settings = Settings(steps=arguments.steps, guidance=arguments.guidance)
     starts = [load(path) for path in arguments.start or ()]
-    seed = script.seed if arguments.seed is None else arguments.seed
     shared: dict[str, Any] = {"seed": seed, "fps": arguments.fps or 20.0, "settings": settings}
-    set_threads(1)  # a window's matrices are small: two threads would wait for each other at every layer
-    prior = load_prior(arguments)
     if script.people == 1:
         return Live(prior, start=starts[0] if starts else None, **shared)
     block = PairBlock.load(arguments.pair_weights, prior)
@@ -124,34 +131,41 @@ def _against_time(script: "Script", live: "Stage") -> tuple[list[tuple["Frame", 
         return frames, player.health
 
 
-def _written(
-    frames: Sequence["Frame"], fps: float, outs: Sequence[Path], target: Target | None, unit: float | None
+def _write(
+    motions: "Sequence[Motion]",
+    words: Sequence[Sequence[str]],
+    outs: Sequence[Path],
+    target: Target | None,
+    unit: float | None,
 ) -> list[Path]:
-    """The files; a picture shows each stretch of the same words in a row of its own."""
+    """The files of one person, with the words of each frame; a picture shows each stretch of the same in a row."""
     from itertools import groupby
 
-    from motionloom.live.live import motion_of
-
-    whole = motion_of(frames, fps)
-    stretches = [(words, motion_of(list(part), fps)) for words, part in groupby(frames, key=lambda frame: frame.words)]
-    said = "; ".join(words for words, _ in stretches[:20])
+    (whole,) = motions
+    stretches: list[tuple[str, Motion]] = []
+    begin = 0
+    for said, part in groupby(one for (one,) in words):
+        begin, first = begin + len(list(part)), begin
+        stretches.append((said, whole.frames(first, begin)))
+    said = "; ".join(one for one, _ in stretches[:20])
     files: list[Path] = []
     for out in outs:
         pieces = stretches[:50] if out.suffix.lower() == ".png" and target is None else [(said, whole)]
-        motions = [motion if target is None else target.put(motion) for _, motion in pieces]
-        files += write_files(motions, [out], [words for words, _ in pieces], target, unit=unit)
+        shown = [motion if target is None else target.put(motion) for _, motion in pieces]
+        files += write_files(shown, [out], [one for one, _ in pieces], target, unit=unit)
     return files
 
 
-def _written_pair(
-    frames: Sequence[tuple["Frame", ...]], fps: float, outs: Sequence[Path], target: Target | None, unit: float | None
+def _write_pair(
+    motions: "Sequence[Motion]",
+    words: Sequence[Sequence[str]],
+    outs: Sequence[Path],
+    target: Target | None,
+    unit: float | None,
 ) -> list[Path]:
     """The files of two people; those that hold one person each come in twos."""
-    from motionloom.live.live import motion_of
-
-    people = [motion_of([both[i] for both in frames], fps) for i in (0, 1)]
-    duet = people if target is None else target.put_together(people)
-    said = dict.fromkeys(" :: ".join(one.words for one in both) for both in frames)
+    duet = list(motions) if target is None else target.put_together(motions)
+    said = dict.fromkeys(" :: ".join(both) for both in words)
     return write_pairs([duet], [[out] for out in outs], [(unit or 1.0, {})] * 2, "; ".join([*said][:20]), target)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from motionloom.cli.finished import Finished, groups
 from motionloom.cli.futures import FORMATS, Long, Writing, targets, write_futures
 from motionloom.cli.futures import Target as Files
+from motionloom.cli.looping import add_loop, all_looped, check_loop_behind
 from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import bar, check_count, fail, sampling_of
 from motionloom.cli.skeletons import Target, add_skeleton, read_target
@@ -125,6 +126,7 @@ def _add_sampling(parser: argparse.ArgumentParser, other: str) -> None:
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
     parser.add_argument("--fps", type=float, metavar="N", help="frame rate of the files (default: PAST's)")
+    add_loop(parser, weights=True)
     add_skeleton(parser, own="PAST's")
     add_writing(parser, unit="PAST's, else m")
     add_reading(parser)
@@ -133,6 +135,10 @@ def _add_sampling(parser: argparse.ArgumentParser, other: str) -> None:
 def run_predict(arguments: argparse.Namespace) -> int:
     """``motionloom predict PAST``."""
     _check(arguments, longest=DAY)
+    if arguments.loop and arguments.seconds > LONG:
+        fail(f"more than {LONG:g} s are written before --loop could draw the end; use: motionloom edit FILE --loop")
+    if arguments.loop and arguments.no_root:
+        fail("--loop draws the way through the world, which --no-root leaves out; give one of them")
     outs = arguments.out or [Path("futures")]
     skin = read_target(arguments, [*outs, *(Path(f"future.{one}") for one in arguments.format or ())])
     if skin is not None:
@@ -146,6 +152,7 @@ def run_predict(arguments: argparse.Namespace) -> int:
     horizon = round(arguments.seconds * past.fps)
     _check_size(arguments, past, horizon, wanted)
     hold = _hold(arguments, past, horizon)
+    check_loop_behind(arguments, past.seconds, arguments.seconds, "nothing is held there" if hold else "")
     predictor = _predictor(arguments)
     if arguments.seconds > LONG:
         given, frames = (_frames_at(arguments, past, count) for count in (len(past), len(past) + horizon))
@@ -193,7 +200,7 @@ def _written(
         put=lambda motions: at_rate(motions, arguments.fps),
         what="futures",
     )
-    interrupted = made.take(drawn)
+    interrupted = made.take(all_looped(arguments, drawn))
     _report(arguments, [str(file) for file in written], made.count)
     note()
     note_rate(arguments, _inputs(arguments))
@@ -219,6 +226,7 @@ def run_switch(arguments: argparse.Namespace) -> int:
     _check_size(arguments, past, round(arguments.seconds * past.fps), wanted)
     target = _like_past(arguments, arguments.target, past)
     _check_poses(arguments, (len(past) + len(target) + round(arguments.seconds * past.fps)) * len(past.skeleton))
+    check_loop_behind(arguments, past.seconds, arguments.seconds + target.seconds, f"{arguments.target} ends otherwise")
     predictor = _predictor(arguments)
     from motionloom.tasks.predict import switch
 

@@ -55,34 +55,6 @@ def add_sampling(
     add_writing(parser, unit=own_unit)
 
 
-def add_loop(parser: argparse.ArgumentParser) -> None:
-    """``--loop``, for `looped`."""
-    parser.add_argument("--loop", action="store_true", help="make the end meet the beginning")
-    parser.add_argument("--blend", type=float, default=1.0, help="seconds drawn anew for --loop (default 1)")
-
-
-def check_loop(arguments: argparse.Namespace, seconds: float) -> None:
-    """Refuse a ``--loop`` of motions that are too short for it."""
-    if arguments.loop:
-        from motionloom.tasks.edit import Loop
-
-        Loop(arguments.blend).check(seconds, 0.0)
-
-
-def looped(arguments: argparse.Namespace, prior: "Prior", motion: "Motion", text: str, *, seed: int) -> "Motion":
-    """The motion with its end drawn anew so that the beginning can follow it, where the line says ``--loop``.
-
-    text: what the person does there.
-    """
-    if not arguments.loop:
-        return motion
-    from motionloom.tasks.edit import Loop, edit
-
-    settings = {name: value for name, value in sampling_of(arguments).items() if name in ("steps", "guidance")}
-    (closed,) = edit(prior, motion, text, Loop(arguments.blend), foot_lock=arguments.foot_lock, seed=seed, **settings)
-    return closed
-
-
 def sampling_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """The settings of `Sampling` that the line says, as keywords of a task; the others are the task's own."""
     names = ("steps", "solver", "guidance", "seed", "count", "temperature", "pair_guidance")

@@ -129,7 +129,12 @@ def read_tensors(path: Path, max_bytes: int = MAX_BYTES) -> tuple[dict[str, np.n
     try:
         check_head(path, max_bytes=max_bytes)
         with safe_open(path, framework="np") as file:
-            return {key: file.get_tensor(key) for key in file.keys()}, dict(file.metadata() or {})  # noqa: SIM118
+            tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+            head = dict(file.metadata() or {})
+        odd = next((value.dtype for value in tensors.values() if value.dtype.kind not in "biuf"), None)
+        if odd is not None:  # bfloat16 and the like are numbers to NumPy only where ml_dtypes is installed too
+            raise ValueError(f"{odd} is no number that NumPy computes with; write float16 or float32")
+        return tensors, head
     except (SafetensorError, OSError, *_WRONG, RuntimeError) as error:
         if isinstance(error, MotionloomError):
             raise

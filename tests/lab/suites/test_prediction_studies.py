@@ -1,5 +1,6 @@
 """The studies of prediction with networks that know nothing: what is trained, kept, measured and written."""
 
+import runpy
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from motionloom.lab.report.report import REAL
 from motionloom.lab.suites import prediction_behaviour as behaviour
 from motionloom.lab.suites import prediction_studies as studies
 from motionloom.lab.suites import prediction_trial as trials
+from motionloom.weights.container import weights_digest
 from motionloom.weights.predictor import save_predictor
 from tests.lab.suites.predicted import AHEAD, SEEN, predictor, protocol
 from tests.lab.suites.test_prediction import humaneva
@@ -289,6 +291,11 @@ def test_the_command_does_a_study(tmp_path: Path, capsys) -> None:
         "motionloom evaluate study horizon --data DIR --weights tiny.safetensors --windows 2 --out FOLDER --quick"
         in said
     )
+    filler = runpy.run_path(str(Path(__file__).parents[3] / "tools" / "fill_readme.py"))
+    (place,) = filler["PLACE"].finditer(said)
+    assert place[4] == f"tiny {weights_digest(weights)[:12]}"
+    assert said.startswith(f"# {studies.TITLES['horizon']}\n\n<!-- figures; of ")
+    assert said.endswith("![A long horizon: window after window](horizon.png)\n<!-- end -->\n")
     assert (tmp_path / "out" / "horizon.png").is_file()
     assert main([*words, "--samples", "0", "--out", str(tmp_path / "bad")]) == 2
     assert "samples must be" in capsys.readouterr().err

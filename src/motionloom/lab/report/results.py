@@ -8,6 +8,7 @@ it. The hashes are those of the weight files that were measured, so that a page 
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 from motionloom.errors import MotionloomError
 from motionloom.lab.report.files import write_text
@@ -41,15 +42,16 @@ def fill(text: str, reports: Sequence[Report], *, again: bool = False) -> tuple[
         if quick and full_before and not again:
             left.append(report.suite)
             return found[0]
-        return f"{_opening(report)}{QUICK_MARK if quick else ''}{shown(report)}{found[4]}"
+        return f"{opening(report, 'suite')}{QUICK_MARK if quick else ''}{shown(report)}{found[4]}"
 
     return PLACE.sub(one, text), left
 
 
-def _opening(report: Report) -> str:
-    files = report.protocol.get(FILES)
-    of = f"; of {', '.join(f'{name} {mark}' for name, mark in files.items())}" if isinstance(files, dict) else ""
-    return f"<!-- suite {report.suite}{of.replace('-->', '')} -->\n"
+def opening(report: Report, kind: Literal["suite", "figures"]) -> str:
+    """The first line of a place: a suite's on a page of all, or of figures on a page of their own."""
+    measured = report.protocol.get(FILES)
+    of = f"; of {', '.join(f'{name} {mark}' for name, mark in measured.items())}" if isinstance(measured, dict) else ""
+    return f"<!-- {kind}{f' {report.suite}' if kind == 'suite' else ''}{of.replace('-->', '')} -->\n"
 
 
 def shown(report: Report) -> str:

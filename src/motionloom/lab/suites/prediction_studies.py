@@ -14,18 +14,18 @@ from motionloom.data.prediction import Protocol
 from motionloom.diffusion import SCHEDULES
 from motionloom.errors import MotionloomError
 from motionloom.lab.papers.benchmarks import find_protocol
-from motionloom.lab.report import files, plots
+from motionloom.lab.report import files, plots, results
 from motionloom.lab.report import report as reports
 from motionloom.lab.report.report import REAL, Column, Report, Row, Value
 from motionloom.lab.suites import prediction, prediction_behaviour
 from motionloom.lab.suites import prediction_trial as trials
-from motionloom.lab.suites.harness import Run, Say, silent
+from motionloom.lab.suites.harness import Run, Say, silent, weight_marks
 from motionloom.lab.suites.prediction_trial import Trial
 from motionloom.tasks.completion import SOLVER, SPACING, STEPS
 from motionloom.train.loop import changed
 from motionloom.train.predictor import train_predictor
 from motionloom.train.recipe import Recipe
-from motionloom.weights.predictor import Predictor, load_predictor
+from motionloom.weights.predictor import Predictor, find_predictor, load_predictor
 
 BASE = {"kept": 24, "layers": 4, "width": 128, "heads": 4, "dropout": 0.1}
 """The small network that studies change one thing of."""
@@ -135,6 +135,8 @@ def run(name: str, run: Run, *, protocol: str | None = None, keep: Path, budget:
         run.progress,
     )
     found = replace(study(name, lab), command=run.command)
+    if not trained:
+        found = replace(found, protocol={**found.protocol, results.FILES: weight_marks([find_predictor(run.weights)])})
     write(found, name, run.folder)
     return found
 
@@ -172,10 +174,18 @@ def study(name: str, lab: Lab) -> Report:
 
 
 def write(report: Report, name: str, folder: Path) -> None:
-    """``NAME.png``, ``NAME.md`` and ``NAME.json``, each whole or not at all."""
+    """``NAME.png``, ``NAME.md`` and ``NAME.json``, each whole or not at all.
+
+    Figures of given weights lie in a place that names these, as `tools/fill_readme.py` holds against those that ship.
+    """
     path = files.check_report(folder / f"{name}.json")
     plots.study(report, folder / f"{name}.png")
-    files.write_text(folder / f"{name}.md", reports.markdown(report) + f"\n![{report.title}]({name}.png)\n")
+    picture = f"\n![{report.title}]({name}.png)\n"
+    page = reports.markdown(report) + picture
+    if results.FILES in report.protocol:
+        place = f"{results.opening(report, 'figures')}{results.shown(report)}{picture}<!-- end -->\n"
+        page = f"# {report.title}\n\n{place}"
+    files.write_text(folder / f"{name}.md", page)
     files.write_json(path, reports.encode(report))
 
 

@@ -1,0 +1,81 @@
+"""``--loop``: the end of a motion drawn anew, so that its beginning can follow it."""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from motionloom.cli.sampling import fail, sampling_of
+
+if TYPE_CHECKING:
+    from motionloom.motion import Motion
+    from motionloom.weights.prior import Prior
+
+
+def add_loop(parser: argparse.ArgumentParser, *, weights: bool = False) -> None:
+    """``--loop``, for `looped`; ``weights``: and ``--loop-weights``, where ``--weights`` are not a prior's."""
+    parser.add_argument("--loop", action="store_true", help="make the end meet the beginning")
+    parser.add_argument("--blend", type=float, default=1.0, help="seconds drawn anew for --loop (default 1)")
+    if weights:
+        meaning = "what draws them (default: default)"
+        parser.add_argument("--loop-weights", default="default", metavar="NAME|PATH", help=meaning)
+
+
+def check_loop(arguments: argparse.Namespace, seconds: float) -> None:
+    """Refuse a ``--loop`` of motions that are too short for it."""
+    if arguments.loop:
+        from motionloom.tasks.edit import Loop
+
+        Loop(arguments.blend).check(seconds, 0.0)
+
+
+def check_loop_behind(arguments: argparse.Namespace, past: float, added: float, lost: str) -> None:
+    """Refuse a ``--loop`` for which the ``added`` seconds behind a past are too short; else note what it changes.
+
+    past: seconds. lost: what is not as it was asked where the end is drawn anew, in words; empty where nothing is.
+    """
+    if not arguments.loop:
+        return
+    if arguments.blend > added:
+        fail(
+            f"--loop draws the last {arguments.blend:g} s anew, and {added:g} s come behind {arguments.past}, which "
+            f"stays as it is; give --blend {added:g} or less"
+        )
+    check_loop(arguments, past + added)
+    note_loop(arguments, lost)
+
+
+def note_loop(arguments: argparse.Namespace, lost: str) -> None:
+    """Say on stderr what is ``lost`` where the end is drawn anew, if anything is."""
+    if arguments.loop and lost:
+        print(f"note: the last {arguments.blend:g} s are drawn anew for --loop; {lost}", file=sys.stderr)
+
+
+def looped(arguments: argparse.Namespace, prior: "Prior", motion: "Motion", text: str, *, seed: int) -> "Motion":
+    """The motion with its end drawn anew so that the beginning can follow it, where the line says ``--loop``.
+
+    text: what the person does there; without it ``--guidance`` is of no use to the prior.
+    """
+    if not arguments.loop:
+        return motion
+    from motionloom.tasks.edit import Loop, edit
+
+    names = ("steps", "guidance") if text else ("steps",)
+    settings = {name: value for name, value in sampling_of(arguments).items() if name in names}
+    foot_lock = getattr(arguments, "foot_lock", True)
+    (closed,) = edit(prior, motion, text, Loop(arguments.blend), foot_lock=foot_lock, seed=seed, **settings)
+    return closed
+
+
+def all_looped(arguments: argparse.Namespace, drawn: "Iterator[list[Motion]]") -> "Iterator[list[Motion]]":
+    """The motions as `looped` makes them with the prior of ``--loop-weights``, which is loaded before any is drawn."""
+    if not arguments.loop:
+        yield from drawn
+        return
+    from motionloom.weights.prior import Prior
+
+    prior = Prior.load(arguments.loop_weights, device=arguments.device)
+    seed = arguments.seed
+    for motions in drawn:
+        yield [looped(arguments, prior, motion, "", seed=seed + number) for number, motion in enumerate(motions)]
+        seed += len(motions)
