@@ -1,16 +1,15 @@
-"""Numbers in the words of `generate`: what is asked and what is drawn, 12 sentences on 5 seeds.
+"""Numbers in the words: what is asked and what is drawn, some sentences on 5 seeds, and the same without reading.
 
 Usage: python benchmarks/read_words.py > benchmarks/read_words.txt
 """
 
-import numpy as np
+import sys
 
-from motionloom.goals.amount_goal import measured
-from motionloom.goals.amounts import Amount, read_amount
-from motionloom.goals.timeline import timeline_of
+from motionloom.goals.amount_goal import kept, measured
 from motionloom.lab.suites.harness import weight_marks
-from motionloom.tasks.control import control
+from motionloom.tasks.sampling import Sampling
 from motionloom.tasks.text import generate
+from motionloom.tasks.worded import draw, read
 from motionloom.weights.prior import Prior, find_weights
 
 SENTENCES = (
@@ -22,55 +21,44 @@ SENTENCES = (
     "a woman walks slowly 2 meters backwards",
     "a man runs 10 meters",
     "a person sidesteps 2 meters to the left",
+    "a person walks backwards in a half circle to the right",
     "take three steps forward and stop",
     "a person walks five steps",
     "a person takes two steps back",
-    "a person walks backwards in a half circle to the right",
+    "a person takes two steps to the left",
+    "a person jumps twice",
+    "jump three times",
+    "hops twice on the right foot",
+    "does three squats",
+    "kicks twice",
+    "a person bows twice",
+    "a boxer punches three times",
+    "a person does five jumping jacks",
+    "claps four times",
 )
 SEEDS = range(5)
 
 
-def steps_of(positions: np.ndarray) -> int:
-    """How often a foot is lifted and put down 15 cm or more from where it stood (frames, 22, 3), metres."""
-    count = 0
-    for foot in (10, 11):
-        place = positions[:, foot][:, [0, 2]]
-        still = np.linalg.norm(np.gradient(place, axis=0), axis=-1) * 20 < 0.35
-        stood = place[0]
-        for frame in np.flatnonzero(still):
-            if np.linalg.norm(place[frame] - stood) > 0.15:
-                count += 1
-                stood = place[frame]
-    return count
-
-
-def kept(amount: Amount, size: float, got: float, steps: int) -> bool:
-    """Whether a motion does what was read: a turn within a ninth, a way within a tenth, steps to the number."""
-    if amount.kind == "steps":
-        return steps == amount.size
-    return abs(got / size - 1) <= (1 / 9 if amount.kind in ("turn", "arc") else 0.1)
-
-
 def main() -> None:
-    """Print a line for each sentence: with its goal, and as the network draws it alone."""
+    """Print a line for each sentence: what is drawn of it, and what the network draws alone."""
     prior = Prior.load("default")
-    print("sentence | asked | with the goal, seeds 0 to 4 (steps) | kept | without: 5 s | kept")
-    for text in SENTENCES:
-        (segment,) = timeline_of(text, amounts=True).segments
-        amount = read_amount(text)
-        assert amount is not None
-        assert segment.goal is not None
-        with_goal = [control(prior, text, segment.goal, seed=seed)[0].motion for seed in SEEDS]
-        without = [generate(prior, text, seed=seed)[0] for seed in SEEDS]
-        size = amount.size if amount.kind in ("turn", "arc") else amount.metres
-        cells = []
-        for motions in (with_goal, without):
-            places = [motion.positions() for motion in motions]
-            got = [(measured(amount, one), steps_of(one)) for one in places]
-            digits = 0 if amount.kind in ("turn", "arc") else 2
-            cells.append(", ".join(f"{value:.{digits}f} ({steps})" for value, steps in got))
-            cells.append(f"{sum(kept(amount, size, *one) for one in got)} of {len(got)}")
-        print(f"{text} | {amount}: {size:.2f}, {segment.seconds:g} s | {' | '.join(cells)}", flush=True)
+    print("sentence | asked | drawn, seeds 0 to 4 | kept | without reading: 5 s | kept")
+    for text in sys.argv[1:] or SENTENCES:
+        asked = read(prior, text)
+        (reading,) = asked.readings
+        amount = reading.amount
+        with_it = [next(iter(draw(prior, [asked], sampling=Sampling(seed=seed)))) for seed in SEEDS]
+        without = [generate(prior, text, seed=seed, literal=True)[0] for seed in SEEDS]
+        alone = [measured(amount, motion.positions(), motion.fps) for motion in without]
+        lines = [
+            ([one.amounts[0].measured for one in with_it], [one.amounts[0].kept for one in with_it]),
+            (alone, [kept(amount, size) for size in alone]),
+        ]
+        digits = 2 if amount.unit == "m" else 0
+        cells = [
+            f"{', '.join(f'{size:.{digits}f}' for size in sizes)} | {sum(good)} of {len(good)}" for sizes, good in lines
+        ]
+        print(f"{text} | {amount}, {asked.seconds:g} s | {' | '.join(cells)}", flush=True)
     [(name, mark)] = weight_marks([find_weights("default")]).items()
     print(f"\nWeights: {name} {mark}")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.amount_goal import goal_for, missed, seconds_for
+from motionloom.goals.amount_goal import goal_for, kept, measured, seconds_for
 from motionloom.goals.amounts import read_amount, read_seconds
 from motionloom.goals.sequence import natural_seconds
 from motionloom.goals.timeline import timeline_of
@@ -131,7 +131,19 @@ def test_a_motion_that_stands_misses() -> None:
     assert amount is not None
     still = np.zeros((10, 22, 3))
     still[:, [2, 17], 0], still[:, [1, 16], 0] = -0.1, 0.1
-    assert "0 degrees" in missed(amount, still)
+    assert measured(amount, still) == 0
+    assert not kept(amount, 0)
+
+
+def test_repetitions_are_strokes_one_after_the_other() -> None:
+    """Slow strokes are segments of their own, quick ones follow each other in one; the number is out of their words."""
+    squats = timeline_of("a person does three squats", amounts=True)
+    assert [segment.text for segment in squats.segments] == ["a person does squats"] * 3
+    assert [(one.first, one.end) for one in squats.readings] == [(0, 3)]
+    assert len(timeline_of("a person does five jumping jacks", amounts=True).segments) == 1
+    two = timeline_of("a person walks 2 meters, then jumps twice", amounts=True)
+    assert [(one.first, one.end) for one in two.readings] == [(0, 1), (1, 3)]
+    assert sum(segment.seconds for segment in timeline_of("a person kicks twice", 3.0, amounts=True).segments) == 3
 
 
 def test_a_sentence_becomes_segments_with_goals() -> None:

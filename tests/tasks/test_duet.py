@@ -236,7 +236,7 @@ def test_a_row_is_led_from_where_it_begins_and_shows_the_noised_state(prior: Pri
         asked.update(state=state, clean=clean, level=level)
         return clean + 1
 
-    row = tasks._PairRow((), net, lead, None)
+    row = tasks._PairRow((), net, lead, None, None)
     denoiser = tasks._PairDenoiser(prior, net, [50, 1], 1.0)
     state, motion = normal((2, 2, 30, 263), 0)
     begin = np.array([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])

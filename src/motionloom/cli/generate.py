@@ -5,9 +5,8 @@ import sys
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from motionloom.cli.amounts import controlled, measuring_amounts, read_amounts
 from motionloom.cli.finished import finished_motions
 from motionloom.cli.looping import add_loop, check_loop, looped
 from motionloom.cli.newcomers import one_sentence
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from motionloom.goals.timeline import Timeline
     from motionloom.kinematics.gestures import Seat
     from motionloom.motion import Motion
+    from motionloom.tasks.worded import Worded
     from motionloom.weights.prior import Prior
 
 SECONDS = 5.0
@@ -96,21 +96,20 @@ def _generate(arguments: argparse.Namespace) -> int:
     remarks = remark_unknown(prior, [segment.text for found in timelines.values() for segment in found.segments])
     made = finished_motions(files, captions, target, unit=arguments.out_unit, rate=arguments.fps)
     asked = [timelines[caption] for caption in captions]
+    worded: list[Worded] = []
     drawn = (
         looped(arguments, prior, motion, asked[number].segments[-1].text, seed=arguments.seed + number)
-        for number, motion in enumerate(_drawn(arguments, prior, asked))
+        for number, motion in enumerate(_drawn(arguments, prior, asked, worded))
     )
     seated: list[list[Seat]] = []
-    amounts: list[list[dict[str, object]]] = []
-    checked = measuring_amounts(amounts, drawn, asked)
-    interrupted = made.take([motion] for motion in _noting(seated, checked, target))
+    interrupted = made.take([motion] for motion in _noting(seated, drawn, target))
     motions = [
         {
             "prompt": caption,
             "seed": arguments.seed + i,
-            "segments": _segments(timelines[caption]),
+            "segments": _segments(worded[i].timeline),
             "seats": [asdict(seat) for seat in seats],
-            "amounts": amounts[i],
+            "amounts": [asdict(one) for one in worded[i].amounts],
         }
         for i, (caption, seats) in enumerate(zip(captions[: made.count], seated))
     ]
@@ -152,22 +151,24 @@ def _remark_seats(seated: "list[list[Seat]]") -> None:
 
 def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str) -> "Timeline":
     """What a prompt asks, one segment or several; says so where there are several."""
-    from motionloom.features.layout import FPS, WIDTH
-    from motionloom.goals import timeline
-    from motionloom.tasks.text import frames_in
+    from motionloom.tasks.worded import read
 
-    seconds = SECONDS if arguments.seconds is None else arguments.seconds
-    frames_in(seconds, prior.fps)
-    parted = not arguments.as_one and seconds >= timeline.SHORTEST
-    if not parted or (len(prior.mean), prior.fps) != (WIDTH, FPS):  # other weights make no long motion
-        return timeline.whole(prompt, seconds)
-    found = timeline.timeline_of(prompt, arguments.seconds, amounts=not arguments.literal)
-    read = [f"{amount}, {segment.seconds:g} s" for segment, amount in read_amounts(found)]
-    if read:
+    found = read(
+        prior,
+        prompt,
+        arguments.seconds,
+        parted=not arguments.as_one,
+        amounts=not (arguments.literal or arguments.as_one),
+    )
+    said = [
+        f"{one.amount}, {sum(segment.seconds for segment in found.segments[one.first : one.end]):g} s"
+        for one in found.readings
+    ]
+    if said:
         if arguments.best_of > 1 and len(found.segments) == 1:
             print("motionloom: --best-of is not for numbers that are kept; this is drawn as it comes", file=sys.stderr)
-        print(f"motionloom: read as: {'; '.join(read)}; --literal leaves numbers to the network", file=sys.stderr)
-    if len(found.segments) > 1:
+        print(f"motionloom: read as: {'; '.join(said)}; --literal leaves numbers to the network", file=sys.stderr)
+    if len(found.segments) > 1 and [(one.first, one.end) for one in found.readings] != [(0, len(found.segments))]:
         if arguments.solver is not None:
             fail("--solver is for one action at a time; give --as-one to leave the sentence whole")
         listed = ", ".join(f"'{segment.text}' {segment.seconds:.1f} s" for segment in found.segments)
@@ -217,57 +218,27 @@ def _lines(file: Path) -> list[str]:
     return [line.strip() for line in text.splitlines() if line.strip()]
 
 
-def _drawn(arguments: argparse.Namespace, prior: "Prior", timelines: "list[Timeline]") -> "Iterator[Motion]":
-    """The motions in order, each from its own seed, as they are finished; those of one action are drawn together."""
-    from itertools import groupby
+def _drawn(
+    arguments: argparse.Namespace, prior: "Prior", asked: "list[Timeline]", worded: "list[Worded]"
+) -> "Iterator[Motion]":
+    """The motions in order, each from its own seed, as they are finished; ``worded`` gets them with what was read."""
+    from motionloom.tasks.sampling import Sampling
+    from motionloom.tasks.worded import draw
 
-    from motionloom.tasks.long import compose
-    from motionloom.tasks.splice import concatenated
-    from motionloom.tasks.text import generate_each
-
-    settings = {name: value for name, value in sampling_of(arguments).items() if name not in ("seed", "count")}
-    options: dict[str, Any] = {"foot_lock": arguments.foot_lock, **settings}
-    count = 0
+    sampling = Sampling(**{name: value for name, value in sampling_of(arguments).items() if name != "count"})
     with bar("generating") as progress:
-        for kind, run in groupby(timelines, _way_of_drawing):
-            segments = [timeline.segments for timeline in run]
-            seed = arguments.seed + count
-            count += len(segments)
-            if kind == "free":
-                yield from _in_order(
-                    generate_each(
-                        prior,
-                        [one.text for (one,) in segments],
-                        seconds=[one.seconds for (one,) in segments],
-                        seed=seed,
-                        best_of=arguments.best_of,
-                        progress=progress,
-                        **options,
-                    )
-                )
-                continue
-            for number, several in enumerate(segments):
-                if kind == "goal":
-                    yield controlled(prior, several[0], seed=seed + number, options=options)
-                    progress(seed - arguments.seed + number + 1, len(timelines))
-                    continue
-                yield concatenated(*compose(prior, several, seed=seed + number, **options))
-                progress(seed - arguments.seed + number + 1, len(timelines))
-
-
-def _way_of_drawing(timeline: "Timeline") -> str:
-    """One action as it comes or with a goal, or several."""
-    if len(timeline.segments) > 1:
-        return "several"
-    return "free" if all(one.goal is None for one in timeline.segments) else "goal"
-
-
-def _in_order(made: "Iterator[tuple[int, Motion]]") -> "Iterator[Motion]":
-    """Motions by their numbers, which those of other lengths are made before."""
-    waiting: dict[int, Motion] = {}
-    number = 0
-    for found, motion in made:
-        waiting[found] = motion
-        while number in waiting:
-            yield waiting.pop(number)
-            number += 1
+        made = draw(
+            prior,
+            asked,
+            foot_lock=arguments.foot_lock,
+            best_of=arguments.best_of,
+            sampling=sampling,
+            progress=progress,
+        )
+        for number, one in enumerate(made, start=1):
+            worded.append(one)
+            for amount in one.amounts:
+                if amount.problem:
+                    whose = f"motion {number}: " if len(asked) > 1 else ""
+                    print(f"motionloom: {whose}{amount.problem}", file=sys.stderr)
+            yield one.motion

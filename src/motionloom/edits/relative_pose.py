@@ -125,19 +125,19 @@ class Places:
         crops, lengths = _crops(state[:, 1:], rows.tolist(), [frame for frame in at for _ in (0, 1)])
         asked = Bound._make(one[rows] for one in bound)._replace(lengths=lengths)
         answer, _ = part(net(join(noised, crops), levels, asked))
-        lacking = _lacking(now, code.decode(people(answer))) * weight
-        changed = (self._moved(features, ways, lacking) - prior.mean) / prior.spread
+        change = lacking(now, code.decode(people(answer))) * weight
+        changed = (self._moved(features, ways, change) - prior.mean) / prior.spread
         return join(places, changed.astype(np.float32, copy=False))
 
-    def _moved(self, features: np.ndarray, ways: np.ndarray, lacking: np.ndarray) -> np.ndarray:
-        """Features (rows, frames, 263) with what lacks at the anchors (all anchors, 3): facing, x and z."""
+    def _moved(self, features: np.ndarray, ways: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Features (rows, frames, 263) with a change at the anchors (all anchors, 3) of facing, x and z."""
         made, start = [], 0
         for pair, (some, spread) in enumerate(zip(self.anchors, self.spread, strict=True)):
-            change = spread @ lacking[start : start + len(some)]
+            own = spread @ change[start : start + len(some)]
             start += len(some)
             for person, sign in ((0, -1.0), (1, 1.0)):
                 share = sign * float(self.shares[pair, person])
-                made.append(_along(features[2 * pair + person], ways[pair, person], share * change))
+                made.append(moved_along(features[2 * pair + person], ways[pair, person], share * own))
         return np.stack(made)
 
 
@@ -172,31 +172,34 @@ def _spread(at: Sequence[int], frames: int) -> np.ndarray:
     return positions_at(np.eye(len(at))[..., None], along)[:, 1:, 0].astype(np.float32)
 
 
-def _lacking(now: np.ndarray, asked: np.ndarray) -> np.ndarray:
-    """(rows, 3): what the second person's facing, x and z lack, relative to the first; from poses (rows, 2, 4)."""
+def lacking(now: np.ndarray, asked: np.ndarray, shares: Sequence[float] | np.ndarray = (0.5, 0.5)) -> np.ndarray:
+    """(rows, 3): what the second person's facing, x and z lack, relative to the first; from poses (rows, 2, 4).
+
+    shares: of it that the first and the second person do.
+    """
     first, second = now[:, 0], now[:, 1]
     there = relative(asked[:, 0], asked[:, 1])
     turn = relative(relative(first, second), there)
     angle = np.arctan2(turn[:, 1], turn[:, 0])
-    first, second = _turned(first, -angle / 2), _turned(second, angle / 2)
+    first = on_the_spot(first, -shares[0] * angle)
     line = compose(first, there)[:, 2:] - first[:, 2:]
     return np.concatenate([angle[:, None], line - (second - first)[:, 2:]], axis=1)
 
 
-def _turned(poses: np.ndarray, angle: np.ndarray) -> np.ndarray:
+def on_the_spot(poses: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Ground poses (rows, 4) of people who turn on the spot, in radians (rows,) to their left."""
     c, s = np.cos(angle), np.sin(angle)
     return stack(c * poses[:, 0] - s * poses[:, 1], s * poses[:, 0] + c * poses[:, 1], poses[:, 2], poses[:, 3])
 
 
-def _along(features: np.ndarray, way: np.ndarray, change: np.ndarray) -> np.ndarray:
+def moved_along(features: np.ndarray, way: np.ndarray, change: np.ndarray) -> np.ndarray:
     """Features (frames, 263) of somebody who goes ``way`` (frames, 4), with a change (frames, 3) of facing, x and z."""
     new = features.copy()
     turn, step = change[1:, 0], change[1:, 1:] - change[:-1, 1:]
     new[:-1, 0] -= (change[1:, 0] - change[:-1, 0]) / 2
     # velocities are given in the heading of the frame they lead to
     x, z = _back(features[:-1, 1], features[:-1, 2], np.cos(turn), np.sin(turn))
-    there = _turned(way[1:], turn)
+    there = on_the_spot(way[1:], turn)
     more = _back(step[:, 0], step[:, 1], there[:, 0], there[:, 1])
     new[:-1, 1], new[:-1, 2] = x + more[0], z + more[1]
     return new

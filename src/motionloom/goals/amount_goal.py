@@ -8,6 +8,7 @@ import numpy as np
 from motionloom.goals.amounts import RADIUS, Amount
 from motionloom.goals.goal import FPS, Goal
 from motionloom.goals.paths import check_speed
+from motionloom.kinematics.counts import Counted, count, foot_moves
 from motionloom.motion import ground_pose
 
 BEFORE, AFTER = 0.3, 0.6
@@ -19,11 +20,29 @@ TURNING = 75.0
 SLOWEST = 0.5
 """Share of the pace of the words that a way may be slowed to where more time is asked; beyond it one stands."""
 TURN_OFF, WAY_OFF = 10.0, 0.1
-"""Degrees, and share of a way, by which a motion may miss what was read."""
+"""Degrees (10 of a full turn), and share of a way, by which a motion may miss what was read."""
+
+
+STROKES: dict[Counted, float] = {
+    "jumps": 1.5,
+    "hops": 0.9,
+    "squats": 2.2,
+    "kicks": 1.8,
+    "punches": 1.6,
+    "bows": 2.5,
+    "claps": 0.5,
+    "jumping jacks": 1.0,
+}
+"""Seconds of one stroke; how often they come is measured, and tried again (`motionloom.tasks.worded`)."""
+CHAINED = 1.4
+"""Seconds from which on a stroke is a segment of its own; quicker ones follow each other in one."""
 
 
 def seconds_for(amount: Amount) -> float:
     """How long it takes at the pace of the words, standing before and after."""
+    if amount.kind == "count":
+        assert amount.of is not None
+        return amount.size * STROKES[amount.of] + (0.5 if STROKES[amount.of] < CHAINED else 0.0)
     moving = amount.size / TURNING if amount.kind == "turn" else amount.metres / amount.speed
     return round((BEFORE + moving + RAMP + AFTER) * FPS) / FPS
 
@@ -69,11 +88,18 @@ def _shares(frames: int, seconds: float, natural: float) -> np.ndarray:
     return np.interp(at, fine, way / way[-1])
 
 
-def measured(amount: Amount, positions: np.ndarray) -> float:
-    """Degrees turned to the side that was said, or metres gone from the first frame to the last.
+def measured(amount: Amount, positions: np.ndarray, fps: float = FPS) -> float:
+    """Degrees turned to the side that was said, metres gone, steps, or repetitions.
 
-    positions: (frames, 22, 3) metres in the world. Of an arc the turn is measured.
+    positions: (frames, 22, 3) metres in the world. Of an arc the turn is measured; of steps to a side those of the foot
+    on that side, which the other follows.
     """
+    if amount.kind == "count":
+        assert amount.of is not None
+        return count(amount.of, positions, fps, side=amount.side)
+    if amount.kind == "steps":
+        moves = foot_moves(positions, fps)
+        return moves[("left", "right").index(amount.direction)] if amount.side else sum(moves)
     if amount.kind in ("turn", "arc"):
         facing = np.unwrap([ground_pose(frame).facing for frame in positions])
         against = amount.kind == "arc" and amount.backward
@@ -83,9 +109,8 @@ def measured(amount: Amount, positions: np.ndarray) -> float:
     return float(np.hypot(moved[0], moved[2]))
 
 
-def missed(amount: Amount, positions: np.ndarray) -> str:
-    """A sentence where a motion does not do what was read; empty where it does."""
-    got = measured(amount, positions)
+def kept(amount: Amount, size: float) -> bool:
+    """Whether what was `measured` is what was asked."""
     if amount.kind in ("turn", "arc"):
-        return "" if abs(got - amount.size) <= TURN_OFF else f"{amount} was asked; {got:.0f} degrees are drawn"
-    return "" if abs(got / amount.metres - 1) <= WAY_OFF else f"{amount.metres:.2f} m were asked; {got:.2f} m are drawn"
+        return abs(size - amount.size) <= max(TURN_OFF, amount.size / 36)
+    return size == amount.size if amount.kind != "way" else abs(size / amount.size - 1) <= WAY_OFF

@@ -10,9 +10,11 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
+from motionloom.goals.numerals import NUMBER, in_digits
 from motionloom.goals.verbs import base_of, kind_of_verb
+from motionloom.kinematics.counts import Counted, Side
 
-Kind = Literal["turn", "way", "steps", "arc"]
+Kind = Literal["turn", "way", "steps", "arc", "count"]
 Direction = Literal["forward", "backward", "left", "right"]
 
 MOST_DEGREES = 720.0
@@ -27,17 +29,28 @@ class Amount:
 
     kind: Kind
     size: float
-    """Degrees of a turn or an arc, metres of a way, number of steps."""
+    """Degrees of a turn or an arc, metres of a way, number of steps or repetitions."""
     direction: Direction
-    """Where somebody goes; of turns and arcs the side, left or right."""
+    """Where somebody goes; of turns and arcs the side, left or right; of repetitions the limb's, forward for either."""
     stride: float = 0.0
     """Metres of one step."""
     speed: float = 0.0
     """Metres per second."""
     backward: bool = False
     """Whether an arc is walked backwards."""
+    of: Counted | None = None
+    """What is repeated."""
+
+    @property
+    def unit(self) -> str:
+        """Of what is asked and measured: degrees, m, steps, or what is repeated."""
+        if self.kind == "count":
+            return str(self.of)
+        return {"way": "m", "steps": "steps"}.get(self.kind, "degrees")
 
     def __str__(self) -> str:
+        if self.kind == "count":
+            return f"{self.size:g} {self.of if self.size > 1 else _SINGLE[self.of]}"  # type: ignore[index]
         if self.kind == "turn":
             return f"a turn of {self.size:g} degrees to the {self.direction}"
         if self.kind == "arc":
@@ -47,6 +60,11 @@ class Amount:
         if self.kind == "steps":
             return f"{self.size:g} step{'s' if self.size > 1 else ''} {way}"
         return f"{self.size:g} m {way}"
+
+    @property
+    def side(self) -> Side:
+        """The limb's side of repetitions, the side of steps that go to one; empty for none."""
+        return self.direction if self.direction in ("left", "right") else ""
 
     @property
     def metres(self) -> float:
@@ -61,39 +79,56 @@ class Amount:
 RADIUS = 1.0
 """Metres: of a half circle that is walked where its size is not said."""
 
-_NUMBERS = {
-    word: number
-    for number, word in enumerate(
-        ["one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"], start=1
-    )
-} | {
-    "fifteen": 15,
-    "twenty": 20,
-    "thirty": 30,
-    "forty": 40,
-    "forty-five": 45,
-    "sixty": 60,
-    "ninety": 90,
-    "hundred": 100,
-}
-_NUMBER = r"(\d+(?:\.\d+)?|" + "|".join(sorted(_NUMBERS, key=len, reverse=True)) + ")"
 _UNITS = {"m": 1.0, "meter": 1.0, "metre": 1.0, "cm": 0.01, "centimeter": 0.01, "centimetre": 0.01, "yard": 0.9144}
 _UNITS |= {"foot": 0.3048, "feet": 0.3048, "ft": 0.3048}
 _WAY = re.compile(
-    rf"(?<![^\s(\"'])(?<!\bon )(?<!\bwith ){_NUMBER}[\s-]?(m|cm|ft|feet|foot|(?:centi)?met(?:er|re)s?|yards?)\b"
+    rf"(?<![^\s(\"'])(?<!\bon )(?<!\bwith ){NUMBER}[\s-]?(m|cm|ft|feet|foot|(?:centi)?met(?:er|re)s?|yards?)\b"
     r"(?!\s*(?:tall|high|wide|long|deep|away|apart|from|below|above|of|behind|wall|pole|rope|board|line|race|dash))"
 )
-_DEGREES = re.compile(rf"(?<![^\s(\"']){_NUMBER}[\s-]?(?:degrees?\b|deg\b|°)")
-_PART_OF_TURN = re.compile(r"\b(?:a )?(half|quarter|full|three[- ]quarter)(?: an?)?[ -]turn\b")
-_ARC = re.compile(r"\b(?:in |along )?(?:a |an )?(half|quarter|semi)(?: of a)?[ -]?circles?\b")
+_DEGREES = re.compile(rf"(?<![^\s(\"']){NUMBER}[\s-]?(?:degrees?\b|deg\b|°)")
+_PART_OF_TURN = re.compile(r"\b(0\.5|half|quarter|full|three[- ]quarter)(?: an?)?[ -]turn\b")
+_TURNS_OFTEN = re.compile(rf"\b{NUMBER} (?:full |complete |whole )?(?:turns|spins|pirouettes|rotations)\b")
+_ARC = re.compile(r"\b(?:in |along )?(?:a |an )?(half|quarter|semi|full|complete|whole|0\.5)(?: of a)?[ -]?circles?\b")
+_CIRCLE = re.compile(r"\bin a circle\b")
 _STEPS = re.compile(
-    rf"\b(?:{_NUMBER}|(?:(?<=takes )|(?<=take )|(?<=taking )|(?<=took ))a(?:n)?(?: single)?)"
+    rf"(?<!up )(?<!down )(?:\b{NUMBER}|(?:(?<=takes )|(?<=take )|(?<=taking )|(?<=took ))a(?:n)?(?: single)?)"
     r"(?: (small|tiny|short|baby|little|big|large|long|giant|huge|quick|slow|careful))?(?: (side|backward|forward))?"
     r"[ -]?(?:steps?|paces|strides?|sidesteps?)\b"
 )
 _SECONDS = re.compile(
-    rf"\bfor (?:about |around |exactly )?(?:{_NUMBER}|(half a|an?))[ -]?(s|secs?|seconds?|mins?|minutes?)\b"
+    r"(?<!\bafter )(?<!\bin )(?<!\bwithin )(?<!\bevery )(?<!\blast )(?<!\bfirst )(?<!\bof )"
+    rf"(?<![\w.]){NUMBER}[ -]?(s|secs?|seconds?|mins?|minutes?)\b(?! (?:ago|later|before|after|lap|hand|time))"
 )
+_OFTEN = re.compile(rf"\b(once|twice|thrice|{NUMBER} times?)\b")
+_OFTEN_KEPT = re.compile(
+    r"\b(?:at|more than|once (?:upon|again|more)|all at|for) (?:once|1 time)\b|\bonce (?:upon|again|more)\b"
+)
+_COUNTED: tuple[tuple[str, Counted], ...] = (
+    (r"jumping[ -]?jacks?|star jumps?", "jumping jacks"),
+    (r"jump\w*|leaps?|leaping", "jumps"),
+    (r"hops?|hopping|hopped", "hops"),
+    (r"squat\w*", "squats"),
+    (r"kicks?|kicking|kicked", "kicks"),
+    (r"punch\w*|jabs?|jabbing|strikes? with (?:the|his|her) fist", "punches"),
+    (r"(?<!a )bow(?:s|ing|ed)?(?! tie)", "bows"),
+    (r"claps?|clapping|clapped", "claps"),
+)
+_MANY = re.compile(
+    rf"(?<!number )\b{NUMBER} (?:(?!and\b)[a-z]+ )?"
+    r"(?:jumping[ -]?jacks?|star jumps?|jumps?|leaps?|hops?|squats?|kicks?|punch(?:es)?|jabs?|bows?|claps?)\b"
+)
+MOST_TIMES = 12
+_SINGLE: dict[Counted, str] = {
+    "jumps": "jump",
+    "hops": "hop",
+    "squats": "squat",
+    "kicks": "kick",
+    "punches": "punch",
+    "bows": "bow",
+    "claps": "clap",
+    "jumping jacks": "jumping jack",
+}
+_AGES = re.compile(rf"\b{NUMBER}[ -]?years?(?:[ -]old)?\b|\bof {NUMBER}\b(?! (?:steps|met))")
 _BODY = re.compile(
     r"\b(?:arms?|hands?|heads?|legs?|foot|knees?|wrists?|elbows?|hips?|waist|torso|shoulders?"
     r"|neck|palms?|body|trunk)\b"
@@ -131,12 +166,16 @@ _STEPPING = {"take", "make", "walk", "go", "move", "step", "march", "run", "side
 
 
 def read_amount(text: str) -> Amount | None:
-    """The turn, way, steps or arc that the words of one action ask for in numbers; None where they ask for none.
+    """The turn, way, steps, arc or repetitions that the words of one action ask for in numbers; None without.
 
     text: one action (`motionloom.goals.sequence.split_actions`).
     """
-    said = " ".join(text.lower().replace(",", " ").split())
+    said = in_digits(text)
     verbs = [base for word in re.findall(r"[a-z]+", said) if word != "left" and (base := base_of(word))]
+    if _AGES.search(said):
+        said = _AGES.sub(" ", said)
+    if found := _times(said):
+        return found
     if not verbs or {kind_of_verb(verb, said) for verb in verbs} & {"jump", "fight", "dance"}:
         return None
     return _turn(said, verbs) or _arc(said, verbs) or _steps(said, verbs) or _way(said, verbs)
@@ -144,21 +183,57 @@ def read_amount(text: str) -> Amount | None:
 
 def read_seconds(text: str) -> float | None:
     """The seconds that "for ten seconds", "for half a minute" ask for; None without, and beyond a minute."""
-    found = _SECONDS.search(text.lower())
-    if not found:
+    found = list(_SECONDS.finditer(in_digits(text)))
+    if len(found) != 1:
         return None
-    number = _value(found[1]) if found[1] else 0.5 if found[2] == "half a" else 1.0
-    seconds = number * (60.0 if found[3].startswith("min") else 1.0)
+    seconds = float(found[0][1]) * (60.0 if found[0][2].startswith("min") else 1.0)
     return seconds if 0.2 <= seconds <= MOST_SECONDS else None
+
+
+def once(text: str) -> str:
+    """The words of one stroke of what is counted: "a person jumps" of "a person jumps three times"."""
+    said = in_digits(text, lower=False)
+    less = _OFTEN.sub("", said)
+    if less == said:
+        less = re.sub(rf"\b{NUMBER} (?=(?:[a-z]+ )?[a-z]+)", "", said, count=1)
+    return " ".join(less.split()).strip(" ,")
+
+
+def _times(said: str) -> Amount | None:
+    """Repetitions of one action whose strokes can be counted."""
+    often, many = _OFTEN.findall(_OFTEN_KEPT.sub(" ", said)), list(_MANY.finditer(said))
+    if len(often) + len(many) != 1 or re.search(r"\b(?:while|every|per)\b", said):
+        return None
+    kinds: set[Counted] = {what for words, what in _COUNTED if re.search(rf"\b(?:{words})\b", said)}
+    if "jumping jacks" in kinds:
+        kinds.discard("jumps")
+    if len(kinds) != 1:
+        return None
+    size = float(many[0][1]) if many else _often(*often[0])
+    if size != int(size) or not 1 <= size <= MOST_TIMES:
+        return None
+    side = _side(said)
+    return Amount(
+        "count", size, "left" if side == "left" else "right" if side == "right" else "forward", of=kinds.pop()
+    )
+
+
+def _often(word: str, number: str) -> float:
+    return {"once": 1.0, "twice": 2.0, "thrice": 3.0}.get(word) or float(number)
 
 
 def _turn(said: str, verbs: list[str]) -> Amount | None:
     if not _TURNS & set(verbs) or _BODY.search(said) or set(verbs) & {"throw", "look"}:
         return None
     found, part = list(_DEGREES.finditer(said)), _PART_OF_TURN.search(said)
-    if len(found) > 1 or bool(found) == bool(part):
+    often = _TURNS_OFTEN.search(said) or _OFTEN.search(_OFTEN_KEPT.sub(" ", said))
+    if len(found) > 1 or bool(found) + bool(part) + bool(often) != 1:
         return None
-    degrees = _value(found[0][1]) if found else {"half": 180.0, "quarter": 90.0, "full": 360.0}.get(part[1], 270.0)  # type: ignore[index]
+    if often:
+        degrees = 360.0 * (float(often[1]) if often.re is _TURNS_OFTEN else _often(often[1], often[2]))
+    else:
+        parts = {"half": 180.0, "0.5": 180.0, "quarter": 90.0, "full": 360.0}
+        degrees = float(found[0][1]) if found else parts.get(part[1], 270.0)  # type: ignore[index]
     side = _side(said) or ("left" if degrees % 180 == 0 and not re.search(r"\b(?:left|right)\b", said) else "")
     if not side or not 5 <= degrees <= MOST_DEGREES or set(verbs) & (_GOING - {"step", "back"}):
         return None
@@ -166,11 +241,12 @@ def _turn(said: str, verbs: list[str]) -> Amount | None:
 
 
 def _arc(said: str, verbs: list[str]) -> Amount | None:
-    found, side = _ARC.search(said), _side(said)
+    found, side = _ARC.search(said) or _CIRCLE.search(said), _side(said)
     if not found or not side or not set(verbs) & _GOING or _BODY.search(said):
         return None
     backward = _backward(said)
-    degrees = 90.0 if found[1] == "quarter" else 180.0
+    size = found[1] if found.re is _ARC else "full"
+    degrees = 90.0 if size == "quarter" else 180.0 if size in ("half", "semi", "0.5") else 360.0
     return Amount("arc", degrees, "left" if side == "left" else "right", speed=_pace(said, verbs), backward=backward)
 
 
@@ -179,7 +255,7 @@ def _steps(said: str, verbs: list[str]) -> Amount | None:
     if len(found) != 1 or not set(verbs) & _STEPPING or _ELSE.search(said):
         return None
     size, direction = found[0][2] or "", _direction(said, aside=True)
-    count = _value(found[0][1]) if found[0][1] else 1.0
+    count = float(found[0][1]) if found[0][1] else 1.0
     if direction is None or count != int(count) or not 1 <= count <= MOST_STEPS:
         return None
     stride = {"forward": 0.62, "backward": 0.4}.get(direction, 0.4)
@@ -192,14 +268,14 @@ def _steps(said: str, verbs: list[str]) -> Amount | None:
 
 
 def _way(said: str, verbs: list[str]) -> Amount | None:
-    found, direction = list(_WAY.finditer(said)), _direction(said, aside=False)
+    found, direction = list(_WAY.finditer(said)), _direction(said, aside=bool({"move", "step"} & set(verbs)))
     going = [verb for verb in verbs if verb in _GOING]
     if len(found) != 1 or direction is None or not going or _ELSE.search(said):
         return None
     if set(verbs) - set(going) - {"stop", "halt", "track", "return", "keep", "continue"} - {"open", "place"}:
         return None
     unit = found[0][2]
-    metres = _value(found[0][1]) * _UNITS[unit if unit in _UNITS else unit.removesuffix("s")]
+    metres = float(found[0][1]) * _UNITS[unit if unit in _UNITS else unit.removesuffix("s")]
     if not 0.2 <= metres <= MOST_METRES:
         return None
     return Amount("way", round(metres, 3), direction, speed=_pace(said, verbs))
@@ -244,7 +320,3 @@ def _direction(said: str, *, aside: bool) -> Direction | None:
     if named or (back and re.search(r"\bforwards?\b", said)):
         return None
     return "backward" if back else "forward"
-
-
-def _value(word: str) -> float:
-    return float(_NUMBERS[word]) if word in _NUMBERS else float(word)

@@ -13,6 +13,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from motionloom.goals.amounts import read_amount, read_seconds
 from motionloom.goals.elided import completed
 from motionloom.goals.verbs import (
     MOODS,
@@ -63,7 +64,7 @@ _THEN = re.compile(
     re.IGNORECASE,
 )
 _KEPT = re.compile(
-    r"\b(?:now|every now|first|only|just|since|until|till|by|back|next to|right|what) (?:and )?then\b", re.I
+    r"\b(?:now|every now|first|only|just|since|until|till|by|back|next to|(?<!the )right|what) (?:and )?then\b", re.I
 )
 _JOIN = re.compile(r"(\s*,\s*and\s+|\s*,\s*|\s+and\s+)", re.IGNORECASE)
 _AT_ONCE = re.compile(r"\b(?:while|whilst|as (?:he|she|they|it|if)|at the same time|simultaneously)\b", re.IGNORECASE)
@@ -156,10 +157,8 @@ def lengths(parts: Sequence[Part], seconds: float | None = None, *, fps: float =
 def natural_seconds(text: str) -> float:
     """How long an action takes people, by its kind, its numbers and how quickly it is done; 1.2 to 12 s."""
     said = text.lower()
-    if found := re.search(r"\bfor (\d+(?:\.\d+)?|\w+) (?:seconds?|s)\b", said):
-        number = _count(found[1])
-        if number:
-            return float(min(max(number, SHORTEST), 60.0))
+    if (asked := read_seconds(text)) is not None:
+        return max(asked, SHORTEST)
     kind = next((kind_of_verb(word, said) for word in re.findall(r"[a-z]+", said) if base_of(word)), "other")
     seconds = _SECONDS[kind]
     if found := re.search(r"\b(\w+) (?:small |large |big |slow |quick )?steps\b", said):
@@ -243,7 +242,8 @@ def _list(clause: str) -> list[str]:
     mood = mood_of(tokens[0])
     for join, piece in zip(tokens[1::2], tokens[2::2], strict=True):
         piece = PRONOUN.sub("", piece)
-        if mood and verb_of(piece, mood) and not _is_thing(items[-1], join) and not _belongs(items[-1], join, piece):
+        thing = mood != "base" and _is_thing(items[-1], join)  # "do squats and lunges" has no second verb
+        if mood and verb_of(piece, mood) and not thing and not _belongs(items[-1], join, piece):
             items.append(piece)
             joins.append(join)
         else:
@@ -253,7 +253,9 @@ def _list(clause: str) -> list[str]:
     if len(items) > 2:
         return items
     comma = mood != "gerund" and not re.search(r"\band\b", joins[0], re.IGNORECASE)
-    return items if comma or _follows(kind_of(items[0], mood), kind_of(items[1], mood)) else [clause]
+    kinds = kind_of(items[0], mood), kind_of(items[1], mood)
+    counted = "gesture" not in kinds and any(read_amount(item) for item in items)
+    return items if comma or counted or _follows(*kinds) else [clause]
 
 
 def _follows(first: str, second: str) -> bool:

@@ -18,6 +18,7 @@ from motionloom.goals.lined_file import LinedFile
 from motionloom.io.lined_yaml import MAX_ITEMS, Lined, read_lined
 
 if TYPE_CHECKING:
+    from motionloom.goals.amounts import Amount
     from motionloom.goals.goal import Goal
     from motionloom.goals.segment import Segment
     from motionloom.goals.sequence import Part
@@ -37,6 +38,16 @@ MAX_GOAL_FRAMES = 1_000_000
 FPS = 20.0
 
 
+@dataclass(frozen=True)
+class Reading:
+    """A number that was read in the words."""
+
+    amount: Amount
+    first: int
+    end: int
+    """Half-open range of the segments that do it."""
+
+
 @dataclass(frozen=True, eq=False)
 class Timeline:
     """What `motionloom.tasks.long.compose` is asked, as read from a file."""
@@ -49,6 +60,8 @@ class Timeline:
     """A motion file that the motion goes on from; it is there, and not yet read."""
     path: Goal | None = None
     """Targets for the whole motion in the world, one row per frame."""
+    readings: tuple[Reading, ...] = ()
+    """Numbers in the words of segments, which their goals and lengths come of."""
 
     @property
     def begins(self) -> tuple[int, ...]:
@@ -126,7 +139,7 @@ def timeline_of(text: str, seconds: float | None = None, *, amounts: bool = Fals
 
 def _with_amounts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeline:
     """As long as the numbers in the words need, with their goals; without one as `_of_parts`."""
-    from motionloom.goals.amount_goal import goal_for, seconds_for
+    from motionloom.goals.amount_goal import seconds_for
     from motionloom.goals.amounts import read_amount, read_seconds
 
     read = [read_amount(part.text) for part in parts]
@@ -137,12 +150,34 @@ def _with_amounts(text: str, parts: Sequence[Part], seconds: float | None) -> Ti
     natural = [replace(part, seconds=length or part.seconds) for part, length in zip(parts, own, strict=True)]
     if seconds is None and len(parts) == 1:
         seconds = min(natural[0].seconds, LONGEST)
-    made = _of_parts(text, natural, seconds)
-    segments = [
-        segment if one is None else replace(segment, goal=goal_for(one, segment.seconds))
-        for segment, one in zip(made.segments, found, strict=True)
-    ]
-    return replace(made, segments=tuple(segments))
+    segments, readings = [], []
+    for segment, amount in zip(_of_parts(text, natural, seconds).segments, found, strict=True):
+        several = (segment,) if amount is None else with_amount(segment, amount)
+        if amount is not None:
+            readings.append(Reading(amount, len(segments), len(segments) + len(several)))
+        segments += several
+    return Timeline(tuple(segments), readings=tuple(readings))
+
+
+def with_amount(segment: Segment, amount: Amount, share: float = 1.0) -> tuple[Segment, ...]:
+    """A segment with the goal that an amount in its words is; repetitions of slow strokes as a segment each.
+
+    share: of the way of steps, and of the time of a stroke, where another than the usual comes nearer to the number.
+    """
+    from motionloom.goals.amount_goal import CHAINED, STROKES, goal_for
+    from motionloom.goals.amounts import once
+
+    if amount.kind != "count":
+        asked = replace(amount, stride=amount.stride * share)
+        return (replace(segment, goal=goal_for(asked, segment.seconds)),)
+    assert amount.of is not None
+    text, number = once(segment.text), int(amount.size)
+    stroke, each = STROKES[amount.of] * share, segment.seconds / number
+    if STROKES[amount.of] < CHAINED:
+        return (replace(segment, text=text, seconds=_whole(min(segment.seconds, LONGEST) * share)),)
+    stroke = _whole(min(stroke, each * share))
+    between = min(TRANSITION, segment.transition, stroke / 2)
+    return (replace(segment, text=text, seconds=stroke, transition=between),) * number
 
 
 def _of_parts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeline:
@@ -164,6 +199,11 @@ def _of_parts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeli
             for part, share, overlap in zip(parts, shares, shared, strict=True)
         )
     )
+
+
+def _whole(seconds: float) -> float:
+    """Seconds in whole frames."""
+    return max(1, _frames(seconds)) / FPS
 
 
 def _frames(seconds: float) -> int:

@@ -50,6 +50,8 @@ CAPSULES: tuple[tuple, ...] = (
     ),
 )
 """The body that the project draws (`viz.figure`, `io.body`) as capsules: ends as weighted joints, radii in metres."""
+ARMS = (3, 4, 8, 9)
+"""Numbers of the capsules that are arms; the others are trunk, head and legs."""
 RADII: Array = np.array([capsule[2:] for capsule in CAPSULES])
 """(capsules, 2) metres at both ends, for the uniform person."""
 

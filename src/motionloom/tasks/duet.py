@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.diffusion import lerp
+from motionloom.edits.bodies import Bodies
 from motionloom.edits.relative_pose import PoseGuidance, people, relative_pose_guidance
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
@@ -221,7 +222,7 @@ def duet_features(
     result.
     """
     chosen = PairSampling.of(sampling, settings)
-    denoise = _PairDenoiser(prior, net, chosen.levels(prior.schedule), chosen.pair_guidance)
+    denoise = _PairDenoiser(prior, net, chosen.levels(prior.schedule), chosen.pair_guidance, chosen.bodies)
     both = (chain_rows(prior, one, chosen.guidance, None) for one in segments)
     rows = denoise.rows(zip(*both, strict=True), segments, chosen.seeds(1)[0])
     made = sample_chain(
@@ -264,6 +265,7 @@ class _PairRow:
     net: PairSession
     """With the segment's adapters."""
     guidance: PoseGuidance
+    bodies: Bodies | None
     before: "_PairRow | None"
     """The row before, as long as this one is under way."""
     noise: np.ndarray | None = None
@@ -290,6 +292,7 @@ class _PairDenoiser:
     net: PairSession
     levels: Sequence[int]
     pair_guidance: float
+    bodies: bool
 
     def rows(
         self, both: Iterable[tuple[Row, ...]], segments: Sequence[Sequence[Segment]], seed: int
@@ -300,16 +303,18 @@ class _PairDenoiser:
             goals = [one[number].goal for one in segments]
             net = self._net(both_of[0].net, before)
             mask = np.zeros((2, 1 + both_of[0].length, WIDTH), np.bool_)
+            frozen = [goal is not None and not goal.empty for goal in goals]
             guidance = relative_pose_guidance(
                 self.prior,
                 net,
                 bound_together([one.cond for one in both_of]),
                 seeds=person_seeds(seed + number, 0),
                 mask=mask,
-                frozen=[goal is not None and not goal.empty for goal in goals],
+                frozen=frozen,
                 weight=self.pair_guidance,
             )
-            before = _PairRow(both_of, net, guidance, before)
+            bodies = replace(Bodies.of(mask, frozen), still=int(before is not None))
+            before = _PairRow(both_of, net, guidance, bodies if self.bodies and not net.silent else None, before)
             yield before
 
     def __call__(self, rows: Sequence[_PairRow], states: Sequence[np.ndarray], at: Sequence[int]) -> list[np.ndarray]:
@@ -327,6 +332,8 @@ class _PairDenoiser:
             motion = np.stack([person.correct(part_of, level) for part_of, person in each])
             begin = self._begin_or(places, row, level)
             motion = self._moved(row, level, motion, begin, state=state)
+            if row.bodies:
+                motion, places, begin = row.bodies.edit(self.prior, self.net.places, motion, places, begin, level=level)
             made.append(_strung(motion, places))
             features = motion * self.prior.std + self.prior.mean
             row.ends[level] = two.later(features, begin, row.length - max(row.overlap, 1))

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.diffusion import Denoiser, NoiseSource, row_noise, row_seed
+from motionloom.edits.bodies import Bodies
 from motionloom.edits.fitting import fit
+from motionloom.edits.meeting import Meeting, met
 from motionloom.edits.relative_pose import people, relative_pose_guidance
 from motionloom.edits.steering import Correction, corrected_rows, toward
 from motionloom.errors import MotionloomError
@@ -20,13 +22,14 @@ from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
 from motionloom.features.layout import FPS, LAYOUT, WIDTH
 from motionloom.features.pair import one_world, together
+from motionloom.goals.contact import read_contact
 from motionloom.goals.goal import Goal, start_of
 from motionloom.goals.segment import LONGEST
 from motionloom.ground import GroundPose, compose, relative
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
 from motionloom.retarget.anatomy import read_body
-from motionloom.runtime.pair import PairSession, join, part
+from motionloom.runtime.pair import PLACE, PairSession, join, part
 from motionloom.tasks.control import moved
 from motionloom.tasks.long import Past, lengthened
 from motionloom.tasks.sampling import (
@@ -74,6 +77,8 @@ class PairEdits:
     """What each row's denoised motion (frames, 263), standardised, goes through, as of `steering`."""
     frozen: Sequence[bool] | None = None
     """Whose motion is not moved by pair guidance; those that are corrected, unless said otherwise."""
+    meetings: Sequence[Meeting | None] | None = None
+    """How the two of each pair touch."""
 
 
 def pair_features(
@@ -110,12 +115,20 @@ def pair_features(
         )
     shape = rows, 1 + frames, len(prior.mean)
     mask = np.broadcast_to(False if given.observed is None else given.observed.mask, shape)
+    meetings = given.meetings or [None] * (rows // 2)
+    bodies = [Bodies.of(mask[2 * i : 2 * i + 2], frozen[2 * i : 2 * i + 2], one) for i, one in enumerate(meetings)]
 
     def corrected(state: np.ndarray, batch: Sequence[int], level: int) -> np.ndarray:
         some = [changes[i] for i in batch]
         if not any(some):
             return state
         return np.concatenate([state[:, :1], corrected_rows(state[:, 1:], some, level)], axis=1)
+
+    def two_bodies(state: np.ndarray, batch: list[int], level: int) -> np.ndarray:
+        if not chosen.bodies or net.silent:
+            return state
+        made = _two_bodies(prior, net, [bodies[row // 2] for row in batch[::2]], state, level)
+        return np.where(mask[batch], state, made)
 
     def edit(denoise: Denoiser, batch: Batch) -> Denoiser:
         guided = relative_pose_guidance(
@@ -127,7 +140,12 @@ def pair_features(
             frozen=[frozen[i] for i in batch.rows],
             weight=chosen.pair_guidance,
         )
-        return lambda state, level: guided(state, corrected(denoise(state, level), batch.rows, level), level)
+
+        def changed(state: np.ndarray, level: int) -> np.ndarray:
+            led = guided(state, corrected(denoise(state, level), batch.rows, level), level)
+            return two_bodies(led, batch.rows, level)
+
+        return changed
 
     silent = not any(prompt.strip() for prompt in prompts)
     how = replace(chosen, batch_size=2 * chosen.batch(PAIRS), guidance=1.0 if silent else chosen.guidance)
@@ -141,8 +159,17 @@ def pair_features(
         state = np.concatenate([state[:, :1], smooth(state[:, 1:])], axis=1)
     if given.observed is not None:
         state = np.where(mask, given.observed.values, state)
-    places, motion = part(corrected(state, range(rows), 0))
+    places, motion = part(two_bodies(corrected(state, range(rows), 0), list(range(rows)), 0))
     return people(motion * prior.std + prior.mean), net.places.decode(people(places))
+
+
+def _two_bodies(prior: Prior, net: PairSession, bodies: list[Bodies], state: np.ndarray, level: int) -> np.ndarray:
+    """Denoised states (2 * pairs, 1 + frames, 263), those of each pair changed as `Bodies.edit` does."""
+    places, motion = (people(each).copy() for each in part(state))
+    for i, one in enumerate(bodies):
+        poses = net.places.decode(places[i])
+        motion[i], places[i], _ = one.edit(prior, net.places, motion[i], places[i], poses, level=level)
+    return join(places.reshape(-1, PLACE), motion.reshape(-1, *motion.shape[2:]))
 
 
 def _view(prior: Prior, net: PairSession) -> View:
@@ -246,26 +273,27 @@ def generate_pair(
     change: list[Correction | None] = [None, None]
     if goal:
         change[person] = toward(goal.seen_from(place), prior)
-    count = chosen.number()
+    count, contact = chosen.number(), read_contact(said) if chosen.bodies else None
+    meetings = [Meeting(contact) if contact else None for _ in range(count)]
     features, poses = pair_features(
         prior,
         block.net(prior),
         said * count,
         frames,
         seeds=pair_seeds(chosen),
-        edits=PairEdits(corrections=change * count),
+        edits=PairEdits(corrections=change * count, meetings=meetings),
         sampling=chosen,
         progress=progress,
     )
     made = []
-    for numbers, beside in zip(features, poses.astype(np.float64), strict=True):
+    for numbers, beside, meeting in zip(features, poses.astype(np.float64), meetings, strict=True):
         if goal:
             beside = poses_at(beside, place, person)
         people = [finish(prior, one, foot_lock=foot_lock) for one in numbers]
         duet = [moved(one, GroundPose.of_numbers(pose)) for one, pose in zip(people, beside, strict=True)]
         if goal:
             duet[person] = fit(duet[person], goal)
-        made.append((duet[0], duet[1]))
+        made.append(met(duet, meeting, goals) if chosen.bodies else (duet[0], duet[1]))
     return made
 
 

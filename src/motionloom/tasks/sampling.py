@@ -69,6 +69,7 @@ class PairSettings(Settings, total=False):
     """The same for two people."""
 
     pair_guidance: float
+    bodies: bool
 
 
 @dataclass(frozen=True)
@@ -191,6 +192,8 @@ class PairSampling(Sampling):
     pair_guidance: float = 1.0
     """How far every denoised estimate of the two is moved to the relative pose that the block estimates, 0 (not at all;
     as published) to 1."""
+    bodies: bool = True
+    """Whether bodies are kept out of each other, and hands that the words say meet are brought together."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -95,7 +95,8 @@ def generate(
     prior: Prior,
     prompts: Sequence[str] | str,
     *,
-    seconds: float | Sequence[float] = 5.0,
+    seconds: float | Sequence[float] | None = None,
+    literal: bool = False,
     foot_lock: bool = True,
     best_of: int = 1,
     sampling: Sampling | None = None,
@@ -107,7 +108,10 @@ def generate(
     Args:
         prior: the weights, from `Prior.load`.
         prompts: what the person does, one text or several.
-        seconds: length, one for all or one per prompt; at the prior's frame rate (20 per second; BABEL's 30).
+        seconds: length, one for all or one per prompt, at the prior's frame rate (20 per second; BABEL's 30); None:
+            what numbers in the words need, or 5.
+        literal: leave numbers in the words to the network. Otherwise "3 meters", "turns left 90 degrees", "jumps twice"
+            are kept; `tasks.worded.generate_worded` says what was read and what was drawn of it.
         foot_lock: keep planted feet still, and feet above the floor.
         best_of: 1 to 16; so many seeds are sampled half way for each motion, and the one nearest to what the words
             usually look like is kept (`tasks.best`): more often what was said, less varied; 4 take two to three times
@@ -122,17 +126,20 @@ def generate(
     Raises:
         MotionloomError: for what cannot be asked.
     """
-    made = generate_each(
+    from motionloom.tasks.worded import generate_worded  # which draws with what is here
+
+    made = generate_worded(
         prior,
         prompts,
         seconds=seconds,
+        literal=literal,
         foot_lock=foot_lock,
         best_of=best_of,
         sampling=sampling,
         progress=progress,
         **settings,
     )
-    return [motion for _, motion in sorted(made, key=lambda numbered: numbered[0])]
+    return [one.motion for one in made]
 
 
 def generate_each(
@@ -146,7 +153,7 @@ def generate_each(
     progress: Progress | None = None,
     **settings: Unpack[Settings],
 ) -> Iterator[tuple[int, Motion]]:
-    """The motions of `generate`, each with its number as soon as it is finished; arguments and errors as there.
+    """Motions of the words as they are, each with its number as soon as it is finished; else as of `generate`.
 
     Those of equal length come in order, a batch at a time.
     """

@@ -1,0 +1,69 @@
+"""Two bodies: how the denoised estimates of a pair are changed, so that people meet and are not in each other."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from motionloom.edits.apart import kept_apart
+from motionloom.edits.meeting import Meeting
+from motionloom.edits.pair_motion import PairMotion
+from motionloom.edits.steering import toward
+from motionloom.features.pair import PlaceCode
+from motionloom.goals.goal import Goal
+from motionloom.ground import GroundPose
+from motionloom.weights.prior import Prior
+
+SURE = 0.8
+"""The noise of a level above which nothing is moved: where the two are is not decided."""
+
+
+@dataclass(eq=False)
+class Bodies:
+    """How the estimates of one pair are changed: their hands meet where something says so, and they are kept apart."""
+
+    free: tuple[bool, bool]
+    """Who may be moved as a whole."""
+    bends: tuple[bool, bool]
+    """Whose limbs may be moved."""
+    still: int = 0
+    """Frames in which both stay where they are."""
+    meeting: Meeting | None = None
+
+    @staticmethod
+    def of(mask: np.ndarray, frozen: Sequence[bool], meeting: Meeting | None = None) -> "Bodies":
+        """mask: (2, 1 + frames, 263) True where the state is known; frozen: who is not moved as a whole."""
+        known = np.asarray(mask[:, 1:, :3].all(axis=-1))
+        still = int(known.all(axis=0).cumprod().sum()) or int(mask[:, 0].any())
+        bends = not known[0].all(), not known[1].all()
+        free = bends[0] and not frozen[0], bends[1] and not frozen[1]
+        if meeting:
+            meeting.free, meeting.still = bends, still
+        return Bodies(free, bends, still, meeting if any(bends) else None)
+
+    def edit(
+        self, prior: Prior, code: PlaceCode, motion: np.ndarray, places: np.ndarray, poses: np.ndarray, *, level: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A denoised motion (2, frames, 263), standardised, its D (2, 4) and ground poses (2, 4), changed."""
+        if prior.schedule.at(level)[1] > SURE:
+            return motion, places, poses
+        free = np.array(self.free, dtype=np.float64)
+        shares = free / free.sum().clip(1.0)
+        pair = PairMotion(motion.astype(np.float64) * prior.spread + prior.mean, np.asarray(poses, dtype=np.float64))
+        made = pair
+        if self.meeting:
+            self.meeting.look(pair.places())
+            made = self.meeting.near(made, shares)
+        made = kept_apart(made, shares, still=self.still)
+        if made is not pair:
+            # the difference: what is not sure yet is near 0, and must not become sure by this
+            places = (places + code.encode(made.poses) - code.encode(pair.poses)).astype(places.dtype)
+            motion = ((made.features - prior.mean) / prior.spread).astype(motion.dtype)
+        if self.meeting:
+            goals = self.meeting.goals(made.places())
+            motion = np.stack([self._reaching(prior, motion[i], goals[i], made.poses[i], level) for i in (0, 1)])
+        return motion, places, made.poses
+
+    def _reaching(self, prior: Prior, motion: np.ndarray, goal: Goal, pose: np.ndarray, level: int) -> np.ndarray:
+        """One person's motion (frames, 263), standardised, with limbs that reach for a goal in the world."""
+        return toward(goal.seen_from(GroundPose.of_numbers(pose)), prior)(motion, level)

@@ -1,0 +1,204 @@
+"""Two people who are sampled meet: they come near each other, and their hands to one place.
+
+What the words ask (`goals.contact`) has no time and no place. Both are found in the first estimate that is sure enough:
+the frame in which what shall meet is nearest already. From then on every estimate is changed: the relative pose so that
+both reach, then the arms, as any other goal does (`steering`). What is left is fitted when all is sampled (`met`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom.blending import smoothstep
+from motionloom.edits.fitting import fit
+from motionloom.edits.pair_motion import PairMotion
+from motionloom.edits.relative_pose import lacking
+from motionloom.goals.contact import CHEST, RIGHT, Contact, Touch
+from motionloom.goals.goal import Goal, overlaid
+from motionloom.ground import relative, turned
+from motionloom.kinematics.capsules import ARMS, CAPSULES, RADII, capsule_ends, closest
+from motionloom.motion import Motion, heading
+
+Array = NDArray[np.float64]
+
+MIDDLE = (0.25, 0.75)
+"""Shares of the length between which people meet."""
+LATE = 0.1
+"""Metres that being at the end of that stretch, instead of in the middle, counts like."""
+GAP = 0.04
+"""Metres between two wrists that touch."""
+ASIDE = 0.12
+"""Metres on the ground, from the middle between two people, within which their hands meet."""
+
+
+@dataclass(eq=False)
+class Meeting:
+    """Where in time two people touch, and how; found once."""
+
+    contact: Contact
+    free: tuple[bool, bool] = (True, True)
+    """Who goes there."""
+    still: int = 0
+    """Frames that stay as they are."""
+    frame: int | None = None
+    """The middle of the touch."""
+    way: tuple[Touch, ...] = ()
+
+    def look(self, places: Array) -> None:
+        """Find the frame and the way: those in which what meets is nearest; places (2, frames, 22, 3) metres."""
+        if self.frame is not None:
+            return
+        frames = places.shape[1]
+        first, last = (self.still + round(share * (frames - self.still)) for share in MIDDLE)
+        at = np.arange(first, max(last, first + 1))
+        late = LATE * np.abs(np.linspace(-1.0, 1.0, len(at)))
+        ways = self.contact.ways
+        far = [sum(self._distance(places[:, at], touch) for touch in way) / len(way) + late for way in ways]
+        chosen = int(np.argmin([one.min() for one in far]))
+        self.way, self.frame = ways[chosen], int(at[far[chosen].argmin()])
+
+    def _distance(self, places: Array, touch: Touch) -> Array:
+        ends = places[touch.person, :, touch.joint], places[1 - touch.person, :, touch.other]
+        return np.linalg.norm(ends[0] - ends[1], axis=-1)
+
+    def near(self, pair: PairMotion, shares: Array) -> PairMotion:
+        """The pair, as near to each other and turned as it takes; (2,) shares of the way, of sum 1 or 0."""
+        if self.frame is None or not shares.any():
+            return pair
+        now = pair.ways()[:, self.frame]
+        there = relative(now[0], now[1])
+        asked = np.stack([[1.0, 0.0, 0.0, 0.0], self._there(there)])
+        change = lacking(now[None], asked[None], shares)[0]
+        frames = pair.features.shape[1]
+        share = np.ones(frames)
+        if self.still:
+            share = smoothstep((np.arange(frames) - self.still + 1) / max(self.frame - self.still, 1))
+        return pair.changed(share[:, None] * change, shares)
+
+    def _there(self, there: Array) -> Array:
+        """The second person's ground pose as the first sees it, (4,), changed as little as it takes."""
+        c, s, x, z = there
+        distance = float(np.hypot(x, z))
+        wanted = float(np.clip(distance, *self.contact.apart))
+        if self.contact.turn == "facing":
+            return np.array([-1.0, 0.0, 0.0, wanted])
+        if self.contact.turn == "beside":
+            side = -1.0 if self.way[0].joint == RIGHT else 1.0
+            return np.array([1.0, 0.0, side * wanted, 0.0])
+        scale = wanted / max(distance, 1e-6)
+        return np.array([c, s, x * scale, z * scale])
+
+    def goals(self, places: Array) -> tuple[Goal, Goal]:
+        """What each is asked, in the world of places (2, frames, 22, 3) metres."""
+        frames = places.shape[1]
+        goals = Goal.nothing(frames), Goal.nothing(frames)
+        if self.frame is None:
+            return goals
+        half = max(round(self.contact.seconds * 10), 1)
+        at = np.arange(max(self.frame - half, self.still), min(self.frame + half + 1, frames))
+        for touch in self.way:
+            if touch.beside is not None:
+                other = places[1 - touch.person, at]
+                beside = np.broadcast_to(touch.beside, (len(at), 3))
+                place = other[:, touch.other] + turned(beside, heading(other))
+                _ask(goals[touch.person], at, touch.joint, place)
+                continue
+            ends = places[0, at, touch.joint], places[1, at, touch.other]
+            point, across = self._point(places[:, at], ends)
+            _ask(goals[0], at, touch.joint, point - GAP / 2 * across)
+            _ask(goals[1], at, touch.other, point + GAP / 2 * across)
+        return goals
+
+    def _point(self, places: Array, ends: tuple[Array, Array]) -> tuple[Array, Array]:
+        """(frames, 3) where two hands meet, and the unit vectors from one to the other."""
+        between = places[:, :, CHEST].mean(axis=0)
+        line = (places[1, :, CHEST] - places[0, :, CHEST]) * [1.0, 0.0, 1.0]
+        across = line / np.linalg.norm(line, axis=-1, keepdims=True).clip(1e-6)
+        if not all(self.free):  # whoever is not moved holds the hand there
+            fixed, sign = (ends[0], 1.0) if not self.free[0] else (ends[1], -1.0)
+            return fixed + sign * GAP / 2 * across, across
+        aside = ((ends[0] + ends[1]) / 2 - between).mean(axis=0)
+        aside[1] = 0.0
+        aside *= min(1.0, ASIDE / max(float(np.linalg.norm(aside)), 1e-9))
+        height = np.clip((ends[0] + ends[1])[:, 1].mean() / 2, *self.contact.height)
+        point = between + aside
+        point[:, 1] = height
+        return point, across
+
+
+def _ask(goal: Goal, at: NDArray[np.intp], joint: int, places: Array) -> None:
+    goal.positions[at, joint], goal.asked[at, joint] = places, True
+
+
+# What is left when all is sampled
+
+
+ROUNDS = 3
+"""How often people are fitted to each other: each moves a little when the other does."""
+DEEP = 0.01
+"""Metres of an arm in somebody's body that stay."""
+EVEN = 5
+"""Frames over which the way out of a body is averaged."""
+_CORE = [number for number in range(len(CAPSULES)) if number not in ARMS]
+
+
+def met(people: Sequence[Motion], meeting: Meeting | None, also: Sequence[Goal | None]) -> tuple[Motion, Motion]:
+    """Two people of the 22-joint skeleton at 20 frames per second in one world, fitted to each other.
+
+    What meets is brought together, and arms come out of the other's body. also: what else each of them is asked.
+    """
+    made = list(people)
+    for _ in range(ROUNDS):
+        places = np.stack([motion.positions() for motion in made])
+        asked = meeting.goals(places) if meeting else [Goal.nothing(places.shape[1])] * 2
+        goals = [overlaid(asked[i], arms_out(places[i], places[1 - i])) for i in (0, 1)]
+        if all(goal.empty for goal in goals):
+            break
+        goals = [
+            goal if goal.empty or own is None else overlaid(own, goal) for goal, own in zip(goals, also, strict=True)
+        ]
+        made = [fit(motion, goal) for motion, goal in zip(made, goals, strict=True)]
+    return made[0], made[1]
+
+
+def arms_out(own: Array, other: Array) -> Goal:
+    """Where elbows and wrists of ``own`` must be so that no arm is in the body of ``other``; (frames, 22, 3) metres."""
+    frames = len(own)
+    goal = Goal.nothing(frames)
+    arms, core = capsule_ends(own)[:, list(ARMS)], capsule_ends(other)[:, _CORE]
+    s, t, apart = closest(arms[:, :, None], core[:, None])
+    thick = [r[..., 0] + at * (r[..., 1] - r[..., 0]) for r, at in ((RADII[list(ARMS)][:, None], s), (RADII[_CORE], t))]
+    deep = thick[0] + thick[1] - apart
+    worst = deep.argmax(axis=-1)
+    for number, arm in enumerate(ARMS):
+        depth = np.take_along_axis(deep[:, number], worst[:, number, None], axis=-1)[:, 0]
+        inside = depth > DEEP
+        if not inside.any():
+            continue
+        pick = np.arange(frames), worst[:, number]
+        here = _at(arms[:, number], s[:, number][pick])
+        there = _at(core[pick], t[:, number][pick])
+        away = (here - there) / np.maximum(apart[:, number][pick], 1e-6)[:, None]
+        push = _even(np.where(inside[:, None], depth[:, None] * away, 0.0))
+        for end, weight in zip(CAPSULES[arm][:2], (s[:, number][pick] < 0.9, s[:, number][pick] > 0.1), strict=True):
+            joint = end[0][0]
+            at = np.flatnonzero(inside & weight)
+            if joint in _BENDING:
+                _ask(goal, at, joint, own[at, joint] + push[at])
+    return goal
+
+
+_BENDING = [joint for number in ARMS for joint, _ in CAPSULES[number][1]]
+"""Elbows and wrists."""
+
+
+def _at(ends: Array, share: Array) -> Array:
+    """(frames, 3) on line segments (frames, 2, 3)."""
+    return ends[:, 0] + share[:, None] * (ends[:, 1] - ends[:, 0])
+
+
+def _even(values: Array) -> Array:
+    padded = np.pad(values, ((EVEN // 2, EVEN // 2), (0, 0)), mode="edge")
+    return np.stack([np.convolve(column, np.ones(EVEN) / EVEN, "valid") for column in padded.T], axis=-1)

@@ -1,0 +1,130 @@
+"""Words that bring two people's hands together: "shake hands", "high five", "hold hands", "hug", "push".
+
+Plain text work by a table. What is read says which joints meet, how near and how turned the two are then, and how high
+and for how long; when, and where in the world, is found in what is sampled (`motionloom.edits.meeting`).
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from motionloom.skeleton import SMPL22
+
+Turn = Literal["facing", "beside", "any"]
+LEFT, RIGHT, CHEST = SMPL22.index("left_wrist"), SMPL22.index("right_wrist"), SMPL22.index("spine3")
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A joint of one person that comes to something of the other's."""
+
+    person: int
+    """Whose joint it is, 0 or 1."""
+    joint: int
+    other: int
+    """The other person's joint."""
+    beside: tuple[float, float, float] | None = None
+    """Metres from it, as the other is turned (+X left, +Z ahead), where the joint comes to, and the other stays; None:
+    the two joints come to one place between the people."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """How two people touch."""
+
+    name: str
+    ways: tuple[tuple[Touch, ...], ...]
+    """Sets of touches; of several the nearest is taken."""
+    apart: tuple[float, float]
+    """Metres between the pelvises then: at least, at most."""
+    turn: Turn = "facing"
+    height: tuple[float, float] = (0.9, 1.2)
+    """Metres above the floor between which hands meet."""
+    seconds: float = 0.4
+    """How long."""
+
+    def __str__(self) -> str:
+        """What was read."""
+        how = {"facing": "facing each other", "beside": "side by side", "any": "as they are"}[self.turn]
+        return f"read as: the two {self.name}, {how}, for {self.seconds:g} s"
+
+
+def _hands(*pairs: tuple[int, int]) -> tuple[Touch, ...]:
+    return tuple(Touch(0, first, second) for first, second in pairs)
+
+
+_ANY = tuple(_hands(pair) for pair in ((LEFT, RIGHT), (RIGHT, LEFT), (RIGHT, RIGHT), (LEFT, LEFT)))
+_ARMS_AROUND = tuple(
+    Touch(person, joint, CHEST, place)
+    for person in (0, 1)
+    for joint, place in ((LEFT, (-0.06, 0.02, -0.11)), (RIGHT, (0.06, -0.18, -0.11)))
+)
+"""One arm above the other's, one below: so they do not cross."""
+_AGAINST = tuple(
+    Touch(0, joint, CHEST, place) for joint, place in ((LEFT, (-0.13, 0.06, 0.1)), (RIGHT, (0.13, 0.06, 0.1)))
+)
+_EACH_OTHER = (
+    r"(?:each other|one another|the (?:other|second|first)|another|a second|(?:the|his|her|their) partner|him|her)"
+)
+_CONTACTS = (
+    (
+        r"shak(?:e|es|ing) (?:each other'?s |right )?hands?|hand ?shakes?",
+        Contact("shake hands", (_hands((RIGHT, RIGHT)),), (0.62, 0.78), height=(0.98, 1.12), seconds=1.2),
+    ),
+    (
+        r"high[- ]tens?|double high[- ]fives?",
+        Contact(
+            "give a high ten", (_hands((RIGHT, LEFT), (LEFT, RIGHT)),), (0.5, 0.7), height=(1.4, 1.55), seconds=0.2
+        ),
+    ),
+    (
+        r"high[- ]?fives?|highfiv(?:e|es|ing)",
+        Contact("give a high five", (_hands((RIGHT, RIGHT)),), (0.5, 0.7), height=(1.4, 1.55), seconds=0.2),
+    ),
+    (
+        r"fist[- ]?bump(?:s|ing)?|bump(?:s|ing)? fists",
+        Contact("bump fists", (_hands((RIGHT, RIGHT)),), (0.65, 0.85), height=(1.1, 1.25), seconds=0.2),
+    ),
+    (
+        r"hugs?|hugging|embrac(?:e|es|ing)",
+        Contact("hug", (_ARMS_AROUND,), (0.2, 0.26), seconds=1.6),
+    ),
+    (
+        rf"(?:push|shov)(?:es|e|ing)? {_EACH_OTHER}",
+        Contact("touch, the first pushing", (_AGAINST,), (0.42, 0.55), seconds=0.3),
+    ),
+    (
+        r"(?:hold|tak|join)(?:s|ing|es|e)? (?:each other'?s )?hands|hand in hand",
+        Contact("hold hands", _ANY, (0.4, 0.7), "any", (0.75, 1.0), seconds=3.0),
+    ),
+    (
+        r"danc(?:e|es|ing) (?:\w+ )?(?:together|with each other|with one another)",
+        Contact("hold hands", _ANY, (0.4, 0.85), "any", (0.95, 1.25), seconds=1.0),
+    ),
+)
+_NOT = re.compile(r"(?:without|not|never|n't|refus\w+ to|before|instead of)(?: \w+)? $")
+_BESIDE = re.compile(r"\b(?:side by side|beside|walk|walks|walking|stroll|strolls|strolling)\b")
+
+
+def read_contact(prompts: Sequence[str]) -> Contact | None:
+    """How two people touch, by what each of them is asked to do (two texts, which may be one); None where nothing is
+    said of it."""
+    for person, prompt in enumerate(prompts):
+        said = " ".join(prompt.lower().replace(",", " ").split())
+        for pattern, contact in _CONTACTS:
+            found = re.search(rf"\b(?:{pattern})\b", said)
+            if found is None or _NOT.search(said[: found.start()]):
+                continue
+            if contact.turn == "any" and _BESIDE.search(said):
+                contact = replace(contact, turn="beside")
+            return _exchanged(contact) if person else contact
+    return None
+
+
+def _exchanged(contact: Contact) -> Contact:
+    """The same with the two people exchanged, where one alone reaches for the other."""
+    if any(touch.beside is None or touch.person for way in contact.ways for touch in way):
+        return contact
+    ways = tuple(tuple(replace(touch, person=1) for touch in way) for way in contact.ways)
+    return replace(contact, ways=ways, name=contact.name.replace("first", "second"))

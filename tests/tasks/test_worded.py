@@ -1,0 +1,68 @@
+"""Sentences with numbers: drawn again until the count is right, the same from Python as from the command line."""
+
+import numpy as np
+import pytest
+
+from motionloom.errors import MotionloomError
+from motionloom.motion import Motion
+from motionloom.tasks import worded
+from motionloom.tasks.sampling import Sampling
+from motionloom.tasks.text import generate
+from motionloom.weights.prior import Prior
+from tests.nets import tiny
+
+
+@pytest.fixture(scope="module")
+def prior() -> Prior:
+    return tiny.prior()
+
+
+def test_it_is_drawn_again_until_the_number_is_right(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first drawing that has it is kept; the strokes get shorter where there were too many; the seeds differ."""
+    counts, drawn = iter([4, 3, 2, 9]), []
+
+    def draw_one(_: Prior, asked, sampling: Sampling, __: bool) -> Motion:
+        drawn.append((asked.seconds, sampling.seed))
+        return generate(prior, "a person stands", seconds=1.0, steps=1)[0]
+
+    monkeypatch.setattr(worded, "_drawn", draw_one)
+    monkeypatch.setattr(worded, "measured", lambda *_: next(counts))
+    asked = worded.read(prior, "a person jumps twice")
+    (made,) = worded.draw(prior, [asked], sampling=Sampling(seed=5))
+    assert [one.measured for one in made.amounts] == [2]
+    assert made.amounts[0].kept
+    assert not made.amounts[0].problem
+    assert len({seed for _, seed in drawn}) == 3
+    assert drawn[0][1] == 5
+    assert drawn[0][0] > drawn[1][0] > drawn[2][0]
+
+
+def test_the_nearest_is_kept_and_told(prior: Prior, monkeypatch: pytest.MonkeyPatch) -> None:
+    counts = iter([7, 1, 4, 4, 5, 6])
+    still = generate(prior, "a person stands", seconds=1.0, steps=1)[0]
+    monkeypatch.setattr(worded, "_drawn", lambda *_: still)
+    monkeypatch.setattr(worded, "measured", lambda *_: next(counts))
+    (made,) = worded.draw(prior, [worded.read(prior, "a person jumps three times")])
+    assert made.amounts[0].measured == 4
+    assert made.amounts[0].problem == "3 jumps asked; 4 jumps drawn"
+
+
+def test_python_reads_numbers_and_can_leave_them(prior: Prior) -> None:
+    few = {"steps": 2, "seed": 3}
+    turn, plain = generate(prior, ["turn left 90 degrees", "a person walks"], **few)
+    (said,) = worded.generate_worded(prior, "turn left 90 degrees", **few)
+    assert np.array_equal(turn.rotations, said.motion.rotations)
+    assert [one.read for one in said.amounts] == ["a turn of 90 degrees to the left"]
+    assert turn.seconds == pytest.approx(2.5)
+    assert plain.seconds == pytest.approx(5.0)
+    (literal,) = generate(prior, "turn left 90 degrees", literal=True, **few)
+    assert literal.seconds == pytest.approx(5.0)
+    (way,) = worded.generate_worded(prior, "a person walks 2 meters, then waves", **few)
+    assert [segment.text for segment in way.timeline.segments] == ["a person walks 2 meters", "a person waves"]
+    (whole,) = worded.generate_worded(prior, "a person walks, then waves", **few)
+    assert len(whole.timeline.segments) == 1
+
+
+def test_another_solver_draws_one_action(prior: Prior) -> None:
+    with pytest.raises(MotionloomError, match="solver ddpm"):
+        generate(prior, "a person does three squats", solver="ddim", steps=2)
