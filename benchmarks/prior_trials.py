@@ -26,7 +26,7 @@ from motionloom.data import sets
 from motionloom.data.sets import Batches, MotionSet, load_set
 from motionloom.diffusion import SCHEDULES
 from motionloom.diffusion.bases import Dct
-from motionloom.lab.metrics.everyday.sets import chosen
+from motionloom.lab.metrics.obedience import chosen
 from motionloom.lab.suites import obey
 from motionloom.lab.suites.generator import generator
 from motionloom.lab.suites.harness import Run

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from motionloom.data.sets import read_clips
 from motionloom.goals.sequence import split_actions
-from motionloom.lab.metrics.everyday.sets import EVERYDAY, in_words
+from motionloom.lab.metrics.obedience import EVERYDAY, in_words
 from motionloom.runtime.text.known import nearest
 from motionloom.weights.prior import Prior
 

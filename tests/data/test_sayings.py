@@ -9,7 +9,7 @@ from motionloom.data.clips import Note
 from motionloom.data.made import GESTURES
 from motionloom.data.sayings import sayings, table
 from motionloom.data.words import LABELS
-from motionloom.lab.metrics.everyday.sets import SETS
+from motionloom.lab.metrics.obedience import SETS
 
 
 def test_every_entry_is_of_an_action_a_gesture_or_a_label() -> None:

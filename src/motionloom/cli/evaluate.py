@@ -158,7 +158,7 @@ def _settings(arguments: argparse.Namespace) -> dict:
 def _obedience(arguments: argparse.Namespace) -> None:
     import json
 
-    from motionloom.lab.metrics.everyday.sets import chosen, in_words
+    from motionloom.lab.metrics.obedience import chosen, in_words
     from motionloom.lab.report import files
     from motionloom.lab.suites import everyday, obey
     from motionloom.lab.suites.reference import known

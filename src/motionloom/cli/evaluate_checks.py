@@ -23,14 +23,13 @@ def add(subparsers) -> None:
 
 def _checks(arguments: argparse.Namespace) -> None:
     from motionloom.errors import MotionloomError
-    from motionloom.lab.metrics.everyday.check import Everyday
-    from motionloom.lab.metrics.everyday.sets import chosen
+    from motionloom.lab.metrics.obedience import chosen
     from motionloom.lab.report import files
     from motionloom.lab.suites import trial
     from motionloom.lab.suites.clips import real_clips
     from motionloom.lab.suites.trial_clips import trials
 
-    checks = [check for check in chosen("everyday", arguments.only) if isinstance(check, Everyday)]
+    checks = [check for check in chosen("everyday", arguments.only) if check.theme]
     if not checks:
         raise MotionloomError("only everyday checks are tried here; 'motionloom evaluate reference' tries the others")
     if arguments.out:

@@ -10,7 +10,7 @@ from motionloom.errors import MotionloomError
 from motionloom.goals.english import is_english
 from motionloom.kinematics.physics import J
 from motionloom.lab.metrics.everyday.body import Body, times
-from motionloom.lab.metrics.everyday.sets import EVERYDAY, SETS, THEMES, chosen
+from motionloom.lab.metrics.obedience import EVERYDAY, SETS, THEMES, chosen
 from motionloom.skeleton import SMPL22
 from tests.kinematics.people import FPS, jumping, moved, spun, standing, walking
 

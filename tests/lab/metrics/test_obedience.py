@@ -27,13 +27,13 @@ def test_every_bound_is_of_a_known_number_with_a_reason(one) -> None:
 
 
 def test_bounds_include_their_ends_and_say_what_they_want() -> None:
-    both = Bound("turn", "a reason in words", low=45.0, high=300.0)
+    both = Bound("turn", 45.0, 300.0, "a reason in words")
     assert both.holds({"turn": 45.0})
     assert both.holds({"turn": 300.0})
     assert not both.holds({"turn": 44.9})
     assert not both.holds({"turn": float("nan")})
     assert both.wanted() == "turn >= 45 and <= 300"
-    assert Bound("turn", "a reason in words", high=3.0).wanted() == "turn <= 3"
+    assert Bound("turn", high=3.0).wanted() == "turn <= 3"
 
 
 @pytest.mark.parametrize(

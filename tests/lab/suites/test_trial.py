@@ -9,7 +9,7 @@ from motionloom.data.build import clips_of
 from motionloom.data.sources import find_takes
 from motionloom.features import humanml
 from motionloom.kinematics import physics as ph
-from motionloom.lab.metrics.everyday.sets import EVERYDAY
+from motionloom.lab.metrics.obedience import EVERYDAY
 from motionloom.lab.suites import trial
 from motionloom.lab.suites.clips import RealClip
 from motionloom.lab.suites.trial import Trial

@@ -12,7 +12,8 @@ from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Caption, Evaluator
 from motionloom.lab.metrics.actions import measure
 from motionloom.lab.metrics.obedience import CHECKS, Check
-from motionloom.lab.report.report import Column, Report, Row, Value
+from motionloom.lab.report.columns import columns
+from motionloom.lab.report.report import Report, Row, Value
 from motionloom.tasks.text import sample_features
 from motionloom.weights.prior import Prior
 
@@ -22,12 +23,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "guidance 0": {"guidance": 0.0},
 }
 """Ways to sample of clearly different obedience."""
-COLUMNS = (
-    Column("obeyed", "obeyed", "up", "share of motions that do what their prompt says, by physics", share=True),
-    Column("nearness", "nearness", "up", "2 minus the distance of a motion to its prompt, mean"),
-    Column("top1", "R@1", "up", "share of motions whose own prompt is the nearest of all prompts", share=True),
-    Column("auc", "AUC", "up", "chance that an obeying motion is nearer than a disobeying one of the same prompt"),
-)
+COLUMNS = columns("agreement")
 
 
 @dataclass(frozen=True, eq=False)

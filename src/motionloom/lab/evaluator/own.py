@@ -26,7 +26,8 @@ from motionloom.lab.evaluator.net import Embedder, is_embedder, load_embedder
 from motionloom.lab.evaluator.pairs import TIMED, backwards
 from motionloom.lab.metrics.frechet import fid, fid_bias
 from motionloom.lab.metrics.retrieval import matching_distance, r_precision
-from motionloom.lab.report.report import Column, Report, Row, Value
+from motionloom.lab.report.columns import columns
+from motionloom.lab.report.report import Report, Row, Value
 from motionloom.train.prior import text_encoder
 
 SHIPPED = "evaluator"
@@ -41,17 +42,7 @@ NOISE = (0.005, 0.01, 0.02, 0.04, 0.08)
 SHARES = (0.25, 0.5, 0.75, 1.0)
 SPEEDS = (0.5, 0.71, 1.41, 2.0)
 
-COLUMNS = (
-    Column("top1", "R@1", "up", "share of captions whose own motion is the nearest of 32"),
-    Column("top2", "R@2", "up", "among the nearest two of 32"),
-    Column("top3", "R@3", "up", "among the nearest three of 32"),
-    Column("rank", "median rank", "down", "place of the own motion among all, 1 is best", 1),
-    Column("distance", "MM-Dist", "down", "distance of a caption to its own motion, 0 to 2"),
-    Column("fid", "FID", "down", "Fréchet distance to the undamaged windows (unit vectors: small numbers)", 4),
-    Column(
-        "noticed", "noticed", "up", "share of captions nearer to the undamaged motion than to the damaged", share=True
-    ),
-)
+COLUMNS = columns("evaluator")
 
 
 @dataclass(frozen=True)

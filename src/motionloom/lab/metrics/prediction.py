@@ -216,38 +216,12 @@ def _count(frames: int) -> int:
 # ---- all of it
 
 
-class Metric(NamedTuple):
-    """A number of `WindowScores` and how it is written."""
-
-    name: str
-    label: str
-    unit: str
-    better: Literal["up", "down", "real"]
-    """Which way is good; ``real``: near the value of real motion."""
-
-
-METRICS: tuple[Metric, ...] = (
-    Metric("apd", "APD", "m", "real"),
-    Metric("ade", "ADE", "m", "down"),
-    Metric("fde", "FDE", "m", "down"),
-    Metric("mmade", "MMADE", "m", "down"),
-    Metric("mmfde", "MMFDE", "m", "down"),
-    Metric("apde", "APDE", "m", "down"),
-    Metric("ade_median", "ADE-M", "m", "down"),
-    Metric("ade_worst", "ADE-W", "m", "down"),
-    Metric("stretch", "limb stretch", "%", "down"),
-    Metric("stretch_rmse", "limb stretch RMSE", "%", "down"),
-    Metric("jitter", "limb jitter", "%", "down"),
-    Metric("jitter_rmse", "limb jitter RMSE", "%", "down"),
-    Metric("mae", "MAE", "degrees", "down"),
-    Metric("jerk", "jerk", "m/s^3", "real"),
-    Metric("jerk_peak", "peak jerk", "m/s^3", "real"),
-    Metric("seam_velocity", "jump of velocity at the seam", "m/s", "real"),
-    Metric("seam_velocity_worst", "of the worst joint", "m/s", "real"),
-    Metric("seam_acceleration", "jump of acceleration at the seam", "m/s^2", "real"),
-    Metric("seam_acceleration_worst", "of the worst joint", "m/s^2", "real"),
+METRICS = (
+    *("apd", "ade", "fde", "mmade", "mmfde", "apde", "ade_median", "ade_worst"),
+    *("stretch", "stretch_rmse", "jitter", "jitter_rmse", "mae", "jerk", "jerk_peak"),
+    *("seam_velocity", "seam_velocity_worst", "seam_acceleration", "seam_acceleration_worst"),
 )
-"""In the order of tables; CMD is apart, for it is not a mean of windows (`Tally.cmd`)."""
+"""Numbers of `WindowScores` in the order of tables; CMD is apart, for it is not a mean of windows (`Tally.cmd`)."""
 MULTIMODAL = ("mmade", "mmfde", "apde")
 """Metrics that ``skip_multimodal`` leaves out for windows with a single future."""
 
@@ -356,19 +330,15 @@ class Tally:
             return
         self.cmd.add_speeds(name, scores.speeds)
         for metric in METRICS:
-            value: float | None = getattr(scores, metric.name)
-            if value is None or (alone and self.singles == "skip_multimodal" and metric.name in MULTIMODAL):
+            value: float | None = getattr(scores, metric)
+            if value is None or (alone and self.singles == "skip_multimodal" and metric in MULTIMODAL):
                 continue
-            self._sums[metric.name] = self._sums.get(metric.name, 0.0) + value
-            self._counts[metric.name] = self._counts.get(metric.name, 0) + 1
+            self._sums[metric] = self._sums.get(metric, 0.0) + value
+            self._counts[metric] = self._counts.get(metric, 0) + 1
 
     def averages(self) -> dict[str, Average]:
         """By name of `METRICS`, in that order; metrics that were measured on no window are absent."""
-        return {
-            m.name: Average(self._sums[m.name] / self._counts[m.name], self._counts[m.name])
-            for m in METRICS
-            if m.name in self._counts
-        }
+        return {m: Average(self._sums[m] / self._counts[m], self._counts[m]) for m in METRICS if m in self._counts}
 
 
 def averages(scores: Iterable[WindowScores], singles: Singles = "all") -> dict[str, Average]:

@@ -27,7 +27,8 @@ from motionloom.lab.metrics.frechet import fid, fid_bias
 from motionloom.lab.metrics.retrieval import r_precision
 from motionloom.lab.metrics.skate import skate
 from motionloom.lab.report import published_rows
-from motionloom.lab.report.report import REAL, Column, Report
+from motionloom.lab.report.columns import columns
+from motionloom.lab.report.report import REAL, Report
 from motionloom.lab.suites import control_kinds, text_reference
 from motionloom.lab.suites.control_kinds import Kind, Target
 from motionloom.lab.suites.control_methods import BASE, METHODS, OURS, Made, Maker, Sampling, checked, fits, maker
@@ -49,42 +50,7 @@ RATIOS = {
 SEEN = {"skate_share": 0.1, "skate_speed": 0.1, "skate_slide": 0.01, "jerk": 0.1}
 """Of uncontrolled motions: what is smaller is nothing, and nothing is held against it."""
 
-COLUMNS: tuple[Column, ...] = (
-    Column("r3", "R@3", "up", "share of captions whose own motion is among the three nearest of its batch"),
-    Column("fid", "FID", "down", "Fréchet distance of the motion embeddings to those of all real motions", 3),
-    Column("diversity", "Diversity", "real", "mean distance of random pairs of motions, at most 300"),
-    Column("root_error", "root cm", "down", "pelvis to the asked place on the ground, mean over asked frames", 2),
-    Column("joint_error", "joints cm", "down", "joints to the asked place in the world, mean over asked frames", 2),
-    Column("worst", "worst cm", "down", "the largest of both", 1),
-    Column("beyond_20", "beyond 20 cm", "down", "location failure: share of asked joint-frames more than 20 cm off"),
-    Column("beyond_50", "beyond 50 cm", "down", "location failure: share of asked joint-frames more than 50 cm off"),
-    Column(
-        "root_sequences",
-        "root failed",
-        "down",
-        "trajectory failure: share of motions whose pelvis is anywhere more than 50 cm off",
-    ),
-    Column("joint_sequences", "joints failed", "down", "the same for the other joints"),
-    Column("facing", "facing °", "down", "between the ways the body and the real one face, where it is asked", 1),
-    Column(
-        "feature_error",
-        "features",
-        "down",
-        "controlled numbers of the representation from the real ones, mean in "
-        "standard deviations; ways that write them have 0, and what they miss in the world is decoding drift",
-        3,
-    ),
-    Column("skate_share", "skate %", "down", "frames in which a toe below 5 cm moves more than 2.5 cm (GMD)", 2),
-    Column("skate_speed", "skate cm/s", "down", "mean speed of the toes below 5 cm (Kimodo)", 2),
-    Column("skate_slide", "skate mm/frame", "down", "step of a toe at contact (Motius)", 2),
-    Column("jerk", "jerk m/s³", "real", "third derivative of the joints' places, mean", 1),
-    Column("penetration", "penetration cm", "down", "the lowest joint under the floor, mean over frames", 2),
-    Column("share_ratio", "skate % ×", "down", "against the uncontrolled row of the same finish", 2),
-    Column("speed_ratio", "skate cm/s ×", "down", "against the uncontrolled row of the same finish", 2),
-    Column("slide_ratio", "skate mm/frame ×", "down", "against the uncontrolled row of the same finish", 2),
-    Column("jerk_ratio", "jerk ×", "down", "against the uncontrolled row of the same finish", 2),
-    Column("seconds", "s per motion", "", "wall time from the goal to the motion, on the machine that measured", 2),
-)
+COLUMNS = columns("control")
 
 
 @dataclass(frozen=True, eq=False)

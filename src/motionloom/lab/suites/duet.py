@@ -18,8 +18,9 @@ from motionloom.errors import MotionloomError
 from motionloom.kinematics.physics import Array, foot_skate
 from motionloom.lab.metrics import pair as mp
 from motionloom.lab.papers.mrt import MrtFile
+from motionloom.lab.report.columns import columns
 from motionloom.lab.report.published_rows import published
-from motionloom.lab.report.report import REAL, Column, Report, Row, Value
+from motionloom.lab.report.report import REAL, Report, Row, Value
 from motionloom.lab.suites import duet_blocks
 from motionloom.lab.suites import duet_ways as ways
 from motionloom.lab.suites.duet_blocks import Beside
@@ -45,18 +46,7 @@ ZERO, CONSTANT, SILENT, ALONE, MRT = (
     "communication only",
     "multi-range transformer",
 )
-COLUMNS = (
-    *(Column(f"root_{k}", f"root m, {k} s", "down", f"distance of the roots, first {k} s") for k in mp.HORIZONS),
-    *(
-        Column(f"joint_{k}", f"joints m, {k} s", "down", f"the same of joints, each from its root, first {k} s")
-        for k in mp.HORIZONS
-    ),
-    Column("speed", "m/s", "real", "how fast the joints go, mean: a completion that stands still has small errors"),
-    Column("hand_contact", "hands", "real", "share of frames with a wrist nearer than 25 cm to one of the other"),
-    Column("penetration", "inside cm", "down", "deepest overlap of the two bodies (capsules), mean over frames", 2),
-    Column("skate", "skate cm/s", "real", "speed of toes below 5 cm (Kimodo), mean of both", 1),
-    Column("seconds", "s per crop", "", "wall time of one completion, on the machine that measured", 3),
-)
+COLUMNS = columns("duet-completion")
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from motionloom.ground import GroundPose
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics import pair as mp
-from motionloom.lab.report.report import Column, Report, Value
+from motionloom.lab.report.columns import columns
+from motionloom.lab.report.report import Report, Value
 from motionloom.lab.suites import duet_text as judged
 from motionloom.lab.suites.duet import HELD_OUT
 from motionloom.lab.suites.duet_text import KINDS, NOTES, How, Make, Table
@@ -27,13 +28,7 @@ from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
 QUICK = judged.QUICK
-COLUMNS = (
-    *judged.COLUMNS,
-    *(
-        Column(f"root_{k}", f"root m, at {k} s", "down", f"from the partner's root to the real partner's after {k} s")
-        for k in mp.HORIZONS
-    ),
-)
+COLUMNS = (*judged.COLUMNS, *columns("duet-answers"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from motionloom.ground import GroundPose
 from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics import pair as mp
 from motionloom.lab.metrics import pair_groups as groups
+from motionloom.lab.report.columns import columns
 from motionloom.lab.report.report import REAL, Column, Report, Row, Value
 from motionloom.lab.suites.duet import HELD_OUT, chosen_block
 from motionloom.lab.suites.duet_ways import no_communication_net
@@ -56,36 +57,7 @@ _STATS = {
     "skate_slide": ("skate_slide", 1.0),
 }
 """Columns out of `PairStats`: which number, and times what."""
-COLUMNS = (
-    Column("distance", "apart m", "real", "from pelvis to pelvis on the ground"),
-    Column("looking_away", "away °", "real", "how far each is turned from the direction to the other", 1),
-    Column("hand_contact", "hands", "real", "share of frames with a wrist nearer than 25 cm to one of the other"),
-    *(
-        Column(
-            f"ratio_{name}",
-            f"{said}, x spread",
-            "down",
-            f"{said}: distance of the distributions over frames from real ones, over that of a real recording from "
-            "the others; partners stay below 1.5",
-        )
-        for name, said in (("distance", "apart"), ("looking_away", "away"), ("hand_contact", "hands"))
-    ),
-    Column("within", "within 1.5", "up", "how many of the three are within 1.5 times of the real spread", 2, True),
-    Column("touch", "touch", "real", "share of frames with a wrist nearer than 10 cm to the body of the other"),
-    Column("penetration", "inside cm", "down", "deepest overlap of the two bodies (capsules), mean over frames", 2),
-    Column("synchrony", "synchrony", "real", "correlation of the root speeds of the two"),
-    Column(
-        "over_strangers",
-        "over strangers",
-        "up",
-        "synchrony less that of everybody with everybody else's partner, in standard deviations of the latter",
-        2,
-    ),
-    Column("skate_share", "skate %", "real", "frames in which a toe below 5 cm moves more than 2.5 cm (GMD)", 1),
-    Column("skate_speed", "skate cm/s", "real", "speed of toes below 5 cm (Kimodo)", 1),
-    Column("skate_slide", "skate mm/frame", "real", "step of toes at contact (Motius)", 2),
-    Column("seconds", "s per duet", "", "wall time of one duet, on the machine that measured", 2),
-)
+COLUMNS = columns("duet-text")
 
 
 @dataclass(frozen=True)

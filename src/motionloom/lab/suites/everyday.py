@@ -6,7 +6,7 @@ from pathlib import Path
 from motionloom.io.atomic import with_folders
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.kinematics.physics import Array
-from motionloom.lab.metrics.everyday.sets import THEMES
+from motionloom.lab.metrics.obedience import THEMES, Check
 from motionloom.lab.suites import obey
 from motionloom.lab.suites.harness import Generate
 from motionloom.viz import draw
@@ -43,7 +43,7 @@ class FirstDraws:
             self._kept.setdefault(prompts[0], (motions[0], fps))
         return motions, fps
 
-    def draw(self, checks: Sequence[obey.Judge], path: Path, *, seed: int) -> Path:
+    def draw(self, checks: Sequence[Check], path: Path, *, seed: int) -> Path:
         """A picture of the first draw of every check: six poses, the prompt, green where it obeys and red where not.
 
         What was not generated here (a run that went on from files) is generated now, from ``seed``.

@@ -12,7 +12,6 @@ from typing import Any
 
 from motionloom.errors import MotionloomError
 from motionloom.io.text import plain_json
-from motionloom.lab.metrics.everyday.check import Everyday
 from motionloom.lab.metrics.obedience import CHECKS, Check
 from motionloom.lab.report.files import check_report, write_json
 from motionloom.lab.suites.generator import generator
@@ -24,8 +23,6 @@ ENOUGH = 0.9
 """Share of seeds that must obey for a prompt to count as obeyed."""
 MOSTLY = 0.7
 """Share of seeds that must obey for a prompt to count as mostly obeyed."""
-Judge = Check | Everyday
-"""What has a prompt and limits, of either set."""
 _LARGEST = 64 << 20
 """Bytes of the attempts that a stopped run kept."""
 
@@ -53,7 +50,7 @@ class Result:
         return tuple(a for a in self.attempts if a.prompt == prompt)
 
 
-def attempts(check: Judge, generate: Generate, prompt: str, *, seeds: int, first_seed: int) -> list[Attempt]:
+def attempts(check: Check, generate: Generate, prompt: str, *, seeds: int, first_seed: int) -> list[Attempt]:
     """Generate one prompt on seeds ``first_seed`` to ``first_seed + seeds - 1`` and judge it."""
     motions, fps = generate([prompt] * seeds, seconds=check.seconds, seed=first_seed)
     if len(motions) != seeds:
@@ -70,7 +67,7 @@ def attempts(check: Judge, generate: Generate, prompt: str, *, seeds: int, first
 
 def run(
     run: Run,
-    checks: Sequence[Judge] = CHECKS,
+    checks: Sequence[Check] = CHECKS,
     *,
     generate: Generate | None = None,
     seeds: int = 10,
@@ -109,13 +106,13 @@ def run(
     return _results(checks, done)
 
 
-def fingerprint(checks: Sequence[Judge]) -> str:
+def fingerprint(checks: Sequence[Check]) -> str:
     """Changes whenever a prompt or a bound changes: results of other checks are not mixed in."""
     said = repr([(c.name, c.seconds, [(b.measure, b.low, b.high) for b in c.bounds]) for c in checks])
     return hashlib.sha256(said.encode()).hexdigest()[:16]
 
 
-def _results(checks: Sequence[Judge], done: dict[str, list[Attempt]]) -> list[Result]:
+def _results(checks: Sequence[Check], done: dict[str, list[Attempt]]) -> list[Result]:
     return [Result(check.name, tuple(done[check.name])) for check in checks if check.name in done]
 
 
@@ -138,7 +135,7 @@ def _attempt(found: dict[str, Any]) -> Attempt:
     return Attempt(str(found["prompt"]), int(found["seed"]), bool(found["obeyed"]), measured)
 
 
-def summary(results: Sequence[Result], checks: Sequence[Judge] = CHECKS, *, settings: dict[str, Any]) -> dict[str, Any]:
+def summary(results: Sequence[Result], checks: Sequence[Check] = CHECKS, *, settings: dict[str, Any]) -> dict[str, Any]:
     """Everything as plain data for JSON."""
     by_name = {check.name: check for check in checks}
     listed = []
@@ -160,7 +157,7 @@ def summary(results: Sequence[Result], checks: Sequence[Judge] = CHECKS, *, sett
     return {"settings": settings, "totals": totals(results, checks), "checks": listed}
 
 
-def totals(results: Sequence[Result], checks: Sequence[Judge] = CHECKS) -> dict[str, float]:
+def totals(results: Sequence[Result], checks: Sequence[Check] = CHECKS) -> dict[str, float]:
     """Share of seeds that obey, prompts obeyed and mostly obeyed, and the share for the other wordings."""
     prompts = {check.name: check.prompt for check in checks}
     own = [r.of(prompts[r.name]) for r in results]
@@ -187,7 +184,7 @@ def _enough(rows: Sequence[Sequence[Attempt]], share: float) -> int:
 
 
 def table(
-    results: Sequence[Result], checks: Sequence[Judge] = CHECKS, *, real: dict[str, Any] | None = None
+    results: Sequence[Result], checks: Sequence[Check] = CHECKS, *, real: dict[str, Any] | None = None
 ) -> list[list[str]]:
     """Rows of text, the heading first: prompt, seeds, other wordings, real clips, seconds, the bounds with the median
     seen. Without ``real``, columns that are empty in every row are left out."""

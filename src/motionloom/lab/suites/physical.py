@@ -12,6 +12,7 @@ from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics.obedience import CHECKS, Check
 from motionloom.lab.metrics.realism import NUMBERS, average, speed_distance
 from motionloom.lab.metrics.realism import realism as numbers_of
+from motionloom.lab.report.columns import columns
 from motionloom.lab.report.report import REAL, Column, Report, Row, Value
 from motionloom.lab.suites import obey, realism
 from motionloom.lab.suites.clips import real_clips
@@ -38,14 +39,11 @@ def obedience_report(
     total = _shares([a for a in every if a.prompt in prompts], [a for a in every if a.prompt not in prompts])
     found = obey.totals(results, checks)
     note = f"{found['prompts_obeyed']} of {found['prompts']} prompts are obeyed on {obey.ENOUGH:.0%} of their seeds."
-    columns = (
-        Column("obeyed", "obeyed", "up", "share of seeds on which every bound of the check holds", 2, True),
-        Column("reworded", "in other words", "up", "the same for the same prompt in other words", 2, True),
-        Column("real", "real clips", "", "share of real clips of that action which pass the same check", 2, True),
-    )
     protocol = {"checks": obey.fingerprint(checks), **settings}
     title = "Obedience: does it do what the words say"
-    return Report("obedience", title, command, protocol, columns, (Row("all prompts", total), *rows), (note,))
+    return Report(
+        "obedience", title, command, protocol, columns("obedience"), (Row("all prompts", total), *rows), (note,)
+    )
 
 
 def _share(passed: int, tried: int) -> Value:
@@ -83,7 +81,7 @@ def realism_report(
     protocol: Mapping[str, Any],
 ) -> Report:
     """A row of real motion (clips at 20 frames per second, or finished averages) and one per group of motions."""
-    columns = [
+    shown = [
         Column(n.name, n.name.replace("_", " "), "real" if n.both_ways else "down", n.meaning, _digits(n.unseen))
         for n in NUMBERS
     ]
@@ -93,7 +91,7 @@ def realism_report(
     else:
         rows.append(Row(REAL, realism_value(real, FPS)))
         meaning = "m/s, Wasserstein-1 distance of the pelvis speeds of all frames to the real ones"
-        columns.append(Column("speed_distance", "speed distance", "down", meaning, 3))
+        shown.append(Column("speed_distance", "speed distance", "down", meaning, 3))
     for name, clips in made.items():
         values = realism_value(clips, fps)
         if not isinstance(real, Mapping) and fps == FPS:
@@ -104,7 +102,7 @@ def realism_report(
         "Intervals are 1.96 standard errors by the bootstrap over clips; the count is the number of clips.",
     )
     title = "Realism: does it move like real people"
-    return Report("realism", title, command, protocol, tuple(columns), tuple(rows), notes)
+    return Report("realism", title, command, protocol, tuple(shown), tuple(rows), notes)
 
 
 def _digits(unseen: float) -> int:
@@ -125,16 +123,16 @@ def realism_orders(data: Path | None, count: int) -> tuple[list[realism.Order], 
 def speed_report(found: Mapping[str, Any], *, command: str) -> Report:
     """`motionloom bench`'s numbers as a report of one row, each number with its target."""
     machine = {name: value for name, value in found["machine"].items() if name != "load"}
-    columns, values = [], {}
+    shown, values = [], {}
     for k, entry in enumerate(found["entries"]):
         name = "".join(c if c.isalnum() else "_" for c in entry["name"]).strip("_") or f"entry_{k}"
         better = "down" if "<" in entry["target"] else "up"
         digits = 0 if abs(entry["value"]) >= 100 else 1 if abs(entry["value"]) >= 10 else 3
-        columns.append(Column(name, f"{entry['name']}, {entry['unit']}", better, f"target {entry['target']}", digits))
+        shown.append(Column(name, f"{entry['name']}, {entry['unit']}", better, f"target {entry['target']}", digits))
         values[name] = Value(entry["value"])
     notes = [f"{entry['name']}: {entry['note']}" for entry in found["entries"] if entry["note"]]
     if found["machine"]["load"] > 0.5:
         notes.append(f"The machine was busy when this began (load {found['machine']['load']}).")
     protocol = {"machine": machine, "repeats": "few" if found["quick"] else "full"}
     title = "Speed: time and memory as ratios within one run"
-    return Report("speed", title, command, protocol, tuple(columns), (Row("this machine", values),), tuple(notes))
+    return Report("speed", title, command, protocol, tuple(shown), (Row("this machine", values),), tuple(notes))

@@ -14,13 +14,14 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.lab.metrics import prediction as metrics
-from motionloom.lab.metrics.prediction import METRICS, Singles
+from motionloom.lab.metrics.prediction import Singles
 from motionloom.lab.papers.humanmac import published_futures
 from motionloom.lab.report import report as reports
+from motionloom.lab.report.columns import columns
 from motionloom.lab.report.published_rows import published
-from motionloom.lab.report.report import REAL, SAME, Column, Report, Row, Value
+from motionloom.lab.report.report import REAL, SAME, Report, Row
 from motionloom.lab.suites import prediction_trial as trials
-from motionloom.lab.suites.harness import Run, check_names, check_steps, digest
+from motionloom.lab.suites.harness import Run, check_names, check_steps, digest, row_of
 from motionloom.lab.suites.prediction_trial import Array, Trial, Way
 from motionloom.tasks.completion import SOLVER, SPACING, STEPS, futures
 from motionloom.weights.predictor import Predictor, find_predictor
@@ -28,53 +29,7 @@ from motionloom.weights.predictor import Predictor, find_predictor
 ZERO, CONSTANT = "zero velocity", "constant velocity"
 KINDS = ("real", "zero", "constant", "ours", "ours-many", "published")
 """Rows of the table."""
-SHOWN = (
-    "apd",
-    "ade",
-    "fde",
-    "mmade",
-    "mmfde",
-    "cmd",
-    "apde",
-    "mae",
-    "stretch",
-    "jitter",
-    "jerk",
-    "seam_velocity",
-    "seam_acceleration",
-    "root_ade",
-    "root_fde",
-    "seconds",
-)
-MEANINGS = {
-    "apd": "variety: mean distance of two futures of one past; of the real row: of the futures of similar pasts",
-    "ade": "mean distance of the flattened pose from what came, of the nearest future",
-    "fde": "the same in the last frame",
-    "mmade": "ADE against every future of a similar past, mean",
-    "mmfde": "FDE against every future of a similar past, mean",
-    "apde": "how far the variety is from that of real futures, windows with more than one",
-    "mae": "error of the angles between limbs, of the nearest future",
-    "stretch": "limbs longer or shorter than the real ones, mean",
-    "jitter": "change of limb length from frame to frame, mean",
-    "jerk": "third derivative of the joints' places from the root, mean",
-    "seam_velocity": "largest jump of velocity where the future sets in, mean over joints",
-    "seam_acceleration": "largest jump of acceleration there, mean over joints",
-}
-FURTHER = (
-    Column("cmd", "CMD m", "down", "motion that dies down or grows lively: mean speed per frame against its class's"),
-    Column("root_ade", "root ADE m", "down", "mean distance of the root's way through the world, nearest future", 3),
-    Column("root_fde", "root FDE m", "down", "the same in the last frame", 3),
-    Column("seconds", "s per past", "", "wall time of all futures of one past, on the machine that measured", 3),
-)
-SHORT = {
-    "seam_velocity": "seam m/s",
-    "seam_acceleration": "seam m/s²",
-    "jerk": "jerk m/s³",
-    "stretch": "stretch %",
-    "jitter": "jitter %",
-    "mae": "MAE °",
-    "apd": "APD",
-}
+COLUMNS = columns("prediction")
 WHOLE = {"h36m": ("Human3.6M", 5168), "humaneva": ("HumanEva-I", None), "amass": ("AMASS", 12727)}
 """Data sets whose published figures share our data if all of it is there: their names there and test windows."""
 
@@ -178,28 +133,17 @@ def measure(
                 )
 
             numbers.append(parts.once(f"{title} {k}", scored))
-        rows.append(Row(title, {c: Value.of([n[c] for n in numbers]) for c in SHOWN if c in numbers[0]}))
-    shown = columns()
-    others = _published(trial, how, [c.name for c in shown]) if with_published else ()
+        rows.append(row_of(title, numbers, COLUMNS))
+    others = _published(trial, how, [c.name for c in COLUMNS]) if with_published else ()
     return Report(
         "prediction",
         "Prediction: many futures of what was seen",
         run.command,
         said,
-        shown,
+        COLUMNS,
         (*rows, *others),
         _notes(trial),
     )
-
-
-def columns() -> tuple[Column, ...]:
-    """Of the table, in order."""
-    by_name = {c.name: c for c in FURTHER}
-    for m in METRICS:
-        if m.name in SHOWN:
-            said, digits = f"{MEANINGS[m.name]} ({m.unit})", 1 if m.name == "jerk" else 3
-            by_name[m.name] = Column(m.name, SHORT.get(m.name, m.label), m.better, said, digits)
-    return tuple(by_name[name] for name in SHOWN)
 
 
 def drawn(

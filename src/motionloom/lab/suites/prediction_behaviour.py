@@ -18,6 +18,7 @@ from motionloom.kinematics import physics
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.lab.metrics import prediction as metrics
 from motionloom.lab.metrics.prediction_body import seam
+from motionloom.lab.report.columns import columns
 from motionloom.lab.report.report import REAL, Column, Row
 from motionloom.lab.suites import prediction_trial as trials
 from motionloom.lab.suites.harness import Say, plain_row, silent
@@ -30,7 +31,7 @@ from motionloom.tasks.sampling import PredictionSampling
 from motionloom.tasks.windows import WindowSampler
 from motionloom.weights.predictor import Predictor
 
-Found = tuple[list[Column], list[Row], dict[str, Any]]
+Found = tuple[tuple[Column, ...], list[Row], dict[str, Any]]
 POSES = 3000
 """Training poses that others are compared with."""
 GROUPS = ("left_arm", "right_arm", "left_leg", "right_leg", "torso", "lower_body", "upper_body")
@@ -52,15 +53,11 @@ def horizon(
         numbers = _lively(part.reshape(-1, *part.shape[2:]), protocol, known)
         spread = {"spread": _spread(part, protocol.layout)} if samples > 1 else {}
         rows.append(plain_row(f"second {start // second + 1}", numbers | spread))
-    columns = [
-        Column("speed", "joint speed m/s", "real", "of joints from the root, mean"),
-        Column("root_speed", "root speed m/s", "real", "along the ground, mean"),
-        Column("jerk", "jerk m/s³", "real", "third derivative of the joints' places from the root, mean", 1),
-        Column("height", "root height m", "real", "mean"),
-        Column("nearest", "nearest pose m", "real", "distance per joint to the nearest of the training poses, mean"),
-        Column("spread", "spread m", "", "distance per joint between futures of one past; real: between windows"),
-    ]
-    return columns, rows, {"weights": predictor.card.name, "seconds": seconds, "training poses": len(known)}
+    return (
+        columns("study-horizon"),
+        rows,
+        {"weights": predictor.card.name, "seconds": seconds, "training poses": len(known)},
+    )
 
 
 def long_futures(
@@ -134,21 +131,7 @@ def hold(
     for group in GROUPS:
         say(f"hold {group}: {len(trial.windows)} windows")
         rows.append(plain_row(group, held_numbers(predictor, trial, group, samples=samples, seed=seed)))
-    columns = [
-        Column("free", "ADE without m", "", "of the joints that are free, of the nearest future, nothing given"),
-        Column("given", "ADE with m", "down", "the same with the group given"),
-        Column("apd_free", "APD without m", "", "variety of the free joints, nothing given"),
-        Column("apd_given", "APD with m", "up", "the same with the group given"),
-        Column("held", "held error m", "down", "largest error of a given place, as the network's window comes out", 6),
-        Column(
-            "rotations",
-            "held rotations off",
-            "down",
-            "largest difference of a held local rotation (quaternion) in what is written, 3 windows",
-            9,
-        ),
-    ]
-    return columns, rows, {"weights": predictor.card.name, "given": "as in the real future"}
+    return columns("study-hold"), rows, {"weights": predictor.card.name, "given": "as in the real future"}
 
 
 def held_numbers(predictor: Predictor, trial: Trial, group: str, *, samples: int, seed: int) -> dict[str, float]:
@@ -197,16 +180,6 @@ def held_rotations(predictor: Predictor, trial: Trial, number: int, group: str, 
     return float(np.minimum(np.abs(got - wanted).max(-1), np.abs(got + wanted).max(-1)).max())
 
 
-SWITCHED = (
-    Column("start_velocity", "seam m/s, start", "real", "jump of velocity where the past ends, mean over joints"),
-    Column("start_acceleration", "seam m/s², start", "real", "jump of acceleration there", 1),
-    Column("end_velocity", "seam m/s, end", "real", "jump of velocity where the target sets in, mean over joints"),
-    Column("end_acceleration", "seam m/s², end", "real", "jump of acceleration there", 1),
-    Column("target", "target off m", "down", "largest difference of the target's first pose, each in its facing", 6),
-    Column("speed", "joint speed m/s", "real", "of joints from the root in between, mean"),
-)
-
-
 def arrive(
     predictor: Predictor, protocol: Protocol, *, windows: int, samples: int, seed: int, seconds: float, say: Say
 ) -> Found:
@@ -239,7 +212,7 @@ def arrive(
             for i in range(samples)
         ]
         rows.append(plain_row(f"{length:g} s", _mean(found)))
-    return list(SWITCHED), rows, {"weights": predictor.card.name, "pairs": len(pairs)}
+    return columns("study-switch"), rows, {"weights": predictor.card.name, "pairs": len(pairs)}
 
 
 def switched(predictor: Predictor, past: Motion, target: Motion, *, seconds: float, seed: int) -> dict[str, float]:

@@ -281,7 +281,7 @@ def _steps(lab: Lab) -> tuple[list[Column], list[Row], dict[str, Any]]:
 
 
 def _columns(names: Sequence[str]) -> list[Column]:
-    return [c for c in prediction.columns() if c.name in names]
+    return [c for c in prediction.COLUMNS if c.name in names]
 
 
 def _row(trial: Trial, name: str, numbers: dict[str, float]) -> Row:

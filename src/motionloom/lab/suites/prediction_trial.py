@@ -41,7 +41,7 @@ OF_REAL = (
     "seam_acceleration_worst",
 )
 """What real futures have numbers of; their errors would be 0."""
-KNOWN = {m.name for m in metrics.METRICS} | {"cmd", "root_ade", "root_fde", "seconds"}
+KNOWN = {*metrics.METRICS, "cmd", "root_ade", "root_fde", "seconds"}
 """Names of everything that `score` gives."""
 EVERY = 20.0
 """Seconds between lines of progress."""

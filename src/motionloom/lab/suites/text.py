@@ -21,7 +21,8 @@ from motionloom.lab.evaluator.evaluators import Caption, Evaluator
 from motionloom.lab.metrics.frechet import fid, fid_bias
 from motionloom.lab.metrics.retrieval import matching_distance, multimodality_of, r_precision
 from motionloom.lab.report import published_rows
-from motionloom.lab.report.report import REAL, Column, Report, Row, Value
+from motionloom.lab.report.columns import columns
+from motionloom.lab.report.report import REAL, Report, Row, Value
 from motionloom.lab.suites import text_reference
 from motionloom.lab.suites.harness import Run, diversity, embedded, plain_words, readable, row_of
 from motionloom.lab.suites.items import fitting, pick, read_items, spread
@@ -36,30 +37,7 @@ CHANCE_ROWS = 500
 """Captions at most whose distances to all motions of others are averaged."""
 SHUFFLED, CHANCE = "real, captions shuffled", "chance"
 
-COLUMNS: tuple[Column, ...] = (
-    Column("r1", "R@1", "up", "share of captions whose own motion is the nearest in its batch"),
-    Column("r2", "R@2", "up", "among the two nearest"),
-    Column("r3", "R@3", "up", "among the three nearest: the papers' R-precision"),
-    Column(
-        "r3_same",
-        "R@3, same words",
-        "up",
-        "the same where any motion of a caption with the same words is a hit; the published count takes it for a miss",
-    ),
-    Column("fid", "FID", "down", "Fréchet distance of the motion embeddings to the real ones", 4),
-    Column("mm_dist", "MM-Dist", "down", "mean distance between a caption and its motion"),
-    Column("diversity", "Diversity", "real", "mean distance of random pairs of motions, at most 300"),
-    Column("multimodality", "MultiModality", "up", "mean distance of pairs of different motions of one caption"),
-    Column("skate_share", "skate %", "down", "frames in which a toe below 5 cm moves more than 2.5 cm (GMD)", 2),
-    Column("skate_speed", "skate cm/s", "down", "mean speed of the toes below 5 cm (Kimodo)", 2),
-    Column("skate_slide", "skate mm/frame", "down", "step of a toe at contact (Motius)", 2),
-    Column("penetration", "penetration cm", "down", "the lowest joint under the floor, mean over frames", 2),
-    Column("jerk", "jerk m/s³", "real", "third derivative of the joints' places, mean", 1),
-    Column("bone_error", "bone error mm", "down", "bones against their median in the motion, mean", 2),
-    Column("ms", "ms per motion", "", "wall time of sampling alone, on the machine that measured", 0),
-    Column("per_second", "motions/s", "", "its inverse", 2),
-    Column("memory", "peak MB", "", "resident memory of a process that generates eight motions of 9.8 s", 0),
-)
+COLUMNS = columns("text")
 
 
 class Draw(Interface):

@@ -26,7 +26,8 @@ from motionloom.lab.metrics.transitions import (
     transition_distance,
 )
 from motionloom.lab.report import published_rows
-from motionloom.lab.report.report import REAL, Column, Report
+from motionloom.lab.report.columns import columns
+from motionloom.lab.report.report import REAL, Report
 from motionloom.lab.suites import text_reference
 from motionloom.lab.suites.harness import Run, Say, diversity, embedded, row_of
 from motionloom.lab.suites.items import fitting, read_items
@@ -40,35 +41,7 @@ from motionloom.lab.suites.text_reference import TextReference
 LEAST_INSIDE = 8
 """Frames: what is left of a segment between its transitions is measured from so many on."""
 
-COLUMNS: tuple[Column, ...] = (
-    Column("r3", "R@3", "up", "share of captions whose own segment is among the three nearest of its long motion"),
-    Column("mm_dist", "MM-Dist", "down", "mean distance between a caption and its segment"),
-    Column("fid", "FID", "down", "of the segments without their handshakes, against real motions", 4),
-    Column("diversity", "Diversity", "real", "of the segments: mean distance of random pairs, at most 300"),
-    Column("transition_fid", "FID, transitions", "down", "of the windows around the seams, against real windows", 4),
-    Column("transition_diversity", "Diversity, transitions", "real", "of these windows"),
-    Column("pj", "peak jerk m/frame³", "real", "the largest value of the mean jerk curve of the windows (FlowMDM)", 4),
-    Column("auj", "AUJ m/frame³", "down", "area between that curve and the mean jerk of the real windows here", 3),
-    Column("auj_humanml3d", "AUJ, HumanML3D", "down", "the same against the published mean of HumanML3D's", 3),
-    Column(
-        "auj_own",
-        "AUJ, own",
-        "down",
-        "the same against the mean of the same motions outside the windows: what the "
-        "seams alone add, however smooth the rest",
-        3,
-    ),
-    Column("step", "step mm", "real", "mean over joints of the step across the seam; real: across any two frames", 1),
-    Column("seam_share", "skate %, transitions", "down", "frames with a sliding toe (GMD), in the windows", 2),
-    Column("inside_share", "skate %, inside", "down", "the same outside the windows", 2),
-    Column("seam_speed", "skate cm/s, transitions", "down", "speed of low toes (Kimodo), in the windows", 2),
-    Column("inside_speed", "skate cm/s, inside", "down", "the same outside the windows", 2),
-    Column("seam_slide", "skate mm/frame, transitions", "down", "step of toes at contact (Motius), in the windows", 2),
-    Column("inside_slide", "skate mm/frame, inside", "down", "the same outside the windows", 2),
-    Column("seam_jerk", "jerk m/s³, transitions", "real", "third derivative of the places, in the windows", 1),
-    Column("inside_jerk", "jerk m/s³, inside", "real", "the same outside the windows", 1),
-    Column("cost", "s per s", "", "seconds of computing for a second of motion, on the machine that measured", 3),
-)
+COLUMNS = columns("transitions")
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from motionloom.features.layout import FPS
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
 from motionloom.lab.metrics.everyday.body import Body
-from motionloom.lab.metrics.everyday.check import Everyday
+from motionloom.lab.metrics.obedience import Check
 from motionloom.lab.suites.clips import RealClip
 from motionloom.skeleton import SMPL22
 
@@ -202,7 +202,7 @@ def standing_and_walking(clips: Sequence[RealClip], seconds: float) -> tuple[Arr
 
 
 def tried(
-    checks: Sequence[Everyday],
+    checks: Sequence[Check],
     trials: Mapping[str, Trial],
     clips: Sequence[RealClip],
     *,

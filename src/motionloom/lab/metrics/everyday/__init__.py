@@ -1,1 +1,1 @@
-"""Everyday prompts with physical checks, by theme; `CHECKS` of the ``sets`` module holds them all."""
+"""What the everyday checks measure, by theme; their prompts and limits are in ``lab/suites/everyday_checks.toml``."""

@@ -23,7 +23,8 @@ class Body:
     """Signals of one motion. Arguments: ``positions`` (frames, 22, 3) metres, SMPL order; ``fps`` frames per second."""
 
     def __init__(self, positions: np.ndarray, fps: float) -> None:
-        self.p: Array = ph.smooth(np.asarray(positions, dtype=np.float64), 3)
+        self.unsmoothed: Array = np.asarray(positions, dtype=np.float64)
+        self.p: Array = ph.smooth(self.unsmoothed, 3)
         self.fps = float(fps)
 
     # ---- time ------------------------------------------------------------------------------------------------------
@@ -43,11 +44,11 @@ class Body:
         at = min(max(frame, 2), len(self.p) - 2)
         return Body(self.p[:at], self.fps), Body(self.p[at:], self.fps)
 
-    def start(self, signal: np.ndarray) -> float:
+    def at_start(self, signal: np.ndarray) -> float:
         """Median of a signal over the first half second."""
         return float(np.median(np.asarray(signal)[: max(1, round(EDGE * self.fps))]))
 
-    def end(self, signal: np.ndarray) -> float:
+    def at_end(self, signal: np.ndarray) -> float:
         """Median of a signal over the last half second."""
         return float(np.median(np.asarray(signal)[-max(1, round(EDGE * self.fps)) :]))
 
@@ -98,6 +99,11 @@ class Body:
         """Share of the way that goes where the chest points: 1 forwards, -1 backwards."""
         return self.advance / max(self.travel, 0.3)
 
+    @property
+    def top(self) -> float:
+        """m/s that a tenth of the time exceeds."""
+        return float(np.percentile(self.pace, 90))
+
     @cached_property
     def moving_pace(self) -> float:
         """m/s: median pace while it is above 0.2 m/s; 0 for somebody who stays."""
@@ -130,6 +136,16 @@ class Body:
     def height(self) -> Array:
         """(frames,) leg lengths of the pelvis over the floor: about 1.15 standing, 0.7 on a chair, 0.15 lying."""
         return self.p[:, 0, 1] / self.leg
+
+    @property
+    def start(self) -> float:
+        """Leg lengths of the pelvis over the floor at the start."""
+        return self.at_start(self.height)
+
+    @property
+    def end(self) -> float:
+        """Leg lengths of the pelvis over the floor at the end."""
+        return self.at_end(self.height)
 
     @cached_property
     def lean(self) -> Array:

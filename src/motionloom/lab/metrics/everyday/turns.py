@@ -3,19 +3,13 @@
 import numpy as np
 
 from motionloom.kinematics import gestures as g
+from motionloom.lab.metrics.actions import Measures
 from motionloom.lab.metrics.everyday.body import ANKLES, Body
-from motionloom.lab.metrics.everyday.check import Everyday, at_least, at_most, between
-from motionloom.lab.metrics.obedience import Measures
 
 
 def turns(body: Body, side: int) -> Measures:
-    """``turn``: degrees turned at the end, to the wanted side positive. ``advance``: metres gone forward.
-    ``height``: leg lengths of the pelvis at its lowest."""
-    return {
-        "turn": float(body.heading[-1]) * (1 if side == 0 else -1),
-        "advance": body.advance,
-        "top": float(np.percentile(body.pace, 90)),
-    }
+    """``turn``: degrees turned at the end, to the wanted side positive."""
+    return {"turn": float(body.heading[-1]) * (1 if side == 0 else -1)}
 
 
 def turns_round(body: Body) -> Measures:
@@ -31,49 +25,41 @@ def turns_round(body: Body) -> Measures:
         "before": before.advance,
         "after": after.advance,
         "back": -float(out @ home) / max(float(np.linalg.norm(out)), 0.1),
-        "travel": body.travel,
     }
 
 
 def spins(body: Body) -> Measures:
-    """``turned``: degrees between the farthest headings to the left and to the right. ``wander``: metres the pelvis
-    gets away from where it began. ``lean``: degrees the trunk leans, median."""
-    return {
-        "turned": float(body.heading.max() - body.heading.min()),
-        "wander": body.wander,
-        "lean": float(np.median(body.lean)),
-    }
+    """``turned``: degrees between the farthest headings to the left and to the right. ``lean``: degrees the trunk
+    leans, median."""
+    return {"turned": float(np.ptp(body.heading)), "lean": float(np.median(body.lean))}
 
 
 def hops_forward(body: Body) -> Measures:
-    """``clearance``: metres both feet are off the floor at the most. ``leap``: metres the pelvis goes where the
-    chest points in the longest leap, from 0.15 s before the feet leave the floor to 0.15 s after. ``run_up``: m/s
-    of the pelvis in the second before it. ``together``: metres between the ankles along the way when that flight
-    begins."""
+    """``clearance``: metres both feet are off the floor at the most. ``leap``: metres the pelvis goes where the chest
+    points in the longest leap, from 0.15 s before the feet leave the floor to 0.15 s after. ``run_up``: m/s of the
+    pelvis in the second before it."""
     margin = round(0.15 * body.fps)
-    best = {"clearance": 0.0, "leap": 0.0, "run_up": 0.0, "together": 9.0}
+    best = {"clearance": 0.0, "leap": 0.0, "run_up": 0.0}
     for flight in body.flights:
         a, b = max(0, flight.start - margin), min(len(body.p), flight.stop + margin)
         leap = float(body.way[a:b, 2].sum() / body.fps)
         if leap > best["leap"]:
-            gap = abs(float(body.own[flight.start, ANKLES[0], 2] - body.own[flight.start, ANKLES[1], 2]))
             before = body.pace[max(0, a - round(body.fps)) : a]
             pace = float(before.mean()) if len(before) else 0.0
-            best = {"clearance": flight.clearance, "leap": leap, "run_up": pace, "together": gap}
+            best = {"clearance": flight.clearance, "leap": leap, "run_up": pace}
     return best
 
 
 def jumps_often(body: Body) -> Measures:
-    """``jumps``: times both feet are 5 cm or more off the floor while the pelvis rises 8 cm or more. ``wander``: metres
-    from where it began."""
-    return {"jumps": sum(f.rise > 0.08 for f in body.flights), "wander": body.wander}
+    """``jumps``: times both feet are 5 cm or more off the floor while the pelvis rises 8 cm or more."""
+    return {"jumps": sum(f.rise > 0.08 for f in body.flights)}
 
 
 def somersaults(body: Body) -> Measures:
-    """``rolled``: degrees the trunk turns over its own left-right axis, forwards positive. ``over``: degrees it
-    leans from the vertical at the most. ``hands``: metres of the lower wrist over the floor at its lowest.
-    ``tumbled``: degrees the trunk turns over to a side (about the direction it faces), either way. ``flown``:
-    metres the lowest joint is over the floor at the most."""
+    """``rolled``: degrees the trunk turns over its own left-right axis, forwards positive. ``over``: degrees it leans
+    from the vertical at the most. ``hands``: metres of the lower wrist over the floor at its lowest. ``tumbled``:
+    degrees the trunk turns over to a side (about the direction it faces), either way. ``flown``: metres the lowest
+    joint is over the floor at the most."""
     rolled, tumbled = body.spin(body.axis_across), body.spin(body.front)
     return {
         "rolled": float(rolled[np.argmax(np.abs(rolled))]),
@@ -85,9 +71,9 @@ def somersaults(body: Body) -> Measures:
 
 
 def one_leg(body: Body, side: int | None = None) -> Measures:
-    """``held``: seconds one ankle stays 15 cm or more above the other one, which stays within 10 cm of its lowest
-    place (``side``: the foot to stand on; None: either). ``wander``: metres from where it began. ``wide``: share of
-    that time in which both wrists are 35 cm or more out to their side and no lower than 35 cm below the shoulders."""
+    """``held``: seconds one ankle stays 15 cm or more above the other one, which stays within 10 cm of its lowest place
+    (``side``: the foot to stand on; None: either). ``wide``: share of that time in which both wrists are 35 cm or
+    more out to their side and no lower than 35 cm below the shoulders."""
     down = body.ankles - np.percentile(body.ankles, 2, axis=0)
     up = body.ankles[:, ::-1] - body.ankles > 0.15  # the foot of this column carries
     carries = up & (down < 0.1)
@@ -99,13 +85,12 @@ def one_leg(body: Body, side: int | None = None) -> Measures:
     return {
         "held": body.held(mask),
         "other": body.held(carries[:, 1 - foot]) if side is not None else 0.0,
-        "wander": body.wander,
         "wide": float(wide[mask].mean()) if mask.any() else 0.0,
     }
 
 
 def sways(body: Body) -> Measures:
-    """``swings``: times the chest goes from side to side against the middle of the feet by 6 cm or more. ``steps``:
+    """``swings``: times the chest goes from side to side against the middle of the feet by 6 cm or more. ``feet``:
     metres the middle of the feet goes. ``turned``: degrees of heading between the farthest ways. ``ahead``: degrees
     the trunk leans to front or back, 90th percentile. ``lifted``: metres an ankle is lifted, 95th percentile.
     ``hands``: m/s of the wrists against the body, mean."""
@@ -126,10 +111,10 @@ def _left_at_start(body: Body) -> np.ndarray:
 
 
 def dances(body: Body) -> Measures:
-    """``feet``, ``hands``: m/s against the body, means. ``turning``: degrees per second of heading, either way,
-    mean. ``ahead``: share of the way that goes where the chest points, either way. ``steps``: lifts of a foot by 4
-    cm, per second. ``lean``: degrees the trunk leans, 90th percentile. ``top``: m/s that a tenth of the time
-    exceeds. ``tempo``: times per second that the pelvis turns back by 4 cm along its own forward or sideways way."""
+    """``feet``, ``hands``: m/s against the body, means. ``turning``: degrees per second of heading, either way, mean.
+    ``ahead``: share of the way that goes where the chest points, either way. ``steps``: lifts of a foot by 4 cm, per
+    second. ``lean``: degrees the trunk leans, 90th percentile. ``tempo``: times per second that the pelvis turns
+    back by 4 cm along its own forward or sideways way."""
     turning = np.abs(np.gradient(body.heading)) * body.fps
     path = np.cumsum(body.way[:, [0, 2]], axis=0) / body.fps
     return {
@@ -139,16 +124,15 @@ def dances(body: Body) -> Measures:
         "ahead": abs(body.ahead),
         "steps": sum(g.foot_height_peaks(body.p, lift=0.04)) / body.seconds,
         "lean": float(np.percentile(body.lean, 90)),
-        "top": float(np.percentile(body.pace, 90)),
         "tempo": max(g.oscillations(path[:, k], 0.04) for k in (0, 1)) / body.seconds,
     }
 
 
 def ballet(body: Body) -> Measures:
-    """``figure``: the larger of two shares: leg lengths that one ankle is above the other at the most, of 0.5;
-    degrees of heading between the farthest ways, of 300. ``wide``: share of the time with a wrist no lower than 20
-    cm below the shoulder or 50 cm away from the middle of the body. ``speed``: m/s of all joints, mean. ``lean``:
-    degrees the trunk leans, 95th percentile."""
+    """``figure``: the larger of two shares: leg lengths that one ankle is above the other at the most, of 0.5; degrees
+    of heading between the farthest ways, of 300. ``wide``: share of the time with a wrist no lower than 20 cm below
+    the shoulder or 50 cm away from the middle of the body. ``speed``: m/s of all joints, mean. ``lean``: degrees the
+    trunk leans, 95th percentile."""
     leg = float(np.abs(body.ankles[:, 0] - body.ankles[:, 1]).max() / body.leg)
     away = np.linalg.norm(body.hands[..., [0, 2]], axis=-1) > 0.5
     return {
@@ -157,177 +141,3 @@ def ballet(body: Body) -> Measures:
         "speed": float(body.stir.mean()),
         "lean": float(np.percentile(body.lean, 95)),
     }
-
-
-_OFF = at_least("clearance", 0.08, "both feet leave the floor")
-
-
-def _turning(side: int):
-    return (
-        between("turn", 40, 190, f"from an eighth of a circle to half of one, to the {('left', 'right')[side]}"),
-        at_least("advance", 0.8, "it goes on walking"),
-        at_most("top", 2.1, "walking, not running"),
-    )
-
-
-CHECKS = (
-    Everyday("walk and turn left", "a man walks and then turns left", 5.0, lambda b: turns(b, 0), _turning(0)),
-    Everyday(
-        "walk and turn right",
-        "someone is walking and makes a turn to the right",
-        5.0,
-        lambda b: turns(b, 1),
-        _turning(1),
-    ),
-    Everyday(
-        "there and back",
-        "a person walks forward, turns around and walks back again",
-        8.0,
-        turns_round,
-        (
-            between("turn", 130, 235, "half a circle"),
-            at_least("before", 0.7, "a few steps there"),
-            at_least("after", 0.7, "and a few steps back"),
-            at_least("back", 0.5, "the way back is the way there, reversed"),
-        ),
-    ),
-    Everyday(
-        "turn around",
-        "she turns around to face the other way",
-        4.0,
-        turns_round,
-        (
-            between("turn", 115, 245, "half a circle"),
-            at_most("travel", 3.0, "it is a turn and not a walk"),
-        ),
-    ),
-    Everyday(
-        "spin",
-        "a kid spins around on the spot",
-        4.0,
-        spins,
-        (
-            at_least("turned", 300, "nearly once round or more"),
-            at_most("wander", 1.6, "more or less on the spot"),
-            at_most("lean", 45, "upright"),
-        ),
-    ),
-    Everyday(
-        "jump forward",
-        "a person jumps forward as far as possible",
-        3.0,
-        hops_forward,
-        (
-            _OFF,
-            at_least("leap", 0.6, "the leap covers more than half a metre"),
-            at_most("run_up", 1.3, "from standing"),
-        ),
-        grounded=False,
-    ),
-    Everyday(
-        "run and leap",
-        "somebody takes a run-up and leaps",
-        4.0,
-        hops_forward,
-        (
-            _OFF,
-            at_least("leap", 0.9, "the leap covers about a metre"),
-            at_least("run_up", 1.0, "there is a run-up"),
-        ),
-        grounded=False,
-    ),
-    Everyday(
-        "jump up and down",
-        "a boy keeps jumping up and down",
-        4.0,
-        jumps_often,
-        (at_least("jumps", 3, "again and again"), at_most("wander", 1.2, "more or less on the spot")),
-        grounded=False,
-    ),
-    Everyday(
-        "cartwheel",
-        "a gymnast does a cartwheel",
-        4.0,
-        somersaults,
-        (
-            at_least("tumbled", 200, "the body goes over to the side"),
-            at_least("over", 120, "the head is below the hips"),
-            at_most("hands", 0.3, "the hands take the weight"),
-        ),
-        grounded=False,
-    ),
-    Everyday(
-        "backflip",
-        "he does a backflip",
-        3.0,
-        somersaults,
-        (
-            at_most("rolled", -220, "the body goes over backwards"),
-            at_least("over", 120, "the head is below the hips"),
-            at_least("flown", 0.2, "in the air"),
-        ),
-        grounded=False,
-    ),
-    Everyday(
-        "stand on one leg",
-        "someone balances on one leg",
-        5.0,
-        one_leg,
-        (at_least("held", 1.5, "a foot stays up"), at_most("wander", 0.8, "on the spot")),
-    ),
-    Everyday(
-        "balance on the left leg",
-        "a woman stands on her left leg with her arms spread out",
-        5.0,
-        lambda b: one_leg(b, 0),
-        (
-            at_least("held", 1.5, "the right foot stays up"),
-            at_most("other", 0.5, "the left one does not"),
-            at_most("wander", 0.8, "on the spot"),
-            at_least("wide", 0.5, "the arms are out"),
-        ),
-    ),
-    Everyday(
-        "sway",
-        "a person sways from side to side",
-        5.0,
-        sways,
-        (
-            at_least("swings", 3, "to and fro, and again"),
-            at_most("feet", 0.3, "the feet stay"),
-            at_most("turned", 60, "it is no turning"),
-            at_most("ahead", 35, "it is no bending"),
-            at_most("lifted", 0.05, "no foot is lifted"),
-            at_most("hands", 0.6, "the arms hang or go along"),
-        ),
-    ),
-    Everyday(
-        "salsa",
-        "a woman dances salsa",
-        6.0,
-        dances,
-        (
-            between("feet", 0.35, 1.3, "the feet keep moving"),
-            at_least("hands", 0.3, "the hands keep moving"),
-            at_least("turning", 12, "the body keeps turning"),
-            at_most("ahead", 0.62, "it is no walk"),
-            at_least("steps", 1.0, "a step in every second"),
-            at_least("tempo", 0.45, "to and fro"),
-            between("top", 0.3, 1.2, "small quick steps, no run"),
-            at_most("lean", 30, "upright"),
-        ),
-    ),
-    Everyday(
-        "ballet",
-        "a ballerina dancing gracefully",
-        6.0,
-        ballet,
-        (
-            at_least("figure", 1.0, "a leg is raised high, or the body pirouettes"),
-            at_least("wide", 0.45, "the arms are held out or up"),
-            between("speed", 0.25, 1.7, "it moves"),
-            at_most("lean", 100, "it stays on the feet"),
-        ),
-        grounded=False,
-    ),
-)
