@@ -33,6 +33,15 @@ def test_the_manifest_names_every_tracked_file() -> None:
     assert not {top for top in tops if top not in words and not top.startswith("constraints")}
 
 
+def test_a_wheel_has_every_file_of_the_package() -> None:
+    """Weights, schemas and tables lie beside the code; each is of a kind that goes with it."""
+    package = ROOT / "src" / "motionloom"
+    patterns = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["motionloom"]
+    named = {path for pattern in patterns for path in package.glob(pattern)}
+    there = {ROOT / name for name in tracked() if name.startswith("src/motionloom/") and not name.endswith(".py")}
+    assert not there - named
+
+
 def test_metadata_says_who_and_for_what() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert project["authors"] == [{"name": "motionloom contributors"}]

@@ -51,6 +51,19 @@ def test_the_id_does_not_change_with_how_the_same_is_said() -> None:
     assert key({"prompt": "walk", "seconds": 5.0}) == key({"prompt": "walk", "seconds": 5.001})  # as many frames
 
 
+def test_numbers_in_a_prompt_are_read_unless_they_are_left_literal() -> None:
+    """The row is as long as they need, or as it says itself; the ids of prompts without numbers are what they were."""
+    row = {"prompt": "a person walks 2 meters", "seed": 1}
+    asked = Sources(Path(), COMMON).ask(parse(json.dumps(row).encode()))
+    assert asked.timeline is not None
+    assert asked.text == "a person walks 2 meters"
+    assert asked.frames == round(20 * asked.timeline.seconds) < 100
+    assert Sources(Path(), COMMON).ask(parse(json.dumps(row | {"seconds": 4}).encode())).frames == 80
+    assert Sources(Path(), COMMON, literal=True).ask(parse(json.dumps(row).encode())).timeline is None
+    assert key(row) != key(row, literal=True)
+    assert key({"prompt": "a person walks"}) == key({"prompt": "a person walks"}, literal=True)
+
+
 def test_the_id_changes_with_what_a_named_file_holds(folder: Path) -> None:
     row = {"prompt": "a person walks", "goal": "goal.json"}
     found = set()

@@ -419,6 +419,7 @@ def test_single_motions_are_those_of_the_single_commands(ready: Maker, folder: P
         {"prompt": "a person walks", "seconds": 1, "seed": 3},
         {"prompt": "a person walks", "seconds": 1, "seed": 3, "goal": goal},
         {"timeline": "a.yaml", "seed": 3},
+        {"prompt": "turn left 90 degrees", "seed": 3},
     ]
     make(ready, found)
     prior, read = ready.prior, read_goal(goal, frames=20, folder=folder)
@@ -427,7 +428,9 @@ def test_single_motions_are_those_of_the_single_commands(ready: Maker, folder: P
         generate(prior, "a person walks", seconds=1.0, seed=3, steps=2)[0],
         control(prior, "a person walks", read, seed=3, steps=2)[0].motion,
         joined(list(compose(prior, segments, seed=3, steps=2))),
+        generate(prior, "turn left 90 degrees", seed=3, steps=2)[0],
     ]
+    assert [one.about["keeps"] is None for one in results()] == [True, True, True, False]
     for one, motion in zip(results(), single, strict=True):
         assert one.motion is not None
         assert np.abs(one.motion.positions() - motion.positions()).max() < 2e-5

@@ -58,6 +58,16 @@ def test_a_sentence_of_two_actions_is_parted_as_on_the_command_line(server: Serv
     assert one["results"][0]["frames"] == sum(round(20 * part["seconds"]) for part in listed)
 
 
+def test_numbers_in_the_words_are_kept_and_measured_as_on_the_command_line(server: Server) -> None:
+    made = server.draw(task="generate", prompt="turn left 90 degrees", seed=5, steps=6)
+    (result,) = made["results"]
+    expected = generate(Prior.load(), "turn left 90 degrees", seed=5, steps=6)[0]
+    assert np.abs(poses(server, result["id"]) - expected.positions()).max() < 1e-3
+    assert [one["read"] for one in result["measures"]["amounts"]] == ["a turn of 90 degrees to the left"]
+    literal = server.draw(task="generate", prompt="turn left 90 degrees", seed=5, steps=6, literal=True)
+    assert literal["results"][0]["frames"] == 100
+
+
 def test_compose_follows_the_path_of_its_timeline(server: Server) -> None:
     timeline = {"segments": [{"text": "a person walks", "seconds": 2}] * 2, "path": PATH, "seed": 4}
     made = server.draw(task="compose", timeline=timeline, steps=6)

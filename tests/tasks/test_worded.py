@@ -48,18 +48,18 @@ def test_the_nearest_is_kept_and_told(prior: Prior, monkeypatch: pytest.MonkeyPa
 
 
 def test_python_reads_numbers_and_can_leave_them(prior: Prior) -> None:
-    few = {"steps": 2, "seed": 3}
-    turn, plain = generate(prior, ["turn left 90 degrees", "a person walks"], **few)
-    (said,) = worded.generate_worded(prior, "turn left 90 degrees", **few)
+    few = Sampling(steps=2, seed=3)
+    turn, plain = generate(prior, ["turn left 90 degrees", "a person walks"], sampling=few)
+    (said,) = worded.generate_worded(prior, "turn left 90 degrees", sampling=few)
     assert np.array_equal(turn.rotations, said.motion.rotations)
     assert [one.read for one in said.amounts] == ["a turn of 90 degrees to the left"]
     assert turn.seconds == pytest.approx(2.5)
     assert plain.seconds == pytest.approx(5.0)
-    (literal,) = generate(prior, "turn left 90 degrees", literal=True, **few)
+    (literal,) = generate(prior, "turn left 90 degrees", literal=True, sampling=few)
     assert literal.seconds == pytest.approx(5.0)
-    (way,) = worded.generate_worded(prior, "a person walks 2 meters, then waves", **few)
+    (way,) = worded.generate_worded(prior, "a person walks 2 meters, then waves", sampling=few)
     assert [segment.text for segment in way.timeline.segments] == ["a person walks 2 meters", "a person waves"]
-    (whole,) = worded.generate_worded(prior, "a person walks, then waves", **few)
+    (whole,) = worded.generate_worded(prior, "a person walks, then waves", sampling=few)
     assert len(whole.timeline.segments) == 1
 
 

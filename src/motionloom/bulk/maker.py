@@ -16,6 +16,7 @@ from motionloom.edits.fitting import fit
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import parse_adapter
 from motionloom.goals.goal import start_of
+from motionloom.goals.timeline import Timeline
 from motionloom.io.stream import joined
 from motionloom.motion import Motion
 from motionloom.retarget import from_smpl22
@@ -25,7 +26,9 @@ from motionloom.tasks.control import Controlled, judged, moved, steered_features
 from motionloom.tasks.duet import compose_pair
 from motionloom.tasks.long import compose, with_loaded
 from motionloom.tasks.pair import Duet, generate_pair, prompts_of
+from motionloom.tasks.sampling import Sampling
 from motionloom.tasks.text import GUIDANCE, SOLVER, STEPS, check, check_features, finish, to_motion
+from motionloom.tasks.worded import draw
 from motionloom.weights.container import PAIRS, weights_digest
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior, find_weights
@@ -70,6 +73,8 @@ class Options:
     """Rows of a shard, up to `motionloom.bulk.jobs.MOST`; None: as suits the job's size."""
     unit: float = 1.0
     """Metres per unit of BVH files."""
+    literal: bool = False
+    """Leave numbers in prompts to the network."""
     filter: str | None = None
     """See `motionloom.bulk.measures.Filter`; motions that do not pass are dropped."""
     judge: str | None = None
@@ -77,7 +82,11 @@ class Options:
 
     def of_motions(self, weights: str) -> dict[str, Any]:
         """What determines every motion of the batch; ``weights``: `hash_weights`."""
-        later = {"hands": (self.hands, "as-is"), "unit": (self.unit, 1.0)}  # left out as they always were: old ids hold
+        later = {
+            "hands": (self.hands, "as-is"),
+            "unit": (self.unit, 1.0),
+            "literal": (self.literal, False),
+        }  # left out as they always were: old ids hold
         return {name: value for name, (value, usual) in later.items() if value != usual} | {
             "weights": weights,
             "steps": self.steps,
@@ -157,6 +166,7 @@ class Maker:
             seconds=options.seconds,
             seed=options.seed,
             skeleton=options.skeleton,
+            literal=options.literal,
         )
         self.judge: Judge | None = find_judge(options.judge) if options.judge else None
         self.together = TOGETHER.get(options.device.partition(":")[0], TOGETHER["cpu"])
@@ -176,7 +186,7 @@ class Maker:
     def _shared(self, asked: Sequence[Asked], *, alone: bool) -> Iterator[list[Asked]]:
         """Rows that are made together."""
         together = 1 if alone else self.together
-        plain = [one for one in asked if one.row.task == "generate"]
+        plain = [one for one in asked if one.row.task == "generate" and one.timeline is None]
         for numbers in groups(self.prior, [one.frames for one in plain], together):
             yield [plain[number] for number in numbers]
         same: dict[int, list[Asked]] = {}
@@ -185,7 +195,7 @@ class Maker:
                 same.setdefault(id(one.goal), []).append(one)
         for rows in same.values():
             yield from (rows[at : at + together] for at in range(0, len(rows), together))
-        yield from ([one] for one in asked if one.row.task in ("compose", "duet"))
+        yield from ([one] for one in asked if one.row.task == "duet" or one.timeline is not None)
 
     def _try(self, rows: list[Asked]) -> Iterator[tuple[Asked, Made | str]]:
         try:
@@ -205,6 +215,8 @@ class Maker:
             return [self._duet(rows[0])]
         if rows[0].row.task == "compose":
             return [self._compose(rows[0])]
+        if rows[0].timeline is not None:
+            return [self._worded(rows[0], rows[0].timeline)]
         if rows[0].row.task == "control":
             return [
                 self._alone(one, made.motion, error=round(made.error, 4), worst=round(made.worst, 4))
@@ -224,6 +236,13 @@ class Maker:
             self._alone(one, finish(self.prior, features, foot_lock=not options.raw))
             for one, features in zip(rows, drawn, strict=True)
         ]
+
+    def _worded(self, asked: Asked, timeline: Timeline) -> Made:
+        """A prompt with numbers that are kept."""
+        options = self.options
+        sampling = Sampling(steps=options.steps, guidance=options.guidance, solver=options.solver, seed=asked.seed)
+        (made,) = draw(self.prior, [timeline], foot_lock=not options.raw, sampling=sampling)
+        return self._alone(asked, made.motion, keeps=all(one.kept for one in made.amounts))
 
     def _control(self, rows: list[Asked]) -> list[Controlled]:
         """As `motionloom.tasks.control.control`, for prompts and seeds that share a goal."""

@@ -29,6 +29,7 @@ MEANING: dict[str, str] = {
     "turn": "degrees that the body turned, to the left is positive",
     "error": "metres from the goal on average (rows with a goal)",
     "worst": "metres from the goal at the most (rows with a goal)",
+    "keeps": "whether it keeps the numbers in its words (prompts with numbers that are read)",
     "obeys": "whether it does what its prompt says (prompts that a physical check knows)",
     "apart": "metres between the hips of two people, on average (rows of the task duet)",
     "nearest": "metres between the nearest joints of two people, where they are nearest (rows of the task duet)",
@@ -58,7 +59,7 @@ def measure(motion: Motion, prompt: str, judge: Judge | None = None) -> dict[str
         "turn": float(np.degrees(physics.turn(positions))),
     }
     found: dict[str, float | bool | None] = {name: round(float(value), 4) for name, value in numbers.items()}
-    unknown = dict.fromkeys(("error", "worst", *SHARED))
+    unknown = dict.fromkeys(("error", "worst", "keeps", *SHARED))
     return {**found, **unknown, "obeys": judge(prompt, positions, fps) if judge else None}
 
 

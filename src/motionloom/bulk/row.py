@@ -16,7 +16,7 @@ from motionloom.goals.fields import Field
 from motionloom.goals.goal import FPS, Goal
 from motionloom.goals.goal_file import read_goal
 from motionloom.goals.segment import LONGEST
-from motionloom.goals.timeline import Timeline, read_timeline
+from motionloom.goals.timeline import SHORTEST, Timeline, read_timeline, timeline_of
 from motionloom.io import load
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22, Skeleton
@@ -84,7 +84,7 @@ class Asked:
     @property
     def text(self) -> str:
         """What the motion shows, in words."""
-        if self.timeline is None:
+        if self.timeline is None or self.row.prompt:
             return self.row.prompt
         return "; ".join(" ".join(segment.text.split()) for segment in self.timeline.segments)[:MAX_CHARACTERS]
 
@@ -237,12 +237,14 @@ class Sources:
         seconds: float = 5.0,
         seed: int = 0,
         skeleton: str | None = None,
+        literal: bool = False,
     ) -> None:
         """``folder``: where these files lie, or below. ``common``: what determines every motion (weights, settings).
 
         pair: what else determines motions of two people. fps: of the weights. seconds, seed, skeleton: of rows that do
-        not say; a skeleton may lie anywhere.
+        not say; a skeleton may lie anywhere. literal: no numbers are read in prompts.
         """
+        self.literal = literal
         self.folder, self.fps, self.seconds, self.seed, self.skeleton = folder, fps, seconds, seed, skeleton
         self._pair = dict(pair or {})
         self._common = json.dumps({**common, "format": FORMAT}, sort_keys=True)
@@ -265,6 +267,8 @@ class Sources:
             start = None if timeline.start is None else self._kept("start", timeline.start, load)
             _check_timeline(row.task, timeline)
             seed = next(s for s in (row.seed, timeline.seed, self.seed) if s is not None)
+            frames = timeline.frames
+        elif (timeline := self._worded(row)) is not None:
             frames = timeline.frames
         else:
             frames = frames_in(self.seconds if row.seconds is None else row.seconds, self.fps)
@@ -289,6 +293,15 @@ class Sources:
             said |= {"pair": self._pair, "person": row.person}
         key = hashlib.sha256(json.dumps(said, sort_keys=True).encode("utf-8", "surrogatepass")).hexdigest()[:32]
         return Asked(row, key, frames, seed, goal, timeline, start, target)
+
+    def _worded(self, row: Row) -> Timeline | None:
+        """The row's prompt as a timeline, where numbers in it are kept; as long as they need where no time is said."""
+        if row.task != "generate" or self.literal or self.fps != FPS or not row.prompt.strip():
+            return None
+        if row.seconds is not None and not SHORTEST <= row.seconds <= LONGEST:
+            return None
+        found = timeline_of(row.prompt, row.seconds, amounts=True)
+        return found if found.readings else None
 
     def _skeleton(self, name: str, field: Field | None) -> Skeleton | None:
         if name.lower() == "smpl22":

@@ -177,7 +177,7 @@ def parquet_schema() -> Any:
             ("names", pa.list_(pa.string())),
             ("parents", pa.list_(pa.int32())),
             ("offsets", floats),
-            *((name, pa.bool_() if name.endswith("obeys") else pa.float64()) for name in measures),
+            *((name, pa.bool_() if name.endswith(("obeys", "keeps")) else pa.float64()) for name in measures),
         ]
     )
 

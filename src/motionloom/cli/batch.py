@@ -55,6 +55,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--shard-rows", type=int, metavar="N", help="rows of a shard (default: by the job, up to 1000)")
     parser.add_argument("--filter", metavar="CONDITION", help="keep what passes, such as 'skate < 0.2 and obeys'")
     parser.add_argument("--seconds", type=float, default=5.0, help="length of rows that do not say (default 5)")
+    parser.add_argument("--literal", action="store_true", help="do not read numbers in prompts as goals: '3 meters'")
     parser.add_argument(
         "--seed", type=int, default=0, help="seed of rows that do not say, of the first variant (default 0)"
     )
@@ -181,6 +182,7 @@ def _options(arguments: argparse.Namespace) -> "Options":
         hands=arguments.hands,
         unit=arguments.out_unit,
         seconds=arguments.seconds,
+        literal=arguments.literal,
         seed=arguments.seed,
         skeleton=arguments.skeleton,
         format=arguments.format,

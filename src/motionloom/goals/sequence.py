@@ -60,7 +60,9 @@ _SECONDS = {
 _THEN = re.compile(
     r"(?:\s*[.;]\s*|\s*,\s*|\s+)(?:and\s+|but\s+)?(?:then|afterwards?|after\s+(?:that|this"
     r"|which)|next(?! to\b)|subsequently"
-    r"|finally|lastly|followed\s+by)\b\s*,?\s*(?:and\s+)?(?:also\s+)?|\s*[.;]\s+(?=\S)",
+    r"|finally|lastly|followed\s+by)\b\s*,?\s*(?:and\s+)?(?:also\s+)?"
+    r"(?:after (?:a|some|one) (?:short |little |brief )?(?:moment|while|second|pause|bit|time)\b\s*,?\s*)?"
+    r"|\s*[.;]\s+(?=\S)",
     re.IGNORECASE,
 )
 _KEPT = re.compile(
@@ -78,6 +80,7 @@ _COUNTED = re.compile(
     re.IGNORECASE,
 )
 _STOPS = re.compile(r"(?:stop|halt|pause)s?(?: (?:there|again|walking|moving))?", re.IGNORECASE)
+_WAITS = re.compile(r"\s*(?:wait|rest|remain|stay|pose|sleep)(?:s|ed|ing)?\b", re.IGNORECASE)
 _REPEATED = re.compile(
     r"\b(two|three|four|five|six|seven|eight|nine|ten|\d+) (?:\w+ )?"
     r"(?:squats|jumps|kicks|punches|push-?ups|sit-?ups|pull-?ups|jumping jacks|jacks|lunges"
@@ -119,6 +122,8 @@ def split_actions(text: str) -> tuple[Part, ...]:
     for number, clause in enumerate(clauses):
         own = subject_of(clause)
         said = clause if not own or number == 0 else PRONOUN.sub("", clause)
+        if own.lower() == "they" and said != clause and mood_of(clauses[0]) == "third":
+            said = finite(said, of="base")  # "a person walks. Then they kick."
         own = own if said == clause else ""
         named = own or subject
         rest = said[len(own) :].strip()
@@ -255,7 +260,8 @@ def _list(clause: str) -> list[str]:
     comma = mood != "gerund" and not re.search(r"\band\b", joins[0], re.IGNORECASE)
     kinds = kind_of(items[0], mood), kind_of(items[1], mood)
     counted = "gesture" not in kinds and any(read_amount(item) for item in items)
-    return items if comma or counted or _follows(*kinds) else [clause]
+    waits = kinds[0] == "state" and bool(_WAITS.match(items[1]))  # "stands there and waits"
+    return items if comma or counted or (_follows(*kinds) and not waits) else [clause]
 
 
 def _follows(first: str, second: str) -> bool:
@@ -280,14 +286,14 @@ def _sentence(subject: str, action: str) -> str:
 
 
 def _is_clause(phrase: str) -> bool:
-    """Whether something happens in a phrase: it begins with a gerund, or with a subject and a verb."""
-    if re.match(r"(?:that|this|which)\b", phrase, re.IGNORECASE):  # "after that" is a "then"
-        return False
+    """Whether the person does something in a phrase: it begins with a gerund, or with a pronoun and a verb."""
     if verb_of(phrase, "gerund"):
         return True
     subject = subject_of(phrase)
     if mood_of(phrase) == "base" and not re.match(r"(?:they|we|you|i)\b", phrase, re.IGNORECASE):
         return False  # "after a long march", "before the big jump"
+    if not PRONOUN.match(phrase) or re.match(r"(?:it|this|that)\b", phrase, re.IGNORECASE):
+        return False  # "after the music stops", "before it gets dark", "after that"
     return bool(subject) and bool(mood_of(phrase)) and bool(verb_of(phrase[len(subject) :].strip(), mood_of(phrase)))
 
 

@@ -97,7 +97,6 @@ _CHANGED_BY = {
     "turn": ("event", r"\b(around|round|about|back|180)\b"),
     "climb": ("event", r"\b(onto|over)\b"),
     "come": ("change", r"\bto a (stop|halt)\b"),
-    "look": ("event", r"\baround\b"),
 }
 """What a word behind the verb makes of it."""
 
@@ -177,12 +176,12 @@ def base_of(word: str) -> str:
     return next((forms[word] for forms in MOODS.values() if word in forms), "")
 
 
-def finite(phrase: str, mood: str = "third") -> str:
-    """A phrase that begins with a gerund, with its verb in the mood: "sitting down" as "sits down"."""
-    base = verb_of(phrase, "gerund")
+def finite(phrase: str, mood: str = "third", *, of: str = "gerund") -> str:
+    """A phrase that begins with a gerund, or a verb of another mood, in the mood: "sitting down" as "sits down"."""
+    base = verb_of(phrase, of)
     if not base:
         return phrase
-    said = next(form for form, of in MOODS[mood or "third"].items() if of == base)
+    said = next(form for form, stem in MOODS[mood or "third"].items() if stem == base)
     return re.sub(rf"^(\s*{_ADVERB})[A-Za-z]+", rf"\g<1>{said}", phrase, count=1, flags=re.IGNORECASE)
 
 

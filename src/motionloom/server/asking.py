@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 COMMON = ("task", "seed", "count", "steps", "guidance", "levels")
 KEYS = {
-    "generate": ("prompt", "seconds", "as_one"),
+    "generate": ("prompt", "seconds", "as_one", "literal"),
     "compose": ("timeline",),
     "control": ("prompt", "seconds", "goals", "timeline"),
     "edit": ("motion", "person", "prompt", "redraw", "keep", "loop", "blend", "extend", "strength"),
@@ -100,6 +100,7 @@ class _Reader:
             "prompt": self.prompt(),
             "seconds": self.seconds(task),
             "as_one": self.flag("as_one"),
+            "literal": self.flag("literal"),
             "keep": self.words("keep"),
             "redraw": self.spans(),
             "loop": self.flag("loop"),
@@ -132,8 +133,8 @@ class _Reader:
         seconds = options["seconds"]
         options["seconds"] = SECONDS if seconds is None else seconds
         if not options["as_one"] and options["seconds"] >= 0.2:
-            found = timeline_of(options["prompt"], seconds)
-            timeline = found if len(found.segments) > 1 else None
+            found = timeline_of(options["prompt"], seconds, amounts=not options["literal"])
+            timeline = found if len(found.segments) > 1 or found.readings else None
         return Request(**common, timeline=timeline)
 
     def compose(self, common: dict[str, Any], options: dict[str, Any]) -> Request:

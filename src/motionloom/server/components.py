@@ -87,6 +87,7 @@ def _properties(limits: Limits) -> dict[str, Schema]:
         "prompt": TEXT | {"maxLength": limits.prompt, "description": "what the person does; two people: 'A :: B'"},
         "seconds": _number(exclusiveMinimum=0, description="length; of predict and switch what is drawn"),
         "as_one": FLAG | {"description": "do not part 'A, then B' into actions that follow each other"},
+        "literal": FLAG | {"description": "leave numbers in the words to the network: '3 meters', 'jumps twice'"},
         "timeline": ref("Timeline"),
         "goals": ref("Goals"),
         "motion": ID,

@@ -1,7 +1,7 @@
 """A `Request` to motions, by the functions that the command line calls; and where its poses stand while it is drawn."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,9 @@ from motionloom.tasks import duet, long, pair, text
 from motionloom.tasks.control import control
 from motionloom.tasks.edit import changes_asked, edit
 from motionloom.tasks.predict import predict, switch
+from motionloom.tasks.sampling import Sampling
 from motionloom.tasks.splice import concatenated
+from motionloom.tasks.worded import draw as draw_worded
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.predictor import Predictor
 from motionloom.weights.prior import Prior
@@ -82,7 +84,8 @@ def batch_key(request: Request) -> tuple[Any, ...] | None:
 
 def at_once(request: Request) -> bool:
     """Whether the motions of a request are drawn in the same network calls, rather than one after the other."""
-    return request.call is None and request.task != "duet" and request.timeline is not None
+    timeline = request.timeline
+    return request.call is None and request.task != "duet" and timeline is not None and not timeline.readings
 
 
 def draw_together(models: Models, requests: Sequence[Request], progress: Progress) -> Iterator[tuple[int, Result]]:
@@ -121,6 +124,16 @@ def _composed(models: Models, request: Request, progress: Progress) -> Iterator[
     )
     for number, motion in enumerate(made):
         yield Result(number, (motion,), request.seed + number, measured(motion, request.parts))
+
+
+def _worded(models: Models, request: Request, progress: Progress) -> Iterator[Result]:
+    """A sentence with numbers that are kept."""
+    assert request.timeline is not None
+    sampling = Sampling.of(None, {"seed": request.seed} | shared(request))
+    asked = [request.timeline] * request.count
+    for number, one in enumerate(draw_worded(models.prior, asked, sampling=sampling, progress=progress)):
+        measures = {"amounts": [asdict(amount) for amount in one.amounts]}
+        yield Result(number, (one.motion,), request.seed + number, measures)
 
 
 def _controlled(models: Models, request: Request, progress: Progress) -> Iterator[Result]:
@@ -254,6 +267,7 @@ def _composed_pair(models: Models, request: Request, progress: Progress) -> Iter
 
 
 _TASKS: dict[str, Callable[[Models, Request, Progress], Iterator[Result]]] = {
+    "generate": _worded,
     "control": _controlled,
     "edit": _edited,
     "predict": _predicted,

@@ -204,9 +204,9 @@ def _shared(asked: Timeline, shares: Sequence[float]) -> Timeline:
 
 
 def _drawn(prior: Prior, asked: Timeline, sampling: Sampling, foot_lock: bool) -> Motion:
-    if len(asked.segments) > 1:
+    segment, *more = asked.segments
+    if more:
         return concatenated(*compose(prior, asked.segments, foot_lock=foot_lock, sampling=sampling))
-    segment = asked.segments[0]
     if segment.goal is not None:
         (made,) = control(prior, segment.text, segment.goal, foot_lock=foot_lock, sampling=sampling)
         return made.motion
