@@ -23,6 +23,7 @@ from motionloom.cli.sampling import (
 )
 from motionloom.cli.skeletons import CHARACTERS, Target, add_skeleton, own_outs, read_target
 from motionloom.cli.writing import add_writing, at_rate, check_overwriting, check_rate, check_unit
+from motionloom.formats import writable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -41,7 +42,7 @@ PAIRS = 8
 """Duets that are drawn together: those of a group that is finished stay where the next one is interrupted."""
 DEEP = 0.02
 """Metres of overlap that are no touch any more: skin and cloth give way as much."""
-SINGLE = (".bvh", ".npz", ".vrma")
+SINGLE = writable(single=True)
 """Files of one person each."""
 
 

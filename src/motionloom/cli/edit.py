@@ -23,6 +23,7 @@ from motionloom.cli.sampling import (
 )
 from motionloom.cli.skeletons import Target, add_one_file, put_all
 from motionloom.cli.writing import at_rate, check_overwriting
+from motionloom.formats import readable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -36,7 +37,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser = subparsers.add_parser(
         "edit",
         help="change parts of a motion file by words",
-        description="Draw parts of a clip (.bvh, .amc with its .asf, .glb, .npz) anew; the rest stays as it is.",
+        description=f"Draw parts of a clip ({', '.join(readable())}) anew; the rest stays as it is.",
     )
     parser.add_argument("clip", type=Path, metavar="CLIP")
     parser.add_argument("text", nargs="?", metavar="TEXT", help="what the person is to do, such as 'waves'")

@@ -17,6 +17,7 @@ from motionloom.cli.reading import (
 )
 from motionloom.cli.skeletons import add_skeleton, read_target
 from motionloom.cli.writing import add_force, add_writing, at_rate, check_overwriting, check_rate
+from motionloom.formats import readable, writable
 
 if TYPE_CHECKING:
     from motionloom.cli.skeletons import Target
@@ -28,8 +29,8 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     export = subparsers.add_parser(
         "export",
         help="turn a motion file into another format",
-        description="Turn a motion (.bvh, .amc with its .asf, .glb, .npz) into .bvh, .glb, .npz, .mp4, .gif or .png; "
-        "the name of OUT picks the format.",
+        description=f"Turn a motion ({', '.join(readable())}; .amc with its .asf) into "
+        f"{', '.join(writable())}; the name of OUT picks the format.",
     )
     export.add_argument(
         "inputs",

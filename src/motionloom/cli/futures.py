@@ -64,17 +64,20 @@ def targets(
 
 
 def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool, own: str | None) -> Target:
-    from motionloom.io import WRITES, check_output
+    from motionloom.formats import writable
+    from motionloom.io import check_output
     from motionloom.io.folder import check_folder
 
     suffix = out.suffix.lower()
-    if suffix in (*WRITES, own) and not out.is_dir():
+    if suffix in (*writable(), own) and not out.is_dir():
         check_output(out, own=own)
         if suffix in OVERLAYS:
             return Target(out.parent, (), (out.name,))
         return Target(out.parent, (tuple(place.name for place in numbered(out, count)),), ())
     if suffix and not out.is_dir():
-        fail(f"cannot write {out}: a file ends in {', '.join(WRITES)}, and a folder's name has no ending; got {suffix}")
+        fail(
+            f"cannot write {out}: a file ends in {', '.join(writable())}, and a folder's name has no ending; got {suffix}"
+        )
     check_folder(out)
     width = max(2, len(str(count - 1)))
     names = tuple(tuple(f"future_{i:0{width}d}.{one}" for i in range(count)) for one in dict.fromkeys(formats))

@@ -14,6 +14,7 @@ from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, no
 from motionloom.cli.sampling import bar, check_count, fail, sampling_of
 from motionloom.cli.skeletons import Target, add_skeleton, read_target
 from motionloom.cli.writing import add_writing, at_rate, check_overwriting, check_rate, check_unit
+from motionloom.formats import readable
 
 if TYPE_CHECKING:
     from motionloom.goals.hold import FixedJoints
@@ -46,7 +47,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     predict = subparsers.add_parser(
         "predict",
         help="make motions that may come after a motion file",
-        description="Make futures of a motion (.bvh, .amc with its .asf, .glb, .npz): see docs/predict.md.",
+        description=f"Make futures of a motion ({', '.join(readable())}): see docs/predict.md.",
     )
     predict.add_argument("past", type=Path, metavar="PAST")
     predict.add_argument(

@@ -5,6 +5,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionloom.formats import with_clips
+
 if TYPE_CHECKING:
     from motionloom.motion import Motion
 
@@ -90,9 +92,9 @@ def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float
     from motionloom import io
     from motionloom.errors import MotionloomError
 
-    if arguments.animation is not None and path.suffix.lower() not in io.CLIPS:
+    if arguments.animation is not None and path.suffix.lower() not in with_clips():
         raise MotionloomError(
-            f"--clip picks one of several animations of a {', '.join(io.CLIPS)}, and {path} is none; leave it out "
+            f"--clip picks one of several animations of a {', '.join(with_clips())}, and {path} is none; leave it out "
             "(--clip-name names the one that is written)"
         )
     unit, orders = None, {}

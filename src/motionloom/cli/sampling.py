@@ -11,6 +11,7 @@ from motionloom.cli.newcomers import one_sentence, suggestion, with_options
 from motionloom.cli.skeletons import Target, add_skeleton, own_outs, read_target
 from motionloom.cli.terminal import escaping, unescaped
 from motionloom.cli.writing import add_writing, check_rate, check_unit
+from motionloom.formats import writable
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
@@ -37,8 +38,7 @@ def add_sampling(
         type=Path,
         action="append",
         metavar="NAME",
-        help="file to write, repeatable; .bvh .glb .vrma .usda .npz .mp4 .gif .png (default motion.bvh; motion.glb "
-        "for a character)",
+        help=f"file to write, repeatable; {' '.join(writable())} (default motion.bvh; motion.glb for a character)",
     )
     parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 24)")
     parser.add_argument(

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionloom.formats import readable
+
 if TYPE_CHECKING:
     from motionloom.ground import GroundPose
     from motionloom.io.character import Character
@@ -362,9 +364,9 @@ def _find(arguments: argparse.Namespace) -> Target:
         except MotionloomError as error:
             raise MotionloomError(str(error).replace(str(made), str(path))) from None
         return Target(name, character.skeleton, character=character, kept=folder, **options)
-    if suffix not in io.READS:
+    if suffix not in readable():
         raise MotionloomError(
-            f"--skeleton needs {', '.join(NAMED)} or a file (.asf, {', '.join(io.READS)}); got {name!r}"
+            f"--skeleton needs {', '.join(NAMED)} or a file (.asf, {', '.join(readable())}); got {name!r}"
         )
     return Target(name, io.load(path).skeleton, **options)
 

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 from motionloom.cli.reading import as_rate, as_unit
 from motionloom.cli.sampling import fail
 from motionloom.cli.writing import add_force, check_overwriting
+from motionloom.formats import readable
 
 if TYPE_CHECKING:
     from motionloom.data.examples import CaptionedClip, Example
     from motionloom.motion import Motion
-
-READS = (".bvh", ".amc", ".glb", ".npz")
 
 
 def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -94,7 +93,7 @@ def _words(words: list[str]) -> tuple[str, list[str]]:
     """The caption, which is no file and no folder and comes first or nowhere, and the clips."""
     caption, places = ("", words)
     first = words[0]
-    if not Path(first).exists() and Path(first).suffix.lower() not in READS:
+    if not Path(first).exists() and Path(first).suffix.lower() not in readable():
         caption, places = first, words[1:]
     if not places:
         fail(f"no clips behind {caption[:60]!r}; name files, as in: motionloom teach 'a zombie walks' clips/*.bvh")

@@ -17,7 +17,7 @@ from motionloom.data.words import mirror_text
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
 from motionloom.features.layout import FPS
-from motionloom.io import READS
+from motionloom.formats import readable
 from motionloom.kinematics.physics import Array
 from motionloom.motion import Motion
 from motionloom.reading import read_bytes
@@ -71,14 +71,14 @@ def find_examples(places: Sequence[Path | str], caption: str = "") -> list[Capti
     files: dict[Path, bool] = {}
     for place in map(Path, places):
         if place.is_dir():
-            inside = (path for path in sorted(place.rglob("*")) if path.suffix.lower() in READS and path.is_file())
+            inside = (path for path in sorted(place.rglob("*")) if path.suffix.lower() in readable() and path.is_file())
             files.update(dict.fromkeys(inside, True))
-        elif place.is_file() and place.suffix.lower() in READS:
+        elif place.is_file() and place.suffix.lower() in readable():
             files.setdefault(place, False)
         elif place.is_file():
-            raise MotionloomError(f"{place} is no motion file; give {', '.join(READS)} or folders of them")
+            raise MotionloomError(f"{place} is no motion file; give {', '.join(readable())} or folders of them")
         else:
-            raise MotionloomError(f"there is no clip {place}; give motion files ({', '.join(READS)}) or folders")
+            raise MotionloomError(f"there is no clip {place}; give motion files ({', '.join(readable())}) or folders")
         if len(files) > MOST_CLIPS:
             raise MotionloomError(
                 f"more than {MOST_CLIPS} clips are not taught but trained: see 'motionloom train prior'; give 1 to "

@@ -10,7 +10,6 @@ from motionloom.edits.meeting import Meeting
 from motionloom.edits.pair_motion import PairMotion
 from motionloom.edits.steering import toward
 from motionloom.features.pair import PlaceCode
-from motionloom.goals.goal import Goal
 from motionloom.ground import GroundPose
 from motionloom.weights.prior import Prior
 
@@ -53,17 +52,21 @@ class Bodies:
         made = pair
         if self.meeting:
             self.meeting.look(pair.places())
-            made = self.meeting.near(made, shares)
+            made = self._reaching(prior, self.meeting.near(made, shares), level)
         made = kept_apart(made, shares, still=self.still)
-        if made is not pair:
-            # the difference: what is not sure yet is near 0, and must not become sure by this
-            places = (places + code.encode(made.poses) - code.encode(pair.poses)).astype(places.dtype)
-            motion = ((made.features - prior.mean) / prior.spread).astype(motion.dtype)
-        if self.meeting:
-            goals = self.meeting.goals(made.places())
-            motion = np.stack([self._reaching(prior, motion[i], goals[i], made.poses[i], level) for i in (0, 1)])
-        return motion, places, made.poses
+        if made is pair:
+            return motion, places, poses
+        # the difference: what is not sure yet is near 0, and must not become sure by this
+        places = (places + code.encode(made.poses) - code.encode(pair.poses)).astype(places.dtype)
+        return ((made.features - prior.mean) / prior.spread).astype(motion.dtype), places, made.poses
 
-    def _reaching(self, prior: Prior, motion: np.ndarray, goal: Goal, pose: np.ndarray, level: int) -> np.ndarray:
-        """One person's motion (frames, 263), standardised, with limbs that reach for a goal in the world."""
-        return toward(goal.seen_from(GroundPose.of_numbers(pose)), prior)(motion, level)
+    def _reaching(self, prior: Prior, pair: PairMotion, level: int) -> PairMotion:
+        """The pair, with limbs that reach for what they are to touch."""
+        assert self.meeting is not None
+        features = pair.features.copy()
+        for i, goal in enumerate(self.meeting.goals(pair.places())):
+            if self.bends[i]:
+                own = goal.seen_from(GroundPose.of_numbers(pair.poses[i]))
+                standard = (features[i] - prior.mean) / prior.spread
+                features[i] = toward(own, prior)(standard, level) * prior.spread + prior.mean
+        return PairMotion(features, pair.poses)

@@ -17,9 +17,10 @@ from motionloom.edits.pair_motion import PairMotion
 from motionloom.edits.relative_pose import lacking
 from motionloom.goals.contact import CHEST, RIGHT, Contact, Touch
 from motionloom.goals.goal import Goal, overlaid
-from motionloom.ground import relative, turned
+from motionloom.ground import GroundPose, relative, turned
 from motionloom.kinematics.capsules import ARMS, CAPSULES, RADII, capsule_ends, closest
 from motionloom.motion import Motion, heading
+from motionloom.skeleton import SMPL22
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,15 @@ GAP = 0.04
 """Metres between two wrists that touch."""
 ASIDE = 0.12
 """Metres on the ground, from the middle between two people, within which their hands meet."""
+
+
+def _heights() -> Array:
+    """(22,) metres above the floor of the joints of somebody who stands."""
+    places = SMPL22.rest_positions()
+    return places[:, 1] - places[:, 1].min()
+
+
+_STANDING = _heights()
 
 
 @dataclass(eq=False)
@@ -98,18 +108,40 @@ class Meeting:
             return goals
         half = max(round(self.contact.seconds * 10), 1)
         at = np.arange(max(self.frame - half, self.still), min(self.frame + half + 1, frames))
+        stands = self._stands(places[:, at]) if self.contact.close else None
         for touch in self.way:
             if touch.beside is not None:
-                other = places[1 - touch.person, at]
-                beside = np.broadcast_to(touch.beside, (len(at), 3))
-                place = other[:, touch.other] + turned(beside, heading(other))
-                _ask(goals[touch.person], at, touch.joint, place)
+                _ask(goals[touch.person], at, touch.joint, self._beside(touch, places[1 - touch.person, at], stands))
                 continue
             ends = places[0, at, touch.joint], places[1, at, touch.other]
             point, across = self._point(places[:, at], ends)
             _ask(goals[0], at, touch.joint, point - GAP / 2 * across)
             _ask(goals[1], at, touch.other, point + GAP / 2 * across)
+        for goal, stand in zip(goals, stands or (), strict=False):
+            goal.positions[at, 0], goal.asked[at, 0] = (stand.x, 0.0, stand.z), (True, False, True)
+            goal.facing[at], goal.facing_asked[at] = stand.facing, True
         return goals
+
+    def _stands(self, places: Array) -> list[GroundPose]:
+        """Where both stand while they are in each other's arms: as near and turned as the words say, in the middle of
+        where they are; nobody goes by where the other goes."""
+        hips = places[:, :, 0].mean(axis=1)
+        line = (hips[1] - hips[0])[[0, 2]]
+        distance = float(np.linalg.norm(line))
+        facing = float(np.arctan2(line[0], line[1])) if distance > 1e-3 else float(heading(places[0])[0])
+        ahead = np.array([np.sin(facing), np.cos(facing)]) * np.clip(distance, *self.contact.apart) / 2
+        x, z = hips.mean(axis=0)[[0, 2]]
+        return [
+            GroundPose(x - ahead[0], z - ahead[1], facing),
+            GroundPose(x + ahead[0], z + ahead[1], facing + np.pi),
+        ]
+
+    def _beside(self, touch: Touch, other: Array, stands: list[GroundPose] | None) -> Array:
+        """(frames, 3) where a touch is on the other person, who is at (frames, 22, 3)."""
+        beside = np.broadcast_to(np.array(touch.beside), (len(other), 3))
+        if stands is None:
+            return other[:, touch.other] + turned(beside, heading(other))
+        return stands[1 - touch.person].to_world(beside + np.array([0.0, _STANDING[touch.other], 0.0]))
 
     def _point(self, places: Array, ends: tuple[Array, Array]) -> tuple[Array, Array]:
         """(frames, 3) where two hands meet, and the unit vectors from one to the other."""

@@ -12,7 +12,7 @@ from typing import Literal
 from motionloom.skeleton import SMPL22
 
 Turn = Literal["facing", "beside", "any"]
-LEFT, RIGHT, CHEST = SMPL22.index("left_wrist"), SMPL22.index("right_wrist"), SMPL22.index("spine3")
+LEFT, RIGHT, CHEST, HEAD = (SMPL22.index(name) for name in ("left_wrist", "right_wrist", "spine3", "head"))
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,8 @@ class Contact:
     """Metres above the floor between which hands meet."""
     seconds: float = 0.4
     """How long."""
+    close: bool = False
+    """Whether they stand in each other's arms."""
 
     def __str__(self) -> str:
         """What was read."""
@@ -58,9 +60,9 @@ _ANY = tuple(_hands(pair) for pair in ((LEFT, RIGHT), (RIGHT, LEFT), (RIGHT, RIG
 _ARMS_AROUND = tuple(
     Touch(person, joint, CHEST, place)
     for person in (0, 1)
-    for joint, place in ((LEFT, (-0.06, 0.02, -0.11)), (RIGHT, (0.06, -0.18, -0.11)))
+    for joint, place in ((LEFT, (-0.12, 0.04, -0.06)), (RIGHT, (0.12, -0.12, -0.06)), (HEAD, (-0.11, 0.26, 0.27)))
 )
-"""One arm above the other's, one below: so they do not cross."""
+"""One arm above the other's, one below, and the head to the left: so nothing crosses."""
 _AGAINST = tuple(
     Touch(0, joint, CHEST, place) for joint, place in ((LEFT, (-0.13, 0.06, 0.1)), (RIGHT, (0.13, 0.06, 0.1)))
 )
@@ -75,12 +77,12 @@ _CONTACTS = (
     (
         r"high[- ]tens?|double high[- ]fives?",
         Contact(
-            "give a high ten", (_hands((RIGHT, LEFT), (LEFT, RIGHT)),), (0.5, 0.7), height=(1.4, 1.55), seconds=0.2
+            "give a high ten", (_hands((RIGHT, LEFT), (LEFT, RIGHT)),), (0.5, 0.7), height=(1.48, 1.58), seconds=0.2
         ),
     ),
     (
         r"high[- ]?fives?|highfiv(?:e|es|ing)",
-        Contact("give a high five", (_hands((RIGHT, RIGHT)),), (0.5, 0.7), height=(1.4, 1.55), seconds=0.2),
+        Contact("give a high five", (_hands((RIGHT, RIGHT)),), (0.5, 0.7), height=(1.48, 1.58), seconds=0.2),
     ),
     (
         r"fist[- ]?bump(?:s|ing)?|bump(?:s|ing)? fists",
@@ -88,7 +90,7 @@ _CONTACTS = (
     ),
     (
         r"hugs?|hugging|embrac(?:e|es|ing)",
-        Contact("hug", (_ARMS_AROUND,), (0.2, 0.26), seconds=1.6),
+        Contact("hug", (_ARMS_AROUND,), (0.38, 0.42), seconds=1.6, close=True),
     ),
     (
         rf"(?:push|shov)(?:es|e|ing)? {_EACH_OTHER}",

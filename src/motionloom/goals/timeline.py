@@ -362,11 +362,11 @@ class _Reader(LinedFile):
     def start(self, found: Lined | None) -> Path | None:
         if found is None:
             return None
-        from motionloom.io import READS
+        from motionloom.formats import readable
 
         place = self.file(found, "start")
-        if place.suffix.lower() not in READS:
-            self.fail(found.line, f"'start' must name a motion, one of {', '.join(READS)}; got {self.got(found)}")
+        if place.suffix.lower() not in readable():
+            self.fail(found.line, f"'start' must name a motion, one of {', '.join(readable())}; got {self.got(found)}")
         return place
 
     def file(self, found: Lined, name: str) -> Path:

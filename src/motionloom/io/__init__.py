@@ -4,16 +4,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from motionloom import formats
 from motionloom.errors import MotionloomError
+from motionloom.formats import Format
 from motionloom.io.atomic import check_place
 from motionloom.motion import Motion
 
-READS = (".bvh", ".amc", ".glb", ".gltf", ".vrm", ".vrma", ".fbx", ".npz")
 GLTF = (".glb", ".gltf", ".vrm", ".vrma")
-CLIPS = (*GLTF, ".fbx")
-"""Files that hold several animations."""
-WRITES = (".bvh", ".glb", ".vrma", ".usda", ".fbx", ".npz", ".mp4", ".gif", ".png")
-_ONE_PERSON = (".bvh", ".npz", ".vrma")
 _OWN = "that is written for a character of such a file: --skeleton hero{0} --out moving{0}; else write a .glb"
 _BLENDER = "Blender turns it into a .glb (docs/blender.md)"
 _WAYS_OUT = {
@@ -42,50 +39,36 @@ def load(
     Raises `MotionloomError` for a file that is missing, damaged or of another kind.
     """
     path = Path(path)
-    suffix = path.suffix.lower()
-    _check(path, suffix, fps, unit=unit, asf=asf)
-    if clip is not None and suffix not in CLIPS:
-        raise MotionloomError(f"{path} holds one motion; a clip is chosen in .glb, .gltf, .vrm and .fbx files")
-    if suffix == ".bvh":
-        from motionloom.io.bvh import load_bvh
-
-        return load_bvh(path, fps=fps, unit=unit)
-    if suffix == ".amc":
-        from motionloom.io.asf import find_asf, load_asf_amc
-
-        return load_asf_amc(asf or find_asf(path), path, fps=fps, unit=unit)
-    if suffix == ".npz":
-        from motionloom.io.npz import load_npz
-
-        return load_npz(path, fps=fps)
-    if suffix == ".fbx":
-        from motionloom.io.fbx import load_fbx
-
-        motion = load_fbx(path, clip=clip)
-    else:
-        from motionloom.io.gltf import load_glb
-
-        motion = load_glb(path, clip=clip)
-    motion = motion if fps is None else replace(motion, fps=fps)
-    return motion if unit is None else motion.scaled(unit)
+    options = {"fps": fps, "unit": unit, "asf": asf, "clip": clip}
+    found = _checked(path, fps, unit=unit, asf=asf)
+    if clip is not None and not found.clips:
+        raise MotionloomError(f"{path} holds one motion; a clip is chosen in {', '.join(formats.with_clips())} files")
+    own = {name: value for name, value in options.items() if value is not None and name in found.options}
+    motion = formats.call(found.reader, path, **own)
+    motion = motion if fps is None or "fps" in own else replace(motion, fps=fps)
+    return motion if unit is None or "unit" in own else motion.scaled(unit)
 
 
-def _check(path: Path, suffix: str, fps: float | None, *, unit: float | None, asf: Path | str | None) -> None:
+def _checked(path: Path, fps: float | None, *, unit: float | None, asf: Path | str | None) -> Format:
+    """The format of a file that may be read, with options that may go with it."""
+    found = formats.find(path)
+    suffix = found.suffix
     if path.is_dir():
         raise MotionloomError(f"{path} is a folder; name a file in it")
     if suffix == ".asf":
         raise MotionloomError(f"{path} is a skeleton without a motion; name the .amc file instead")
-    if suffix not in READS:
+    if not found.reader:
         hint = f"; {_WAYS_IN[suffix]}" if suffix in _WAYS_IN else f"; it ends in {suffix or 'none'}"
-        raise MotionloomError(f"{path} cannot be read: its name must end in {', '.join(READS)}{hint}")
+        raise MotionloomError(f"{path} cannot be read: its name must end in {', '.join(formats.readable())}{hint}")
     if fps is not None and not 1e-3 <= fps <= 1e5:
         raise MotionloomError(f"the frame rate must be a number from 0.001 to 100000; got {fps:g}")
     if unit is not None and not 1e-9 < unit < 1e9:
         raise MotionloomError(f"the unit must be a positive number of metres; got {unit:g}")
-    if unit is not None and suffix == ".npz":
+    if unit is not None and found.metres:
         raise MotionloomError(f"{path} is in metres by its format; a unit is for BVH, ASF and glTF files")
-    if asf is not None and suffix != ".amc":
+    if asf is not None and "asf" not in found.options:
         raise MotionloomError(f"{path} has its own skeleton; an ASF file is for AMC files")
+    return found
 
 
 def check_output(path: Path | str, *, own: str | None = None) -> Path:
@@ -94,19 +77,14 @@ def check_output(path: Path | str, *, own: str | None = None) -> Path:
     ``own`` is a further suffix that may be written, that of a character's own file.
     """
     path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in (*WRITES, own) and not path.is_dir():
+    found = formats.find(path)
+    suffix = found.suffix
+    if not found.writer and suffix != own and not path.is_dir():
         hint = f"; {_WAYS_OUT[suffix]}" if suffix in _WAYS_OUT else f"; it ends in {suffix or 'none'}"
-        raise MotionloomError(f"cannot write {path}: its name must end in {', '.join(WRITES)}{hint}")
+        raise MotionloomError(f"cannot write {path}: its name must end in {', '.join(formats.writable())}{hint}")
     check_place(path)
-    if suffix == ".fbx":
-        from motionloom.io.blender import find_blender
-
-        find_blender()
-    if suffix == ".mp4":
-        from motionloom.viz.film import find_ffmpeg
-
-        find_ffmpeg()
+    if found.needs:
+        formats.call(found.needs)
     return path
 
 
@@ -119,42 +97,14 @@ def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequ
     """
     path = check_output(path)
     several = [motions] if isinstance(motions, Motion) else list(motions)
-    suffix = path.suffix.lower()
-    _check_count(several, path)
-    if suffix == ".bvh":
-        from motionloom.io.bvh_writer import save_bvh
-
-        return save_bvh(several[0], path)
-    if suffix == ".npz":
-        from motionloom.io.npz import save_npz
-
-        return save_npz(several[0], path)
-    if suffix == ".vrma":
-        from motionloom.io.vrma import save_vrma
-
-        return save_vrma(several[0], path)
-    if suffix == ".usda":
-        from motionloom.io.usda import save_usda
-
-        return save_usda(several, path)
-    if suffix == ".fbx":
-        from motionloom.io.fbx import save_fbx
-
-        return save_fbx(several, path)
-    if suffix == ".glb":
-        from motionloom.io.gltf import save_glb
-
-        save_glb(several, path)
-    else:
-        from motionloom.viz.video import draw_sheet, draw_video
-
-        draw = draw_sheet if suffix == ".png" else draw_video
-        draw(several, path, captions=captions)
-    return path
+    found = formats.find(path)
+    _check_count(several, found, path)
+    labels = {"captions": captions} if found.labels == "captions" else {}
+    return formats.call(found.writer, several[0] if found.single else several, path, **labels)
 
 
-def _check_count(motions: Sequence[Motion], path: Path) -> None:
-    if not motions or (len(motions) > 1 and path.suffix.lower() in _ONE_PERSON):
+def _check_count(motions: Sequence[Motion], found: Format, path: Path) -> None:
+    if not motions or (len(motions) > 1 and found.single):
         raise MotionloomError(f"{path} holds one motion; got {len(motions)}, so give each its own file or write a .glb")
 
 
@@ -176,22 +126,12 @@ def save_scene(
     for what, texts in (("names", names), ("captions", captions)):
         if texts is not None and len(texts) != len(motions):
             raise MotionloomError(f"{len(motions)} motions need as many {what}; got {len(texts)}")
-    _check_count(motions, path)
-    suffix = path.suffix.lower()
-    if suffix in _ONE_PERSON:
+    found = formats.find(path)
+    _check_count(motions, found, path)
+    if found.single or not found.labels:
         return save(motions, path)
-    if suffix == ".glb":
-        from motionloom.io.gltf import save_glb
-
-        return save_glb(motions, path, names=names)
-    if suffix == ".usda":
-        from motionloom.io.usda import save_usda
-
-        return save_usda(motions, path, names=names)
-    if suffix == ".fbx":
-        from motionloom.io.fbx import save_fbx
-
-        return save_fbx(motions, path, names=names)
+    if found.labels == "names":
+        return formats.call(found.writer, motions, path, names=names)
     from motionloom.viz.overlay import draw_scene, tint
     from motionloom.viz.scene import Actor
 
@@ -207,9 +147,5 @@ def load_scene(path: Path | str) -> list[Motion]:
     Raises `MotionloomError` as `load` does; `load` itself gives a GLB's first person.
     """
     path = Path(path)
-    _check(path, path.suffix.lower(), None, unit=None, asf=None)
-    if path.suffix.lower() not in GLTF:
-        return [load(path)]
-    from motionloom.io.gltf import load_glb_people
-
-    return load_glb_people(path)
+    found = _checked(path, None, unit=None, asf=None)
+    return formats.call(found.people, path) if found.people else [load(path)]

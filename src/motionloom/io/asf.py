@@ -67,6 +67,13 @@ def load_asf_amc(asf: Path | str, amc: Path | str, *, fps: float | None = None, 
     )
 
 
+def load_amc(
+    path: Path | str, *, asf: Path | str | None = None, fps: float | None = None, unit: float | None = None
+) -> Motion:
+    """Read a motion as `load_asf_amc` does; ``asf`` None: the skeleton that lies beside it (`find_asf`)."""
+    return load_asf_amc(asf or find_asf(path), path, fps=fps, unit=unit)
+
+
 # ASF -----------------------------------------------------------------------------------------------------------------
 
 

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from motionloom.errors import MotionloomError
+from motionloom.formats import readable
 from motionloom.goals.fields import Field
-from motionloom.io import GLTF, READS, load, load_scene, save, save_scene
+from motionloom.io import load, load_scene, save, save_scene
 from motionloom.io.character import load_character
 from motionloom.io.text import parse_json
 from motionloom.motion import Motion
@@ -31,7 +32,7 @@ FORMATS = {
     "png": "image/png",
 }
 ONE_PERSON = ("bvh", "npz")
-UPLOADS = (*(suffix for suffix in READS if suffix not in (".gltf", ".vrma")), ".json")
+UPLOADS = (*(suffix for suffix in readable() if suffix not in (".gltf", ".vrma")), ".json")
 SUFFIXES = (".glb", ".vrm", ".gltf", ".bvh")
 """Of characters."""
 
@@ -145,7 +146,7 @@ def read_upload(project: Project, part: Path, name: str, *, asf: str | None, lim
     elif suffix == ".json":
         people = from_json(part, name)
     else:
-        people = load_scene(part) if suffix in GLTF else [load(part)]
+        people = load_scene(part)
     if len(people) > limits.people:
         raise MotionloomError(f"{name} holds {len(people)} people; at most {limits.people} are taken")
     for motion in people:

@@ -1,0 +1,128 @@
+"""File formats of motion, by suffix: what reads and writes each, and what may be said of it.
+
+Functions are named as ``module:function`` and imported when a file is read or written, so that all formats can be
+listed, as ``--help`` does, before any of them is opened. A package of your own adds one with `register`, or by an
+entry point of the group `GROUP` that is named as the suffix without its dot and leads to a `Format`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+GROUP = "motionloom.formats"
+
+
+@dataclass(frozen=True)
+class Format:
+    """One kind of file."""
+
+    suffix: str
+    """In small letters, with its dot."""
+    reader: str | Callable[..., Any] = ""
+    """``(path, **options) -> Motion`` in metres; empty: it is not read."""
+    options: tuple[str, ...] = ()
+    """Those of ``fps``, ``unit``, ``asf`` and ``clip`` that the reader takes; the first two are else applied behind it."""
+    metres: bool = False
+    """It is in metres by its definition, so that a unit is a mistake."""
+    clips: bool = False
+    """It holds several animations, of which ``clip`` picks one."""
+    people: str | Callable[..., Any] = ""
+    """``(path) -> list[Motion]``: everybody in it, in one world; empty: it holds one person."""
+    writer: str | Callable[..., Any] = ""
+    """``(motions, path) -> path``; empty: it is not written."""
+    single: bool = False
+    """It holds one person: the writer takes one motion instead of several."""
+    labels: str = ""
+    """The keyword by which the writer takes a word for each motion: ``names``, ``captions``, or none."""
+    needs: str | Callable[..., Any] = ""
+    """Raises `MotionloomError` where a program that the writer needs is missing; asked before long work."""
+
+
+def _picture(suffix: str, draw: str, needs: str = "") -> Format:
+    return Format(suffix, writer=f"motionloom.viz.video:{draw}", labels="captions", needs=needs)
+
+
+def _gltf(suffix: str, **written: Any) -> Format:
+    people = "motionloom.io.gltf:load_glb_people"
+    return Format(suffix, "motionloom.io.gltf:load_glb", ("clip",), clips=True, people=people, **written)
+
+
+FORMATS = {
+    one.suffix: one
+    for one in (
+        Format(
+            ".bvh",
+            "motionloom.io.bvh:load_bvh",
+            ("fps", "unit"),
+            writer="motionloom.io.bvh_writer:save_bvh",
+            single=True,
+        ),
+        Format(".amc", "motionloom.io.asf:load_amc", ("fps", "unit", "asf")),
+        _gltf(".glb", writer="motionloom.io.gltf:save_glb", labels="names"),
+        _gltf(".gltf"),
+        _gltf(".vrm"),
+        _gltf(".vrma", writer="motionloom.io.vrma:save_vrma", single=True),
+        Format(".usda", writer="motionloom.io.usda:save_usda", labels="names"),
+        Format(
+            ".fbx",
+            "motionloom.io.fbx:load_fbx",
+            ("clip",),
+            clips=True,
+            writer="motionloom.io.fbx:save_fbx",
+            labels="names",
+            needs="motionloom.io.blender:find_blender",
+        ),
+        Format(
+            ".npz",
+            "motionloom.io.npz:load_npz",
+            ("fps",),
+            metres=True,
+            writer="motionloom.io.npz:save_npz",
+            single=True,
+        ),
+        _picture(".mp4", "draw_video", "motionloom.viz.film:find_ffmpeg"),
+        _picture(".gif", "draw_video"),
+        _picture(".png", "draw_sheet"),
+    )
+}
+"""Every format, by its suffix."""
+
+
+def register(*formats: Format) -> None:
+    """Add formats, or replace those of the same suffixes, for this process."""
+    FORMATS.update({one.suffix: one for one in formats})
+
+
+def find(path: Path | str) -> Format:
+    """The format of a path by its suffix; one that neither reads nor writes where nothing knows it."""
+    suffix = Path(path).suffix.lower()
+    if suffix and suffix not in FORMATS:
+        from importlib.metadata import entry_points
+
+        register(*(point.load() for point in entry_points(group=GROUP, name=suffix[1:])))
+    return FORMATS.get(suffix, Format(suffix))
+
+
+def call(function: str | Callable[..., Any], *values: Any, **options: Any) -> Any:
+    """What a format's function answers."""
+    if isinstance(function, str):
+        module, _, name = function.partition(":")
+        function = getattr(import_module(module), name)
+    return function(*values, **options)
+
+
+def readable() -> tuple[str, ...]:
+    """Suffixes of files that are read."""
+    return tuple(suffix for suffix, one in FORMATS.items() if one.reader)
+
+
+def writable(*, single: bool | None = None) -> tuple[str, ...]:
+    """Suffixes of files that are written; ``single``: only those that hold one person, or only the others."""
+    return tuple(suffix for suffix, one in FORMATS.items() if one.writer and single in (None, one.single))
+
+
+def with_clips() -> tuple[str, ...]:
+    """Suffixes of files that hold several animations."""
+    return tuple(suffix for suffix, one in FORMATS.items() if one.clips)
