@@ -20,6 +20,7 @@ FAMILIES = (
     "batch",
     "serve",
     "files",
+    "robots",
     "weights",
     "completion",
 )
@@ -57,6 +58,7 @@ BROUGHT_BY = {
     "onnx": "motionloom[train]",
     "motionloom.train": "motionloom[train]",
     "matplotlib": "motionloom[lab]",
+    **dict.fromkeys(("mujoco", "mink", "qpsolvers", "daqp"), "motionloom[robots]"),
     "motionloom.lab": "motionloom[lab]",
 }
 """What this package does without, and what installs each."""

@@ -30,6 +30,7 @@ def add_reading(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--asf", type=Path, metavar="FILE", help="skeleton of an AMC file (default: the one beside it)"
     )
+    add_robot(command)
     command.add_argument("--source-fps", type=as_rate, metavar="N", help="take this rate for the file's (AMC: 120)")
     command.add_argument("--start", type=as_seconds, metavar="S", help="begin at this second")
     command.add_argument("--end", type=as_seconds, metavar="S", help="end at this second")
@@ -44,6 +45,28 @@ def add_blender(command: argparse.ArgumentParser) -> None:
             metavar="PROGRAM",
             help="Blender, or a Python with bpy, for .fbx files (default: the one on the path)",
         )
+
+
+def add_robot(command: argparse.ArgumentParser) -> None:
+    """``--robot`` and what goes with it, once."""
+    if "--robot" in command._option_string_actions:
+        return
+    command.add_argument(
+        "--robot",
+        type=Path,
+        metavar="MODEL",
+        help="a humanoid robot's model (.xml of MuJoCo, .urdf): its joint angles are written and read, .csv or .npz",
+    )
+    command.add_argument("--robot-map", type=Path, metavar="JSON", help="which joints are which, of the --robot")
+    command.add_argument(
+        "--max-speed",
+        type=float,
+        metavar="RAD/S",
+        help="speed that no joint of the robot exceeds (default: the model's)",
+    )
+    command.add_argument("--avoid-collisions", action="store_true", help="keep the robot's parts out of each other")
+    command.add_argument("--no-header", action="store_true", help="leave the names out of a .csv")
+    command.add_argument("--figures", action="store_true", help="print how good the robot's clip is, as a line of JSON")
 
 
 def _number(text: str) -> float:
@@ -90,8 +113,11 @@ def as_unit(text: str) -> float:
 def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float | None, dict[str, str]]":
     """The motion and, of a BVH, the unit of its file and the orders of its rotations."""
     from motionloom import io
+    from motionloom.cli.robots import read_motion, reads_as_clip
     from motionloom.errors import MotionloomError
 
+    if reads_as_clip(arguments, path):
+        return read_motion(arguments, path), None, {}
     if arguments.animation is not None and path.suffix.lower() not in with_clips():
         raise MotionloomError(
             f"--clip picks one of several animations of a {', '.join(with_clips())}, and {path} is none; leave it out "
@@ -141,7 +167,7 @@ def check_size(arguments: argparse.Namespace, path: Path, motion: "Motion") -> N
     from motionloom.errors import MotionloomError
     from motionloom.retarget.anatomy import read_body
 
-    if arguments.unit is not None or path.suffix.lower() in (".npz", ".amc"):
+    if arguments.unit is not None or path.suffix.lower() in (".npz", ".csv", ".amc"):
         return
     try:
         leg = read_body(motion.skeleton).leg

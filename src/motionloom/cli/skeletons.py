@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionloom.cli.reading import add_robot
 from motionloom.formats import readable
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ def add_skeleton(parser: argparse.ArgumentParser, *, own: str = "the uniform per
     )
     parser.add_argument("--replace", action="store_true", help="leave only this animation in the character's file")
     parser.add_argument("--target-map", type=Path, metavar="JSON", help="which joints are which, of the --skeleton")
+    add_robot(parser)
 
 
 @dataclass(frozen=True)
@@ -232,6 +234,8 @@ def add_one_file(parser: argparse.ArgumentParser) -> None:
 
 def own_outs(arguments: argparse.Namespace, name: str, suffix: str = ".bvh") -> list[Path]:
     """What is written where the line does not say: ``name`` with the suffix, or as the character is."""
+    if arguments.robot is not None:
+        return [Path(name + ".csv")]
     own = Path(arguments.skeleton or "").suffix.lower()
     return [Path(name + (own if own in CHARACTERS else suffix))]
 
@@ -240,6 +244,13 @@ def read_target(arguments: argparse.Namespace, outs: Sequence[Path]) -> Target |
     """The skeleton that the line names, if it does; refuses options and files that do not go with it."""
     from motionloom.errors import MotionloomError
 
+    if arguments.robot is not None:
+        from motionloom.cli.robots import read_robot_target
+
+        return read_robot_target(arguments)
+    for name in ("robot_map", "max_speed", "avoid_collisions", "no_header", "figures"):
+        if getattr(arguments, name):
+            raise MotionloomError(f"--{name.replace('_', '-')} goes with a --robot; name its model")
     if arguments.skeleton is None:
         for name in ("root", "hands", "at", "clip_name", "replace", "one_file", "target_map"):
             if getattr(arguments, name, None):

@@ -166,7 +166,7 @@ def correction(ankle: Array, toe: Array, planted: Flags, fps: float, *, held: bo
     result = np.zeros_like(ankle)
     for start, values in pieces:
         result[start : start + len(values)] = values
-    _bridge(result, [(start, start + len(values)) for start, values in pieces], ease)
+    bridge(result, [(start, start + len(values)) for start, values in pieces], ease)
     return result
 
 
@@ -186,8 +186,9 @@ def _pieces(steps: Array, standing: Flags, hole: int) -> Iterator[tuple[int, Arr
         waiting += [(fastest + 1 + hole, stop), (start, fastest + 1 - hole)]
 
 
-def _bridge(values: Array, pieces: list[tuple[int, int]], ease: int) -> None:
-    """Fill the frames between pieces of ``values`` (frames, 3): across short gaps directly, else by way of zero."""
+def bridge(values: Array, pieces: list[tuple[int, int]], ease: int) -> None:
+    """Fill the frames between pieces of ``values`` (frames, 3), in place: across short gaps directly, else by way of
+    zero, in ``ease`` frames."""
     frames = len(values)
     ends = [(-ease, -ease), *pieces, (frames + ease, frames + ease)]
     for (first, stop), (start, last) in pairwise(ends):

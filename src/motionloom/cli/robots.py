@@ -1,0 +1,228 @@
+"""Robots on the command line: ``--robot`` of the commands that read and write motions, and ``robot-check``."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from motionloom.cli.skeletons import Target
+
+if TYPE_CHECKING:
+    from motionloom.motion import Motion
+    from motionloom.robots.body import Robot
+    from motionloom.robots.clip import Clip
+
+OUTS = (".csv", ".npz")
+PICTURES = (".png", ".mp4", ".gif")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotTarget(Target):
+    """A robot whose joint angles are written. Motions reach `save` as they are; the robot's own rate is set there."""
+
+    robot: "Robot"
+    fps: float
+    max_speed: float | None = None
+    avoid: bool = False
+    header: bool = True
+    figures: bool = False
+
+    @property
+    def suffix(self) -> str | None:
+        """The suffix of joint angles that no other motion has."""
+        return ".csv"
+
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """Files that hold one robot."""
+        return OUTS
+
+    def writes(self, path: Path) -> bool:
+        """No file of a robot is a character's with one more animation."""
+        return False
+
+    def put(self, motion: "Motion", *, source: str = "the motion", source_map: Path | None = None) -> "Motion":
+        """The motion as it is, or on the uniform person where a map says which joints are which."""
+        from motionloom.retarget import to_smpl22
+
+        return motion if source_map is None else to_smpl22(motion, source_map)
+
+    def put_together(self, motions: "Sequence[Motion]") -> "list[Motion]":
+        """Motions of one world, as they are."""
+        return list(motions)
+
+    def save(self, motion: "Motion", path: Path, *, caption: str | None = None) -> Path:
+        """Write the robot's clip, or a picture or a film of it; any other format gets the motion of its skeleton."""
+        from motionloom import io
+        from motionloom.robots.body import to_motion
+        from motionloom.robots.files import save_clip
+        from motionloom.robots.film import draw
+
+        clip = self.clip(motion, path)
+        if path.suffix.lower() in OUTS:
+            return save_clip(clip, self.robot, path, header=self.header)
+        if path.suffix.lower() in PICTURES:
+            return draw(self.robot, clip.qpos, clip.fps, path, caption=caption or "")
+        return io.save(to_motion(self.robot, clip.qpos, clip.fps), path)
+
+    def clip(self, motion: "Motion", path: Path) -> "Clip":
+        """The motion as the robot does it, with a line on stderr about what became of it."""
+        from motionloom.errors import MotionloomError
+        from motionloom.robots.clip import put_on_robot
+        from motionloom.robots.figures import measure
+
+        try:
+            clip = put_on_robot(motion, self.robot, fps=self.fps, max_speed=self.max_speed, avoid_collisions=self.avoid)
+        except MotionloomError as error:
+            raise MotionloomError(f"{path} for {self.robot.name}: {error}") from None
+        figures = measure(clip, self.robot)
+        if clip.slowed:
+            print(
+                f"note: {path} is {clip.slowed:.2f} s longer than the motion, so that no joint is too fast",
+                file=sys.stderr,
+            )
+        for fault in figures.faults():
+            print(f"note: {path}: {fault}", file=sys.stderr)
+        if self.figures:
+            import json
+
+            print(json.dumps({"file": str(path), **figures.as_dict()}))
+        return clip
+
+
+def read_robot_target(arguments: argparse.Namespace) -> RobotTarget:
+    """What ``--robot`` and its options say."""
+    from motionloom.errors import MotionloomError
+    from motionloom.robots.clip import FPS, check_settings
+
+    for name in ("skeleton", "root", "hands", "at", "clip_name", "replace", "one_file", "target_map"):
+        if getattr(arguments, name, None):
+            raise MotionloomError(f"--{name.replace('_', '-')} is for characters; leave it out with --robot")
+    fps = arguments.fps or FPS
+    check_settings(fps, arguments.max_speed)
+    robot = opened(arguments)
+    print(f"note: {robot.name}: {robot.parts.told()} (--robot-map says otherwise)", file=sys.stderr)
+    return RobotTarget(
+        name=str(arguments.robot),
+        skeleton=robot.skeleton,
+        robot=robot,
+        fps=fps,
+        max_speed=arguments.max_speed,
+        avoid=arguments.avoid_collisions,
+        header=not arguments.no_header,
+        figures=arguments.figures,
+    )
+
+
+def opened(arguments: argparse.Namespace) -> "Robot":
+    """The robot of the line, what its file lacks told."""
+    from motionloom.robots.body import read_robot
+
+    robot = read_robot(arguments.robot, arguments.robot_map)
+    for note in robot.notes:
+        print(f"note: {note}", file=sys.stderr)
+    return robot
+
+
+def reads_as_clip(arguments: argparse.Namespace, path: Path) -> bool:
+    """Whether a file holds joint angles of a robot; refuses one where the line names no robot."""
+    from motionloom.errors import MotionloomError
+
+    if path.suffix.lower() not in OUTS:
+        return False
+    from motionloom.robots.files import is_clip
+
+    if not is_clip(path):
+        return False
+    if getattr(arguments, "robot", None) is None:
+        raise MotionloomError(f"{path} holds joint angles of a robot; name its model with --robot")
+    return True
+
+
+def read_motion(arguments: argparse.Namespace, path: Path) -> "Motion":
+    """A robot's file as motion of its skeleton."""
+    from motionloom.robots.body import to_motion
+    from motionloom.robots.files import load_clip
+
+    robot = opened(arguments)
+    clip = load_clip(path, robot, fps=arguments.source_fps)
+    if path.suffix.lower() == ".csv" and arguments.source_fps is None:
+        print(
+            f"note: {path} states no rate; {clip.fps:g} frames per second are assumed (--source-fps)", file=sys.stderr
+        )
+    return to_motion(robot, clip.qpos, clip.fps)
+
+
+def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Register ``robot-check``."""
+    from motionloom.cli.reading import add_reading, add_robot
+
+    parser = subparsers.add_parser(
+        "robot-check",
+        help="say how good a robot's clip is",
+        description="Say how good a robot's clip is: soles, limits, speeds, hands and feet; of joint angles (.csv, "
+        ".npz) or of any motion, which is put on the robot first. Nothing is written.",
+    )
+    parser.add_argument("input", metavar="FILE", type=Path)
+    add_reading(parser)
+    add_robot(parser)
+    parser.add_argument("--source-map", type=Path, metavar="JSON", help="which joints are which, of FILE")
+    parser.add_argument(
+        "--physics", action="store_true", help="also follow the clip in MuJoCo with plain gains: when it falls"
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.set_defaults(run=run_check, fps=None)
+
+
+def run_check(arguments: argparse.Namespace) -> int:
+    """``motionloom robot-check FILE --robot MODEL``; 0 where every figure is within its limit, else 1."""
+    import json
+
+    from motionloom.cli.reading import crop, read_clip
+    from motionloom.errors import MotionloomError
+    from motionloom.robots.clip import FPS, put_on_robot
+    from motionloom.robots.figures import measure
+    from motionloom.robots.files import load_clip
+    from motionloom.robots.physics import track
+
+    if arguments.robot is None:
+        raise MotionloomError("robot-check needs the robot's model; name it with --robot")
+    robot = opened(arguments)
+    if reads_as_clip(arguments, arguments.input):
+        clip = load_clip(arguments.input, robot, fps=arguments.source_fps)
+    else:
+        motion = crop(read_clip(arguments, arguments.input)[0], arguments)
+        clip = put_on_robot(
+            motion,
+            robot,
+            fps=FPS,
+            max_speed=arguments.max_speed,
+            avoid_collisions=arguments.avoid_collisions,
+            source_map=arguments.source_map,
+        )
+    figures = measure(clip, robot)
+    found = figures.as_dict() | {"faults": figures.faults()}
+    if arguments.physics:
+        if len(clip) < 2:
+            raise MotionloomError(f"{arguments.input} has one frame; --physics follows a clip of at least two")
+        found["physics"] = track(clip, robot).as_dict()
+    if arguments.json:
+        print(json.dumps({"file": str(arguments.input), **found}, indent=2))
+    else:
+        _print(found)
+    return 1 if found["faults"] else 0
+
+
+def _print(found: dict) -> None:
+    for name, value in found.items():
+        if name == "physics":
+            fell = f"falls after {value['free_seconds']:.2f} s" if value["fell"] else "does not fall"
+            print(f"  {'root free':24} {fell}, {value['free_error']:.3f} rad off until then")
+            full = 100 * value["held_saturated"]
+            print(f"  {'root held':24} {value['held_error']:.3f} rad off, {full:.0f} % of the time at full force")
+        elif name != "faults":
+            print(f"  {name.replace('_', ' '):24} {'-' if value is None else value}")
+    for fault in found["faults"]:
+        print(f"  {'fault':24} {fault}")

@@ -1,0 +1,17 @@
+"""MuJoCo, when it is needed: nothing imports it before a robot is read."""
+
+import importlib
+import os
+import sys
+from ctypes.util import find_library
+from typing import Any
+
+
+def load_mujoco() -> Any:
+    """The module `mujoco`, set to draw without a screen, or not at all: which way it takes is settled at its import.
+
+    Raises `ModuleNotFoundError` where it is not installed (the extra ``motionloom[robots]``).
+    """
+    if sys.platform == "linux" and "DISPLAY" not in os.environ:
+        os.environ.setdefault("MUJOCO_GL", "egl" if find_library("EGL") else "disabled")
+    return importlib.import_module("mujoco")

@@ -1,0 +1,171 @@
+"""How good a robot's clip is, in figures: what its feet do, what its limits say, how near it comes to the motion."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.robots.body import Robot, to_motion, to_mujoco, turns_to_mujoco
+from motionloom.robots.clip import Clip
+from motionloom.robots.engine import load_mujoco
+from motionloom.robots.joints import SIDES
+from motionloom.robots.solve import pairs_apart
+
+Array = NDArray[np.float64]
+NEAR_LIMIT = 0.01
+"""Radians from a limit at which a hinge counts as being there."""
+_TOUCHING = 0.002
+"""Metres by which geoms are in each other before that counts."""
+_LOW, _SLOW = 0.02, 0.3
+"""Metres and metres per second: a part of a sole that is lower and slower is planted, where nobody says."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Of one clip. Feet are measured while they are planted, at the 95th percentile."""
+
+    robot: str
+    frames: int
+    fps: float
+    slowed_seconds: float
+    float_cm: float
+    """How far the lowest corner of a planted sole is above the ground."""
+    slide_cm: float
+    """How far what is planted of a sole moves along the ground in a frame."""
+    sunk_cm: float
+    """How deep the lowest corner of a sole ever is in the ground."""
+    planted_share: float
+    """Share of frames with a foot on the ground."""
+    limits_broken: int
+    """Hinges out of their range, over all frames."""
+    at_limit_share: float
+    """Share of frames with a hinge at its limit."""
+    largest_step: float
+    """Radians that a hinge moves in a frame at most."""
+    top_speed: float
+    """Radians per second of the fastest hinge, and its name."""
+    fastest: str
+    speed_share: float | None
+    """Top speed in shares of the hinge's own limit; None where the model has none."""
+    effector_cm: float | None
+    """Median distance of hands and feet from where they were to be; None where only the angles are known."""
+    outside_support_share: float
+    """Share of frames on the ground whose centre of mass is not above the planted soles: such a pose cannot be held."""
+    collision_frames: int | None
+    """Frames in which the robot's geoms are in each other; None where the model has none that could."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return asdict(self)
+
+    def faults(self) -> list[str]:
+        """What is over the limits that `docs/robots.md` names, in words."""
+        found = []
+        if self.limits_broken:
+            found.append(f"{self.limits_broken} angles are out of range")
+        if self.float_cm > 1.0:
+            found.append(f"planted soles float {self.float_cm:.1f} cm")
+        if self.slide_cm > 0.3:
+            found.append(f"planted soles slide {self.slide_cm:.2f} cm a frame")
+        if self.sunk_cm > 1.0:
+            found.append(f"soles are {self.sunk_cm:.1f} cm in the ground")
+        if self.largest_step * self.fps > 15.001:
+            found.append(f"{self.fastest} jumps {self.largest_step:.2f} rad in a frame")
+        if self.speed_share is not None and self.speed_share > 1.001:
+            found.append(f"{self.fastest} is {self.speed_share:.2f} times as fast as it can be")
+        if self.effector_cm is not None and self.effector_cm > 6.0:
+            found.append(f"hands and feet are {self.effector_cm:.1f} cm off")
+        if self.collision_frames:
+            found.append(f"the robot touches itself in {self.collision_frames} frames")
+        return found
+
+
+def measure(clip: Clip, robot: Robot) -> Figures:
+    """The figures of a clip."""
+    corners, masses, touching = _followed(clip, robot)
+    planted = clip.planted
+    edges = np.stack([corners[:, :, :2].mean(axis=2), corners[:, :, 2:].mean(axis=2)], axis=2)
+    stays = planted[1:] & planted[:-1]
+    moved = np.linalg.norm(np.diff(edges[..., :2], axis=0), axis=-1)[stays]
+    stands = planted[..., 0] | planted[..., 1]
+    heights = corners[..., 2].min(axis=2)
+    angles = clip.qpos[:, 7:]
+    lower, upper = robot.file.lower, robot.file.upper
+    speeds = np.abs(np.diff(angles, axis=0)) * clip.fps if len(clip) > 1 else np.zeros((1, angles.shape[1]))
+    top = speeds.max(axis=0)
+    share = top / robot.file.speed
+    fastest = int((share if np.isfinite(robot.file.speed).any() else top).argmax())
+    supported = stands[:, 0] | stands[:, 1]
+    outside = [_outside(masses[f], corners[f][stands[f]].reshape(-1, 3)) for f in np.flatnonzero(supported)]
+    return Figures(
+        robot=robot.name,
+        frames=len(clip),
+        fps=clip.fps,
+        slowed_seconds=round(clip.slowed, 3),
+        float_cm=_high(100 * heights[stands]),
+        slide_cm=_high(100 * moved),
+        sunk_cm=round(100 * max(0.0, -float(heights.min())), 3),
+        planted_share=round(float(supported.mean()), 3),
+        limits_broken=int(((angles < lower - 1e-9) | (angles > upper + 1e-9)).sum()),
+        at_limit_share=round(
+            float(((angles < lower + NEAR_LIMIT) | (angles > upper - NEAR_LIMIT)).any(axis=1).mean()), 3
+        ),
+        largest_step=round(float(top.max()) / clip.fps, 4),
+        top_speed=round(float(top[fastest]), 3),
+        fastest=robot.file.hinges[fastest].name,
+        speed_share=round(float(share[fastest]), 4) if share[fastest] > 0 else None,
+        effector_cm=None if clip.errors is None else round(100 * float(np.median(clip.errors)), 3),
+        outside_support_share=round(float(np.mean(outside)), 3) if outside else 0.0,
+        collision_frames=None if touching is None else int(touching.sum()),
+    )
+
+
+def _high(values: Array) -> float:
+    return round(float(np.percentile(np.abs(values), 95)), 3) if values.size else 0.0
+
+
+def _followed(clip: Clip, robot: Robot) -> tuple[Array, Array, NDArray[np.bool_] | None]:
+    """Corners of the soles (frames, 2, 4, 3), centres of mass (frames, 3), and frames in which the robot touches
+    itself."""
+    mujoco = load_mujoco()
+
+    model, data, pairs = robot.model, mujoco.MjData(robot.model), list(pairs_apart(robot))
+    sites = [model.site(robot.site(f"{side}_ankle")).id for side in SIDES]
+    corners, masses = np.empty((len(clip), 2, 4, 3)), np.empty((len(clip), 3))
+    touching, nearest = np.zeros(len(clip), dtype=bool), np.zeros(6)
+    root = int(model.jnt_bodyid[0])
+    for frame, pose in enumerate(clip.qpos):
+        data.qpos = pose
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        masses[frame] = data.subtree_com[root]
+        for number, (side, site) in enumerate(zip(SIDES, sites)):
+            corners[frame, number] = data.site_xpos[site] + robot.soles[side] @ data.site_xmat[site].reshape(3, 3).T
+        touching[frame] = any(
+            mujoco.mj_geomDistance(model, data, one, other, 0.0, nearest) < -_TOUCHING for one, other in pairs
+        )
+    return corners, masses, touching if pairs else None
+
+
+def _outside(point: Array, corners: Array) -> bool:
+    """Whether a point is not above the convex hull of points on the ground."""
+    around = corners[:, :2] - point[:2]
+    angles = np.sort(np.arctan2(around[:, 1], around[:, 0]))
+    gaps = np.diff(np.concatenate([angles, angles[:1] + 2 * np.pi]))
+    return bool(gaps.max() > np.pi)
+
+
+def planted_soles(robot: Robot, qpos: Array, fps: float) -> NDArray[np.bool_]:
+    """(frames, 2, 2) which heels and toes are on the ground, by how low and slow they are: for angles out of a file."""
+    motion = to_motion(robot, qpos, fps)
+    places, turns = to_mujoco(motion.positions()), turns_to_mujoco(motion.world_rotations())
+    found = np.zeros((len(qpos), 2, 2), dtype=bool)
+    for number, side in enumerate(SIDES):
+        j = robot.skeleton.index(f"{side}_ankle")
+        corners = places[:, j, None] + rot.rotate(turns[:, j, None], robot.soles[side][None])
+        edges = np.stack([corners[:, :2].mean(axis=1), corners[:, 2:].mean(axis=1)], axis=1)
+        speed = np.linalg.norm(np.gradient(edges, axis=0), axis=-1) * fps if len(qpos) > 1 else np.zeros((1, 2))
+        found[:, number] = (edges[..., 2] < _LOW) & (speed < _SLOW)
+    return found

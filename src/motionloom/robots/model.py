@@ -1,0 +1,188 @@
+"""Robot models: MJCF (and URDF as MuJoCo reads it) to a `Model`, checked before anything is done with it."""
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom.errors import MotionloomError, one_line
+from motionloom.reading import read_bytes
+from motionloom.robots.engine import load_mujoco
+
+Array = NDArray[np.float64]
+MAX_BYTES = 50_000_000
+MAX_HINGES = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Hinge:
+    """One joint of a robot."""
+
+    name: str
+    joint: int
+    """Number in MuJoCo's model."""
+    body: int
+    """The body that it turns."""
+    parent: int
+    """The body that this one hangs on."""
+    anchor: Array
+    """(3,) metres, and the axis (3,), in MuJoCo's world in the model's own pose (``qpos0``)."""
+    axis: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A robot as MuJoCo knows it: a root that moves freely, and hinges with limits."""
+
+    path: Path
+    spec: Any
+    """`mujoco.MjSpec`: what the model is compiled from."""
+    model: Any
+    """`mujoco.MjModel`."""
+    hinges: tuple[Hinge, ...]
+    """In the model's order, which is that of ``qpos`` behind the root's seven numbers."""
+    lower: Array
+    """(hinges,) radians."""
+    upper: Array
+    speed: Array
+    """(hinges,) radians per second; infinite where the file states none."""
+    notes: tuple[str, ...]
+    """What a user should know about the file, a sentence each."""
+
+    @property
+    def name(self) -> str:
+        """What the model calls itself; the file's name where it does not."""
+        return str(self.spec.modelname) or self.path.stem
+
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the hinges in order."""
+        return tuple(hinge.name for hinge in self.hinges)
+
+
+def read_model(path: Path | str, *, meshes: bool = False) -> Model:
+    """Read and check a robot's model.
+
+    Args:
+        path: MJCF (.xml) or URDF (.urdf).
+        meshes: Whether meshes that are only looked at are read; without them a model loads faster.
+
+    Raises:
+        MotionloomError: It is missing, damaged, or no robot with one free root and hinges that have limits.
+        ModuleNotFoundError: MuJoCo is not installed.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in (".xml", ".mjcf", ".urdf"):
+        raise MotionloomError(f"a robot's model is MJCF (.xml) or URDF (.urdf); got {path}")
+    text = read_bytes(path, max_bytes=MAX_BYTES)
+    mujoco = load_mujoco()
+
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        notes = [*_without_meshes(spec, path, meshes), *_free_root(spec, path)]
+        model = spec.compile()
+    except (ValueError, RuntimeError) as error:
+        raise MotionloomError(f"{path} is no model that MuJoCo reads: {one_line(str(error))[:300]}") from None
+    hinges = _hinges(model, path)
+    if not model.nu:
+        notes.append(f"{path} has no actuators; that matters for --physics alone, where no force is limited then")
+    joints = [hinge.joint for hinge in hinges]
+    limited = model.jnt_limited[joints].astype(bool)
+    lower, upper = np.where(limited, model.jnt_range[joints].T, [[-np.inf], [np.inf]])
+    return Model(path, spec, model, hinges, lower, upper, _speeds(text, hinges), tuple(notes))
+
+
+def _without_meshes(spec: Any, path: Path, wanted: bool) -> list[str]:
+    """Take meshes out that are not there and say so, and unless ``wanted`` those that are only looked at."""
+    mujoco = load_mujoco()
+
+    folder = path.parent / spec.meshdir
+    missing = {mesh.name: mesh.file for mesh in spec.meshes if mesh.file and not (folder / mesh.file).is_file()}
+    heavy = all(body.explicitinertial for body in spec.bodies if body.parent is not None)  # without its geoms
+    for geom in list(spec.geoms):
+        looks = not wanted and heavy and not (geom.contype or geom.conaffinity)
+        if geom.meshname and (geom.meshname in missing or looks):
+            spec.delete(geom)
+    used = {geom.meshname for geom in spec.geoms}
+    for mesh in list(spec.meshes):
+        if mesh.name not in used:
+            spec.delete(mesh)
+    if missing:
+        spec.compiler.boundmass, spec.compiler.boundinertia = 1e-3, 1e-6
+    for mesh in spec.meshes:  # one that MuJoCo thinks open is no reason to refuse a robot
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+    if not missing:
+        return []
+    first = next(iter(missing.values()))
+    return [f"{len(missing)} of the meshes of {path} are not there (such as {first}); the robot does without them"]
+
+
+def _free_root(spec: Any, path: Path) -> list[str]:
+    """Give a robot whose base is fixed a root that moves; refuse several things that move freely."""
+    mujoco = load_mujoco()
+
+    spec.compiler.fusestatic = False
+    free = [joint for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
+    if len(free) > 1:
+        raise MotionloomError(
+            f"{path} has {len(free)} things that move freely; give the model of one robot alone, without objects"
+        )
+    if free:
+        return []
+    bases = [body for body in spec.bodies if body.parent is not None and body.parent.name == "world"]
+    if not bases:
+        raise MotionloomError(f"{path} has no bodies; give the model of a humanoid robot")
+    base = max(bases, key=lambda body: len(body.find_all("joint")))
+    base.add_freejoint(name="root")
+    return [] if path.suffix.lower() == ".urdf" else [f"the base of the robot in {path} is fixed; it was set free"]
+
+
+def _hinges(model: Any, path: Path) -> tuple[Hinge, ...]:
+    mujoco = load_mujoco()
+
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    found = []
+    for joint in range(model.njnt):
+        kind, name = model.jnt_type[joint], model.joint(joint).name
+        if kind == mujoco.mjtJoint.mjJNT_FREE:
+            if joint:
+                raise MotionloomError(f"{path} has its free root behind other joints; put the robot first in the model")
+            continue
+        if kind != mujoco.mjtJoint.mjJNT_HINGE:
+            what = "a ball joint" if kind == mujoco.mjtJoint.mjJNT_BALL else "a joint that slides"
+            raise MotionloomError(f"{path} has {what}, {name!r}; a robot whose joints are all hinges is needed")
+        body = int(model.jnt_bodyid[joint])
+        hinge = Hinge(
+            name or f"joint{joint}", joint, body, int(model.body_parentid[body]), data.xanchor[joint], data.xaxis[joint]
+        )
+        found.append(hinge)
+    if not found or len(found) > MAX_HINGES:
+        raise MotionloomError(f"{path} has {len(found)} hinges; a humanoid robot has some, and at most {MAX_HINGES}")
+    return tuple(found)
+
+
+def check_limits(model: Model, joints: set[int]) -> None:
+    """Refuse a robot that has no limits at these joints (numbers in MuJoCo's model)."""
+    open_ended = [h.name for h in model.hinges if h.joint in joints and not model.model.jnt_limited[h.joint]]
+    if open_ended:
+        more = f" and {len(open_ended) - 3} more" if len(open_ended) > 3 else ""
+        raise MotionloomError(
+            f"{model.path} states no limits for {', '.join(open_ended[:3])}{more}; give each joint a range in the model"
+        )
+
+
+def _speeds(text: bytes, hinges: tuple[Hinge, ...]) -> Array:
+    """(hinges,) rad/s that a URDF states (MuJoCo does not keep them); infinite elsewhere."""
+    stated: dict[str, float] = {}
+    try:
+        for joint in ElementTree.fromstring(text).iter("joint"):
+            limit = joint.find("limit")
+            if limit is not None and limit.get("velocity"):
+                stated[joint.get("name", "")] = float(limit.get("velocity", ""))
+    except (ElementTree.ParseError, ValueError):
+        return np.full(len(hinges), np.inf)
+    found = np.array([stated.get(hinge.name, np.inf) for hinge in hinges])
+    return np.where(found > 0, found, np.inf)

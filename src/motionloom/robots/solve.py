@@ -1,0 +1,230 @@
+"""Joint angles that come nearest to what is aimed at, under the robot's limits: `mink`'s tasks, frame after frame.
+
+Each frame starts from the one before. The quadratic program holds every hinge within its range and within the step
+that its speed allows; planted feet outweigh all else; then come feet in the air, pelvis and trunk, hands, elbows.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.robots.body import Robot
+from motionloom.robots.engine import load_mujoco
+from motionloom.robots.joints import SIDES
+from motionloom.robots.targets import Targets
+
+Array = NDArray[np.float64]
+STEP = 15.0
+"""Radians per second that no hinge exceeds from frame to frame: 0.3 rad at 50 frames per second."""
+ROUNDS, FIRST_ROUNDS = 2, 40
+"""How often a frame's program is linearised anew; the first frame starts from the robot's own pose."""
+_DAMPING = 0.02
+_NEAR_GROUND, _SINKING = 0.5, 0.0005
+"""Metres: ankles above are not looked at, and soles may be so deep."""
+_MARGIN = 1e-4
+"""Radians inside of its range that a hinge stays, so that no rounding of a file breaks a limit."""
+
+
+@dataclass(frozen=True)
+class Weight:
+    """What an error of a metre and of a radian costs."""
+
+    place: float
+    turn: float
+
+
+PLANTED, SWINGING = Weight(300.0, 20.0), Weight(15.0, 2.0)
+PELVIS, TRUNK, HEAD = Weight(3.0, 1.0), Weight(0.0, 1.5), Weight(0.0, 0.5)
+HAND, ELBOW = Weight(5.0, 0.1), Weight(2.0, 0.0)
+POSTURE = 0.02
+
+
+class Solver:
+    """Follows targets frame by frame; what it has solved last is where it goes on."""
+
+    def __init__(self, robot: Robot, fps: float, *, speed: Array | None = None, avoid: bool = False) -> None:
+        """speed: (hinges,) radians per second that are kept, at most `STEP`; avoid: keep the robot's parts apart."""
+        import mink
+
+        self.robot, self.fps = robot, fps
+        self.configuration = mink.Configuration(robot.model, q=robot.home)
+        self.tasks = _tasks(robot)
+        self.posture = mink.PostureTask(robot.model, cost=_posture(robot))
+        self.posture.set_target(robot.home)
+        lower, upper = robot.file.lower + _MARGIN, robot.file.upper - _MARGIN
+        self.limit = _box(robot, lower, upper, np.minimum(STEP if speed is None else speed, STEP) / fps)
+        self.limits = [self.limit, _ground(robot), *([_apart(robot)] if avoid else [])]
+        self.begun = False
+
+    def frame(self, targets: Targets, number: int) -> Array:
+        """(nq,) the robot's pose at a frame of the targets."""
+        import mink
+
+        for joint, task in self.tasks.items():
+            place, turn = targets.place(joint)[number], targets.turn(joint)[number]
+            task.set_target(mink.SE3(np.concatenate([turn, place])))
+        for number_of, side in enumerate(SIDES):
+            weight = PLANTED if targets.planted[number, number_of].any() else SWINGING
+            self.tasks[f"{side}_ankle"].set_position_cost(weight.place)
+            self.tasks[f"{side}_ankle"].set_orientation_cost(weight.turn)
+        if not self.begun:
+            self._place_root(targets, number)
+        self.limit.before = None if not self.begun else self.configuration.q[7:].copy()
+        for _ in range(ROUNDS if self.begun else FIRST_ROUNDS):
+            self._round()
+        self.begun = True
+        return self.configuration.q.copy()
+
+    def _round(self) -> None:
+        import mink
+
+        tasks = [*self.tasks.values(), self.posture]
+        velocity = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", _DAMPING, limits=self.limits)
+        pose = self.configuration.integrate(velocity, 1.0)
+        pose[7:] = np.clip(pose[7:], *self.limit.bounds())
+        self.configuration.update(pose)
+
+    def _place_root(self, targets: Targets, number: int) -> None:
+        """Begin beside the first target, so that what is far away is not walked to."""
+        start = self.robot.home.copy()
+        ahead = targets.turn("pelvis")[number]
+        start[:2] = targets.place("pelvis")[number][:2]
+        heading = 2 * np.arctan2(ahead[3], ahead[0])
+        half = np.array([np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2)])
+        start[3:7] = rot.multiply(half, start[3:7])
+        self.configuration.update(start)
+
+
+def solve(
+    robot: Robot,
+    targets: Targets,
+    *,
+    avoid: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Array:
+    """(frames, nq) poses of the robot; the same targets give the same numbers, bit for bit."""
+    solver = Solver(robot, targets.fps, avoid=avoid)
+    poses = np.empty((len(targets), robot.model.nq))
+    for number in range(len(targets)):
+        poses[number] = solver.frame(targets, number)
+        if progress is not None:
+            progress(number + 1, len(targets))
+    return poses
+
+
+def _tasks(robot: Robot) -> dict[str, Any]:
+    """mink's task for each joint that is aimed at."""
+    import mink
+
+    weights = {"pelvis": PELVIS}
+    if robot.has("waist"):
+        weights["spine1"] = TRUNK
+    if robot.has("neck"):
+        weights["neck"] = HEAD
+    for side in SIDES:
+        turn = HAND.turn if robot.has(f"{side}_wrist") else 0.0
+        weights |= {f"{side}_ankle": SWINGING, f"{side}_elbow": ELBOW, f"{side}_wrist": Weight(HAND.place, turn)}
+    return {
+        joint: mink.FrameTask(
+            robot.site(joint), "site", position_cost=weight.place, orientation_cost=weight.turn, lm_damping=1e-3
+        )
+        for joint, weight in weights.items()
+    }
+
+
+def _posture(robot: Robot) -> Array:
+    """(nv,) how strongly each hinge is drawn to the pose that the robot prefers."""
+    cost = np.full(robot.model.nv, POSTURE)
+    cost[:6] = 0
+    return cost
+
+
+def _box(robot: Robot, lower: Array, upper: Array, step: Array | float) -> Any:
+    """mink's limit of the hinges' places and of their steps since the frame before, in one."""
+    import mink
+
+    class Box(mink.Limit):
+        before: Array | None = None
+        rows = np.eye(robot.model.nv)[6:]
+        matrix = np.vstack([rows, -rows])
+
+        def bounds(self) -> tuple[Array, Array]:
+            if self.before is None:
+                return lower, upper
+            return np.maximum(lower, self.before - step), np.minimum(upper, self.before + step)
+
+        def compute_qp_inequalities(self, configuration: Any, dt: float) -> Any:
+            low, high = self.bounds()
+            now = configuration.q[7:]
+            room = np.concatenate([high - now, now - low])
+            known = np.isfinite(room)
+            return mink.Constraint(self.matrix[known], room[known].clip(0))
+
+    return Box()
+
+
+def _ground(robot: Robot) -> Any:
+    """mink's limit of soles that are not to go into the ground."""
+    import mink
+
+    mujoco = load_mujoco()
+
+    sites = [robot.model.site(robot.site(f"{side}_ankle")).id for side in SIDES]
+    bodies = [int(robot.model.site_bodyid[site]) for site in sites]
+
+    class Ground(mink.Limit):
+        jacobian = np.empty((3, robot.model.nv))
+
+        def compute_qp_inequalities(self, configuration: Any, dt: float) -> Any:
+            rows, room = [], []
+            data = configuration.data
+            for site, body, side in zip(sites, bodies, SIDES):
+                turn, place = data.site_xmat[site].reshape(3, 3), data.site_xpos[site]
+                if place[2] > _NEAR_GROUND:
+                    continue
+                for corner in place + robot.soles[side] @ turn.T:
+                    mujoco.mj_jac(robot.model, data, self.jacobian, None, corner, body)
+                    rows.append(-self.jacobian[2])
+                    room.append(corner[2] + _SINKING)
+            return mink.Constraint(np.array(rows), np.array(room)) if rows else mink.Constraint()
+
+    return Ground()
+
+
+def pairs_apart(robot: Robot) -> Iterator[tuple[int, int]]:
+    """Pairs of geoms of the robot that may touch and do not where it stands."""
+    mujoco = load_mujoco()
+
+    model, data = robot.model, mujoco.MjData(robot.model)
+    data.qpos = robot.home
+    mujoco.mj_kinematics(model, data)
+    own = [
+        g for g in range(model.ngeom) if model.geom_bodyid[g] and (model.geom_contype[g] or model.geom_conaffinity[g])
+    ]
+    nearest = np.zeros(6)
+    for i, one in enumerate(own):
+        for other in own[i + 1 :]:
+            bodies = [int(model.body_weldid[model.geom_bodyid[g]]) for g in (one, other)]
+            above = [int(model.body_weldid[model.body_parentid[b]]) for b in bodies]
+            meet = model.geom_contype[one] & model.geom_conaffinity[other] | (
+                model.geom_contype[other] & model.geom_conaffinity[one]
+            )
+            if not meet or bodies[0] == bodies[1] or bodies[0] in above[1:] or bodies[1] in above[:1]:
+                continue
+            if mujoco.mj_geomDistance(model, data, one, other, 0.05, nearest) > 0.005:
+                yield one, other
+
+
+def _apart(robot: Robot) -> Any:
+    import mink
+
+    return mink.CollisionAvoidanceLimit(
+        robot.model,
+        geom_pairs=[([one], [other]) for one, other in pairs_apart(robot)],
+        minimum_distance_from_collisions=0.005,
+        collision_detection_distance=0.05,
+    )

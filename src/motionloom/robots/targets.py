@@ -1,0 +1,105 @@
+"""What a robot's inverse kinematics aims at: a motion on its skeleton, feet planted, knees never snapped.
+
+The retargeting of characters (`motionloom.retarget`) does the sizes: the way over the ground and the stance by the
+length of the legs, arms by their directions and the robot's lengths.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom import rotations as rot
+from motionloom.kinematics.feet import envelope, planted_feet
+from motionloom.motion import Motion
+from motionloom.retarget import retarget, to_smpl22
+from motionloom.retarget.joint_map import Override
+from motionloom.robots.body import Robot, to_mujoco, turns_to_mujoco
+from motionloom.robots.feet import plant
+from motionloom.robots.joints import SIDES
+from motionloom.skeleton import SMPL22
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+STRAIGHTEST = 0.985
+"""Share of a leg's length that hip and ankle are apart at most: nearer to 1 knees snap."""
+_LOWEST = 0.25
+"""Share of a leg's length by which the pelvis goes down at most so that both feet reach."""
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Poses of the robot's skeleton in MuJoCo's world."""
+
+    fps: float
+    joints: tuple[str, ...]
+    places: Array
+    """(frames, joints, 3) metres."""
+    turns: Array
+    """(frames, joints, 4) world orientations."""
+    planted: Flags
+    """(frames, 2, 2) whether heel and toes of the left and right foot are held to the ground."""
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def place(self, joint: str) -> Array:
+        """(frames, 3) metres."""
+        return self.places[:, self.joints.index(joint)]
+
+    def turn(self, joint: str) -> Array:
+        """(frames, 4)."""
+        return self.turns[:, self.joints.index(joint)]
+
+
+def aim(motion: Motion, robot: Robot, *, fps: float, source_map: Override | None = None) -> Targets:
+    """What the robot is to do, frame by frame at ``fps``.
+
+    Raises `MotionloomError` where the motion is not that of a person.
+    """
+    person = motion if motion.skeleton == SMPL22 else to_smpl22(motion, source_map)
+    planted = planted_feet(person.resample(fps).positions(), fps)
+    if motion.skeleton != robot.skeleton:
+        motion = retarget(motion, robot.skeleton, source_map=source_map)
+    motion = motion.resample(fps)
+    joints = robot.skeleton.names
+    made = Targets(
+        fps,
+        joints,
+        to_mujoco(motion.positions()),
+        turns_to_mujoco(motion.world_rotations()),
+        planted.reshape(len(planted), 2, 2),
+    )
+    return _reaching(_stepping(made, robot), robot)
+
+
+def _stepping(targets: Targets, robot: Robot) -> Targets:
+    """With feet that stand where they are planted."""
+    places, turns, held = targets.places.copy(), targets.turns.copy(), targets.planted.copy()
+    for number, side in enumerate(SIDES):
+        ankle = targets.joints.index(f"{side}_ankle")
+        places[:, ankle], turns[:, ankle], held[:, number] = plant(
+            places[:, ankle], turns[:, ankle], targets.planted[:, number], robot.soles[side], targets.fps
+        )
+    return replace(targets, places=places, turns=turns, planted=held)
+
+
+def _reaching(targets: Targets, robot: Robot) -> Targets:
+    """With the body lowered so that no leg is stretched out."""
+    skeleton, need = robot.skeleton, np.zeros(len(targets))
+    pelvis, around = targets.place("pelvis"), targets.turn("pelvis")
+    leg = 1.0
+    for side in SIDES:
+        bones = [skeleton.offsets[skeleton.index(f"{side}_{part}")] for part in ("knee", "ankle")]
+        leg = sum(float(np.linalg.norm(bone)) for bone in bones)
+        offset = to_mujoco(skeleton.offsets[skeleton.index(f"{side}_hip")])
+        hip = pelvis + rot.rotate(around, np.broadcast_to(offset, pelvis.shape))
+        line = targets.place(f"{side}_ankle") - hip
+        most = (STRAIGHTEST * leg) ** 2 - (line[:, :2] ** 2).sum(axis=-1)
+        need = np.maximum(need, -line[:, 2] - np.sqrt(most.clip(0)))
+    down = envelope(need.clip(0, _LOWEST * leg), round(0.1 * targets.fps))
+    places = targets.places.copy()
+    legs = [j for j, name in enumerate(targets.joints) if name.endswith(("ankle", "foot", "knee"))]
+    upper = [j for j in range(len(targets.joints)) if j not in legs]
+    places[:, upper] -= down[:, None, None] * np.array([0.0, 0.0, 1.0])
+    return replace(targets, places=places)
