@@ -7,7 +7,6 @@ entry point of the group `GROUP` that is named as the suffix without its dot and
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ class Format:
     reader: str | Callable[..., Any] = ""
     """``(path, **options) -> Motion`` in metres; empty: it is not read."""
     options: tuple[str, ...] = ()
-    """Those of ``fps``, ``unit``, ``asf`` and ``clip`` that the reader takes; the first two are else applied behind it."""
+    """Those of ``fps``, ``unit``, ``asf`` and ``clip`` that the reader takes; else the first two come after it."""
     metres: bool = False
     """It is in metres by its definition, so that a unit is a mistake."""
     clips: bool = False
@@ -103,14 +102,6 @@ def find(path: Path | str) -> Format:
 
         register(*(point.load() for point in entry_points(group=GROUP, name=suffix[1:])))
     return FORMATS.get(suffix, Format(suffix))
-
-
-def call(function: str | Callable[..., Any], *values: Any, **options: Any) -> Any:
-    """What a format's function answers."""
-    if isinstance(function, str):
-        module, _, name = function.partition(":")
-        function = getattr(import_module(module), name)
-    return function(*values, **options)
 
 
 def readable() -> tuple[str, ...]:

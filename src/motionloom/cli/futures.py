@@ -76,7 +76,8 @@ def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool, ow
         return Target(out.parent, (tuple(place.name for place in numbered(out, count)),), ())
     if suffix and not out.is_dir():
         fail(
-            f"cannot write {out}: a file ends in {', '.join(writable())}, and a folder's name has no ending; got {suffix}"
+            f"cannot write {out}: a file ends in {', '.join(writable())}, "
+            f"and a folder's name has no ending; got {suffix}"
         )
     check_folder(out)
     width = max(2, len(str(count - 1)))

@@ -1,8 +1,10 @@
 """Motion files, in and out: the suffix picks the format."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from motionloom import formats
 from motionloom.errors import MotionloomError
@@ -44,7 +46,7 @@ def load(
     if clip is not None and not found.clips:
         raise MotionloomError(f"{path} holds one motion; a clip is chosen in {', '.join(formats.with_clips())} files")
     own = {name: value for name, value in options.items() if value is not None and name in found.options}
-    motion = formats.call(found.reader, path, **own)
+    motion = _call(found.reader, path, **own)
     motion = motion if fps is None or "fps" in own else replace(motion, fps=fps)
     return motion if unit is None or "unit" in own else motion.scaled(unit)
 
@@ -84,7 +86,7 @@ def check_output(path: Path | str, *, own: str | None = None) -> Path:
         raise MotionloomError(f"cannot write {path}: its name must end in {', '.join(formats.writable())}{hint}")
     check_place(path)
     if found.needs:
-        formats.call(found.needs)
+        _call(found.needs)
     return path
 
 
@@ -100,7 +102,7 @@ def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequ
     found = formats.find(path)
     _check_count(several, found, path)
     labels = {"captions": captions} if found.labels == "captions" else {}
-    return formats.call(found.writer, several[0] if found.single else several, path, **labels)
+    return _call(found.writer, several[0] if found.single else several, path, **labels)
 
 
 def _check_count(motions: Sequence[Motion], found: Format, path: Path) -> None:
@@ -131,7 +133,7 @@ def save_scene(
     if found.single or not found.labels:
         return save(motions, path)
     if found.labels == "names":
-        return formats.call(found.writer, motions, path, names=names)
+        return _call(found.writer, motions, path, names=names)
     from motionloom.viz.overlay import draw_scene, tint
     from motionloom.viz.scene import Actor
 
@@ -148,4 +150,12 @@ def load_scene(path: Path | str) -> list[Motion]:
     """
     path = Path(path)
     found = _checked(path, None, unit=None, asf=None)
-    return formats.call(found.people, path) if found.people else [load(path)]
+    return _call(found.people, path) if found.people else [load(path)]
+
+
+def _call(function: str | Callable[..., Any], *values: Any, **options: Any) -> Any:
+    """What a format's function answers."""
+    if not isinstance(function, str):
+        return function(*values, **options)
+    module, _, name = function.partition(":")
+    return getattr(import_module(module), name)(*values, **options)
