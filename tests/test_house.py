@@ -36,7 +36,7 @@ BUDGETS = {
     "lab/metrics": 3_748,
     "lab/papers": 5_232,
     "lab/report": 1_303,
-    "lab/suites": 8_425,
+    "lab/suites": 8_429,
     "live": 3_054,
     "nets": 1_242,
     "retarget": 3_249,

@@ -19,7 +19,6 @@ def folder(tmp_path, monkeypatch) -> Path:
     [
         (["info", "walk.bvh", "--fps", "3"], "motionloom info --help"),
         (["generate", "a person walks", "--bogus"], "motionloom generate --help"),
-        (["weights", "convert", "a", "b", "--bogus"], "motionloom weights convert --help"),
         (["--bogus"], "motionloom --help"),
     ],
 )

@@ -9,7 +9,7 @@ from motionloom.tasks import worded
 from motionloom.tasks.sampling import Sampling
 from motionloom.tasks.text import generate
 from motionloom.weights.prior import Prior
-from tests.nets import tiny
+from tests.recorded import tiny
 
 
 @pytest.fixture(scope="module")

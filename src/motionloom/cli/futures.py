@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 FORMATS = ("bvh", "glb", "vrma", "usda", "fbx", "npz", "mp4", "gif", "png")
 OVERLAYS = (".png", ".mp4", ".gif")
-PICTURES = ("overview.png", "overlay.mp4")
 SHOWN = 50
 """Futures that pictures show, the first ones."""
 BEFORE, BEHIND = 2.0, 10.0
@@ -82,7 +81,29 @@ def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool, ow
     check_folder(out)
     width = max(2, len(str(count - 1)))
     names = tuple(tuple(f"future_{i:0{width}d}.{one}" for i in range(count)) for one in dict.fromkeys(formats))
-    return Target(out, names, PICTURES if pictures else ())
+    for one in formats:
+        _check_program(f"future.{one}")
+    return Target(out, names, ("overview.png", _film()) if pictures else ())
+
+
+def _check_program(name: str) -> None:
+    """Raise `MotionloomError` where files of such a name need a program that is not here."""
+    from motionloom.formats import call, find
+
+    needs = find(name).needs
+    if needs:
+        call(needs)
+
+
+def _film() -> str:
+    """Name of a folder's film: a .gif where there is no ffmpeg for an .mp4."""
+    from motionloom.errors import MotionloomError
+
+    try:
+        _check_program("overlay.mp4")
+    except MotionloomError:
+        return "overlay.gif"
+    return "overlay.mp4"
 
 
 def write_futures(

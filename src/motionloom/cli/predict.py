@@ -64,7 +64,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     predict.add_argument(
         "--format", action="append", choices=FORMATS, help="of the files in the folder, repeatable (default bvh)"
     )
-    predict.add_argument("--no-picture", action="store_true", help="no overview.png and overlay.mp4 in the folder")
+    predict.add_argument("--no-picture", action="store_true", help="no overview.png and overlay film in the folder")
     predict.add_argument(
         "--hold",
         action="append",

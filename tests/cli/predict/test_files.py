@@ -34,6 +34,23 @@ def test_a_folder_holds_one_file_per_future_a_picture_and_a_film(weights, asked,
     assert [name for *_, name, _ in drawn] == names[3:]
 
 
+def test_without_ffmpeg_the_folders_film_is_a_gif_and_an_mp4_is_refused_at_once(
+    weights, asked, drawn, capsys, monkeypatch
+):
+    """As after `pip install .` on a machine that has no ffmpeg of its own."""
+
+    def none() -> str:
+        raise MotionloomError("there is no ffmpeg")
+
+    monkeypatch.setattr("motionloom.viz.film.find_ffmpeg", none)
+    assert run(weights, "predict", "past.bvh", "--count", "2") == 0
+    assert written("futures") == {"future_00.bvh", "future_01.bvh", "overview.png", "overlay.gif"}
+    asked.clear()
+    assert run(weights, "predict", "past.bvh", "--out", "other", "--format", "mp4") == 2
+    assert "there is no ffmpeg" in capsys.readouterr().err
+    assert "seconds" not in asked
+
+
 def test_lines_ask_what_the_tasks_take(weights, asked):
     words = ["predict", "past.bvh", "--horizon", "3", "--out", "a.npz", "--seed", "5", "--guidance", "1.5"]
     walk = ["--steps", "4", "--temperature", "0"]

@@ -44,3 +44,9 @@ def test_captions_that_are_none_are_reported_in_one_short_sentence(content, mess
     assert said.startswith("motionloom: ")
     assert message in said
     assert len(said) < 300
+
+
+def test_an_unknown_option_points_to_the_help_of_its_command(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["data", "build", "here", "--out", "there", "--bogus"])
+    assert capsys.readouterr().err.endswith("see motionloom data build --help\n")

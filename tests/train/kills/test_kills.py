@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import torch
 
+from motionloom.data import build
 from motionloom.data.clips import read_clip
 from motionloom.io.atomic import finished
 from tests.data import people as made
@@ -20,7 +21,7 @@ from tests.kills.programs import SEED, ended_by, kills, moments, needs_signals, 
 from tests.train import runs
 
 pytestmark = needs_signals
-programs.PRELOADED += ["motionloom.data.build", "tests.train.runs"]
+programs.PRELOADED += [build.__name__, runs.__name__]
 
 
 def train(data: str, out: str, steps: str) -> None:
@@ -67,7 +68,7 @@ def test_data_build_goes_on_where_it_was_killed(pack: Path, tmp_path: Path, work
 def test_training_goes_on_bit_for_bit(tmp_path: Path) -> None:
     """Ended at random moments, again and again: the losses and the last state are those of an uninterrupted run."""
     data = runs.write_set(tmp_path / "data")
-    words = ["tests.train.kills.test_kills:train", str(data), "run", "14"]
+    words = [f"{__name__}:train", str(data), "run", "14"]
     whole, _ = moments(words, tmp_path / "whole", 2, seed=SEED)
     right = dict(line.split() for line in whole.out.splitlines())
     state = (tmp_path / "whole" / "run" / "state.safetensors").read_bytes()
