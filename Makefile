@@ -150,12 +150,13 @@ $(VENV)/.runtime: pyproject.toml constraints-runtime.txt
 	@$(PIP) --no-build-isolation -e .
 	@touch $@
 
-$(VENV)/.dev: $(VENV)/.runtime constraints.txt constraints-cuda.txt
+$(VENV)/.dev: $(VENV)/.runtime constraints.txt constraints-cuda.txt constraints-robots.txt
 	@echo "Installing PyTorch and the test tools into $(VENV) (PyTorch is large; this happens once) ..."
 	@# A build of torch that pip is pointed to (find-links), such as one for the CPU, goes before the index's.
 	@sed -n '/^torch==/,/[^\\]$$/p' constraints.txt > $(VENV)/torch.txt
 	@$(LOCKED) $(VENV)/torch.txt --no-index 2>/dev/null || true
 	@$(LOCKED) constraints.txt
+	@$(LOCKED) constraints-robots.txt
 	@if $(BIN)/python -c "import importlib.metadata as m; exit(not any(r.startswith('nvidia') for r in m.requires('torch')))"; \
 	then $(LOCKED) constraints-cuda.txt; fi
 	@touch $@

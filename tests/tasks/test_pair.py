@@ -12,6 +12,7 @@ from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
 from motionloom.features.pair import one_world
 from motionloom.goals.goal import Goal
+from motionloom.goals.roles import prompts_of
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
@@ -26,7 +27,6 @@ from motionloom.tasks.pair import (
     known_state,
     pair_features,
     person_seeds,
-    prompts_of,
 )
 from motionloom.tasks.sampling import Observed
 from motionloom.tasks.text import finish, sample_features

@@ -16,6 +16,7 @@ from motionloom.edits.fitting import fit
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import parse_adapter
 from motionloom.goals.goal import start_of
+from motionloom.goals.roles import prompts_of
 from motionloom.goals.timeline import Timeline
 from motionloom.io.stream import joined
 from motionloom.motion import Motion
@@ -25,7 +26,7 @@ from motionloom.tasks.adapting import adapt
 from motionloom.tasks.control import Controlled, judged, moved, steered_features
 from motionloom.tasks.duet import compose_pair
 from motionloom.tasks.long import compose, with_loaded
-from motionloom.tasks.pair import Duet, generate_pair, prompts_of
+from motionloom.tasks.pair import Duet, generate_pair
 from motionloom.tasks.sampling import Sampling
 from motionloom.tasks.text import GUIDANCE, SOLVER, STEPS, check, check_features, finish, to_motion
 from motionloom.tasks.worded import draw

@@ -15,12 +15,12 @@ from motionloom.errors import MotionloomError
 from motionloom.goals.fields import Field
 from motionloom.goals.goal import FPS, Goal
 from motionloom.goals.goal_file import read_goal
+from motionloom.goals.roles import MARK, prompts_of
 from motionloom.goals.segment import LONGEST
 from motionloom.goals.timeline import SHORTEST, Timeline, read_timeline, timeline_of
 from motionloom.io import load
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22, Skeleton
-from motionloom.tasks.pair import MARK, prompts_of
 from motionloom.tasks.text import LARGEST_SEED, frames_in
 
 FORMAT = 2

@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from motionloom.cli.measuring import say
 from motionloom.cli.sampling import fail
 from motionloom.cli.writing import add_force, check_overwriting
 
@@ -64,6 +63,7 @@ def _weights(arguments: argparse.Namespace) -> str:
 
 def _generated(arguments: argparse.Namespace) -> dict[str, Any]:
     from motionloom.lab.bench import bench, defaults
+    from motionloom.lab.suites.harness import say
     from motionloom.tasks.long import compose
     from motionloom.tasks.text import generate
     from motionloom.weights.prior import Prior
@@ -81,6 +81,7 @@ def _generated(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _predicted(arguments: argparse.Namespace) -> dict[str, Any]:
     from motionloom.lab.bench import bench_prediction
+    from motionloom.lab.suites.harness import say
     from motionloom.weights.predictor import Predictor
 
     predictor = Predictor.load(arguments.weights or "predictor", device=arguments.device)

@@ -17,6 +17,7 @@ from motionloom.cli.sampling import (
     load_prior,
     moves,
     places,
+    remark_unknown,
     report,
     sampling_of,
     take_text_anywhere,
@@ -44,6 +45,8 @@ DEEP = 0.02
 """Metres of overlap that are no touch any more: skin and cloth give way as much."""
 SINGLE = writable(single=True)
 """Files of one person each."""
+REMARKED = 64
+"""Segments of a timeline whose words are remarked on."""
 
 
 def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -61,7 +64,13 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "--react-to", type=Path, metavar="FILE", help="motion file of the first; only the second is drawn"
     )
     parser.add_argument("--timeline", type=Path, metavar="YAML", help="several texts, one after the other")
-    parser.add_argument("--path", type=Path, metavar="FILE", help="goal file (.json, .yaml) or drawing (.svg) for one")
+    parser.add_argument(
+        "--path",
+        type=Path,
+        action="append",
+        metavar="FILE",
+        help="goal file (.json, .yaml) or drawing (.svg) for one; given twice, one for each",
+    )
     parser.add_argument(
         "--person", type=int, choices=(1, 2), default=1, help="whose the path and a timeline's goals are (default 1)"
     )
@@ -114,10 +123,11 @@ def run_duet(arguments: argparse.Namespace) -> int:
     files = places(outs, arguments.count, sheets=False, target=skin)
     check_overwriting(arguments, [file for several in files for file in several])
     timeline = _timeline(arguments) if arguments.timeline else None
-    goal = _goal(arguments) if arguments.path else None
+    goals = _goals(arguments)
     given, manners = _read(arguments)
     _check_sizes(arguments, files, given, timeline)
     prior, block = _load(arguments)
+    remarks = _remarks_on_words(prior, block, _texts(arguments, timeline))
     caption = _caption(arguments, timeline)
 
     def write(duets: "Sequence[list[Motion]]", places: list[list[Path]], first: int) -> None:
@@ -136,7 +146,7 @@ def run_duet(arguments: argparse.Namespace) -> int:
         with bar("drawing two people") as progress:
             for some, moved in groups(arguments.count, PAIRS, progress):
                 duets = _make(
-                    arguments, prior, block, given=given, timeline=timeline, goal=goal, progress=moved, some=some
+                    arguments, prior, block, given=given, timeline=timeline, goals=goals, progress=moved, some=some
                 )
                 seconds = duets[0][0].seconds
                 seed = (arguments.seed or 0) + some["first"]
@@ -149,9 +159,7 @@ def run_duet(arguments: argparse.Namespace) -> int:
 
     interrupted = made.take(drawn())
     about = _about(arguments, made.count, seconds)
-    about |= {"measures": measures[: made.count], "remarks": _remarks(measures[: made.count])}
-    for line in about["remarks"]:
-        print(f"motionloom: {line}", file=sys.stderr)
+    about |= {"measures": measures[: made.count], "remarks": remarks + _printed(_remarks(measures[: made.count]))}
     report(arguments, about, made.written, made.sampling)
     note_rate(arguments, _inputs(arguments))
     return made.ended(interrupted)
@@ -164,7 +172,7 @@ def _make(
     *,
     given: "list[Motion]",
     timeline: "Timeline | None",
-    goal: "Goal | None",
+    goals: "tuple[Goal | None, Goal | None]",
     progress: Any,
     some: dict[str, int],
 ) -> "list[list[Motion]]":
@@ -183,9 +191,7 @@ def _make(
         made = duet.react(prior, block, given[0], text, **shared)
     else:
         length = SECONDS if arguments.seconds is None else arguments.seconds
-        made = pair.generate_pair(
-            prior, block, text, seconds=length, goals=(goal, None) if arguments.person == 1 else (None, goal), **shared
-        )
+        made = pair.generate_pair(prior, block, text, seconds=length, goals=goals, **shared)
     return [list(one) for one in made]
 
 
@@ -251,10 +257,10 @@ def _read(arguments: argparse.Namespace) -> "tuple[list[Motion], list[tuple[floa
 
 def _timeline(arguments: argparse.Namespace) -> "Timeline":
     from motionloom.errors import MotionloomError
+    from motionloom.goals.roles import prompts_of
     from motionloom.goals.timeline import read_timeline
     from motionloom.io.lined_yaml import fail as fail_at
     from motionloom.io.lined_yaml import read_lined
-    from motionloom.tasks.pair import prompts_of
 
     path = arguments.timeline
     timeline = read_timeline(path)
@@ -275,15 +281,23 @@ def _timeline(arguments: argparse.Namespace) -> "Timeline":
     return timeline
 
 
-def _goal(arguments: argparse.Namespace) -> "Goal":
-    """What one of the two is asked: a goal file, such a mapping in YAML, or a drawn line."""
+def _goals(arguments: argparse.Namespace) -> "tuple[Goal | None, Goal | None]":
+    """What the first and what the second is asked."""
+    asked = [_goal(arguments, path) for path in arguments.path or ()]
+    if len(asked) == 2:
+        return asked[0], asked[1]
+    goal = asked[0] if asked else None
+    return (goal, None) if arguments.person == 1 else (None, goal)
+
+
+def _goal(arguments: argparse.Namespace, path: Path) -> "Goal":
+    """What somebody is asked: a goal file, such a mapping in YAML, or a drawn line."""
     from motionloom.errors import MotionloomError
     from motionloom.goals.goal import FPS
     from motionloom.goals.goal_file import read_goal
     from motionloom.io.lined_yaml import read_lined
     from motionloom.tasks.text import frames_in
 
-    path: Path = arguments.path
     frames = frames_in(SECONDS if arguments.seconds is None else arguments.seconds, FPS)
     if path.suffix.lower() in (".yaml", ".yml"):
         what = read_lined(path).plain()
@@ -320,6 +334,8 @@ def _check(arguments: argparse.Namespace) -> None:
         fail(f"--seconds does not go with --{kinds[0]}, which says how long it is")
     if arguments.path and kinds:
         fail(f"--path does not go with --{kinds[0]}; give it with a text, or write it into a timeline")
+    if len(arguments.path or ()) > 2:
+        fail(f"--path is given {len(arguments.path)} times; two people have one each")
     if arguments.seconds is not None and not 0 < arguments.seconds <= 60:
         fail(f"--seconds must be above 0 and at most 60; got {arguments.seconds:g}")
     _check_numbers(arguments)
@@ -381,6 +397,41 @@ def _check_sizes(
 # What is written and reported
 
 
+def _texts(arguments: argparse.Namespace, timeline: "Timeline | None") -> list[str]:
+    """What the two are asked in words."""
+    said = [arguments.text or ""] if timeline is None else [segment.text for segment in timeline.segments[:REMARKED]]
+    return [text for text in dict.fromkeys(said) if text.strip()]
+
+
+def _remarks_on_words(prior: "Prior", block: "PairBlock", texts: list[str]) -> list[str]:
+    """Say how the words were read, and which of them neither the prior nor the block has learned; and give the lines.
+
+    Of a block whose file has no table of what it knows nothing is said.
+    """
+    from motionloom.goals.contact import read_contact
+    from motionloom.goals.roles import MARK, prompts_of
+    from motionloom.runtime.text.known import nearest
+
+    asked = {text: prompts_of(text) for text in texts}
+    lines = []
+    for text, said in asked.items():
+        if MARK not in text and said[0] != said[1]:
+            lines.append(f"read as: '{said[0]} {MARK} {said[1]}'")
+        contact = read_contact(said)
+        lines += [] if contact is None else [f"read as: {contact}"]
+    if block.known is not None and texts:
+        lines += [
+            f"of two people {found.remark()}" for found in nearest(block.known, texts, prior.text) if not found.near
+        ]
+    return _printed(lines) + remark_unknown(prior, [prompt for said in asked.values() for prompt in said])
+
+
+def _printed(lines: list[str]) -> list[str]:
+    for line in lines:
+        print(f"motionloom: {line}", file=sys.stderr)
+    return lines
+
+
 def _caption(arguments: argparse.Namespace, timeline: "Timeline | None") -> str:
     if timeline is not None:
         return "; ".join(" ".join(segment.text.split()) for segment in timeline.segments[:20])
@@ -433,17 +484,20 @@ def _about(arguments: argparse.Namespace, count: int, seconds: float) -> dict[st
 
 
 def _measures(duet: "Sequence[Motion]") -> dict[str, float]:
-    """How near the two bodies come, and how deep and in how many frames they are in each other."""
-    from motionloom.kinematics.capsules import overlap, trunk_distance
+    """How near the two bodies and their hands come, and how deep and in how many frames they are in each other."""
+    from motionloom.kinematics.capsules import overlap, trunk_distance, wrist_distance
     from motionloom.retarget import joints22
 
     first, second = (joints22(person) for person in duet)
     apart, depth = trunk_distance(first, second), overlap(first, second)
+    hands = wrist_distance(first, second)
     return {
         "least_trunk_distance": round(float(apart.min()), 4),
         "trunk_distance": round(float(sorted(apart)[len(apart) // 2]), 4),
         "deepest_overlap": round(float(depth.max()), 4),
         "overlapping_frames": int((depth > DEEP).sum()),
+        "least_wrist_distance": round(float(hands.min()), 4),
+        "least_wrist_distance_at": round(float(hands.argmin()) / duet[0].fps, 3),
     }
 
 

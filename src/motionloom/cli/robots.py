@@ -3,7 +3,7 @@
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +28,8 @@ class RobotTarget(Target):
     avoid: bool = False
     header: bool = True
     figures: bool = False
+    last: "list[tuple[Motion, Clip]]" = field(default_factory=list)
+    """What was made last, for a second file of the same motion."""
 
     @property
     def suffix(self) -> str | None:
@@ -60,7 +62,9 @@ class RobotTarget(Target):
         from motionloom.robots.files import save_clip
         from motionloom.robots.film import draw
 
-        clip = self.clip(motion, path)
+        if not self.last or self.last[0][0] is not motion:
+            self.last[:] = [(motion, self.clip(motion, path))]
+        clip = self.last[0][1]
         if path.suffix.lower() in OUTS:
             return save_clip(clip, self.robot, path, header=self.header)
         if path.suffix.lower() in PICTURES:

@@ -210,21 +210,10 @@ def check_prompt(prompt: str) -> None:
 
 
 def remark_unknown(prior: "Prior", prompts: Sequence[str]) -> list[str]:
-    """Say on stderr, a line each, which prompts are like nothing that these weights have learned; and give the lines.
+    """Say on stderr, a line each, which prompts are not English or like nothing learned; and give the lines."""
+    from motionloom.goals.remarks import remarks_on
 
-    Of weights whose file has no table of what they know it is only said which prompts are not English.
-    """
-    import sys
-
-    from motionloom.goals.english import is_english
-    from motionloom.runtime.text.known import nearest
-
-    asked = [prompt for prompt in dict.fromkeys(prompts) if prompt.strip()]
-    foreign = [prompt for prompt in asked if not is_english(prompt)]
-    remarks = [f"{prompt[:60]!r} does not look like English, and these weights know nothing else" for prompt in foreign]
-    english = [prompt for prompt in asked if prompt not in foreign]
-    if prior.known is not None and english:
-        remarks += [found.remark() for found in nearest(prior.known, english, prior.text) if not found.near]
+    remarks = remarks_on(prompts, prior.known, prior.text)
     for line in remarks:
         print(f"motionloom: {line}", file=sys.stderr)
     return remarks

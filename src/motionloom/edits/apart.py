@@ -37,24 +37,29 @@ _CORE = [number for number in range(len(CAPSULES)) if number not in ARMS]
 _TRUNK = [J["pelvis"], J["spine3"]]
 
 
-def kept_apart(pair: PairMotion, shares: Array, *, still: int = 0) -> PairMotion:
+def kept_apart(pair: PairMotion, shares: Array, *, still: int = 0, close: tuple[int, int] = (0, 0)) -> PairMotion:
     """The pair, moved apart where bodies overlap; (2,) shares of the way that each one goes, of sum 1 or 0.
 
-    still: frames in which both stay where they are.
+    still: frames in which both stay where they are; close: the same from one frame to before another.
     """
     if not shares.any():
         return pair
-    shift = shift_apart(pair.places(), still=still)
+    shift = shift_apart(pair.places(), still=still, close=close)
     if not shift.any():
         return pair
     return pair.changed(np.concatenate([np.zeros((len(shift), 1)), shift], axis=1), shares)
 
 
-def shift_apart(places: Array, *, still: int = 0) -> Array:
-    """(frames, 2) metres x, z that the second person goes from the first; places (2, frames, 22, 3) metres."""
+def shift_apart(places: Array, *, still: int = 0, close: tuple[int, int] = (0, 0)) -> Array:
+    """(frames, 2) metres x, z that the second person goes from the first; places (2, frames, 22, 3) metres.
+
+    still, close: as of `kept_apart`.
+    """
     frames = places.shape[1]
     shift = np.zeros((frames, 2))
     looked = np.arange(still, frames, -(-(frames - still) // MOST)) if frames > still else np.arange(0)
+    looked = looked[(looked < close[0]) | (looked >= close[1])]
+    rest = np.concatenate([np.arange(max(still - 2, 0), still), np.arange(*close, 4)])
     if _far(places):
         return shift
     ends = [capsule_ends(one[looked])[:, _CORE] for one in places]
@@ -66,7 +71,7 @@ def shift_apart(places: Array, *, still: int = 0) -> Array:
         at = np.flatnonzero(need)
         if not len(at):
             break
-        shift += _slow(frames, looked[at], line[at], need[at], still)
+        shift[still:] += _slow(frames, looked[at], line[at], need[at], rest)[still:]
     return shift
 
 
@@ -117,9 +122,8 @@ def _need(first: Array, second: Array, line: Array) -> Array:
     return need
 
 
-def _slow(frames: int, at: NDArray[np.intp], line: Array, need: Array, still: int) -> Array:
-    """(frames, 2) metres: the curve that goes ``need`` along ``line`` at some frames, and nowhere while ``still``."""
-    rest = np.arange(max(still - 2, 0), still)
+def _slow(frames: int, at: NDArray[np.intp], line: Array, need: Array, rest: NDArray[np.intp]) -> Array:
+    """(frames, 2) metres: the curve that goes ``need`` along ``line`` at some frames, and nowhere at ``rest``."""
     where = np.concatenate([at, rest, rest])
     ways = np.concatenate([line, *(np.tile(axis, (len(rest), 1)) for axis in np.eye(2))])
     asked = np.concatenate([need, np.zeros(2 * len(rest))])
@@ -129,7 +133,6 @@ def _slow(frames: int, at: NDArray[np.intp], line: Array, need: Array, still: in
     inner[np.diag_indices_from(inner)] += np.where(np.arange(len(where)) < len(at), LOOSE, 1e-3) ** 2
     curve = covariance @ (np.linalg.solve(inner, asked)[:, None] * ways)
     curve *= (need.max() / np.linalg.norm(curve, axis=-1, keepdims=True).clip(1e-9)).clip(max=1.0)
-    curve[:still] = 0.0
     return np.asarray(curve, dtype=np.float64)
 
 

@@ -30,10 +30,11 @@ class Bodies:
     meeting: Meeting | None = None
 
     @staticmethod
-    def of(mask: np.ndarray, frozen: Sequence[bool], meeting: Meeting | None = None) -> "Bodies":
-        """mask: (2, 1 + frames, 263) True where the state is known; frozen: who is not moved as a whole."""
+    def of(mask: np.ndarray, frozen: Sequence[bool], meeting: Meeting | None = None, *, still: int = 0) -> "Bodies":
+        """mask: (2, 1 + frames, 263) True where the state is known; frozen: who is not moved as a whole; still: frames
+        that stay in any case."""
         known = np.asarray(mask[:, 1:, :3].all(axis=-1))
-        still = int(known.all(axis=0).cumprod().sum()) or int(mask[:, 0].any())
+        still = int(known.all(axis=0).cumprod().sum()) or int(mask[:, 0].any()) or still
         bends = not known[0].all(), not known[1].all()
         free = bends[0] and not frozen[0], bends[1] and not frozen[1]
         if meeting:
@@ -49,11 +50,12 @@ class Bodies:
         free = np.array(self.free, dtype=np.float64)
         shares = free / free.sum().clip(1.0)
         pair = PairMotion(motion.astype(np.float64) * prior.spread + prior.mean, np.asarray(poses, dtype=np.float64))
-        made = pair
+        made, close = pair, (0, 0)
         if self.meeting:
             self.meeting.look(pair.places())
             made = self._reaching(prior, self.meeting.near(made, shares), level)
-        made = kept_apart(made, shares, still=self.still)
+            close = self.meeting.close(motion.shape[1])
+        made = kept_apart(made, shares, still=self.still, close=close)
         if made is pair:
             return motion, places, poses
         # the difference: what is not sure yet is near 0, and must not become sure by this

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionloom.blending import smoothstep
+from motionloom.edits.apart import shift_apart
 from motionloom.edits.fitting import fit
 from motionloom.edits.pair_motion import PairMotion
 from motionloom.edits.relative_pose import lacking
@@ -30,6 +31,8 @@ LATE = 0.1
 """Metres that being at the end of that stretch, instead of in the middle, counts like."""
 GAP = 0.04
 """Metres between two wrists that touch."""
+LEFT_OF = 0.06
+"""Metres that each of two people in each other's arms stands to the left of the middle: heads and arms pass."""
 ASIDE = 0.12
 """Metres on the ground, from the middle between two people, within which their hands meet."""
 
@@ -65,7 +68,7 @@ class Meeting:
         at = np.arange(first, max(last, first + 1))
         late = LATE * np.abs(np.linspace(-1.0, 1.0, len(at)))
         ways = self.contact.ways
-        far = [sum(self._distance(places[:, at], touch) for touch in way) / len(way) + late for way in ways]
+        far = [late + sum(self._distance(places[:, at], touch) / len(way) for touch in way) for way in ways]
         chosen = int(np.argmin([one.min() for one in far]))
         self.way, self.frame = ways[chosen], int(at[far[chosen].argmin()])
 
@@ -93,7 +96,7 @@ class Meeting:
         distance = float(np.hypot(x, z))
         wanted = float(np.clip(distance, *self.contact.apart))
         if self.contact.turn == "facing":
-            return np.array([-1.0, 0.0, 0.0, wanted])
+            return np.array([-1.0, 0.0, -2 * LEFT_OF if self.contact.close else 0.0, wanted])
         if self.contact.turn == "beside":
             side = -1.0 if self.way[0].joint == RIGHT else 1.0
             return np.array([1.0, 0.0, side * wanted, 0.0])
@@ -106,8 +109,7 @@ class Meeting:
         goals = Goal.nothing(frames), Goal.nothing(frames)
         if self.frame is None:
             return goals
-        half = max(round(self.contact.seconds * 10), 1)
-        at = np.arange(max(self.frame - half, self.still), min(self.frame + half + 1, frames))
+        at = np.arange(*self._span(frames))
         stands = self._stands(places[:, at]) if self.contact.close else None
         for touch in self.way:
             if touch.beside is not None:
@@ -122,19 +124,30 @@ class Meeting:
             goal.facing[at], goal.facing_asked[at] = stand.facing, True
         return goals
 
+    def _span(self, frames: int) -> tuple[int, int]:
+        """The frames of the touch, of so many."""
+        assert self.frame is not None
+        half = max(round(self.contact.seconds * 10), 1)
+        return max(self.frame - half, self.still), min(self.frame + half + 1, frames)
+
+    def close(self, frames: int) -> tuple[int, int]:
+        """The frames in which the two are in each other's arms, of so many."""
+        return self._span(frames) if self.contact.close and self.frame is not None else (0, 0)
+
     def _stands(self, places: Array) -> list[GroundPose]:
         """Where both stand while they are in each other's arms: as near and turned as the words say, in the middle of
         where they are; nobody goes by where the other goes."""
         hips = places[:, :, 0].mean(axis=1)
         line = (hips[1] - hips[0])[[0, 2]]
         distance = float(np.linalg.norm(line))
+        half = float(np.clip(distance, *self.contact.apart)) / 2
         facing = float(np.arctan2(line[0], line[1])) if distance > 1e-3 else float(heading(places[0])[0])
-        ahead = np.array([np.sin(facing), np.cos(facing)]) * np.clip(distance, *self.contact.apart) / 2
+        facing += float(np.arctan2(LEFT_OF, half))
+        ahead = half * np.array([np.sin(facing), np.cos(facing)])
+        left = LEFT_OF * np.array([np.cos(facing), -np.sin(facing)])
         x, z = hips.mean(axis=0)[[0, 2]]
-        return [
-            GroundPose(x - ahead[0], z - ahead[1], facing),
-            GroundPose(x + ahead[0], z + ahead[1], facing + np.pi),
-        ]
+        first, second = np.array([x, z]) - ahead + left, np.array([x, z]) + ahead - left
+        return [GroundPose(*first.tolist(), facing), GroundPose(*second.tolist(), facing + np.pi)]
 
     def _beside(self, touch: Touch, other: Array, stands: list[GroundPose] | None) -> Array:
         """(frames, 3) where a touch is on the other person, who is at (frames, 22, 3)."""
@@ -167,25 +180,30 @@ def _ask(goal: Goal, at: NDArray[np.intp], joint: int, places: Array) -> None:
 # What is left when all is sampled
 
 
-ROUNDS = 3
+ROUNDS = 2
 """How often people are fitted to each other: each moves a little when the other does."""
 DEEP = 0.01
 """Metres of an arm in somebody's body that stay."""
 EVEN = 5
 """Frames over which the way out of a body is averaged."""
-_CORE = [number for number in range(len(CAPSULES)) if number not in ARMS]
 
 
 def met(people: Sequence[Motion], meeting: Meeting | None, also: Sequence[Goal | None]) -> tuple[Motion, Motion]:
     """Two people of the 22-joint skeleton at 20 frames per second in one world, fitted to each other.
 
-    What meets is brought together, and arms come out of the other's body. also: what else each of them is asked.
+    What meets is brought together, and who is in the other's body comes out of it. also: what else each is asked.
     """
     made = list(people)
+    free = np.array([goal is None for goal in also], dtype=np.float64)
+    shares = free / free.sum().clip(1.0) * [-1.0, 1.0]
     for _ in range(ROUNDS):
         places = np.stack([motion.positions() for motion in made])
         asked = meeting.goals(places) if meeting else [Goal.nothing(places.shape[1])] * 2
-        goals = [overlaid(asked[i], arms_out(places[i], places[1 - i])) for i in (0, 1)]
+        shift = shift_apart(places, close=meeting.close(places.shape[1]) if meeting else (0, 0))
+        goals = [
+            overlaid(asked[i], overlaid(arms_out(places[i], places[1 - i]), _stepped(places[i], shares[i] * shift)))
+            for i in (0, 1)
+        ]
         if all(goal.empty for goal in goals):
             break
         goals = [
@@ -195,14 +213,24 @@ def met(people: Sequence[Motion], meeting: Meeting | None, also: Sequence[Goal |
     return made[0], made[1]
 
 
+def _stepped(own: Array, shift: Array) -> Goal:
+    """The pelvis, (frames, 2) metres from where it is, where that is more than `DEEP`."""
+    goal = Goal.nothing(len(own))
+    at = np.flatnonzero(np.linalg.norm(shift, axis=-1) > DEEP)
+    goal.positions[at, 0, 0], goal.positions[at, 0, 2] = (own[at, 0][:, [0, 2]] + shift[at]).T
+    goal.asked[at, 0] = True, False, True
+    return goal
+
+
 def arms_out(own: Array, other: Array) -> Goal:
-    """Where elbows and wrists of ``own`` must be so that no arm is in the body of ``other``; (frames, 22, 3) metres."""
+    """Where elbows and wrists of ``own`` must be so that no arm is in ``other``; (frames, 22, 3) metres."""
     frames = len(own)
     goal = Goal.nothing(frames)
-    arms, core = capsule_ends(own)[:, list(ARMS)], capsule_ends(other)[:, _CORE]
-    s, t, apart = closest(arms[:, :, None], core[:, None])
-    thick = [r[..., 0] + at * (r[..., 1] - r[..., 0]) for r, at in ((RADII[list(ARMS)][:, None], s), (RADII[_CORE], t))]
+    arms, body = capsule_ends(own)[:, list(ARMS)], capsule_ends(other)
+    s, t, apart = closest(arms[:, :, None], body[:, None])
+    thick = [r[..., 0] + at * (r[..., 1] - r[..., 0]) for r, at in ((RADII[list(ARMS)][:, None], s), (RADII, t))]
     deep = thick[0] + thick[1] - apart
+    deep[..., list(ARMS)] /= 2  # two arms that cross each go half of the way
     worst = deep.argmax(axis=-1)
     for number, arm in enumerate(ARMS):
         depth = np.take_along_axis(deep[:, number], worst[:, number, None], axis=-1)[:, 0]
@@ -211,7 +239,7 @@ def arms_out(own: Array, other: Array) -> Goal:
             continue
         pick = np.arange(frames), worst[:, number]
         here = _at(arms[:, number], s[:, number][pick])
-        there = _at(core[pick], t[:, number][pick])
+        there = _at(body[pick], t[:, number][pick])
         away = (here - there) / np.maximum(apart[:, number][pick], 1e-6)[:, None]
         push = _even(np.where(inside[:, None], depth[:, None] * away, 0.0))
         for end, weight in zip(CAPSULES[arm][:2], (s[:, number][pick] < 0.9, s[:, number][pick] > 0.1), strict=True):

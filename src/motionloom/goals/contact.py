@@ -47,9 +47,9 @@ class Contact:
     """Whether they stand in each other's arms."""
 
     def __str__(self) -> str:
-        """What was read."""
+        """What was read, in words."""
         how = {"facing": "facing each other", "beside": "side by side", "any": "as they are"}[self.turn]
-        return f"read as: the two {self.name}, {how}, for {self.seconds:g} s"
+        return f"the two {self.name}, {how}" + (f", for {self.seconds:g} s" if self.seconds else "")
 
 
 def _hands(*pairs: tuple[int, int]) -> tuple[Touch, ...]:
@@ -60,7 +60,7 @@ _ANY = tuple(_hands(pair) for pair in ((LEFT, RIGHT), (RIGHT, LEFT), (RIGHT, RIG
 _ARMS_AROUND = tuple(
     Touch(person, joint, CHEST, place)
     for person in (0, 1)
-    for joint, place in ((LEFT, (-0.12, 0.04, -0.06)), (RIGHT, (0.12, -0.12, -0.06)), (HEAD, (-0.11, 0.26, 0.27)))
+    for joint, place in ((LEFT, (-0.12, 0.04, -0.06)), (RIGHT, (0.12, -0.12, -0.06)), (HEAD, (-0.14, 0.26, 0.27)))
 )
 """One arm above the other's, one below, and the head to the left: so nothing crosses."""
 _AGAINST = tuple(
@@ -69,7 +69,7 @@ _AGAINST = tuple(
 _EACH_OTHER = (
     r"(?:each other|one another|the (?:other|second|first)|another|a second|(?:the|his|her|their) partner|him|her)"
 )
-_CONTACTS = (
+_CONTACTS: tuple[tuple[str, Contact], ...] = (
     (
         r"shak(?:e|es|ing) (?:each other'?s |right )?hands?|hand ?shakes?",
         Contact("shake hands", (_hands((RIGHT, RIGHT)),), (0.62, 0.78), height=(0.98, 1.12), seconds=1.2),
@@ -94,7 +94,7 @@ _CONTACTS = (
     ),
     (
         rf"(?:push|shov)(?:es|e|ing)? {_EACH_OTHER}",
-        Contact("touch, the first pushing", (_AGAINST,), (0.42, 0.55), seconds=0.3),
+        Contact("touch as the first pushes", (_AGAINST,), (0.42, 0.55), seconds=0.3),
     ),
     (
         r"(?:hold|tak|join)(?:s|ing|es|e)? (?:each other'?s )?hands|hand in hand",
@@ -105,6 +105,15 @@ _CONTACTS = (
         Contact("hold hands", _ANY, (0.4, 0.85), "any", (0.95, 1.25), seconds=1.0),
     ),
 )
+_FACING = (
+    (r"fight(?:s|ing)?|box(?:es|ing)?|spar(?:s|ring)?|wrestl(?:e|es|ing)|duel(?:s|ling)?", (0.7, 1.1)),
+    (
+        r"(?:talk|speak|chat|bow|wave|fac|greet)\w* (?:to |with |at )?(?:each other|one another)|argu(?:e|es|ing)",
+        (0.8, 1.6),
+    ),
+)
+"""Words of people who face each other, and metres between them."""
+_CONTACTS += tuple((pattern, Contact("are near", ((),), apart, seconds=0.0)) for pattern, apart in _FACING)
 _NOT = re.compile(r"(?:without|not|never|n't|refus\w+ to|before|instead of)(?: \w+)? $")
 _BESIDE = re.compile(r"\b(?:side by side|beside|walk|walks|walking|stroll|strolls|strolling)\b")
 

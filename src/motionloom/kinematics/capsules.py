@@ -5,7 +5,7 @@ Places are metres, +Y up, in one world.
 
 import numpy as np
 
-from motionloom.kinematics.physics import Array, J
+from motionloom.kinematics.physics import WRISTS, Array, J
 
 TOGETHER = 400
 """Frames that are measured at once: memory does not grow with the length."""
@@ -118,3 +118,9 @@ def trunk_distance(first: np.ndarray, second: np.ndarray) -> Array:
     """(frames,) metres between the axes of two trunks, from pelvis to neck; shapes as of `overlap`."""
     ends = [np.asarray(one, dtype=np.float64)[:, [J["pelvis"], J["neck"]]] for one in (first, second)]
     return closest(*ends)[2]
+
+
+def wrist_distance(first: np.ndarray, second: np.ndarray) -> Array:
+    """(frames,) metres between the two people's nearest wrists; shapes as of `overlap`."""
+    hands = [np.asarray(one, dtype=np.float64)[:, list(WRISTS)] for one in (first, second)]
+    return np.asarray(np.linalg.norm(hands[0][:, :, None] - hands[1][:, None], axis=-1).min(axis=(1, 2)))

@@ -11,6 +11,7 @@ import numpy as np
 from motionloom.diffusion import row_seed
 from motionloom.edits.steering import Correction
 from motionloom.features.layout import FPS
+from motionloom.goals.roles import prompts_of
 from motionloom.ground import GroundPose, relative
 from motionloom.live.commands import Command, Say
 from motionloom.live.live import Frame, Stage, check
@@ -19,7 +20,7 @@ from motionloom.live.settings import Settings
 from motionloom.live.window import leaving
 from motionloom.motion import Motion
 from motionloom.skeleton import Skeleton
-from motionloom.tasks.pair import Duet, PairEdits, PairSampling, known_state, pair_features, prompts_of
+from motionloom.tasks.pair import Duet, PairEdits, PairSampling, known_state, pair_features
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 

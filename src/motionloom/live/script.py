@@ -20,10 +20,10 @@ from typing import NamedTuple
 
 from motionloom.errors import MotionloomError
 from motionloom.goals.lined_file import LinedFile
+from motionloom.goals.roles import prompts_of
 from motionloom.io.lined_yaml import Lined, read_lined
 from motionloom.live.commands import Command, Say, from_json, person_of, to_json
 from motionloom.live.live import Frame, Stage
-from motionloom.tasks.pair import prompts_of
 
 LONGEST = 3600.0
 """Seconds of a session that is written to files."""

@@ -16,12 +16,15 @@ from numpy.typing import NDArray
 
 from motionloom.diffusion import lerp
 from motionloom.edits.bodies import Bodies
+from motionloom.edits.meeting import Meeting
 from motionloom.edits.relative_pose import PoseGuidance, people, relative_pose_guidance
 from motionloom.errors import MotionloomError
 from motionloom.features import pair as two
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.features.pair import one_world
+from motionloom.goals.contact import read_contact
 from motionloom.goals.goal import Goal
+from motionloom.goals.roles import prompts_of
 from motionloom.goals.segment import LONGEST, Segment
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
@@ -39,11 +42,11 @@ from motionloom.tasks.pair import (
     check_pair,
     check_person,
     known_state,
+    meetings_of,
     pair_features,
     pair_seeds,
     person_seeds,
     poses_at,
-    prompts_of,
     stacked,
 )
 from motionloom.tasks.sampling import Moves, PairSampling, PairSettings, Progress, sample_chain, smooth
@@ -107,7 +110,7 @@ def react(
         said * chosen.number(),
         known.shape[1],
         seeds=pair_seeds(chosen),
-        edits=PairEdits(stacked([observed] * chosen.number())),
+        edits=PairEdits(stacked([observed] * chosen.number()), meetings=meetings_of(said, chosen)),
         sampling=chosen,
         progress=progress,
     )
@@ -313,7 +316,8 @@ class _PairDenoiser:
                 frozen=frozen,
                 weight=self.pair_guidance,
             )
-            bodies = replace(Bodies.of(mask, frozen), still=int(before is not None))
+            contact = read_contact([one[number].text for one in segments])
+            bodies = Bodies.of(mask, frozen, Meeting(contact) if contact else None, still=int(before is not None))
             before = _PairRow(both_of, net, guidance, bodies if self.bodies and not net.silent else None, before)
             yield before
 

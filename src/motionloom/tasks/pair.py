@@ -24,6 +24,7 @@ from motionloom.features.layout import FPS, LAYOUT, WIDTH
 from motionloom.features.pair import one_world, together
 from motionloom.goals.contact import read_contact
 from motionloom.goals.goal import Goal, start_of
+from motionloom.goals.roles import prompts_of
 from motionloom.goals.segment import LONGEST
 from motionloom.ground import GroundPose, compose, relative
 from motionloom.motion import Motion
@@ -55,8 +56,6 @@ Prompt = str | tuple[str, str]
 
 PAIRS = 8
 """Pairs denoised at once."""
-MARK = "::"
-"""Parts what the first person does from what the second does, in one text."""
 CONTEXT = 3.0
 """Seconds of a past that are looked at for where its floor is."""
 SEEN = 40
@@ -201,18 +200,6 @@ def pair_seeds(sampling: PairSampling) -> list[int]:
     return [seed for number in sampling.numbers() for seed in person_seeds(sampling.seed, number)]
 
 
-def prompts_of(prompt: Prompt) -> tuple[str, str]:
-    """The prompts of the first and of the second person: a text with `MARK` parts them, one without is for both."""
-    if isinstance(prompt, tuple):
-        return prompt
-    said = [words.strip() for words in prompt.split(MARK)]
-    if len(said) == 1:
-        return prompt, prompt
-    if len(said) > 2 or not all(said):
-        raise MotionloomError(f"the prompt {prompt[:60]!r} must have words for each person around one {MARK}")
-    return said[0], said[1]
-
-
 def known_state(prior: Prior, net: PairSession, features: np.ndarray, poses: np.ndarray, frames: int) -> Observed:
     """A state (2, 1 + frames, 263) in which the first frames of two people are known, and their ground poses.
 
@@ -226,10 +213,24 @@ def known_state(prior: Prior, net: PairSession, features: np.ndarray, poses: np.
     return Observed(state, mask, noise_free=True)
 
 
+def known_places(net: PairSession, poses: np.ndarray, frames: int) -> Observed:
+    """A state (2, 1 + frames, 263) in which only the ground poses (2, 4) of two people at frame 0 are known."""
+    state = join(net.places.encode(poses.astype(np.float32)), np.zeros((2, frames, WIDTH), np.float32))
+    mask = np.zeros(state.shape, np.bool_)
+    mask[:, 0] = True
+    return Observed(state, mask, noise_free=True)
+
+
 def stacked(pairs: Sequence[Observed]) -> Observed:
     """What is known of several pairs."""
     values, masks = (np.concatenate(parts) for parts in zip(*((one.values, one.mask) for one in pairs), strict=True))
     return replace(pairs[0], values=values, mask=masks)
+
+
+def meetings_of(prompts: tuple[str, str], sampling: PairSampling) -> list[Meeting | None]:
+    """How the two of each duet touch, where their prompts say that they do."""
+    contact = read_contact(prompts) if sampling.bodies else None
+    return [Meeting(contact) if contact else None for _ in range(sampling.number())]
 
 
 # From words
@@ -253,8 +254,8 @@ def generate_pair(
         block: what makes two people of one prior.
         prompt: what both do together, or (what the first does, what the second does); ``"A :: B"`` says the same.
         seconds: length; not looked at where there is a goal, which has its own.
-        goals: what the first or the second person is asked to do in the world, who then starts at its `start_of`;
-            one of the two may have a goal. Without any the first person starts at the origin facing +Z.
+        goals: what the first and the second person are asked to do in the world, who then start at its `start_of`; two
+            goals are of one length. Without any the first person starts at the origin facing +Z.
         foot_lock: keep planted feet still.
         sampling: or single settings of it as keywords. Duet i depends on ``seed`` and i alone; two seeds are one for
             each person, and go with the person where people are exchanged.
@@ -263,45 +264,37 @@ def generate_pair(
     Raises:
         MotionloomError: for what cannot be asked.
     """
-    goal, person = _goal_of(goals)
     said, chosen = prompts_of(prompt), PairSampling.of(sampling, settings)
     if not all(words.strip() for words in said):
         raise MotionloomError("a prompt is empty; say in words what the two people do")
+    goal = goals[0] or goals[1]
     check_pair(prior, count=chosen.number(), seconds=len(goal) / FPS if goal else seconds)
-    frames = _goal_frames(goal) if goal else frames_in(seconds, prior.fps)
-    place = start_of(goal) if goal else GroundPose()
-    change: list[Correction | None] = [None, None]
-    if goal:
-        change[person] = toward(goal.seen_from(place), prior)
-    count, contact = chosen.number(), read_contact(said) if chosen.bodies else None
-    meetings = [Meeting(contact) if contact else None for _ in range(count)]
+    frames = _goal_frames(goals) if goal else frames_in(seconds, prior.fps)
+    starts = [start_of(one) if one else GroundPose() for one in goals]
+    change = [toward(one.seen_from(start), prior) if one else None for one, start in zip(goals, starts, strict=True)]
+    person = 0 if goals[0] or not goals[1] else 1
+    net = block.net(prior)
+    observed = known_places(net, np.stack([start.numbers() for start in starts]), frames) if all(goals) else None
+    count, meetings = chosen.number(), meetings_of(said, chosen)
     features, poses = pair_features(
         prior,
-        block.net(prior),
+        net,
         said * count,
         frames,
         seeds=pair_seeds(chosen),
-        edits=PairEdits(corrections=change * count, meetings=meetings),
+        edits=PairEdits(stacked([observed] * count) if observed else None, change * count, meetings=meetings),
         sampling=chosen,
         progress=progress,
     )
     made = []
     for numbers, beside, meeting in zip(features, poses.astype(np.float64), meetings, strict=True):
         if goal:
-            beside = poses_at(beside, place, person)
+            beside = poses_at(beside, starts[person], person)
         people = [finish(prior, one, foot_lock=foot_lock) for one in numbers]
         duet = [moved(one, GroundPose.of_numbers(pose)) for one, pose in zip(people, beside, strict=True)]
-        if goal:
-            duet[person] = fit(duet[person], goal)
+        duet = [fit(one, goal) if goal else one for one, goal in zip(duet, goals, strict=True)]
         made.append(met(duet, meeting, goals) if chosen.bodies else (duet[0], duet[1]))
     return made
-
-
-def _goal_of(goals: tuple[Goal | None, Goal | None]) -> tuple[Goal | None, int]:
-    """The one goal and whose it is."""
-    if None not in goals:
-        raise MotionloomError("both people have a goal; give one to one of them, and the other goes along")
-    return next((goal for goal in goals if goal), None), int(goals[0] is None and goals[1] is not None)
 
 
 def poses_at(poses: Array, place: GroundPose, person: int) -> Array:
@@ -309,8 +302,13 @@ def poses_at(poses: Array, place: GroundPose, person: int) -> Array:
     return compose(place.numbers(), relative(poses[person], poses))
 
 
-def _goal_frames(goal: Goal) -> int:
+def _goal_frames(goals: Sequence[Goal | None]) -> int:
+    goal, *others = (goal for goal in goals if goal)
     longest = round(LONGEST * FPS)
+    if any(len(other) != len(goal) for other in others):
+        raise MotionloomError(
+            f"the goals of the two people have {len(goal)} and {len(others[0])} frames; give both the same length"
+        )
     if not 4 <= len(goal) <= longest:
         raise MotionloomError(f"a goal of {len(goal)} frames cannot be followed; one of 4 to {longest} can")
     return len(goal)
@@ -374,7 +372,9 @@ def complete_pair(
     net, count = block.net(prior), chosen.number()
     observed = known_state(prior, net, known, poses, frames)
     leaving = [Past(one, GroundPose()).holder(prior, frames) for one in known]
-    edits = PairEdits(stacked([observed] * count), leaving * count, frozen=[False] * (2 * count))
+    edits = PairEdits(
+        stacked([observed] * count), leaving * count, frozen=[False] * (2 * count), meetings=meetings_of(said, chosen)
+    )
     features, _ = pair_features(
         prior, net, said * count, frames, seeds=pair_seeds(chosen), edits=edits, sampling=chosen, progress=progress
     )

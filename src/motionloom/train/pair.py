@@ -20,6 +20,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, LAYOUT
 from motionloom.nets.pair import PLACE, PairConfig, PairNet, Talk, fitting, join, part
 from motionloom.nets.prior import Condition
+from motionloom.runtime.text.known import known_sentences
 from motionloom.train.duets import Crops, Duets, Sight
 from motionloom.train.export import pair_graph
 from motionloom.train.loop import STATE, Average, Log, World, changed, train
@@ -351,6 +352,8 @@ class _Export:
         self.place, self.last = folder / f"{recipe.name}.safetensors", folder / "last.safetensors"
         self.licences = "; ".join(sorted({pair.licence for pair in pairs}))
         self.names = [pair.name for pair in pairs]
+        texts = [text for pair in pairs for text in pair.captions]
+        self.known = known_sentences(texts, {}, prior.text) if texts else None
         self.digest = fingerprint(prior.net)
         going_on = (folder / STATE).is_file() and self.place.is_file()
         self.best = _loss_of(PairBlock.load(self.place, prior)) if going_on and held else float("inf")
@@ -385,6 +388,7 @@ class _Export:
             self.licences,
             notes,
             pair_graph(self.config, self.prior.net.config),
+            self.known,
         )
 
 

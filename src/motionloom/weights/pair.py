@@ -17,6 +17,7 @@ from motionloom.runtime.pair import PairConfig, PairSession
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.session import check_graph
 from motionloom.runtime.shapes import pair_shapes
+from motionloom.runtime.text.known import Known, pack_known, unpack_known
 from motionloom.weights.adapter import origin
 from motionloom.weights.container import PAIRS, check, check_graphs, finite, graph_tensors, halved, split_graphs
 
@@ -57,6 +58,8 @@ class PairBlock:
     """How it was made: steps, seed, measured numbers."""
     graph: bytes = b""
     """Of prior and block together."""
+    known: Known | None = None
+    """What pairs it has learned, in words; None: its file does not say."""
 
     @staticmethod
     def load(block: str | Path, prior: HasNet) -> "PairBlock":
@@ -83,7 +86,11 @@ class PairBlock:
             raise MotionloomError("the block has weights that are not finite, and is not written; train it again")
         about = {key: getattr(self, key) for key in _TEXTS}
         about |= {"config": asdict(self.config), "notes": self.notes}
-        return PAIRS.write(path, halved(self.tensors, half) | graph_tensors({"pair": self.graph}), about)
+        tensors = halved(self.tensors, half) | graph_tensors({"pair": self.graph})
+        if self.known is not None:
+            table, about["known"] = pack_known(self.known)
+            tensors |= table
+        return PAIRS.write(path, tensors, about)
 
     def weights(self, prior: HasNet) -> dict[str, np.ndarray]:
         """All that the graph is filled with."""
@@ -116,5 +123,9 @@ def read_block(path: Path) -> PairBlock:
         ):
             raise ValueError("values of the wrong kind")
         weights, graphs = split_graphs(tensors)
-        graph = graphs.get("pair", b"")
-        return PairBlock(config=PairConfig.parse(config), tensors=weights, notes=notes, graph=graph, **said)
+        graph, known = graphs.get("pair", b""), None
+        if "known" in about:  # files of before there were tables lack it
+            known = unpack_known(weights, about["known"], width=weights["known.vectors"].shape[-1])
+            weights = {name: value for name, value in weights.items() if not name.startswith("known.")}
+        config = PairConfig.parse(config)
+        return PairBlock(config=config, tensors=weights, notes=notes, graph=graph, known=known, **said)

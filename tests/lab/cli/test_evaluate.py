@@ -1,8 +1,7 @@
 """`motionloom evaluate` from the outside, with a made-up generator in place of weights."""
 
-import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ def walks_or_stands(prompts: Sequence[str], *, seconds: float, seed: int) -> tup
 
 @pytest.fixture(autouse=True)
 def _no_weights(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motionloom.cli.evaluate._generator", lambda arguments: walks_or_stands)
+    monkeypatch.setattr("motionloom.lab.suites.commands.generator_of", lambda asked: walks_or_stands)
 
 
 @pytest.fixture
@@ -175,7 +174,7 @@ def test_mistakes_are_one_sentence_and_exit_code_2(words: list[str], capsys: pyt
     assert captured.out == ""
 
 
-def _fakes(arguments: argparse.Namespace) -> Tools:
+def _fakes(asked: Mapping[str, Any]) -> Tools:
     def speed(quick: bool) -> dict[str, Any]:
         entry = {"name": "help", "value": 0.1, "unit": "s", "target": "< 1", "passes": True, "note": ""}
         return {"machine": {"device": "x", "load": 0.0}, "quick": quick, "entries": [entry]}
@@ -191,7 +190,7 @@ PHYSICAL = ["--only", "obedience", "--only", "realism", "--only", "speed"]
 
 @pytest.fixture
 def fakes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motionloom.cli.evaluate_all._tools", _fakes)
+    monkeypatch.setattr("motionloom.lab.suites.commands.tools_of", _fakes)
 
 
 @pytest.mark.usefixtures("fakes")

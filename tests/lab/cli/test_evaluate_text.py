@@ -19,7 +19,7 @@ FEW = ["--batch", "4", "--replications", "2", "--steps", "2,3", "--multimodality
 @pytest.fixture(autouse=True)
 def _judge(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("motionloom.lab.evaluator.evaluators.load_evaluator", lambda name: Judge(name=name))
-    monkeypatch.setattr("motionloom.cli.evaluate_text._memory", lambda arguments, steps: 300.0)
+    monkeypatch.setattr("motionloom.lab.suites.commands.memory_of", lambda asked, steps: 300.0)
     monkeypatch.setattr("motionloom.lab.report.plots.draw", lambda report, folder: [])
 
 

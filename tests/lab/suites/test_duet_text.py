@@ -151,7 +151,7 @@ def test_duets_that_cannot_be_compared_are_reported() -> None:
         duet_text.text_table([replace(pair, captions=()) for pair in RECORDED])
     with pytest.raises(MotionloomError, match="fewer than two pairs"):
         duet_text.measure(RECORDED[:1], made_at(1.0), None, TEXT_HOW, table=TABLE)
-    with pytest.raises(MotionloomError, match="2 duets or more"):
+    with pytest.raises(MotionloomError, match="duets must be from 2"):
         duet_text.How(duets=1)
 
 
@@ -287,7 +287,7 @@ def test_captions_follow_one_another_and_pieces_are_one_duet() -> None:
         assert (len(first), len(second)) == (80, 80)
         assert not np.allclose(first.rotations[:, 1:], second.rotations[:, 1:])
     assert mp.distance(np.stack([first.positions(), second.positions()]))[0] == pytest.approx(1.0, abs=0.2)
-    with pytest.raises(MotionloomError, match="2 to 100 segments"):
+    with pytest.raises(MotionloomError, match="segments must be from 2 to 100"):
         duet_long.How(segments=1)
 
 
@@ -310,7 +310,9 @@ def test_every_part_is_made_by_its_own_module_and_told_with_its_command(
         assert main([*words, "--only", part]) == 0
         how = asked[part]["how"]
         assert (how.duets, how.steps) == (3, 6)
-        assert asked[part]["command"] == f"motionloom evaluate duet --data PACK --only {part} --duets 3 --quick"
+        assert asked[part]["command"] == (
+            f"motionloom evaluate duet --weights default --data PACK --only {part} --duets 3 --quick"
+        )
         assert (tmp_path / "out" / part / "report.json").is_file()
     assert asked["long"]["how"].segments == 2
     capsys.readouterr()

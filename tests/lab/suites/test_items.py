@@ -16,6 +16,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.lab.evaluator.evaluators import Caption
 from motionloom.lab.suites import items, text_reference
+from motionloom.lab.suites.harness import averaged
 from motionloom.lab.suites.protocol import Protocol, Selection
 from tests.kinematics.people import moved, standing, walking
 from tests.lab.suites.judged import WIDTH, Judge, item
@@ -263,16 +264,16 @@ def test_any_bytes_in_place_of_a_reference_are_read_or_refused(
 def test_physical_numbers_of_a_slide_are_its_speed() -> None:
     """Standing and pushed at 1 m/s: 100 % of frames skate, at 100 cm/s and 50 mm a frame; bones stay, nothing sinks."""
     push = np.outer(np.arange(80) / 20, [0.0, 0.0, 1.0])
-    found = text_reference.physical(humanml.encode(moved(standing(4.0), push), heading="corrected"))
+    found = text_reference.of_features(humanml.encode(moved(standing(4.0), push), heading="corrected"))
     wanted = {"skate_share": 100, "skate_speed": 100, "skate_slide": 50, "penetration": 0, "bone_error": 0, "jerk": 0}
     assert found == pytest.approx(wanted, abs=0.1)
-    sunk = text_reference.physical(humanml.encode(standing(4.0) - [0, 0.03, 0], heading="corrected"))
+    sunk = text_reference.of_features(humanml.encode(standing(4.0) - [0, 0.03, 0], heading="corrected"))
     assert sunk["penetration"] == pytest.approx(3, abs=0.01)
 
 
 def test_averages_are_weighted_by_length() -> None:
     numbers = np.array([[1.0] * 6, [4.0] * 6])
-    assert set(text_reference.averaged(numbers, [40, 80]).values()) == {3.0}
+    assert set(averaged(numbers, [40, 80]).values()) == {3.0}
 
 
 def test_a_count_takes_evenly_spread_items(reference: text_reference.TextReference) -> None:

@@ -172,7 +172,7 @@ def test_published_rows_are_marked_as_of_other_data_unless_all_of_it_is_here(tri
 
 
 def test_on_a_terminal_every_block_is_a_table_of_its_own(trial: trials.Trial) -> None:
-    said = prediction.printed(prediction.measure(predictor(), trial, FEW, ("real", "zero")))
+    said = report.by_place(prediction.measure(predictor(), trial, FEW, ("real", "zero")))
     first, *others = said.split("Published, measured on ")
     assert "zero velocity" in first
     assert "HumanMAC" not in first

@@ -288,7 +288,7 @@ def test_the_command_does_a_study(tmp_path: Path, capsys) -> None:
     assert "second 4" in capsys.readouterr().out
     said = (tmp_path / "out" / "horizon.md").read_text()
     assert (
-        "motionloom evaluate study horizon --data DIR --weights tiny.safetensors --windows 2 --out FOLDER --quick"
+        "motionloom evaluate study horizon --weights tiny.safetensors --data DIR --windows 2 --out FOLDER --quick"
         in said
     )
     filler = runpy.run_path(str(Path(__file__).parents[3] / "tools" / "fill_readme.py"))
@@ -303,8 +303,9 @@ def test_the_command_does_a_study(tmp_path: Path, capsys) -> None:
 
 
 def test_the_command_lists_what_there_is() -> None:
-    from motionloom.cli import evaluate_prediction
+    from motionloom.lab.suites.options import commands
     from motionloom.lab.suites.prediction import KINDS
 
-    assert tuple(studies.TITLES) == evaluate_prediction.STUDIES
-    assert evaluate_prediction.ROWS == KINDS
+    choices = {(name, o.name): o.choices for name, command in commands().items() for o in command.options}
+    assert tuple(studies.TITLES) == choices["study", "name"]
+    assert choices["prediction", "row"] == KINDS

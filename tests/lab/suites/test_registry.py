@@ -16,7 +16,7 @@ from motionloom.lab.metrics.obedience import check
 from motionloom.lab.metrics.realism import NUMBERS, average
 from motionloom.lab.report import results
 from motionloom.lab.report.report import Column, Report, Row, Value, encode, markdown, read
-from motionloom.lab.suites import needs, obey, physical
+from motionloom.lab.suites import bodies, needs, obey, physical
 from motionloom.lab.suites.clips import RealClip
 from motionloom.lab.suites.everything import QUICK, Outcome, run_all
 from motionloom.lab.suites.harness import Run
@@ -298,10 +298,17 @@ def test_suites_with_a_judge_ask_for_what_was_said(
     assert (found.suite, found.command) == (name, words)
     judge = asked["run"].evaluator if name == "text" else asked["evaluator"]
     assert judge == (job.evaluator if name == "text" else f"judge {job.evaluator}")
-    if name != "evaluator":  # sha256 of abc, FIPS 180-2
-        assert found.protocol["evaluator file"] == "ba7816bf8f01"
+    assert suite.judged == (name != "evaluator")
     if name == "text":
         assert (asked["run"].weights, asked["run"].data, asked["protocol"].replications) == ("default", tmp_path, 2)
+
+
+def test_a_judged_report_says_which_evaluator_file_it_was(job: Job, tmp_path: Path) -> None:
+    (tmp_path / "mine.tar").write_bytes(b"abc")
+    job = replace(job, evaluator=str(tmp_path / "mine.tar"))
+    (outcome,) = run_all(job, tmp_path / "out", [replace(Counted("one").suite(), judged=True)])
+    assert outcome.report
+    assert outcome.report.protocol["evaluator file"] == "ba7816bf8f01"  # sha256 of abc, FIPS 180-2
 
 
 # ---- obedience, realism and speed as reports ------------------------------------------------------------------------
@@ -359,7 +366,18 @@ def test_realism_beside_real_clips_and_beside_shipped_numbers() -> None:
     wanted, real, about = physical.realism_orders(None, 20)
     assert sum(len(order.prompts) for order in wanted) == 20
     alone = physical.realism_report({"generated": clips}, FPS, real, command="", protocol=about)
-    assert [c.name for c in alone.columns] == [n.name for n in NUMBERS]
+    assert [c.name for c in alone.columns][: len(NUMBERS)] == [n.name for n in NUMBERS]
+
+
+def test_the_realism_report_holds_bodies_against_recorded_people() -> None:
+    """Eight numbers of the body, the same as of `motionloom evaluate realism`."""
+    clips, numbers = [walking(1.2, 3.0), standing(3.0)], dict.fromkeys((n.name for n in NUMBERS), 1.0)
+    real, ours = physical.realism_report({"ours": clips}, FPS, numbers, command="", protocol={}).rows
+    held, reach = bodies.judge(clips, bodies.known()), bodies.known()
+    assert ours.values["body_knees"].mean == held["numbers"]["knees"]["median"]
+    assert ours.values["body_bones"].mean == held["numbers"]["bones"]["stretched"]
+    assert real.values["body_knees"].mean == reach["knees"][2]
+    assert sum(name.startswith("body_") for name in ours.values) == held["of"] == 8
 
 
 def test_speed_has_its_targets_and_the_machine_in_the_protocol() -> None:

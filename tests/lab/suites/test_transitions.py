@@ -1,6 +1,5 @@
 """The suite of long motion in a world where every number is known (`tests.lab.suites.judged`); methods are made up."""
 
-import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from motionloom.cli import evaluate_transitions
+from motionloom.cli import main
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS
 from motionloom.lab.metrics.transitions import JERK_HUMANML3D
@@ -302,12 +301,6 @@ def test_ways_by_name() -> None:
 # ---- the command and the suite ---
 
 
-def parsed(*words: str) -> argparse.Namespace:
-    parser = argparse.ArgumentParser()
-    evaluate_transitions.add(parser.add_subparsers())
-    return parser.parse_args(["transitions", *words])
-
-
 def test_the_command_asks_for_what_was_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys) -> None:
     asked = {}
 
@@ -317,8 +310,7 @@ def test_the_command_asks_for_what_was_said(monkeypatch: pytest.MonkeyPatch, tmp
 
     monkeypatch.setattr(transitions, "run", fake)
     words = ["--methods", "ours,paper", "--intervals", "16", "--steps", "12", "--split", "test", "--out", str(tmp_path)]
-    arguments = parsed(*words, "--data", "/home/me/set")
-    arguments.run(arguments)
+    assert main(["evaluate", "transitions", *words, "--data", "/home/me/set"]) == 0
     assert asked["names"] == ("ours", "paper")
     assert asked["how"] == Transitions(intervals=16, steps=12)
     assert asked["selection"].splits == ("test",)

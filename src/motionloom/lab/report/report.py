@@ -7,7 +7,7 @@ disk a report is a folder: ``report.json`` (everything), ``report.md`` (to be re
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -208,6 +208,15 @@ def plain(report: Report) -> str:
     marked = [Row(f"{row.name} [{row.measured_on}]", row.values) for row in elsewhere]
     parts = [report.title, columns_of_text(_cells(report, (*here, *marked))), *report.notes]
     return "\n\n".join(_safe(part) for part in parts)
+
+
+def by_place(report: Report) -> str:
+    """For a terminal: what was measured here, then every block of published rows as a table of its own."""
+    parts = [plain(replace(report, rows=tuple(_split(report)[0])))]
+    for place in dict.fromkeys(row.measured_on for row in _split(report)[1]):
+        rows = tuple(replace(row, measured_on="") for row in report.rows if row.measured_on == place)
+        parts.append(plain(replace(report, title=origin(place), rows=rows, notes=())))
+    return "\n\n".join(parts)
 
 
 def _split(report: Report) -> tuple[list[Row], list[Row]]:

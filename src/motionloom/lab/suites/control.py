@@ -17,22 +17,19 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
-from motionloom.features.layout import FPS
-from motionloom.kinematics import physics
 from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Caption, Evaluator
 from motionloom.lab.metrics import control as metrics
 from motionloom.lab.metrics.control import ControlError
 from motionloom.lab.metrics.frechet import fid, fid_bias
 from motionloom.lab.metrics.retrieval import r_precision
-from motionloom.lab.metrics.skate import skate
 from motionloom.lab.report import published_rows
 from motionloom.lab.report.columns import columns
 from motionloom.lab.report.report import REAL, Report
 from motionloom.lab.suites import control_kinds, text_reference
 from motionloom.lab.suites.control_kinds import Kind, Target
 from motionloom.lab.suites.control_methods import BASE, METHODS, OURS, Made, Maker, Sampling, checked, fits, maker
-from motionloom.lab.suites.harness import Run, check_names, digest, diversity, row_of
+from motionloom.lab.suites.harness import Run, check_names, digest, diversity, physical_mean, row_of
 from motionloom.lab.suites.items import Item, fitting, pick, read_items, spread
 from motionloom.lab.suites.parts import Parts
 from motionloom.lab.suites.protocol import Protocol, Selection
@@ -128,7 +125,7 @@ def measured(trial: Trial, replication: int, made: Sequence[Made], targets: Sequ
     return {
         **_judged(trial, replication, embedded),
         **met(made, targets, trial.scale),
-        **physical([one.positions for one in made]),
+        **physical_mean([one.positions for one in made]),
     }
 
 
@@ -166,22 +163,10 @@ def _error(of: str, error: ControlError | None) -> dict[str, float]:
     return {} if error is None else {f"{of}_error": error.error, f"{of}_sequences": error.sequences}
 
 
-def physical(clips: Sequence[np.ndarray]) -> dict[str, float]:
-    """Skate (%, cm/s, mm per frame), jerk (m/s³) and penetration (cm) of clips (frames, 22, 3), weighted by length."""
-    rows = []
-    for positions in clips:
-        found = skate(positions, FPS)
-        depth, jerk = 100 * physics.penetration(positions), physics.jerk(positions, FPS).mean
-        rows.append((100 * found.share, found.speed, found.slide, jerk, depth))
-    names = ("skate_share", "skate_speed", "skate_slide", "jerk", "penetration")
-    means = np.average(np.array(rows), axis=0, weights=[len(positions) for positions in clips])
-    return dict(zip(names, means.tolist(), strict=True))
-
-
 def of_real(trial: Trial, replication: int) -> dict[str, float]:
     """The real motions themselves; they meet every goal, which they are."""
     clips = [humanml.decode_positions(item.features.astype(np.float64)) for item in trial.items]
-    return {**_judged(trial, replication, trial.motions), **physical(clips)}
+    return {**_judged(trial, replication, trial.motions), **physical_mean(clips)}
 
 
 def of_method(trial: Trial, one: Kind, name: str, replication: int) -> dict[str, float]:
@@ -357,11 +342,6 @@ def settings(
         guidance=guidance,
         seed=seed,
     )
-
-
-def quick() -> Protocol:
-    """The same in a few minutes: eight motions, one replication."""
-    return settings(count=8, replications=1)
 
 
 def identity(items: Sequence[Item]) -> str:

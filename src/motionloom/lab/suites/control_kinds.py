@@ -31,17 +31,6 @@ DEFAULT = (
     "in_between",
 )
 """Every kind of the paper's Table 4, each joint without and with the path, and two sparse ones."""
-SUITE = (
-    TRAJECTORY,
-    "left_wrist",
-    "head",
-    "trajectory+left_wrist",
-    "trajectory+right_foot",
-    "left_wrist+right_foot",
-    "keyframes",
-    "in_between",
-)
-"""Those of the suite of `evaluate all`: all of `DEFAULT` take hours on two CPU cores."""
 QUICK = (TRAJECTORY, f"{TRAJECTORY}+left_wrist")
 """One control and two of them, to see that everything works."""
 MOST_KINDS = 50

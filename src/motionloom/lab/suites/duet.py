@@ -28,6 +28,7 @@ from motionloom.lab.suites.duet_ways import FRAMES, GIVEN, Crops, Way
 from motionloom.lab.suites.harness import Run, Say, check_names, digest
 from motionloom.lab.suites.needs import NoData, pairs_of
 from motionloom.lab.suites.parts import Parts
+from motionloom.lab.suites.protocol import GUIDANCES, SEEDS, check_ranges
 from motionloom.tasks.text import STEPS
 from motionloom.weights.pair import PairBlock, blocks
 from motionloom.weights.prior import Prior
@@ -65,13 +66,9 @@ class How:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, value, most in (("crops", self.crops, 10_000), ("samples", self.samples, 100)):
-            if not 1 <= value <= most:
-                raise MotionloomError(f"{name} must be from 1 to {most:,}; got {value}")
+        check_ranges(self, crops=(1, 10_000), samples=(1, 100), steps=(1, 1000), guidance=GUIDANCES, seed=SEEDS)
         if self.given not in GIVEN:
             raise MotionloomError(f"what is given is one of {', '.join(GIVEN)}; got {self.given[:40]!r}")
-        if not 0 <= self.seed < 2**31 or not np.isfinite(self.guidance) or not 1 <= self.steps <= 1000:
-            raise MotionloomError(f"seed, steps or guidance cannot be {self.seed}, {self.steps}, {self.guidance}")
 
 
 QUICK = How(crops=6, samples=2, steps=6)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from motionloom.data.pairs import Pair
-from motionloom.errors import MotionloomError
 from motionloom.goals.segment import Segment
 from motionloom.ground import GroundPose
 from motionloom.lab.metrics import pair as mp
@@ -17,6 +16,7 @@ from motionloom.lab.suites import duet_text as judged
 from motionloom.lab.suites.duet_answers import own_seed
 from motionloom.lab.suites.duet_text import KINDS, NOTES, Make, Table
 from motionloom.lab.suites.harness import Run
+from motionloom.lab.suites.protocol import check_ranges
 from motionloom.motion import Motion
 from motionloom.tasks.control import moved
 from motionloom.tasks.duet import compose_pair
@@ -39,8 +39,7 @@ class How(judged.How):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 2 <= self.segments <= MOST:
-            raise MotionloomError(f"long duets have 2 to {MOST} segments; got {self.segments}")
+        check_ranges(self, segments=(2, MOST))
 
 
 QUICK = How(duets=2, steps=6, segments=2)

@@ -26,6 +26,7 @@ from motionloom.lab.suites.duet import HELD_OUT, chosen_block
 from motionloom.lab.suites.duet_ways import no_communication_net
 from motionloom.lab.suites.harness import Run, Say, check_names
 from motionloom.lab.suites.needs import pairs_of
+from motionloom.lab.suites.protocol import SEEDS, check_ranges
 from motionloom.tasks.control import moved
 from motionloom.tasks.pair import (
     Duet,
@@ -73,10 +74,7 @@ class How:
     """Feet cleaned up, as `motionloom duet` writes them."""
 
     def __post_init__(self) -> None:
-        if not 2 <= self.duets <= 10_000 or not 0 <= self.seed < 2**31 or not 1 <= self.seconds <= 30:
-            raise MotionloomError(
-                f"2 duets or more of 1 to 30 s are measured; got {self.duets} of {self.seconds:g} s, seed {self.seed}"
-            )
+        check_ranges(self, duets=(2, 10_000), seconds=(1, 30), seed=SEEDS)
 
 
 QUICK = How(duets=4, steps=6)

@@ -15,7 +15,7 @@ from motionloom.lab.report import files
 from motionloom.lab.report import report as reports
 from motionloom.lab.report.report import Report
 from motionloom.lab.report.results import FILES
-from motionloom.lab.suites.harness import weight_marks
+from motionloom.lab.suites.harness import digest, evaluator_file, weight_marks
 from motionloom.lab.suites.needs import NoData
 from motionloom.lab.suites.registry import SUITES, Job, Suite
 from motionloom.reading import read_bytes
@@ -89,6 +89,10 @@ def _one(suite: Suite, job: Job, folder: Path, *, again: bool) -> Outcome:
             shutil.rmtree(parts)
         job.tools.progress(f"{suite.name}: {suite.measures}")
         made = suite.run(replace(job, folder=parts), settings)
+        if suite.judged:
+            judge = evaluator_file(job.evaluator)
+            seal = digest(judge)[:12] if judge else "unknown"  # trained anew under the same name it is another measure
+            made = replace(made, protocol={**made.protocol, "evaluator file": seal})
         if job.quick:
             made = replace(made, protocol={**made.protocol, "quick": True}, notes=(QUICK, *made.notes))
         made = replace(made, protocol={**made.protocol, FILES: weight_marks(suite.weights(job))})

@@ -1,6 +1,7 @@
 """What all suites share: where and how they measure, what is opened and refused first, and rows over replications."""
 
 import re
+import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,10 +11,12 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
+from motionloom.kinematics import physics
 from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator import evaluators, own
 from motionloom.lab.evaluator.evaluators import Evaluator
 from motionloom.lab.metrics import retrieval
+from motionloom.lab.metrics.skate import skate
 from motionloom.lab.report.report import Column, Row, Value
 from motionloom.lab.suites.parts import Parts, fingerprint
 from motionloom.weights.container import weights_digest
@@ -24,6 +27,8 @@ Say = Callable[[str], None]
 CHUNK = 64
 """Motions embedded at once."""
 DIVERSITY_PAIRS = 300
+PHYSICAL = ("skate_share", "skate_speed", "skate_slide", "penetration", "jerk", "bone_error")
+"""Names of the numbers of `physical`, in order."""
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -37,6 +42,11 @@ class Generate(Protocol):
 
 def silent(line: str) -> None:
     """Say nothing."""
+
+
+def say(line: str) -> None:
+    """Report progress on stderr."""
+    print(line, file=sys.stderr, flush=True)
 
 
 @dataclass(frozen=True)
@@ -137,10 +147,30 @@ def plain_words(text: str) -> str:
     return " ".join(re.findall(r"\w+", text.lower()))
 
 
-def averaged(rows: Sequence[Mapping[str, float]], frames: Sequence[int]) -> dict[str, float]:
-    """Means of the numbers of several motions, weighted by their lengths."""
-    means = np.average(np.array([list(row.values()) for row in rows]), axis=0, weights=frames)
-    return dict(zip(rows[0], means.tolist(), strict=True))
+def physical(positions: np.ndarray) -> dict[str, float]:
+    """The numbers of `PHYSICAL` for one motion (frames, 22, 3) metres at 20 frames per second, the floor at y = 0.
+
+    Skate: share of frames in %, cm/s, mm per frame (`lab.metrics.skate`); cm under the floor; m/s³; mm.
+    """
+    found = skate(positions, FPS)
+    return {
+        "skate_share": 100 * found.share,
+        "skate_speed": found.speed,
+        "skate_slide": found.slide,
+        "penetration": 100 * physics.penetration(positions),
+        "jerk": physics.jerk(positions, FPS).mean,
+        "bone_error": 1000 * physics.bone_length_error(positions),
+    }
+
+
+def averaged(numbers: Sequence[Sequence[float]] | Array, frames: Sequence[int]) -> dict[str, float]:
+    """Means of (motions, numbers of `PHYSICAL`), weighted by length."""
+    return dict(zip(PHYSICAL, np.average(np.asarray(numbers), axis=0, weights=frames).tolist(), strict=True))
+
+
+def physical_mean(clips: Sequence[np.ndarray]) -> dict[str, float]:
+    """The numbers of `PHYSICAL` of several clips, weighted by length."""
+    return averaged([list(physical(clip).values()) for clip in clips], [len(clip) for clip in clips])
 
 
 def row_of(

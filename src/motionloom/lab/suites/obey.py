@@ -5,7 +5,7 @@ file after every prompt; a run that was stopped goes on with the next one.
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -177,6 +177,20 @@ def totals(results: Sequence[Result], checks: Sequence[Check] = CHECKS) -> dict[
         reworded = [a.obeyed for row in other for a in row]
         found["paraphrases_obeyed_share"] = round(sum(reworded) / len(reworded), 4)
     return found
+
+
+def in_a_sentence(found: Mapping[str, float]) -> str:
+    """What `totals` found."""
+    said = (
+        f"{found['prompts_obeyed']} of {found['prompts']} prompts obeyed on at least {ENOUGH:.0%} of the seeds, "
+        f"{found['prompts_mostly_obeyed']} on at least {MOSTLY:.0%}; {found['seeds_obeyed_share']:.1%} of all seeds"
+    )
+    if "paraphrases_obeyed_share" in found:
+        said += (
+            f";\nin other words {found['paraphrases_obeyed']} of {found['paraphrases']}, "
+            f"{found['paraphrases_mostly_obeyed']} and {found['paraphrases_obeyed_share']:.1%}"
+        )
+    return said
 
 
 def _enough(rows: Sequence[Sequence[Attempt]], share: float) -> int:

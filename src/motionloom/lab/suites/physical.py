@@ -14,7 +14,7 @@ from motionloom.lab.metrics.realism import NUMBERS, average, speed_distance
 from motionloom.lab.metrics.realism import realism as numbers_of
 from motionloom.lab.report.columns import columns
 from motionloom.lab.report.report import REAL, Column, Report, Row, Value
-from motionloom.lab.suites import obey, realism
+from motionloom.lab.suites import bodies, obey, realism
 from motionloom.lab.suites.clips import real_clips
 from motionloom.lab.suites.reference import known
 
@@ -80,7 +80,10 @@ def realism_report(
     command: str,
     protocol: Mapping[str, Any],
 ) -> Report:
-    """A row of real motion (clips at 20 frames per second, or finished averages) and one per group of motions."""
+    """A row of real motion (clips at 20 frames per second, or finished averages) and one per group of motions.
+
+    Bodies are held against recorded people (`bodies.known`), whatever the clips are.
+    """
     shown = [
         Column(n.name, n.name.replace("_", " "), "real" if n.both_ways else "down", n.meaning, _digits(n.unseen))
         for n in NUMBERS
@@ -92,17 +95,31 @@ def realism_report(
         rows.append(Row(REAL, realism_value(real, FPS)))
         meaning = "m/s, Wasserstein-1 distance of the pelvis speeds of all frames to the real ones"
         shown.append(Column("speed_distance", "speed distance", "down", meaning, 3))
+    reach, said = bodies.known(), []
+    people = {f"body_{name}": Value(percentiles[2]) for name, percentiles in reach.items()}
+    rows = [Row(row.name, {**row.values, **people}) for row in rows]
     for name, clips in made.items():
-        values = realism_value(clips, fps)
+        held = bodies.judge(clips, reach)
+        values = realism_value(clips, fps) | body_values(held, len(clips))
+        said.append(f"{name}: {held['passed']} of {held['of']} numbers of the body are within what recorded people do.")
         if not isinstance(real, Mapping) and fps == FPS:
             values["speed_distance"] = Value(speed_distance(list(clips), list(real), FPS))
         rows.append(Row(name, values))
     notes = (
+        *said,
         f"'{AS_DRAWN}' is what the network draws; '{AS_EXPORTED}' has constant bones and planted feet held still.",
         "Intervals are 1.96 standard errors by the bootstrap over clips; the count is the number of clips.",
     )
     title = "Realism: does it move like real people"
-    return Report("realism", title, command, protocol, tuple(shown), tuple(rows), notes)
+    return Report("realism", title, command, protocol, (*shown, *columns("realism-body")), tuple(rows), notes)
+
+
+def body_values(held: Mapping[str, Any], count: int) -> dict[str, Value]:
+    """The columns of bodies out of `bodies.judge`'s answer for so many clips."""
+    numbers = held["numbers"]
+    found = {name: n["median"] for name, n in numbers.items() if "median" in n}
+    found |= {"whole": numbers["whole"]["share"], "bones": numbers["bones"]["stretched"]}
+    return {f"body_{name}": Value(value, count=count) for name, value in found.items()}
 
 
 def _digits(unseen: float) -> int:

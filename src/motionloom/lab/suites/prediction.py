@@ -16,13 +16,13 @@ from motionloom.errors import MotionloomError
 from motionloom.lab.metrics import prediction as metrics
 from motionloom.lab.metrics.prediction import Singles
 from motionloom.lab.papers.humanmac import published_futures
-from motionloom.lab.report import report as reports
 from motionloom.lab.report.columns import columns
 from motionloom.lab.report.published_rows import published
 from motionloom.lab.report.report import REAL, SAME, Report, Row
 from motionloom.lab.suites import prediction_trial as trials
 from motionloom.lab.suites.harness import Run, check_names, check_steps, digest, row_of
 from motionloom.lab.suites.prediction_trial import Array, Trial, Way
+from motionloom.lab.suites.protocol import GUIDANCES, SEEDS, check_ranges
 from motionloom.tasks.completion import SOLVER, SPACING, STEPS, futures
 from motionloom.weights.predictor import Predictor, find_predictor
 
@@ -50,17 +50,11 @@ class How:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        whole = {
-            "samples": self.samples,
-            "steps": self.steps,
-            "published_steps": self.published_steps,
-            "replications": self.replications,
-        }
-        for name, value in whole.items():
-            if not 1 <= value <= 1000:
-                raise MotionloomError(f"{name.replace('_', ' ')} must be from 1 to 1000; got {value}")
-        if self.singles not in get_args(Singles) or not np.isfinite(self.guidance) or not 0 <= self.seed < 2**31:
-            raise MotionloomError(f"singles, guidance or seed cannot be {self.singles}, {self.guidance}, {self.seed}")
+        some = (1, 1000)
+        check_ranges(self, samples=some, steps=some, published_steps=some, replications=some)
+        check_ranges(self, guidance=GUIDANCES, seed=SEEDS)
+        if self.singles not in get_args(Singles):
+            raise MotionloomError(f"singles are one of {', '.join(get_args(Singles))}; got {self.singles!r}")
 
 
 QUICK = How(samples=6, windows=6, published_steps=20)
@@ -263,12 +257,3 @@ def _published(trial: Trial, how: How, names: Sequence[str]) -> tuple[Row, ...]:
         replace(row, measured_on=SAME + row.measured_on) if same and row.measured_on.startswith(called) else row
         for row in rows
     )
-
-
-def printed(report: Report) -> str:
-    """For a terminal: what was measured here, then every block of published rows as a table of its own."""
-    here = [reports.plain(replace(report, rows=tuple(row for row in report.rows if not row.measured_on)))]
-    for place in dict.fromkeys(row.measured_on for row in report.rows if row.measured_on):
-        rows = tuple(replace(row, measured_on="") for row in report.rows if row.measured_on == place)
-        here.append(reports.plain(replace(report, title=reports.origin(place), rows=rows, notes=())))
-    return "\n\n".join(here)

@@ -21,6 +21,7 @@ from motionloom.lab.suites import prediction, prediction_behaviour
 from motionloom.lab.suites import prediction_trial as trials
 from motionloom.lab.suites.harness import Run, Say, silent, weight_marks
 from motionloom.lab.suites.prediction_trial import Trial
+from motionloom.lab.suites.protocol import check_ranges
 from motionloom.tasks.completion import SOLVER, SPACING, STEPS
 from motionloom.train.loop import changed
 from motionloom.train.predictor import train_predictor
@@ -48,6 +49,7 @@ TITLES = {
     "hold": "Parts of the body held",
     "switch": "Arriving at another motion",
 }
+MOST = 1_000_000
 WALKS = (2, 3, 4, 5, 8, 10, 20, 50, 100)
 SPREADS = ("index", "early", "snr")
 SHOWN = ("apd", "ade", "fde", "mmade", "mmfde", "jerk", "seam_velocity", "seconds")
@@ -79,23 +81,13 @@ class Lab:
     progress: Say = silent
 
 
-def budget(
-    name: str,
-    *,
-    quick: bool = False,
-    windows: int | None = None,
-    samples: int | None = None,
-    train_steps: int | None = None,
-    seed: int = 0,
-) -> Budget:
-    """The usual budget of a study with what was said; raises MotionloomError for what cannot be."""
+def budget(name: str, *, quick: bool = False, **said: int) -> Budget:
+    """The usual budget of a study with what was said of `Budget`; raises MotionloomError for what cannot be."""
     usual = {"steps": Budget(16, 10), "horizon": Budget(16, 4), "hold": Budget(16, 8), "switch": Budget(24, 1)}
     found = Budget(4, 2, 20, seconds=4.0, walks=(2, 4)) if quick else usual.get(name, Budget(64, 20))
-    said = {"windows": windows, "samples": samples, "train_steps": train_steps, "seed": seed}
-    for key, value in said.items():
-        if value is not None and not (key == "seed" or 1 <= value <= 1_000_000):
-            raise MotionloomError(f"{key.replace('_', ' ')} must be from 1 to 1000000; got {value}")
-    return replace(found, **{key: value for key, value in said.items() if value is not None})
+    found = replace(found, **said)  # type: ignore[arg-type]
+    check_ranges(found, windows=(1, MOST), samples=(1, MOST), train_steps=(1, MOST))
+    return found
 
 
 def run(name: str, run: Run, *, protocol: str | None = None, keep: Path, budget: Budget) -> Report:

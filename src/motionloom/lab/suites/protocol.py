@@ -4,7 +4,6 @@ The published protocol (Guo et al. 2022, as MDM and PriorMDM ran it) in its own 
 batches of 32, replications with a 95 % interval of 1.96 sigma / sqrt(replications).
 """
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -21,6 +20,10 @@ PUBLISHED_CAPTION = 22
 STRIDE = 1 << 32
 """Between the first seeds of two replications; what a replication draws stays below it."""
 MOST_STEPS, MOST_REPLICATIONS, MOST_ITEMS = 12, 1000, 100_000
+GUIDANCES = (-100, 100)
+"""Others make no motion; usual values are 1 to 7."""
+SEEDS = (0, 2**31 - 1)
+"""Of suites that count on from their seed."""
 
 
 @dataclass(frozen=True)
@@ -79,27 +82,10 @@ class Transitions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if min(self.handshake, self.unfoldings, self.intervals) < 1 or min(self.margin, self.blend) < 0:
-            raise MotionloomError(
-                "a handshake, unfoldings and intervals are at least 1, a margin and a blend at least 0"
-            )
-        _need(
-            max(self.handshake, self.margin, self.blend) <= 100 and max(self.unfoldings, self.intervals) <= 1000,
-            "a handshake, a margin and a blend are at most 100 frames, unfoldings and intervals at most 1000",
-        )
-        _need(
-            1 <= self.replications <= MOST_REPLICATIONS,
-            f"replications must be 1 to {MOST_REPLICATIONS}; got {self.replications}",
-        )
-        _need(1 <= self.steps <= 1000, f"steps are 1 to 1000; got {self.steps}")
-        _need(
-            math.isfinite(self.guidance) and abs(self.guidance) <= 100,
-            f"a guidance of {self.guidance:g} makes no motion; usual values are 1 to 7",
-        )
-        _need(
-            self.seed >= 0 and self.seed + (self.replications + 1) * STRIDE < LARGEST_SEED,
-            f"a seed is a whole number from 0 to below 2**61; got {self.seed}",
-        )
+        frames, several = (0, 100), (1, 1000)
+        check_ranges(self, handshake=(1, 100), margin=frames, blend=frames, unfoldings=several, intervals=several)
+        check_ranges(self, replications=(1, MOST_REPLICATIONS), steps=(1, 1000), guidance=GUIDANCES)
+        check_ranges(self, seed=(0, LARGEST_SEED - 1 - (self.replications + 1) * STRIDE))
 
     @property
     def window(self) -> int:
@@ -182,10 +168,8 @@ class Protocol:
             0 < len(steps) <= MOST_STEPS and len(set(steps)) == len(steps) and min(steps) >= 1,
             f"steps are 1 to {MOST_STEPS} different numbers of 1 or more; got {', '.join(map(str, steps)) or 'none'}",
         )
-        _need(
-            1 <= self.replications <= MOST_REPLICATIONS,
-            f"replications must be 1 to {MOST_REPLICATIONS}; got {self.replications}",
-        )
+        check_ranges(self, replications=(1, MOST_REPLICATIONS), guidance=GUIDANCES)
+        check_ranges(self, seed=(0, LARGEST_SEED - 1 - (self.replications + 1) * STRIDE))
         _need(self.batch is None or 4 <= self.batch <= 4096, f"a batch is 4 to 4096 motions, or all; got {self.batch}")
         least = self.batch or 4
         _need(
@@ -198,14 +182,6 @@ class Protocol:
             f"multimodality is captions x motions of each, such as 10x10, or 0; got {captions}x{samples}",
         )
         _need(self.solver in SOLVERS, f"no solver {self.solver!r}; there are {', '.join(SOLVERS)}")
-        _need(
-            math.isfinite(self.guidance) and abs(self.guidance) <= 100,
-            f"a guidance of {self.guidance:g} makes no motion; usual values are 1 to 7",
-        )
-        last = self.seed + (self.replications + 1) * STRIDE
-        _need(
-            self.seed >= 0 and last < LARGEST_SEED, f"a seed is a whole number from 0 to below 2**61; got {self.seed}"
-        )
 
     def seeds(self, replication: int, rows: int, *, after: int = 0) -> list[int]:
         """One seed per motion of a replication; no two replications share one. ``after``: so many were drawn before."""
@@ -270,6 +246,14 @@ def quick(protocol: Protocol) -> Protocol:
 def quick_transitions(how: Transitions) -> Transitions:
     """The same in minutes: eight captions, one unfolding, two replications."""
     return replace(how, intervals=min(how.intervals, 8), unfoldings=1, replications=min(how.replications, 2))
+
+
+def check_ranges(settings: object, **ranges: tuple[float, float]) -> None:
+    """Raise MotionloomError where a setting of that name is not from the first to the second number."""
+    for name, (least, most) in ranges.items():
+        value = getattr(settings, name)
+        if not least <= value <= most:
+            raise MotionloomError(f"{name.replace('_', ' ')} must be from {least:,} to {most:,}; got {value}")
 
 
 def _need(fine: bool, message: str) -> None:

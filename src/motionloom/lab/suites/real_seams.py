@@ -15,12 +15,9 @@ import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
-from motionloom.features.layout import FPS
 from motionloom.io.text import plain_json
-from motionloom.kinematics import physics
 from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Evaluator
-from motionloom.lab.metrics.skate import skate
 from motionloom.lab.metrics.transitions import (
     JERK_HUMANML3D,
     area_under_jerk,
@@ -28,7 +25,7 @@ from motionloom.lab.metrics.transitions import (
     mean_jerk,
     peak_jerk,
 )
-from motionloom.lab.suites.harness import embedded
+from motionloom.lab.suites.harness import embedded, physical_mean
 from motionloom.lab.suites.protocol import Transitions
 from motionloom.reading import read_bytes
 
@@ -38,7 +35,7 @@ COUNTS = (7, 31, 62, 93)
 """Windows whose mean curve the shipped peaks and areas are of: a mean of more windows is flatter."""
 REPEATS = 20
 NAMES = ("pj", "auj", "auj_humanml3d")
-PHYSICAL = ("share", "speed", "slide", "jerk")
+PHYSICAL = {"share": "skate_share", "speed": "skate_speed", "slide": "skate_slide", "jerk": "jerk"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,22 +99,10 @@ def jerks(positions: np.ndarray, reference: float) -> dict[str, float]:
     }
 
 
-def physical(positions: np.ndarray) -> dict[str, float]:
-    """`PHYSICAL` of one clip (frames, 22, 3): %, cm/s, mm per frame, m/s³."""
-    found = skate(positions, FPS)
-    return {
-        "share": 100 * found.share,
-        "speed": found.speed,
-        "slide": found.slide,
-        "jerk": physics.jerk(positions, FPS).mean,
-    }
-
-
 def averaged(clips: Sequence[np.ndarray]) -> dict[str, float]:
-    """Means of `physical`, weighted by length."""
-    numbers = np.array([list(physical(clip).values()) for clip in clips])
-    means = np.average(numbers, axis=0, weights=[len(clip) for clip in clips])
-    return dict(zip(PHYSICAL, means.tolist(), strict=True))
+    """`PHYSICAL` of clips (frames, 22, 3), weighted by length."""
+    found = physical_mean(clips)
+    return {short: found[name] for short, name in PHYSICAL.items()}
 
 
 @dataclass(frozen=True)

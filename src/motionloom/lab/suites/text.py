@@ -24,11 +24,11 @@ from motionloom.lab.report import published_rows
 from motionloom.lab.report.columns import columns
 from motionloom.lab.report.report import REAL, Report, Row, Value
 from motionloom.lab.suites import text_reference
-from motionloom.lab.suites.harness import Run, diversity, embedded, plain_words, readable, row_of
+from motionloom.lab.suites.harness import PHYSICAL, Run, averaged, diversity, embedded, plain_words, readable, row_of
 from motionloom.lab.suites.items import fitting, pick, read_items, spread
 from motionloom.lab.suites.parts import Parts
 from motionloom.lab.suites.protocol import Protocol, Selection
-from motionloom.lab.suites.text_reference import PHYSICAL, TextReference
+from motionloom.lab.suites.text_reference import TextReference
 from motionloom.tasks.text import sample_features
 from motionloom.weights.prior import Prior
 
@@ -136,7 +136,7 @@ def of_real(trial: Trial, replication: int, *, shuffled: bool = False) -> dict[s
         dealt = rng.permutation(len(texts))
         return matched(trial, texts[dealt][order], motions[order], [said[k] for k in dealt[order]])
     found = matched(trial, texts[order], motions[order], [said[k] for k in order])
-    physical = text_reference.averaged(trial.real.physical, trial.real.frames)
+    physical = averaged(trial.real.physical, trial.real.frames)
     return {**found, "fid": fid(motions, trial.real.motions), "diversity": diversity(motions, replication), **physical}
 
 
@@ -151,8 +151,7 @@ def of_generated(trial: Trial, replication: int, steps: int) -> dict[str, float]
     texts = np.stack([several[k] for several, k in zip(trial.read, chosen, strict=True)])
     found = matched(trial, texts[order], motions[order], [said[k] for k in order])
     found["fid"], found["diversity"] = fid(motions, trial.real.motions), diversity(motions, replication)
-    numbers = np.array([list(text_reference.physical(features).values()) for features in drawn])
-    found |= text_reference.averaged(numbers, frames)
+    found |= averaged([list(text_reference.of_features(one).values()) for one in drawn], frames)
     found |= {"ms": 1000 * seconds / len(said), "per_second": len(said) / max(seconds, 1e-9)}
     captions, samples = trial.protocol.multimodality
     if captions and replication < trial.protocol.multimodal_replications:

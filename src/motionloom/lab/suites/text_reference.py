@@ -16,22 +16,18 @@ from safetensors import SafetensorError, safe_open
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
-from motionloom.features.layout import FPS, WIDTH
+from motionloom.features.layout import WIDTH
 from motionloom.io.atomic import check_place
 from motionloom.io.tensors import check_head, save_tensors
 from motionloom.io.text import plain_json
-from motionloom.kinematics import physics
 from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Caption, Evaluator
-from motionloom.lab.metrics.skate import skate
-from motionloom.lab.suites.harness import CHUNK
+from motionloom.lab.suites.harness import CHUNK, PHYSICAL, physical
 from motionloom.lab.suites.items import Item, spread
 from motionloom.lab.suites.protocol import MOST_ITEMS, RECORDED, Protocol, Selection
 
 FORMAT = 1
 LARGEST_FILE = 64 << 20
-PHYSICAL = ("skate_share", "skate_speed", "skate_slide", "penetration", "jerk", "bone_error")
-"""Physical numbers of a clip, in the order of the columns of `TextReference.physical`."""
 SOURCE = (
     "derived from mocap.cs.cmu.edu (free for any use), ACCAD / The Ohio State University, Open Motion Project "
     "(CC BY 3.0), UI-PRMD (PDDL) and HumanML3D's captions (MIT, Copyright (c) 2022 Chuan Guo)"
@@ -91,7 +87,7 @@ def measure(
     for start in range(0, len(items), CHUNK):
         part = items[start : start + CHUNK]
         motions.append(evaluator.motions([item.features for item in part]))
-        physicals += [list(physical(item.features).values()) for item in part]
+        physicals += [list(of_features(item.features).values()) for item in part]
         progress(f"{start + len(part)} of {len(items)} real motions measured")
     return TextReference(
         tuple(item.name for item in items),
@@ -105,26 +101,9 @@ def measure(
     )
 
 
-def physical(features: np.ndarray) -> dict[str, float]:
-    """The numbers of `PHYSICAL` for one motion (frames, 263), not standardised, as the network draws it.
-
-    Skate: share in %, cm/s, mm per frame (`lab.metrics.skate`); cm under the floor; m/s^3; mm.
-    """
-    positions = humanml.decode_positions(np.asarray(features, dtype=np.float64))
-    found = skate(positions, FPS)
-    return {
-        "skate_share": 100 * found.share,
-        "skate_speed": found.speed,
-        "skate_slide": found.slide,
-        "penetration": 100 * physics.penetration(positions),
-        "jerk": physics.jerk(positions, FPS).mean,
-        "bone_error": 1000 * physics.bone_length_error(positions),
-    }
-
-
-def averaged(numbers: np.ndarray, frames: Sequence[int]) -> dict[str, float]:
-    """Means of (motions, numbers of `PHYSICAL`), weighted by length."""
-    return dict(zip(PHYSICAL, np.average(numbers, axis=0, weights=frames).tolist(), strict=True))
+def of_features(features: np.ndarray) -> dict[str, float]:
+    """`harness.physical` of a motion (frames, 263), not standardised, as the network draws it."""
+    return physical(humanml.decode_positions(np.asarray(features, dtype=np.float64)))
 
 
 def probe(evaluator: Evaluator) -> Array:

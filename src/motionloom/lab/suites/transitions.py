@@ -28,13 +28,13 @@ from motionloom.lab.metrics.transitions import (
 from motionloom.lab.report import published_rows
 from motionloom.lab.report.columns import columns
 from motionloom.lab.report.report import REAL, Report
-from motionloom.lab.suites import text_reference
+from motionloom.lab.suites import harness, text_reference
 from motionloom.lab.suites.harness import Run, Say, diversity, embedded, row_of
 from motionloom.lab.suites.items import fitting, read_items
 from motionloom.lab.suites.long_baselines import Long, Method, methods, titled
 from motionloom.lab.suites.parts import Parts
 from motionloom.lab.suites.protocol import Selection, Transitions
-from motionloom.lab.suites.real_seams import Crops, Shipped, averaged, jerks, load_shipped
+from motionloom.lab.suites.real_seams import PHYSICAL, Crops, Shipped, averaged, jerks, load_shipped
 from motionloom.lab.suites.text import identity
 from motionloom.lab.suites.text_reference import TextReference
 
@@ -142,9 +142,8 @@ def of_real(trial: Trial, replication: int) -> dict[str, float]:
     rows = [item for items, _, _ in trial.asked(replication) for item in items]
     said = [caption for _, captions, _ in trial.asked(replication) for caption in captions]
     found = _matched(trial, said, trial.real.motions[rows], replication)
-    numbers = text_reference.averaged(trial.real.physical, trial.real.frames)
-    names = {"skate_share": "share", "skate_speed": "speed", "skate_slide": "slide", "jerk": "jerk"}
-    found |= {f"inside_{short}": numbers[long] for long, short in names.items()}
+    numbers = harness.averaged(trial.real.physical, trial.real.frames)
+    found |= {f"inside_{short}": numbers[name] for short, name in PHYSICAL.items()}
     if trial.crops is not None:
         other = trial.crops.again(trial.how.seams, seed=(trial.how.seed, replication, 1))
         found |= _around(trial, other.features, other.positions, replication)

@@ -7,6 +7,7 @@ subject ("a person", "someone is"), because the subject is most of a short sente
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,18 +18,20 @@ from motionloom.errors import MotionloomError, one_line
 from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.runtime.text.quantise import dequantise, quantise
 
-SAME, NEAR, AROUND = 0.75, 0.475, 8
+SAME, NEAR, AROUND = 0.75, 0.45, 8
 """A prompt is near to what was learned where the cosine to one sentence is at least `SAME`, or the mean over its
 nearest `AROUND` sentences at least `NEAR`: one alone may share no more than a noun with it (figures: docs/words.md)."""
+UNHEARD = 0.08
+"""How much nearer a prompt must be whose verb is in no sentence: "vacuuming" is no cartwheel for the room it is in."""
 MOST_SENTENCES = 1500
 MAX_SENTENCES, MAX_CHARACTERS, MAX_ACTIONS = 8192, 1000, 8192
 """What is read from a file at most."""
 
 _SUBJECT = re.compile(
-    r"^\W*(?:(?:(?:a|an|the|this|one|another|some)\s+)?"
+    r"^\W*(?:(?:(?:a|an|the|this|one|another|some|two|both)\s+)?"
     r"(?:(?:young|old|tall|small|little|single)\s+)?"
     r"(?:person|persons|man|woman|human|figure|guy|boy|girl|individual|character|stick figure|somebody|someone"
-    r"|he|she|they|it|people|men|women|you|i)\s+)"
+    r"|he|she|they|it|people|men|women|couple|dancers|you|i)\s+)"
     r"(?:(?:is|are|was|were|am|appears to be|seems to be)\s+)?",
     re.IGNORECASE,
 )
@@ -45,6 +48,11 @@ class Known:
     seconds: Mapping[str, float]
     """Seconds of training motion per action."""
 
+    @cached_property
+    def words(self) -> frozenset[str]:
+        """The stems of all words in the sentences."""
+        return frozenset(stem(word) for sentence in self.sentences for word in re.findall(r"[a-z]+", sentence.lower()))
+
 
 @dataclass(frozen=True)
 class Nearest:
@@ -56,16 +64,25 @@ class Nearest:
     """Cosine of the first of them."""
     around: float
     """Mean cosine of the nearest `AROUND` sentences, or of all where there are fewer."""
+    heard: bool = True
+    """Whether the prompt's verb is in any of the sentences."""
 
     @property
     def near(self) -> bool:
         """Whether anything like the prompt was learned."""
-        return self.similarity >= SAME or self.around >= NEAR
+        return self.similarity >= SAME or self.around >= NEAR + (0.0 if self.heard else UNHEARD)
 
     def remark(self) -> str:
         """One line for somebody whose prompt is not near to anything."""
         said = ", ".join(f"'{sentence}'" for sentence in self.sentences)
         return one_line(f"these weights have seen nothing like '{_short(bare(self.prompt))}'; nearest: {said}")
+
+
+def stem(word: str) -> str:
+    """A word without the ending that its forms differ in: "walking", "walks" and "walked" are "walk"."""
+    ending = next((end for end in ("ing", "ed", "es", "s", "ly", "er") if word.endswith(end) and len(word) > 2 + len(end)), "")
+    short = word.removesuffix(ending)
+    return short.rstrip("e") if len(short) > 3 else short
 
 
 def bare(sentence: str) -> str:
@@ -98,17 +115,21 @@ def known_sentences(
     return Known(tuple(plain[i] for i in chosen), vectors[chosen], dict(seconds))
 
 
-def nearest(known: Known, prompts: Sequence[str], encoder: TextEncoder, *, count: int = 3) -> list[Nearest]:
-    """For each prompt its ``count`` nearest known sentences. Raises `MotionloomError` as the encoder does."""
+def nearest(known: Known, prompts: Sequence[str], encoder: TextEncoder, *, verbs: Sequence[Sequence[str]] = (), count: int = 3) -> list[Nearest]:
+    """For each prompt its ``count`` nearest known sentences.
+
+    verbs: of each prompt the words that say what is done, all of which should be known; left out: not looked at. Raises `MotionloomError` as the encoder does.
+    """
     if not prompts:
         return []
     asked = unit(encoder.encode([bare(p) for p in prompts]).pooled)
     similar = asked @ known.vectors.T
     places = np.argsort(-similar, axis=1, kind="stable")
     similar = np.take_along_axis(similar, places, axis=1)
+    heard = [all(stem(word) in known.words for word in words) for words in verbs] or [True] * len(prompts)
     return [
-        Nearest(prompt, tuple(known.sentences[i] for i in row), float(values[0]), float(values[:AROUND].mean()))
-        for prompt, row, values in zip(prompts, places[:, :count].tolist(), similar, strict=True)
+        Nearest(prompt, tuple(known.sentences[i] for i in row), float(values[0]), float(values[:AROUND].mean()), one)
+        for prompt, row, values, one in zip(prompts, places[:, :count].tolist(), similar, heard, strict=True)
     ]
 
 

@@ -1,0 +1,48 @@
+"""What is said of words before anything is drawn: that they are not English, or like nothing that was learned."""
+
+import re
+from collections.abc import Sequence
+
+from motionloom.goals.english import is_english
+from motionloom.goals.verbs import subject_of
+from motionloom.runtime.text.known import Known, bare, nearest, stem
+from motionloom.runtime.text.protocol import TextEncoder
+
+_LIGHT = {stem(word) for word in "do make take play perform give use put ride go get start begin come throw have".split()}
+"""Verbs that say what is done only with the word behind them: "plays golf"."""
+_SMALL = frozenset(
+    """a an the his her its their and or of to in on at with from over up down for as by into is are was be this that
+    one two three something somebody someone very like out off around through across while""".split()
+)
+
+
+def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder) -> list[str]:
+    """A line for each text that is not English, and for each that is like nothing in the table of what is known.
+
+    known: None where a weight file has no such table. Raises `MotionloomError` as the encoder does.
+    """
+    asked = [text for text in dict.fromkeys(texts) if text.strip()]
+    foreign = [text for text in asked if not is_english(text)]
+    remarks = [f"{text[:60]!r} does not look like English, and these weights know nothing else" for text in foreign]
+    english = [text for text in asked if text not in foreign]
+    if known is None or not english:
+        return remarks
+    found = nearest(known, english, encoder, verbs=[verb_words(text) for text in english])
+    return remarks + [one.remark() for one in found if not one.near]
+
+
+def verb_words(text: str) -> tuple[str, ...]:
+    """The word that says what is done in a sentence, as far as its place shows; empty where there is none.
+
+    The first word behind the subject, small words and adverbs aside; of "plays golf" the word behind it.
+    """
+    said = bare(text)
+    subject = subject_of(said)
+    rest = said[len(subject) :] if len(said) > len(subject) else said
+    words = [
+        word for word in re.findall(r"[a-z]+(?:-[a-z]+)*", rest) if word not in _SMALL and not word.endswith("ly")
+    ]
+    first, *more = words or [""]
+    if stem(first) in _LIGHT:
+        return tuple(re.findall("[a-z]+", more[0])[:1]) if more else ()
+    return tuple(re.findall("[a-z]+", first)[:1])

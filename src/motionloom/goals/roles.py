@@ -1,0 +1,45 @@
+"""Who of two people does what: "one person bows and the other waves" is two prompts, one for each."""
+
+import re
+
+from motionloom.errors import MotionloomError
+
+MARK = "::"
+"""Parts what the first person does from what the second does, in one text."""
+_NOUN = r"person|man|woman|dancer|figure|boy|girl"
+_PARTS = r"hands?|arms?|leg|foot|knee|side|step|hip|shoulder|eye|elbow|time|way|direction|end"
+_FIRST = re.compile(
+    rf"^(?:(?:one|the first)(?: one)?(?: of (?:them|the two|the people))?(?! (?:{_PARTS})\b)(?: ({_NOUN}))?"
+    rf"|an? ({_NOUN})) "
+)
+_SECOND = re.compile(
+    r"(?:\s*[,;.]\s*(?:and |while |but |then )*|\s+(?:and|while|whilst|as|but|whereas) (?:then )?)"
+    rf"(?:the other|the second|another)(?: one)?(?! (?:{_PARTS})\b)(?: ({_NOUN}))? "
+)
+_ALIKE = re.compile(r"(?:does (?:the same|so|it|likewise)|follows suit)\b")
+
+
+def prompts_of(prompt: str | tuple[str, str]) -> tuple[str, str]:
+    """The prompts of the first and of the second person: a text with `MARK` parts them, and so does one that says what
+    one does and what the other does; any other is for both. Raises MotionloomError for a part without words."""
+    if isinstance(prompt, tuple):
+        return prompt
+    said = [words.strip() for words in prompt.split(MARK)]
+    if len(said) == 1:
+        return read_roles(prompt) or (prompt, prompt)
+    if len(said) > 2 or not all(said):
+        raise MotionloomError(f"the prompt {prompt[:60]!r} must have words for each person around one {MARK}")
+    return said[0], said[1]
+
+
+def read_roles(text: str) -> tuple[str, str] | None:
+    """What each of two people does, where one sentence says it of one and of the other; None where it does not."""
+    said = " ".join(text.split()).rstrip(" .!")
+    first = _FIRST.match(said.lower())
+    second = _SECOND.search(said.lower(), first.end()) if first else None
+    if first is None or second is None:
+        return None
+    does = said[first.end() : second.start()], said[second.end() :]
+    if _ALIKE.match(does[1].lower()):
+        return None
+    return f"a {first[1] or first[2] or 'person'} {does[0]}", f"a {second[1] or 'person'} {does[1]}"
