@@ -13,6 +13,7 @@ SLOW = (
     "tests/bulk/test_batch.py",
     "tests/cli/test_batch.py",
     "tests/live/test_socket.py",
+    "tests/outputs/test_processors.py",
     "tests/server/test_project.py",
     "tests/server/test_assistant.py",
 )

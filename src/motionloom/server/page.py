@@ -10,7 +10,7 @@ from starlette.routing import BaseRoute, Route
 FOLDER = Path(__file__).with_name("page")
 MISSING = (
     "The studio's page is not built into this installation: run 'make studio' in a clone of motionloom, or install "
-    "it again ('pip install .') with Node.js 22 or later on the PATH. The server itself works; /docs says what it "
+    "it again ('pip install .') with Node.js 20.19 or later on the PATH. The server itself works; /docs says what it "
     "answers."
 )
 

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from motionloom.diffusion import SCHEDULES, Dct, NoiseSource, Schedule, from_betas, from_noise
-from motionloom.lab.papers.humanmac import PARTS, Fixed, Padding, Target, padded, published_completion
+from motionloom.lab.papers.humanmac import PARTS, Fixed, Padding, SwitchTarget, padded, published_completion
 from motionloom.nets.predictor import TransLinear, waves
 from motionloom.runtime.predictor import PredictorConfig, PredictorSession
 from motionloom.train.modules import predictor_session
@@ -100,7 +100,7 @@ def test_whole_runs_give_the_published_motions(recorded: Case) -> None:
     rng = stream(seed, NOISE)
     draw, shapes = counted(lambda like: np.asarray(normal(rng, like.shape)).astype(like.dtype))
     fixed = Fixed(motion, list(PARTS.values())[int(mode[-1])]) if control else None
-    target = Target(motion[:1, -2 * h :], relax=20) if mode == "switch" else None
+    target = SwitchTarget(motion[:1, -2 * h :], relax=20) if mode == "switch" else None
     state, result = published_completion(
         from_noise(noise, schedule),
         motion[:, :h],
@@ -237,7 +237,7 @@ def oracle(name: str, case: str) -> tuple[np.ndarray, np.ndarray, int]:
         schedule=schedule,
         noise=draw,
         fixed=Fixed(motion[:1], PARTS["lower"]) if control else None,
-        target=Target(motion[:1, -2 * h :]) if case == "switch" else None,
+        target=SwitchTarget(motion[:1, -2 * h :]) if case == "switch" else None,
     )
     return state, result, calls
 

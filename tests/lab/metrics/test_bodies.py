@@ -34,7 +34,7 @@ def test_bends_are_degrees_and_percentiles_are_of_all_frames() -> None:
 def test_frames_beyond_what_people_do_are_counted_and_too_many_fail() -> None:
     reach = bodies.reach_of([with_elbows(np.linspace(0, 100, 1001))])
 
-    def elbows(share: float) -> bodies.Held:
+    def elbows(share: float) -> bodies.BodyNumber:
         degrees = np.where(np.arange(1000) < 1000 * share, 120.0, 50.0)
         return next(row for row in bodies.held([with_elbows(degrees)], reach) if row.name == "elbows")
 

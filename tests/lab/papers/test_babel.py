@@ -84,7 +84,7 @@ def still(frames: int) -> Motion:
     return decode(numbers)
 
 
-def shown(item: babel.Item) -> tuple[int, int]:
+def shown(item: babel.BabelItem) -> tuple[int, int]:
     """First and last (half-open) frame of `still` that an item holds."""
     numbers = np.round(item.features[:, 0] * 100).astype(int)
     assert (np.diff(numbers) == 1).all()
@@ -358,7 +358,7 @@ def test_labels_beyond_the_recording_are_cut_to_it() -> None:
     ("frames", "lengths"), [(100, (96, 100)), (254, (250, 250)), (252, (248, 250)), (46, (45, 46))]
 )
 def test_items_lose_up_to_four_frames_at_random(frames: int, lengths: tuple[int, int]) -> None:
-    item = babel.Item("a", "walk", np.zeros((frames, 135), np.float32), np.zeros(frames, bool))
+    item = babel.BabelItem("a", "walk", np.zeros((frames, 135), np.float32), np.zeros(frames, bool))
     found = {len(babel.trimmed(item, np.random.default_rng(s))) for s in range(60)}
     assert (min(found), max(found)) == lengths
     assert len(found) == lengths[1] - lengths[0] + 1

@@ -15,7 +15,7 @@ from motionloom.train.modules import prior_module
 from motionloom.weights.adapter import adapted
 from tests.noise import normal
 from tests.recorded import tiny
-from tests.weights.test_adapter import adapter_of, trained
+from tests.train.test_adapter import adapter_of, trained
 
 PROMPTS, FRAMES = ["a person walks", "a person waves"], 10
 

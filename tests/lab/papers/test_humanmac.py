@@ -13,7 +13,7 @@ from motionloom.errors import MotionloomError
 from motionloom.lab.papers.humanmac import (
     PARTS,
     Fixed,
-    Target,
+    SwitchTarget,
     padded,
     published_completion,
     published_futures,
@@ -136,7 +136,7 @@ def test_a_target_is_imposed_until_the_relaxed_steps(relax: float) -> None:
         drawn += 1
         return np.zeros_like(like)
 
-    target = Target(np.ones((1, 4, 48), np.float32), relax)
+    target = SwitchTarget(np.ones((1, 4, 48), np.float32), relax)
     _, motion = published_completion(
         lambda x, level: np.zeros_like(x),
         np.zeros((2, 5, 48), np.float32),
@@ -156,7 +156,7 @@ def test_a_target_is_imposed_until_the_relaxed_steps(relax: float) -> None:
 
 def test_a_target_longer_than_the_window_is_refused() -> None:
     with pytest.raises(MotionloomError, match="target"):
-        complete(np.zeros((1, 5, 48), np.float32), 1, target=Target(np.zeros((1, 21, 48), np.float32)))
+        complete(np.zeros((1, 5, 48), np.float32), 1, target=SwitchTarget(np.zeros((1, 21, 48), np.float32)))
 
 
 @pytest.mark.parametrize(("count", "share", "told"), [(50, 0.5, 25), (50, 1.0, 50), (50, 0.0, 0), (10, 0.26, 3)])

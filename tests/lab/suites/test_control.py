@@ -83,7 +83,7 @@ class Fakes:
         return draw
 
 
-def trial(fakes: Fakes) -> control.Trial:
+def trial(fakes: Fakes) -> control.ControlTrial:
     return control.prepare(ITEMS, Judge(), fakes, SMALL, scale=np.ones(263), selection=Selection())
 
 
@@ -320,7 +320,9 @@ def test_an_unknown_way_is_refused() -> None:
 
 
 def test_the_report_is_kept_as_data_and_told_as_tables() -> None:
-    found = control.measure(trial(Fakes()), control_kinds.kinds(["in_between"]), command="motionloom evaluate control")
+    found = control.measure(
+        trial(Fakes()), control_kinds.kinds(["in_between"]), run=Run(command="motionloom evaluate control")
+    )
     again = report.decode(json.loads(json.dumps(report.encode(found))))
     assert values(again, "in between, ours")["root_error"] == pytest.approx(0, abs=1e-6)
     text = report.markdown(again)

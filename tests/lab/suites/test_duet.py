@@ -15,7 +15,7 @@ from motionloom.lab.report import report as reports
 from motionloom.lab.report.report import REAL
 from motionloom.lab.suites import duet, duet_answers, duet_blocks, duet_text
 from motionloom.lab.suites import duet_ways as ways
-from motionloom.lab.suites.duet import COLUMNS, ERRORS, LOOKS, How
+from motionloom.lab.suites.duet import COLUMNS, ERRORS, LOOKS, CompletionSettings
 from motionloom.lab.suites.duet_blocks import Beside
 from motionloom.lab.suites.duet_ways import FRAMES, Crops
 from motionloom.lab.suites.harness import Run
@@ -42,7 +42,7 @@ def gliding(speed: float, seconds: float = 6.0) -> np.ndarray:
 
 
 def crops_of(positions: np.ndarray, count: int = 3, **how: Any) -> Crops:
-    return duet.draw([pair_of(positions)], How(crops=count, **how))
+    return duet.draw([pair_of(positions)], CompletionSettings(crops=count, **how))
 
 
 def perfect(crops: Crops, sample: int) -> np.ndarray:
@@ -193,8 +193,8 @@ def test_crops_are_drawn_from_held_out_pairs_in_both_orders() -> None:
     long, short = pair_of(couple(6.0)), pair_of(couple(4.0), "short", "test")
     train = pair_of(couple(6.0), "train", "train")
     assert [pair.name for pair in duet.held_out([long, short, train])] == ["p"]
-    crops = duet.draw([long], How(crops=40))
-    assert np.array_equal(crops.positions, duet.draw([long], How(crops=40)).positions)
+    crops = duet.draw([long], CompletionSettings(crops=40))
+    assert np.array_equal(crops.positions, duet.draw([long], CompletionSettings(crops=40)).positions)
     first = crops.positions[:, 0, 0, 0, 0] - crops.positions[:, 1, 0, 0, 0]
     assert 5 < (first > 0).sum() < 35
     assert len({float(z) for z in crops.positions[:, 0, 0, 0, 2]}) > 10
@@ -211,7 +211,7 @@ def test_the_report_has_every_row_and_the_papers_table() -> None:
         return made
 
     found = {"zero": ways.standing(), "constant": ways.gliding(), "silent": off, "ours": off, "mrt": perfect}
-    how = How(crops=6, samples=2)
+    how = CompletionSettings(crops=6, samples=2)
     made = duet.measure(crops, found, how)
     here = [row for row in made.rows if not row.measured_on]
     assert [row.name for row in here] == [
@@ -243,7 +243,7 @@ def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
         calls.append(crops.numbers)
         return perfect(crops, sample)
 
-    how = How(crops=20, samples=1)
+    how = CompletionSettings(crops=20, samples=1)
     first = duet.measure(crops, {"ours": counted}, how, kinds=("ours",), run=Run(folder=tmp_path))
     assert calls == [tuple(range(16)), (16, 17, 18, 19)]
     assert duet.measure(crops, {"ours": counted}, how, kinds=("ours",), run=Run(folder=tmp_path)) == first
@@ -258,7 +258,7 @@ def test_targets_that_cannot_be_are_reported(tmp_path: Path, monkeypatch: pytest
     impossible: list[dict[str, Any]] = [{"crops": 0}, {"samples": 0}, {"given": "all"}, {"seed": -1}]
     for wrong in impossible:
         with pytest.raises(MotionloomError):
-            How(**wrong)
+            CompletionSettings(**wrong)
     with pytest.raises(MotionloomError, match="no two-person block is shipped"):
         duet.chosen_block(None)
     with pytest.raises(MotionloomError, match="name some with --data"):
@@ -278,7 +278,7 @@ def test_targets_that_cannot_be_are_reported(tmp_path: Path, monkeypatch: pytest
 def test_a_transformer_from_its_file_is_a_row(tmp_path: Path) -> None:
     config = MrtConfig(width=16, hidden=24, layers=1, heads=2, key=8)
     file = MrtFile(Mrt(config)).save(tmp_path / "mrt.safetensors")
-    found = duet.ways_of(tiny.prior(), None, How(), mrt=file)
+    found = duet.ways_of(tiny.prior(), None, CompletionSettings(), mrt=file)
     assert list(found) == ["zero", "constant", "silent", "mrt"]
     made = found["mrt"](crops_of(couple(6.0), 2), 0)
     assert made.shape == (2, 2, FRAMES, 22, 3)
@@ -332,7 +332,7 @@ def test_a_block_beside_has_one_sample_and_a_new_one_leaves_what_is_done(tmp_pat
 
         return way
 
-    how, kinds = How(crops=4, samples=2), ("ours",)
+    how, kinds = CompletionSettings(crops=4, samples=2), ("ours",)
     first, again, second = (
         Beside(f"{name}: 1 layer", digest, counted(digest, off))
         for name, digest, off in [("b", "1", 0.1), ("b", "1", 0.1), ("b", "2", 0.3)]

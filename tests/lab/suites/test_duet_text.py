@@ -22,7 +22,7 @@ from tests.recorded import tiny
 # From words ----------------------------------------------------------------------------------------------------------
 
 
-TEXT_HOW = duet_text.How(duets=5, seconds=6.0)
+TEXT_HOW = duet_text.DuetSettings(duets=5, seconds=6.0)
 TABLE = duet_text.text_table(RECORDED)
 
 
@@ -124,7 +124,7 @@ def test_the_columns_have_their_units() -> None:
 def test_duets_are_made_for_captions_of_train_pairs_each_with_seeds_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     pairs = [*RECORDED, pair_of(partners(1.0), "other", "test", ["two people fight"])]
     assert duet_text.text_table(pairs).captions == ("two people dance", "a couple dances")
-    assert duet_text.turns(("a", "b"), duet_text.How(duets=5, seed=2)) == [("a", 3, 4), ("b", 2, 5)]
+    assert duet_text.turns(("a", "b"), duet_text.DuetSettings(duets=5, seed=2)) == [("a", 3, 4), ("b", 2, 5)]
     times = iter([3.0, 13.0])
     monkeypatch.setattr(duet_text.time, "perf_counter", lambda: next(times))
     found = duet_text.measure(RECORDED, made_at(1.0), None, TEXT_HOW, table=TABLE, kinds=("ours",))
@@ -136,7 +136,7 @@ def test_duets_are_made_for_captions_of_train_pairs_each_with_seeds_of_its_own(m
 
 
 def test_beginnings_are_of_random_train_windows() -> None:
-    def apart(how: duet_text.How, seed: int) -> list[float]:
+    def apart(how: duet_text.DuetSettings, seed: int) -> list[float]:
         return [
             round(float(np.hypot(*(two[1] - two[0])[2:])), 3) for two in duet_text.beginnings(RECORDED, how)(40, seed)
         ]
@@ -152,11 +152,11 @@ def test_duets_that_cannot_be_compared_are_reported() -> None:
     with pytest.raises(MotionloomError, match="fewer than two pairs"):
         duet_text.measure(RECORDED[:1], made_at(1.0), None, TEXT_HOW, table=TABLE)
     with pytest.raises(MotionloomError, match="duets must be from 2"):
-        duet_text.How(duets=1)
+        duet_text.DuetSettings(duets=1)
 
 
 def test_the_prior_without_communication_begins_where_real_partners_stand() -> None:
-    prior, how = tiny.prior(), duet_text.How(duets=2, seconds=2.0, steps=2, clean=False)
+    prior, how = tiny.prior(), duet_text.DuetSettings(duets=2, seconds=2.0, steps=2, clean=False)
     made = duet_text.beside(prior, RECORDED, how)("two people dance", 2, 0)
     for duo in made:
         places = np.stack([person.positions() for person in duo])
@@ -222,7 +222,7 @@ def test_the_distance_is_that_at_the_end_of_each_second() -> None:
 
 
 def test_somebody_given_stays_whoever_answers() -> None:
-    prior, how = tiny.prior(), duet_text.How(duets=2, seconds=2.0, steps=2, clean=False)
+    prior, how = tiny.prior(), duet_text.DuetSettings(duets=2, seconds=2.0, steps=2, clean=False)
     given = duet_answers.Windows.of(RECORDED, how)
     real = given.draw("two people dance", 2, 5)
     for make in (duet_answers.answers(prior, block_over(prior), given, how), duet_answers.alone(prior, given, how)):
@@ -237,7 +237,7 @@ def test_the_silent_partner_begins_where_the_real_one_does(monkeypatch: pytest.M
     """A prior that draws somebody standing still draws the real partner, who stands, turned and placed."""
     still = motion_from_positions(standing(2.0), FPS)
     monkeypatch.setattr(duet_answers, "generate", lambda *a, **k: [still])
-    how = duet_text.How(duets=2, seconds=2.0)
+    how = duet_text.DuetSettings(duets=2, seconds=2.0)
     given = duet_answers.Windows.of(RECORDED, how)
     made = duet_answers.alone(tiny.prior(), given, how)("two people dance", 6, 5)
     for (_, second), window in zip(made, given.draw("two people dance", 6, 5), strict=True):
@@ -255,7 +255,7 @@ def drifting(rate: float) -> duet_text.Make:
 
 
 def test_partners_who_drift_apart_are_seen_in_the_last_seconds() -> None:
-    how = duet_long.How(duets=3)
+    how = duet_long.LongDuetSettings(duets=3)
     table = duet_long.table(TABLE.captions, how)
     found = duet_text.measure(RECORDED, drifting(0.1), drifting(0.0), how, table=table)
     assert [row.name for row in found.rows[3:]] == [
@@ -275,8 +275,10 @@ def test_partners_who_drift_apart_are_seen_in_the_last_seconds() -> None:
 
 
 def test_captions_follow_one_another_and_pieces_are_one_duet() -> None:
-    prior, how = tiny.prior(), duet_long.How(duets=2, seconds=2.0, segments=2, steps=2, clean=False)
-    said = [segment.text for segment in duet_long.timeline(("a", "b", "c"), "b", duet_long.How(segments=4))]
+    prior, how = tiny.prior(), duet_long.LongDuetSettings(duets=2, seconds=2.0, segments=2, steps=2, clean=False)
+    said = [
+        segment.text for segment in duet_long.timeline(("a", "b", "c"), "b", duet_long.LongDuetSettings(segments=4))
+    ]
     assert said == ["b", "c", "a", "b"]
     makes = (
         duet_long.ours(prior, block_over(prior), TABLE.captions, how),
@@ -288,7 +290,7 @@ def test_captions_follow_one_another_and_pieces_are_one_duet() -> None:
         assert not np.allclose(first.rotations[:, 1:], second.rotations[:, 1:])
     assert mp.distance(np.stack([first.positions(), second.positions()]))[0] == pytest.approx(1.0, abs=0.2)
     with pytest.raises(MotionloomError, match="segments must be from 2 to 100"):
-        duet_long.How(segments=1)
+        duet_long.LongDuetSettings(segments=1)
 
 
 # The command ---------------------------------------------------------------------------------------------------------

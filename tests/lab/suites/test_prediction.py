@@ -15,25 +15,25 @@ from motionloom.lab.report.report import REAL, SAME
 from motionloom.lab.suites import prediction
 from motionloom.lab.suites import prediction_trial as trials
 from motionloom.lab.suites.harness import Run
-from motionloom.lab.suites.prediction import How
+from motionloom.lab.suites.prediction import PredictionSettings
 from motionloom.weights.predictor import save_predictor
 from tests.lab.suites.predicted import AHEAD, FPS, SEEN, predictor, protocol
 
-FEW = How(samples=3, steps=2, published_steps=3)
+FEW = PredictionSettings(samples=3, steps=2, published_steps=3)
 
 
 @pytest.fixture(scope="module")
-def trial() -> trials.Trial:
+def trial() -> trials.PredictionTrial:
     return trials.prepare(protocol())
 
 
-def told(trial: trials.Trial):
+def told(trial: trials.PredictionTrial):
     """A way that knows what comes, by the first frame of the past."""
     known = {trial.pasts(k, k + 1)[0].tobytes(): trial.future(k) for k in range(len(trial.windows))}
     return lambda past: np.stack([known[one.tobytes()][None].repeat(2, 0) for one in past])
 
 
-def test_who_knows_the_future_is_right_and_draws_it_every_time(trial: trials.Trial) -> None:
+def test_who_knows_the_future_is_right_and_draws_it_every_time(trial: trials.PredictionTrial) -> None:
     found = trials.score(trial, told(trial), samples=2)
     assert max(found[name] for name in ("apd", "ade", "fde", "root_ade", "root_fde", "mae", "stretch")) < 1e-5
     real = trials.score(trial, None)
@@ -43,7 +43,7 @@ def test_who_knows_the_future_is_right_and_draws_it_every_time(trial: trials.Tri
     assert not {"ade", "fde", "root_ade", "seconds"} & real.keys()
 
 
-def test_baselines_are_the_last_pose_and_the_last_step_gone_on(trial: trials.Trial) -> None:
+def test_baselines_are_the_last_pose_and_the_last_step_gone_on(trial: trials.PredictionTrial) -> None:
     """ADE and FDE written out; the root glides evenly, so that of constant velocity is exact."""
     zero = trials.score(trial, prediction.by_rule(metrics.zero_velocity, AHEAD))
     constant = trials.score(trial, prediction.by_rule(metrics.constant_velocity, AHEAD))
@@ -61,7 +61,9 @@ def test_baselines_are_the_last_pose_and_the_last_step_gone_on(trial: trials.Tri
     assert constant["jerk"] < 1e-6
 
 
-def test_futures_of_similar_pasts_are_counted_among_all_windows_whichever_are_measured(trial: trials.Trial) -> None:
+def test_futures_of_similar_pasts_are_counted_among_all_windows_whichever_are_measured(
+    trial: trials.PredictionTrial,
+) -> None:
     few = trials.prepare(protocol(), count=3)
     places = [0, 6, 11]  # evenly of twelve
     names = [(r.name, start) for r, start in few.windows]
@@ -75,7 +77,7 @@ def test_futures_of_similar_pasts_are_counted_among_all_windows_whichever_are_me
     assert any(np.allclose(one, truth) for one in few.futures(0))
 
 
-def test_how_many_windows_go_at_a_time_changes_nothing(trial: trials.Trial) -> None:
+def test_how_many_windows_go_at_a_time_changes_nothing(trial: trials.PredictionTrial) -> None:
     tiny = predictor()
     for way in (
         prediction.drawn(tiny, 0, samples=3, steps=2),
@@ -100,7 +102,9 @@ def test_windows_of_a_single_future_are_skipped_when_asked() -> None:
     assert counted["mmade"] == pytest.approx(counted["ade"])
 
 
-def test_the_table_has_every_row_and_everything_that_must_be_said(trial: trials.Trial, tmp_path: Path) -> None:
+def test_the_table_has_every_row_and_everything_that_must_be_said(
+    trial: trials.PredictionTrial, tmp_path: Path
+) -> None:
     lines: list[str] = []
     how = replace(FEW, replications=2)
     made = prediction.measure(predictor(), trial, how, run=Run("predictor", folder=tmp_path, progress=lines.append))
@@ -141,13 +145,13 @@ def test_the_table_has_every_row_and_everything_that_must_be_said(trial: trials.
         prediction.measure(predictor(), trial, FEW, run=Run("predictor", folder=tmp_path))
 
 
-def test_ours_keeps_bones_and_the_published_sampler_does_not(trial: trials.Trial) -> None:
+def test_ours_keeps_bones_and_the_published_sampler_does_not(trial: trials.PredictionTrial) -> None:
     made = prediction.measure(predictor(), trial, FEW, ("ours", "published"), with_published=False)
     ours, published = (row.values["jitter"].mean for row in made.rows)
     assert ours < published
 
 
-def test_published_rows_are_marked_as_of_other_data_unless_all_of_it_is_here(trial: trials.Trial) -> None:
+def test_published_rows_are_marked_as_of_other_data_unless_all_of_it_is_here(trial: trials.PredictionTrial) -> None:
     kinds = ("zero",)
     own = prediction.measure(predictor(), trial, FEW, kinds)
     others = [row for row in own.rows if row.measured_on]
@@ -171,7 +175,7 @@ def test_published_rows_are_marked_as_of_other_data_unless_all_of_it_is_here(tri
     assert len(prediction.measure(predictor(), trial, FEW, kinds, with_published=False).rows) == 1
 
 
-def test_on_a_terminal_every_block_is_a_table_of_its_own(trial: trials.Trial) -> None:
+def test_on_a_terminal_every_block_is_a_table_of_its_own(trial: trials.PredictionTrial) -> None:
     said = report.by_place(prediction.measure(predictor(), trial, FEW, ("real", "zero")))
     first, *others = said.split("Published, measured on ")
     assert "zero velocity" in first
@@ -180,7 +184,7 @@ def test_on_a_terminal_every_block_is_a_table_of_its_own(trial: trials.Trial) ->
     assert all("APD" in block or "stretch" in block for block in others)
 
 
-def test_a_layout_without_the_roots_way_has_no_figures_of_it(trial: trials.Trial) -> None:
+def test_a_layout_without_the_roots_way_has_no_figures_of_it(trial: trials.PredictionTrial) -> None:
     tiny = predictor()
     blind = replace(tiny, layout=replace(tiny.layout, root=False))
     rows = prediction._ways(blind, trial, FEW, ("zero", "ours"), label="blind")
@@ -196,7 +200,7 @@ def test_a_layout_without_the_roots_way_has_no_figures_of_it(trial: trials.Trial
 )
 def test_settings_that_cannot_be_are_refused(values: dict) -> None:
     with pytest.raises(MotionloomError):
-        How(**values)
+        PredictionSettings(**values)
 
 
 def test_weights_of_other_windows_are_refused() -> None:

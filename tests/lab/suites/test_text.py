@@ -11,6 +11,7 @@ from motionloom.errors import MotionloomError
 from motionloom.lab.report import published_rows, report
 from motionloom.lab.report.report import Report
 from motionloom.lab.suites import text, text_reference
+from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.parts import Parts, fingerprint
 from motionloom.lab.suites.protocol import Protocol, Selection
 from tests.lab.suites.judged import WIDTH, Judge, Painter, item, place
@@ -19,7 +20,9 @@ SMALL = Protocol(batch=8, replications=3, multimodality=(3, 4), multimodal_repli
 MEASURED = ("r1", "r2", "r3", "r3_same", "fid", "mm_dist", "diversity")
 
 
-def trial(painter: Painter, protocol: Protocol = SMALL, *, people: int = 32, judge: Judge | None = None) -> text.Trial:
+def trial(
+    painter: Painter, protocol: Protocol = SMALL, *, people: int = 32, judge: Judge | None = None
+) -> text.TextTrial:
     judge = judge or Judge()
     items = [item(k, 40 + 4 * (k % 3)) for k in range(people)]
     return text.prepare(painter, judge, text_reference.measure(items, judge, Selection()), protocol)
@@ -210,7 +213,7 @@ def test_too_few_items_for_a_batch_is_a_mistake() -> None:
 
 
 def test_the_report_can_be_read_again_and_its_published_rows_stand_apart() -> None:
-    found = text.measure(trial(Painter()), command="motionloom evaluate text")
+    found = text.measure(trial(Painter()), run=Run(command="motionloom evaluate text"))
     plain = json.loads(json.dumps(report.encode(found)))
     assert report.encode(report.decode(plain)) == plain
     page = report.markdown(found)

@@ -47,11 +47,11 @@ class Maker:
         return Long(said, self.path(frames))
 
 
-def trial(how: Transitions = HOW, *, people: int = 40, crops: bool = True) -> transitions.Trial:
+def trial(how: Transitions = HOW, *, people: int = 40, crops: bool = True) -> transitions.SeamTrial:
     judge = Judge()
     items = [item(k, 64 + 4 * (k % 30)) for k in range(people)]
     real = text_reference.measure(items, judge, Selection())
-    cut = real_seams.Crops.of([one.features for one in items], how.window, judge) if crops else None
+    cut = real_seams.SeamCrops.of([one.features for one in items], how.window, judge) if crops else None
     return transitions.prepare(judge, real, how, cut, real_seams.load_shipped())
 
 
@@ -177,7 +177,7 @@ def test_all_ways_get_the_same_prompts_lengths_and_seeds_and_no_item_twice() -> 
 
 
 def test_a_report_has_the_published_rows_beside_and_can_be_read_again() -> None:
-    found = transitions.measure(trial(), {"ours": Maker()}, command="motionloom evaluate transitions")
+    found = transitions.measure(trial(), {"ours": Maker()}, run=Run(command="motionloom evaluate transitions"))
     again = report.decode(json.loads(json.dumps(report.encode(found))))
     assert again.row("real") is not None
     elsewhere = {row.name for row in again.rows if row.measured_on}
@@ -214,7 +214,7 @@ def test_without_recordings_the_shipped_numbers_stand_in_the_real_row() -> None:
 def test_shipped_numbers_are_those_of_their_own_windows(tmp_path: Path) -> None:
     """Written, read back, and computed once more by hand on the same windows."""
     moving = [features(place(k), 80) + 0.01 * np.random.default_rng(k).standard_normal((80, 263)) for k in range(9)]
-    crops = real_seams.Crops.of(moving, 60, None)
+    crops = real_seams.SeamCrops.of(moving, 60, None)
     found = real_seams.measure_shipped(crops, source="made up")
     (tmp_path / "r.json").write_text(json.dumps(found))
     kept = real_seams.load_shipped(tmp_path / "r.json")

@@ -12,7 +12,7 @@ from motionloom.kinematics import physics as ph
 from motionloom.lab.metrics.obedience import EVERYDAY
 from motionloom.lab.suites import trial
 from motionloom.lab.suites.clips import RealClip
-from motionloom.lab.suites.trial import Trial
+from motionloom.lab.suites.trial import Examples
 from motionloom.lab.suites.trial_clips import trials
 from tests.kinematics.people import standing, walking
 from tests.lab.metrics.test_everyday import PEOPLE, mirrored
@@ -38,7 +38,9 @@ CLIPS = [
 
 def test_examples_others_and_the_other_side_are_counted_apart() -> None:
     check = BY_NAME["raise the left arm"]
-    found = trial.tried([check], {check.name: Trial(r"raises the left", like="unnamed", sided=True)}, CLIPS)[check.name]
+    found = trial.tried([check], {check.name: Examples(r"raises the left", like="unnamed", sided=True)}, CLIPS)[
+        check.name
+    ]
     assert found.shown == (2, 2)  # the left arm, and the right one mirrored
     assert found.opposite == (0, 2)
     assert found.others == (0, 4)
@@ -47,21 +49,21 @@ def test_examples_others_and_the_other_side_are_counted_apart() -> None:
 
 def test_a_check_that_lets_everybody_pass_is_doubted() -> None:
     check = BY_NAME["sit down from standing"]
-    found = trial.tried([check], {check.name: Trial(r"walks", like="up|stand")}, CLIPS)[check.name]
+    found = trial.tried([check], {check.name: Examples(r"walks", like="up|stand")}, CLIPS)[check.name]
     assert found.shown == (0, 2)
     assert found.slipped == ["sitting@0"]
     assert len(found.missed) == 2
     assert "seat" in found.missed[0]
     assert [doubt.split()[0] for doubt in found.doubts()] == ["misses", "50.0%"]
-    assert "no example" in trial.tried([check], {check.name: Trial()}, CLIPS)[check.name].doubts()
+    assert "no example" in trial.tried([check], {check.name: Examples()}, CLIPS)[check.name].doubts()
 
 
 def test_examples_are_made_backwards_cut_and_joined() -> None:
     up = BY_NAME["stand up"]
-    assert trial.tried([up], {up.name: Trial(backwards="sits down")}, CLIPS)[up.name].made == (1, 1)
+    assert trial.tried([up], {up.name: Examples(backwards="sits down")}, CLIPS)[up.name].made == (1, 1)
     both = BY_NAME["walk, then sit"]
-    assert trial.tried([both], {both.name: Trial(joined=("stroll", "sitting"))}, CLIPS)[both.name].made == (1, 1)
-    assert len(next(trial.examples(Trial("stroll", cut=(0.2, 0.7)), CLIPS))[2]) == 50
+    assert trial.tried([both], {both.name: Examples(joined=("stroll", "sitting"))}, CLIPS)[both.name].made == (1, 1)
+    assert len(next(trial.examples(Examples("stroll", cut=(0.2, 0.7)), CLIPS))[2]) == 50
 
 
 def test_joined_clips_go_on_where_and_whither_the_first_one_ends() -> None:
@@ -91,7 +93,7 @@ def test_every_check_has_a_trial_and_every_trial_a_check() -> None:
 
 def test_the_tables_have_a_row_per_check() -> None:
     checks = [BY_NAME["stand up"], BY_NAME["bow"]]
-    found = trial.tried(checks, {c.name: Trial("sits") for c in checks}, CLIPS)
+    found = trial.tried(checks, {c.name: Examples("sits") for c in checks}, CLIPS)
     assert [row[0] for row in trial.table(found)] == ["check", "stand up", "bow"]
     assert trial.summary(found)["bow"]["shown"] == (0, 1)
 

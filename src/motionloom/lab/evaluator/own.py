@@ -91,7 +91,7 @@ def is_own(path: Path) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class HeldOut:
     """Held-out motions: captioned stretches, and windows of everything."""
 
     captioned: tuple[np.ndarray, ...]
@@ -102,10 +102,10 @@ class Held:
 
 
 TURNS = 200
-"""At most so many of `Held.turns`."""
+"""At most so many of `HeldOut.turns`."""
 
 
-def held_out(clips: Sequence[Clip]) -> Held:
+def held_out(clips: Sequence[Clip]) -> HeldOut:
     """The stretches that people described, and consecutive windows of all clips; mirrored copies included."""
     captioned, captions, windows, turns = [], [], [], []
     for clip in clips:
@@ -121,7 +121,7 @@ def held_out(clips: Sequence[Clip]) -> Held:
             if len(part := clip.features[start : start + WINDOW]) >= 2 * SHORTEST:
                 windows.append(part)
     few = np.linspace(0, len(turns) - 1, min(TURNS, len(turns))).astype(int)
-    return Held(tuple(captioned), tuple(captions), tuple(windows), tuple(turns[i] for i in few))
+    return HeldOut(tuple(captioned), tuple(captions), tuple(windows), tuple(turns[i] for i in few))
 
 
 Damage = Callable[[np.ndarray, np.random.Generator], np.ndarray]
@@ -180,7 +180,7 @@ class Judge:
     """An evaluator with the points of the undamaged motions and all captions."""
 
     evaluator: Evaluator
-    held: Held
+    held: HeldOut
     repeats: int
     seed: int
 
@@ -238,7 +238,7 @@ class Judge:
         return Value(float((before < after).mean()), count=len(kept))
 
     def sides(self) -> Value:
-        """Share of `Held.turns` whose words are nearer to them than to their mirror image."""
+        """Share of `HeldOut.turns` whose words are nearer to them than to their mirror image."""
         texts = self.evaluator.texts([Caption(text) for _, text in self.held.turns])
         shown = [motion for motion, _ in self.held.turns]
         before, after = (

@@ -3,7 +3,9 @@
 ``positions`` (frames, 22, 3) metres on the uniform person, SMPL order, the floor near y = 0.
 """
 
+import tomllib
 from collections.abc import Callable
+from importlib import resources
 
 import numpy as np
 
@@ -14,50 +16,7 @@ from motionloom.kinematics.wholeness import wholeness
 
 Measures = dict[str, float]
 
-MEANING: dict[str, str] = {
-    "travel": "m walked along the path",
-    "pace": "m/s, median while moving",
-    "gap": "distance from start to end / travel: 0 comes back",
-    "advance": "m gone in the direction the chest points; backwards is negative",
-    "sidestep": "m gone to one side of the chest",
-    "facing_share": "advance / travel",
-    "side_share": "sidestep / travel",
-    "top_pace": "m/s, the fastest tenth begins here",
-    "turn": "degrees the body turned, + left",
-    "winding": "degrees the path bent round, either way",
-    "turning": "degrees per second the body turns either way, on average",
-    "rise": "m both feet gained and kept for three quarters of a second",
-    "jump_rise": "m the pelvis flew above its usual height",
-    "jump_clearance": "m both feet were off the floor",
-    "flights": "times both feet were off the floor for less than a second",
-    "one_leg": "s one foot was held up without a break",
-    "steps": "times a foot was lifted by 6 cm and put down",
-    "hops": "hops on one foot while the other was held up",
-    "kick": "leg lengths the kicking foot was above the other",
-    "kick_speed": "m/s of the kicking foot against the body",
-    "kick_height": "leg lengths between the ankles at the most, behind as well",
-    "kick_snap": "m/s at which a leg is stretched",
-    "foot_speed": "m/s of the quicker foot against the body, 98th percentile",
-    "hands_up": "s both wrists stayed above the neck",
-    "both_over_head": "m the lower wrist got above the head; below is negative",
-    "arms_raised": "s both wrists stayed at the height of the shoulders or above",
-    "hand_over_neck": "m the higher wrist got above the neck; below is negative",
-    "wave_swings": "swings of 4 cm or more of a raised hand",
-    "punch_speed": "m/s of a fist away from the body",
-    "hand_speed": "m/s of the quicker hand against the body, 98th percentile",
-    "pelvis_low": "leg lengths from ankle to pelvis at the lowest; 1.05 standing",
-    "low_seconds": "s the pelvis stayed below 0.85 leg lengths",
-    "low_still": "m/s while the pelvis was low (9: it never was)",
-    "bend": "degrees the back leaned forward, 98th percentile",
-    "bend_when_low": "degrees the back leaned forward when the pelvis was lowest",
-    "feet_ahead_when_low": "leg lengths the feet were in front of the lowest pelvis",
-    "knees": "degrees the straighter knee was bent, 98th percentile",
-    "arm_energy": "m/s of the wrists against the body, mean",
-    "leg_energy": "m/s of the ankles against the body, mean",
-    "mean_stir": "m/s of all joints, mean",
-    "stir": "m/s of the quickest joint, 90th percentile",
-    "whole": "share of the frames in which the body is a person's (kinematics/wholeness.py)",
-}
+MEANING: dict[str, str] = tomllib.loads((resources.files("motionloom.lab.suites") / "actions.toml").read_text("utf-8"))
 """What each number is."""
 
 

@@ -43,7 +43,7 @@ MEANING = {
 
 
 @dataclass(frozen=True)
-class Held:
+class BodyNumber:
     """One number of drawn bodies beside recorded ones."""
 
     name: str
@@ -97,7 +97,7 @@ def reach_of(recordings: Iterable[Array]) -> Reach:
     }
 
 
-def held(clips: Sequence[Array], reach: Reach) -> list[Held]:
+def held(clips: Sequence[Array], reach: Reach) -> list[BodyNumber]:
     """The numbers of drawn motions, (frames, 22, 3) metres each; ``head`` is left out where nobody stands."""
     found = [signals(clip) for clip in clips]
     rows = []
@@ -106,7 +106,7 @@ def held(clips: Sequence[Array], reach: Reach) -> list[Held]:
         if len(values):
             low, high = reach[name][0] - _slack(name), reach[name][-1] + _slack(name)
             outside = float(((values < low) | (values > high)).mean())
-            rows.append(Held(name, round(float(np.median(values)), 2), round(outside, 4), reach[name]))
+            rows.append(BodyNumber(name, round(float(np.median(values)), 2), round(outside, 4), reach[name]))
     return rows
 
 

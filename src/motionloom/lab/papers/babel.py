@@ -96,7 +96,7 @@ class Pair:
 
 
 @dataclass(frozen=True, eq=False)
-class Item:
+class BabelItem:
     """One training example of the BABEL representation."""
 
     name: str
@@ -292,7 +292,7 @@ def items(
     shortest: int = SHORTEST,
     longest: int = LONGEST,
     crop: np.random.Generator | None = None,
-) -> Iterator[Item]:
+) -> Iterator[BabelItem]:
     """The examples of one recording, up to four per pair: A; A and transition; B; transition and B; each once.
 
     ``motion`` at 30 fps. Kept are ``shortest`` to ``longest`` + 4 frames (`trimmed` takes the rest off); with ``crop``
@@ -311,7 +311,7 @@ def items(
         flags = np.zeros(len(motion), dtype=bool)
         flags[_frame(transition[0], len(motion)) : _frame(transition[1], len(motion))] = True
         name = f"{recording.name}_{number}"
-        yield Item(name, said, encode(motion.frames(first, last)), flags[first:last])
+        yield BabelItem(name, said, encode(motion.frames(first, last)), flags[first:last])
 
 
 def _stretches(pair: Pair) -> Iterator[tuple[str, float, float, float, float]]:
@@ -328,7 +328,9 @@ def _frame(seconds: float, frames: int) -> int:
     return round(min(max(seconds, 0.0) * FPS, frames))
 
 
-def trimmed(item: Item, rng: np.random.Generator, *, shortest: int = SHORTEST, longest: int = LONGEST) -> Item:
+def trimmed(
+    item: BabelItem, rng: np.random.Generator, *, shortest: int = SHORTEST, longest: int = LONGEST
+) -> BabelItem:
     """The item without 0 to 4 of its last frames, drawn at random such that its length is within the limits."""
     least, most = max(len(item) - longest, 0), max(min(SLACK, len(item) - shortest), 0)
     stop = len(item) - int(rng.integers(least, max(most, least) + 1))
@@ -344,7 +346,7 @@ def load_items(
     crop: bool = False,
     seed: int = 0,
     dropped: Callable[[str], None] | None = None,
-) -> list[Item]:
+) -> list[BabelItem]:
     """All examples of one split of a BABEL folder. ``crop``: cut longer ones at random, by ``seed`` (see `items`).
 
     ``dropped`` is called with a sentence for each recording that is missing, broken or under half a second; without it
@@ -365,7 +367,7 @@ def load_items(
     return result
 
 
-def statistics(items: Sequence[Item]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def statistics(items: Sequence[BabelItem]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Mean and standard deviation (135,) of every number over the frames of all items, as published per number."""
     if not items:
         raise MotionloomError("there are no items to take a mean of; is the split empty?")

@@ -336,7 +336,7 @@ def double_take(
     return Takes(made, inside, weights, refined, rebuilt, unfold(rebuilt, plan))
 
 
-class Settings(TypedDict, total=False):
+class TakeSettings(TypedDict, total=False):
     """How `double_take_features` samples."""
 
     steps: int
@@ -357,7 +357,7 @@ def double_take_features(
     handshake: int | Sequence[int] = HANDSHAKE,
     ramp: int | Sequence[int] | None = None,
     seed: int = 0,
-    **settings: Unpack[Settings],
+    **settings: Unpack[TakeSettings],
 ) -> tuple[np.ndarray, list[int]]:
     """One long motion. The second take's text is empty, and asked once per step.
 

@@ -85,7 +85,7 @@ class Fixed:
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class SwitchTarget:
     """Motion switch: the end of the window is to approach this motion (rows or 1, m, channels)."""
 
     motion: np.ndarray
@@ -101,7 +101,7 @@ class Options(TypedDict, total=False):
     padding: Padding
     """What stands for frames that were not observed; "last" as published."""
     fixed: Fixed | None
-    target: Target | None
+    target: SwitchTarget | None
     complete: bool
     """False leaves the observation to the condition alone."""
 
@@ -179,7 +179,7 @@ def mixed_in_time(
     return constrain
 
 
-def _approached(target: Target, rows: int, walk: Sequence[int], basis: Basis) -> Held:
+def _approached(target: SwitchTarget, rows: int, walk: Sequence[int], basis: Basis) -> Held:
     """The target at the end of the window, imposed until the walk's last steps."""
     m, steps = target.motion.shape[1], len(walk) - 1
     if not 1 <= m <= basis.frames:

@@ -72,7 +72,7 @@ class Seconds:
         return 1000 * ((said - wanted) ** 2).mean()
 
 
-class Settings(TypedDict, total=False):
+class MrtSettings(TypedDict, total=False):
     """What of the recipe may be asked otherwise."""
 
     steps: int
@@ -88,7 +88,7 @@ def train_mrt(
     device: str | None = None,
     stop: int | None = None,
     say: Callable[[str], None] = print,
-    **settings: Unpack[Settings],
+    **settings: Unpack[MrtSettings],
 ) -> Path:
     """Train (or go on training) on the ``train`` pairs at 20 frames per second.
 

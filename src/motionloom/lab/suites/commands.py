@@ -168,7 +168,7 @@ def make_reference(asked: Asked) -> None:
     files.check_report(place)
     how, chosen = measures.with_asked(protocol.Transitions(), asked), fitting(data, chosen)
     motions = [item.features for item in read_items(data, chosen)]
-    crops = real_seams.Crops.of(motions, how.window, None, seed=how.seed)
+    crops = real_seams.SeamCrops.of(motions, how.window, None, seed=how.seed)
     source = f"{' + '.join(chosen.splits)} of {', '.join(chosen.sources) or 'all sources'}"
     files.write_json(place, real_seams.measure_shipped(crops, source=source, seed=how.seed))
     return print(f"{place}: {len(crops.motions)} windows, mean jerk {crops.mean_jerk:.6f} m/frame³")

@@ -28,7 +28,7 @@ from motionloom.lab.report.columns import columns
 from motionloom.lab.report.report import REAL, Report
 from motionloom.lab.suites import control_kinds, text_reference
 from motionloom.lab.suites.control_kinds import Kind, Target
-from motionloom.lab.suites.control_methods import BASE, METHODS, OURS, Made, Maker, Sampling, checked, fits, maker
+from motionloom.lab.suites.control_methods import BASE, METHODS, OURS, Made, Maker, checked, fits, maker
 from motionloom.lab.suites.harness import Run, check_names, digest, diversity, physical_mean, row_of
 from motionloom.lab.suites.items import Item, fitting, pick, read_items, spread
 from motionloom.lab.suites.parts import Parts
@@ -51,7 +51,7 @@ COLUMNS = columns("control")
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class ControlTrial:
     """Everything that a row is measured with."""
 
     items: tuple[Item, ...]
@@ -91,7 +91,7 @@ def prepare(
     *,
     scale: np.ndarray,
     selection: Selection,
-) -> Trial:
+) -> ControlTrial:
     """Choose the items, spread evenly, and embed them; MotionloomError where they do not fill a batch."""
     real = text_reference.measure(items, evaluator, selection)
     rows = spread(protocol.count or len(items), len(items))
@@ -102,7 +102,7 @@ def prepare(
     flat = [caption for item in chosen for caption in item.captions]
     cuts = np.cumsum([len(item.captions) for item in chosen])[:-1]
     texts = tuple(np.split(evaluator.texts(flat), cuts))
-    return Trial(
+    return ControlTrial(
         chosen,
         texts,
         real.motions[rows],
@@ -119,7 +119,9 @@ def prepare(
 # ---- the numbers of one replication ----------------------------------------------------------------------------------
 
 
-def measured(trial: Trial, replication: int, made: Sequence[Made], targets: Sequence[Target]) -> dict[str, float]:
+def measured(
+    trial: ControlTrial, replication: int, made: Sequence[Made], targets: Sequence[Target]
+) -> dict[str, float]:
     """What one motion per target is worth; a number that has no meaning for this kind is left out."""
     embedded = trial.evaluator.motions([one.features for one in made])
     return {
@@ -129,7 +131,7 @@ def measured(trial: Trial, replication: int, made: Sequence[Made], targets: Sequ
     }
 
 
-def _judged(trial: Trial, replication: int, embedded: Array) -> dict[str, float]:
+def _judged(trial: ControlTrial, replication: int, embedded: Array) -> dict[str, float]:
     _, texts = trial.captions(replication)
     order = np.random.default_rng((trial.protocol.seed, replication, 1)).permutation(len(texts))
     return {
@@ -163,13 +165,13 @@ def _error(of: str, error: ControlError | None) -> dict[str, float]:
     return {} if error is None else {f"{of}_error": error.error, f"{of}_sequences": error.sequences}
 
 
-def of_real(trial: Trial, replication: int) -> dict[str, float]:
+def of_real(trial: ControlTrial, replication: int) -> dict[str, float]:
     """The real motions themselves; they meet every goal, which they are."""
     clips = [humanml.decode_positions(item.features.astype(np.float64)) for item in trial.items]
     return {**_judged(trial, replication, trial.motions), **physical_mean(clips)}
 
 
-def of_method(trial: Trial, one: Kind, name: str, replication: int) -> dict[str, float]:
+def of_method(trial: ControlTrial, one: Kind, name: str, replication: int) -> dict[str, float]:
     """One way of control on one kind of goal; the time is that of making the motions."""
     targets = trial.targets(one, replication)
     made, seconds = trial.plain.get((name, replication)) or _made(trial, one, name, replication, targets)
@@ -178,7 +180,9 @@ def of_method(trial: Trial, one: Kind, name: str, replication: int) -> dict[str,
     return {**measured(trial, replication, made, targets), "seconds": seconds / len(targets)}
 
 
-def _made(trial: Trial, one: Kind, name: str, replication: int, targets: Sequence[Target]) -> tuple[list[Made], float]:
+def _made(
+    trial: ControlTrial, one: Kind, name: str, replication: int, targets: Sequence[Target]
+) -> tuple[list[Made], float]:
     """One motion per target, and the seconds that all took."""
     make = trial.make(one, name)
     start = time.perf_counter()
@@ -190,21 +194,19 @@ def _made(trial: Trial, one: Kind, name: str, replication: int, targets: Sequenc
 
 
 def measure(
-    trial: Trial,
+    trial: ControlTrial,
     kinds: Sequence[Kind],
     methods: Sequence[str] = METHODS,
+    run: Run | None = None,
     *,
-    label: str = "default",
     parts: Parts | None = None,
-    command: str = "",
-    progress: Callable[[str], None] = lambda line: None,
 ) -> Report:
     """All rows: the real motions, then each way of control for each kind of goal.
 
     A way that these weights cannot go (no adapter of that name) is reported in a note and stops nothing. The
     uncontrolled rows are made wherever something is held against them.
     """
-    parts, count = parts or Parts(None, ""), range(trial.protocol.replications)
+    run, parts, count = run or Run(), parts or Parts(None, ""), range(trial.protocol.replications)
     wanted = {*methods, *(BASE[name] for name in methods)}
     fixed = ("skate_share", "skate_speed", "skate_slide", "jerk", "penetration", "fid")  # the same motion each time
     rows, missing = [row_of(REAL, [of_real(trial, r) for r in count], COLUMNS, fixed)], list[str]()
@@ -214,11 +216,11 @@ def measure(
             done = [parts.find(f"{one.name} {name} {r}") for r in count]  # those of another run are refused
             try:
                 found[name] = [
-                    numbers or _new(trial, parts, one, name, r, progress=progress) for r, numbers in enumerate(done)
+                    numbers or _new(trial, parts, one, name, r, progress=run.progress) for r, numbers in enumerate(done)
                 ]
             except MotionloomError as error:
                 missing.append(f"{one.title}, {name}: not measured ({error})")
-                progress(missing[-1])
+                run.progress(missing[-1])
         rows += [
             row_of(f"{one.title}, {name}", against(numbers, found.get(BASE[name])), COLUMNS)
             for name, numbers in found.items()
@@ -232,19 +234,13 @@ def measure(
         "goals": [one.name for one in kinds],
         "fid": f"of {len(trial.items)} motions to all {len(trial.everyone)} real ones",
     }
-    return Report(
-        "control",
-        f"Control: {label}",
-        command,
-        described,
-        COLUMNS,
-        (*rows, *published_rows.published("control", [column.name for column in COLUMNS])),
-        (*_notes(trial), *missing),
-    )
+    others = published_rows.published("control", [column.name for column in COLUMNS])
+    notes, title = (*_notes(trial), *missing), f"Control: {run.label}"
+    return Report("control", title, run.command, described, COLUMNS, (*rows, *others), notes)
 
 
 def _new(
-    trial: Trial, parts: Parts, one: Kind, name: str, replication: int, *, progress: Callable[[str], None]
+    trial: ControlTrial, parts: Parts, one: Kind, name: str, replication: int, *, progress: Callable[[str], None]
 ) -> dict[str, float]:
     found = of_method(trial, one, name, replication)
     parts.keep(f"{one.name} {name} {replication}", found)
@@ -266,7 +262,7 @@ def against(numbers: Sequence[dict[str, float]], base: Sequence[dict[str, float]
     ]
 
 
-def _notes(trial: Trial) -> tuple[str, ...]:
+def _notes(trial: ControlTrial) -> tuple[str, ...]:
     count, every = len(trial.items), len(trial.everyone)
     bias = f"FID compares {count} motions with {every} real ones in {trial.everyone.shape[1]} dimensions"
     if every > count + 1:
@@ -309,11 +305,10 @@ def run(
         raise MotionloomError("goals are taken out of real motions, and none are shipped; name a set with --data")
     prior = run.prior(protocol.steps[0])  # what cannot be drawn is said before anything is read
     judge, selection = run.judge(), fitting(run.data, selection)
-    how = Sampling(protocol.steps[0], protocol.guidance, protocol.solver, protocol.spacing)
     trial = prepare(
         read_items(run.data, selection),
         judge,
-        maker(prior, how),
+        maker(prior, protocol.drawing(protocol.steps[0])),
         protocol,
         scale=prior.std,
         selection=selection,
@@ -321,7 +316,7 @@ def run(
     files = {name: digest(path) for name, path in adapters().items()}
     said = {**protocol.drawn(), "steps": list(protocol.steps), "adapters": files, "items": identity(trial.items)}
     parts = run.parts({**said, **run.settings(judge)})
-    return measure(trial, asked, methods, label=run.label, parts=parts, command=run.command, progress=run.progress)
+    return measure(trial, asked, methods, run, parts=parts)
 
 
 def settings(

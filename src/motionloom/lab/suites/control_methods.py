@@ -12,11 +12,12 @@ from motionloom.features import humanml
 from motionloom.kinematics.physics import Array
 from motionloom.lab.papers.diffusion_blending import control_features
 from motionloom.lab.suites.control_kinds import Kind, Target
+from motionloom.lab.suites.protocol import Drawing
 from motionloom.motion import Motion
 from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.sampling import BATCH as ROWS
 from motionloom.tasks.sampling import Observed
-from motionloom.tasks.text import SOLVER, SPACING, sample_features, smooth, to_motion
+from motionloom.tasks.text import sample_features, smooth, to_motion
 from motionloom.weights.adapter import Adapter, adapted, adapters
 from motionloom.weights.prior import Prior
 
@@ -57,22 +58,12 @@ Maker = Callable[[Kind, str], Method]
 """(kind, name out of `METHODS`) to the method; MotionloomError where these weights have none of that name."""
 
 
-@dataclass(frozen=True)
-class Sampling:
-    """How everything is sampled."""
-
-    steps: int
-    guidance: float
-    solver: str = SOLVER
-    spacing: str = SPACING
-
-
 def fits(one: Kind, name: str) -> bool:
     """Whether a method is a row of a kind: one control is fine-tuned, several are blended."""
     return {TUNED: len(one.adapters) == 1, BLENDING: len(one.adapters) > 1}.get(name, True)
 
 
-def maker(prior: Prior, how: Sampling) -> Maker:
+def maker(prior: Prior, how: Drawing) -> Maker:
     """The methods of a prior and its shipped adapters; a control that has none of its own takes ``any``."""
     shipped = adapters()
 
@@ -94,19 +85,12 @@ def maker(prior: Prior, how: Sampling) -> Maker:
     return make
 
 
-def uncontrolled(prior: Prior, how: Sampling, *, exported: bool) -> Method:
+def uncontrolled(prior: Prior, how: Drawing, *, exported: bool) -> Method:
     """Goals are ignored: motions from the words alone, as the network draws them or as they are exported."""
 
     def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
         drawn = sample_features(
-            prior,
-            [target.prompt for target in targets],
-            [len(target) for target in targets],
-            seeds=seeds,
-            guidance=how.guidance,
-            steps=how.steps,
-            solver=how.solver,
-            spacing=how.spacing,
+            prior, [target.prompt for target in targets], [len(target) for target in targets], seeds=seeds, **how
         )
         features = [one.astype(np.float64) for one in drawn]
         return [of_motion(to_motion(one, prior.fps)) if exported else of_features(one) for one in features]
@@ -114,51 +98,28 @@ def uncontrolled(prior: Prior, how: Sampling, *, exported: bool) -> Method:
     return draw
 
 
-def published(prior: Prior, how: Sampling, nets: Sequence[PriorSession], *, noise_free: bool) -> Method:
+def published(prior: Prior, how: Drawing, nets: Sequence[PriorSession], *, noise_free: bool) -> Method:
     """Control in the representation: the fixed numbers are written into every estimate (`diffusion_blending`)."""
 
     def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
         result: dict[int, Made] = {}
         for rows in groups([len(target) for target in targets]):
-            drawn = _controlled(
-                prior, how, nets, [targets[row] for row in rows], [seeds[row] for row in rows], noise_free
-            )
-            result |= {row: of_features(one) for row, one in zip(rows, drawn, strict=True)}
+            some = [targets[row] for row in rows]
+            mask = np.stack([target.mask for target in some])
+            given = np.stack([target.known for target in some]).astype(np.float32)
+            known = Observed((given - prior.mean) / prior.std, mask, noise_free)
+            prompts, own = [target.prompt for target in some], [seeds[row] for row in rows]
+            drawn = control_features(prior, nets, prompts, known, seeds=own, **how) * prior.std + prior.mean
+            if prior.net.config.patch > 1:
+                drawn = smooth(drawn)  # as everything that such a network draws
+            fixed = np.where(mask, given, drawn).astype(np.float64)
+            result |= {row: of_features(one) for row, one in zip(rows, fixed, strict=True)}
         return [result[row] for row in range(len(targets))]
 
     return draw
 
 
-def _controlled(
-    prior: Prior,
-    how: Sampling,
-    nets: Sequence[PriorSession],
-    targets: Sequence[Target],
-    seeds: Sequence[int],
-    noise_free: bool,
-) -> np.ndarray:
-    """(rows, frames, 263) not standardised, of targets of one length."""
-    mask = np.stack([target.mask for target in targets])
-    given = np.stack([target.known for target in targets]).astype(np.float32)
-    known = (given - prior.mean) / prior.std
-    state = control_features(
-        prior,
-        nets,
-        [target.prompt for target in targets],
-        Observed(known, mask, noise_free),
-        seeds=seeds,
-        guidance=how.guidance,
-        steps=how.steps,
-        solver=how.solver,
-        spacing=how.spacing,
-    )
-    drawn = state * prior.std + prior.mean
-    if prior.net.config.patch > 1:
-        drawn = smooth(drawn)  # as everything that such a network draws
-    return np.where(mask, given, drawn).astype(np.float64)
-
-
-def ours(prior: Prior, how: Sampling, *, exact: bool) -> Method:
+def ours(prior: Prior, how: Drawing, *, exact: bool) -> Method:
     """`tasks.control.control` as it is by default, with or without its exact fit; as exported."""
 
     def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
@@ -167,7 +128,7 @@ def ours(prior: Prior, how: Sampling, *, exact: bool) -> Method:
         made = []
         for target, seed in zip(targets, seeds, strict=True):
             (one,) = control(
-                prior, target.prompt, target.goal, seed=seed, guidance=how.guidance, steps=how.steps, fit=exact
+                prior, target.prompt, target.goal, seed=seed, guidance=how["guidance"], steps=how["steps"], fit=exact
             )
             made.append(of_motion(one.motion))
         return made

@@ -51,7 +51,7 @@ COLUMNS = columns("duet-completion")
 
 
 @dataclass(frozen=True)
-class How:
+class CompletionSettings:
     """How completions are measured."""
 
     crops: int = 200
@@ -71,7 +71,7 @@ class How:
             raise MotionloomError(f"what is given is one of {', '.join(GIVEN)}; got {self.given[:40]!r}")
 
 
-QUICK = How(crops=6, samples=2, steps=6)
+QUICK = CompletionSettings(crops=6, samples=2, steps=6)
 
 
 def run(
@@ -81,7 +81,7 @@ def run(
     communication: Path | None = None,
     mrt: Path | None = None,
     beside: Sequence[str | Path] = (),
-    how: How | None = None,
+    how: CompletionSettings | None = None,
     kinds: Sequence[str] = KINDS,
     with_published: bool = True,
 ) -> Report:
@@ -97,7 +97,7 @@ def run(
         kinds: the rows, out of `KINDS`.
         with_published: whether the report has what others published.
     """
-    how = how or How()
+    how = how or CompletionSettings()
     check_names(kinds, KINDS, "rows")
     prior = Prior.load(run.weights, device=run.device)
     found = PairBlock.load(chosen_block(block), prior) if "ours" in kinds else None
@@ -133,7 +133,7 @@ def held_out(pairs: Sequence[Pair]) -> list[Pair]:
     return found
 
 
-def draw(pairs: Sequence[Pair], how: How) -> Crops:
+def draw(pairs: Sequence[Pair], how: CompletionSettings) -> Crops:
     """Random crops, every pair as often as any, either person first."""
     rng = np.random.default_rng(how.seed)
     made = []
@@ -147,7 +147,7 @@ def draw(pairs: Sequence[Pair], how: How) -> Crops:
 def ways_of(
     prior: Prior,
     block: PairBlock | None,
-    how: How,
+    how: CompletionSettings,
     kinds: Sequence[str] = KINDS,
     *,
     communication: Path | None = None,
@@ -167,7 +167,7 @@ def ways_of(
     return found
 
 
-def _asked(how: How) -> dict[str, Any]:
+def _asked(how: CompletionSettings) -> dict[str, Any]:
     """What `duet_ways.drawn` takes."""
     return {"given": how.given, "seed": how.seed, "steps": how.steps, "guidance": how.guidance, "prompt": how.prompt}
 
@@ -175,7 +175,7 @@ def _asked(how: How) -> dict[str, Any]:
 def measure(
     crops: Crops,
     found: Mapping[str, Way],
-    how: How,
+    how: CompletionSettings,
     *,
     run: Run | None = None,
     kinds: Sequence[str] = KINDS,
@@ -305,7 +305,7 @@ def verdicts(errors: Mapping[str, tuple[str, Mapping[str, Array]]]) -> tuple[str
     return tuple(notes)
 
 
-def protocol_of(crops: Crops, how: How) -> dict[str, Any]:
+def protocol_of(crops: Crops, how: CompletionSettings) -> dict[str, Any]:
     """The notes under the table."""
     known, true = GIVEN[how.given]
     last = "of the real next frame" if true else "as between the last two given ones"

@@ -17,7 +17,7 @@ from motionloom.lab.report.columns import columns
 from motionloom.lab.report.report import Report, Value
 from motionloom.lab.suites import duet_text as judged
 from motionloom.lab.suites.duet import HELD_OUT
-from motionloom.lab.suites.duet_text import KINDS, NOTES, How, Make, Table
+from motionloom.lab.suites.duet_text import KINDS, NOTES, DuetSettings, Make, Table
 from motionloom.lab.suites.harness import Run
 from motionloom.lab.suites.needs import NoData
 from motionloom.tasks.control import moved
@@ -27,7 +27,7 @@ from motionloom.tasks.text import LARGEST_SEED, frames_in, generate
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
-QUICK = judged.QUICK
+FULL, QUICK = judged.FULL, judged.QUICK
 COLUMNS = (*judged.COLUMNS, *columns("duet-answers"))
 
 
@@ -40,7 +40,7 @@ class Windows:
     frames: int
 
     @staticmethod
-    def of(pairs: Sequence[Pair], how: How) -> "Windows":
+    def of(pairs: Sequence[Pair], how: DuetSettings) -> "Windows":
         """Raises NoData where no held-out pair with a caption is long enough."""
         frames = frames_in(how.seconds, mp.FPS)
         found = tuple(p for p in pairs if p.split in HELD_OUT and p.frames >= frames and p.captions)
@@ -64,15 +64,17 @@ class Windows:
             made.append(positions[:: 1 if rng.random() < 0.5 else -1, start : start + self.frames])
         return made
 
-    def all(self, how: How) -> list[Array]:
+    def all(self, how: DuetSettings) -> list[Array]:
         """Those of a whole run, in its order."""
         turns = judged.turns(self.captions(), how)
         return [window for caption, count, seed in turns for window in self.draw(caption, count, seed)]
 
 
-def run(run: Run, *, block: str | Path | None = None, how: How | None = None, kinds: Sequence[str] = KINDS) -> Report:
+def run(
+    run: Run, *, block: str | Path | None = None, how: DuetSettings | None = None, kinds: Sequence[str] = KINDS
+) -> Report:
     """Measure a two-person block on people of the held-out pairs of ``run.data``; arguments as of `duet_text.run`."""
-    how = how or How()
+    how = how or DuetSettings()
     prior, found, pairs, about = judged.opened(run, block, kinds)
     given = Windows.of(pairs, how)
     return judged.measure(
@@ -87,7 +89,7 @@ def run(run: Run, *, block: str | Path | None = None, how: How | None = None, ki
     )
 
 
-def table(given: Windows, how: How) -> Table:
+def table(given: Windows, how: DuetSettings) -> Table:
     """The columns of duets from words, and how far partners are from the real ones."""
     silent = "The prior without communication does not know who is given; it begins where the real partner does."
     return Table(
@@ -107,7 +109,7 @@ def apart(duets: Sequence[Array], real: Sequence[Array]) -> Mapping[str, Value]:
     return {f"root_{k}": Value.of([float(one[frame]) for one in way]) for k, frame in at.items() if frame < len(way[0])}
 
 
-def answers(prior: Prior, block: PairBlock, given: Windows, how: How) -> Make:
+def answers(prior: Prior, block: PairBlock, given: Windows, how: DuetSettings) -> Make:
     """`react` to the first person of each window."""
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
@@ -119,30 +121,20 @@ def answers(prior: Prior, block: PairBlock, given: Windows, how: How) -> Make:
                 motion_from_positions(window[0], mp.FPS),
                 caption,
                 seed=own_seed(seed, number),
-                guidance=how.guidance,
-                steps=how.steps,
-                foot_lock=how.clean,
+                **how.drawing,
             )
         return made
 
     return make
 
 
-def alone(prior: Prior, given: Windows, how: How) -> Make:
+def alone(prior: Prior, given: Windows, how: DuetSettings) -> Make:
     """Partners from the prior alone, who begin where the real partner does, facing as they do."""
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
         made = []
         for number, window in enumerate(given.draw(caption, count, seed)):
-            (partner,) = generate(
-                prior,
-                caption,
-                seconds=how.seconds,
-                seed=own_seed(seed, number),
-                guidance=how.guidance,
-                steps=how.steps,
-                foot_lock=how.clean,
-            )
+            (partner,) = generate(prior, caption, seconds=how.seconds, seed=own_seed(seed, number), **how.drawing)
             begins = GroundPose.of_numbers(two.encode(window).poses[1])
             made.append((motion_from_positions(window[0], mp.FPS), moved(partner, begins)))
         return made

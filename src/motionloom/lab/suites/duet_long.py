@@ -32,7 +32,7 @@ MOST = 100
 
 
 @dataclass(frozen=True)
-class How(judged.How):
+class LongDuetSettings(judged.DuetSettings):
     """How long duets are made and measured; ``seconds`` is the length of a segment."""
 
     segments: int = 3
@@ -42,12 +42,14 @@ class How(judged.How):
         check_ranges(self, segments=(2, MOST))
 
 
-QUICK = How(duets=2, steps=6, segments=2)
+FULL, QUICK = LongDuetSettings(), LongDuetSettings(duets=2, steps=6, segments=2)
 
 
-def run(run: Run, *, block: str | Path | None = None, how: How | None = None, kinds: Sequence[str] = KINDS) -> Report:
+def run(
+    run: Run, *, block: str | Path | None = None, how: LongDuetSettings | None = None, kinds: Sequence[str] = KINDS
+) -> Report:
     """Measure a two-person block on long duets for the captions of train pairs; arguments as of `duet_text.run`."""
-    how = how or How()
+    how = how or LongDuetSettings()
     prior, found, pairs, about = judged.opened(run, block, kinds)
     said = judged.captions_of(pairs)
     return judged.measure(
@@ -62,7 +64,7 @@ def run(run: Run, *, block: str | Path | None = None, how: How | None = None, ki
     )
 
 
-def table(captions: tuple[str, ...], how: How) -> Table:
+def table(captions: tuple[str, ...], how: LongDuetSettings) -> Table:
     """The last and the first stretch, as long as a segment."""
     frames = frames_in(how.seconds, mp.FPS)
     cuts = (
@@ -73,22 +75,14 @@ def table(captions: tuple[str, ...], how: How) -> Table:
     return Table("duet-long", "Two people for long", captions, (*NOTES, silent), cuts)
 
 
-def ours(prior: Prior, block: PairBlock, captions: Sequence[str], how: How) -> Make:
+def ours(prior: Prior, block: PairBlock, captions: Sequence[str], how: LongDuetSettings) -> Make:
     """`compose_pair` of captions in turn, from the one that is asked for."""
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
         made = []
         for number in range(count):
             pieces = list(
-                compose_pair(
-                    prior,
-                    block,
-                    timeline(captions, caption, how),
-                    seed=own_seed(seed, number),
-                    guidance=how.guidance,
-                    steps=how.steps,
-                    foot_lock=how.clean,
-                )
+                compose_pair(prior, block, timeline(captions, caption, how), seed=own_seed(seed, number), **how.drawing)
             )
             made.append((_whole(first for first, _ in pieces), _whole(second for _, second in pieces)))
         return made
@@ -96,21 +90,12 @@ def ours(prior: Prior, block: PairBlock, captions: Sequence[str], how: How) -> M
     return make
 
 
-def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: How) -> Make:
+def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: LongDuetSettings) -> Make:
     """Two long motions of the prior alone, which begin where partners of random train windows stand."""
     begun = judged.beginnings(pairs, how)
 
     def one(caption: str, seed: int) -> Motion:
-        return _whole(
-            compose(
-                prior,
-                timeline(captions, caption, how),
-                seed=seed,
-                guidance=how.guidance,
-                steps=how.steps,
-                foot_lock=how.clean,
-            )
-        )
+        return _whole(compose(prior, timeline(captions, caption, how), seed=seed, **how.drawing))
 
     def make(caption: str, count: int, seed: int) -> list[Duet]:
         made = []
@@ -125,7 +110,7 @@ def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: How
     return make
 
 
-def timeline(captions: Sequence[str], caption: str, how: How) -> list[Segment]:
+def timeline(captions: Sequence[str], caption: str, how: LongDuetSettings) -> list[Segment]:
     """``how.segments`` captions in turn, the first of which is ``caption``."""
     first = captions.index(caption)
     return [Segment(captions[(first + n) % len(captions)], how.seconds) for n in range(how.segments)]

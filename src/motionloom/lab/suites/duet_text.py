@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -28,15 +28,7 @@ from motionloom.lab.suites.harness import Run, Say, check_names
 from motionloom.lab.suites.needs import pairs_of
 from motionloom.lab.suites.protocol import SEEDS, check_ranges
 from motionloom.tasks.control import moved
-from motionloom.tasks.pair import (
-    Duet,
-    PairEdits,
-    generate_pair,
-    known_state,
-    pair_features,
-    person_seeds,
-    stacked,
-)
+from motionloom.tasks.pair import Duet, PairEdits, generate_pair, known_state, pair_features, person_seeds, stacked
 from motionloom.tasks.text import GUIDANCE, STEPS, finish, frames_in
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
@@ -61,8 +53,16 @@ _STATS = {
 COLUMNS = columns("duet-text")
 
 
+class DuetDrawing(TypedDict):
+    """How people are drawn, as the tasks take it."""
+
+    guidance: float
+    steps: int
+    foot_lock: bool
+
+
 @dataclass(frozen=True)
-class How:
+class DuetSettings:
     """How duets are made and measured."""
 
     duets: int = 24
@@ -76,8 +76,13 @@ class How:
     def __post_init__(self) -> None:
         check_ranges(self, duets=(2, 10_000), seconds=(1, 30), seed=SEEDS)
 
+    @property
+    def drawing(self) -> "DuetDrawing":
+        """What every task that draws people is asked beside its seed."""
+        return {"guidance": self.guidance, "steps": self.steps, "foot_lock": self.clean}
 
-QUICK = How(duets=4, steps=6)
+
+FULL, QUICK = DuetSettings(), DuetSettings(duets=4, steps=6)
 Make = Callable[[str, int, int], Sequence[Duet]]
 """(caption, count, seed) to that many duets."""
 Cut = Callable[[Array], Array]
@@ -111,7 +116,9 @@ class Table:
     """Further columns of all that was made, in the order of `turns`."""
 
 
-def run(run: Run, *, block: str | Path | None = None, how: How | None = None, kinds: Sequence[str] = KINDS) -> Report:
+def run(
+    run: Run, *, block: str | Path | None = None, how: DuetSettings | None = None, kinds: Sequence[str] = KINDS
+) -> Report:
     """Measure a two-person block against the pairs of ``run.data`` and their captions.
 
     Args:
@@ -120,18 +127,10 @@ def run(run: Run, *, block: str | Path | None = None, how: How | None = None, ki
         how: how duets are made and measured.
         kinds: the rows, out of `KINDS`.
     """
-    how = how or How()
+    how = how or DuetSettings()
     prior, found, pairs, about = opened(run, block, kinds)
     ours: Make = lambda caption, count, seed: generate_pair(  # noqa: E731
-        prior,
-        found,
-        caption,
-        seconds=how.seconds,
-        count=count,
-        seed=seed,
-        guidance=how.guidance,
-        steps=how.steps,
-        foot_lock=how.clean,
+        prior, found, caption, seconds=how.seconds, count=count, seed=seed, **how.drawing
     )
     return measure(
         pairs, ours, beside(prior, pairs, how), how, table=text_table(pairs), run=run, kinds=kinds, about=about
@@ -155,7 +154,7 @@ def text_table(pairs: Sequence[Pair]) -> Table:
     return Table("duet-text", "Two people from words", captions_of(pairs), (*NOTES, silent))
 
 
-def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
+def beside(prior: Prior, pairs: Sequence[Pair], how: DuetSettings) -> Make:
     """The prior without communication, its people beginning where partners of random train windows stand."""
     frames, net, begun = frames_in(how.seconds, prior.fps), no_communication_net(prior), beginnings(pairs, how)
 
@@ -184,7 +183,7 @@ def beside(prior: Prior, pairs: Sequence[Pair], how: How) -> Make:
     return make
 
 
-def beginnings(pairs: Sequence[Pair], how: How) -> Callable[[int, int], list[Array]]:
+def beginnings(pairs: Sequence[Pair], how: DuetSettings) -> Callable[[int, int], list[Array]]:
     """(count, seed) to ground poses (2, 4) of partners at the beginning of random train windows."""
     frames = frames_in(how.seconds, mp.FPS)
     real = [window for pair in pairs if pair.split == "train" for window in windows(pair, frames, frames // 2)]
@@ -200,7 +199,7 @@ def measure(
     pairs: Sequence[Pair],
     ours: Make,
     silent: Make | None,
-    how: How,
+    how: DuetSettings,
     *,
     table: Table,
     run: Run | None = None,
@@ -262,7 +261,7 @@ def captions_of(pairs: Sequence[Pair]) -> tuple[str, ...]:
     return found
 
 
-def turns(captions: Sequence[str], how: How) -> list[tuple[str, int, int]]:
+def turns(captions: Sequence[str], how: DuetSettings) -> list[tuple[str, int, int]]:
     """(caption, count, seed) of all duets, captions in turn."""
     counts = [len(range(number, how.duets, len(captions))) for number in range(len(captions))]
     return [
@@ -272,7 +271,7 @@ def turns(captions: Sequence[str], how: How) -> list[tuple[str, int, int]]:
     ]
 
 
-def _made(make: Make, captions: Sequence[str], how: How, say: Say) -> tuple[list[Array], float]:
+def _made(make: Make, captions: Sequence[str], how: DuetSettings, say: Say) -> tuple[list[Array], float]:
     """Positions of all duets, in the order of `turns`, and seconds for one."""
     made, began = [], time.perf_counter()
     for caption, count, seed in turns(captions, how):
@@ -325,7 +324,7 @@ def verdicts(rows: Sequence[Row]) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def protocol_of(recorded: dict[str, list[Array]], captions: Sequence[str], how: How) -> dict[str, Any]:
+def protocol_of(recorded: dict[str, list[Array]], captions: Sequence[str], how: DuetSettings) -> dict[str, Any]:
     """The notes under the table."""
     return {
         "recordings": len(recorded),

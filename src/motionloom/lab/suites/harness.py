@@ -173,6 +173,35 @@ def physical_mean(clips: Sequence[np.ndarray]) -> dict[str, float]:
     return averaged([list(physical(clip).values()) for clip in clips], [len(clip) for clip in clips])
 
 
+def replicated(
+    name: str,
+    count: int,
+    measure: Callable[[int], Mapping[str, float]],
+    parts: Parts,
+    said: Callable[[Mapping[str, float]], str],
+    progress: Say = silent,
+) -> list[dict[str, float]]:
+    """The numbers of every replication of one row, each kept as it is done.
+
+    Args:
+        name: the row, in the names of what is kept and in lines of progress.
+        count: replications.
+        measure: the numbers of one.
+        parts: where they are kept; what is there already is not measured again.
+        said: the numbers in a few words.
+        progress: called with a line for each that was measured now.
+    """
+    return [
+        parts.once(
+            f"{name} {r}",
+            lambda r=r: measure(r),
+            lambda numbers, r=r: f"{name}, replication {r + 1} of {count}: {said(numbers)}",
+            progress,
+        )
+        for r in range(count)
+    ]
+
+
 def row_of(
     name: str, found: Sequence[Mapping[str, float]], columns: Sequence[Column], constant: Collection[str] = ()
 ) -> Row:

@@ -8,17 +8,19 @@ by h / 2 at each seam.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, Unpack
 
 import numpy as np
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import FPS
+from motionloom.goals.segment import Segment
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.lab.papers.baselines import BLANK, slerp_joined
-from motionloom.lab.papers.double_take import double_take_features
+from motionloom.lab.papers.double_take import TakeSettings, double_take_features
 from motionloom.lab.suites.protocol import Transitions
+from motionloom.tasks.long import compose, long_features
 from motionloom.tasks.text import sample_features
 from motionloom.weights.prior import Prior
 
@@ -41,14 +43,17 @@ Method: TypeAlias = Callable[[Sequence[str], Sequence[int], int], Long]
 
 def methods(prior: Prior, how: Transitions, names: Sequence[str] | None = None) -> dict[str, Method]:
     """The named ways (default `DEFAULT`), in that order; MotionloomError for a name there is not, and for none."""
-    made = {name: partial(maker, prior, how) for name, maker in _MAKERS.items()}
     wanted = list(dict.fromkeys(DEFAULT if names is None else names))
     if not wanted:
-        raise MotionloomError(f"no method is named; the methods are {', '.join(made)}")
+        raise MotionloomError(f"no method is named; the methods are {', '.join(_MAKERS)}")
     for name in wanted:
-        if name not in made:
-            raise MotionloomError(f"there is no method {name!r}; the methods are {', '.join(made)}")
-    return {name: made[name] for name in wanted}
+        if name not in _MAKERS:
+            raise MotionloomError(f"there is no method {name!r}; the methods are {', '.join(_MAKERS)}")
+
+    def method(name: str) -> Method:
+        return lambda prompts, frames, seed: _MAKERS[name][1](Wanted(prior, how, prompts, frames, seed))
+
+    return {name: method(name) for name in wanted}
 
 
 def rows_of(frames: Sequence[int], handshake: int) -> list[int]:
@@ -70,98 +75,76 @@ def from_positions(positions: Array) -> Long:
     return Long(np.concatenate([found, found[-1:]]), np.asarray(positions, dtype=np.float64))
 
 
-def _ours(prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequence[int], seed: int) -> Long:
-    from motionloom.goals.segment import Segment
-    from motionloom.tasks.long import long_features
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """One long motion that is asked for."""
 
-    segments = [Segment(text, n / FPS) for text, n in zip(prompts, frames, strict=True)]
-    pieces = list(long_features(prior, segments, seed=seed, guidance=how.guidance, steps=how.steps))
-    return from_features(np.concatenate(pieces))
+    prior: Prior
+    how: Transitions
+    prompts: Sequence[str]
+    frames: Sequence[int]
+    """Visible frames of each prompt."""
+    seed: int
+
+    @property
+    def segments(self) -> list[Segment]:
+        """The prompts with their seconds."""
+        return [Segment(text, n / FPS) for text, n in zip(self.prompts, self.frames, strict=True)]
+
+    def alone(self, frames: Sequence[int]) -> list[np.ndarray]:
+        """Every prompt by itself, (frames, 263) each."""
+        seeds = [self.seed + row for row in range(len(self.prompts))]
+        return sample_features(self.prior, self.prompts, frames, seeds=seeds, **self.how.drawing)
 
 
-def _exported(prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequence[int], seed: int) -> Long:
+def _ours(wanted: Wanted) -> Long:
+    pieces = long_features(wanted.prior, wanted.segments, seed=wanted.seed, **wanted.how.drawing)
+    return from_features(np.concatenate(list(pieces)))
+
+
+def _exported(wanted: Wanted) -> Long:
     """What a user gets: constant bones, planted feet held still."""
-    from motionloom.goals.segment import Segment
-    from motionloom.tasks.long import compose
-
-    segments = [Segment(text, n / FPS) for text, n in zip(prompts, frames, strict=True)]
-    blocks = compose(prior, segments, seed=seed, guidance=how.guidance, steps=how.steps)
+    blocks = compose(wanted.prior, wanted.segments, seed=wanted.seed, **wanted.how.drawing)
     return from_positions(np.concatenate([block.positions() for block in blocks]))
 
 
 def _double_take(
-    prior: Prior,
-    how: Transitions,
-    prompts: Sequence[str],
-    frames: Sequence[int],
-    seed: int,
-    *,
-    mode: Literal["published", "paper"],
-    steps: int | None = None,
-    first: bool = False,
-    second: bool = False,
+    wanted: Wanted, mode: Literal["published", "paper"] = "published", **more: Unpack[TakeSettings]
 ) -> Long:
-    made, _ = double_take_features(
-        prior,
-        prompts,
-        rows_of(frames, how.handshake),
-        mode=mode,
-        handshake=how.handshake,
-        ramp=how.blend,
-        steps=steps or how.steps,
-        seed=seed,
-        guidance=how.guidance,
-        first_take_only=first,
-        second_take_only=second,
-    )
+    how = wanted.how
+    settings: TakeSettings = {**how.drawing, **more}
+    rows = rows_of(wanted.frames, how.handshake)
+    joins = {"handshake": how.handshake, "ramp": how.blend}
+    made, _ = double_take_features(wanted.prior, wanted.prompts, rows, mode=mode, seed=wanted.seed, **joins, **settings)
     return from_features(made)
 
 
-def _alone(
-    prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequence[int], seed: int
-) -> list[np.ndarray]:
-    seeds = [seed + row for row in range(len(prompts))]
-    return sample_features(prior, prompts, frames, seeds=seeds, guidance=how.guidance, steps=how.steps)
+def _concatenated(wanted: Wanted) -> Long:
+    return from_features(np.concatenate(wanted.alone(wanted.frames)))
 
 
-def _concatenated(prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequence[int], seed: int) -> Long:
-    return from_features(np.concatenate(_alone(prior, how, prompts, frames, seed)))
-
-
-def _slerp(prior: Prior, how: Transitions, prompts: Sequence[str], frames: Sequence[int], seed: int) -> Long:
+def _slerp(wanted: Wanted) -> Long:
     """The blank frames belong to the later segment, which is generated so much shorter, as TEACH has it."""
-    shorter = [n - (BLANK if row else 0) for row, n in enumerate(frames)]
-    alone = _alone(prior, how, prompts, shorter, seed)
+    alone = wanted.alone([n - (BLANK if row else 0) for row, n in enumerate(wanted.frames)])
     motions = [motion_from_positions(from_features(features).positions, FPS) for features in alone]
     return from_positions(slerp_joined(motions).positions())
 
 
-_MAKERS: Mapping[str, Callable[..., Long]] = {
-    "ours": _ours,
-    "ours-exported": _exported,
-    "published": partial(_double_take, mode="published"),
-    "paper": partial(_double_take, mode="paper"),
-    "first-take": partial(_double_take, mode="published", first=True),
-    "second-take": partial(_double_take, mode="published", second=True),
-    "concatenation": _concatenated,
-    "slerp": _slerp,
-    "published-1000": partial(_double_take, mode="published", steps=1000),
-    "paper-1000": partial(_double_take, mode="paper", steps=1000),
+_MAKERS: Mapping[str, tuple[str, Callable[[Wanted], Long]]] = {
+    "ours": ("motionloom compose, as drawn", _ours),
+    "ours-exported": ("motionloom compose, as exported", _exported),
+    "published": ("DoubleTake, published", _double_take),
+    "paper": ("DoubleTake, paper", partial(_double_take, mode="paper")),
+    "first-take": ("first take only", partial(_double_take, first_take_only=True)),
+    "second-take": ("second take only", partial(_double_take, second_take_only=True)),
+    "concatenation": ("concatenation", _concatenated),
+    "slerp": ("segments + SLERP", _slerp),
+    "published-1000": ("DoubleTake, published", partial(_double_take, steps=1000)),
+    "paper-1000": ("DoubleTake, paper", partial(_double_take, mode="paper", steps=1000)),
 }
 DEFAULT = ("ours", "ours-exported", "published", "paper", "first-take", "concatenation", "slerp")
 """Without second take only and without the slow ones of 1000 steps."""
-TITLES = {
-    "ours": "motionloom compose, as drawn",
-    "ours-exported": "motionloom compose, as exported",
-    "published": "DoubleTake, published",
-    "paper": "DoubleTake, paper",
-    "first-take": "first take only",
-    "second-take": "second take only",
-    "concatenation": "concatenation",
-    "slerp": "segments + SLERP",
-    "published-1000": "DoubleTake, published",
-    "paper-1000": "DoubleTake, paper",
-}
+TITLES = {name: title for name, (title, _) in _MAKERS.items()}
 """Names of the rows; the number of steps is said behind them."""
 
 

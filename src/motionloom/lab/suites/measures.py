@@ -79,7 +79,7 @@ def prediction(job: "Job", asked: Asked) -> Report:
     from motionloom.lab.suites import prediction
 
     singles = asked.get("singles", "all").replace("-", "_")
-    usual = prediction.QUICK if asked.get("quick") else prediction.How()
+    usual = prediction.QUICK if asked.get("quick") else prediction.PredictionSettings()
     return prediction.run(
         job.run("prediction", asked.get("weights", "predictor")),
         name=asked.get("protocol"),
@@ -99,7 +99,7 @@ def duet_completion(job: "Job", asked: Asked) -> Report:
         communication=asked.get("communication_only"),
         mrt=_mrt(job, asked),
         beside=asked.get("beside", ()),
-        how=with_asked(duet.QUICK if asked.get("quick") else duet.How(), asked),
+        how=with_asked(duet.QUICK if asked.get("quick") else duet.CompletionSettings(), asked),
         with_published=not asked.get("rows_without_published"),
     )
 
@@ -130,7 +130,7 @@ def _duets(name: str) -> Callable[["Job", Asked], Report]:
         from importlib import import_module
 
         module: ModuleType = import_module(f"motionloom.lab.suites.duet_{name}")
-        how = with_asked(module.QUICK if asked.get("quick") else module.How(), asked)
+        how = with_asked(module.QUICK if asked.get("quick") else module.FULL, asked)
         return module.run(job.run(f"duet-{name}"), block=asked.get("block"), how=how)
 
     return measure

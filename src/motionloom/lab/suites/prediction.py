@@ -21,7 +21,7 @@ from motionloom.lab.report.published_rows import published
 from motionloom.lab.report.report import REAL, SAME, Report, Row
 from motionloom.lab.suites import prediction_trial as trials
 from motionloom.lab.suites.harness import Run, check_names, check_steps, digest, row_of
-from motionloom.lab.suites.prediction_trial import Array, Trial, Way
+from motionloom.lab.suites.prediction_trial import Array, PredictionTrial, Way
 from motionloom.lab.suites.protocol import GUIDANCES, SEEDS, check_ranges
 from motionloom.tasks.completion import SOLVER, SPACING, STEPS, futures
 from motionloom.weights.predictor import Predictor, find_predictor
@@ -35,7 +35,7 @@ WHOLE = {"h36m": ("Human3.6M", 5168), "humaneva": ("HumanEva-I", None), "amass":
 
 
 @dataclass(frozen=True)
-class How:
+class PredictionSettings:
     """How it is measured."""
 
     samples: int = 50
@@ -57,14 +57,14 @@ class How:
             raise MotionloomError(f"singles are one of {', '.join(get_args(Singles))}; got {self.singles!r}")
 
 
-QUICK = How(samples=6, windows=6, published_steps=20)
+QUICK = PredictionSettings(samples=6, windows=6, published_steps=20)
 
 
 def run(
     run: Run,
     *,
     name: str | None = None,
-    how: How | None = None,
+    how: PredictionSettings | None = None,
     kinds: Sequence[str] = KINDS,
     with_published: bool = True,
 ) -> Report:
@@ -77,7 +77,7 @@ def run(
         kinds: the rows, out of `KINDS`.
         with_published: whether the report has what others published.
     """
-    how = how or How()
+    how = how or PredictionSettings()
     check_names(kinds, KINDS, "rows")
     if run.data is None:
         raise MotionloomError("futures are compared with what came, and no recordings are shipped; name some: --data")
@@ -99,8 +99,8 @@ def run(
 
 def measure(
     predictor: Predictor,
-    trial: Trial,
-    how: How,
+    trial: PredictionTrial,
+    how: PredictionSettings,
     kinds: Sequence[str] = KINDS,
     *,
     run: Run | None = None,
@@ -176,7 +176,7 @@ def by_rule(rule: Callable[[np.ndarray, int], Array], frames: int) -> Way:
 
 
 def _ways(
-    predictor: Predictor, trial: Trial, how: How, kinds: Sequence[str], *, label: str
+    predictor: Predictor, trial: PredictionTrial, how: PredictionSettings, kinds: Sequence[str], *, label: str
 ) -> list[tuple[str, Callable[[int], Way] | None, int]]:
     """Name, the way of each seed (None: real futures), and how often it is measured."""
     frames, many = trial.protocol.future, how.published_steps
@@ -197,7 +197,7 @@ def _ways(
     return [found[kind] for kind in KINDS if kind in kinds and not (same and kind == "ours-many" and "ours" in kinds)]
 
 
-def protocol_of(trial: Trial, how: How, predictor: Predictor) -> dict[str, Any]:
+def protocol_of(trial: PredictionTrial, how: PredictionSettings, predictor: Predictor) -> dict[str, Any]:
     """What stands with every table."""
     p = trial.protocol
     classes = {recording.action for recording, _ in trial.windows}
@@ -230,7 +230,7 @@ def protocol_of(trial: Trial, how: How, predictor: Predictor) -> dict[str, Any]:
     }
 
 
-def _identity(trial: Trial) -> str:
+def _identity(trial: PredictionTrial) -> str:
     digest = hashlib.sha256()
     for number, (recording, start) in enumerate(trial.windows):
         digest.update(f"{recording.name} {start} {len(trial.alike[number])} ".encode())
@@ -238,7 +238,7 @@ def _identity(trial: Trial) -> str:
     return digest.hexdigest()[:16]
 
 
-def _notes(trial: Trial) -> tuple[str, ...]:
+def _notes(trial: PredictionTrial) -> tuple[str, ...]:
     all_, several = len(trial.windows), trial.several
     return (
         "APD to MMFDE are distances of the whole flattened pose, not means over joints: numbers by the other "
@@ -247,7 +247,7 @@ def _notes(trial: Trial) -> tuple[str, ...]:
     )
 
 
-def _published(trial: Trial, how: How, names: Sequence[str]) -> tuple[Row, ...]:
+def _published(trial: PredictionTrial, how: PredictionSettings, names: Sequence[str]) -> tuple[Row, ...]:
     """What others published, marked where it was measured on what was measured here."""
     called, windows = WHOLE.get(trial.protocol.name, ("", None))
     whole = len(trial.windows) == len(trial.every) and windows in (None, len(trial.every))

@@ -22,7 +22,7 @@ from motionloom.lab.report.columns import columns
 from motionloom.lab.report.report import REAL, Column, Row
 from motionloom.lab.suites import prediction_trial as trials
 from motionloom.lab.suites.harness import Say, plain_row, silent
-from motionloom.lab.suites.prediction_trial import Array, Trial, from_root
+from motionloom.lab.suites.prediction_trial import Array, PredictionTrial, from_root
 from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.completion import Known, next_frames
@@ -61,7 +61,7 @@ def horizon(
 
 
 def long_futures(
-    predictor: Predictor, trial: Trial, *, samples: int, seed: int, seconds: float, say: Say = silent
+    predictor: Predictor, trial: PredictionTrial, *, samples: int, seed: int, seconds: float, say: Say = silent
 ) -> Array:
     """(windows, samples, frames, joints, 3): every future goes on from its own end, as `tasks.predict` does."""
     count, fps = len(trial.windows), predictor.fps
@@ -134,7 +134,9 @@ def hold(
     return columns("study-hold"), rows, {"weights": predictor.card.name, "given": "as in the real future"}
 
 
-def held_numbers(predictor: Predictor, trial: Trial, group: str, *, samples: int, seed: int) -> dict[str, float]:
+def held_numbers(
+    predictor: Predictor, trial: PredictionTrial, group: str, *, samples: int, seed: int
+) -> dict[str, float]:
     """Means over windows, largest errors; joints of a group of the 22."""
     joints = sorted(SMPL22.groups[group])
     free = [j - 1 for j in range(1, 22) if j not in joints]
@@ -166,7 +168,7 @@ def held_numbers(predictor: Predictor, trial: Trial, group: str, *, samples: int
     }
 
 
-def held_rotations(predictor: Predictor, trial: Trial, number: int, group: str, *, seed: int) -> float:
+def held_rotations(predictor: Predictor, trial: PredictionTrial, number: int, group: str, *, seed: int) -> float:
     """Largest difference between a held rotation in the motion that `predict` gives and the one it was held to."""
     seen, joints = trial.protocol.observed, [j for j in SMPL22.groups[group] if j]
     whole = motion_from_positions(

@@ -20,7 +20,7 @@ from motionloom.lab.report.report import REAL, Column, Report, Row, Value
 from motionloom.lab.suites import prediction, prediction_behaviour
 from motionloom.lab.suites import prediction_trial as trials
 from motionloom.lab.suites.harness import Run, Say, silent, weight_marks
-from motionloom.lab.suites.prediction_trial import Trial
+from motionloom.lab.suites.prediction_trial import PredictionTrial
 from motionloom.lab.suites.protocol import check_ranges
 from motionloom.tasks.completion import SOLVER, SPACING, STEPS
 from motionloom.train.loop import changed
@@ -276,5 +276,5 @@ def _columns(names: Sequence[str]) -> list[Column]:
     return [c for c in prediction.COLUMNS if c.name in names]
 
 
-def _row(trial: Trial, name: str, numbers: dict[str, float]) -> Row:
+def _row(trial: PredictionTrial, name: str, numbers: dict[str, float]) -> Row:
     return Row(name, {key: Value(value) for key, value in numbers.items() if key in SHOWN or key not in trials.KNOWN})

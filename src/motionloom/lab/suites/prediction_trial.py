@@ -48,7 +48,7 @@ EVERY = 20.0
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class PredictionTrial:
     """Test windows and what came after each of them."""
 
     protocol: Protocol
@@ -103,7 +103,7 @@ def read_test(data: Path | str, name: str | None = None, *, say: Callable[[str],
     return checked(data, Protocol("cmu, built set", 30.0, 30, 60, SMPL_LAYOUT, tuple(found), "as the set's"))
 
 
-def prepare(protocol: Protocol, *, count: int | None = None, singles: metrics.Singles = "all") -> Trial:
+def prepare(protocol: Protocol, *, count: int | None = None, singles: metrics.Singles = "all") -> PredictionTrial:
     """The test windows of a protocol, ``count`` of them evenly chosen; similar pasts are looked for among all.
 
     Raises MotionloomError where there is no test window, or none that is left with ``singles``.
@@ -122,11 +122,13 @@ def prepare(protocol: Protocol, *, count: int | None = None, singles: metrics.Si
     chosen = [usable[k] for k in places]
     h36m = protocol.name == "h36m"
     limbs = metrics.H36M_LIMBS if h36m else metrics.limbs_of(protocol.layout.parents)
-    trial = Trial(protocol, tuple(every[k] for k in chosen), every, tuple(near[k] for k in chosen), limbs, singles, {})
+    trial = PredictionTrial(
+        protocol, tuple(every[k] for k in chosen), every, tuple(near[k] for k in chosen), limbs, singles, {}
+    )
     return replace(trial, speeds=_speeds(trial) | protocol.speeds)
 
 
-def _speeds(trial: Trial) -> dict[str, float]:
+def _speeds(trial: PredictionTrial) -> dict[str, float]:
     tally = metrics.CmdTally()
     for number, (recording, _) in enumerate(trial.windows):
         tally.add(recording.action, from_root(trial.future(number))[None])
@@ -153,7 +155,7 @@ def check_fit(predictor: Predictor, protocol: Protocol) -> None:
 
 
 def score(
-    trial: Trial,
+    trial: PredictionTrial,
     way: Way | None,
     *,
     samples: int = 1,
@@ -187,7 +189,9 @@ def score(
     return found | {"seconds": seconds / len(trial.windows)}
 
 
-def _made(trial: Trial, way: Way | None, chunk: int, say: Callable[[str], None]) -> Iterator[tuple[int, Array, float]]:
+def _made(
+    trial: PredictionTrial, way: Way | None, chunk: int, say: Callable[[str], None]
+) -> Iterator[tuple[int, Array, float]]:
     """Number of each window, its futures (samples, frames, joints, 3), and the seconds that they took."""
     reported = time.perf_counter()
     for first in range(0, len(trial.windows), chunk):

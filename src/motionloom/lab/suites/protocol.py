@@ -5,7 +5,7 @@ batches of 32, replications with a 95 % interval of 1.96 sigma / sqrt(replicatio
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict
 
 from motionloom.diffusion import SOLVERS
 from motionloom.errors import MotionloomError
@@ -111,6 +111,11 @@ class Transitions:
         """No two long motions share one, nor do their segments."""
         return self.seed + replication * STRIDE + unfolding * (1 << 16)
 
+    @property
+    def drawing(self) -> "LongDrawing":
+        """What sampling is asked beside seeds."""
+        return {"steps": self.steps, "guidance": self.guidance}
+
     def drawn(self) -> dict[str, Any]:
         """Everything that changes the motions of one replication: what a resumed run must agree in."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "replications"}
@@ -132,6 +137,22 @@ class Transitions:
             "replications": self.replications,
             "interval": "1.96 sigma / sqrt(replications)",
         }
+
+
+class LongDrawing(TypedDict):
+    """How long motions are drawn."""
+
+    steps: int
+    guidance: float
+
+
+class Drawing(TypedDict):
+    """How motions are drawn, as `tasks.text.sample_features` takes it."""
+
+    steps: int
+    guidance: float
+    solver: str
+    spacing: str
 
 
 @dataclass(frozen=True)
@@ -182,6 +203,10 @@ class Protocol:
             f"multimodality is captions x motions of each, such as 10x10, or 0; got {captions}x{samples}",
         )
         _need(self.solver in SOLVERS, f"no solver {self.solver!r}; there are {', '.join(SOLVERS)}")
+
+    def drawing(self, steps: int) -> Drawing:
+        """What sampling is asked beside seeds."""
+        return {"steps": steps, "guidance": self.guidance, "solver": self.solver, "spacing": self.spacing}
 
     def seeds(self, replication: int, rows: int, *, after: int = 0) -> list[int]:
         """One seed per motion of a replication; no two replications share one. ``after``: so many were drawn before."""

@@ -18,13 +18,7 @@ from motionloom.features import humanml
 from motionloom.io.text import plain_json
 from motionloom.kinematics.physics import Array
 from motionloom.lab.evaluator.evaluators import Evaluator
-from motionloom.lab.metrics.transitions import (
-    JERK_HUMANML3D,
-    area_under_jerk,
-    jerk_curve,
-    mean_jerk,
-    peak_jerk,
-)
+from motionloom.lab.metrics.transitions import JERK_HUMANML3D, area_under_jerk, jerk_curve, mean_jerk, peak_jerk
 from motionloom.lab.suites.harness import embedded, physical_mean
 from motionloom.lab.suites.protocol import Transitions
 from motionloom.reading import read_bytes
@@ -39,7 +33,7 @@ PHYSICAL = {"share": "skate_share", "speed": "skate_speed", "slide": "skate_slid
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
+class SeamWindows:
     """Random windows of real motion."""
 
     features: tuple[np.ndarray, ...]
@@ -54,7 +48,7 @@ class Windows:
 
 
 @dataclass(frozen=True, eq=False)
-class Crops:
+class SeamCrops:
     """One random window of each real motion that is long enough, embedded; and the motions to draw others from."""
 
     motions: tuple[np.ndarray, ...]
@@ -65,7 +59,7 @@ class Crops:
     """m/frame³ over all windows."""
 
     @staticmethod
-    def of(features: Sequence[np.ndarray], window: int, evaluator: Evaluator | None, *, seed: int = 0) -> "Crops":
+    def of(features: Sequence[np.ndarray], window: int, evaluator: Evaluator | None, *, seed: int = 0) -> "SeamCrops":
         """The windows of these motions; MotionloomError where hardly one is long enough. No judge, no embeddings."""
         motions = tuple(one for one in features if len(one) >= window)
         if len(motions) < 2:
@@ -74,19 +68,19 @@ class Crops:
         embeddings = np.zeros((len(motions), 0))
         if evaluator is not None:
             embeddings = embedded(evaluator, chosen.features)
-        return Crops(motions, window, embeddings, mean_jerk(chosen.positions))
+        return SeamCrops(motions, window, embeddings, mean_jerk(chosen.positions))
 
-    def again(self, count: int, *, seed: tuple[int, ...]) -> Windows:
+    def again(self, count: int, *, seed: tuple[int, ...]) -> SeamWindows:
         """``count`` windows of as many different motions, drawn anew."""
         rng = np.random.default_rng(seed)
         rows = rng.permutation(len(self.motions))[:count]
         return _windows([self.motions[k] for k in rows], self.window, rng)
 
 
-def _windows(motions: Sequence[np.ndarray], window: int, rng: np.random.Generator) -> Windows:
+def _windows(motions: Sequence[np.ndarray], window: int, rng: np.random.Generator) -> SeamWindows:
     starts = [int(rng.integers(len(one) - window + 1)) for one in motions]
     parts = [one[start : start + window] for one, start in zip(motions, starts, strict=True)]
-    return Windows(tuple(parts), np.stack([humanml.decode_positions(part.astype(np.float64)) for part in parts]))
+    return SeamWindows(tuple(parts), np.stack([humanml.decode_positions(part.astype(np.float64)) for part in parts]))
 
 
 def jerks(positions: np.ndarray, reference: float) -> dict[str, float]:
@@ -124,7 +118,7 @@ class Shipped:
         return {**seams, "step": self.physical["step"], **self.jerks.get(how.seams, {})}
 
 
-def measure_shipped(crops: Crops, *, source: str, seed: int = 0) -> dict[str, Any]:
+def measure_shipped(crops: SeamCrops, *, source: str, seed: int = 0) -> dict[str, Any]:
     """The content of the file: all crops once, and `REPEATS` draws of each of `COUNTS`."""
     every = crops.again(len(crops.motions), seed=(seed, 2))
     found: dict[str, Any] = {}

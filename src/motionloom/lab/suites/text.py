@@ -24,7 +24,17 @@ from motionloom.lab.report import published_rows
 from motionloom.lab.report.columns import columns
 from motionloom.lab.report.report import REAL, Report, Row, Value
 from motionloom.lab.suites import text_reference
-from motionloom.lab.suites.harness import PHYSICAL, Run, averaged, diversity, embedded, plain_words, readable, row_of
+from motionloom.lab.suites.harness import (
+    PHYSICAL,
+    Run,
+    averaged,
+    diversity,
+    embedded,
+    plain_words,
+    readable,
+    replicated,
+    row_of,
+)
 from motionloom.lab.suites.items import fitting, pick, read_items, spread
 from motionloom.lab.suites.parts import Parts
 from motionloom.lab.suites.protocol import Protocol, Selection
@@ -51,7 +61,7 @@ class Draw(Interface):
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class TextTrial:
     """Everything that a row is measured with."""
 
     draw: Draw
@@ -74,7 +84,7 @@ class Trial:
         return [several[k].text for several, k in zip(self.real.captions, chosen, strict=True)]
 
 
-def prepare(draw: Draw, evaluator: Evaluator, real: TextReference, protocol: Protocol) -> Trial:
+def prepare(draw: Draw, evaluator: Evaluator, real: TextReference, protocol: Protocol) -> TextTrial:
     """Choose the items and embed their captions; MotionloomError where that cannot be done as asked."""
     chosen = real.chosen(protocol)
     flat = [caption for several in chosen.captions for caption in several]
@@ -83,7 +93,7 @@ def prepare(draw: Draw, evaluator: Evaluator, real: TextReference, protocol: Pro
     read = texts
     if protocol.caption_length == "published":
         read = tuple(np.split(_as_published(evaluator, flat), cuts))
-    return Trial(draw, evaluator, chosen, protocol, texts, read)
+    return TextTrial(draw, evaluator, chosen, protocol, texts, read)
 
 
 def _as_published(evaluator: Evaluator, captions: Sequence[Caption]) -> Array:
@@ -98,7 +108,7 @@ def _as_published(evaluator: Evaluator, captions: Sequence[Caption]) -> Array:
 # ---- the numbers of one replication ----------------------------------------------------------------------------------
 
 
-def matched(trial: Trial, texts: Array, motions: Array, said: Sequence[str]) -> dict[str, float]:
+def matched(trial: TextTrial, texts: Array, motions: Array, said: Sequence[str]) -> dict[str, float]:
     """How well (items, width) texts and motions in one order go together."""
     batch = trial.protocol.batch
     r1, r2, r3 = r_precision(texts, motions, top=3, batch=batch)
@@ -127,7 +137,7 @@ def same_words_precision(texts: Array, motions: Array, said: Sequence[str], *, t
     return float(np.mean(hits))
 
 
-def of_real(trial: Trial, replication: int, *, shuffled: bool = False) -> dict[str, float]:
+def of_real(trial: TextTrial, replication: int, *, shuffled: bool = False) -> dict[str, float]:
     """Real motions with their captions, or with anybody's: the captions then are dealt out anew over all items."""
     chosen, order, rng = trial.shuffle(replication)
     texts = np.stack([several[k] for several, k in zip(trial.texts, chosen, strict=True)])
@@ -140,7 +150,7 @@ def of_real(trial: Trial, replication: int, *, shuffled: bool = False) -> dict[s
     return {**found, "fid": fid(motions, trial.real.motions), "diversity": diversity(motions, replication), **physical}
 
 
-def of_generated(trial: Trial, replication: int, steps: int) -> dict[str, float]:
+def of_generated(trial: TextTrial, replication: int, steps: int) -> dict[str, float]:
     """One motion per item, measured; the time goes to sampling alone."""
     chosen, order, _ = trial.shuffle(replication)
     said, frames = trial.said(chosen), trial.real.frames
@@ -160,7 +170,7 @@ def of_generated(trial: Trial, replication: int, steps: int) -> dict[str, float]
 
 
 def _drawn(
-    trial: Trial, said: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int
+    trial: TextTrial, said: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int
 ) -> list[np.ndarray]:
     """Motions of the wanted lengths, cut to them where they are generated longer."""
     padded = trial.protocol.lengths == "padded"
@@ -171,7 +181,7 @@ def _drawn(
     return [features[:length] for features, length in zip(drawn, frames, strict=True)]
 
 
-def _several(trial: Trial, replication: int, steps: int, *, captions: int, samples: int) -> float:
+def _several(trial: TextTrial, replication: int, steps: int, *, captions: int, samples: int) -> float:
     """MultiModality of different motions of one caption: unlike the published draw, none is paired with itself."""
     chosen, order, rng = trial.shuffle(replication)
     items = order[:captions]
@@ -190,7 +200,7 @@ def _several(trial: Trial, replication: int, steps: int, *, captions: int, sampl
     return multimodality_of(motions, mixed[:pairs], mixed[pairs : 2 * pairs])
 
 
-def of_chance(trial: Trial) -> dict[str, float]:
+def of_chance(trial: TextTrial) -> dict[str, float]:
     """What an evaluator that knows nothing would find: k of the batch, and captions against all other motions."""
     size = trial.protocol.batch or len(trial.texts)
     motions = trial.real.motions
@@ -203,16 +213,14 @@ def of_chance(trial: Trial) -> dict[str, float]:
 
 
 def measure(
-    trial: Trial,
+    trial: TextTrial,
+    run: Run | None = None,
     *,
-    label: str = "default",
     parts: Parts | None = None,
     memory: Callable[[int], float] | None = None,
-    command: str = "",
-    progress: Callable[[str], None] = lambda line: None,
 ) -> Report:
-    """All rows. ``memory`` gives the peak in MB of generating with so many steps; ``label`` names the weights."""
-    parts = parts or Parts(None, "")
+    """All rows. ``memory`` gives the peak in MB of generating with so many steps; ``run`` names what is measured."""
+    run, parts = run or Run(), parts or Parts(None, "")
     protocol, count = trial.protocol, range(trial.protocol.replications)
     rows = [
         row_of(REAL, [of_real(trial, r) for r in count], COLUMNS, (*PHYSICAL, "fid")),
@@ -220,37 +228,27 @@ def measure(
         row_of(CHANCE, [of_chance(trial)], COLUMNS),
     ]
     for steps in protocol.steps:
-        found = [
-            parts.once(
-                f"{steps} steps {r}",
-                lambda r=r, steps=steps: of_generated(trial, r, steps),
-                lambda n, r=r, steps=steps: (
-                    f"{steps} steps, replication {r + 1} of {protocol.replications}: "
-                    f"R@3 {n['r3']:.3f}, FID {n['fid']:.3f}, {n['ms']:.0f} ms per motion"
-                ),
-                progress,
-            )
-            for r in count
-        ]
+        found = replicated(
+            f"{steps} steps",
+            len(count),
+            lambda r, steps=steps: of_generated(trial, r, steps),
+            parts,
+            lambda n: f"R@3 {n['r3']:.3f}, FID {n['fid']:.3f}, {n['ms']:.0f} ms per motion",
+            run.progress,
+        )
         values = dict(row_of("", found, COLUMNS).values)
         if memory is not None:
             peak = parts.once(f"{steps} steps memory", lambda steps=steps: {"memory": memory(steps)})
             values["memory"] = Value(peak["memory"])
-        rows.append(Row(f"{label}, {steps} steps", values))
-    return Report(
-        "text",
-        f"Text to motion: {label}",
-        command,
-        protocol.described(
-            trial.real.selection, data=trial.real.data, items=len(trial.texts), evaluator=trial.evaluator.name
-        ),
-        COLUMNS,
-        (*rows, *published_rows.published("text", [column.name for column in COLUMNS])),
-        _notes(trial),
-    )
+        rows.append(Row(f"{run.label}, {steps} steps", values))
+    selection, data, judge = trial.real.selection, trial.real.data, trial.evaluator.name
+    described = protocol.described(selection, data=data, items=len(trial.texts), evaluator=judge)
+    others = published_rows.published("text", [column.name for column in COLUMNS])
+    title = f"Text to motion: {run.label}"
+    return Report("text", title, run.command, described, COLUMNS, (*rows, *others), _notes(trial))
 
 
-def _notes(trial: Trial) -> tuple[str, ...]:
+def _notes(trial: TextTrial) -> tuple[str, ...]:
     real, protocol = trial.real, trial.protocol
     half = len(real.motions) // 2
     bias = fid_bias(real.motions, half, repeats=10, seed=protocol.seed)
@@ -295,7 +293,7 @@ def run(
         _as_published(judge, [text_reference.SENTENCE])
     trial = prepare(draw, judge, reference(judge, run.data, selection, run.progress), protocol)
     parts = run.parts({**protocol.drawn(), **run.settings(judge), "real": identity(trial.real)})
-    return measure(trial, label=run.label, parts=parts, memory=memory, command=run.command, progress=run.progress)
+    return measure(trial, run, parts=parts, memory=memory)
 
 
 def reference(
@@ -313,16 +311,7 @@ def drawer(prior: Prior, protocol: Protocol) -> Draw:
     readable(prior, max(protocol.steps))
 
     def draw(prompts: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int) -> list[np.ndarray]:
-        drawn = sample_features(
-            prior,
-            prompts,
-            frames,
-            seeds=seeds,
-            guidance=protocol.guidance,
-            steps=steps,
-            solver=protocol.solver,
-            spacing=protocol.spacing,
-        )
+        drawn = sample_features(prior, prompts, frames, seeds=seeds, **protocol.drawing(steps))
         return [features.astype(np.float64) for features in drawn]
 
     return draw

@@ -6,7 +6,7 @@ every way is kept in a small file as it is done; a run that was stopped goes on 
 """
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,12 +29,12 @@ from motionloom.lab.report import published_rows
 from motionloom.lab.report.columns import columns
 from motionloom.lab.report.report import REAL, Report
 from motionloom.lab.suites import harness, text_reference
-from motionloom.lab.suites.harness import Run, Say, diversity, embedded, row_of
+from motionloom.lab.suites.harness import Run, Say, diversity, embedded, replicated, row_of
 from motionloom.lab.suites.items import fitting, read_items
 from motionloom.lab.suites.long_baselines import Long, Method, methods, titled
 from motionloom.lab.suites.parts import Parts
 from motionloom.lab.suites.protocol import Selection, Transitions
-from motionloom.lab.suites.real_seams import PHYSICAL, Crops, Shipped, averaged, jerks, load_shipped
+from motionloom.lab.suites.real_seams import PHYSICAL, SeamCrops, Shipped, averaged, jerks, load_shipped
 from motionloom.lab.suites.text import identity
 from motionloom.lab.suites.text_reference import TextReference
 
@@ -45,7 +45,7 @@ COLUMNS = columns("transitions")
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class SeamTrial:
     """Everything that a way is measured with."""
 
     evaluator: Evaluator
@@ -53,7 +53,7 @@ class Trial:
     how: Transitions
     mean_jerk: float
     """m/frame³ of the real windows."""
-    crops: Crops | None
+    crops: SeamCrops | None
     """Windows of real motion; None where only the shipped numbers are at hand."""
     shipped: Shipped | None = None
 
@@ -70,8 +70,8 @@ class Trial:
 
 
 def prepare(
-    evaluator: Evaluator, real: TextReference, how: Transitions, crops: Crops | None, shipped: Shipped | None = None
-) -> Trial:
+    evaluator: Evaluator, real: TextReference, how: Transitions, crops: SeamCrops | None, shipped: Shipped | None = None
+) -> SeamTrial:
     """Checks that there is enough real motion; MotionloomError where there is not."""
     need = how.unfoldings * how.intervals
     if how.intervals < 4:
@@ -89,7 +89,7 @@ def prepare(
     if crops is None and shipped is None:
         raise MotionloomError("this copy ships no numbers of real transitions; name real motions with --data")
     mean = crops.mean_jerk if crops is not None else shipped.mean_jerk  # type: ignore[union-attr]
-    return Trial(evaluator, real, how, mean, crops, shipped)
+    return SeamTrial(evaluator, real, how, mean, crops, shipped)
 
 
 # ---- one replication -------------------------------------------------------------------------------------------------
@@ -110,7 +110,7 @@ def windows(frames: Sequence[int], size: int) -> list[slice]:
     return [slice(seam - size // 2, seam - size // 2 + size) for seam in np.cumsum(frames)[:-1].tolist()]
 
 
-def of_method(trial: Trial, method: Method, replication: int) -> dict[str, float]:
+def of_method(trial: SeamTrial, method: Method, replication: int) -> dict[str, float]:
     """All columns for one way; the time goes to making the motions alone."""
     how = trial.how
     middles, seams, said, around, inside, steps = [], [], [], [], [], []
@@ -137,7 +137,7 @@ def of_method(trial: Trial, method: Method, replication: int) -> dict[str, float
     return found
 
 
-def of_real(trial: Trial, replication: int) -> dict[str, float]:
+def of_real(trial: SeamTrial, replication: int) -> dict[str, float]:
     """Real motions with their own captions; other random windows of real motion in place of transitions."""
     rows = [item for items, _, _ in trial.asked(replication) for item in items]
     said = [caption for _, captions, _ in trial.asked(replication) for caption in captions]
@@ -155,7 +155,7 @@ def of_real(trial: Trial, replication: int) -> dict[str, float]:
     return found
 
 
-def _matched(trial: Trial, said: Sequence[Caption], motions: Array, replication: int) -> dict[str, float]:
+def _matched(trial: SeamTrial, said: Sequence[Caption], motions: Array, replication: int) -> dict[str, float]:
     """Segments (segments, width), whatever is said of them."""
     texts = trial.evaluator.texts(said)
     return {
@@ -166,7 +166,9 @@ def _matched(trial: Trial, said: Sequence[Caption], motions: Array, replication:
     }
 
 
-def _around(trial: Trial, features: Sequence[np.ndarray], positions: np.ndarray, replication: int) -> dict[str, float]:
+def _around(
+    trial: SeamTrial, features: Sequence[np.ndarray], positions: np.ndarray, replication: int
+) -> dict[str, float]:
     """Numbers of windows: features of each, and positions (windows, frames, 22, 3)."""
     found = {
         **jerks(positions, trial.mean_jerk),
@@ -190,32 +192,22 @@ def _check(made: Long, frames: int) -> None:
 
 
 def measure(
-    trial: Trial,
-    ways: Mapping[str, Method],
-    *,
-    label: str = "default",
-    parts: Parts | None = None,
-    command: str = "",
-    progress: Callable[[str], None] = lambda line: None,
+    trial: SeamTrial, ways: Mapping[str, Method], run: Run | None = None, *, parts: Parts | None = None
 ) -> Report:
     """All rows: real motion, then every way by the name it was given."""
-    parts, how = parts or Parts(None, ""), trial.how
+    run, parts, how = run or Run(), parts or Parts(None, ""), trial.how
     real = [of_real(trial, r) for r in range(how.replications)]
     looked_up = [name for name in real[0] if len({numbers.get(name) for numbers in real}) == 1]
     rows = [row_of(REAL, real, COLUMNS, looked_up)]
     for name, method in ways.items():
-        found = [
-            parts.once(
-                f"{name} {r}",
-                lambda r=r, method=method: of_method(trial, method, r),
-                lambda n, r=r, name=name: (
-                    f"{name}, replication {r + 1} of {how.replications}: AUJ {n['auj']:.3f}, "
-                    f"peak jerk {n['pj']:.4f}, FID {n['fid']:.3f}, {n['cost']:.2f} s per second"
-                ),
-                progress,
-            )
-            for r in range(how.replications)
-        ]
+        found = replicated(
+            name,
+            how.replications,
+            lambda r, method=method: of_method(trial, method, r),
+            parts,
+            lambda n: f"AUJ {n['auj']:.3f}, peak jerk {n['pj']:.4f}, FID {n['fid']:.3f}, {n['cost']:.2f} s per second",
+            run.progress,
+        )
         rows.append(row_of(titled(name, how.steps), found, COLUMNS))
     said = {
         "data": trial.real.data,
@@ -225,18 +217,12 @@ def measure(
         "representation": "HumanML3D at 20 frames per second, positions as the network draws them (not finished)",
         **how.described(),
     }
-    return Report(
-        "transitions",
-        f"Long motion and its transitions: {label}",
-        command,
-        said,
-        COLUMNS,
-        (*rows, *published_rows.published("long", [column.name for column in COLUMNS])),
-        _notes(trial),
-    )
+    others = published_rows.published("long", [column.name for column in COLUMNS])
+    title = f"Long motion and its transitions: {run.label}"
+    return Report("transitions", title, run.command, said, COLUMNS, (*rows, *others), _notes(trial))
 
 
-def _notes(trial: Trial) -> tuple[str, ...]:
+def _notes(trial: SeamTrial) -> tuple[str, ...]:
     how, segments = trial.how, trial.how.unfoldings * trial.how.intervals
     half = len(trial.real.motions) // 2
     bias = fid_bias(trial.real.motions, min(half, segments), other=half, repeats=10, seed=how.seed)
@@ -263,11 +249,7 @@ def _notes(trial: Trial) -> tuple[str, ...]:
 
 
 def run(
-    run: Run,
-    *,
-    selection: Selection | None = None,
-    how: Transitions | None = None,
-    names: Sequence[str] | None = None,
+    run: Run, *, selection: Selection | None = None, how: Transitions | None = None, names: Sequence[str] | None = None
 ) -> Report:
     """Measure weights by the named ways of making long motion (default `long_baselines.DEFAULT`).
 
@@ -283,17 +265,17 @@ def run(
     trial = real_motion(judge, run.data, selection, how, run.progress)
     windows = {"windows": trial.crops is not None}
     parts = run.parts({**how.drawn(), **run.settings(judge), "real": identity(trial.real), **windows})
-    return measure(trial, ways, label=run.label, parts=parts, command=run.command, progress=run.progress)
+    return measure(trial, ways, run, parts=parts)
 
 
 def real_motion(
     judge: Evaluator, data: Path | str | None, selection: Selection | None, how: Transitions, progress: Say
-) -> Trial:
+) -> SeamTrial:
     """Real motions out of ``data``, or the shipped numbers."""
     if data is None:
         return prepare(judge, text_reference.load_shipped(judge, selection), how, None, load_shipped())
     chosen = fitting(data, selection)
     items = read_items(data, chosen)
     real = text_reference.measure(items, judge, chosen, progress)
-    crops = Crops.of([item.features for item in items], how.window, judge, seed=how.seed)
+    crops = SeamCrops.of([item.features for item in items], how.window, judge, seed=how.seed)
     return prepare(judge, real, how, crops)

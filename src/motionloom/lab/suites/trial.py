@@ -33,7 +33,7 @@ STANDING, WALKING = r"^(acf_stand|accad_male\d_a1_stand)@", r"^35_\d+@"
 
 
 @dataclass(frozen=True)
-class Trial:
+class Examples:
     """How to find, among real clips, examples for one check. Patterns look at ``NAME | caption | caption``, lower
     case."""
 
@@ -55,7 +55,7 @@ class Trial:
 
 
 @dataclass
-class Tally:
+class CheckTally:
     """Passes of one check, ``(passed, tried)`` each."""
 
     shown: tuple[int, int] = (0, 0)
@@ -137,7 +137,7 @@ def joined(parts: Sequence[Array], *, blend: int = 6) -> Array:
     return whole
 
 
-def examples(trial: Trial, clips: Sequence[RealClip]) -> Iterator[tuple[str, str, Array]]:
+def examples(trial: Examples, clips: Sequence[RealClip]) -> Iterator[tuple[str, str, Array]]:
     """``(kind, name, positions)``: kinds are ``shown``, ``made`` and ``opposite``."""
     away = exchanged(trial.shows) if trial.sided else NOTHING
     for clip in clips:
@@ -160,7 +160,7 @@ def examples(trial: Trial, clips: Sequence[RealClip]) -> Iterator[tuple[str, str
     yield from _joins(trial, clips)
 
 
-def _joins(trial: Trial, clips: Sequence[RealClip]) -> Iterator[tuple[str, str, Array]]:
+def _joins(trial: Examples, clips: Sequence[RealClip]) -> Iterator[tuple[str, str, Array]]:
     if not trial.joined:
         return
     rows = [[c for c in clips if re.search(pattern, text_of(c))] for pattern in trial.joined]
@@ -178,7 +178,7 @@ def _cut(positions: Array, cut: tuple[float, float] | None) -> Array:
     return positions[first:last]
 
 
-def others(trial: Trial, clips: Iterable[RealClip]) -> Iterator[RealClip]:
+def others(trial: Examples, clips: Iterable[RealClip]) -> Iterator[RealClip]:
     """Clips of other actions."""
     away = exchanged(trial.shows) if trial.sided else NOTHING
     near = f"(?:{trial.shows})|(?:{away})|(?:{trial.unless})|(?:{trial.like})|(?:{trial.backwards})"
@@ -203,11 +203,11 @@ def standing_and_walking(clips: Sequence[RealClip], seconds: float) -> tuple[Arr
 
 def tried(
     checks: Sequence[Check],
-    trials: Mapping[str, Trial],
+    trials: Mapping[str, Examples],
     clips: Sequence[RealClip],
     *,
     progress: Callable[[str], None] = lambda line: None,
-) -> dict[str, Tally]:
+) -> dict[str, CheckTally]:
     """Every check on all clips.
 
     Args:
@@ -217,10 +217,10 @@ def tried(
         progress: called with a line now and then.
     """
     bodies = {id(clip): Body(on_the_floor(clip.positions[:LONGEST]), FPS) for clip in clips}
-    found: dict[str, Tally] = {}
+    found: dict[str, CheckTally] = {}
     for check in checks:
         trial = trials[check.name]
-        tally = found[check.name] = Tally()
+        tally = found[check.name] = CheckTally()
         for kind, name, positions in examples(trial, clips):
             numbers = check.measured(positions, FPS)
             ok = check.obeyed(numbers)
@@ -244,7 +244,7 @@ def _said(name: str, numbers: Mapping[str, float]) -> str:
     return f"{name} {numbers[name]:g}"
 
 
-def table(found: Mapping[str, Tally]) -> list[list[str]]:
+def table(found: Mapping[str, CheckTally]) -> list[list[str]]:
     """Rows of text, the heading first: check, passes of each kind as ``passed/tried``, and what is to be doubted."""
     rows = [["check", "real", "made of real", "other side", "other actions", "wrong", "doubts"]]
     for name, tally in found.items():
@@ -254,7 +254,7 @@ def table(found: Mapping[str, Tally]) -> list[list[str]]:
     return rows
 
 
-def summary(found: Mapping[str, Tally]) -> dict[str, Any]:
+def summary(found: Mapping[str, CheckTally]) -> dict[str, Any]:
     """Everything as plain data for JSON, with the names of the clips that were judged wrongly."""
     return {
         name: {

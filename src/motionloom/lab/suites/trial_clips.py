@@ -1,13 +1,13 @@
-"""Which real clips show what, for the trial of the everyday checks: `trial_clips.toml` as `Trial` values."""
+"""Which real clips show what, for the trial of the everyday checks: `trial_clips.toml` as `Examples`."""
 
 import tomllib
 from importlib import resources
 from typing import Any
 
-from motionloom.lab.suites.trial import NOTHING, Trial
+from motionloom.lab.suites.trial import NOTHING, Examples
 
 
-def trials() -> dict[str, Trial]:
+def trials() -> dict[str, Examples]:
     """How to find examples, by the name of the check."""
     place = resources.files("motionloom.lab.suites") / "trial_clips.toml"
     found = tomllib.loads(place.read_text(encoding="utf-8"))
@@ -15,12 +15,12 @@ def trials() -> dict[str, Trial]:
     return {name: _trial(entry, words) for name, entry in found.items()}
 
 
-def _trial(entry: dict[str, Any], words: dict[str, str]) -> Trial:
+def _trial(entry: dict[str, Any], words: dict[str, str]) -> Examples:
     def pattern(items: list[str]) -> str:
         return "|".join(_expanded(item, words) for item in items) or NOTHING
 
     cut = entry.get("cut")
-    return Trial(
+    return Examples(
         **{name: pattern(entry.get(name, [])) for name in ("shows", "unless", "like", "backwards")},
         sided=entry.get("sided", False),
         cut=None if cut is None else (cut[0], cut[1]),
