@@ -190,3 +190,11 @@ def test_who_stands_walks_squats_or_sits_on_the_floor_needs_no_seat() -> None:
         sitting(0.54, seconds=0.8),
     ):
         assert gestures.seats(p, FPS) == []
+
+
+def test_from_when_on_somebody_stands_still() -> None:
+    body = walking(1.2, 2.0)
+    assert gestures.still_from(body, FPS) is None
+    rest = np.concatenate([body, np.repeat(body[-1:], 40, axis=0)])
+    assert gestures.still_from(rest, FPS) == pytest.approx(2.0, abs=0.15)
+    assert gestures.still_from(standing(2.0), FPS) == 0

@@ -1,5 +1,7 @@
 """Sentences with numbers: drawn again until the count is right, the same from Python as from the command line."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -66,3 +68,18 @@ def test_python_reads_numbers_and_can_leave_them(prior: Prior) -> None:
 def test_another_solver_draws_one_action(prior: Prior) -> None:
     with pytest.raises(MotionloomError, match="solver ddpm"):
         generate(prior, "a person does three squats", solver="ddim", steps=2)
+
+
+@pytest.mark.parametrize(("text", "told"), [("a person vacuums", True), ("a person sits and waits", False)])
+def test_who_ends_standing_still_is_told(prior: Prior, text: str, told: bool) -> None:
+    """Unless the words ask for it."""
+    moving = generate(prior, "a person walks", seconds=2.0, steps=1)[0]
+    held = replace(
+        moving,
+        root=np.concatenate([moving.root, np.repeat(moving.root[-1:], 60, axis=0)]),
+        rotations=np.concatenate([moving.rotations, np.repeat(moving.rotations[-1:], 60, axis=0)]),
+    )
+    one = worded.Worded(held, worded.read(prior, text), ())
+    assert one.still_from == pytest.approx(2.0, abs=0.2)
+    assert bool(one.stillness(of=0.3)) == told
+    assert not one.stillness(of=0.8)

@@ -19,9 +19,9 @@ from motionloom.cli.sampling import (
     fail,
     load_prior,
     places,
-    remark_unknown,
     report,
     sampling_of,
+    unknown_words,
 )
 from motionloom.cli.skeletons import add_one_file
 from motionloom.cli.writing import check_overwriting
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from motionloom.tasks.worded import Worded
     from motionloom.weights.prior import Prior
 
+ENDS_STILL, MOSTLY_STILL = 0.3, 0.8
+"""Shares of a motion at whose end somebody who stands still is told: of words that are not known, and of all."""
 SECONDS = 5.0
 """Length of one action where nothing is said of it."""
 MAX_PROMPTS = 1000
@@ -93,13 +95,13 @@ def _generate(arguments: argparse.Namespace) -> int:
     timelines = {prompt: _timeline(arguments, prior, prompt) for prompt in prompts}
     for found in timelines.values():
         check_loop(arguments, found.seconds)
-    remarks = remark_unknown(prior, [segment.text for found in timelines.values() for segment in found.segments])
+    remarks = unknown_words(prior, [segment.text for found in timelines.values() for segment in found.segments])
     made = finished_motions(files, captions, target, unit=arguments.out_unit, rate=arguments.fps)
     asked = [timelines[caption] for caption in captions]
     worded: list[Worded] = []
     drawn = (
         looped(arguments, prior, motion, asked[number].segments[-1].text, seed=arguments.seed + number)
-        for number, motion in enumerate(_drawn(arguments, prior, asked, worded))
+        for number, motion in enumerate(_drawn(arguments, prior, asked, worded, unknown=frozenset(remarks)))
     )
     seated: list[list[Seat]] = []
     interrupted = made.take([motion] for motion in _noting(seated, drawn, target))
@@ -110,12 +112,18 @@ def _generate(arguments: argparse.Namespace) -> int:
             "segments": _segments(worded[i].timeline),
             "seats": [asdict(seat) for seat in seats],
             "amounts": [asdict(one) for one in worded[i].amounts],
+            "still_from": worded[i].still_from,
         }
         for i, (caption, seats) in enumerate(zip(captions[: made.count], seated))
     ]
     _remark_seats(seated[: made.count])
     length = SECONDS if arguments.seconds is None else arguments.seconds
-    about = {"motions": motions, "seconds": length, "weights": str(arguments.weights), "remarks": remarks}
+    about = {
+        "motions": motions,
+        "seconds": length,
+        "weights": str(arguments.weights),
+        "remarks": list(remarks.values()),
+    }
     report(arguments, about, made.written, made.sampling)
     return made.ended(interrupted)
 
@@ -219,7 +227,12 @@ def _lines(file: Path) -> list[str]:
 
 
 def _drawn(
-    arguments: argparse.Namespace, prior: "Prior", asked: "list[Timeline]", worded: "list[Worded]"
+    arguments: argparse.Namespace,
+    prior: "Prior",
+    asked: "list[Timeline]",
+    worded: "list[Worded]",
+    *,
+    unknown: frozenset[str],
 ) -> "Iterator[Motion]":
     """The motions in order, each from its own seed, as they are finished; ``worded`` gets them with what was read."""
     from motionloom.tasks.sampling import Sampling
@@ -237,8 +250,10 @@ def _drawn(
         )
         for number, one in enumerate(made, start=1):
             worded.append(one)
-            for amount in one.amounts:
-                if amount.problem:
-                    whose = f"motion {number}: " if len(asked) > 1 else ""
-                    print(f"motionloom: {whose}{amount.problem}", file=sys.stderr)
+            said = [amount.problem for amount in one.amounts]
+            last = one.timeline.segments[-1].text in unknown
+            said.append(one.stillness(of=ENDS_STILL if last else MOSTLY_STILL))
+            for line in filter(None, said):
+                whose = f"motion {number}: " if len(asked) > 1 else ""
+                print(f"motionloom: {whose}{line}", file=sys.stderr)
             yield one.motion

@@ -211,10 +211,15 @@ def check_prompt(prompt: str) -> None:
 
 def remark_unknown(prior: "Prior", prompts: Sequence[str]) -> list[str]:
     """Say on stderr, a line each, which prompts are not English or like nothing learned; and give the lines."""
+    return list(unknown_words(prior, prompts).values())
+
+
+def unknown_words(prior: "Prior", prompts: Sequence[str]) -> dict[str, str]:
+    """The prompts that `remark_unknown` has a line for, with the line."""
     from motionloom.goals.remarks import remarks_on
 
     remarks = remarks_on(prompts, prior.known, prior.text)
-    for line in remarks:
+    for line in remarks.values():
         print(f"motionloom: {line}", file=sys.stderr)
     return remarks
 

@@ -5,30 +5,49 @@ from collections.abc import Sequence
 
 from motionloom.goals.english import is_english
 from motionloom.goals.verbs import subject_of
-from motionloom.runtime.text.known import Known, bare, nearest, stem
+from motionloom.runtime.text.known import Known, Nearest, bare, nearest, stem
 from motionloom.runtime.text.protocol import TextEncoder
 
-_LIGHT = {stem(word) for word in "do make take play perform give use put ride go get start begin come throw have".split()}
+_LIGHT = frozenset(
+    map(
+        stem,
+        re.findall(
+            "[a-z]+",
+            """do does make take play perform give use put ride go goes get start begin come
+    throw have""",
+        ),
+    )
+)
 """Verbs that say what is done only with the word behind them: "plays golf"."""
 _SMALL = frozenset(
-    """a an the his her its their and or of to in on at with from over up down for as by into is are was be this that
-    one two three something somebody someone very like out off around through across while""".split()
+    re.findall(
+        "[a-z]+",
+        """a an the his her its their and or of to in on at with from over up down for as
+    by into is are was be this that one two three something somebody someone very like out off around through across
+    while""",
+    )
 )
 
 
-def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder) -> list[str]:
-    """A line for each text that is not English, and for each that is like nothing in the table of what is known.
+def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder) -> dict[str, str]:
+    """Lines for texts that are not English, and for those that are like nothing in the table of what is known.
 
-    known: None where a weight file has no such table. Raises `MotionloomError` as the encoder does.
+    known: None where a weight file has no such table. The texts without a remark are left out. Raises `MotionloomError`
+    as the encoder does.
     """
     asked = [text for text in dict.fromkeys(texts) if text.strip()]
     foreign = [text for text in asked if not is_english(text)]
-    remarks = [f"{text[:60]!r} does not look like English, and these weights know nothing else" for text in foreign]
-    english = [text for text in asked if text not in foreign]
-    if known is None or not english:
-        return remarks
-    found = nearest(known, english, encoder, verbs=[verb_words(text) for text in english])
-    return remarks + [one.remark() for one in found if not one.near]
+    remarks = {
+        text: f"{text[:60]!r} does not look like English, and these weights know nothing else" for text in foreign
+    }
+    english = [text for text in asked if text not in remarks]
+    found = looked_up(english, known, encoder) if known else []
+    return remarks | {one.prompt: one.remark() for one in found if not one.near}
+
+
+def looked_up(texts: Sequence[str], known: Known, encoder: TextEncoder) -> list[Nearest]:
+    """The nearest known sentences of each text, its verb looked at; `Nearest.near` says whether it is known."""
+    return nearest(known, texts, encoder, verbs=[verb_words(text) for text in texts])
 
 
 def verb_words(text: str) -> tuple[str, ...]:
@@ -39,9 +58,7 @@ def verb_words(text: str) -> tuple[str, ...]:
     said = bare(text)
     subject = subject_of(said)
     rest = said[len(subject) :] if len(said) > len(subject) else said
-    words = [
-        word for word in re.findall(r"[a-z]+(?:-[a-z]+)*", rest) if word not in _SMALL and not word.endswith("ly")
-    ]
+    words = [word for word in re.findall(r"[a-z]+(?:-[a-z]+)*", rest) if word not in _SMALL and not word.endswith("ly")]
     first, *more = words or [""]
     if stem(first) in _LIGHT:
         return tuple(re.findall("[a-z]+", more[0])[:1]) if more else ()

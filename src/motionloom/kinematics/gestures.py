@@ -120,6 +120,14 @@ def torso_inclination(positions: np.ndarray) -> Array:
     return np.arctan2(np.linalg.norm(spine[:, [0, 2]], axis=-1), spine[:, 1])
 
 
+def still_from(positions: np.ndarray, fps: float, *, slower: float = 0.2) -> float | None:
+    """Seconds from which on no joint is faster than ``slower`` m/s, to the end; None where one is at the end."""
+    speed = np.linalg.norm(smooth(velocity(positions, fps), 3), axis=-1).max(axis=1)
+    moving = np.flatnonzero(speed > slower)
+    begin = int(moving[-1]) + 1 if len(moving) else 0
+    return None if begin >= len(speed) else begin / fps
+
+
 @dataclass(frozen=True)
 class Seat:
     """What somebody sits on who is drawn without it: when, how high, and where."""

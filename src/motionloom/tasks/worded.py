@@ -5,6 +5,7 @@ asked; of steps and repetitions the drawn motion is counted, and where the numbe
 another seed, with a shorter or longer way or stroke, `TRIES` times at most. The one with the least missing is kept.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -18,6 +19,8 @@ from motionloom.features.layout import FPS, WIDTH
 from motionloom.goals import timeline as timelines
 from motionloom.goals.amount_goal import kept, measured
 from motionloom.goals.timeline import Timeline
+from motionloom.goals.verbs import base_of, kind_of_verb
+from motionloom.kinematics.gestures import still_from
 from motionloom.motion import Motion
 from motionloom.tasks.control import control
 from motionloom.tasks.long import compose
@@ -27,6 +30,7 @@ from motionloom.tasks.text import check_prompts, frames_in, generate_each
 from motionloom.weights.prior import Prior
 
 TRIES = 6
+STILL = 1.5
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,25 @@ class Worded:
     """What was drawn, segment by segment."""
     amounts: tuple[Measured, ...]
     """What was read of numbers in the words, in their order."""
+
+    @property
+    def still_from(self) -> float | None:
+        """Seconds from which on no part of the body moves, if that is `STILL` or more before the end."""
+        begin = still_from(self.motion.positions(), self.motion.fps)
+        return None if begin is None or self.motion.seconds - begin < STILL else round(begin, 2)
+
+    def stillness(self, *, of: float) -> str:
+        """A sentence where somebody who should move stands still at the end, for that share of the motion or more.
+
+        Empty for words that ask for it: waiting, sitting, a change of posture or a stop.
+        """
+        begin, last = self.still_from, self.timeline.segments[-1]
+        kinds = {
+            kind_of_verb(word, last.text.lower()) for word in re.findall("[a-z]+", last.text.lower()) if base_of(word)
+        }
+        if begin is None or kinds & {"state", "change"} or self.motion.seconds - begin < of * self.motion.seconds:
+            return ""
+        return f"it ends standing still, from {begin:.1f} s on: what these weights do not know often does"
 
 
 def read(

@@ -80,7 +80,8 @@ class Nearest:
 
 def stem(word: str) -> str:
     """A word without the ending that its forms differ in: "walking", "walks" and "walked" are "walk"."""
-    ending = next((end for end in ("ing", "ed", "es", "s", "ly", "er") if word.endswith(end) and len(word) > 2 + len(end)), "")
+    endings = ("ing", "ed", "es", "s", "ly", "er")
+    ending = next((end for end in endings if word.endswith(end) and len(word) > 2 + len(end)), "")
     short = word.removesuffix(ending)
     return short.rstrip("e") if len(short) > 3 else short
 
@@ -115,10 +116,13 @@ def known_sentences(
     return Known(tuple(plain[i] for i in chosen), vectors[chosen], dict(seconds))
 
 
-def nearest(known: Known, prompts: Sequence[str], encoder: TextEncoder, *, verbs: Sequence[Sequence[str]] = (), count: int = 3) -> list[Nearest]:
+def nearest(
+    known: Known, prompts: Sequence[str], encoder: TextEncoder, *, verbs: Sequence[Sequence[str]] = (), count: int = 3
+) -> list[Nearest]:
     """For each prompt its ``count`` nearest known sentences.
 
-    verbs: of each prompt the words that say what is done, all of which should be known; left out: not looked at. Raises `MotionloomError` as the encoder does.
+    verbs: of each prompt the words that say what is done, all of which should be known; left out: not looked at. Raises
+    `MotionloomError` as the encoder does.
     """
     if not prompts:
         return []
