@@ -34,12 +34,12 @@ def main() -> None:
     block = PairBlock.load("duet", prior)
     print("seeds 0 to 2 together, cm; trunks: median distance; inside: frames with an overlap above 2 cm;")
     print("wrists: least distance, mean of seeds; feet: speed of toes below 5 cm, cm/s")
-    print(f"{'':<42}" + "".join(f"{name:>9}" for name in HEAD))
+    print(f"{'':<50}" + "".join(f"{name:>9}" for name in HEAD))
     for words in PROMPTS:
         for name, bodies in (("alone", False), ("kept apart", True)):
             duets = [generate_pair(prior, block, words, seed=seed, bodies=bodies)[0] for seed in SEEDS]
             row = "".join(f"{value:>9.1f}" for value in measured(duets))
-            print(f"{words if not bodies else '':<31}{name:<11}{row}", flush=True)
+            print(f"{words if not bodies else '':<39}{name:<11}{row}", flush=True)
     files = {"default": PRIORS.shipped()["default"], "duet": PAIRS.shipped()["duet"]}
     marks = [f"{name} {weights_digest(path)[:12]}" for name, path in files.items()]
     print(f"\nWeights: {', '.join(marks)}")
@@ -53,7 +53,8 @@ def measured(duets: Sequence[tuple[Motion, Motion]]) -> list[float]:
     wrists = np.mean([wrist_distance(*pair).min() for pair in places])
     feet = np.mean([foot_skate(person, duets[0][0].fps).contact_speed for pair in places for person in pair])
     inside = 100 * float((depths > 0.02).mean())
-    return [100 * np.median(trunks), 100 * trunks.min(), 100 * depths.max(), inside, 100 * wrists, float(feet)]
+    lengths = [100 * float(value) for value in (np.median(trunks), trunks.min(), depths.max())]
+    return [*lengths, inside, 100 * float(wrists), float(feet)]
 
 
 if __name__ == "__main__":

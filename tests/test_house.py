@@ -26,9 +26,9 @@ BUDGETS = {
     "cli": 7_508,
     "data": 5_319,
     "diffusion": 1_088,
-    "edits": 1_617,
+    "edits": 2_270,
     "features": 1_170,
-    "goals": 3_740,
+    "goals": 3_940,
     "io": 6_619,
     "kinematics": 1_758,
     "lab/bench": 967,
@@ -42,10 +42,10 @@ BUDGETS = {
     "retarget": 3_249,
     "runtime": 1_983,
     "server": 5_398,
-    "tasks": 4_700,
-    "train": 4_285,
+    "tasks": 4_770,
+    "train": 4_290,
     "viz": 2_064,
-    "weights": 1_268,
+    "weights": 1_300,
 }
 """Canonical lines per room (`tools/measure_house.py`), of 2026-11-24. They only go down: a room that needs more says
 why in docs/architecture.md, and its number is raised there and then."""

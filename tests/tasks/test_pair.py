@@ -12,7 +12,6 @@ from motionloom.features import pair as two
 from motionloom.features.humanml import positions_at
 from motionloom.features.pair import one_world
 from motionloom.goals.goal import Goal
-from motionloom.goals.roles import prompts_of
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
 from motionloom.retarget import to_smpl22
@@ -164,8 +163,9 @@ def test_seeds_of_people_go_with_them() -> None:
 
 
 def test_files_keep_the_distance_that_was_drawn(prior: Prior, block: PairBlock) -> None:
-    [duet] = generate_pair(prior, block, SAID[0], seconds=0.7, steps=4, seed=1, foot_lock=False)
-    made, stands = pair_features(prior, block.net(prior), [SAID[0]] * 2, 14, seeds=person_seeds(1, 0), steps=4)
+    few = {"steps": 4, "bodies": False}
+    [duet] = generate_pair(prior, block, SAID[0], seconds=0.7, seed=1, foot_lock=False, **few)
+    made, stands = pair_features(prior, block.net(prior), [SAID[0]] * 2, 14, seeds=person_seeds(1, 0), **few)
     alone = np.stack([finish(prior, one, foot_lock=False).positions() for one in made[0]])
     expected = two.to_world(alone, stands[0].astype(np.float64)[:, None, None])
     np.testing.assert_allclose(np.stack([motion.positions() for motion in duet]), expected, atol=1e-4)
@@ -191,9 +191,15 @@ def test_a_path_leads_one_of_the_two(prior: Prior, block: PairBlock, person: int
     assert len(duet[0]) == len(duet[1]) == 40
 
 
-def test_two_people_with_a_goal_each_are_refused(prior: Prior, block: PairBlock) -> None:
-    with pytest.raises(MotionloomError, match="both people have a goal"):
-        generate_pair(prior, block, SAID[0], goals=(walk(40), walk(40)))
+def test_two_people_with_a_goal_each_follow_both(prior: Prior, block: PairBlock) -> None:
+    first = walk(40)
+    there = GroundPose(2.0, 0.5, 1.0)
+    second = first.placed(there)
+    [duet] = generate_pair(prior, block, SAID[0], goals=(first, second), steps=4, seed=2, foot_lock=False)
+    for motion, goal in zip(duet, (first, second), strict=True):
+        assert np.linalg.norm((motion.root - goal.positions[:, 0])[:, [0, 2]], axis=-1).mean() < 0.02
+    with pytest.raises(MotionloomError, match="40 and 30 frames"):
+        generate_pair(prior, block, SAID[0], goals=(walk(40), walk(30)))
 
 
 def test_the_other_one_stands_as_drawn_beside_who_follows_a_path(
@@ -355,11 +361,3 @@ def test_what_nothing_can_be_made_of_is_refused(prior: Prior, block: PairBlock) 
     for prompt in ("", "  ", ("a person walks", "")):
         with pytest.raises(MotionloomError, match="prompt is empty"):
             generate_pair(prior, block, prompt)
-
-
-def test_two_prompts_are_parted_by_two_colons() -> None:
-    assert prompts_of("a person walks :: another: waits") == ("a person walks", "another: waits")
-    assert prompts_of("two people dance") == ("two people dance",) * 2
-    for wrong in ("a ::", ":: b", "a :: b :: c", "::"):
-        with pytest.raises(MotionloomError, match="around one ::"):
-            prompts_of(wrong)

@@ -59,6 +59,9 @@ def shift_apart(places: Array, *, still: int = 0, close: tuple[int, int] = (0, 0
     shift = np.zeros((frames, 2))
     looked = np.arange(still, frames, -(-(frames - still) // MOST)) if frames > still else np.arange(0)
     looked = looked[(looked < close[0]) | (looked >= close[1])]
+    ease = smoothstep((looked - still + 1) / WIDTH) if still else np.ones(len(looked))
+    if close[1]:
+        ease *= smoothstep(np.maximum(close[0] - looked, looked - close[1] + 1) / WIDTH)
     rest = np.concatenate([np.arange(max(still - 2, 0), still), np.arange(*close, 4)])
     if _far(places):
         return shift
@@ -66,8 +69,7 @@ def shift_apart(places: Array, *, still: int = 0, close: tuple[int, int] = (0, 0
     line = _line(places)[looked]
     for _ in range(ROUNDS):
         need = _need(ends[0], ends[1] + _level(shift[looked])[:, None, None], line)
-        if still:  # what overlaps already cannot come apart at once
-            need *= smoothstep((looked - still + 1) / WIDTH)
+        need *= ease  # what overlaps already cannot come apart at once
         at = np.flatnonzero(need)
         if not len(at):
             break

@@ -35,7 +35,7 @@ class Bodies:
         that stay in any case."""
         known = np.asarray(mask[:, 1:, :3].all(axis=-1))
         still = int(known.all(axis=0).cumprod().sum()) or int(mask[:, 0].any()) or still
-        bends = not known[0].all(), not known[1].all()
+        bends = not bool(known[0].all()), not bool(known[1].all())
         free = bends[0] and not frozen[0], bends[1] and not frozen[1]
         if meeting:
             meeting.free, meeting.still = bends, still

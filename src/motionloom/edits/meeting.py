@@ -31,6 +31,8 @@ LATE = 0.1
 """Metres that being at the end of that stretch, instead of in the middle, counts like."""
 GAP = 0.04
 """Metres between two wrists that touch."""
+OFFERED = 0.1
+"""Metres below and above where hands meet at which a given person's hand is reached for."""
 LEFT_OF = 0.06
 """Metres that each of two people in each other's arms stands to the left of the middle: heads and arms pass."""
 ASIDE = 0.12
@@ -116,6 +118,8 @@ class Meeting:
                 _ask(goals[touch.person], at, touch.joint, self._beside(touch, places[1 - touch.person, at], stands))
                 continue
             ends = places[0, at, touch.joint], places[1, at, touch.other]
+            if not all(self.free) and not self._offered(ends[0] if self.free[1] else ends[1]):
+                continue
             point, across = self._point(places[:, at], ends)
             _ask(goals[0], at, touch.joint, point - GAP / 2 * across)
             _ask(goals[1], at, touch.other, point + GAP / 2 * across)
@@ -147,7 +151,10 @@ class Meeting:
         left = LEFT_OF * np.array([np.cos(facing), -np.sin(facing)])
         x, z = hips.mean(axis=0)[[0, 2]]
         first, second = np.array([x, z]) - ahead + left, np.array([x, z]) + ahead - left
-        return [GroundPose(*first.tolist(), facing), GroundPose(*second.tolist(), facing + np.pi)]
+        return [
+            GroundPose(float(first[0]), float(first[1]), facing),
+            GroundPose(float(second[0]), float(second[1]), facing + np.pi),
+        ]
 
     def _beside(self, touch: Touch, other: Array, stands: list[GroundPose] | None) -> Array:
         """(frames, 3) where a touch is on the other person, who is at (frames, 22, 3)."""
@@ -155,6 +162,11 @@ class Meeting:
         if stands is None:
             return other[:, touch.other] + turned(beside, heading(other))
         return stands[1 - touch.person].to_world(beside + np.array([0.0, _STANDING[touch.other], 0.0]))
+
+    def _offered(self, hand: Array) -> bool:
+        """Whether the hand (frames, 3) of somebody who is given is where such hands meet: else nobody reaches for it."""
+        low, high = self.contact.height
+        return low - OFFERED < float(hand[:, 1].mean()) < high + OFFERED
 
     def _point(self, places: Array, ends: tuple[Array, Array]) -> tuple[Array, Array]:
         """(frames, 3) where two hands meet, and the unit vectors from one to the other."""

@@ -81,7 +81,7 @@ _CONTACTS: tuple[tuple[str, Contact], ...] = (
         ),
     ),
     (
-        r"high[- ]?fives?|highfiv(?:e|es|ing)",
+        r"high[- ]?fiv(?:e|es|ing)(?! times)",
         Contact("give a high five", (_hands((RIGHT, RIGHT)),), (0.5, 0.7), height=(1.48, 1.58), seconds=0.2),
     ),
     (

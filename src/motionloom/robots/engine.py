@@ -12,6 +12,6 @@ def load_mujoco() -> Any:
 
     Raises `ModuleNotFoundError` where it is not installed (the extra ``motionloom[robots]``).
     """
-    if sys.platform == "linux" and "DISPLAY" not in os.environ:
-        os.environ.setdefault("MUJOCO_GL", "egl" if find_library("EGL") else "disabled")
+    if sys.platform == "linux" and not {"DISPLAY", "MUJOCO_GL"} & set(os.environ):
+        os.environ["MUJOCO_GL"] = "egl" if find_library("EGL") else "disabled"
     return importlib.import_module("mujoco")

@@ -20,8 +20,12 @@ from motionloom.robots.targets import Targets
 Array = NDArray[np.float64]
 STEP = 15.0
 """Radians per second that no hinge exceeds from frame to frame: 0.3 rad at 50 frames per second."""
-ROUNDS, FIRST_ROUNDS = 2, 40
+ROUNDS, AVOIDING_ROUNDS, FIRST_ROUNDS = 2, 4, 40
 """How often a frame's program is linearised anew; the first frame starts from the robot's own pose."""
+_SHORT = 0.08
+"""Radians that a hinge goes in one round where parts are kept apart: further, and distances are no longer linear."""
+_NEAR, _APART, _AWAY = 0.15, 0.01, 0.003
+"""Metres: from which distance on parts are kept apart, how far, and by how much in a round at least if nearer."""
 _DAMPING = 0.02
 _NEAR_GROUND, _SINKING = 0.5, 0.0005
 """Metres: ankles above are not looked at, and soles may be so deep."""
@@ -56,8 +60,10 @@ class Solver:
         self.posture = mink.PostureTask(robot.model, cost=_posture(robot))
         self.posture.set_target(robot.home)
         lower, upper = robot.file.lower + _MARGIN, robot.file.upper - _MARGIN
-        self.limit = _box(robot, lower, upper, np.minimum(STEP if speed is None else speed, STEP) / fps)
+        step = np.minimum(STEP if speed is None else speed, STEP) / fps
+        self.limit = _box(robot, lower, upper, step, at_once=_SHORT if avoid else np.inf)
         self.limits = [self.limit, _ground(robot), *([_apart(robot)] if avoid else [])]
+        self.rounds = AVOIDING_ROUNDS if avoid else ROUNDS
         self.begun = False
 
     def frame(self, targets: Targets, number: int) -> Array:
@@ -74,7 +80,7 @@ class Solver:
         if not self.begun:
             self._place_root(targets, number)
         self.limit.before = None if not self.begun else self.configuration.q[7:].copy()
-        for _ in range(ROUNDS if self.begun else FIRST_ROUNDS):
+        for _ in range(self.rounds if self.begun else FIRST_ROUNDS):
             self._round()
         self.begun = True
         return self.configuration.q.copy()
@@ -83,7 +89,10 @@ class Solver:
         import mink
 
         tasks = [*self.tasks.values(), self.posture]
-        velocity = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", _DAMPING, limits=self.limits)
+        try:
+            velocity = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", _DAMPING, limits=self.limits)
+        except mink.NoSolutionFound:  # parts that cannot be kept apart within the limits
+            velocity = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", _DAMPING, limits=self.limits[:2])
         pose = self.configuration.integrate(velocity, 1.0)
         pose[7:] = np.clip(pose[7:], *self.limit.bounds())
         self.configuration.update(pose)
@@ -143,7 +152,7 @@ def _posture(robot: Robot) -> Array:
     return cost
 
 
-def _box(robot: Robot, lower: Array, upper: Array, step: Array | float) -> Any:
+def _box(robot: Robot, lower: Array, upper: Array, step: Array | float, *, at_once: float) -> Any:
     """mink's limit of the hinges' places and of their steps since the frame before, in one."""
     import mink
 
@@ -160,9 +169,9 @@ def _box(robot: Robot, lower: Array, upper: Array, step: Array | float) -> Any:
         def compute_qp_inequalities(self, configuration: Any, dt: float) -> Any:
             low, high = self.bounds()
             now = configuration.q[7:]
-            room = np.concatenate([high - now, now - low])
+            room = np.concatenate([high - now, now - low]).clip(0, at_once)
             known = np.isfinite(room)
-            return mink.Constraint(self.matrix[known], room[known].clip(0))
+            return mink.Constraint(self.matrix[known], room[known])
 
     return Box()
 
@@ -225,6 +234,7 @@ def _apart(robot: Robot) -> Any:
     return mink.CollisionAvoidanceLimit(
         robot.model,
         geom_pairs=[([one], [other]) for one, other in pairs_apart(robot)],
-        minimum_distance_from_collisions=0.005,
-        collision_detection_distance=0.05,
+        minimum_distance_from_collisions=_APART,
+        collision_detection_distance=_NEAR,
+        bound_relaxation=-_AWAY,
     )

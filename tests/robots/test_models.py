@@ -1,0 +1,223 @@
+"""Which robots are read, which joint is found to be which, and one sentence about everything else."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionloom.errors import MotionloomError
+from tests.robots import models
+from tests.shared import shared
+
+pytest.importorskip("mujoco")
+
+from motionloom.robots.body import Robot, read_robot
+
+
+def written(folder: Path, text: str, name: str = "robot.xml") -> Path:
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def read(folder: Path, text: str) -> Robot:
+    return read_robot(written(folder, text))
+
+
+LEG, ARM = ("hip", "knee", "ankle"), ("shoulder", "elbow")
+
+
+@pytest.mark.parametrize("names", ["UNITREE", "BOOSTER", "ENGINEAI", "ATLAS", "NAMELESS"])
+def test_joints_are_found_by_names_and_by_shape(names: str, tmp_path: Path) -> None:
+    """The knee is the fourth hinge of a leg and the elbow bends the arm, whatever they are called."""
+    robot = read(tmp_path, models.humanoid(getattr(models, names)))
+    order = getattr(models, names)
+    for side in ("left", "right"):
+        found = {part: [h.name for h in robot.parts.hinges[f"{side}_{part}"]] for part in (*LEG, *ARM)}
+        said = [n.format(side=side, Side=side.title(), s=side[0], S=side[0].upper()) for n in order]
+        assert found["hip"] == said[:3]
+        assert found["knee"] == said[3:4]
+        assert found["ankle"] == said[4:6]
+        assert found["elbow"][-1] == said[10]
+        assert found["shoulder"] + found["elbow"] == said[7:]
+    assert robot.parts.hinges["waist"][0].name == order[6]
+    assert ("shape" in robot.parts.how) == (names == "NAMELESS")
+
+
+@pytest.mark.parametrize(
+    ("name", "part"),
+    [
+        ("left_hip_pitch_joint", "left_hip"),
+        ("right_knee_joint", "right_knee"),
+        ("torso_joint", "waist"),
+        ("waist_roll_joint", "waist"),
+        ("left_wrist_yaw_joint", "left_wrist"),
+        ("left_hand_thumb_0_joint", None),
+        ("right_hand_index_1_joint", None),
+        ("AAHead_yaw", "neck"),
+        ("Head_pitch", "neck"),
+        ("J18_ELBOW_YAW_L", "left_elbow"),
+        ("J23_HEAD_YAW", "neck"),
+        ("r_leg_akx", "right_ankle"),
+        ("l_arm_wry", "left_wrist"),
+        ("neck_ry", "neck"),
+        ("abdomen_z", "waist"),
+        ("imu", None),
+    ],
+)
+def test_names_of_well_known_robots(name: str, part: str | None) -> None:
+    from motionloom.robots.joints import _read
+
+    assert _read(name) == part
+
+
+def test_the_skeleton_has_the_models_own_lengths(tmp_path: Path) -> None:
+    """Thighs, shins and arms are as long as the model's bodies are apart; the soles are on the ground."""
+    robot = read(tmp_path, models.humanoid())
+    rest = robot.skeleton.rest_positions()
+
+    def apart(a: str, b: str) -> float:
+        return float(np.linalg.norm(rest[robot.skeleton.index(a)] - rest[robot.skeleton.index(b)]))
+
+    assert apart("left_hip", "left_knee") == pytest.approx(0.3)
+    assert apart("right_knee", "right_ankle") == pytest.approx(0.3)
+    assert apart("left_shoulder", "left_elbow") == pytest.approx(0.2)
+    assert apart("left_elbow", "left_wrist") == pytest.approx(0.2)
+    assert rest[robot.skeleton.index("left_ankle"), 1] == pytest.approx(0.05)
+    assert rest[robot.skeleton.index("left_hip"), 0] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.0, np.pi])
+def test_a_robot_may_face_any_way_in_its_file(turn: float, tmp_path: Path) -> None:
+    """A model that faces elsewhere gives the same skeleton."""
+    plain = read(tmp_path, models.humanoid())
+    turned = models.humanoid().replace('name="base"', f'name="base" euler="0 0 {turn}"')
+    assert np.allclose(read(tmp_path, turned).skeleton.offsets, plain.skeleton.offsets, atol=1e-9)
+
+
+def test_a_map_says_which_joint_is_which(tmp_path: Path) -> None:
+    path = written(tmp_path, models.humanoid(("x{s}0", *models.UNITREE[1:])))
+    chosen = tmp_path / "map.json"
+    chosen.write_text(json.dumps({"left_hip": ["xl0", "left_hip_roll_joint", "left_hip_yaw_joint"]}))
+    robot = read_robot(path, chosen)
+    assert robot.parts.hinges["left_hip"][0].name == "xl0"
+    for wrong, said in (
+        ({"left_hip": "nobody"}, "the hinges are"),
+        ({"tail": "xl0"}, "the parts are"),
+        ([1], "object"),
+    ):
+        chosen.write_text(json.dumps(wrong))
+        with pytest.raises(MotionloomError, match=said):
+            read_robot(path, chosen)
+
+
+def _with(text: str) -> str:
+    return models.humanoid(extra=text)
+
+
+BAD = {
+    "on 4 legs": models.on_legs(4),
+    "wheel does": models.on_wheels(),
+    "no limits": models.humanoid().replace(' range="0 2.4"', "", 1),
+    "2 things that move freely": models.humanoid().replace(
+        "</worldbody>", '<body><freejoint/><geom size="0.1"/></body></worldbody>'
+    ),
+    "in metres": models.humanoid(size=39.37),
+    "slides": _with('<body><joint type="slide" range="0 1"/><geom size="0.02"/></body>'),
+    "ball joint": _with('<body><joint type="ball"/><geom size="0.02"/></body>'),
+    "does not stand upright": models.humanoid().replace('name="base"', 'name="base" euler="1.57 0 0"'),
+    "no model that MuJoCo reads": "<mujoco><bad/></mujoco>",
+    "is empty": " ",
+    "no bodies": "<mujoco/>",
+}
+
+
+@pytest.mark.parametrize("said", BAD)
+def test_what_is_no_humanoid_is_refused_in_one_sentence(said: str, tmp_path: Path) -> None:
+    with pytest.raises(MotionloomError, match=said) as caught:
+        read(tmp_path, BAD[said])
+    assert "\n" not in str(caught.value)
+    assert "robot.xml" in str(caught.value)
+
+
+def test_missing_meshes_are_no_obstacle(tmp_path: Path) -> None:
+    """They are told, and left out."""
+    text = models.humanoid(extra='<geom type="mesh" mesh="face"/>').replace(
+        "<worldbody>", '<asset><mesh name="face" file="face.stl"/></asset><worldbody>'
+    )
+    robot = read(tmp_path, text)
+    assert any("face.stl" in note for note in robot.notes)
+
+
+def test_a_model_without_actuators_and_one_with_a_fixed_base_are_told(tmp_path: Path) -> None:
+    robot = read(tmp_path, models.humanoid(free=""))
+    assert robot.model.nq == 7 + len(robot.file.hinges)
+    assert any("no actuators" in note for note in robot.notes)
+    assert any("set free" in note for note in robot.notes)
+
+
+def _as_urdf(robot: Robot) -> str:
+    """The robot's tree as URDF, hinges in the model's own order."""
+    model, parts = robot.file.model, []
+    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    of = {hinge.body: hinge for hinge in robot.file.hinges}
+    for body in range(1, model.nbody):
+        name, above = model.body(body).name, model.body(int(model.body_parentid[body])).name
+        parts.append(f'<link name="{name}">{inertial}</link>')
+        if body == 1:
+            continue
+        place = " ".join(map(str, model.body_pos[body]))
+        origin, ends = f'<origin xyz="{place}"/>', f'<parent link="{above}"/><child link="{name}"/>'
+        if body not in of:
+            parts.append(f'<joint name="fix_{name}" type="fixed">{ends}{origin}</joint>')
+            continue
+        row, axis = robot.file.hinges.index(of[body]), " ".join(map(str, of[body].axis))
+        limit = (
+            f'<limit lower="{robot.file.lower[row]}" upper="{robot.file.upper[row]}" effort="9" velocity="{4 + row}"/>'
+        )
+        parts.append(f'<joint name="{of[body].name}" type="revolute">{ends}{origin}<axis xyz="{axis}"/>{limit}</joint>')
+    return f'<robot name="tin">{"".join(parts)}</robot>'
+
+
+def test_urdf_is_read_with_its_speeds(tmp_path: Path) -> None:
+    """MuJoCo drops a URDF's speeds and welds its base to the world; both are put right."""
+    plain = read(tmp_path, models.humanoid())
+    robot = read_robot(written(tmp_path, _as_urdf(plain), "robot.urdf"))
+    assert robot.file.joint_names() == plain.file.joint_names()
+    assert robot.file.speed.tolist() == [4.0 + row for row in range(len(robot.file.hinges))]
+    thigh = robot.skeleton.index("left_knee")
+    assert np.allclose(robot.skeleton.offsets[thigh], plain.skeleton.offsets[thigh], atol=1e-6)
+
+
+def test_the_published_models_are_read() -> None:
+    """Joint counts as their makers state them."""
+    g1 = read_robot(shared("robots/unitree_g1/g1_29dof_without_meshes.xml"))
+    assert (len(g1.file.hinges), len(g1.parts.hinges["waist"]), len(g1.parts.hinges["left_wrist"])) == (29, 3, 3)
+    t1 = read_robot(shared("robots/booster_t1/t1_mocap.xml"))
+    assert (len(t1.file.hinges), len(t1.parts.hinges["waist"]), "left_wrist" in t1.parts.hinges) == (21, 1, False)
+
+
+WITHOUT = """
+import importlib.abc, sys
+
+class Nowhere(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ("mujoco", "mink"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Nowhere())
+from motionloom.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_without_the_extra_one_sentence_names_it(tmp_path: Path) -> None:
+    """Everything else works; a robot is refused before any work."""
+    path = written(tmp_path, models.humanoid())
+    line = ["export", "nothing.bvh", str(tmp_path / "out.csv"), "--robot", str(path)]
+    done = subprocess.run([sys.executable, "-c", WITHOUT, *line], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "motionloom[robots]" in done.stderr
