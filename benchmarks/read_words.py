@@ -7,7 +7,7 @@ import sys
 
 from motionloom.goals.amount_goal import kept, measured
 from motionloom.lab.suites.harness import weight_marks
-from motionloom.tasks.sampling import Sampling
+from motionloom.requests.sampling import Sampling
 from motionloom.tasks.text import generate
 from motionloom.tasks.worded import draw, read
 from motionloom.weights.prior import Prior, find_weights

@@ -21,6 +21,7 @@ KNOWN = {
     "$ref",
     "title",
     "description",
+    "default",
     "type",
     "enum",
     "anyOf",

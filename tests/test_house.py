@@ -39,6 +39,7 @@ BUDGETS = {
     "lab/suites": 8_974,
     "live": 3_054,
     "nets": 1_242,
+    "requests": 1_000,
     "retarget": 3_249,
     "runtime": 1_983,
     "server": 5_398,
@@ -68,7 +69,7 @@ def test_help_is_quick() -> None:
     )
     done = run("-c", code)
     assert done.returncode == 0, done.stderr
-    assert "LOADED ['motionloom'] ['cli', 'errors', 'formats', 'interruption']" in done.stdout
+    assert "LOADED ['motionloom'] ['cli', 'errors', 'formats', 'interruption', 'requests']" in done.stdout
 
 
 CLOCKS = {"perf_counter", "perf_counter_ns", "monotonic", "monotonic_ns", "process_time", "thread_time", "getrusage"}

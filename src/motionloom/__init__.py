@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from motionloom.live.live import Live
     from motionloom.live.pair import LivePair
     from motionloom.motion import Motion
+    from motionloom.requests.sampling import PairSampling, PredictionSampling, Sampling
     from motionloom.retarget import from_smpl22, retarget, to_smpl22
     from motionloom.skeleton import SMPL22, Skeleton
     from motionloom.tasks.control import Controlled, control
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from motionloom.tasks.long import compose
     from motionloom.tasks.pair import complete_pair, generate_pair
     from motionloom.tasks.predict import predict, switch
-    from motionloom.tasks.sampling import PairSampling, PredictionSampling, Sampling
     from motionloom.tasks.text import generate
     from motionloom.weights.pair import PairBlock
     from motionloom.weights.predictor import Predictor, save_predictor
@@ -76,9 +76,9 @@ _PLACES = {
     "generate_pair": "tasks.pair",
     "predict": "tasks.predict",
     "switch": "tasks.predict",
-    "PairSampling": "tasks.sampling",
-    "PredictionSampling": "tasks.sampling",
-    "Sampling": "tasks.sampling",
+    "PairSampling": "requests.sampling",
+    "PredictionSampling": "requests.sampling",
+    "Sampling": "requests.sampling",
     "generate": "tasks.text",
 }
 

@@ -1,6 +1,8 @@
 """The one exception a user is meant to see, and how what it quotes is shown."""
 
 import json
+from collections.abc import Collection, Mapping
+from typing import Any
 
 
 class MotionloomError(ValueError):
@@ -10,6 +12,11 @@ class MotionloomError(ValueError):
     to stderr and exits with 2. Programming errors stay ordinary exceptions. Whatever names and values it mentions, it
     is shown as one line of at most `LONGEST_MESSAGE` characters.
     """
+
+    def __init__(self, message: str = "", *, where: str = "") -> None:
+        super().__init__(message)
+        self.where = where
+        """Keys from the outside in, such as ``segments[1].goal.joints[0]``, where the mistake is in JSON."""
 
     def __str__(self) -> str:
         return one_line(super().__str__())
@@ -35,3 +42,39 @@ def _escaped(line: str, keep: str = "") -> str:
     if line.isprintable():
         return line
     return "".join(each if each.isprintable() or each in keep else json.dumps(each)[1:-1] for each in line)
+
+
+def quoted(text: str, limit: int = 40) -> str:
+    """Text as it may appear in a message: in quotes, without control characters, not too long."""
+    return repr(text if len(text) <= limit else text[: limit - 3] + "...")
+
+
+def listed(keys: Collection[str]) -> str:
+    """'a, b and c'"""
+    *first, last = keys
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def meant(word: str, known: Collection[str]) -> str:
+    """What a message may add about a misspelt word: the known one that is like it, in brackets, if there is one."""
+    import difflib  # here, since whoever makes no mistake need not wait for it
+
+    near = difflib.get_close_matches(word[:40], known, n=1)
+    return f" (did you mean {near[0]!r}?)" if near else ""
+
+
+def kind_of(value: Any) -> str:
+    """A value for a message: what it is, and itself where that is short."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value) if abs(value) < 10**20 else "a number beyond all bounds"
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, str):
+        return quoted(value)
+    if isinstance(value, Mapping):
+        return "a mapping"
+    return f"a list of {len(value)}" if isinstance(value, list | tuple) else f"a {type(value).__name__}"

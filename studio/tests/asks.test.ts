@@ -100,8 +100,8 @@ describe("what is drawn", () => {
   it("is only what is not frozen, block by block", () => {
     const project = asking((old) => freeze(old, [0, 2]));
     expect(plan(project).jobs).toMatchObject([
-      { task: "edit", motion: "m1", prompt: "a person walks forward", redraw: [[2, 3.5]] },
-      { task: "edit", prompt: "a person waves with the right hand", redraw: [[3.5, 6.5]] },
+      { task: "edit", motion: "m1", prompt: "a person walks forward", between: [[2, 3.5]] },
+      { task: "edit", prompt: "a person waves with the right hand", between: [[3.5, 6.5]] },
     ]);
   });
 
@@ -109,7 +109,7 @@ describe("what is drawn", () => {
     const project = asking((old) => freezeRest(old, old.segments[0]!.id));
     const changed = write(project, project.segments[1]!.id, "a person claps");
     expect(changed.base).toBe(keptTake(project));
-    expect(plan(changed).jobs).toMatchObject([{ prompt: "a person claps", redraw: [[3.5, 6.5]] }]);
+    expect(plan(changed).jobs).toMatchObject([{ prompt: "a person claps", between: [[3.5, 6.5]] }]);
   });
 
   it("is told apart by everything that changes the motion, and by nothing else", () => {

@@ -4,7 +4,7 @@ import { checked } from "../src/project/file";
 import { type TimelineJson, timelineOf } from "../src/project/goals";
 import { type Project, type Vec3, exampleProject } from "../src/project/model";
 import { opened } from "../src/project/opened";
-import { placeOf, withoutLine } from "../src/project/places";
+import { placeOf, withoutKeys } from "../src/project/places";
 import { setPeople } from "../src/project/timeline";
 
 const STANDING: Vec3[] = Array.from({ length: 22 }, (_, joint) => [joint / 50, joint / 20, 0]);
@@ -125,17 +125,17 @@ describe("a sentence of the server", () => {
     (old) => putTarget(old, 0, 21, 1, [0.3, 3.5, 1]),
   );
   const [target] = project.people[0]!.targets;
-  const high = "the timeline, line 9: path: the goal asks for right_wrist at 1.00 s 3.50 m high; keep it below 3 m";
+  const high = "the timeline, path: path: the goal asks for right_wrist at 1.00 s 3.50 m high; keep it below 3 m";
 
   it.each([
     [high, "path", { kind: "target", who: 0, id: target!.id }],
     [
-      "the timeline, line 4: 'seconds' must be a number",
+      "the timeline, segments[1].seconds: 'seconds' must be a number",
       "segments[1].seconds",
       { kind: "segment", id: project.segments[1]!.id },
     ],
     ["segment 2 ('x') of 1 s is shorter than the halves", "", { kind: "segment", id: project.segments[1]!.id }],
-    ["the timeline, line 9: path: 'path' cannot be walked", "path.path", { kind: "path", who: 0 }],
+    ["the timeline, path.path: path: 'path' cannot be walked", "path.path", { kind: "path", who: 0 }],
     [
       "path: 'joints[0].points[0].time' must be 0 to 2",
       "path.joints[0].points[0].time",
@@ -147,6 +147,6 @@ describe("a sentence of the server", () => {
   });
 
   it("loses the line of a file that nobody wrote", () => {
-    expect(withoutLine(high)).toBe("the goal asks for right wrist at 1.00 s 3.50 m high; keep it below 3 m");
+    expect(withoutKeys(high)).toBe("the goal asks for right wrist at 1.00 s 3.50 m high; keep it below 3 m");
   });
 });

@@ -196,7 +196,10 @@ def test_everything_that_determines_a_duet_changes_its_key_and_no_other(weights:
         ({"task": "duet", "prompt": "a :: b :: c"}, "words for each person"),
         ({"task": "duet"}, "no prompt"),
         ({"task": "duet", "prompt": "a", "person": 2}, "'person' says whose"),
-        ({"task": "duet", "prompt": "a", "goal": GOAL, "person": 3}, "must be 1 or 2"),
+        (
+            {"task": "duet", "prompt": "a", "goal": GOAL, "person": 3},
+            "whole number from 1 to 2; got 3",
+        ),
         ({"prompt": "a", "goal": GOAL, "person": 2}, "'person' says whose"),
         ({"task": "edit", "prompt": "a"}, "'motionloom edit --count'"),
         ({"task": "predict", "prompt": "a"}, "'motionloom predict --count'"),

@@ -20,8 +20,8 @@ from motionloom.weights.prior import Prior
 from tests.bulk.rows import rows, written
 from tests.cli.said import complaint
 from tests.io.motions import largest_distance
+from tests.recorded.tiny import adapter
 from tests.retarget.test_hands import handed, still
-from tests.tasks.test_adapting import adapter
 
 
 @pytest.fixture(autouse=True)
@@ -76,7 +76,7 @@ def test_what_was_taught_is_in_the_motions_and_in_their_names(weights: str, caps
     """Motions with an adapter are those of `generate` with it; without it the folder is another batch's."""
     prior = Prior.load(weights)
     for seed, name in ((1, "a"), (2, "b")):
-        adapter(prior, seed).save(f"{name}.safetensors")
+        adapter(prior, seed=seed).save(f"{name}.safetensors")
     words = ("--prompts", "prompts.txt", "--seconds", "0.5", "--seed", "3")
     assert command(weights, *words, "--adapter", "a.safetensors:0.5") == 0
     made = {path.name: io.load(path) for path in finished(Path("out"), "**/*.npz")}
@@ -101,7 +101,7 @@ def test_failed_rows_are_reported_and_the_exit_code_says_so(weights: str, capsys
     written(Path("jobs.jsonl"), [*rows(2), {"prompt": "a", "seconds": 99}])
     assert command(weights, "jobs.jsonl", "--filter", "travel < 0") == 1
     said = capsys.readouterr()
-    assert said.err == "motionloom: row 2: a motion of 99 seconds cannot be made; ask for more than 0 and at most 60\n"
+    assert said.err == "motionloom: row 2: 'seconds' must be above 0 and at most 60 seconds; got 99\n"
     assert "2 were dropped by the filter, 1 failed" in said.out
 
 
@@ -155,7 +155,7 @@ def test_mistakes_are_one_sentence_and_nothing_is_written(
 def test_a_column_that_is_none_is_reported_before_the_work(weights: str, capsys: pytest.CaptureFixture[str]) -> None:
     written(Path("jobs.jsonl"), [{"prompt": "a", "sead": 3}])
     assert command(weights, "jobs.jsonl") == 2
-    assert "unknown column 'sead'" in complaint(capsys)
+    assert "the row has no 'sead' (did you mean 'seed'?); it has task, " in complaint(capsys)
     assert not Path("out").exists()
 
 

@@ -34,7 +34,7 @@ def written() -> set[str]:
 def test_the_issues_line_is_understood() -> None:
     """A text behind options, one before them, and none."""
     behind = parser().parse_args(["edit", "clip.bvh", "--keep", "lower_body", "waves with both hands"])
-    assert (behind.text, behind.keep) == ("waves with both hands", ["lower_body"])
+    assert (behind.text, behind.keep) == ("waves with both hands", ("lower_body",))
     assert parser().parse_args(["edit", "clip.bvh", "waves", "--loop"]).text == "waves"
     assert parser().parse_args(["edit", "clip.bvh", "--loop"]).text is None
 

@@ -151,7 +151,7 @@ def test_the_best_of_several_is_kept_for_single_actions_and_the_rest_is_told(
     assert "--best-of is for one action; these are drawn as they come" in capsys.readouterr().err
     for words in ("a person walks", "a person walks, then sits"):
         assert main(["generate", words, "--weights", weights, "--out", "d.npz", "--best-of", "99"]) == 2
-        assert complaint(capsys).startswith("motionloom: the best is chosen of 1 to 16 motions; got 99")
+        assert complaint(capsys).startswith("motionloom: --best-of must be a whole number from 1 to 16; got 99")
     assert not Path("d.npz").exists()
 
 

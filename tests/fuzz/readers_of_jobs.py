@@ -164,6 +164,7 @@ def read_project(folder: Path) -> None:
 def read_request(name: str) -> Callable[[Path], None]:
     def read(folder: Path) -> None:
         from motionloom.server.asking import read_request
+
         from motionloom.server.project import Limits
 
         body = parse_json((folder / name).read_bytes(), "the request")
@@ -175,6 +176,7 @@ def read_request(name: str) -> Callable[[Path], None]:
 
 def read_timeline_text(folder: Path) -> None:
     from motionloom.server.asking import timeline_json
+
     from motionloom.server.project import Limits
 
     with opened(folder) as found:

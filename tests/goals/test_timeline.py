@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 
 from motionloom import io
 from motionloom.errors import MotionloomError
-from motionloom.goals.timeline import KEYS, SCHEMA, SEGMENT_KEYS, plain_timeline, read_timeline
+from motionloom.goals.timeline import SCHEMA, plain_timeline, read_timeline
 from motionloom.io import lined_yaml
 from motionloom.motion import Motion
+from motionloom.requests.fields import specs
+from motionloom.requests.timeline import SegmentKeys, TimelineKeys
 from motionloom.rotations import IDENTITY
 from motionloom.skeleton import SMPL22
 from tests.schema_check import valid
@@ -24,6 +26,7 @@ from tests.work import work
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples" / "timelines").glob("*.yaml"))
 PATH = "{points: [[0, 0], [0, 4]]}"
+WHOLE, PART = specs(TimelineKeys), specs(SegmentKeys)
 
 
 @pytest.fixture
@@ -112,7 +115,7 @@ REFUSED = [
     ("segments:\n- text:\n", 2, "got nothing"),
     ("segments:\n- text: [a]", 2, "got a list"),
     ("segments:\n- a\n- " + "x" * 20_001, 3, "20,001 characters"),
-    ("segments:\n- text: a\n  seconds: 0", 3, "'seconds' must be 0.2 to 60; got 0"),
+    ("segments:\n- text: a\n  seconds: 0", 3, "'seconds' must be 0.2 to 60 seconds; got 0"),
     ("segments:\n- text: a\n  seconds: -5", 3, "got -5"),
     ("segments:\n- text: a\n  seconds: 60.01", 3, "got 60.01"),
     ("segments:\n- text: a\n  seconds: five", 3, "'seconds' must be a number; got 'five'"),
@@ -124,8 +127,8 @@ REFUSED = [
     ("segments:\n- text: a\n  seconds: NaN", 3, "not a finite number"),
     ("segments:\n- text: a\n  seconds: 1e999", 3, "too large a number"),
     ("segments:\n- text: a\n  seconds: " + "1" * 5000, 3, "a number of 5000 digits"),
-    ("segments:\n- text: a\n  guidance: 101", 3, "'guidance' must be -100 to 100; got 101"),
-    ("segments:\n- text: a\n  transition: 0\n- b", 3, "'transition' must be 0.05 to 30; got 0"),
+    ("segments:\n- text: a\n  guidance: 101", 3, "'guidance' must be -100 to 100, usually 1 to 7; got 101"),
+    ("segments:\n- text: a\n  transition: 0\n- b", 3, "'transition' must be 0.05 to 30 seconds; got 0"),
     ("transition: -1\nsegments: [a]", 1, "got -1"),
     (
         "segments:\n- text: a\n  transition: 2.6\n- b",
@@ -139,9 +142,9 @@ REFUSED = [
         "the segment of line 4 3 s; it may take at m",
     ),
     ("transition: 2\nsegments:\n- a\n- {text: b, seconds: 3}", 3, "at most half of that, 1.5 s"),
-    ("seed: 1.5\nsegments: [a]", 1, "'seed' must be a whole number; got the number 1.5"),
-    ("seed: -1\nsegments: [a]", 1, "'seed' must be 0 to"),
-    ("seed: 4611686018427387904\nsegments: [a]", 1, "'seed' must be 0 to"),
+    ("seed: 1.5\nsegments: [a]", 1, "'seed' must be a whole number from 0 to 4,611,686,018,427,387,903; got 1.5"),
+    ("seed: -1\nsegments: [a]", 1, "'seed' must be a whole number from 0 to"),
+    ("seed: 4611686018427387904\nsegments: [a]", 1, "'seed' must be a whole number from 0 to"),
     ("segments: [a]\nseed: 1\nseed: 2", 3, "the key 'seed' stands here a second time"),
     ("segments:\n- text: a\n  text: b", 3, "second time"),
     ("segments: &a [b]", 1, "anchors and aliases"),
@@ -275,7 +278,7 @@ def test_any_bytes_are_a_timeline_or_one_sentence(read, data, quick):
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(-70, 70) | st.sampled_from(["walk", "", "5", "~", "a: b"]),
     lambda inner: (
-        st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from([*KEYS, *SEGMENT_KEYS, "x"]), inner, max_size=4)
+        st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from([*WHOLE, *PART, "x"]), inner, max_size=4)
     ),
     max_leaves=8,
 )
@@ -295,8 +298,8 @@ def test_plain_values_survive(tmp_path, value):
 
 def test_the_schema_has_the_readers_keys():
     schema = json.loads(SCHEMA.read_text())
-    assert set(schema["properties"]) == set(KEYS)
-    assert set(schema["$defs"]["segment"]["anyOf"][1]["properties"]) == set(SEGMENT_KEYS)
+    assert set(schema["properties"]) == set(WHOLE)
+    assert set(schema["$defs"]["segment"]["anyOf"][1]["properties"]) == set(PART)
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -358,6 +361,8 @@ def test_the_document_explains_every_key_with_an_example_that_is_read(tmp_path):
     (tmp_path / "zombie.safetensors").touch()
     assert read_timeline(tmp_path / "t.yaml").frames == 100 + 50 + 80 + 100
     plain = yaml.safe_load(example)
-    assert set(plain) == set(KEYS)
-    assert {key for segment in plain["segments"] if isinstance(segment, dict) for key in segment} == set(SEGMENT_KEYS)
+    assert set(plain) == set(WHOLE)
+    assert {key for segment in plain["segments"] if isinstance(segment, dict) for key in segment} == set(
+        specs(SegmentKeys)
+    )
     assert valid(SCHEMA, plain)

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from motionloom import load
+from motionloom.requests.tasks import REQUESTS
 
 mcp = pytest.importorskip("mcp", reason="needs the extra 'mcp': pip install 'motionloom[mcp]'", exc_type=ImportError)
 
@@ -50,19 +51,24 @@ def test_an_assistant_makes_motion_and_exports_it(tmp_path: Path) -> None:
     def long_one(answers: list[Any]) -> str:
         return plain(answers[1])[0]["id"]
 
-    names, (one, _, written, refused, escaped) = talk(
+    names, (one, _, written, refused, escaped, wrong) = talk(
         tmp_path,
         ("generate_motion", {"prompt": "a person jumps", "seconds": 1.0, "seed": 3, "count": 2}),
-        ("compose", {"segments": [{"text": "a person walks", "seconds": 1}, {"text": "a person waves", "seconds": 1}]}),
+        (
+            "compose",
+            {"timeline": {"segments": [{"text": f"a person {verb}", "seconds": 1} for verb in ("walks", "waves")]}},
+        ),
         lambda made: ("export", {"motion": long_one(made), "format": "bvh", "name": "walk-and-wave"}),
         ("export", {"motion": "0" * 16}),
         lambda made: ("export", {"motion": long_one(made), "name": "../evil"}),
+        ("generate_motion", {"prompt": "a person jumps", "best_of": 99}),
     )
-    assert set(names) == {"generate_motion", "compose", "export"}
+    assert set(names) == {"generate_motion", *REQUESTS, "export"} - {"generate"}
     assert [take["seed"] for take in plain(one)] == [3, 4]
     file = Path(plain(written)["file"])
     assert file == (tmp_path / "exports" / "walk-and-wave.bvh").resolve()
     assert load(file).seconds == pytest.approx(2.0)
+    assert "'best_of' must be a whole number from 1 to 16; got 99" in wrong.content[0].text
     assert refused.is_error
     assert "there is no motion" in json.dumps(refused.model_dump(mode="json"))
     assert escaped.is_error

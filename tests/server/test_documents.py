@@ -10,8 +10,9 @@ pytest.importorskip("starlette", reason="needs the extra 'studio'")
 
 from starlette.routing import Route
 
+from motionloom.requests.fields import specs
+from motionloom.requests.tasks import REQUESTS
 from motionloom.server.app import routes
-from motionloom.server.asking import COMMON, KEYS
 from motionloom.server.components import request_of
 from motionloom.server.limits import Limits
 from motionloom.server.openapi import as_page, document
@@ -32,11 +33,11 @@ def test_every_route_is_told_of_and_nothing_else() -> None:
 
 def test_every_task_has_its_keys() -> None:
     schemas = document(Limits())["components"]["schemas"]
-    assert set(schemas["JobRequest"]["discriminator"]["mapping"]) == set(KEYS)
-    for task, keys in KEYS.items():
+    assert set(schemas["JobRequest"]["discriminator"]["mapping"]) == set(REQUESTS)
+    for task, request in REQUESTS.items():
         variant = schemas[request_of(task)]
         assert variant["properties"]["task"] == {"const": task}
-        assert set(variant["properties"]) == {*COMMON, *keys}
+        assert set(variant["properties"]) == {"task", "levels", *specs(request)}
 
 
 def test_references_lead_somewhere() -> None:

@@ -109,7 +109,7 @@ def test_levels_of_a_controlled_motion_stand_in_the_world_of_its_goals(server: S
 
 
 def test_an_edit_keeps_what_is_outside_of_its_stretch(server: Server, walk: str) -> None:
-    made = server.draw(task="edit", motion=walk, prompt="a person waves", redraw=[[0.5, 1.5]], steps=6, count=2)
+    made = server.draw(task="edit", motion=walk, prompt="a person waves", between=[[0.5, 1.5]], steps=6, count=2)
     before = poses(server, walk)
     for one in made["results"]:
         after = poses(server, one["id"])
@@ -119,7 +119,7 @@ def test_an_edit_keeps_what_is_outside_of_its_stretch(server: Server, walk: str)
 
 def test_levels_of_an_edit_say_where_in_the_motion_they_begin(server: Server) -> None:
     (long,) = server.draw(task="generate", prompt="a person walks", seconds=9.0, steps=4)["results"]
-    job = server.submit(task="edit", motion=long["id"], prompt="a person waves", redraw=[[6.0, 7.0]], steps=4)
+    job = server.submit(task="edit", motion=long["id"], prompt="a person waves", between=[[6.0, 7.0]], steps=4)
     events = list(server.events(job))
     [*_, last] = [data for _, kind, data in events if kind == "level"]
     assert 0 < last["begin"] < 6.0
@@ -138,7 +138,7 @@ def test_futures_begin_with_their_past(server: Server, walk: str) -> None:
 
 def test_a_switch_has_both_motions_and_what_is_between(server: Server, walk: str) -> None:
     (other,) = server.draw(task="generate", prompt="a person waves", seconds=2.0, steps=6)["results"]
-    (made,) = server.draw(task="switch", motion=walk, to=other["id"], seconds=0.5)["results"]
+    (made,) = server.draw(task="switch", motion=walk, target=other["id"], seconds=0.5)["results"]
     assert made["frames"] == 40 + 10 + 40
 
 
@@ -183,17 +183,20 @@ BROKEN: list[tuple[Any, str]] = [
     ({"task": "generate", "prompt": "  "}, "prompt is empty"),
     ({"task": "generate", "prompt": "x" * 5000}, "characters"),
     ({"task": "generate", "prompt": ["a", "b"]}, "'prompt' must be text; got a list of 2"),
-    ({"task": "generate", "prompt": "a", "seconds": 1e9}, "'seconds' must be 0 to 60;"),
-    ({"task": "generate", "prompt": "a", "seconds": 61}, "'seconds' must be 0 to 60; got 61"),
-    ({"task": "generate", "prompt": "a", "seconds": 0}, "more than 0 and at most 60"),
-    ({"task": "duet", "prompt": "a", "seconds": 61}, "'seconds' must be 0 to 60; got 61"),
+    ({"task": "generate", "prompt": "a", "seconds": 1e9}, "'seconds' must be above 0 and at most 60 seconds;"),
+    ({"task": "generate", "prompt": "a", "seconds": 61}, "'seconds' must be above 0 and at most 60 seconds; got 61"),
+    ({"task": "generate", "prompt": "a", "seconds": 0}, "above 0 and at most 60"),
+    ({"task": "duet", "prompt": "a", "seconds": 61}, "'seconds' must be above 0 and at most 60 seconds; got 61"),
     ({"task": "generate", "prompt": "a", "count": 9}, "from 1 to 8"),
     ({"task": "generate", "prompt": "a", "count": True}, "whole number"),
     ({"task": "generate", "prompt": "a", "seed": -1}, "whole number"),
     ({"task": "generate", "prompt": "a", "steps": 10**6}, "from 1 to 200"),
     ({"task": "generate", "prompt": "a", "secnds": 1}, "did you mean 'seconds'"),
     ({"task": "compose", "timeline": {"segments": []}}, "at least one"),
-    ({"task": "compose", "timeline": {"segments": [{"text": "a", "seconds": "x"}]}}, "line 3"),
+    (
+        {"task": "compose", "timeline": {"segments": [{"text": "a", "seconds": "x"}]}},
+        "the timeline, segments[0].seconds: 'seconds' must be a number",
+    ),
     (
         {"task": "compose", "timeline": {"segments": ["a"], "start": "../../etc/passwd"}},
         "leads out of the project folder;",
@@ -217,7 +220,7 @@ def test_what_cannot_be_asked_is_answered_with_one_sentence(server: Server, body
 
 
 def test_what_only_the_library_can_refuse_fails_the_job_with_its_sentence(server: Server, walk: str) -> None:
-    job = server.submit(task="edit", motion=walk, redraw=[[1.0, 30.0]], prompt="a person waves")
+    job = server.submit(task="edit", motion=walk, between=[[1.0, 30.0]], prompt="a person waves")
     found = server.wait(job)
     assert found["state"] == "failed"
     assert "no stretch from 1 to 30 s" in found["error"]

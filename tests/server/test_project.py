@@ -206,9 +206,9 @@ def test_a_timeline_goes_to_yaml_and_back(server: Server) -> None:
     assert server.json("POST", "/timeline.json", text) == (200, TIMELINE)
 
 
-def test_a_mistake_in_a_timeline_is_reported_with_its_line(server: Server) -> None:
+def test_a_mistake_in_a_timeline_is_reported_with_its_place(server: Server) -> None:
     status, answer = server.json("POST", "/timeline.yaml", {"segments": [{"text": "a", "transition": 9}]})
-    assert (status, answer["error"].startswith("the timeline, line 3")) == (400, True)
+    assert (status, answer["error"].startswith("the timeline, segments[0].transition: ")) == (400, True)
     status, answer = server.json("POST", "/timeline.json", b"segments: [a\n")
     assert (status, "the timeline" in answer["error"]) == (400, True)
 

@@ -8,7 +8,8 @@ import pytest
 
 pytest.importorskip("starlette", reason="needs the extra 'studio'")
 
-from motionloom.server.asking import Request
+from motionloom.requests.sampling import Sampling
+from motionloom.server.job_request import JobRequest
 from motionloom.server.jobs import Event, Job
 from motionloom.server.limits import Limits
 from motionloom.server.queue import Queue
@@ -16,12 +17,11 @@ from motionloom.server.refusal import Refusal
 
 
 def job(client: str, *, count: int = 1, key: str | None = None) -> Job:
-    options = {"key": key}
-    return Job(Request("generate", 0, count, None, None, True, options), client, 1 << 20)
+    return Job(JobRequest("generate", key, Sampling(count=count)), client, 1 << 20)
 
 
 def key(one: Job) -> str | None:
-    return one.request.options["key"]
+    return one.request.values
 
 
 def test_clients_take_turns_however_many_jobs_they_have() -> None:
@@ -101,7 +101,7 @@ def data(event: Event) -> dict[str, Any]:
 
 
 def test_the_log_of_a_job_stays_small_and_keeps_the_newest() -> None:
-    one = Job(Request("generate", 0, 1, None, None, True, {}), "a", 400_000)
+    one = Job(JobRequest("generate", None, Sampling()), "a", 400_000)
     for level in range(1, 51):
         one.level(level, 50, 0, np.zeros((1, 100, 22, 3)))
     kept = [data(event)["level"] for event in log(one)]
@@ -119,7 +119,7 @@ def test_an_event_is_written_out_once_however_many_read_it() -> None:
 
 
 def test_a_stream_that_is_slow_goes_on_with_what_is_still_in_the_log() -> None:
-    one = Job(Request("generate", 0, 1, None, None, True, {}), "a", 100_000)
+    one = Job(JobRequest("generate", None, Sampling()), "a", 100_000)
     one.level(1, 99, 0, np.zeros((1, 40, 22, 3)))
     seen = one.event_after(0)
     assert seen is not None

@@ -5,8 +5,9 @@ import pytest
 
 from motionloom.diffusion.sampling import row_seed
 from motionloom.errors import MotionloomError
+from motionloom.requests.sampling import Sampling
 from motionloom.tasks.best import with_best_seeds
-from motionloom.tasks.sampling import Rows, Sampling, sample
+from motionloom.tasks.sampling import Rows, sample
 from motionloom.tasks.text import finish, generate, sample_features
 from motionloom.weights.prior import Prior
 from tests.noise import normal
@@ -26,8 +27,9 @@ def best(prior: Prior, prompts: list[str], seeds: list[int], count: int = 4) -> 
     return list(with_best_seeds(prior, Rows(prompts, [12] * len(seeds), seeds), count, SAMPLING).seeds)
 
 
-def test_kept_is_the_seed_whose_rotations_are_nearest_to_the_mean_at_pure_noise() -> None:
+def test_of_equals_the_one_nearest_to_the_mean_at_pure_noise_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of the weights that ship. The mean is estimated here from other noise, 24 rows of it."""
+    monkeypatch.setattr("motionloom.tasks.best._looked_at", lambda prior, prompt, estimates: [()] * len(estimates))
     prior, tried = Prior.load(), [7, *(row_seed(7, number) for number in range(1, 5))]
     noise = normal((24, 40, 263), 1)
     mean = prior.net(noise, 1000, prior.net.bind(prior.condition([TURN] * 24))).mean(0)
@@ -36,6 +38,21 @@ def test_kept_is_the_seed_whose_rotations_are_nearest_to_the_mean_at_pure_noise(
     assert sorted(away)[1] - min(away) > 1e-3  # no tie
     kept = with_best_seeds(prior, Rows([TURN], [40], [7]), 5, SAMPLING).seeds
     assert kept == [tried[away.index(min(away))]]
+
+
+@pytest.mark.parametrize(("met", "whole", "kept"), [((0, 1, 0, 1), (1, 1, 1, 1), 1), ((1, 1, 1, 1), (0, 0, 1, 0), 2)])
+def test_what_words_allow_to_check_comes_first_and_a_whole_body_second(
+    prior: Prior, monkeypatch: pytest.MonkeyPatch, met: tuple[int, ...], whole: tuple[int, ...], kept: int
+) -> None:
+    """Whatever is nearest to the mean. Two that do as much: the livelier."""
+    shares, bodies = iter(met), iter(whole)
+    far = iter([0.1, 0.2, 0.3, 0.2])
+    monkeypatch.setattr("motionloom.tasks.best.share_met", lambda *_: next(shares))
+    monkeypatch.setattr("motionloom.tasks.best.wholeness", lambda _: next(bodies))
+    monkeypatch.setattr("motionloom.tasks.best._distance", lambda *_: next(far))
+    monkeypatch.setattr("motionloom.tasks.best.asks_for_rest", lambda _: True)
+    seeds = [7, *(row_seed(7, number) for number in range(1, 4))]
+    assert best(prior, [WALK], [7]) == [seeds[kept]]
 
 
 def test_halfway_gives_the_estimates_after_half_of_the_calls(prior: Prior) -> None:
@@ -69,7 +86,7 @@ def test_progress_sees_one_job(prior: Prior) -> None:
     assert said == [(done, of) for done in range(1, of + 1)]
 
 
-@pytest.mark.parametrize("count", [0, -1, 17, 2.0, True])
+@pytest.mark.parametrize("count", [0, -1, 17, 2.5, True])
 def test_numbers_that_cannot_be_tried_are_refused(prior: Prior, count) -> None:
-    with pytest.raises(MotionloomError, match="of 1 to 16 motions"):
+    with pytest.raises(MotionloomError, match="best_of must be a whole number"):
         generate(prior, WALK, best_of=count)

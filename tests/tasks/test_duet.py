@@ -299,5 +299,5 @@ def test_nothing_is_composed_of_nothing(prior: Prior, block: PairBlock) -> None:
 
 @pytest.mark.parametrize("share", [-0.1, 8, float("nan")])
 def test_nobody_is_kept_together_by_more_than_wholly(prior: Prior, block: PairBlock, share: float) -> None:
-    with pytest.raises(MotionloomError, match="kept together by 0"):
+    with pytest.raises(MotionloomError, match="pair_guidance must be 0 to 1"):
         list(compose_pair(prior, block, SEGMENTS, pair_guidance=share))

@@ -11,6 +11,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features import humanml
 from motionloom.features.layout import WIDTH
 from motionloom.motion import Motion
+from motionloom.requests.sampling import Sampling
 from motionloom.retarget import from_smpl22
 from motionloom.retarget.onto import match_root
 from motionloom.runtime.prior import PriorSession
@@ -18,7 +19,6 @@ from motionloom.runtime.prior_condition import Bound
 from motionloom.skeleton import SMPL22, Skeleton
 from motionloom.tasks.edit import Extend, Loop, Redraw, changes_asked, edit, kept_numbers
 from motionloom.tasks.inpaint import inpaint_motion
-from motionloom.tasks.sampling import Sampling
 from motionloom.tasks.splice import carried, kept_parts, person_at_20, splice, standing
 from motionloom.weights.prior import Prior
 from tests.noise import normal

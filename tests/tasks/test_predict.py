@@ -9,10 +9,10 @@ from motionloom import rotations as rot
 from motionloom.errors import MotionloomError
 from motionloom.io import load
 from motionloom.motion import Motion
+from motionloom.requests.sampling import PredictionSampling
 from motionloom.retarget import from_smpl22, joints22
 from motionloom.tasks import predict as task
 from motionloom.tasks.predict import predict, predict_pieces, switch
-from motionloom.tasks.sampling import PredictionSampling
 from motionloom.tasks.splice import concatenated, standing
 from motionloom.tasks.windows import Past, WindowSampler
 from tests.recorded import tiny_predictor

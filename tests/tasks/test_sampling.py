@@ -4,24 +4,24 @@ import numpy as np
 import pytest
 
 from motionloom.errors import MotionloomError
-from motionloom.tasks.sampling import PairSampling, PredictionSampling, Sampling
+from motionloom.requests.sampling import PairSampling, PredictionSampling, Sampling
 
 
 @pytest.mark.parametrize(
     ("kind", "settings", "said"),
     [
-        (Sampling, {"steps": 0}, "0 steps"),
-        (Sampling, {"steps": 2.5}, "2.5 steps"),
-        (Sampling, {"solver": "euler"}, "no solver 'euler'"),
-        (Sampling, {"spacing": "wide"}, "no spacing 'wide'"),
-        (Sampling, {"guidance": float("nan")}, "guidance of nan"),
-        (Sampling, {"guidance": 101.0}, "guidance of 101"),
+        (Sampling, {"steps": 0}, "steps must be a whole number from 1 to 100,000; got 0"),
+        (Sampling, {"steps": 2.5}, "steps must be a whole number .*; got 2.5"),
+        (Sampling, {"solver": "euler"}, "solver is 'euler'; there are ddpm"),
+        (Sampling, {"spacing": "wide"}, "spacing is 'wide' .*; there are index"),
+        (Sampling, {"guidance": float("nan")}, "guidance must be -100 to 100, usually 1 to 7; got nan"),
+        (Sampling, {"guidance": 101.0}, "guidance must .* got 101"),
         (Sampling, {"seed": -1}, "seed"),
         (Sampling, {"seed": (0, 2**62)}, "seed"),
-        (Sampling, {"count": 0}, "count of 0"),
-        (Sampling, {"batch_size": 0}, "batch_size of 0"),
+        (Sampling, {"count": 0}, "count must .* got 0"),
+        (Sampling, {"batch_size": 0}, "batch_size must .* got 0"),
         (PredictionSampling, {"temperature": 2.5}, "temperature"),
-        (PairSampling, {"pair_guidance": 1.5}, "together"),
+        (PairSampling, {"pair_guidance": 1.5}, "pair_guidance must be 0 to 1; got 1.5"),
     ],
 )
 def test_a_value_checks_itself(kind: type[Sampling], settings: dict, said: str) -> None:

@@ -7,11 +7,11 @@ import pytest
 
 from motionloom.diffusion import row_seed
 from motionloom.features.positions import bone_lengths
+from motionloom.requests.sampling import PredictionSampling
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks import windows
 from motionloom.tasks.completion import next_frames
-from motionloom.tasks.sampling import PredictionSampling
 from motionloom.tasks.windows import TEMPERATURE_AFTER_FIRST, Past, WindowSampler, windows_for
 from tests.tasks.small_predictor import FPS, FRAMES, OBSERVED, small_predictor
 from tests.tasks.test_edit import person

@@ -7,8 +7,8 @@ import pytest
 
 from motionloom.errors import MotionloomError
 from motionloom.motion import Motion
+from motionloom.requests.sampling import Sampling
 from motionloom.tasks import worded
-from motionloom.tasks.sampling import Sampling
 from motionloom.tasks.text import generate
 from motionloom.weights.prior import Prior
 from tests.recorded import tiny

@@ -17,6 +17,8 @@ from motionloom.bulk.row import parse
 from motionloom.bulk.shard import Batch, Report, Task, problems
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import parse_adapter
+from motionloom.requests.fields import specs
+from motionloom.requests.sampling import PairSampling
 
 Source = Jobs | Path | str | Mapping[str, Any] | Iterable[Mapping[str, Any]]
 LOCAL = "local"
@@ -128,8 +130,7 @@ def check_options(options: Options) -> None:
             raise MotionloomError(
                 "the filter asks whether motions obey, and there is no judge; name one in the options"
             )
-    if not 0 <= options.pair_guidance <= 1:
-        raise MotionloomError(f"the pair guidance must be 0 to 1; got {options.pair_guidance:g}")
+    specs(PairSampling)["pair_guidance"].check(options.pair_guidance, "pair_guidance")
     if options.shard_rows is not None and not 1 <= options.shard_rows <= MOST:
         raise MotionloomError(f"a shard has 1 to {MOST:,} rows; got {options.shard_rows:,}")
     if options.unit != 1.0 and options.format != "bvh":
@@ -147,7 +148,7 @@ def check_jobs(jobs: Jobs, rows: int) -> None:
     try:
         parse(next(jobs.read()))
     except MotionloomError as error:
-        if "unknown column" in str(error):  # so will it be in all others
+        if "the row has no '" in str(error):  # so will it be in all others
             raise MotionloomError(f"{jobs.path or 'the job'}: {error}") from None
 
 

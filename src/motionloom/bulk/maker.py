@@ -20,14 +20,16 @@ from motionloom.goals.roles import prompts_of
 from motionloom.goals.timeline import Timeline
 from motionloom.io.stream import joined
 from motionloom.motion import Motion
+from motionloom.requests.sampling import Sampling
 from motionloom.retarget import from_smpl22
 from motionloom.retarget.hands import HandPose, pose_hands
 from motionloom.tasks.adapting import adapt
+from motionloom.tasks.best import with_best_seeds
 from motionloom.tasks.control import Controlled, judged, moved, steered_features
 from motionloom.tasks.duet import compose_pair
 from motionloom.tasks.long import compose, with_loaded
 from motionloom.tasks.pair import Duet, generate_pair
-from motionloom.tasks.sampling import Sampling
+from motionloom.tasks.sampling import Rows
 from motionloom.tasks.text import GUIDANCE, SOLVER, STEPS, check, check_features, finish, to_motion
 from motionloom.tasks.worded import draw
 from motionloom.weights.container import PAIRS, weights_digest
@@ -53,6 +55,8 @@ class Options:
     """How firmly two people keep to where that wants them, 0 to 1."""
     device: str = "cpu"
     """Let the network compute in bfloat16."""
+    best_of: int = 1
+    """Seeds that are tried for each motion of a prompt, of rows that do not say."""
     steps: int = STEPS
     guidance: float = GUIDANCE
     solver: str = SOLVER
@@ -168,6 +172,7 @@ class Maker:
             seed=options.seed,
             skeleton=options.skeleton,
             literal=options.literal,
+            best_of=options.best_of,
         )
         self.judge: Judge | None = find_judge(options.judge) if options.judge else None
         self.together = TOGETHER.get(options.device.partition(":")[0], TOGETHER["cpu"])
@@ -228,7 +233,7 @@ class Maker:
             self.prior,
             [one.row.prompt for one in rows],
             [one.frames for one in rows],
-            seeds=[one.seed for one in rows],
+            seeds=[self._best_seed(one) for one in rows],
             guidance=options.guidance,
             steps=options.steps,
             solver=options.solver,
@@ -237,6 +242,16 @@ class Maker:
             self._alone(one, finish(self.prior, features, foot_lock=not options.raw))
             for one, features in zip(rows, drawn, strict=True)
         ]
+
+    def _best_seed(self, asked: Asked) -> int:
+        """The row's own seed, or the best of several; tried alone, so that it is the same whatever rows are beside."""
+        if asked.best_of == 1:
+            return asked.seed
+        options = self.options
+        rows = Rows([asked.row.prompt], [asked.frames], [asked.seed])
+        sampling = Sampling(steps=options.steps, guidance=options.guidance, solver=options.solver)
+        (seed,) = with_best_seeds(self.prior, rows, asked.best_of, sampling).seeds
+        return seed
 
     def _worded(self, asked: Asked, timeline: Timeline) -> Made:
         """A prompt with numbers that are kept."""

@@ -16,20 +16,19 @@ from motionloom.goals.fields import Field
 from motionloom.goals.goal import FPS, Goal
 from motionloom.goals.goal_file import read_goal
 from motionloom.goals.roles import MARK, prompts_of
-from motionloom.goals.segment import LONGEST
 from motionloom.goals.timeline import SHORTEST, Timeline, read_timeline, timeline_of
 from motionloom.io import load
 from motionloom.motion import Motion
+from motionloom.requests.batch import RowKeys
+from motionloom.requests.reading import read
+from motionloom.requests.shared import LONGEST, LONGEST_PROMPT
 from motionloom.skeleton import SMPL22, Skeleton
-from motionloom.tasks.text import LARGEST_SEED, frames_in
+from motionloom.tasks.text import frames_in
 
 FORMAT = 2
 """Version of what an id means, and of how shards are laid out."""
-COLUMNS = ("task", "prompt", "seconds", "seed", "timeline", "goal", "person", "skeleton", "id")
-TASKS = ("generate", "control", "compose", "duet")
 _ELSEWHERE = ("edit", "predict", "switch")
 """Tasks that begin with a clip: a batch does none of them."""
-MAX_CHARACTERS = 20_000
 MAX_DUET = 3600.0
 """Seconds of a timeline of two people."""
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
@@ -51,6 +50,8 @@ class Row:
     person: int = 1
     """Whose the goal is, or a timeline's path and goals: of two people the first (1) or the second (2)."""
     skeleton: str | None = None
+    best_of: int | None = None
+    """Seeds that are tried for the motion of a prompt; None: as the job says."""
     name: str | None = None
     """The user's own ``id``: the name of the motion's files."""
 
@@ -75,6 +76,8 @@ class Asked:
     start: Motion | None = None
     """What a timeline goes on from."""
     target: Skeleton | None = None
+    best_of: int = 1
+    """Seeds that are tried."""
 
     @property
     def id(self) -> str:
@@ -86,7 +89,7 @@ class Asked:
         """What the motion shows, in words."""
         if self.timeline is None or self.row.prompt:
             return self.row.prompt
-        return "; ".join(" ".join(segment.text.split()) for segment in self.timeline.segments)[:MAX_CHARACTERS]
+        return "; ".join(" ".join(segment.text.split()) for segment in self.timeline.segments)[:LONGEST_PROMPT]
 
 
 class Unexpected(MotionloomError):
@@ -110,18 +113,42 @@ def parse(raw: bytes) -> Row:
 
 def _parsed(raw: bytes) -> Row:
     row = _columns(raw)
-    prompt, timeline, skeleton, name = (_text(row, key) for key in ("prompt", "timeline", "skeleton", "id"))
     goal = _goal(row.get("goal"))
-    task = _task(_text(row, "task"), goal is not None, timeline is not None)
-    if timeline is None and not (prompt or "").strip():
+    if row.get("task") in _ELSEWHERE:
+        raise MotionloomError(
+            f"a batch does not {row['task']}, since that begins with a clip: 'motionloom {row['task']} --count' makes "
+            "many of one"
+        )
+    if type(row.get("id")) is int:
+        row["id"] = str(row["id"])
+    keys = read(RowKeys, row, "the row")
+    task = _task(keys.task, goal is not None, keys.timeline is not None)
+    if keys.timeline is None and keys.prompt is None:
         raise MotionloomError("the row has no prompt; say in words what the person does")
-    if timeline is not None and (prompt is not None or "seconds" in row):
+    if keys.timeline is not None and (keys.prompt is not None or keys.seconds is not None):
         raise MotionloomError("a row with a timeline has no prompt and no seconds; write them into the timeline")
-    _check_words(task, prompt or "")
-    if name is not None and not _NAME.fullmatch(name):
-        raise MotionloomError(f"the id {name[:40]!r} cannot name a file; use at most 100 letters, digits, '_' and '-'")
-    person = _person(row, task, alone=goal is None and timeline is None)
-    return Row(task, prompt or "", _seconds(row), _seed(row), timeline, goal, person, skeleton, name)
+    _check_words(task, keys.prompt or "")
+    if keys.id is not None and not _NAME.fullmatch(keys.id):
+        raise MotionloomError(
+            f"the id {keys.id[:40]!r} cannot name a file; use at most 100 letters, digits, '_' and '-'"
+        )
+    if keys.person is not None and (task != "duet" or (goal is None and keys.timeline is None)):
+        raise MotionloomError("'person' says whose a goal or a timeline's path is, in rows of the task duet")
+    person = keys.person or 1
+    if keys.best_of is not None and task != "generate":
+        raise MotionloomError(f"'best_of' chooses among motions of a prompt; the row asks for {task}")
+    return Row(
+        task,
+        keys.prompt or "",
+        keys.seconds,
+        keys.seed,
+        keys.timeline,
+        goal,
+        person,
+        keys.skeleton,
+        keys.best_of,
+        keys.id,
+    )
 
 
 def _columns(raw: bytes) -> dict[str, Any]:
@@ -132,12 +159,7 @@ def _columns(raw: bytes) -> dict[str, Any]:
         raise MotionloomError(f"the row is no JSON ({error}); write one object per line") from None
     if not isinstance(row, dict):
         raise MotionloomError('the row is no JSON object; write one object per line, such as {"prompt": "..."}')
-    row = {key: value for key, value in row.items() if value is not None}
-    if unknown := [key for key in row if key not in COLUMNS]:
-        raise MotionloomError(
-            f"the row has the unknown column {unknown[0][:40]!r}; the columns are {', '.join(COLUMNS)}"
-        )
-    return row
+    return {key: value for key, value in row.items() if value is not None}
 
 
 def _goal(goal: Any) -> str | dict[str, Any] | None:
@@ -151,12 +173,6 @@ def _task(given: str | None, goal: bool, timeline: bool) -> str:
     meant = "duet" if given == "duet" else "compose" if timeline else "control" if goal else "generate"
     if goal and timeline:
         raise MotionloomError("the row has a goal and a timeline; write the goal into the timeline")
-    if given in _ELSEWHERE:
-        raise MotionloomError(
-            f"a batch does not {given}, since that begins with a clip: 'motionloom {given} --count' makes many of one"
-        )
-    if given is not None and given not in TASKS:
-        raise MotionloomError(f"no task {given[:40]!r}; there are {', '.join(TASKS)}")
     if given is not None and given != meant:
         needs = {"compose": "a timeline", "control": "a goal", "generate": "neither goal nor timeline"}
         raise MotionloomError(f"the task {given} needs {needs[given]}, and the row asks for {meant}")
@@ -171,57 +187,12 @@ def _check_words(task: str, words: str) -> None:
         raise MotionloomError(f"the prompt {words[:60]!r} has words for two people; give the row the task duet")
 
 
-def _person(row: dict[str, Any], task: str, *, alone: bool) -> int:
-    value = row.get("person")
-    if value is None:
-        return 1
-    if isinstance(value, bool) or value not in (1, 2):
-        raise MotionloomError(f"'person' must be 1 or 2; got {str(value)[:40]!r}")
-    if task != "duet" or alone:
-        raise MotionloomError("'person' says whose a goal or a timeline's path is, in rows of the task duet")
-    return int(value)
-
-
-def _text(row: dict[str, Any], key: str) -> str | None:
-    value = row.get(key)
-    if value is None:
-        return None
-    if isinstance(value, int) and not isinstance(value, bool) and key == "id":
-        return str(value)
-    if not isinstance(value, str) or len(value) > MAX_CHARACTERS:
-        raise MotionloomError(f"'{key}' must be text of at most {MAX_CHARACTERS:,} characters")
-    return value
-
-
 def _mapping(text: str) -> dict[str, Any]:
     try:
         value = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise MotionloomError(f"'goal' is no JSON ({error})") from None
     return value
-
-
-def _seconds(row: dict[str, Any]) -> float | None:
-    value = row.get("seconds")
-    if value is None:
-        return None
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise MotionloomError(f"'seconds' must be a number; got {str(value)[:40]!r}")
-    try:
-        return float(value)
-    except OverflowError:
-        digits = len(str(abs(value)))
-        raise MotionloomError(f"'seconds' is a number of {digits:,} digits; ask for at most {LONGEST:g}") from None
-
-
-def _seed(row: dict[str, Any]) -> int | None:
-    value = row.get("seed")
-    if value is None:
-        return None
-    whole = isinstance(value, int) or (isinstance(value, float) and value.is_integer())
-    if isinstance(value, bool) or not whole or not 0 <= value < LARGEST_SEED:
-        raise MotionloomError(f"'seed' must be a whole number from 0 to below 2**62; got {str(value)[:40]!r}")
-    return int(value)
 
 
 class Sources:
@@ -238,13 +209,15 @@ class Sources:
         seed: int = 0,
         skeleton: str | None = None,
         literal: bool = False,
+        best_of: int = 1,
     ) -> None:
         """``folder``: where these files lie, or below. ``common``: what determines every motion (weights, settings).
 
         pair: what else determines motions of two people. fps: of the weights. seconds, seed, skeleton: of rows that do
-        not say; a skeleton may lie anywhere. literal: no numbers are read in prompts.
+        not say; a skeleton may lie anywhere. literal: no numbers are read in prompts. best_of:
+        of rows that do not say.
         """
-        self.literal = literal
+        self.literal, self.best_of = literal, best_of
         self.folder, self.fps, self.seconds, self.seed, self.skeleton = folder, fps, seconds, seed, skeleton
         self._pair = dict(pair or {})
         self._common = json.dumps({**common, "format": FORMAT}, sort_keys=True)
@@ -289,10 +262,18 @@ class Sources:
             "timeline": timeline and digest_timeline(timeline, start),
             "skeleton": target and digest_skeleton(target),
         }
+        best_of = self._best_of(row) if timeline is None else 1
+        if best_of > 1:  # left out as it always was: old ids hold
+            said["best_of"] = best_of
         if row.task == "duet":
             said |= {"pair": self._pair, "person": row.person}
         key = hashlib.sha256(json.dumps(said, sort_keys=True).encode("utf-8", "surrogatepass")).hexdigest()[:32]
-        return Asked(row, key, frames, seed, goal, timeline, start, target)
+        return Asked(row, key, frames, seed, goal, timeline, start, target, best_of)
+
+    def _best_of(self, row: Row) -> int:
+        if row.task != "generate":
+            return 1
+        return self.best_of if row.best_of is None else row.best_of
 
     def _worded(self, row: Row) -> Timeline | None:
         """The row's prompt as a timeline, where numbers in it are kept; as long as they need where no time is said."""

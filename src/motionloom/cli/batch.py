@@ -7,10 +7,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from motionloom.cli.options import add_options
 from motionloom.cli.reading import as_unit
 from motionloom.cli.sampling import add_adapters, fail
 from motionloom.cli.skeletons import HANDS
 from motionloom.cli.terminal import escaping, unescaped
+from motionloom.requests.batch import Batch
 
 if TYPE_CHECKING:
     from motionloom.bulk.batch import Where
@@ -41,7 +43,6 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument(
         "--prompts", type=Path, metavar="FILE", help="a text file with a prompt per line, instead of JOBS"
     )
-    parser.add_argument("--variants", type=int, metavar="N", help="motions per line of --prompts, of seeds 0 to N - 1")
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="the folder of the batch")
     parser.add_argument(
         "--verify", type=Path, metavar="FOLDER", help="only say whether a batch's files are still as they were written"
@@ -54,35 +55,18 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     )
     parser.add_argument("--shard-rows", type=int, metavar="N", help="rows of a shard (default: by the job, up to 1000)")
     parser.add_argument("--filter", metavar="CONDITION", help="keep what passes, such as 'skate < 0.2 and obeys'")
-    parser.add_argument("--seconds", type=float, default=5.0, help="length of rows that do not say (default 5)")
-    parser.add_argument("--literal", action="store_true", help="do not read numbers in prompts as goals: '3 meters'")
-    parser.add_argument(
-        "--seed", type=int, default=0, help="seed of rows that do not say, of the first variant (default 0)"
-    )
+    add_options(parser, Batch)
     parser.add_argument("--skeleton", metavar="FILE|smpl22", help="put the motions on this skeleton")
     parser.add_argument("--hands", choices=HANDS, default="as-is", help="pose of the hands, on skeletons with fingers")
     parser.add_argument(
         "--out-unit", type=as_unit, default=1.0, metavar="UNIT", help="unit of --format bvh: m (default), cm, inch ..."
     )
-    parser.add_argument("--guidance", type=float, help="strength of the text (default 2.5)")
-    parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 24)")
-    parser.add_argument("--solver", help="ddim, ddpm (the default), dpm2m or dpm2m-sde")
     parser.add_argument("--fps", type=float, help="frame rate of the files (default: the model's 20)")
-    parser.add_argument(
-        "--no-foot-lock", dest="raw", action="store_true", help="leave the feet as the network drew them"
-    )
     parser.add_argument(
         "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
     )
     parser.add_argument(
         "--pair-weights", default="duet", metavar="NAME|PATH", help="what makes two people of one (default duet)"
-    )
-    parser.add_argument(
-        "--pair-guidance",
-        type=float,
-        default=1.0,
-        metavar="SHARE",
-        help="how firmly two people keep to where that wants them, 0 to 1 (default)",
     )
     add_adapters(parser)
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
@@ -162,11 +146,6 @@ def _options(arguments: argparse.Namespace) -> "Options":
     from motionloom.bulk.maker import Options
     from motionloom.bulk.measures import Filter
 
-    if not 0 <= arguments.seed < 2**62:
-        fail(f"--seed must be 0 or more and below 2**62; got {arguments.seed}")
-    if arguments.variants is not None and arguments.variants < 1:
-        fail(f"--variants must be 1 or more; got {arguments.variants}")
-    given = {name: getattr(arguments, name) for name in ("steps", "guidance", "solver")}
     obeys = arguments.filter is not None and "obeys" in Filter(arguments.filter).names
     if obeys:
         import_module(JUDGE.partition(":")[0])  # before any work: without the laboratory nobody judges
@@ -174,7 +153,10 @@ def _options(arguments: argparse.Namespace) -> "Options":
         weights=arguments.weights,
         adapters=arguments.adapter,
         device=arguments.device,
-        raw=arguments.raw,
+        raw=not arguments.foot_lock,
+        steps=arguments.steps,
+        guidance=arguments.guidance,
+        solver=arguments.solver,
         fps=arguments.fps,
         pair_weights=arguments.pair_weights,
         pair_guidance=arguments.pair_guidance,
@@ -183,12 +165,12 @@ def _options(arguments: argparse.Namespace) -> "Options":
         unit=arguments.out_unit,
         seconds=arguments.seconds,
         literal=arguments.literal,
+        best_of=arguments.best_of,
         seed=arguments.seed,
         skeleton=arguments.skeleton,
         format=arguments.format,
         filter=arguments.filter,
         judge=JUDGE if obeys else None,
-        **{name: value for name, value in given.items() if value is not None},
     )
 
 

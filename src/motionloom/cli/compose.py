@@ -6,10 +6,14 @@ from collections.abc import Generator, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from motionloom.cli.looping import add_loop, check_loop, looped
+from motionloom.cli.looping import check_loop, looped
+from motionloom.cli.options import add_options
 from motionloom.cli.sampling import add_sampling, bar, check_outs, fail, load_prior, moves, remark_unknown, sampling_of
 from motionloom.cli.skeletons import Target, open_target
 from motionloom.cli.writing import check_overwriting
+from motionloom.requests.compose import Compose
+from motionloom.requests.shared import FINISH
+from motionloom.requests.timeline import SegmentKeys
 
 if TYPE_CHECKING:
     from motionloom.goals.timeline import Timeline
@@ -33,15 +37,9 @@ def add(subparsers) -> None:
     parser.add_argument(
         "segments", nargs="*", metavar="PROMPT|TIMELINE", help="what happens, one after the other; or one .yaml file"
     )
-    parser.add_argument("--seconds", type=float, help="length of each segment, with prompts (default 5)")
-    parser.add_argument(
-        "--transition", type=float, help="seconds that two neighbours share, with prompts (default 1, or what fits)"
-    )
-    parser.add_argument("--seed", type=int, help="the same seed makes the same motion (default 0, or the timeline's)")
-    parser.add_argument(
-        "--guidance", type=float, help="strength of the text where a segment has none of its own (default 2.5)"
-    )
-    add_loop(parser)
+    add_options(parser, SegmentKeys, "seconds", "transition", helps={"seconds": "length of each segment, with prompts"})
+    parser.set_defaults(seconds=None)
+    add_options(parser, Compose, "seed", "guidance", "steps", *FINISH)
     add_sampling(parser)
     parser.add_argument("--check", action="store_true", help="only say what would be made")
     parser.add_argument("--schema", action="store_true", help="print the JSON Schema of timeline files")
@@ -83,10 +81,6 @@ def _timeline(arguments: argparse.Namespace) -> "Timeline":
     from motionloom.goals import timeline
 
     given: list[str] = arguments.segments
-    if arguments.seed is not None and not 0 <= arguments.seed < timeline.MAX_SEED:
-        fail(f"--seed must be 0 or more and below 2**62; got {arguments.seed}")
-    if arguments.guidance is not None and not abs(arguments.guidance) <= timeline.MAX_GUIDANCE:
-        fail(f"--guidance must be -100 to 100, usually 1 to 7; got {arguments.guidance:g}")
     files = [word for word in given if word.lower().endswith((".yaml", ".yml"))]
     if not files:
         seconds = timeline.SECONDS if arguments.seconds is None else arguments.seconds

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.cli.finished import finished_motions, groups
-from motionloom.cli.looping import add_loop, check_loop, looped, note_loop
+from motionloom.cli.looping import check_loop, looped, note_loop
 from motionloom.cli.newcomers import one_sentence
+from motionloom.cli.options import add_options
 from motionloom.cli.sampling import (
     add_sampling,
     bar,
-    check_count,
     check_outs,
     check_prompt,
     fail,
@@ -23,6 +23,7 @@ from motionloom.cli.sampling import (
 )
 from motionloom.cli.skeletons import add_one_file
 from motionloom.cli.writing import check_overwriting
+from motionloom.requests.control import Control
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -64,13 +65,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         metavar="METRES",
         help="width of the drawing (default: as large as is walked in the time)",
     )
-    parser.add_argument("--seconds", type=float, help="length of each motion (default: that of --from, else 5)")
-    parser.add_argument("--seed", type=int, default=0, help="the first motion's seed (default 0)")
-    parser.add_argument("--count", type=int, default=1, help="motions to make (default 1)")
-    parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
-    parser.add_argument(
-        "--no-fit", dest="fit", action="store_false", help="leave the motion as sampled, near the goals"
-    )
+    add_options(parser, Control)
     parser.add_argument(
         "--adapters",
         action="append",
@@ -79,7 +74,6 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         help="none (the default), fitting (the shipped ones for these goals), or names of adapters, repeatable",
     )
     parser.add_argument("--schema", action="store_true", help="print what a goal file may hold as JSON Schema and end")
-    add_loop(parser)
     add_one_file(parser)
     add_sampling(parser)
     parser.set_defaults(run=run_control)
@@ -93,7 +87,6 @@ def run_control(arguments: argparse.Namespace) -> int:
         print(SCHEMA.read_text(encoding="utf-8"), end="")
         return 0
     outs, target = check_outs(arguments)
-    check_count(arguments)
     if len(one_sentence(arguments.prompt)) > 1:
         fail(f"one prompt is needed; got {len(arguments.prompt)}: {', '.join(arguments.prompt)[:200]}")
     arguments.prompt = next(iter(one_sentence(arguments.prompt)), None)
@@ -169,8 +162,8 @@ def _made(
     arguments: argparse.Namespace, prior: "Prior", goal: "Goal", judged: "list[Controlled]"
 ) -> "Iterator[list[Motion]]":
     """The motions, as many at once as the network sees; ``judged`` gets them too, with how near they came."""
+    from motionloom.requests.sampling import BATCH
     from motionloom.tasks.control import control
-    from motionloom.tasks.sampling import BATCH
 
     adapters = _adapters(arguments.adapters, prior)
     with bar("controlling") as progress:

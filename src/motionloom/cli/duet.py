@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from motionloom.cli.finished import Finished, groups
-from motionloom.cli.looping import add_loop, looped
+from motionloom.cli.looping import looped
+from motionloom.cli.options import add_options
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
     add_adapters,
     bar,
-    check_count,
     check_prompt,
     fail,
     load_prior,
@@ -25,6 +25,8 @@ from motionloom.cli.sampling import (
 from motionloom.cli.skeletons import CHARACTERS, Target, add_skeleton, own_outs, read_target
 from motionloom.cli.writing import add_writing, at_rate, check_overwriting, check_rate, check_unit
 from motionloom.formats import writable
+from motionloom.requests.duet import Duet
+from motionloom.requests.shared import FINISH, SAMPLED
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -74,20 +76,10 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument(
         "--person", type=int, choices=(1, 2), default=1, help="whose the path and a timeline's goals are (default 1)"
     )
-    parser.add_argument("--seconds", type=float, metavar="S", help="length (default 6), or what --past gets (3)")
-    parser.add_argument("--seed", type=int, help="the same seed makes the same duets (default 0, or the timeline's)")
-    parser.add_argument("--count", type=int, default=1, help="duets to make (default 1)")
-    parser.add_argument("--guidance", type=float, help="strength of the text (default 2.5, or the timeline's)")
-    parser.add_argument(
-        "--pair-guidance",
-        type=float,
-        metavar="SHARE",
-        help="how firmly the two keep to where the block wants them, 0 (they may drift apart) to 1 (default)",
-    )
+    add_options(parser, Duet, "seconds", *SAMPLED, "pair_guidance", "bodies", *FINISH)
     parser.add_argument(
         "--pair-weights", default="duet", metavar="NAME|PATH", help="what makes two of one (default duet)"
     )
-    add_loop(parser)
     _add_sampling(parser)
     add_reading(parser)
     take_text_anywhere(parser)
@@ -103,13 +95,9 @@ def _add_sampling(parser: argparse.ArgumentParser) -> None:
         help="file to write, repeatable: both people in a .glb .mp4 .gif .png, or two .bvh or .npz, one for each "
         "(default duet.glb)",
     )
-    parser.add_argument("--steps", type=int, help="network calls per duet: fewer is faster (default 24)")
     parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="the prior (default: default)")
     add_adapters(parser)
     parser.add_argument("--fps", type=float, help="frame rate of the files (default 20, or that of the motions given)")
-    parser.add_argument(
-        "--no-foot-lock", dest="foot_lock", action="store_false", help="leave the feet as the network drew them"
-    )
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
     add_skeleton(parser, own="the uniform person's, or those of the motions given")
@@ -336,19 +324,6 @@ def _check(arguments: argparse.Namespace) -> None:
         fail(f"--path does not go with --{kinds[0]}; give it with a text, or write it into a timeline")
     if len(arguments.path or ()) > 2:
         fail(f"--path is given {len(arguments.path)} times; two people have one each")
-    if arguments.seconds is not None and not 0 < arguments.seconds <= 60:
-        fail(f"--seconds must be above 0 and at most 60; got {arguments.seconds:g}")
-    _check_numbers(arguments)
-
-
-def _check_numbers(arguments: argparse.Namespace) -> None:
-    check_count(arguments)
-    if arguments.steps is not None and not 1 <= arguments.steps <= 100_000:
-        fail(f"--steps must be 1 or more; got {arguments.steps}")
-    if arguments.guidance is not None and not abs(arguments.guidance) <= 100:
-        fail(f"--guidance must be -100 to 100, usually 1 to 7; got {arguments.guidance:g}")
-    if arguments.pair_guidance is not None and not 0 <= arguments.pair_guidance <= 1:
-        fail(f"--pair-guidance must be 0 to 1; got {arguments.pair_guidance:g}")
     check_rate(arguments)
 
 

@@ -5,12 +5,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from motionloom.cli.finished import Finished, groups
-from motionloom.cli.looping import add_loop
+from motionloom.cli.options import add_options
 from motionloom.cli.reading import add_reading, check_size, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
     add_sampling,
     bar,
-    check_count,
     check_outs,
     check_prompt,
     load_prior,
@@ -24,6 +23,8 @@ from motionloom.cli.sampling import (
 from motionloom.cli.skeletons import Target, add_one_file, put_all
 from motionloom.cli.writing import at_rate, check_overwriting
 from motionloom.formats import readable
+from motionloom.requests.edit import Edit
+from motionloom.requests.shared import FINISH, SAMPLED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -41,31 +42,8 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     )
     parser.add_argument("clip", type=Path, metavar="CLIP")
     parser.add_argument("text", nargs="?", metavar="TEXT", help="what the person is to do, such as 'waves'")
-    parser.add_argument(
-        "--keep",
-        action="append",
-        default=[],
-        metavar="PART",
-        help="part that stays, repeatable: a joint, a group such as lower_body, root",
-    )
-    parser.add_argument(
-        "--between",
-        nargs=2,
-        type=float,
-        action="append",
-        default=[],
-        metavar=("FROM", "TO"),
-        help="change only these seconds, repeatable",
-    )
-    add_loop(parser)
+    add_options(parser, Edit, "keep", "between", "extend", "strength", *SAMPLED, *FINISH)
     add_one_file(parser)
-    parser.add_argument("--extend", type=float, default=0.0, metavar="SECONDS", help="go on behind the clip")
-    parser.add_argument(
-        "--strength", type=float, default=1.0, help="how far from the clip, above 0 to 1 (default 1: from noise alone)"
-    )
-    parser.add_argument("--seed", type=int, default=0, help="the first version's seed (default 0)")
-    parser.add_argument("--count", type=int, default=1, help="versions to make (default 1)")
-    parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
     add_sampling(parser, own_rate="the clip's", own_skeleton="own, the clip's", own_unit="the clip's")
     add_reading(parser)
     take_text_anywhere(parser)
@@ -77,7 +55,6 @@ def run_edit(arguments: argparse.Namespace) -> int:
     uniform = arguments.skeleton in ("smpl", "smpl22")  # made so, rather than put on it afterwards
     arguments.skeleton = None if uniform or arguments.skeleton == "own" else arguments.skeleton
     outs, target = check_outs(arguments)
-    check_count(arguments)
     if arguments.text is not None:
         check_prompt(arguments.text)
     captions = [arguments.text or arguments.clip.stem] * arguments.count
@@ -119,7 +96,7 @@ def _made(
         text,
         keep=[name.strip() for part in arguments.keep for name in part.split(",")],
         loop=arguments.loop,
-        between=[tuple(span) for span in arguments.between],
+        between=arguments.between,
         blend=arguments.blend,
         extend=arguments.extend,
         strength=arguments.strength,

@@ -64,7 +64,7 @@ def targets(
 
 def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool, own: str | None) -> Target:
     from motionloom.formats import writable
-    from motionloom.io import check_output
+    from motionloom.io import check_output, check_program
     from motionloom.io.folder import check_folder
 
     suffix = out.suffix.lower()
@@ -82,25 +82,17 @@ def _target(out: Path, count: int, formats: Sequence[str], *, pictures: bool, ow
     width = max(2, len(str(count - 1)))
     names = tuple(tuple(f"future_{i:0{width}d}.{one}" for i in range(count)) for one in dict.fromkeys(formats))
     for one in formats:
-        _check_program(f"future.{one}")
+        check_program(f"future.{one}")
     return Target(out, names, ("overview.png", _film()) if pictures else ())
-
-
-def _check_program(name: str) -> None:
-    """Raise `MotionloomError` where files of such a name need a program that is not here."""
-    from motionloom.formats import call, find
-
-    needs = find(name).needs
-    if needs:
-        call(needs)
 
 
 def _film() -> str:
     """Name of a folder's film: a .gif where there is no ffmpeg for an .mp4."""
     from motionloom.errors import MotionloomError
+    from motionloom.io import check_program
 
     try:
-        _check_program("overlay.mp4")
+        check_program("overlay.mp4")
     except MotionloomError:
         return "overlay.gif"
     return "overlay.mp4"

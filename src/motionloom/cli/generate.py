@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from motionloom.cli.finished import finished_motions
-from motionloom.cli.looping import add_loop, check_loop, looped
+from motionloom.cli.looping import check_loop, looped
 from motionloom.cli.newcomers import one_sentence
+from motionloom.cli.options import add_options
 from motionloom.cli.sampling import (
     add_sampling,
     bar,
-    check_count,
     check_outs,
     check_prompt,
     fail,
@@ -25,6 +25,8 @@ from motionloom.cli.sampling import (
 )
 from motionloom.cli.skeletons import add_one_file
 from motionloom.cli.writing import check_overwriting
+from motionloom.requests.generate import Generate
+from motionloom.requests.sampling import SOLVER
 
 if TYPE_CHECKING:
     from motionloom.cli.skeletons import Target
@@ -49,31 +51,7 @@ def add(subparsers) -> None:
     parser.add_argument(
         "--from", dest="file", type=Path, metavar="FILE", help="a text file with one prompt per line, - for stdin"
     )
-    parser.add_argument(
-        "--seconds",
-        type=float,
-        help="length of each motion (default 5; of several actions in a sentence what they take)",
-    )
-    parser.add_argument(
-        "--as-one", action="store_true", help="do not part 'A, then B' into actions that follow each other"
-    )
-    parser.add_argument(
-        "--literal", action="store_true", help="do not read numbers as goals: '3 meters', 'turns left 90 degrees'"
-    )
-    parser.add_argument(
-        "--seed", type=int, default=0, help="the first motion's seed, the next have the next (default 0)"
-    )
-    parser.add_argument("--count", type=int, default=1, help="motions per prompt (default 1)")
-    parser.add_argument(
-        "--best-of",
-        type=int,
-        default=1,
-        metavar="N",
-        help="of each motion begin N and keep the one nearest to what the words usually look like (default 1)",
-    )
-    parser.add_argument("--guidance", type=float, default=2.5, help="strength of the text (default 2.5)")
-    parser.add_argument("--solver", help="ddim, ddpm (the default), dpm2m or dpm2m-sde")
-    add_loop(parser)
+    add_options(parser, Generate)
     add_one_file(parser)
     add_sampling(parser)
     parser.set_defaults(run=_generate)
@@ -82,16 +60,12 @@ def add(subparsers) -> None:
 def _generate(arguments: argparse.Namespace) -> int:
     prompts = _prompts(arguments)
     outs, target = check_outs(arguments)
-    check_count(arguments, most=MAX_MOTIONS)
     if len(prompts) * arguments.count > MAX_MOTIONS:
         fail(f"{len(prompts)} prompts, {arguments.count} of each, are too many; at most {MAX_MOTIONS:,} in one call")
     captions = [prompt for prompt in prompts for _ in range(arguments.count)]
     files = places(outs, len(captions), target=target)
     check_overwriting(arguments, [file for several in files for file in several])
     prior = load_prior(arguments)
-    from motionloom.tasks.best import check_best_of
-
-    check_best_of(arguments.best_of)
     timelines = {prompt: _timeline(arguments, prior, prompt) for prompt in prompts}
     for found in timelines.values():
         check_loop(arguments, found.seconds)
@@ -177,7 +151,7 @@ def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str) -> "Ti
             print("motionloom: --best-of is not for numbers that are kept; this is drawn as it comes", file=sys.stderr)
         print(f"motionloom: read as: {'; '.join(said)}; --literal leaves numbers to the network", file=sys.stderr)
     if len(found.segments) > 1 and [(one.first, one.end) for one in found.readings] != [(0, len(found.segments))]:
-        if arguments.solver is not None:
+        if arguments.solver != SOLVER:
             fail("--solver is for one action at a time; give --as-one to leave the sentence whole")
         listed = ", ".join(f"'{segment.text}' {segment.seconds:.1f} s" for segment in found.segments)
         print(f"motionloom: one after the other: {listed}; --as-one leaves the sentence whole", file=sys.stderr)
@@ -235,7 +209,7 @@ def _drawn(
     unknown: frozenset[str],
 ) -> "Iterator[Motion]":
     """The motions in order, each from its own seed, as they are finished; ``worded`` gets them with what was read."""
-    from motionloom.tasks.sampling import Sampling
+    from motionloom.requests.sampling import Sampling
     from motionloom.tasks.worded import draw
 
     sampling = Sampling(**{name: value for name, value in sampling_of(arguments).items() if name != "count"})

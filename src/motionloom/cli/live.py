@@ -6,11 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.duet import check_pair_outs, write_pairs
-from motionloom.cli.looping import add_loop, check_loop, looped
+from motionloom.cli.looping import check_loop, looped
+from motionloom.cli.options import add_options
 from motionloom.cli.sampling import add_adapters, check_outs, fail, load_prior
 from motionloom.cli.sampling import write as write_files
 from motionloom.cli.skeletons import Target, add_skeleton
 from motionloom.cli.writing import add_writing, check_overwriting, check_unit
+from motionloom.requests.live import Live
 
 if TYPE_CHECKING:
     from motionloom.live.clock import Health
@@ -36,8 +38,7 @@ def add(subparsers) -> None:
         help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default motion.bvh); of two people a .bvh or "
         ".npz holds one each: give two (default duet.glb)",
     )
-    parser.add_argument("--seed", type=int, help="the same seed makes the same motion (default: the script's, else 0)")
-    parser.add_argument("--fps", type=float, help="frames per second that are shown (default: the model's 20)")
+    add_options(parser, Live)
     parser.add_argument(
         "--start",
         type=Path,
@@ -45,8 +46,6 @@ def add(subparsers) -> None:
         metavar="FILE",
         help="a motion to go on from, in its place; with two people one for each",
     )
-    parser.add_argument("--steps", type=int, default=8, help="network calls per window (default 8)")
-    parser.add_argument("--guidance", type=float, default=2.5, help="strength of the words (default 2.5)")
     parser.add_argument(
         "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
     )
@@ -57,7 +56,6 @@ def add(subparsers) -> None:
     parser.add_argument("--clock", action="store_true", help="play it against the time and say how that went")
     parser.add_argument("--check", action="store_true", help="only say what would be made")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
-    add_loop(parser)
     add_adapters(parser)
     add_skeleton(parser)
     add_writing(parser)
@@ -77,8 +75,6 @@ def _live(arguments: argparse.Namespace) -> int:
     outs, target = check_outs(arguments) if script.people == 1 else check_pair_outs(arguments)
     if target is not None and script.people == 1:
         target.names(["live"])
-    if arguments.fps is not None and not 1 <= arguments.fps <= 240:
-        fail(f"--fps must be 1 to 240; got {arguments.fps:g}")
     check_unit(arguments, outs)
     check_overwriting(arguments, outs)
     if len(arguments.start or ()) not in (0, script.people):

@@ -12,15 +12,6 @@ if TYPE_CHECKING:
     from motionloom.weights.prior import Prior
 
 
-def add_loop(parser: argparse.ArgumentParser, *, weights: bool = False) -> None:
-    """``--loop``, for `looped`; ``weights``: and ``--loop-weights``, where ``--weights`` are not a prior's."""
-    parser.add_argument("--loop", action="store_true", help="make the end meet the beginning")
-    parser.add_argument("--blend", type=float, default=1.0, help="seconds drawn anew for --loop (default 1)")
-    if weights:
-        meaning = "what draws them (default: default)"
-        parser.add_argument("--loop-weights", default="default", metavar="NAME|PATH", help=meaning)
-
-
 def check_loop(arguments: argparse.Namespace, seconds: float) -> None:
     """Refuse a ``--loop`` of motions that are too short for it."""
     if arguments.loop:
@@ -58,13 +49,12 @@ def looped(arguments: argparse.Namespace, prior: "Prior", motion: "Motion", text
     """
     if not arguments.loop:
         return motion
-    from motionloom.tasks.edit import Loop, edit
+    from motionloom.tasks.edit import close
 
     names = ("steps", "guidance") if text else ("steps",)
     settings = {name: value for name, value in sampling_of(arguments).items() if name in names}
-    foot_lock = getattr(arguments, "foot_lock", True)
-    (closed,) = edit(prior, motion, text, Loop(arguments.blend), foot_lock=foot_lock, seed=seed, **settings)
-    return closed
+    settings |= {"blend": arguments.blend, "foot_lock": getattr(arguments, "foot_lock", True)}
+    return close(prior, motion, text, seed=seed, **settings)
 
 
 def all_looped(arguments: argparse.Namespace, drawn: "Iterator[list[Motion]]") -> "Iterator[list[Motion]]":
@@ -72,10 +62,11 @@ def all_looped(arguments: argparse.Namespace, drawn: "Iterator[list[Motion]]") -
     if not arguments.loop:
         yield from drawn
         return
+    from motionloom.tasks.edit import close
     from motionloom.weights.prior import Prior
 
     prior = Prior.load(arguments.loop_weights, device=arguments.device)
-    seed = arguments.seed
+    seed, how = arguments.seed, {"blend": arguments.blend, "foot_lock": arguments.foot_lock}
     for motions in drawn:
-        yield [looped(arguments, prior, motion, "", seed=seed + number) for number, motion in enumerate(motions)]
+        yield [close(prior, motion, "", seed=seed + number, **how) for number, motion in enumerate(motions)]
         seed += len(motions)

@@ -9,12 +9,16 @@ from typing import TYPE_CHECKING, Any
 from motionloom.cli.finished import Finished, groups
 from motionloom.cli.futures import FORMATS, Long, Writing, targets, write_futures
 from motionloom.cli.futures import Target as Files
-from motionloom.cli.looping import add_loop, all_looped, check_loop_behind
+from motionloom.cli.looping import all_looped, check_loop_behind
+from motionloom.cli.options import add_options
 from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, note_rate, read_clip
-from motionloom.cli.sampling import bar, check_count, fail, sampling_of
+from motionloom.cli.sampling import bar, fail, sampling_of
 from motionloom.cli.skeletons import Target, add_skeleton, read_target
 from motionloom.cli.writing import add_writing, at_rate, check_overwriting, check_rate, check_unit
 from motionloom.formats import readable
+from motionloom.requests.fields import specs
+from motionloom.requests.predict import NAMES, Predict, Switch
+from motionloom.requests.shared import FINISH
 
 if TYPE_CHECKING:
     from motionloom.goals.hold import FixedJoints
@@ -23,7 +27,7 @@ if TYPE_CHECKING:
 
 LONG = 30.0
 """Seconds from which on futures are written while they are made, one after the other."""
-DAY = 86_400.0
+OPTIONS = (*NAMES, *FINISH)
 LISTED = 40
 """Files named at the end; --json lists all."""
 TOGETHER = 16
@@ -50,10 +54,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         description=f"Make futures of a motion ({', '.join(readable())}): see docs/predict.md.",
     )
     predict.add_argument("past", type=Path, metavar="PAST")
-    predict.add_argument(
-        "--seconds", "--horizon", type=float, default=2.0, metavar="S", help="how far to predict (default 2)"
-    )
-    predict.add_argument("--count", type=int, default=10, help="futures to make (default 10)")
+    add_options(predict, Predict, "seconds", *OPTIONS, aliases=["--horizon"], helps={"count": "futures to make"})
     predict.add_argument(
         "--out",
         type=Path,
@@ -77,7 +78,7 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     predict.add_argument(
         "--from-time", type=as_seconds, default=0.0, metavar="S", help="the second of --from at which it begins"
     )
-    predict.add_argument("--no-root", action="store_true", help="leave the person in its place, as published")
+    predict.add_argument("--no-root", action="store_true", help=f"do not {specs(Predict)['root'].help}")
     predict.add_argument("--schema", action=_PrintSchema, nargs=0, help="print the JSON Schema of mask files and end")
     _add_sampling(predict, "--from")
     predict.set_defaults(run=run_predict)
@@ -92,14 +93,7 @@ def _add_switch(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]
     )
     switch.add_argument("past", type=Path, metavar="PAST")
     switch.add_argument("target", type=Path, metavar="TARGET")
-    switch.add_argument("--seconds", type=float, default=1.0, metavar="S", help="of the transition (default 1)")
-    switch.add_argument("--count", type=int, default=1, help="versions to make (default 1)")
-    switch.add_argument(
-        "--facing",
-        choices=("turned", "kept"),
-        default="turned",
-        help="turn TARGET to go on as PAST faces, or keep its own direction (default turned)",
-    )
+    add_options(switch, Switch, "seconds", "facing", *OPTIONS, helps={"count": "versions to make"})
     switch.add_argument(
         "--out",
         type=Path,
@@ -114,20 +108,18 @@ def _add_switch(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]
 def _add_sampling(parser: argparse.ArgumentParser, other: str) -> None:
     """How and where is sampled, how files are read; ``other`` is the second motion, in words."""
     parser.add_argument("--retarget", action="store_true", help=f"put {other} on PAST's skeleton if it has another")
-    parser.add_argument("--seed", type=int, default=0, help="the same seed makes the same motions (default 0)")
-    parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster")
-    parser.add_argument("--guidance", type=float, default=1.0, help="strength of what is known (default 1)")
-    parser.add_argument("--temperature", type=float, help="livelier above 1, calmer below, 0 to 2 (default 1.1)")
-    parser.add_argument(
-        "--no-foot-lock", dest="foot_lock", action="store_false", help="leave the feet as the network drew them"
-    )
     parser.add_argument(
         "--weights", default="predictor", metavar="NAME|PATH", help="shipped name or file (default: predictor)"
     )
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
     parser.add_argument("--fps", type=float, metavar="N", help="frame rate of the files (default: PAST's)")
-    add_loop(parser, weights=True)
+    parser.add_argument(
+        "--loop-weights",
+        default="default",
+        metavar="NAME|PATH",
+        help="what draws the end for --loop (default: default)",
+    )
     add_skeleton(parser, own="PAST's")
     add_writing(parser, unit="PAST's, else m")
     add_reading(parser)
@@ -135,7 +127,7 @@ def _add_sampling(parser: argparse.ArgumentParser, other: str) -> None:
 
 def run_predict(arguments: argparse.Namespace) -> int:
     """``motionloom predict PAST``."""
-    _check(arguments, longest=DAY)
+    check_rate(arguments)
     if arguments.loop and arguments.seconds > LONG:
         fail(f"more than {LONG:g} s are written before --loop could draw the end; use: motionloom edit FILE --loop")
     if arguments.loop and arguments.no_root:
@@ -212,7 +204,7 @@ def run_switch(arguments: argparse.Namespace) -> int:
     """``motionloom switch PAST TARGET``."""
     from motionloom.io import check_output
 
-    _check(arguments, longest=LONG)
+    check_rate(arguments)
     outs = arguments.out or [Path("switch.bvh")]
     skin = read_target(arguments, outs)
     if skin is not None:
@@ -407,20 +399,6 @@ def _hold(arguments: argparse.Namespace, past: "Motion", horizon: int) -> "Fixed
 
 
 # What cannot be asked
-
-
-def _check(arguments: argparse.Namespace, *, longest: float) -> None:
-    if not 0 < arguments.seconds <= longest:
-        most = "86,400, a day" if longest == DAY else f"{longest:g}"
-        fail(f"--seconds must be above 0 and at most {most}; got {arguments.seconds:g}")
-    check_count(arguments)
-    check_rate(arguments)
-    if arguments.steps is not None and not 1 <= arguments.steps <= 100_000:
-        fail(f"--steps must be 1 or more; got {arguments.steps}")
-    if arguments.temperature is not None and not 0 <= arguments.temperature <= 2:
-        fail(f"--temperature must be 0 to 2, usually about 1; got {arguments.temperature:g}")
-    if not abs(arguments.guidance) <= 100:
-        fail(f"--guidance must be -100 to 100, usually about 1; got {arguments.guidance:g}")
 
 
 def _check_size(arguments: argparse.Namespace, past: "Motion", horizon: int, wanted: list[Files]) -> None:

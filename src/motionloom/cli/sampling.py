@@ -12,13 +12,12 @@ from motionloom.cli.skeletons import Target, add_skeleton, own_outs, read_target
 from motionloom.cli.terminal import escaping, unescaped
 from motionloom.cli.writing import add_writing, check_rate, check_unit
 from motionloom.formats import writable
+from motionloom.requests.fields import specs
+from motionloom.requests.generate import Generate
 
 if TYPE_CHECKING:
     from motionloom.motion import Motion
     from motionloom.weights.prior import Prior
-
-MAX_CHARACTERS = 20_000
-MAX_COUNT = 1000
 
 
 def add_sampling(
@@ -28,7 +27,7 @@ def add_sampling(
     own_skeleton: str = "the uniform person's",
     own_unit: str = "m",
 ) -> None:
-    """``--out``, how and where motions are sampled, and ``--skeleton``.
+    """``--out``, what motions are sampled with and where, and ``--skeleton``.
 
     ``own_rate``, ``own_skeleton`` and ``own_unit`` are those of the files without ``--fps``, ``--skeleton`` and
     ``--out-unit``, in words.
@@ -40,15 +39,11 @@ def add_sampling(
         metavar="NAME",
         help=f"file to write, repeatable; {' '.join(writable())} (default motion.bvh; motion.glb for a character)",
     )
-    parser.add_argument("--steps", type=int, help="network calls per motion: fewer is faster (default 24)")
     parser.add_argument(
         "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
     )
     add_adapters(parser)
     parser.add_argument("--fps", type=float, help=f"frame rate of the files (default: {own_rate})")
-    parser.add_argument(
-        "--no-foot-lock", dest="foot_lock", action="store_false", help="leave the feet as the network drew them"
-    )
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
     add_skeleton(parser, own=own_skeleton)
@@ -57,14 +52,14 @@ def add_sampling(
 
 def sampling_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """The settings of `Sampling` that the line says, as keywords of a task; the others are the task's own."""
-    names = ("steps", "solver", "guidance", "seed", "count", "temperature", "pair_guidance")
+    names = ("steps", "solver", "guidance", "seed", "count", "temperature", "pair_guidance", "bodies")
     found: dict[str, Any] = {name: getattr(arguments, name, None) for name in names}
     return {name: value for name, value in found.items() if value is not None}
 
 
 def moves(progress: Callable[[int, int], None], steps: int | None, rows: int) -> Callable[[int], None]:
     """What a chain of ``rows`` says of its moves, as a progress bar takes it."""
-    from motionloom.tasks.sampling import STEPS
+    from motionloom.requests.sampling import STEPS
 
     done, total = 0, (steps or STEPS) * rows
 
@@ -135,12 +130,6 @@ def check_outs(arguments: argparse.Namespace) -> tuple[list[Path], Target | None
     return outs, target
 
 
-def check_count(arguments: argparse.Namespace, *, most: int = MAX_COUNT) -> None:
-    """Refuse a ``--count`` and a ``--seed`` that cannot be."""
-    if not 1 <= arguments.count <= most or not 0 <= (arguments.seed or 0) < 2**62:
-        fail(f"--count must be 1 to {most} and --seed 0 or more; got {arguments.count} and {arguments.seed}")
-
-
 def numbered(out: Path, count: int) -> list[Path]:
     """The file of one motion, or numbered files of several."""
     if count == 1:
@@ -203,10 +192,7 @@ def report(arguments: argparse.Namespace, about: dict[str, Any], written: Sequen
 
 def check_prompt(prompt: str) -> None:
     """Refuse a prompt without words, and one that is a book."""
-    if not prompt.strip():
-        fail("a prompt is empty; say in words what the person does")
-    if len(prompt) > MAX_CHARACTERS:
-        fail(f"a prompt has {len(prompt):,} characters; say it in fewer than {MAX_CHARACTERS:,}")
+    specs(Generate)["prompt"].check(prompt, "prompt")
 
 
 def remark_unknown(prior: "Prior", prompts: Sequence[str]) -> list[str]:

@@ -164,7 +164,7 @@ class Meeting:
         return stands[1 - touch.person].to_world(beside + np.array([0.0, _STANDING[touch.other], 0.0]))
 
     def _offered(self, hand: Array) -> bool:
-        """Whether the hand (frames, 3) of somebody who is given is where such hands meet: else nobody reaches for it."""
+        """Whether the hand (frames, 3) of somebody given is where such hands meet; else nobody reaches for it."""
         low, high = self.contact.height
         return low - OFFERED < float(hand[:, 1].mean()) < high + OFFERED
 

@@ -199,14 +199,18 @@ def once(text: str) -> str:
     return " ".join(less.split()).strip(" ,")
 
 
+def counted_in(said: str) -> set[Counted]:
+    """What can be counted of what is said, in small letters."""
+    kinds: set[Counted] = {what for words, what in _COUNTED if re.search(rf"\b(?:{words})\b", said)}
+    return kinds - {"jumps"} if "jumping jacks" in kinds else kinds
+
+
 def _times(said: str) -> Amount | None:
     """Repetitions of one action whose strokes can be counted."""
     often, many = _OFTEN.findall(_OFTEN_KEPT.sub(" ", said)), list(_MANY.finditer(said))
     if len(often) + len(many) != 1 or re.search(r"\b(?:while|every|per)\b", said):
         return None
-    kinds: set[Counted] = {what for words, what in _COUNTED if re.search(rf"\b(?:{words})\b", said)}
-    if "jumping jacks" in kinds:
-        kinds.discard("jumps")
+    kinds = counted_in(said)
     if len(kinds) != 1:
         return None
     size = float(many[0][1]) if many else _often(*often[0])

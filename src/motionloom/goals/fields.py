@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 from typing import Any, NoReturn
 
-from motionloom.errors import MotionloomError
-from motionloom.io.lined_yaml import meant
-from motionloom.io.text import shown
+from motionloom.errors import MotionloomError, kind_of, listed, meant, quoted
 
 
 @dataclass(frozen=True)
@@ -27,7 +25,7 @@ class Field:
 
     def wrong(self, wanted: str) -> NoReturn:
         """Say what was wanted and what is there."""
-        self.fail(f"must be {wanted}; got {_kind(self.value)}")
+        self.fail(f"must be {wanted}; got {kind_of(self.value)}")
 
     def mapping(self, known: Collection[str], needed: Collection[str] = ()) -> dict[str, "Field"]:
         """The values by key; no key but ``known`` ones, and all that are ``needed``."""
@@ -36,7 +34,7 @@ class Field:
         for key in self.value:
             if key not in known:
                 word = str(key)
-                self.fail(f"has the unknown key {shown(word)}{meant(word, known)}; it may have {listed(known)}")
+                self.fail(f"has the unknown key {quoted(word)}{meant(word, known)}; it may have {listed(known)}")
         for key in needed:
             if key not in self.value:
                 self.fail(f"has no '{key}'; it needs {listed(needed)}")
@@ -62,7 +60,7 @@ class Field:
         if isinstance(self.value, bool) or not isinstance(self.value, int | float):
             self.wrong("a number")
         if not low <= self.value <= high or not math.isfinite(self.value):
-            self.fail(f"must be {low:g} to {high:g}; got {_kind(self.value)}")
+            self.fail(f"must be {low:g} to {high:g}; got {kind_of(self.value)}")
         return float(self.value)
 
     def numbers(self, low: float, high: float, *, least: int = 1, most: int = 100_000) -> list[float]:
@@ -80,7 +78,7 @@ class Field:
         if not isinstance(self.value, str):
             self.wrong(f"one of {', '.join(known)}")
         if self.value not in known:
-            self.fail(f"is {shown(self.value)}{meant(self.value, known)}; there are {', '.join(known)}")
+            self.fail(f"is {quoted(self.value)}{meant(self.value, known)}; there are {', '.join(known)}")
         return self.value
 
     def file(self, folder: Path) -> Path:
@@ -91,7 +89,7 @@ class Field:
         foreign = PureWindowsPath(said)
         if foreign.drive or foreign.root or ".." in foreign.parts:
             self.fail(
-                f"is {shown(said)}, which leads out of the folder {folder}; put the file there and name it without "
+                f"is {quoted(said)}, which leads out of the folder {folder}; put the file there and name it without "
                 "'..' and without a leading '/'"
             )
         place = folder / said
@@ -100,28 +98,7 @@ class Field:
         except (OSError, ValueError, RuntimeError):
             inside, there = True, False
         if not inside:
-            self.fail(f"is {shown(said)}, a link that leads out of the folder {folder}; copy the file there")
+            self.fail(f"is {quoted(said)}, a link that leads out of the folder {folder}; copy the file there")
         if not there:
-            self.fail(f"names {shown(said, 200)}, and there is no such file in {folder}")
+            self.fail(f"names {quoted(said, 200)}, and there is no such file in {folder}")
         return place
-
-
-def listed(keys: Collection[str]) -> str:
-    """'a, b and c'"""
-    *first, last = keys
-    return f"{', '.join(first)} and {last}" if first else last
-
-
-def _kind(value: Any) -> str:
-    """A value for a message: what it is, and itself where that is short."""
-    if value is None:
-        return "null"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int | float):
-        return "a number beyond all bounds" if isinstance(value, int) and abs(value) > 10**300 else f"{value:g}"
-    if isinstance(value, str):
-        return shown(value)
-    if isinstance(value, Mapping):
-        return "a mapping"
-    return f"a list of {len(value)}" if isinstance(value, list | tuple) else f"a {type(value).__name__}"

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.errors import MotionloomError
+from motionloom.errors import MotionloomError, listed
 from motionloom.features.humanml import resample_positions
 from motionloom.goals.drawing import read_drawing
-from motionloom.goals.fields import Field, listed
+from motionloom.goals.fields import Field
 from motionloom.goals.following import follow, tracks
 from motionloom.goals.goal import FPS, Goal, merged, start_of, turn_between
 from motionloom.goals.paths import CURVES, WALKING, curve, lengths_along, root_path, through, turned_to

@@ -1,13 +1,14 @@
 """A YAML file from an untrusted source, taken apart so that every mistake is reported with the file and the line."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
-from motionloom.goals.fields import listed
-from motionloom.io.lined_yaml import MAX_ITEMS, Lined, fail, meant
+from motionloom.errors import MotionloomError, listed, meant
+from motionloom.io.lined_yaml import MAX_ITEMS, Lined, fail
 from motionloom.io.text import shown
+from motionloom.requests.fields import specs
 
 
 @dataclass(frozen=True)
@@ -15,6 +16,8 @@ class LinedFile:
     """A file being read; whoever reads a kind of file builds on it."""
 
     path: Path
+    places: tuple[str, ...] = field(default=(), kw_only=True)
+    """Of values that come from no file: what leads to each, by its number (`lined_of`)."""
 
     def mapping(self, found: Lined, keys: Sequence[str], what: str) -> dict[str, Lined]:
         """The values by key; no key but ``keys``. what: the mapping, in words."""
@@ -46,10 +49,25 @@ class LinedFile:
             self.fail(found.line, f"'{name}' must be {low:g} to {f'{high:g} {unit}'.strip()}; got {value:g}")
         return value
 
+    def field(self, given: Mapping[str, Lined], keys: type, name: str) -> Any:
+        """The value of one of the keys that a request of `motionloom.requests` names; None where nothing is written."""
+        if (found := given.get(name)) is None:
+            return None
+        try:
+            return specs(keys)[name].check(found.plain(), repr(name))
+        except MotionloomError as error:
+            self.fail(found.line, str(error))
+
     def got(self, found: Lined) -> str:
         """What is there, for messages."""
         return found.kind
 
     def fail(self, line: int, message: str) -> NoReturn:
-        """Raise a `MotionloomError` that names file and line."""
-        fail(self.path, line, message)
+        """Raise a `MotionloomError` that names file and line, or the keys that lead there."""
+        if not self.places:
+            fail(self.path, line, message)
+        raise MotionloomError(f"{self.path.name}, {self.at(line)}: {message}", where=self.places[line])
+
+    def at(self, line: int) -> str:
+        """A place in words."""
+        return (self.places[line] or "as a whole") if self.places else f"line {line}"

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from motionloom.errors import MotionloomError
+from motionloom.errors import MotionloomError, meant
 from motionloom.goals.lined_file import LinedFile
-from motionloom.io.lined_yaml import Lined, meant, read_lined
+from motionloom.io.lined_yaml import Lined, read_lined
 from motionloom.io.text import shown
 from motionloom.skeleton import SMPL22
 

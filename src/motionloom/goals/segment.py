@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import Applied
 from motionloom.goals.goal import FPS, Goal
+from motionloom.requests.sampling import LARGEST_GUIDANCE
+from motionloom.requests.shared import LONGEST
 
-LONGEST = 60.0
-"""Seconds: beyond this one prompt is no longer one action."""
 TRANSITION = 1.0
 """Seconds that neighbours share unless said otherwise: the paper's handshake."""
 
@@ -32,7 +32,7 @@ class Segment:
         limits = (
             ("seconds", self.seconds, LONGEST),
             ("transition", self.transition, LONGEST),
-            ("guidance", self.guidance, 100),
+            ("guidance", self.guidance, LARGEST_GUIDANCE),
         )
         for name, value, most in limits:
             if value is not None and not abs(value) <= most:

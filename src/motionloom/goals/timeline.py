@@ -15,7 +15,10 @@ from typing import TYPE_CHECKING, Any
 from motionloom.errors import MotionloomError
 from motionloom.goals.fields import Field
 from motionloom.goals.lined_file import LinedFile
-from motionloom.io.lined_yaml import MAX_ITEMS, Lined, read_lined
+from motionloom.io.lined_yaml import MAX_ITEMS, Lined, lined_of, read_lined
+from motionloom.requests.fields import specs
+from motionloom.requests.shared import LONGEST, LONGEST_PROMPT
+from motionloom.requests.timeline import SECONDS, SegmentKeys, TimelineKeys
 
 if TYPE_CHECKING:
     from motionloom.goals.amounts import Amount
@@ -24,15 +27,10 @@ if TYPE_CHECKING:
     from motionloom.goals.sequence import Part
 
 SCHEMA = Path(__file__).parents[1] / "schemas" / "timeline.schema.json"
-KEYS = ("segments", "seed", "guidance", "transition", "start", "path")
-SEGMENT_KEYS = ("text", "seconds", "guidance", "transition", "goal", "goals", "adapters")
-SECONDS, TRANSITION = 5.0, 1.0
-"""A segment's length, and what two neighbours share, where the file does not say."""
-SHORTEST, LONGEST, SHORTEST_TRANSITION = 0.2, 60.0, 0.05
+TRANSITION = 1.0
+"""What two neighbours share where the file does not say."""
+SHORTEST = specs(SegmentKeys)["seconds"].low
 MAX_SEGMENTS = MAX_ITEMS
-MAX_CHARACTERS = 20_000
-MAX_GUIDANCE = 100.0
-MAX_SEED = 2**62
 MAX_GOAL_FRAMES = 1_000_000
 """Frames with targets in one timeline, 0.6 GB of them."""
 FPS = 20.0
@@ -92,6 +90,15 @@ def read_timeline(path: Path | str) -> Timeline:
     return _Reader(path).timeline(read_lined(path))
 
 
+def timeline_from(value: Any, *, folder: Path) -> Timeline:
+    """The timeline of plain values, such as JSON; mistakes name the keys that lead to them.
+
+    folder: where the files that it names lie, or below.
+    """
+    document, places = lined_of(value)
+    return _Reader(folder / "the timeline", places=places).timeline(document)
+
+
 def plain_timeline(texts: Sequence[str], *, seconds: float = SECONDS, transition: float | None = None) -> Timeline:
     """A timeline of equally long segments; `MotionloomError` for what a file could not ask either."""
     from motionloom.goals.segment import Segment
@@ -103,11 +110,11 @@ def plain_timeline(texts: Sequence[str], *, seconds: float = SECONDS, transition
     for number, text in enumerate(texts, start=1):
         if problem := _text_problem(text):
             raise MotionloomError(f"segment {number}: {problem}")
-    if not SHORTEST <= seconds <= LONGEST:
-        raise MotionloomError(f"a segment takes {SHORTEST:g} to {LONGEST:g} seconds; got {seconds:g}")
-    if transition is not None and not SHORTEST_TRANSITION <= transition <= seconds / 2 + 1e-9:
+    specs(SegmentKeys)["seconds"].check(seconds, "a segment's length")
+    least = specs(SegmentKeys)["transition"].low
+    if transition is not None and not least <= transition <= seconds / 2 + 1e-9:
         raise MotionloomError(
-            f"a transition takes {SHORTEST_TRANSITION:g} s to half of a segment, {seconds / 2:g} s; got {transition:g}"
+            f"a transition takes {least:g} s to half of a segment, {seconds / 2:g} s; got {transition:g}"
         )
     shared = min(TRANSITION, seconds / 2) if transition is None else transition
     return Timeline(tuple(Segment(text, seconds, transition=shared) for text in texts))
@@ -213,8 +220,8 @@ def _frames(seconds: float) -> int:
 def _text_problem(text: str) -> str:
     if not text.strip():
         return "the text is empty; say in words what the person does"
-    if len(text) > MAX_CHARACTERS:
-        return f"the text has {len(text):,} characters; say it in at most {MAX_CHARACTERS:,}"
+    if len(text) > LONGEST_PROMPT:
+        return f"the text has {len(text):,} characters; say it in at most {LONGEST_PROMPT:,}"
     return ""
 
 
@@ -234,11 +241,11 @@ class _Row:
 
 class _Reader(LinedFile):
     def timeline(self, document: Lined) -> Timeline:
-        top = self.mapping(document, KEYS, "a timeline")
+        top = self.mapping(document, tuple(specs(TimelineKeys)), "a timeline")
         if "segments" not in top:
             self.fail(document.line, "there are no 'segments'; list what the person does, one after the other")
         rows = [self.row(item) for item in self.items(top["segments"], "segments", of="segment")]
-        shared = self.number(top.get("transition"), "transition", low=SHORTEST_TRANSITION, high=LONGEST / 2)
+        shared = self.field(top, TimelineKeys, "transition")
         transitions = self.transitions(rows, shared)
         total = sum(_frames(row.seconds) for row in rows)
         targets = sum(_frames(row.seconds) for row in rows if row.goals) + (total if "path" in top else 0)
@@ -248,8 +255,8 @@ class _Reader(LinedFile):
             )
         return Timeline(
             self.segments(rows, transitions),
-            self.seed(top.get("seed")),
-            self.number(top.get("guidance"), "guidance", low=-MAX_GUIDANCE, high=MAX_GUIDANCE),
+            self.field(top, TimelineKeys, "seed"),
+            self.field(top, TimelineKeys, "guidance"),
             self.start(top.get("start")),
             self.goal(top["path"], "path", total) if "path" in top else None,
         )
@@ -257,19 +264,19 @@ class _Reader(LinedFile):
     def row(self, item: Lined) -> _Row:
         if isinstance(item.value, str):
             return _Row(item.line, self.text(item))
-        given = self.mapping(item, SEGMENT_KEYS, "a segment")
+        given = self.mapping(item, tuple(specs(SegmentKeys)), "a segment")
         if "text" not in given:
             self.fail(item.line, "a segment has no 'text'; say in words what the person does")
         if "goal" in given and "goals" in given:
             self.fail(given["goals"].key_line, "a segment has either 'goal' or 'goals'; put them all into 'goals'")
-        seconds = self.number(given.get("seconds"), "seconds", low=SHORTEST, high=LONGEST)
+        seconds = self.field(given, SegmentKeys, "seconds")
         transition = given.get("transition")
         return _Row(
             item.line,
             self.text(given["text"]),
             SECONDS if seconds is None else seconds,
-            self.number(given.get("guidance"), "guidance", low=-MAX_GUIDANCE, high=MAX_GUIDANCE),
-            self.number(transition, "transition", low=SHORTEST_TRANSITION, high=LONGEST / 2),
+            self.field(given, SegmentKeys, "guidance"),
+            self.field(given, SegmentKeys, "transition"),
             transition.line if transition else 0,
             self.goals(given),
             self.adapters(given.get("adapters")),
@@ -313,7 +320,7 @@ class _Reader(LinedFile):
                 short = row if row.seconds <= following.seconds else following
                 self.fail(
                     row.transition_line or row.line,
-                    f"the transition takes {asked:g} s and the segment of line {short.line} {short.seconds:g} s; "
+                    f"the transition takes {asked:g} s and the segment of {self.at(short.line)} {short.seconds:g} s; "
                     f"it may take at most half of that, {most:g} s",
                 )
             result.append(min(TRANSITION, most) if asked is None else asked)
@@ -375,14 +382,6 @@ class _Reader(LinedFile):
             return Field(found.value, name).file(self.path.parent)
         except MotionloomError as error:
             self.fail(found.line, str(error))
-
-    def seed(self, found: Lined | None) -> int | None:
-        if found is None:
-            return None
-        value = self.number(found, "seed", low=0, high=MAX_SEED - 1)
-        if not isinstance(value, int | float) or value != int(value):
-            self.fail(found.line, f"'seed' must be a whole number; got {self.got(found)}")
-        return int(value)
 
     def text(self, found: Lined) -> str:
         if not isinstance(found.value, str):

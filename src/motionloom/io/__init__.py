@@ -85,9 +85,14 @@ def check_output(path: Path | str, *, own: str | None = None) -> Path:
         hint = f"; {_WAYS_OUT[suffix]}" if suffix in _WAYS_OUT else f"; it ends in {suffix or 'none'}"
         raise MotionloomError(f"cannot write {path}: its name must end in {', '.join(formats.writable())}{hint}")
     check_place(path)
-    if found.needs:
-        _call(found.needs)
+    check_program(path)
     return path
+
+
+def check_program(path: Path | str) -> None:
+    """Raise `MotionloomError` where files of such a name need a program that is not here."""
+    if needs := formats.find(path).needs:
+        _call(needs)
 
 
 def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequence[str] | None = None) -> Path:

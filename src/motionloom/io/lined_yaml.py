@@ -4,9 +4,8 @@ Anchors, aliases and tags are refused, so that a small file cannot become a larg
 documents, duplicate keys, NaN and infinity. Built from the parser's events in one pass and without recursion.
 """
 
-import difflib
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -59,15 +58,25 @@ class Lined:
         return shown(self.value) if isinstance(self.value, str) else f"the number {self.value:g}"
 
 
+def lined_of(value: Any) -> tuple[Lined, tuple[str, ...]]:
+    """Plain values as `read_lined` gives those of a file; each ``line`` is a number of what leads there, in keys."""
+    places: list[str] = []
+
+    def lined(inner: Any, name: str) -> Lined:
+        number = len(places)
+        places.append(name)
+        if isinstance(inner, dict):
+            inner = {key: lined(one, f"{name}.{key}".removeprefix(".")) for key, one in inner.items()}
+        elif isinstance(inner, list):
+            inner = [lined(one, f"{name}[{index}]") for index, one in enumerate(inner)]
+        return Lined(number, inner, number)
+
+    return lined(value, ""), tuple(places)
+
+
 def fail(path: Path | str, line: int, message: str) -> NoReturn:
     """Raise a `MotionloomError` that names file and line."""
     raise MotionloomError(f"{path}, line {line}: {message}")
-
-
-def meant(word: str, known: Collection[str]) -> str:
-    """What a message may add about a misspelt word: the known one that is like it, in brackets, if there is one."""
-    near = difflib.get_close_matches(word[:40], known, n=1)
-    return f" (did you mean {near[0]!r}?)" if near else ""
 
 
 def read_lined(path: Path | str, *, max_bytes: int = 32_000_000) -> Lined:

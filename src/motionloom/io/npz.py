@@ -179,7 +179,7 @@ def read_header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype]:
     version = np.lib.format.read_magic(stream)
     reader = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
     shape, fortran, dtype = reader(stream)
-    if len(shape) > 32 or not all(type(n) is int and 0 <= n < 2**62 for n in shape):
+    if len(shape) > 32 or not all(type(n) is int and 0 <= n < 1 << 62 for n in shape):
         raise ValueError("it has no shape")
     return shape, fortran, dtype
 

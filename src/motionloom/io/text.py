@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionloom.errors import MotionloomError
+from motionloom.errors import MotionloomError, quoted
 from motionloom.motion import MAX_POSES
 from motionloom.reading import MAX_BYTES, read_bytes
 
@@ -93,8 +93,7 @@ def word(raw: bytes) -> str:
 
 def shown(raw: bytes | str, limit: int = 40) -> str:
     """A piece of a file as it may appear in a message: quoted, without control characters, not too long."""
-    text = word(raw) if isinstance(raw, bytes) else raw
-    return repr(text if len(text) <= limit else text[: limit - 3] + "...")
+    return quoted(word(raw) if isinstance(raw, bytes) else raw, limit)
 
 
 def number(raw: bytes | str) -> float | None:

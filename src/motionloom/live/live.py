@@ -23,8 +23,9 @@ from motionloom.live.person import Asked, Person, Request, State
 from motionloom.live.settings import Settings
 from motionloom.live.window import Noise, Sampler
 from motionloom.motion import Motion
+from motionloom.requests.fields import specs
+from motionloom.requests.sampling import Sampling
 from motionloom.skeleton import SMPL22, Skeleton
-from motionloom.tasks.text import LARGEST_SEED
 from motionloom.weights.prior import Prior
 
 Array = NDArray[np.float64]
@@ -310,5 +311,4 @@ def check(prior: Prior, seed: int) -> None:
         raise MotionloomError(
             f"these weights make {len(prior.mean)} numbers a frame; live motion needs {WIDTH} at {FPS:g} fps"
         )
-    if not 0 <= seed < LARGEST_SEED:
-        raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {seed}")
+    specs(Sampling)["seed"].check(seed, "seed")

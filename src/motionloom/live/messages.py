@@ -1,7 +1,7 @@
 """The JSON messages of a live connection: what a client may say, checked, and what it is answered (docs/live.md)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,27 +11,15 @@ from motionloom.io.text import parse_json
 from motionloom.live.clock import Health, first_of
 from motionloom.live.commands import Taken, to_json
 from motionloom.live.live import Frame
+from motionloom.requests import reading
+from motionloom.requests.live import Hello
 from motionloom.retarget.named import named_skeleton
-from motionloom.skeleton import SMPL22, Skeleton
+from motionloom.skeleton import Skeleton
 
 VERSION = 1
 LARGEST = 256 * 1024
 """Bytes of one message."""
 MOST_JOINTS = 300
-_HELLO = ("type", "seed", "fps", "people", "skeleton", "session")
-
-
-@dataclass(frozen=True)
-class Hello:
-    """How a session begins."""
-
-    seed: int = 0
-    fps: float = 20.0
-    people: int = 1
-    """1 or 2."""
-    skeleton: Skeleton = field(default_factory=lambda: SMPL22)
-    session: str = ""
-    """The key of a session to go on with."""
 
 
 def read(text: str | bytes) -> Mapping[str, Any]:
@@ -48,19 +36,8 @@ def hello(said: Mapping[str, Any]) -> Hello:
     """The first message of a client; `MotionloomError` names what is wrong with it."""
     if said.get("type") != "hello":
         raise MotionloomError('the first message is {"type": "hello"}')
-    if extra := [key for key in said if key not in _HELLO]:
-        raise MotionloomError(f"hello has no {extra[0][:40]!r}; it has {', '.join(_HELLO[1:])}")
-    seed, fps, session = said.get("seed", 0), said.get("fps", 20.0), said.get("session", "")
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**62:
-        raise MotionloomError("a seed is a whole number from 0 to below 2**62")
-    if isinstance(fps, bool) or not isinstance(fps, int | float) or not 1 <= fps <= 120:
-        raise MotionloomError("fps is a number from 1 to 120")
-    people = said.get("people", 1)
-    if isinstance(people, bool) or people not in (1, 2):
-        raise MotionloomError("people is 1 or 2")
-    if not isinstance(session, str) or len(session) > 100:
-        raise MotionloomError("a session is named by the key that its welcome gave")
-    return Hello(seed, float(fps), int(people), skeleton(said.get("skeleton", "smpl22")), session)
+    found = reading.read(Hello, {key: value for key, value in said.items() if key != "type"}, "hello")
+    return replace(found, skeleton=skeleton(found.skeleton))
 
 
 def skeleton(said: Any) -> Skeleton:

@@ -24,6 +24,7 @@ from motionloom.goals.roles import prompts_of
 from motionloom.io.lined_yaml import Lined, read_lined
 from motionloom.live.commands import Command, Say, from_json, person_of, to_json
 from motionloom.live.live import Frame, Stage
+from motionloom.requests.sampling import LARGEST_SEED
 
 LONGEST = 3600.0
 """Seconds of a session that is written to files."""
@@ -100,7 +101,7 @@ class _Reader(LinedFile):
         seconds = self.number(parts.get("seconds"), "seconds", low=0.05, high=LONGEST, unit="seconds")
         if seconds is None:
             self.fail(found.line, "a live script says how long it is: give 'seconds'")
-        seed = self.number(parts.get("seed"), "seed", low=0, high=2**62 - 1)
+        seed = self.number(parts.get("seed"), "seed", low=0, high=LARGEST_SEED - 1)
         if seed is not None and not isinstance(seed, int):
             self.fail(parts["seed"].line, f"'seed' must be a whole number; got {seed:g}")
         people = self.number(parts.get("people"), "people", low=1, high=2)

@@ -20,11 +20,11 @@ from starlette.routing import BaseRoute, Route
 from motionloom.errors import MotionloomError
 from motionloom.io.text import parse_json
 from motionloom.retarget.named import NAMED
-from motionloom.server import asking
 from motionloom.server import page as built
 from motionloom.server.bodies import body_of, file_of
 from motionloom.server.components import FORMATS
 from motionloom.server.guard import Door, Guard
+from motionloom.server.job_request import TASKS, read_request
 from motionloom.server.limits import Limits
 from motionloom.server.mmcp.routes import capabilities_of
 from motionloom.server.mmcp.routes import routes as mmcp_routes
@@ -35,6 +35,7 @@ from motionloom.server.refusal import Refusal, full_disk
 from motionloom.server.saved import Saved
 from motionloom.server.saved import routes as project_routes
 from motionloom.server.streaming import EventStream, Streams
+from motionloom.server.timelines import timeline_json, timeline_yaml
 from motionloom.server.worker import Worker
 from motionloom.skeleton import SMPL22
 
@@ -129,7 +130,7 @@ async def capabilities(request: Request) -> Response:
             "parents": list(SMPL22.parents),
             "offsets": SMPL22.offsets.tolist(),
             "groups": {name: list(at) for name, at in SMPL22.groups.items()},
-            "tasks": list(asking.TASKS),
+            "tasks": list(TASKS),
             "limits": studio.limits.public(),
             "formats": list(FORMATS),
             "skeletons": list(NAMED),
@@ -152,7 +153,7 @@ async def docs(request: Request) -> Response:
 async def make_job(request: Request) -> Response:
     studio = studio_of(request)
     body = parse_json(await body_of(request, studio.limits.body_bytes), "the body")
-    asked = await run_in_threadpool(asking.read_request, body, studio.project, studio.limits)
+    asked = await run_in_threadpool(read_request, body, studio.project, studio.limits)
     made = studio.worker.submit(asked, client_of(request))
     return JSONResponse({"id": made.id}, status_code=202, headers={"Location": f"/jobs/{made.id}"})
 
@@ -262,8 +263,7 @@ async def _with_file(studio: Studio, call: Callable[[], Any], part: Path | None 
 async def timeline_to_yaml(request: Request) -> Response:
     studio = studio_of(request)
     value = parse_json(await body_of(request, studio.limits.body_bytes), "the body")
-    text = asking.timeline_yaml(value)
-    await run_in_threadpool(asking.read_timeline_text, text, studio.project, studio.limits)
+    text = await run_in_threadpool(timeline_yaml, value, studio.project, studio.limits)
     return PlainTextResponse(text, media_type="text/yaml")
 
 
@@ -274,7 +274,7 @@ async def timeline_to_json(request: Request) -> Response:
         text = body.decode("utf-8")
     except UnicodeDecodeError:
         raise MotionloomError("the timeline is not UTF-8 text; save it as UTF-8") from None
-    return JSONResponse(await run_in_threadpool(asking.timeline_json, text, studio.project, studio.limits))
+    return JSONResponse(await run_in_threadpool(timeline_json, text, studio.project, studio.limits))
 
 
 # What goes wrong

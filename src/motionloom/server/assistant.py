@@ -1,18 +1,25 @@
-"""MCP over standard input and output, so that an assistant can make motion: three tools over the same worker.
+"""MCP over standard input and output, so that an assistant can make motion: a tool for each task, and one for files.
 
+What the tools take is what the requests say (`motionloom.requests`).
 Needs the extra ``mcp``. Nothing but the protocol may be written to standard output.
 """
 
+import inspect
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import Applied
-from motionloom.server.asking import read_request
+from motionloom.requests.fields import specs
+from motionloom.requests.reading import narrowed
+from motionloom.requests.schema import Schema, schema
+from motionloom.requests.tasks import REQUESTS
+from motionloom.requests.timeline import SegmentKeys, TimelineKeys
+from motionloom.server.job_request import TASKS, most, read_request
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project
 from motionloom.server.refusal import Refusal
@@ -21,8 +28,29 @@ from motionloom.server.worker import Worker
 CLIENT = "assistant"
 WHAT = (
     "Human motion from plain English, on a skeleton of 22 joints at 20 frames per second. Make motion with "
-    "generate_motion (one action) or compose (several, one after the other), then write files with export."
+    "generate_motion (one action), compose (several, one after the other) or another task; write files with export."
 )
+
+
+_GOALS: Schema = {"type": "object", "description": "paths, joints and poses that are kept to (docs/control.md)"}
+_PARTS: Mapping[str, Schema] = {"goal": _GOALS, "adapters": {}, "motion file": {"type": "string"}}
+_SEGMENT: Schema = {
+    "type": "object",
+    "properties": {name: schema(spec, _PARTS) for name, spec in specs(SegmentKeys).items()},
+    "required": ["text"],
+}
+_TIMELINE: Schema = {
+    "type": "object",
+    "properties": {
+        name: schema(
+            spec, {**_PARTS, "segments": {"type": "array", "items": {"anyOf": [{"type": "string"}, _SEGMENT]}}}
+        )
+        for name, spec in specs(TimelineKeys).items()
+    },
+    "required": ["segments"],
+}
+KINDS: Mapping[str, Schema] = {"motion": {"type": "string"}, "goals": _GOALS, "timeline": _TIMELINE}
+"""Fields that are read by their kind; no schema of a tool refers to another."""
 
 
 class Assistant:
@@ -31,33 +59,36 @@ class Assistant:
     def __init__(self, project: Project, worker: Worker) -> None:
         self.project, self.worker = project, worker
 
-    async def generate_motion(
-        self, prompt: str, seconds: float = 5.0, seed: int = 0, count: int = 1
-    ) -> list[dict[str, Any]]:
-        """Make motions of one person from a sentence such as 'a person walks forward and waves'.
+    def tool(self, task: str) -> Callable[..., Any]:
+        """What makes motion of a task's request, with its fields as arguments."""
+        from pydantic import WithJsonSchema
 
-        seconds: length, at most 60. count: takes to make, 1 to 8; take i is drawn from seed + i. Gives an id for each.
-        """
-        asked = {"task": "generate", "prompt": prompt, "seconds": seconds, "seed": seed, "count": count}
-        return await self._drawn(asked)
+        async def call(**given: Any) -> list[dict[str, Any]]:
+            return await self._drawn({"task": task} | given)
 
-    async def compose(
-        self, segments: list[dict[str, Any]], path: dict[str, Any] | None = None, seed: int = 0
-    ) -> list[dict[str, Any]]:
-        """Make one long motion of several actions, one after the other, without seams.
-
-        segments: such as {"text": "a person walks", "seconds": 4, "transition": 1}, in their order; text is needed.
-        path: where the person goes, such as {"path": {"points": [[0, 0], [1, 2], [0, 4]]}} (x and z, metres).
-        """
-        timeline = {"segments": segments} | ({} if path is None else {"path": path})
-        return await self._drawn({"task": "compose", "timeline": timeline, "seed": seed})
+        known = narrowed(REQUESTS[task], most(task, self.worker.limits))
+        call.__name__ = "generate_motion" if task == "generate" else task
+        call.__doc__ = f"{inspect.getdoc(REQUESTS[task])} Gives an id for each motion."
+        call.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+            [
+                inspect.Parameter(
+                    name,
+                    inspect.Parameter.KEYWORD_ONLY,
+                    default=inspect.Parameter.empty if spec.needed else None,
+                    annotation=Annotated[Any, WithJsonSchema(schema(spec, KINDS))],
+                )
+                for name, spec in sorted(known.items(), key=lambda one: not one[1].needed)
+            ],
+            return_annotation=list[dict[str, Any]],
+        )
+        return call
 
     async def export(
         self, motion: str, format: str = "bvh", skeleton: str | None = None, name: str | None = None
     ) -> dict[str, Any]:
         """Write a motion to a file in the project folder and give its path.
 
-        motion: an id that generate_motion or compose gave. format: bvh, glb, npz, mp4 or png. skeleton: smpl22, mixamo,
+        motion: an id that another tool gave. format: bvh, glb, npz, mp4 or png. skeleton: smpl22, mixamo,
         unreal, vrm or rigify. name: of the file, letters, digits, - and _ only; without it the motion's id.
         """
         import anyio
@@ -114,7 +145,7 @@ def run(folder: Path, *, weights: str = "default", device: str = "cpu", adapters
     limits = Limits()
     worker = Worker(Project(folder, limits), limits, weights=weights, device=device, adapters=adapters)
     tools = Assistant(worker.project, worker)
-    for tool in (tools.generate_motion, tools.compose, tools.export):
+    for tool in (*map(tools.tool, TASKS), tools.export):
         server.tool()(tool)
     worker.start()
     try:

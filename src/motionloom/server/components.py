@@ -3,13 +3,17 @@
 No object is described inside of another, so that no two classes of a client get one name.
 """
 
+from dataclasses import replace
 from typing import Any
 
-from motionloom.server.asking import COMMON, KEYS, TASKS
+from motionloom.requests.fields import specs
+from motionloom.requests.reading import narrowed
+from motionloom.requests.schema import Schema, schema
+from motionloom.requests.tasks import REQUESTS
+from motionloom.requests.timeline import SegmentKeys, TimelineKeys
+from motionloom.server.job_request import LEVELS, TASKS, most
 from motionloom.server.jobs import FINAL
 from motionloom.server.limits import Limits
-
-Schema = dict[str, Any]
 
 TEXT: Schema = {"type": "string"}
 FLAG: Schema = {"type": "boolean"}
@@ -26,6 +30,19 @@ _FLOATS = TEXT | {"description": "base64 of little-endian float32", "contentEnco
 def ref(name: str) -> Schema:
     """A schema by its name."""
     return {"$ref": f"#/components/schemas/{name}"}
+
+
+_GOAL = {"anyOf": [ref("Goals"), TEXT]}
+"""Goals, or in a timeline the name of a file in the project that holds them."""
+KINDS: dict[str, Schema] = {
+    "motion": ID,
+    "timeline": ref("Timeline"),
+    "goals": ref("Goals"),
+    "goal": _GOAL,
+    "motion file": TEXT,
+    "segments": {"type": "array", "items": {"anyOf": [TEXT, ref("Segment")]}, "minItems": 1},
+}
+"""Fields that are read by their kind."""
 
 
 def _number(**more: Any) -> Schema:
@@ -55,87 +72,37 @@ def components(limits: Limits) -> dict[str, Schema]:
 
 
 def _requests(limits: Limits) -> dict[str, Schema]:
-    known = _properties(limits)
-    tasks = {
-        request_of(task): _object(
-            {key: {"const": task} if key == "task" else known[key] for key in (*COMMON, *keys)}, "task", more=False
-        )
-        for task, keys in KEYS.items()
-    }
+    """Of every task, and of the words that fields of them may be, which are named after these fields."""
+    found: dict[str, Schema] = {}
+    for task, request in REQUESTS.items():
+        fields = narrowed(request, most(task, limits))
+        found |= {name.title(): {"enum": list(spec.words)} for name, spec in fields.items() if spec.words}
+        keys = {"task": {"const": task}, "levels": _levels(limits)}
+        keys |= {name: ref(name.title()) if spec.words else schema(spec, KINDS) for name, spec in fields.items()}
+        needed = [name for name, spec in fields.items() if spec.needed]
+        found[request_of(task)] = _object(keys, "task", *needed, more=False)
     mapping = {task: ref(request_of(task))["$ref"] for task in TASKS}
     one = {
         "oneOf": [ref(request_of(task)) for task in TASKS],
         "discriminator": {"propertyName": "task", "mapping": mapping},
     }
-    return {"JobRequest": one, **tasks}
+    return {"JobRequest": one, **found}
 
 
-def _properties(limits: Limits) -> dict[str, Schema]:
-    """Every key that a job may have."""
-    whole = WHOLE | {"minimum": 0}
-    every = WHOLE | {"minimum": 1, "maximum": limits.steps}
-    return {
-        "seed": whole | {"default": 0, "description": "motion i is drawn from seed + i (predict, duet: from both)"},
-        "count": WHOLE | {"minimum": 1, "maximum": limits.count, "default": 1},
-        "steps": every | {"description": "network calls a motion"},
-        "guidance": _number(minimum=-100, maximum=100, description="strength of the text"),
-        "levels": {
-            "oneOf": [FLAG, every],
-            "default": True,
-            "description": "send the poses as events after every network call, or after every so many",
-        },
-        "prompt": TEXT | {"maxLength": limits.prompt, "description": "what the person does; two people: 'A :: B'"},
-        "seconds": _number(exclusiveMinimum=0, description="length; of predict and switch what is drawn"),
-        "as_one": FLAG | {"description": "do not part 'A, then B' into actions that follow each other"},
-        "literal": FLAG | {"description": "leave numbers in the words to the network: '3 meters', 'jumps twice'"},
-        "timeline": ref("Timeline"),
-        "goals": ref("Goals"),
-        "motion": ID,
-        "to": ID | {"description": "the motion that is switched to"},
-        "person": whole | {"maximum": limits.people - 1, "description": "who is edited, or has the goals"},
-        "redraw": _list(_list(_number(), minItems=2, maxItems=2), description="stretches, in seconds, drawn anew"),
-        "keep": _list(TEXT, description="joints and groups that stay"),
-        "loop": FLAG,
-        "blend": _number(),
-        "extend": _number(),
-        "strength": _number(exclusiveMinimum=0, maximum=1),
-        "start": _number(description="use the motion from this second on"),
-        "end": _number(),
-        "temperature": _number(minimum=0, maximum=2),
-        "facing": ref("Facing"),
-        "past": ID | {"description": "a motion of two people that both go on from"},
-        "react_to": ID | {"description": "a motion of the first person, whom the second answers"},
-        "together": _number(minimum=0, maximum=1),
-    }
+def _levels(limits: Limits) -> Schema:
+    every = schema(replace(LEVELS, high=limits.steps), {})
+    return {"oneOf": [FLAG, every], "default": True, "description": every.pop("description")}
 
 
 def _timelines() -> dict[str, Schema]:
-    goal = {"anyOf": [ref("Goals"), TEXT], "description": "goals, or the name of a file in the project that holds them"}
-    segment = _object(
-        {
-            "text": TEXT | {"description": "what the person does"},
-            "seconds": _number(minimum=0.2, maximum=60),
-            "guidance": _number(minimum=-100, maximum=100),
-            "transition": _number(minimum=0.05, maximum=30, description="seconds shared with the next segment"),
-            "goal": goal,
-            "goals": _list(goal),
-        },
-        "text",
-    )
-    timeline = _object(
-        {
-            "segments": _list({"anyOf": [TEXT, ref("Segment")]}, minItems=1),
-            "seed": WHOLE | {"minimum": 0},
-            "guidance": _number(minimum=-100, maximum=100),
-            "transition": _number(minimum=0.05, maximum=30),
-            "start": TEXT | {"description": "a motion of the project that is gone on from, such as ID.npz"},
-            "path": goal,
-        },
-        "segments",
-        about="what a timeline's YAML file holds (docs/compose.md)",
-    )
-    goals = {"type": "object", "description": "what a goal file holds (docs/control.md)"}
-    return {"Timeline": timeline, "Segment": segment, "Goals": goals, "Facing": {"enum": ["turned", "kept"]}}
+    """What timelines hold in JSON: no files of adapters."""
+    segment = {name: schema(spec, KINDS) for name, spec in specs(SegmentKeys).items() if spec.kind != "adapters"}
+    timeline = {name: schema(spec, KINDS) for name, spec in specs(TimelineKeys).items()}
+    return {
+        "Timeline": _object(timeline, "segments", about="what a timeline's YAML file holds (docs/compose.md)"),
+        "Segment": _object(segment, "text"),
+        "Goals": {"type": "object", "description": "what a goal file holds (docs/control.md)"},
+    }
 
 
 def _jobs() -> dict[str, Schema]:

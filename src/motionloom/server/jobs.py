@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from motionloom.server.asking import Request
+from motionloom.server.job_request import JobRequest
 
 FINAL = ("done", "failed", "cancelled")
 
@@ -38,7 +38,7 @@ class Event:
 class Job:
     """One job of one client."""
 
-    request: Request
+    request: JobRequest
     client: str
     most_bytes: int
     """Of levels in the log."""

@@ -2,12 +2,14 @@
 
 from dataclasses import asdict, dataclass
 
+from motionloom.requests.shared import LONGEST
+
 
 @dataclass(frozen=True)
 class Limits:
     """Bounds of requests, of the queue and of the project folder."""
 
-    seconds: float = 60.0
+    seconds: float = LONGEST
     """Of one motion of one prompt."""
     total_seconds: float = 600.0
     """Of a long motion, of futures, and of a clip that is uploaded."""

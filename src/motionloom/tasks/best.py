@@ -1,8 +1,10 @@
 """Best of several: which of a few seeds a motion is sampled from.
 
-Several seeds are sampled half way. There the denoised estimates show what each becomes. Kept is the one whose joint
-rotations lie nearest to the mean of what the words ask for, which is what the network answers to pure noise.
-Odd motions, and those that do only half of what is said, lie far from it. docs/decisions/0024 says what it is worth.
+Several seeds are sampled half way. There the denoised estimates show what each becomes. Kept is one that does the most
+of what its words allow to check (`motionloom.goals.expected`), then one whose body is whole, then one of the livelier
+half. Of those that are left it is the one whose joint rotations lie nearest to the mean of what the words ask for,
+which is what the network answers to pure noise: odd motions lie far from it, and so do those that move, which is why
+the mean comes last. docs/decisions/0024 says what it is worth.
 """
 
 from dataclasses import replace
@@ -11,18 +13,13 @@ import numpy as np
 
 from motionloom.diffusion import row_noise
 from motionloom.diffusion.sampling import row_seed
-from motionloom.errors import MotionloomError
+from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT, WIDTH
-from motionloom.tasks.sampling import Progress, Rows, Sampling, sample
+from motionloom.goals.expected import asks_for_rest, share_met
+from motionloom.kinematics.wholeness import ENOUGH, wholeness
+from motionloom.requests.sampling import Sampling
+from motionloom.tasks.sampling import Progress, Rows, sample, to_features
 from motionloom.weights.prior import Prior
-
-MOST = 16
-
-
-def check_best_of(count: int) -> None:
-    """Raise `MotionloomError` for a number of seeds that cannot be tried."""
-    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST:
-        raise MotionloomError(f"the best is chosen of 1 to {MOST} motions; got {count}")
 
 
 def with_best_seeds(
@@ -41,10 +38,26 @@ def with_best_seeds(
     estimates = dict(sample(prior, several, sampling, halfway=True, progress=progress))
     chosen = []
     for row, seeds in enumerate(tried):
-        mean = _mean(prior, rows.prompts[row], rows.lengths[row], seeds, sampling)
-        away = [_distance(estimates[row * count + number], mean) for number in range(count)]
-        chosen.append(seeds[away.index(min(away))])
+        prompt, own = rows.prompts[row], np.stack([estimates[row * count + number] for number in range(count)])
+        mean = _mean(prior, prompt, rows.lengths[row], seeds, sampling)
+        ranks = [
+            (*before, _distance(one, mean)) for before, one in zip(_looked_at(prior, prompt, own), own, strict=True)
+        ]
+        chosen.append(seeds[ranks.index(min(ranks))])
     return replace(rows, seeds=chosen)
+
+
+def _looked_at(prior: Prior, prompt: str, estimates: np.ndarray) -> list[tuple[float, ...]]:
+    """Of each estimate (rows, frames, features) what comes before the mean, the smaller the better."""
+    if len(prior.mean) != WIDTH:
+        return [()] * len(estimates)
+    bodies = humanml.decode_positions(to_features(prior, estimates))
+    pace = np.linalg.norm(np.diff(bodies, axis=1), axis=-1).mean(axis=(1, 2))
+    still = np.zeros(len(pace)) if asks_for_rest(prompt) else pace < np.median(pace)
+    return [
+        (-share_met(prompt, body, prior.fps), float(wholeness(body) < ENOUGH), float(slow))
+        for body, slow in zip(bodies, still, strict=True)
+    ]
 
 
 def _mean(prior: Prior, prompt: str, length: int, seeds: list[int], sampling: Sampling) -> np.ndarray:

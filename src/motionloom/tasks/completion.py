@@ -17,7 +17,7 @@ from motionloom.diffusion import SOLVERS, guide, row_noise, row_seed, sample
 from motionloom.edits.boundary import match_boundary
 from motionloom.errors import MotionloomError
 from motionloom.features.positions import bone_lengths, with_bones
-from motionloom.tasks.sampling import PredictionSampling, PredictionSettings
+from motionloom.requests.sampling import PredictionSampling, PredictionSettings
 from motionloom.tasks.watching import View
 from motionloom.weights.predictor import Predictor
 

@@ -19,13 +19,14 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import mask as named
 from motionloom.features.layout import ric
 from motionloom.goals.goal import Goal, start_of
-from motionloom.goals.segment import LONGEST
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
+from motionloom.requests.sampling import Sampling, Settings
+from motionloom.requests.shared import LONGEST
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Condition
 from motionloom.skeleton import SMPL22
-from motionloom.tasks.sampling import Batch, Progress, Rows, Sampling, Settings, sample, to_features
+from motionloom.tasks.sampling import Batch, Progress, Rows, sample, to_features
 from motionloom.tasks.text import alone, check_prompts, to_motion
 from motionloom.weights.adapter import Adapter, adapted, show
 from motionloom.weights.adapter import adapters as shipped

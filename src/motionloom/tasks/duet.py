@@ -25,9 +25,11 @@ from motionloom.features.pair import one_world
 from motionloom.goals.contact import read_contact
 from motionloom.goals.goal import Goal
 from motionloom.goals.roles import prompts_of
-from motionloom.goals.segment import LONGEST, Segment
+from motionloom.goals.segment import Segment
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion
+from motionloom.requests.sampling import PairSampling, PairSettings
+from motionloom.requests.shared import LONGEST
 from motionloom.retarget import joints22, to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.runtime.pair import PLACE, PairSession, join, part
@@ -49,7 +51,7 @@ from motionloom.tasks.pair import (
     poses_at,
     stacked,
 )
-from motionloom.tasks.sampling import Moves, PairSampling, PairSettings, Progress, sample_chain, smooth
+from motionloom.tasks.sampling import Moves, Progress, sample_chain, smooth
 from motionloom.tasks.splice import apply_positions, person_at_20
 from motionloom.tasks.text import finish
 from motionloom.tasks.watching import ChainView

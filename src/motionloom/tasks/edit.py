@@ -17,12 +17,15 @@ from motionloom.edits.boundary import InpaintWindow
 from motionloom.errors import MotionloomError
 from motionloom.features import layout
 from motionloom.features.layout import FPS, WIDTH
-from motionloom.goals.segment import LONGEST
 from motionloom.motion import Motion
+from motionloom.requests.edit import Edit
+from motionloom.requests.fields import specs
+from motionloom.requests.sampling import Sampling, Settings
+from motionloom.requests.shared import LONGEST
 from motionloom.retarget import to_smpl22
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.inpaint import inpaint_motion
-from motionloom.tasks.sampling import Progress, Sampling, Settings
+from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import (
     Kept,
     apply_sample,
@@ -63,8 +66,7 @@ class Redraw:
     """How much noise the old motion gets before it is denoised again, above 0 to 1 (nothing of it is left)."""
 
     def __post_init__(self) -> None:
-        if not 0 < self.strength <= 1:
-            raise MotionloomError(f"the strength must be above 0 and at most 1; got {self.strength:g}")
+        specs(Edit)["strength"].check(self.strength, "strength")
         unknown = [name for name in self.keep if name not in PARTS]
         if unknown:
             raise MotionloomError(f"no part called {unknown[0]!r} to keep; the parts are {', '.join(PARTS)}")
@@ -196,6 +198,17 @@ def edit(
             version = change.apply(sampler, version, seed)
         made.append(version)
     return made
+
+
+def close(
+    prior: Prior, motion: Motion, text: str, *, blend: float, foot_lock: bool = True, **settings: Unpack[Settings]
+) -> Motion:
+    """The motion with its end sampled anew so that the beginning can follow it.
+
+    text: what the person does there. blend: seconds that are sampled. Raises MotionloomError where it is too short.
+    """
+    (closed,) = edit(prior, motion, text, Loop(blend), foot_lock=foot_lock, **settings)
+    return closed
 
 
 def changes_asked(

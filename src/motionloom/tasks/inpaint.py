@@ -16,7 +16,8 @@ from motionloom.features import humanml
 from motionloom.features.layout import LAYOUT
 from motionloom.ground import GroundPose
 from motionloom.motion import ground_pose
-from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, Sampling, sample, smooth
+from motionloom.requests.sampling import Sampling
+from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, sample, smooth
 from motionloom.tasks.watching import View
 from motionloom.weights.prior import Prior
 

@@ -29,11 +29,12 @@ from motionloom.goals.paths import along
 from motionloom.goals.segment import Segment
 from motionloom.ground import GroundPose
 from motionloom.motion import Motion, ground_pose
+from motionloom.requests.sampling import Sampling, Settings
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.prior_condition import Bound
 from motionloom.tasks.adapting import AdaptedPriors, loaded
 from motionloom.tasks.body import Places, solve_stream
-from motionloom.tasks.sampling import Moves, Sampling, Settings, sample_chain
+from motionloom.tasks.sampling import Moves, sample_chain
 from motionloom.tasks.splice import concatenated, person_at_20
 from motionloom.tasks.watching import ChainView
 from motionloom.weights.prior import Prior

@@ -25,25 +25,16 @@ from motionloom.features.pair import one_world, together
 from motionloom.goals.contact import read_contact
 from motionloom.goals.goal import Goal, start_of
 from motionloom.goals.roles import prompts_of
-from motionloom.goals.segment import LONGEST
 from motionloom.ground import GroundPose, compose, relative
 from motionloom.motion import Motion
+from motionloom.requests.sampling import PairSampling, PairSettings, Seed
+from motionloom.requests.shared import LONGEST
 from motionloom.retarget import to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.runtime.pair import PLACE, PairSession, join, part
 from motionloom.tasks.control import moved
 from motionloom.tasks.long import Past, lengthened
-from motionloom.tasks.sampling import (
-    Batch,
-    Observed,
-    PairSampling,
-    PairSettings,
-    Progress,
-    Rows,
-    Seed,
-    sample,
-    smooth,
-)
+from motionloom.tasks.sampling import Batch, Observed, Progress, Rows, sample, smooth
 from motionloom.tasks.splice import concatenated, continued
 from motionloom.tasks.text import finish, frames_in
 from motionloom.tasks.watching import View

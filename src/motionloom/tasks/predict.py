@@ -19,10 +19,12 @@ from motionloom.features.humanml import positions_at
 from motionloom.features.positions import SMPL_LAYOUT
 from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.motion import Motion
+from motionloom.requests.predict import DAY
+from motionloom.requests.sampling import PredictionSampling, PredictionSettings
 from motionloom.retarget import to_smpl22
 from motionloom.tasks.completion import FUTURES, Known
 from motionloom.tasks.held import Given, check_like, given
-from motionloom.tasks.sampling import PredictionSampling, PredictionSettings, Progress
+from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import apply_positions, carried_level, concatenated, continued, splice, standing
 from motionloom.tasks.windows import CONTEXT, Past, WindowSampler, windows_for
 from motionloom.weights.predictor import Predictor
@@ -31,14 +33,11 @@ __all__ = ["FixedJoints", "FixedPart", "predict", "predict_pieces", "switch"]
 
 Array = NDArray[np.float64]
 
-LONGEST = 24 * 3600.0
 """Seconds that are predicted at most."""
 WHOLE = 600.0
 """Seconds above which motions come in pieces only (`predict_pieces`)."""
 MOST = 6000.0
 """Seconds of all futures together that are made at once."""
-MANY = 1000
-"""Futures that are made at once, at most."""
 CHUNK = 8.0
 """Seconds that become a body at once."""
 ARRIVAL = 0.75
@@ -114,7 +113,7 @@ def predict_pieces(
     The arguments and errors are those of `predict`; a day is the longest.
     """
     chosen = PredictionSampling.of(sampling, settings).alone()
-    _check(predictor, past, seconds, count=1, sampling=chosen, longest=LONGEST)
+    _check(predictor, past, seconds, count=1, sampling=chosen, longest=DAY)
     seen = Past.of(predictor, past)
     total = max(round(seconds * past.fps), 1)
     parts = given(predictor, seen, hold, seconds) if hold else None
@@ -260,6 +259,4 @@ def _check(
         raise MotionloomError(
             f"{count} futures of {seconds:g} s are too much at once; ask for at most {MOST:g} s together"
         )
-    if count > MANY:
-        raise MotionloomError(f"the count must be 1 to {MANY}; got {count}")
     sampling.levels(predictor.schedule)

@@ -12,16 +12,19 @@ import numpy as np
 from motionloom.errors import MotionloomError
 from motionloom.features import babel, humanml
 from motionloom.features.layout import LAYOUT, WIDTH
-from motionloom.goals.segment import LONGEST
 from motionloom.kinematics.feet import clean_feet
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
-from motionloom.tasks.best import check_best_of, with_best_seeds
-from motionloom.tasks.sampling import GUIDANCE as GUIDANCE
-from motionloom.tasks.sampling import LARGEST_SEED, Progress, Rows, Sampling, Settings, sample, to_features
-from motionloom.tasks.sampling import SOLVER as SOLVER
-from motionloom.tasks.sampling import SPACING as SPACING
-from motionloom.tasks.sampling import STEPS as STEPS
+from motionloom.requests.fields import specs
+from motionloom.requests.generate import Generate
+from motionloom.requests.sampling import GUIDANCE as GUIDANCE
+from motionloom.requests.sampling import LARGEST_SEED, Sampling, Settings
+from motionloom.requests.sampling import SOLVER as SOLVER
+from motionloom.requests.sampling import SPACING as SPACING
+from motionloom.requests.sampling import STEPS as STEPS
+from motionloom.requests.shared import LONGEST
+from motionloom.tasks.best import with_best_seeds
+from motionloom.tasks.sampling import Progress, Rows, sample, to_features
 from motionloom.tasks.sampling import smooth as smooth
 from motionloom.tasks.watching import View
 from motionloom.weights.prior import Prior
@@ -66,9 +69,9 @@ def _sampled(
 ) -> Iterator[tuple[int, np.ndarray]]:
     """`sample_features` row by row, each as soon as it is finished: the row's number and its features."""
     check_prompts(prompts)
-    check_best_of(best_of)
+    best_of = specs(Generate)["best_of"].check(best_of, "best_of")
     if not all(0 <= seed < 2 * LARGEST_SEED for seed in seeds):
-        raise MotionloomError(f"a seed is a whole number from 0 to below 2**62; got {min(seeds)}")
+        raise MotionloomError(f"seed must be {specs(Sampling)['seed'].range}; got {min(seeds)}")
     rows = Rows(prompts, frames, seeds)
     if best_of > 1:
         choosing, progress = _in_turn(progress, of=len(rows.batches(sampling.batch())) * sampling.steps)
@@ -113,9 +116,9 @@ def generate(
         literal: leave numbers in the words to the network. Otherwise "3 meters", "turns left 90 degrees", "jumps twice"
             are kept; `tasks.worded.generate_worded` says what was read and what was drawn of it.
         foot_lock: keep planted feet still, and feet above the floor.
-        best_of: 1 to 16; so many seeds are sampled half way for each motion, and the one nearest to what the words
-            usually look like is kept (`tasks.best`): more often what was said, less varied; 4 take two to three times
-            as long.
+        best_of: 1 to 16; so many seeds are sampled half way for each motion, and the one is kept that does most of what
+            its words allow to check, whole, moving, and near to what they usually look like (`tasks.best`); 4 take two
+            to three times as long.
         sampling: how it is sampled; single settings of it may be given as keywords: ``count=2, seed=3, steps=12``.
             Motion i of the answer is sampled from ``seed + i`` alone.
         progress: called after each network call with the calls done and the calls in all.

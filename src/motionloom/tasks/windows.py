@@ -11,9 +11,9 @@ from motionloom.diffusion import row_seed
 from motionloom.features.humanml import positions_at
 from motionloom.kinematics.feet import envelope
 from motionloom.motion import Motion
+from motionloom.requests.sampling import PredictionSampling
 from motionloom.retarget import to_smpl22
 from motionloom.tasks.completion import Known, next_frames
-from motionloom.tasks.sampling import PredictionSampling
 from motionloom.weights.predictor import Predictor
 
 Array = NDArray[np.float64]

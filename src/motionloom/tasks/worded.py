@@ -22,9 +22,10 @@ from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import base_of, kind_of_verb
 from motionloom.kinematics.gestures import still_from
 from motionloom.motion import Motion
+from motionloom.requests.sampling import LARGEST_SEED, SOLVER, Sampling, Settings
 from motionloom.tasks.control import control
 from motionloom.tasks.long import compose
-from motionloom.tasks.sampling import LARGEST_SEED, SOLVER, Progress, Sampling, Settings
+from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import concatenated
 from motionloom.tasks.text import check_prompts, frames_in, generate_each
 from motionloom.weights.prior import Prior

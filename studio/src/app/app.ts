@@ -3,7 +3,7 @@
 import type { MotionClip } from "../body/clip";
 import type { History } from "../project/history";
 import { type Project, length } from "../project/model";
-import { type Problem, placeOf, withoutLine } from "../project/places";
+import { type Problem, placeOf, withoutKeys } from "../project/places";
 import { FULL, Refused, Unreachable } from "../server/http";
 import type { LiveState } from "./live";
 import type { Session } from "./session";
@@ -41,7 +41,7 @@ export function seenTakes(app: App): readonly MotionClip[] {
 export function problemOf(app: App, error: unknown): Problem {
   const { message } = error as Error;
   if (!(error instanceof Refused)) return { message, at: null };
-  return { message: withoutLine(message), at: placeOf(app.project.value, message, error.where) };
+  return { message: withoutKeys(message), at: placeOf(app.project.value, message, error.where) };
 }
 
 /** Show what went wrong: nobody answers, there is no room, or a sentence at its place; `what` begins it. */

@@ -120,7 +120,7 @@ export class Deeds {
     const results = await this.drawer.once({
       task: "switch",
       motion: from.motion,
-      to: to.motion,
+      target: to.motion,
       seconds: SWITCH_SECONDS,
       seed: this.app.project.value.seed,
       count: 1,

@@ -4,7 +4,8 @@ import { keepWay, needsWay } from "../project/asks";
 import { overlaid } from "../body/clip";
 import { type Project, keptTake } from "../project/model";
 import { type Job, type Plan, isDrawn, plan, planKey } from "../project/plan";
-import { type JobRequest, type Result, motion, takeOf } from "../server/api";
+import { type Result, motion, takeOf } from "../server/api";
+import type { JobRequest } from "../server/types";
 import { Refused } from "../server/http";
 import { type Level, runJob } from "../server/jobs";
 import { type App, denoised, fail, shownClip } from "./app";
@@ -145,7 +146,7 @@ export class Drawer {
   private async chain(jobs: readonly Job[], running: AbortController): Promise<readonly Result[]> {
     let results: readonly Result[] = [];
     for (const job of jobs) {
-      const request = job.task === "edit" && !job.motion ? { ...job, motion: results[0]!.id } : job;
+      const request = job.task === "edit" ? { ...job, motion: job.motion ?? results[0]!.id } : job;
       results = await this.run(request, running, job.count);
     }
     return results;
@@ -187,8 +188,9 @@ export class Drawer {
     const { denoising } = this.app;
     const shown = denoising.value.slice(0, takes);
     if (row > shown.length) return;
-    const whole = job.task === "edit" ? (shown[row] ?? denoised(this.app) ?? shownClip(this.app)) : null;
-    shown[row] = whole ? overlaid(whole, clip, Number(job.person ?? 0), begin) : clip;
+    const edited = job.task === "edit" ? job : null;
+    const whole = edited ? (shown[row] ?? denoised(this.app) ?? shownClip(this.app)) : null;
+    shown[row] = whole ? overlaid(whole, clip, edited?.person ?? 0, begin) : clip;
     denoising.value = shown;
     if (this.previewed.has(row) || level / of < PREVIEW) return;
     this.previewed.add(row);

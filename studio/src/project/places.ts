@@ -27,9 +27,9 @@ export function placeOf(project: Project, sentence: string, where: string): Plac
   return /^path\b/.test(where) || /\bpath\b/.test(sentence) ? pathPlace(project) : null;
 }
 
-/** A sentence without the file and line that somebody who writes no file has never seen. */
-export function withoutLine(sentence: string): string {
-  const plain = sentence.replace(/^the timeline, line \d+: (?:(?:goal|path): )?/, "");
+/** A sentence without the keys that somebody who writes no file has never seen. */
+export function withoutKeys(sentence: string): string {
+  const plain = sentence.replace(/^the timeline, [\w.[\]]+: (?:(?:goal|path): )?/, "");
   return plain
     .replace(/'(?:path|joints|points|poses|time|position|times|facing)[\w.[\]]*' /, "")
     .replace(/\b([a-z]+(?:_[a-z]+)+)\b/g, (name) =>

@@ -1,18 +1,15 @@
 /** Which jobs of the server make a project's motion. */
 
 import { type Project, type Range, begins, length } from "./model";
-import { type Goal, type TimelineJson, asked, goalOf, timelineOf } from "./goals";
+import { asked, goalOf, timelineOf } from "./goals";
 import { needsWay } from "./asks";
 import type { Place, Problem } from "./places";
 import { between } from "./timeline";
+import type { ComposeRequest, DuetRequest, EditRequest } from "../server/types";
 
 /** One job; where `motion` is missing in an edit, it is the result of the job before. */
-export type Job =
-  | { task: "compose"; timeline: TimelineJson; seed: number; count: number }
-  | { task: "duet"; timeline: TimelineJson; seed: number; count: number; person: number }
-  | { task: "duet"; prompt: string; seconds: number; goals: Goal; seed: number; count: number; person: number }
-  | { task: "duet"; react_to: string; prompt: string; seed: number; count: number }
-  | { task: "edit"; motion?: string; prompt: string; redraw: Range[]; person: number; seed: number; count: number };
+export type Job = ComposeRequest | DuetRequest | UnfinishedEdit;
+type UnfinishedEdit = Omit<EditRequest, "motion"> & { motion?: string };
 
 /** Jobs one after the other, what is missing, or nothing to do. */
 export type Plan = { jobs: Job[]; missing: null } | { jobs: []; missing: Problem | null };
@@ -50,21 +47,21 @@ function redraw(project: Project): Plan {
   const { base, seed } = project;
   if (!base) return { jobs: [], missing: null };
   const at = begins(project.segments);
-  const jobs: Job[] = [];
+  const jobs: UnfinishedEdit[] = [];
   for (const [from, to] of between(project.frozen, Math.min(base.seconds, length(project)))) {
     for (const person of redrawn(project)) {
       project.segments.forEach((one, index) => {
         const range: Range = [Math.max(from, at[index]!), Math.min(to, at[index + 1]!)];
         const prompt = (person === 1 && one.other.trim()) || one.text.trim();
         if (range[1] - range[0] > 0.01 && prompt)
-          jobs.push({ task: "edit", prompt, redraw: [range], person, seed, count: 1 });
+          jobs.push({ task: "edit", prompt, between: [range], person, seed, count: 1 });
       });
     }
   }
   const [first, last] = [jobs[0], jobs.at(-1)];
   if (!first || !last) return { jobs: [], missing: null };
-  if (first.task === "edit") first.motion = base.motion;
-  last.count = project.count;
+  jobs[0] = { ...first, motion: base.motion };
+  jobs.push({ ...jobs.pop()!, count: project.count });
   return { jobs, missing: null };
 }
 

@@ -5,6 +5,7 @@ import { filed, stampOf } from "../project/file";
 import type { TimelineJson } from "../project/goals";
 import type { Project, Stamp, Take } from "../project/model";
 import { getJson, json, request } from "./http";
+import type { JobRequest } from "./types";
 
 export interface Result {
   readonly id: string;
@@ -20,9 +21,6 @@ export interface JobState {
   readonly error: string | null;
   readonly results: readonly Result[];
 }
-
-/** What a job is asked; the tasks and their keys are those of the command line. */
-export type JobRequest = { readonly task: string; readonly [key: string]: unknown };
 
 interface MotionJson {
   fps: number;

@@ -2,9 +2,10 @@
 
 import { type MotionClip, motionClip, POSE } from "../body/clip";
 import { FPS } from "../project/model";
-import { type JobRequest, type JobState, type Result, cancelJob, floats, jobState, startJob } from "./api";
+import { type JobState, type Result, cancelJob, floats, jobState, startJob } from "./api";
 import { follow } from "./events";
 import { Refused, Unreachable } from "./http";
+import type { JobRequest } from "./types";
 
 /** The pose of a row while it is denoised. */
 export interface Level {

@@ -58,11 +58,11 @@ def test_lines_ask_what_the_tasks_take(weights, asked):
     keys = ("seconds", "count", "seed", "walk", "guidance", "root", "foot_lock", "hold")
     assert [asked[key] for key in keys] == [3, 2, 5, {"steps": 4, "temperature": 0}, 1.5, False, False, None]
     assert run(weights, "predict", "past.bvh", "--no-picture") == 0
-    assert [asked[key] for key in keys] == [2, 10, 0, {}, 1, True, True, None]
+    assert [asked[key] for key in keys] == [2, 10, 0, {"steps": 5, "temperature": 1.1}, 1, True, True, None]
     assert run(weights, "predict", "past.bvh", "--horizon", "40", "--out", "a.bvh", "--temperature", "0.5") == 0
-    assert asked["walk"] == {"temperature": 0.5}
+    assert asked["walk"]["temperature"] == 0.5
     assert run(weights, "switch", "past.bvh", "past.bvh", "--out", "a.bvh", "--temperature", "2") == 0
-    assert asked["walk"] == {"temperature": 2}
+    assert asked["walk"]["temperature"] == 2
     assert written("futures") == {f"future_{i:02d}.bvh" for i in range(10)}
 
 

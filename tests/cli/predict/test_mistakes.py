@@ -19,7 +19,7 @@ HOLD = ["--hold", "head", "--from", "kick.bvh"]
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["past.bvh", "--horizon", "0"], "--seconds must be above 0 and at most 86,400, a day; got 0"),
+        (["past.bvh", "--horizon", "0"], "--seconds must be above 0 and at most 86,400 seconds; got 0"),
         (["past.bvh", "--seconds", "-1"], "got -1"),
         (["past.bvh", "--seconds", "nan"], "got nan"),
         (["past.bvh", "--seconds", "inf"], "got inf"),
@@ -27,10 +27,10 @@ HOLD = ["--hold", "head", "--from", "kick.bvh"]
         (["past.bvh", "--seconds", "0.001"], "less than a frame of past.bvh (0.0333 s)"),
         (["past.bvh", "--horizon", "86400"], "at most 2,500,000 fit"),
         (["past.bvh", "--horizon", "70", "--out", "a.glb", "--format", "gif", "--out", "f"], "write an .mp4"),
-        (["past.bvh", "--count", "0"], "--count must be 1 to 1000"),
-        (["past.bvh", "--count", "1001"], "got 1001"),
-        (["past.bvh", "--seed", "-1"], "--seed 0 or more"),
-        (["past.bvh", "--steps", "0"], "--steps must be 1 or more; got 0"),
+        (["past.bvh", "--count", "0"], "--count must be a whole number from 1 to 10,000"),
+        (["past.bvh", "--count", "10001"], "got 10001"),
+        (["past.bvh", "--seed", "-1"], "--seed must be a whole number from 0"),
+        (["past.bvh", "--steps", "0"], "--steps must be a whole number from 1 to 100,000; got 0"),
         (["past.bvh", "--guidance", "nan"], "--guidance must be -100 to 100"),
         (["past.bvh", "--temperature", "2.1"], "--temperature must be 0 to 2, usually about 1; got 2.1"),
         (["past.bvh", "--temperature", "nan"], "--temperature must be 0 to 2"),

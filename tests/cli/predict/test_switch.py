@@ -57,7 +57,7 @@ def test_a_target_on_another_skeleton_is_retargeted_where_that_is_asked(weights,
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--seconds", "0"], "--seconds must be above 0 and at most 30; got 0"),
+        (["--seconds", "0"], "--seconds must be above 0 and at most 30 seconds; got 0"),
         (["--seconds", "31"], "got 31"),
         (["--count", "0"], "--count"),
         (["--out", "folder"], "it is a folder"),

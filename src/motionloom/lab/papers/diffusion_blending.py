@@ -30,9 +30,10 @@ from motionloom.diffusion import (
 )
 from motionloom.edits.steering import Correction, corrected
 from motionloom.errors import MotionloomError
+from motionloom.requests.sampling import Sampling, Settings
 from motionloom.runtime.prior import PriorSession
 from motionloom.tasks.control import blended
-from motionloom.tasks.sampling import Observed, Sampling, Settings
+from motionloom.tasks.sampling import Observed
 from motionloom.weights.prior import Prior
 
 

@@ -14,8 +14,8 @@ from motionloom.lab.papers.diffusion_blending import control_features
 from motionloom.lab.suites.control_kinds import Kind, Target
 from motionloom.lab.suites.protocol import Drawing
 from motionloom.motion import Motion
+from motionloom.requests.sampling import BATCH as ROWS
 from motionloom.runtime.prior import PriorSession
-from motionloom.tasks.sampling import BATCH as ROWS
 from motionloom.tasks.sampling import Observed
 from motionloom.tasks.text import sample_features, smooth, to_motion
 from motionloom.weights.adapter import Adapter, adapted, adapters

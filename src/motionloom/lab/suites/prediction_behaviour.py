@@ -24,10 +24,10 @@ from motionloom.lab.suites import prediction_trial as trials
 from motionloom.lab.suites.harness import Say, plain_row, silent
 from motionloom.lab.suites.prediction_trial import Array, PredictionTrial, from_root
 from motionloom.motion import Motion
+from motionloom.requests.sampling import PredictionSampling
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.completion import Known, next_frames
 from motionloom.tasks.predict import predict, switch
-from motionloom.tasks.sampling import PredictionSampling
 from motionloom.tasks.windows import WindowSampler
 from motionloom.weights.predictor import Predictor
 

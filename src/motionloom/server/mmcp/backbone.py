@@ -10,7 +10,9 @@ from motionmcp import Backbone, ModelSpec, MotionResult, ProtocolError, build_ap
 from motionmcp.backbone import Limits as ModelLimits
 from motionmcp.schemas import GenerateRequest, Skeleton
 
-from motionloom.server.asking import Request
+from motionloom.requests.sampling import Sampling
+from motionloom.requests.shared import LONGEST
+from motionloom.server.job_request import JobRequest
 from motionloom.server.jobs import Job
 from motionloom.server.mmcp.rigs import canonical
 from motionloom.server.refusal import Refusal
@@ -19,7 +21,6 @@ from motionloom.server.worker import Worker
 MODEL = "motionloom"
 CONSTRAINTS = ["root_path", "effector_target", "pose_keyframe", "ground_height"]
 SEGMENTS = ["text", "unconditioned", "pose", "motion_reference"]
-SECONDS = 60.0
 PAGES = ("/docs", "/docs/oauth2-redirect", "/redoc")
 log = logging.getLogger("motionloom.server")
 
@@ -45,7 +46,7 @@ class MotionloomBackbone(Backbone):
             chunking="stitched",
             recommended_max_duration_seconds=30.0,
             limits=ModelLimits(
-                max_duration_seconds=SECONDS,
+                max_duration_seconds=LONGEST,
                 max_num_samples=limits.count,
                 max_prompt_length=limits.prompt,
                 max_request_bytes=limits.body_bytes,
@@ -70,7 +71,7 @@ class MotionloomBackbone(Backbone):
             found.extend(answer(models, request, progress))
             return iter(())
 
-        asked = Request("generate", 0, 1, None, None, False, {"prompt": ""}, call=call)
+        asked = JobRequest("generate", None, Sampling(count=1), call=call)
         try:
             job = self.worker.submit(asked, "mmcp")
         except Refusal as refusal:

@@ -11,10 +11,13 @@ from hypothesis import strategies as st
 pytest.importorskip("starlette", reason="needs the extra 'studio'")
 
 from motionloom.errors import MotionloomError
-from motionloom.server.asking import COMMON, KEYS, Request, read_request, timeline_json, timeline_yaml
+from motionloom.requests.fields import specs
+from motionloom.requests.tasks import REQUESTS
+from motionloom.server.job_request import JobRequest, read_request
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project
 from motionloom.server.refusal import Refusal
+from motionloom.server.timelines import timeline_json, timeline_yaml
 
 
 @pytest.fixture(scope="module")
@@ -31,18 +34,18 @@ NAMES = st.sampled_from(
 JSON = st.recursive(
     SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(NAMES | st.text(max_size=5), inner, max_size=3)
 )
-KNOWN = st.sampled_from(sorted({key for keys in KEYS.values() for key in keys} | set(COMMON)))
+KNOWN = st.sampled_from(sorted({key for request in REQUESTS.values() for key in specs(request)} | {"levels"}))
 
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
-@given(task=st.sampled_from(sorted(KEYS)), more=st.dictionaries(KNOWN, JSON, max_size=5))
+@given(task=st.sampled_from(sorted(REQUESTS)), more=st.dictionaries(KNOWN, JSON, max_size=5))
 def test_any_json_is_a_request_or_one_sentence(project: Project, task: str, more: dict[str, Any]) -> None:
-    found: Request | MotionloomError | Refusal
+    found: JobRequest | MotionloomError | Refusal
     try:
         found = read_request({"task": task} | more, project, Limits())
     except (MotionloomError, Refusal) as error:
         found = error
-    if isinstance(found, Request):
+    if isinstance(found, JobRequest):
         assert 1 <= found.count <= Limits().count
     elif isinstance(found, Refusal):
         assert 400 <= found.status < 500
@@ -60,7 +63,7 @@ SEGMENTS = st.lists(PARTS, min_size=1, max_size=4)
 @example(segments=[{"text": "INF"}], seed=0)
 def test_a_timeline_comes_back_from_yaml_as_it_went(project: Project, segments: list[Any], seed: int) -> None:
     value = {"segments": segments, "seed": seed}
-    assert timeline_json(timeline_yaml(value), project, Limits()) == value
+    assert timeline_json(timeline_yaml(value, project, Limits()), project, Limits()) == value
 
 
 def test_reading_leaves_no_files(project: Project) -> None:

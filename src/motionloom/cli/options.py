@@ -1,0 +1,75 @@
+"""Options of a command from the fields of its request: names, kinds and sentences are written there."""
+
+import argparse
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+from motionloom.requests.fields import Spec, specs
+
+
+def option(name: str, spec: Spec) -> str:
+    """How a field is typed, such as ``--best-of``; one that is true unless said otherwise is ``--no-foot-lock``."""
+    return f"--{'no-' if spec.kind == 'flag' and spec.default else ''}{name.replace('_', '-')}"
+
+
+class _Store(argparse.Action):
+    """Keeps what was typed as the field holds it; a mistake names the option."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, spec: Spec, **more: Any) -> None:
+        super().__init__(option_strings, dest, **more)
+        self.spec = spec
+
+    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: str | None = None) -> None:
+        spec, place = self.spec, self.option_strings[0]
+        typed = values if isinstance(values, list) else [values]
+        found = [spec.parse(one, place) for one in typed]
+        value = tuple(found) if spec.size else found[0]
+        setattr(namespace, self.dest, (*getattr(namespace, self.dest), value) if spec.many else value)
+
+
+def add_options(
+    parser: argparse.ArgumentParser,
+    request: type,
+    *names: str,
+    aliases: Sequence[str] = (),
+    helps: Mapping[str, str] = MappingProxyType({}),
+) -> None:
+    """An option for each of these fields of a request; without names, for all whose values can be typed.
+
+    aliases: other names of the first one's option. helps: other sentences of single fields.
+    """
+    for name, spec in specs(request).items():
+        typed = spec.kind in ("number", "whole", "flag", "word", "text") and not spec.needed
+        if not (name in names if names else typed):
+            continue
+        sentence = helps.get(name, spec.help)
+        if spec.kind == "flag":
+            sentence = f"do not {sentence}" if spec.default else sentence
+            kind = "store_false" if spec.default else "store_true"
+            parser.add_argument(option(name, spec), dest=name, action=kind, help=sentence)
+            continue
+        about = [f"{spec.low:g} to {spec.high:g}"] if spec.high <= 1000 and spec.kind in ("whole", "number") else []
+        about += [] if spec.default is None or spec.many else [f"default {_shown(spec.default)}"]
+        about += ["repeatable"] if spec.many else []
+        parser.add_argument(
+            option(name, spec),
+            *(aliases if (name,) == names[:1] else ()),
+            action=_Store,
+            spec=spec,
+            default=spec.default,
+            nargs=spec.size or None,
+            metavar=_metavar(spec),
+            help=f"{sentence} ({', '.join(about)})" if about else sentence,
+        )
+
+
+def _metavar(spec: Spec) -> str | tuple[str, ...]:
+    if spec.words:
+        return f"{{{','.join(spec.words)}}}"
+    one = {"whole": "N", "number": "S" if spec.unit else "X"}.get(spec.kind, "WORD")
+    return ("FROM", "TO") if spec.size else one
+
+
+def _shown(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,28 @@
+"""`edit`: a clip changed by words."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from motionloom.requests.fields import declare, group
+from motionloom.requests.sampling import Sampling
+from motionloom.requests.shared import LONGEST, SAMPLED, Finish, prompt
+
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Edit(Finish):
+    """Change a motion by words: some seconds, some joints, its end."""
+
+    motion: Any = declare("motion", "the clip", needed=True)
+    prompt: str | None = prompt("what the person is to do, such as 'waves'")
+    between: tuple[Span, ...] = declare(
+        "number", "change only these seconds", (), low=0, many=50, size=2, unit="seconds"
+    )
+    keep: tuple[str, ...] = declare(
+        "text", "part that stays: a joint, a group such as lower_body, root", (), high=1000, many=100
+    )
+    extend: float = declare("number", "go on behind the clip", 0.0, low=0, high=LONGEST, unit="seconds")
+    strength: float = declare("number", "how far from the clip: 1 is from noise alone", 1.0, low=0, high=1, above=True)
+    person: int = declare("whole", "whom to change, of several people in one motion, counted from 0", 0, low=0, high=7)
+    sampling: Sampling = group(Sampling(count=1), *SAMPLED)

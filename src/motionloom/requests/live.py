@@ -1,0 +1,29 @@
+"""Somebody who is steered while he moves: how a session begins, and what it is sampled with."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from motionloom.requests.fields import Checked, declare, like
+from motionloom.requests.sampling import Sampling
+from motionloom.requests.shared import Looping
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hello(Checked):
+    """How a session begins."""
+
+    seed: int = like(Sampling, "seed", "the same seed makes the same motion")
+    fps: float = declare("number", "frames per second that are shown", 20.0, low=1, high=120)
+    people: int = declare("whole", "1 or 2", 1, low=1, high=2)
+    skeleton: Any = declare("skeleton", "a name, or an object with names, parents and offsets in metres", "smpl22")
+    session: str = declare("text", "the key that the welcome of a session gave, to go on with it", "", high=100)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Live(Looping):
+    """How a scripted session is made."""
+
+    seed: int | None = like(Sampling, "seed", "the same seed makes the same motion: the script's, else 0", default=None)
+    fps: float | None = declare("number", "frames per second that are shown: the model's 20", low=1, high=240)
+    steps: int = like(Sampling, "steps", "network calls per window", default=8, high=200)
+    guidance: float = like(Sampling, "guidance", "strength of the words")

@@ -1,0 +1,39 @@
+"""What the requests of several tasks share."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from motionloom.requests.fields import Checked, declare
+
+LONGEST = 60.0
+"""Seconds: beyond this one prompt is no longer one action."""
+LONGEST_PROMPT = 20_000
+"""Characters."""
+SAMPLED = ("seed", "count", "guidance", "steps")
+FINISH = ("foot_lock", "loop", "blend")
+"""Fields that most tasks have."""
+
+
+def prompt(help: str = "what the person does, such as 'a person walks'", *, needed: bool = False) -> Any:
+    """A field with words for the network."""
+    return declare("text", help, high=LONGEST_PROMPT, hint="say in words what the person does", needed=needed)
+
+
+def seconds(help: str, default: float | None = None, *, high: float = LONGEST) -> Any:
+    """A field with a length."""
+    return declare("number", help, default, low=0, high=high, above=True, unit="seconds")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Looping(Checked):
+    """What becomes of the end of a motion that was sampled."""
+
+    loop: bool = declare("flag", "make the end meet the beginning", False)
+    blend: float = declare("number", "seconds drawn anew for a loop", 1.0, low=0, high=LONGEST, unit="seconds")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finish(Looping):
+    """What becomes of the whole."""
+
+    foot_lock: bool = declare("flag", "keep planted feet still, and feet above the floor", True)

@@ -1,0 +1,65 @@
+"""Timelines as JSON and as the YAML files of the command line; files that they name are motions of the project."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import yaml
+
+from motionloom.errors import MotionloomError
+from motionloom.goals.timeline import Timeline, read_timeline, timeline_from
+from motionloom.io.lined_yaml import read_lined
+from motionloom.server.limits import Limits
+from motionloom.server.project import Project
+
+
+class _Quoting(yaml.SafeDumper):
+    """Writes in quotes what is not plain words: other readers of YAML know other numbers ("0o7", "INF")."""
+
+
+def _quoted(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    plain = re.fullmatch(r"(?!(?i:inf|nan|infinity)$)[^\W\d_][^\W\d_]*(?:[ _][^\W\d_]+)*", text)
+    style = None if plain else '"'
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_Quoting.add_representer(str, _quoted)
+
+
+def timeline_from_json(value: Any, project: Project, limits: Limits) -> Timeline:
+    """A timeline's JSON; a mistake names the keys that lead to it."""
+    if not isinstance(value, Mapping):
+        raise MotionloomError("a timeline is a mapping with 'segments', as its YAML file is")
+    return _checked(timeline_from(value, folder=project.motions), limits)
+
+
+def timeline_yaml(value: Any, project: Project, limits: Limits) -> str:
+    """A timeline's JSON, once it has been read as a timeline, as the text of its YAML file."""
+    timeline_from_json(value, project, limits)
+    text = yaml.dump(value, Dumper=_Quoting, sort_keys=False, allow_unicode=True, width=120)
+    if any("\ud800" <= letter <= "\udfff" for letter in text):
+        raise MotionloomError("the timeline holds characters that are no text; write it in UTF-8")
+    return text
+
+
+def timeline_json(text: str, project: Project, limits: Limits) -> Any:
+    """A timeline file's text, once it has been read as a timeline, as the JSON that `timeline_yaml` takes."""
+    place = project.motions / f".{project.part().name}.yaml"
+    try:
+        place.write_text(text, encoding="utf-8")
+        _checked(read_timeline(place), limits)
+        return read_lined(place).plain()
+    except MotionloomError as error:
+        raise MotionloomError(str(error).replace(str(place), "the timeline")) from None
+    finally:
+        place.unlink(missing_ok=True)
+
+
+def _checked(timeline: Timeline, limits: Limits) -> Timeline:
+    if timeline.seconds > limits.total_seconds:
+        raise MotionloomError(
+            f"the timeline takes {timeline.seconds:g} s; at most {limits.total_seconds:g} s are made in one job"
+        )
+    if any(segment.adapters for segment in timeline.segments):
+        raise MotionloomError("a timeline of the server has no 'adapters'; run it with motionloom compose")
+    return timeline
