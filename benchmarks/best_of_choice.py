@@ -12,12 +12,12 @@ import numpy as np
 from motionloom.diffusion.sampling import row_seed
 from motionloom.goals.sequence import split_actions
 from motionloom.kinematics.physics import jerk, velocity
-from motionloom.lab.metrics.obedience import EVERYDAY, Check
-from motionloom.lab.suites.harness import weight_marks
 from motionloom.tasks import best
 from motionloom.tasks.sampling import Rows, Sampling, sample
 from motionloom.tasks.text import finish, frames_in, sample_features
 from motionloom.weights.prior import Prior, find_weights
+from motionloom_lab.metrics.obedience import EVERYDAY, Check
+from motionloom_lab.suites.harness import weight_marks
 
 SEEDS, COUNT, EVERY = (200, 201), 4, 5
 

@@ -13,7 +13,7 @@ import tempfile
 import warnings
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "packages/motionloom"))
 
 from motionloom.errors import MotionloomError
 from motionloom.io.gltf_read import open_glb

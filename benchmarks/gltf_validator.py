@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "packages/motionloom"))
 
 from motionloom import rotations as rot
 from motionloom.errors import MotionloomError

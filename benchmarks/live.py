@@ -25,9 +25,6 @@ from motionloom.features.layout import FEET, FPS
 from motionloom.goals.segment import Segment
 from motionloom.kinematics.feet import planted_feet
 from motionloom.kinematics.physics import speed
-from motionloom.lab.metrics.obedience import check
-from motionloom.lab.metrics.skate import slide
-from motionloom.lab.metrics.transitions import mean_jerk
 from motionloom.live.clock import LATE, WAITING
 from motionloom.live.commands import Command, Say, Steer, to_json
 from motionloom.live.commands import Path as Way
@@ -38,6 +35,9 @@ from motionloom.live.socket import live_session
 from motionloom.tasks.long import compose
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
+from motionloom_lab.metrics.obedience import check
+from motionloom_lab.metrics.skate import slide
+from motionloom_lab.metrics.transitions import mean_jerk
 
 WORDS = ("walk forward", "walk backward", "walk sideways", "run", "jog", "turn left", "turn right", "walk in a circle")
 """The locomotion checks of the obedience suite; a circle has 4 of its 8 seconds and must be half as far round."""

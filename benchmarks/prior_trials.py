@@ -22,21 +22,21 @@ from unittest import mock
 import torch
 from torch import Tensor, nn
 
-from motionloom.data import sets
-from motionloom.data.sets import Batches, MotionSet, load_set
 from motionloom.diffusion import SCHEDULES
 from motionloom.diffusion.bases import Dct
-from motionloom.lab.metrics.obedience import chosen
-from motionloom.lab.suites import obey
-from motionloom.lab.suites.generator import generator
-from motionloom.lab.suites.harness import Run
-from motionloom.nets.prior import NetConfig, PriorNet
 from motionloom.runtime.text.protocol import TextEncoder
-from motionloom.train.loop import Average, train
-from motionloom.train.objectives import CleanError, Conditioned, Drawn, WordBank, feature_scale, masked_error
-from motionloom.train.prior import restandardised, text_encoder
-from motionloom.train.recipe import Recipe, load_recipe
 from motionloom.weights.prior import Card, Prior
+from motionloom_lab.metrics.obedience import chosen
+from motionloom_lab.suites import obey
+from motionloom_lab.suites.generator import generator
+from motionloom_lab.suites.harness import Run
+from motionloom_train.data import sets
+from motionloom_train.data.sets import Batches, MotionSet, load_set
+from motionloom_train.loop import Average, train
+from motionloom_train.nets.prior import NetConfig, PriorNet
+from motionloom_train.objectives import CleanError, Conditioned, Drawn, WordBank, feature_scale, masked_error
+from motionloom_train.prior import restandardised, text_encoder
+from motionloom_train.recipe import Recipe, load_recipe
 
 RECIPE = Path(__file__).parents[1] / "recipes" / "default.toml"
 LEVELS = {"pure noise": (980, 1000), "much": (700, 900), "little": (100, 400)}

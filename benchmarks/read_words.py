@@ -6,11 +6,11 @@ Usage: python benchmarks/read_words.py > benchmarks/read_words.txt
 import sys
 
 from motionloom.goals.amount_goal import kept, measured
-from motionloom.lab.suites.harness import weight_marks
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks.text import generate
 from motionloom.tasks.worded import draw, read
 from motionloom.weights.prior import Prior, find_weights
+from motionloom_lab.suites.harness import weight_marks
 
 SENTENCES = (
     "turn left 90 degrees",

@@ -14,12 +14,12 @@ import numpy as np
 import torch
 
 from motionloom.diffusion import join_rows
-from motionloom.nets.prior import Bound
 from motionloom.runtime import set_threads
 from motionloom.runtime.prior import PriorSession
 from motionloom.runtime.sizes import NetConfig
-from motionloom.train.modules import prior_module
 from motionloom.weights.prior import Prior
+from motionloom_train.modules import prior_module
+from motionloom_train.nets.prior import Bound
 
 FRAMES = 196
 """9.8 seconds."""

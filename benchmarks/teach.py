@@ -23,22 +23,22 @@ from typing import Any
 import numpy as np
 import torch
 
-from motionloom.data.examples import CaptionedClip, make_examples, uniform_positions
-from motionloom.data.paths import inside
-from motionloom.data.sources import find_takes
 from motionloom.errors import MotionloomError
 from motionloom.io import load
 from motionloom.io.atomic import atomic_path
 from motionloom.kinematics import physics as ph
 from motionloom.kinematics.physics import Array
-from motionloom.lab.suites import obey
-from motionloom.lab.suites.harness import Run
 from motionloom.motion import Motion
 from motionloom.tasks.adapting import adapt
 from motionloom.tasks.text import generate
-from motionloom.train.teach import Lesson, teach
 from motionloom.viz.video import draw_sheet
 from motionloom.weights.prior import Prior
+from motionloom_lab.suites import obey
+from motionloom_lab.suites.harness import Run
+from motionloom_train.data.examples import CaptionedClip, make_examples, uniform_positions
+from motionloom_train.data.paths import inside
+from motionloom_train.data.sources import find_takes
+from motionloom_train.teach import Lesson, teach
 
 FIRST_SEED = 7000
 CLIPS = 3

@@ -31,8 +31,8 @@ from safetensors.torch import load_file
 from torch import Tensor
 from torch.nn import functional as F
 
-from motionloom.nets.text.hub import open_pretrained
 from motionloom.runtime.text.minilm import MiniLM
+from motionloom_train.nets.text.hub import open_pretrained
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tools.compress_text_encoder import find_source

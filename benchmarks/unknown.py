@@ -11,11 +11,11 @@ import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
-from motionloom.data.sets import read_clips
 from motionloom.goals.remarks import looked_up
 from motionloom.goals.sequence import split_actions
-from motionloom.lab.metrics.obedience import EVERYDAY, in_words
 from motionloom.weights.prior import Prior
+from motionloom_lab.metrics.obedience import EVERYDAY, in_words
+from motionloom_train.data.sets import read_clips
 
 HERE = Path(__file__).parent
 

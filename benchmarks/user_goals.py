@@ -29,8 +29,6 @@ from motionloom.goals.goal_file import read_goal
 from motionloom.io import save
 from motionloom.io.atomic import atomic_path
 from motionloom.kinematics import physics
-from motionloom.lab.metrics.skate import skate
-from motionloom.lab.suites.harness import weight_marks
 from motionloom.motion import Motion
 from motionloom.rotations import rotvec_to_quat
 from motionloom.skeleton import Skeleton
@@ -38,6 +36,8 @@ from motionloom.tasks.control import Controlled, control
 from motionloom.tasks.text import generate
 from motionloom.viz.video import draw_sheet
 from motionloom.weights.prior import Prior, find_weights
+from motionloom_lab.metrics.skate import skate
+from motionloom_lab.suites.harness import weight_marks
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "goals"
 OWN_POSE = "other_person.bvh"
@@ -222,7 +222,7 @@ def measure(case: Case, prior: Prior, out: Path, seeds: Sequence[int]) -> dict[s
 
 def off(motion: Motion, goal: Any) -> float:
     """Metres from the asked places, mean."""
-    from motionloom.lab.metrics.control import distances
+    from motionloom_lab.metrics.control import distances
 
     return float(np.nanmean(distances(motion.positions(), goal.positions, goal.asked))) if goal.asked.any() else 0.0
 

@@ -9,7 +9,7 @@ export default defineConfig({
   base: "./",
   plugins: [thirdPartyNotices()],
   build: {
-    outDir: "../src/motionloom/server/page",
+    outDir: "../packages/motionloom/src/motionloom/server/page",
     emptyOutDir: true,
     target: "es2022",
     modulePreload: { polyfill: false },

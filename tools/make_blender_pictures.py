@@ -20,7 +20,7 @@ from pathlib import Path
 
 from PIL import Image
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "packages/motionloom"))
 
 from motionloom.io import save
 from motionloom.io.character import load_character

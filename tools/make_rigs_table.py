@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "packages/motionloom"))
 
 from motionloom.cli import main
 from motionloom.io.bvh_writer import save_bvh

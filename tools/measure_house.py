@@ -19,7 +19,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-SOURCE = ROOT / "src" / "motionloom"
+SOURCES = {
+    "": ROOT / "packages" / "motionloom" / "src" / "motionloom",
+    "train": ROOT / "packages" / "motionloom-train" / "src" / "motionloom_train",
+    "lab": ROOT / "packages" / "motionloom-lab" / "src" / "motionloom_lab",
+}
+"""The packages' folders; rooms of training and of the laboratory begin with these words."""
 PARAMETERS, COMPLEXITY = 8, 20
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -29,10 +34,8 @@ HOLDS = re.compile(r"[ \t]*# fmt: (?:skip|off|on)\b.*")
 
 
 def room_of(path: Path) -> str:
-    """The room of a file below the package's folder; rooms of the laboratory are lab/ROOM."""
-    if len(path.parts) == 1:
-        return "(top)"
-    return "/".join(path.parts[:2]) if path.parts[0] == "lab" and len(path.parts) > 2 else path.parts[0]
+    """The room of a file below its package's folder."""
+    return "(top)" if len(path.parts) == 1 else path.parts[0]
 
 
 def canonical(folder: Path) -> dict[str, int]:
@@ -55,17 +58,19 @@ def canonical(folder: Path) -> dict[str, int]:
 def lines() -> dict[str, int]:
     """Canonical lines per room."""
     count: Counter[str] = Counter()
-    for name, number in canonical(SOURCE).items():
-        count[room_of(Path(name))] += number
+    for package, source in SOURCES.items():
+        for name, number in canonical(source).items():
+            count["/".join(filter(None, [package, room_of(Path(name))]))] += number
     return dict(count.most_common())
 
 
 def functions() -> Iterator[tuple[str, Function]]:
     """Every function with its place."""
-    for path in sorted(SOURCE.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, Function):
-                yield f"{path.relative_to(SOURCE)}:{node.lineno} {node.name}", node
+    for source in SOURCES.values():
+        for path in sorted(source.rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, Function):
+                    yield f"{path.relative_to(source.parent)}:{node.lineno} {node.name}", node
 
 
 def parameters(node: Function) -> int:
@@ -92,13 +97,16 @@ def complexity(node: Function) -> int:
 def measured() -> dict[str, object]:
     """Everything, by name."""
     rooms, every = lines(), list(functions())
-    lab = sum(count for room, count in rooms.items() if room.startswith("lab"))
+    packages = {
+        name: sum(count for room, count in rooms.items() if room.startswith(f"{name}/")) for name in ("train", "lab")
+    }
     many = [(parameters(node), place) for place, node in every if not node.name.startswith("_")]
     long = [((node.end_lineno or node.lineno) - node.lineno + 1, place) for place, node in every]
     return {
         "canonical lines": rooms,
-        "product and training": sum(rooms.values()) - lab,
-        "laboratory": lab,
+        "product": sum(rooms.values()) - sum(packages.values()),
+        "training": packages["train"],
+        "laboratory": packages["lab"],
         f"public functions with more than {PARAMETERS} parameters": sorted(
             (one for one in many if one[0] > PARAMETERS), reverse=True
         ),

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "packages/motionloom"))
 
 from motionloom.io.atomic import atomic_path
 from tests.outputs.commands import COMMANDS, RECORDED, ROOT, places, sampled
@@ -43,10 +43,16 @@ def made_here(names: Sequence[str]) -> dict[str, np.ndarray]:
     return made
 
 
+def sources(root: Path) -> list[str]:
+    """Where the packages of a checkout lie: below `packages`, or in `src` where there was only one."""
+    found = [*sorted((root / "packages").glob("*/src")), root / "src"]
+    return [str(place) for place in found if place.is_dir()]
+
+
 @contextmanager
 def checkout(place: str) -> Iterator[Path]:
     """The folder of a checkout: one that is there, or a commit of this repository in a folder of its own."""
-    if (Path(place) / "src" / "motionloom").is_dir():
+    if sources(Path(place)):
         yield Path(place).resolve()
         return
     with tempfile.TemporaryDirectory() as folder:
@@ -62,7 +68,7 @@ def made_there(place: str, names: Sequence[str]) -> dict[str, np.ndarray]:
     """What the same commands make of the code of another checkout or commit, in a process of its own."""
     with checkout(place) as root, tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "made.npz"
-        environment = {**os.environ, "PYTHONPATH": str(root / "src")}
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sources(root))}
         words = [sys.executable, __file__, "--into", str(target), "--only", *names]
         subprocess.run(words, check=True, env=environment, stdout=sys.stderr)
         with np.load(target, allow_pickle=False) as made:

@@ -1,10 +1,10 @@
 """Write the graphs of all weights that ship into their files, in place: `python tools/write_graphs.py`.
 
-To be done after a network or `motionloom.train.export` has changed; weights and their digests stay as they are.
+To be done after a network or `motionloom_train.export` has changed; weights and their digests stay as they are.
 """
 
-from motionloom.train.convert import convert
 from motionloom.weights.container import PAIRS, PREDICTORS, PRIORS, weights_digest
+from motionloom_train.convert import convert
 
 
 def main() -> None:

@@ -1,0 +1,27 @@
+"""What holds for every test."""
+
+import pytest
+from hypothesis import settings
+
+settings.register_profile("house", deadline=None)  # a busy machine is no fault of the code
+settings.load_profile("house")
+
+SLOW = (
+    "packages/motionloom/tests/kills",
+    "packages/motionloom/tests/studio",
+    "packages/motionloom-train/tests_train/kills",
+    "packages/motionloom/tests/bulk/test_batch.py",
+    "packages/motionloom/tests/cli/test_batch.py",
+    "packages/motionloom/tests/live/test_socket.py",
+    "packages/motionloom/tests/outputs/test_processors.py",
+    "packages/motionloom/tests/server/test_project.py",
+    "packages/motionloom/tests/server/test_assistant.py",
+)
+"""Folders and files of tests that start other programs, or wait for a clock: all of them are slow."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what is slow by its place."""
+    for item in items:
+        if item.nodeid.startswith(SLOW):
+            item.add_marker("slow")

@@ -1,0 +1,1 @@
+"""Commands that `motionloom` shows where this package is installed."""

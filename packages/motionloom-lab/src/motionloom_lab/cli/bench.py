@@ -1,0 +1,88 @@
+"""`motionloom bench`: speed and memory, as ratios within one run."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from motionloom.cli.sampling import fail
+from motionloom.cli.writing import add_force, check_overwriting
+
+
+def add(subparsers) -> None:
+    """Register `bench`."""
+    parser = subparsers.add_parser("bench", help="measure speed and memory on this machine")
+    parser.add_argument("--weights", help="shipped name or file (default: default; with --prediction: predictor)")
+    parser.add_argument(
+        "--long", action="store_true", help="measure long motion instead: 1 to 10 minutes of it; takes some minutes"
+    )
+    parser.add_argument("--prediction", action="store_true", help="measure fifty futures of one past instead")
+    parser.add_argument(
+        "--quick", action="store_true", help="fewer repeats and sizes; with --long 10 to 40 s of motion"
+    )
+    parser.add_argument("--device", default="cpu", help="cpu or cuda for the network's part (default cpu)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to this file as well")
+    add_force(parser)
+    parser.set_defaults(run=_bench)
+
+
+def _bench(arguments: argparse.Namespace) -> None:
+    from motionloom_lab.bench import table
+    from motionloom_lab.report.files import check_report, plain, write_json
+
+    if arguments.json:
+        check_report(arguments.json)
+        check_overwriting(arguments, [arguments.json])
+    if arguments.long and arguments.prediction:
+        fail("--long and --prediction are two measurements; ask for one")
+    found = _predicted(arguments) if arguments.prediction else _generated(arguments)
+    if arguments.json:
+        write_json(arguments.json, found)
+    on = found["machine"]
+    print(
+        f"{on['device']}, {on['cores']} cores, {on['threads']} threads, ONNX Runtime {on['onnxruntime']}, {on['type']}"
+    )
+    print(plain(table(found)))
+    if on["load"] > 0.5:
+        print(f"\nthe machine was busy when this began (load {on['load']}): run it again when nothing else does")
+    print(f"\nWeights: {_weights(arguments)}")
+
+
+def _weights(arguments: argparse.Namespace) -> str:
+    """Name and hash of what was measured, by which pages that show the table are held against what ships."""
+    from motionloom.weights.predictor import find_predictor
+    from motionloom.weights.prior import find_weights
+    from motionloom_lab.suites.harness import weight_marks
+
+    if arguments.prediction:
+        path = find_predictor(arguments.weights or "predictor")
+    else:
+        path = find_weights(arguments.weights or "default")
+    [(name, mark)] = weight_marks([path]).items()
+    return f"{name} {mark}"
+
+
+def _generated(arguments: argparse.Namespace) -> dict[str, Any]:
+    from motionloom.tasks.long import compose
+    from motionloom.tasks.text import generate
+    from motionloom.weights.prior import Prior
+    from motionloom_lab.bench import bench, defaults
+    from motionloom_lab.suites.harness import say
+
+    weights = arguments.weights or "default"
+    return bench(
+        Prior.load(weights, device=arguments.device),
+        defaults(compose if arguments.long else generate),
+        what="long" if arguments.long else "short",
+        quick=arguments.quick,
+        weights=weights,
+        progress=say,
+    )
+
+
+def _predicted(arguments: argparse.Namespace) -> dict[str, Any]:
+    from motionloom.weights.predictor import Predictor
+    from motionloom_lab.bench import bench_prediction
+    from motionloom_lab.suites.harness import say
+
+    predictor = Predictor.load(arguments.weights or "predictor", device=arguments.device)
+    return bench_prediction(predictor, quick=arguments.quick, progress=say)

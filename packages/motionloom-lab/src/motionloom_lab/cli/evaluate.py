@@ -1,0 +1,102 @@
+"""`motionloom evaluate`: does it do what the words say, does it look real, and did it get better.
+
+Its commands and their options are those of `lab/suites/options.toml`; this reads them from the line.
+"""
+
+import argparse
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from motionloom.cli.writing import add_force, check_overwriting
+
+if TYPE_CHECKING:
+    from motionloom_lab.suites.options import Option
+
+
+def add(subparsers) -> None:
+    """Register the commands of `evaluate`."""
+    from motionloom_lab.suites.options import commands
+
+    family = subparsers.add_parser("evaluate", help="measure weights: obedience, realism, text metrics; compare runs")
+    group = family.add_subparsers(metavar="COMMAND", required=True)
+    for name, command in commands().items():
+        parser = group.add_parser(name, help=command.help)
+        for option in command.options:
+            add_option(parser, option)
+        if name != "compare":
+            add_force(parser)
+        parser.set_defaults(run=partial(_run, name))
+
+
+def add_option(parser: argparse.ArgumentParser, option: "Option") -> None:
+    """Register one option."""
+    if option.kind == "flag":
+        parser.add_argument(f"--{option.name}", dest=option.dest, action="store_true", help=option.help)
+        return
+    how: dict[str, Any] = {
+        "type": READERS[option.kind],
+        "choices": option.choices or None,
+        "metavar": option.metavar,
+        "help": option.help.replace("%", "%%"),
+    }
+    if option.positional:
+        parser.add_argument(option.name, **how)
+        return
+    how |= {"action": "append"} if option.many == "append" else {"nargs": option.many} if option.many else {}
+    parser.add_argument(f"--{option.name}", dest=option.dest, default=option.default, required=option.required, **how)
+
+
+def _run(name: str, arguments: argparse.Namespace) -> int | None:
+    """The command, after a note about finished pages that it writes over; what a stopped run left has none."""
+    from motionloom_lab.suites import commands, options
+
+    out = getattr(arguments, "out", None)
+    if out is not None:
+        check_overwriting(arguments, [out] if out.is_file() else sorted({*out.glob("*.md"), *out.glob("*/report.md")}))
+    given = {key: value for key, value in vars(arguments).items() if value is not None and value is not False}
+    return getattr(commands, options.commands()[name].run)({**given, "command": name})
+
+
+def words(said: str) -> tuple[str, ...]:
+    """What is between commas."""
+    return tuple(word.strip() for word in said.split(",") if word.strip())
+
+
+def numbers(said: str) -> tuple[int, ...]:
+    """Whole numbers between commas."""
+    try:
+        return tuple(int(word) for word in said.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{said!r} are not whole numbers with commas, such as 5,20,50") from None
+
+
+def batch(said: str) -> int | str:
+    """A number of motions, or all."""
+    try:
+        return said if said == "all" else int(said)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{said!r} is no number of motions and not all") from None
+
+
+def times(said: str) -> tuple[int, int]:
+    """Captions x motions of each."""
+    try:
+        captions, motions = (int(word) for word in ("0x0" if said == "0" else said).split("x"))
+        return captions, motions
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{said!r} is not captions x motions of each, such as 10x10, or 0") from None
+
+
+READERS: dict[str, Callable[[str], Any]] = {
+    "text": str,
+    "int": int,
+    "float": float,
+    "path": Path,
+    "words": words,
+    "numbers": numbers,
+    "batch": batch,
+    "times": times,
+}
+"""What an option's text is read with, by its kind."""

@@ -1,0 +1,269 @@
+"""How two people move together: errors of a completion, and what errors cannot see.
+
+Every function takes ``positions`` (2, frames, 22, 3) in metres in one world, SMPL joint order, +Y up, the floor at
+y = 0, at 20 frames per second unless ``fps`` says otherwise. Angles are radians. `motionloom_lab.metrics.pair_groups`
+compares groups of duets with real ones.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.kinematics import physics as ph
+from motionloom.kinematics.capsules import RADII, capsule_ends, gaps, overlap
+from motionloom.kinematics.physics import Array
+from motionloom_lab.metrics.skate import skate
+
+FPS = 20.0
+PREFIX = 20
+"""Frames that are given in prefix completion."""
+HORIZONS = (1, 2, 3)
+"""Seconds after the prefix; each counts from its end."""
+HOLD = 0.25
+"""Metres from wrist to wrist below which hands may hold: each palm is some 8 cm beyond its wrist."""
+TOUCH = 0.10
+"""Metres from a wrist to the surface of the other's body below which the hand may lie on it."""
+LOOK = np.pi / 3
+"""Radians between where someone faces and where the other one is, below which the other is in view."""
+_GROUND = np.array([1.0, 0.0, 1.0])
+
+
+# Errors --------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class HorizonError:
+    """Metres, averaged over crops, both people and the frames from the end of the prefix to the horizon."""
+
+    seconds: float
+    root: float
+    """Distance of the roots."""
+    joint: float
+    """Distance of joints 1 to 21, each from its own root; mean over joints."""
+    absolute: float
+    """Distance of all 22 joints where they are in the world; mean over joints."""
+
+
+def completion_errors(
+    real: np.ndarray,
+    predicted: np.ndarray,
+    *,
+    prefix: int = PREFIX,
+    fps: float = FPS,
+    horizons: Sequence[float] = HORIZONS,
+) -> tuple[HorizonError, ...]:
+    """Prefix completion of two people (Shafir et al., priorMDM, 2023, table 3): one `HorizonError` per horizon.
+
+    Both are (crops, 2, frames, 22, 3) or one crop without the first axis. Each is put in the frame of its own person 0
+    at frame 0 (`in_first_frame`), as the published evaluation decodes it. Horizons are cumulative: seconds k averages
+    frames ``prefix`` to ``prefix + k fps``. Raises MotionloomError for other shapes or too few frames.
+    """
+    r, p = (_crops(positions) for positions in (real, predicted))
+    need = prefix + round(max(horizons) * fps)
+    if r.shape != p.shape or r.shape[2] < need:
+        raise MotionloomError(
+            f"completions need as many crops of as many frames as the real ones, {need} or more; got {p.shape[:3]} "
+            f"against {r.shape[:3]} (crops, people, frames)"
+        )
+    r, p = (np.stack([in_first_frame(crop) for crop in positions]) for positions in (r, p))
+    apart = p - r
+    root = np.linalg.norm(apart[:, :, :, 0], axis=-1)
+    joint = np.linalg.norm(apart[:, :, :, 1:] - apart[:, :, :, :1], axis=-1).mean(axis=-1)
+    absolute = np.linalg.norm(apart, axis=-1).mean(axis=-1)
+    spans = [(k, slice(prefix, prefix + round(k * fps))) for k in horizons]
+    return tuple(
+        HorizonError(float(k), *(float(e[:, :, span].mean()) for e in (root, joint, absolute))) for k, span in spans
+    )
+
+
+def in_first_frame(positions: np.ndarray) -> Array:
+    """Both people moved rigidly so that person 0 begins over x = z = 0, facing +Z; heights stay."""
+    p = _pair(positions)
+    moved = p - p[0, 0, 0] * _GROUND
+    return ph.turned(moved, float(ph.heading(p[0, :1])[0]))
+
+
+# Where they are ------------------------------------------------------------------------------------------------------
+
+
+def distance(positions: np.ndarray) -> Array:
+    """(frames,) metres on the ground from pelvis to pelvis."""
+    p = _pair(positions)
+    return np.linalg.norm((p[1] - p[0])[:, 0] * _GROUND, axis=-1)
+
+
+def facing_angle(positions: np.ndarray) -> Array:
+    """(frames,) 0 to pi: between the two headings; 0 both face the same way, pi opposite ways."""
+    p = _pair(positions)
+    return _between(ph.heading(p[1]) - ph.heading(p[0]))
+
+
+def looking_away(positions: np.ndarray) -> Array:
+    """(2, frames) 0 to pi: how far each one's heading is turned from the direction to the other; 0 looks at them."""
+    p = _pair(positions)
+    apart = (p[1] - p[0])[:, 0]
+    way = np.arctan2(apart[:, 0], apart[:, 2])
+    return np.stack([_between(way - ph.heading(p[0])), _between(way + np.pi - ph.heading(p[1]))])
+
+
+def mutual(positions: np.ndarray, *, within: float = LOOK) -> float:
+    """Share of frames in which each has the other within ``within`` radians of the heading."""
+    return float((looking_away(positions) < within).all(axis=0).mean())
+
+
+# Touch ---------------------------------------------------------------------------------------------------------------
+
+
+def hand_distance(positions: np.ndarray) -> Array:
+    """(frames,) metres from a wrist of one to a wrist of the other, the nearest of the four."""
+    p = _pair(positions)
+    wrists = p[:, :, list(ph.WRISTS)]
+    return np.linalg.norm(wrists[0][:, :, None] - wrists[1][:, None], axis=-1).min(axis=(1, 2))
+
+
+def hand_contact(positions: np.ndarray, *, within: float = HOLD) -> float:
+    """Share of frames in which a wrist of one is nearer than ``within`` metres to a wrist of the other."""
+    return float((hand_distance(positions) < within).mean())
+
+
+def hand_to_body(positions: np.ndarray) -> Array:
+    """(frames,) metres from a wrist of one to the surface of the other's `CAPSULES`, the nearest; below 0 inside."""
+    p = _pair(positions)
+    apart = []
+    for person, other in ((0, 1), (1, 0)):
+        points = p[person][:, list(ph.WRISTS)]
+        ends = capsule_ends(p[other])
+        apart.append(gaps(np.stack([points, points], axis=2), np.zeros((2, 2)), ends, RADII).min(axis=(1, 2)))
+    return np.minimum(*apart)
+
+
+def touch(positions: np.ndarray, *, within: float = TOUCH) -> float:
+    """Share of frames in which a wrist of one is nearer than ``within`` metres to the other's body, hands and all."""
+    return float((hand_to_body(positions) < within).mean())
+
+
+def penetration_depth(positions: np.ndarray) -> Array:
+    """(frames,) metres: how deep the deepest capsule of one is in a capsule of the other; 0 where none touch."""
+    return overlap(*_pair(positions))
+
+
+def penetration(positions: np.ndarray) -> float:
+    """Metres: `penetration_depth` averaged over all frames."""
+    return float(penetration_depth(positions).mean())
+
+
+# Together ------------------------------------------------------------------------------------------------------------
+
+
+def synchrony(positions: np.ndarray, fps: float = FPS) -> float:
+    """-1 to 1: correlation of the two pelvis velocities on the ground, averaged over a quarter of a second.
+
+    Both components together, each less its mean: 1 where one moves as the other does (partners in hold), -1 where they
+    always move against each other, 0 where they have nothing to do with each other or one stands still.
+    """
+    return _correlation(*_root_velocities(positions, fps))
+
+
+def speed_synchrony(positions: np.ndarray, fps: float = FPS) -> float:
+    """-1 to 1: correlation of how fast the two pelvises go, wherever to. Partners who turn about each other move
+    against each other and those who travel move alike, so that `synchrony` is near 0 for a mix; this one is not."""
+    first, second = (np.linalg.norm(v, axis=-1) for v in _root_velocities(positions, fps))
+    return _correlation(first, second)
+
+
+def _root_velocities(positions: np.ndarray, fps: float) -> list[Array]:
+    return [ph.smooth(ph.velocity(one[:, 0, [0, 2]], fps), ph.odd(fps / 4)) for one in _pair(positions)]
+
+
+def _correlation(first: Array, second: Array) -> float:
+    a, b = first - first.mean(axis=0), second - second.mean(axis=0)
+    size = float(np.sqrt((a**2).sum() * (b**2).sum()))
+    return float((a * b).sum() / size) if size > 1e-9 else 0.0
+
+
+@dataclass(frozen=True)
+class PairStats:
+    """The numbers of one duet."""
+
+    distance: float
+    """Metres from pelvis to pelvis on the ground, mean."""
+    distance_range: float
+    """Metres: standard deviation of that distance over the frames."""
+    facing: float
+    """Radians between the headings, mean; pi: opposite."""
+    looking_away: float
+    """Radians each is turned away from the other, mean over both and all frames."""
+    mutual: float
+    """Share of frames in which both have the other in view."""
+    hand_distance: float
+    """Metres between the nearest wrists, mean."""
+    hand_contact: float
+    """Share of frames with wrists nearer than `HOLD`."""
+    touch: float
+    """Share of frames with a wrist nearer than `TOUCH` to the other's body."""
+    penetration: float
+    """Metres of the deepest overlap of the bodies, mean over frames."""
+    synchrony: float
+    """Correlation of the root velocities."""
+    speed_synchrony: float
+    """Correlation of the root speeds."""
+    skate_share: float
+    """`skate.Skate.share`, mean of both people."""
+    skate_speed: float
+    """`skate.Skate.speed`, cm/s, mean of both people."""
+    skate_slide: float
+    """`skate.Skate.slide`, mm per frame, mean of both people."""
+
+
+NAMES: tuple[str, ...] = tuple(field.name for field in fields(PairStats))
+"""The numbers of `PairStats` in order."""
+
+
+def pair_stats(positions: np.ndarray, fps: float = FPS) -> PairStats:
+    """All numbers of one duet of at least two frames."""
+    p = _pair(positions)
+    apart, hands = distance(p), hand_distance(p)
+    feet = [skate(person, fps) for person in p]
+    return PairStats(
+        distance=float(apart.mean()),
+        distance_range=float(apart.std()),
+        facing=float(facing_angle(p).mean()),
+        looking_away=float(looking_away(p).mean()),
+        mutual=mutual(p),
+        hand_distance=float(hands.mean()),
+        hand_contact=float((hands < HOLD).mean()),
+        touch=touch(p),
+        penetration=penetration(p),
+        synchrony=synchrony(p, fps),
+        speed_synchrony=speed_synchrony(p, fps),
+        skate_share=float(np.mean([foot.share for foot in feet])),
+        skate_speed=float(np.mean([foot.speed for foot in feet])),
+        skate_slide=float(np.mean([foot.slide for foot in feet])),
+    )
+
+
+# Parts ---------------------------------------------------------------------------------------------------------------
+
+
+def _pair(positions: np.ndarray) -> Array:
+    p = np.asarray(positions, dtype=np.float64)
+    if p.ndim != 4 or p.shape[0] != 2 or p.shape[1] < 1 or p.shape[2:] != (22, 3):
+        raise MotionloomError(f"two people must be (2, frames, 22, 3), at least one frame; got {p.shape}")
+    if not np.isfinite(p).all():
+        raise MotionloomError("the positions of the two people have numbers that are not finite (NaN or infinity)")
+    return p
+
+
+def _crops(positions: np.ndarray) -> Array:
+    p = np.asarray(positions, dtype=np.float64)
+    p = p[None] if p.ndim == 4 else p
+    if p.ndim != 5 or len(p) == 0:
+        raise MotionloomError(f"crops of two people must be (crops, 2, frames, 22, 3), at least one; got {p.shape}")
+    return p
+
+
+def _between(angle: np.ndarray) -> Array:
+    """0 to pi: how far an angle of any size is from no turn."""
+    return np.abs((angle + np.pi) % (2 * np.pi) - np.pi)

@@ -1,0 +1,226 @@
+"""Human3.6M, HumanEva-I and AMASS as prediction is measured on them, out of the files that are usual.
+
+None of the data is here, and each has a licence of its own. Files have +Z up; positions are handed out with +Y up
+(x, y, z become y, z, x), which `Layout.encode` of a layout with ``z_up`` undoes. The root keeps its way in the
+recordings; the layouts drop it, as published (Yuan and Kitani 2020, DLow; Barquero et al. 2023, BeLFusion for AMASS).
+
+No model is to be chosen on the test part: what the published protocols train on is split further. See `held_out`.
+"""
+
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom.errors import MotionloomError
+from motionloom.io import text
+from motionloom.io.atomic import finished
+from motionloom_lab.papers.amass import is_amass, read_amass
+from motionloom_lab.papers.benchmark_layouts import H36M_LAYOUT, HUMANEVA_LAYOUT
+from motionloom_lab.papers.pickled import Tables, read_tables
+from motionloom_lab.papers.readers import find_takes
+from motionloom_train.data.prediction import Protocol, Recording, checked, read_cmu, read_folder
+
+SPLITS = ("train", "val", "test")
+NAMES = ("h36m", "humaneva", "amass", "cmu", "own")
+H36M_LICENCE = "Human3.6M: academic use only, under the licence of its owners (Ionescu et al. 2014)"
+HUMANEVA_LICENCE = "HumanEva-I: research use only, under the licence of its owners (Sigal et al. 2010)"
+H36M_TRAIN, H36M_TEST = ("S1", "S5", "S6", "S7", "S8"), ("S9", "S11")
+H36M_JOINTS = (0, 1, 2, 3, 6, 7, 8, 12, 13, 14, 15, 17, 18, 19, 25, 26, 27)
+"""The 17 of the file's 32 joints that are kept."""
+H36M_SPEEDS = {
+    "Directions": 0.0045333,
+    "Discussion": 0.0050718,
+    "Eating": 0.0039681,
+    "Greeting": 0.0059260,
+    "Phoning": 0.0035907,
+    "Posing": 0.0041949,
+    "Purchases": 0.0056251,
+    "Sitting": 0.0024797,
+    "SittingDown": 0.0035406,
+    "Smoking": 0.0036022,
+    "Photo": 0.0043476,
+    "Waiting": 0.0042226,
+    "Walking": 0.0075376,
+    "WalkDog": 0.0070660,
+    "WalkTogether": 0.0067542,
+}
+"""Mean displacement of a joint by action, metres per frame at 50 fps: what CMD compares with (BeLFusion)."""
+_ALIASES = {"TakingPhoto": "Photo", "WalkingDog": "WalkDog", "WalkingTogether": "WalkTogether"}
+HUMANEVA_DROPPED = {
+    ("Train/S3", "Walking 1 chunk0"),
+    ("Train/S3", "Walking 1 chunk2"),
+    ("Validate/S3", "Walking 1 chunk4"),
+}
+"""Chunks with a bad head marker."""
+FARTHEST = 100.0
+"""Metres from the middle of the room beyond which numbers are no metres."""
+
+
+def read_h36m(
+    path: Path | str, *, splits: tuple[str, ...] = SPLITS, say: Callable[[str], None] = lambda line: None
+) -> Protocol:
+    """Human3.6M out of ``data_3d_h36m.npz``: 17 of 32 joints at 50 Hz, 25 frames observed and 100 predicted.
+
+    Train on S1, S5, S6, S7, S8 less what is held out for validation (`held_out`), test on S9 and S11: windows start at
+    frames 0, 25, 50 ... and the one that would end with the last frame is left out, as published (5,168 windows of the
+    whole file). A class is an action without its number. ``say`` hears of subjects that are missing.
+    Raises MotionloomError for a file that is missing, damaged, or of another form.
+    """
+    table = _subjects(path, H36M_TRAIN + H36M_TEST, "Human3.6M", say)
+    recordings: list[Recording] = []
+    for number, subject in enumerate(H36M_TRAIN + H36M_TEST):
+        actions = sorted(table.get(subject, {}))
+        kept = held_out(len(actions), number)
+        for order, action in enumerate(actions):
+            split = "test" if subject in H36M_TEST else "val" if order in kept else "train"
+            if split in splits:
+                places = _placed(table[subject][action], 32, f"{path}: {subject}, {action}")[:, H36M_JOINTS]
+                recordings.append(Recording(f"{subject}/{action}", subject, h36m_class(action), split, places))
+    return checked(
+        path,
+        Protocol("h36m", 50.0, 25, 100, H36M_LAYOUT, tuple(recordings), H36M_LICENCE, speeds=dict(H36M_SPEEDS)),
+    )
+
+
+def h36m_class(action: str) -> str:
+    """``Walking 1`` is ``Walking``; the data set's own longer names are the benchmark's."""
+    name = action.rstrip("0123456789")
+    name = name[:-1] if name.endswith((" ", "_")) else name
+    return _ALIASES.get(name, name)
+
+
+def read_humaneva(
+    path: Path | str, *, splits: tuple[str, ...] = SPLITS, say: Callable[[str], None] = lambda line: None
+) -> Protocol:
+    """HumanEva-I out of ``data_3d_humaneva15.npz``: 15 joints at 60 Hz, 15 frames observed and 60 predicted.
+
+    Train on Train/S1 to S3 less what is held out (`held_out`), test on Validate/S1 to S3: the same three people, as
+    published. Three chunks with a bad marker and all shorter than 75 frames are dropped; one of exactly 75 is a window
+    for training and, as a window that ends with the last frame, none for the test. Raises as `read_h36m`.
+    """
+    subjects = tuple(f"{part}/S{number}" for part in ("Train", "Validate") for number in (1, 2, 3))
+    table = _subjects(path, subjects, "HumanEva-I", say)
+    recordings: list[Recording] = []
+    for number, subject in enumerate(subjects):
+        whole = table.get(subject, {})
+        good = sorted(a for a in whole if (subject, a) not in HUMANEVA_DROPPED and whole[a].shape[:1] >= (75,))
+        kept = held_out(len(good), number)
+        for order, action in enumerate(good):
+            split = "test" if subject.startswith("Validate") else "val" if order in kept else "train"
+            if split in splits:
+                places = _placed(whole[action], 15, f"{path}: {subject}, {action}")
+                said = re.sub(r"( \d+)?( chunk\d+)?$", "", action)
+                recordings.append(Recording(f"{subject}/{action}", subject.split("/")[1], said, split, places))
+    return checked(path, Protocol("humaneva", 60.0, 15, 60, HUMANEVA_LAYOUT, tuple(recordings), HUMANEVA_LICENCE))
+
+
+def held_out(actions: int, subject: int) -> set[int]:
+    """Which of a training subject's actions, in order of name, are kept for validation: one in ten, at least one of
+    two or more, and others for each subject: with 30 actions in 15 pairs, five subjects hold out every class once."""
+    count = max(1, actions // 10) if actions > 1 else 0
+    return {(2 * subject + 1 + 10 * k) % actions for k in range(count)}
+
+
+def _subjects(path: Path | str, wanted: tuple[str, ...], called: str, say: Callable[[str], None]) -> Tables:
+    table = read_tables(path, "positions_3d")
+    missing = [name for name in wanted if name not in table]
+    if len(missing) == len(wanted):
+        has = ", ".join(text.shown(name, 20) for name in list(table)[:8]) or "nobody"
+        raise MotionloomError(f"{path} has none of the subjects {', '.join(wanted)} of {called}; it has {has}")
+    if missing:
+        say(f"{path} lacks {', '.join(missing)}, so figures on it are not those of the whole of {called}")
+    return table
+
+
+def _placed(array: np.ndarray, joints: int, where: str) -> NDArray[np.float32]:
+    """(frames, joints, 3) with +Z up, checked, to +Y up."""
+    if array.ndim != 3 or array.shape[1:] != (joints, 3) or not len(array) or array.dtype.kind != "f":
+        raise MotionloomError(
+            f"{where} is {array.dtype} of the shape {array.shape} and must be numbers of (frames, {joints}, 3)"
+        )
+    if not (np.abs(array) <= FARTHEST).all():
+        raise MotionloomError(
+            f"{where} has places that are not finite or over {FARTHEST:g} away; they must be finite and in metres"
+        )
+    return array.astype(np.float32)[..., [1, 2, 0]]
+
+
+# Which one it is
+
+
+def find_protocol(
+    path: Path | str,
+    *,
+    name: str | None = None,
+    splits: tuple[str, ...] = SPLITS,
+    segments: Path | str | None = None,
+    fps: float = 30.0,
+    say: Callable[[str], None] = lambda line: None,
+) -> Protocol:
+    """The data set that a file or folder holds, recognised by what is in it; ``name`` (one of `NAMES`) wins.
+
+    ``segments``: a list of test windows for AMASS. ``fps``: for a folder of a user's own files.
+    Raises MotionloomError where nothing or two data sets are recognised, and as the readers do.
+    """
+    path = Path(path)
+    if name is not None and name not in NAMES:
+        raise MotionloomError(f"there is no data set {text.shown(name)} for prediction; name one of {', '.join(NAMES)}")
+    kind, place = _recognised(path, name)
+    if segments is not None and kind != "amass":
+        raise MotionloomError(f"a list of test segments is for AMASS, and {path} is read as {kind}; leave it out")
+    if kind == "amass":
+        return read_amass(place, splits=splits, segments=segments, say=say)
+    if kind == "own":
+        return read_folder(place, fps=fps, say=say)
+    return {"h36m": read_h36m, "humaneva": read_humaneva, "cmu": read_cmu}[kind](place, splits=splits, say=say)
+
+
+def _recognised(path: Path, name: str | None) -> tuple[str, Path]:
+    if not path.exists():
+        raise MotionloomError(f"there is no {path}; name a file or folder of one of {', '.join(NAMES)}")
+    if not path.is_dir():
+        if name in (None, "h36m", "humaneva") and path.suffix == ".npz":
+            return name or _file_kind(path), path
+        raise MotionloomError(
+            f"{path} is a file and is not data_3d_h36m.npz or data_3d_humaneva15.npz; name one of those or a folder"
+        )
+    if name in ("amass", "cmu", "own"):
+        return name, path
+    files = {kind: _npz_files(path, kind) for kind in ("h36m", "humaneva") if name in (None, kind)}
+    found = [(kind, place) for kind, places in files.items() for place in places]
+    if len(found) > 1:
+        listed = " and ".join(place.name for _, place in found[:3])
+        raise MotionloomError(f"{path} has {listed}; name the one that is meant")
+    if found:
+        return found[0]
+    if name is not None:
+        raise MotionloomError(f"{path} has no data_3d_{name}*.npz; name the file itself")
+    pack = (path / "manifest.csv").is_file()
+    if not pack and is_amass(path):
+        return "amass", path
+    cmu = [take.source == "cmu" for take in find_takes(path)]
+    return "cmu" if (any(cmu) if pack else all(cmu)) else "own", path
+
+
+def _npz_files(folder: Path, kind: str) -> list[Path]:
+    return [p for p in finished(folder, f"data_3d_{kind}*.npz") if not p.stem.endswith("_test")]
+
+
+def _file_kind(path: Path) -> str:
+    for kind in ("h36m", "humaneva"):
+        if kind in path.name.lower():
+            return kind
+    return _subject_kind(path, read_tables(path, "positions_3d"))
+
+
+def _subject_kind(path: Path, names: Iterable[str]) -> str:
+    found = set(names)
+    if any(name.startswith(("Train/", "Validate/")) for name in found):
+        return "humaneva"
+    if found & set(H36M_TRAIN + H36M_TEST):
+        return "h36m"
+    listed = ", ".join(text.shown(name, 20) for name in sorted(found)[:8]) or "nobody"
+    raise MotionloomError(f"{path} has the subjects of neither Human3.6M nor HumanEva-I; it has {listed}")

@@ -1,0 +1,92 @@
+"""Recorded people as `lab.metrics.bodies` wants them, and what drawn bodies are beside them.
+
+``bodies.json`` beside this file holds the percentiles of the packs that the project was built with (no motion);
+`motionloom evaluate reach` makes it anew.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.kinematics.physics import Array
+from motionloom.kinematics.wholeness import whole_frames
+from motionloom_lab.metrics import bodies
+from motionloom_lab.papers.readers import find_takes
+
+MOST = 200
+"""Recordings of each folder: enough for percentiles."""
+
+
+def known() -> bodies.Reach:
+    """The shipped percentiles."""
+    place = resources.files("motionloom_lab.suites") / "bodies.json"
+    return {name: tuple(values) for name, values in json.loads(place.read_text(encoding="utf-8"))["reach"].items()}
+
+
+def reach_of(
+    folders: Sequence[Path | str], *, most: int = MOST, say: Callable[[str], None] = lambda line: None
+) -> bodies.Reach:
+    """Percentiles of the people recorded in folders, on their own skeletons; what is animated by hand is left out.
+
+    most: recordings of each folder that are read, spread evenly over it.
+    Raises `MotionloomError` for folders without recordings of joints.
+    """
+    return bodies.reach_of(_recordings(folders, most, say))
+
+
+def _recordings(folders: Sequence[Path | str], most: int, say: Callable[[str], None]) -> Iterator[Array]:
+    count = 0
+    for folder in folders:
+        captured = [take for take in find_takes(folder) if take.kind == "capture"]
+        takes = [captured[k * len(captured) // most] for k in range(most)] if len(captured) > most else captured
+        for number, take in enumerate(takes):
+            if number % 100 == 0:
+                say(f"{folder}: recording {number + 1} of {len(takes)}")
+            try:
+                read = take.read()
+            except MotionloomError:
+                continue  # `data build` says which
+            if not isinstance(read, np.ndarray):
+                count += 1
+                yield read.own
+    if not count:
+        raise MotionloomError(
+            f"{', '.join(map(str, folders))}: no recordings of joints; name folders of BVH or AMC files"
+        )
+
+
+def judge(made: Sequence[Array], reach: bodies.Reach) -> dict[str, Any]:
+    """How drawn bodies are held, as plain data; ``passed`` of ``of``."""
+    rows = bodies.held(made, reach)
+    whole = float(np.mean([whole_frames(clip).mean() for clip in made])) if made else 0.0
+    stretched = bodies.stretched(made)
+    numbers: dict[str, Any] = {
+        row.name: {"median": row.median, "people": list(row.reach), "outside": row.outside, "passes": row.passes}
+        for row in rows
+    }
+    numbers["whole"] = {"share": round(whole, 4), "passes": whole >= 1 - bodies.OUTSIDE}
+    numbers["bones"] = {"stretched": round(stretched, 4), "passes": stretched <= bodies.STRETCHED}
+    return {"numbers": numbers, "passed": sum(n["passes"] for n in numbers.values()), "of": len(numbers)}
+
+
+def table(found: dict[str, Any]) -> list[list[str]]:
+    """Rows of text for `judge`'s answer, the heading first."""
+    rows = [["body", "drawn", "people (5 to 95 %)", "outside", "", "what it is"]]
+    for name, n in found["numbers"].items():
+        verdict = "ok" if n["passes"] else "FAIL"
+        if name in bodies.MEANING:
+            people = f"{n['people'][1]:.0f} to {n['people'][3]:.0f}"
+            rows.append([name, f"{n['median']:.1f}", people, f"{n['outside']:.1%}", verdict, bodies.MEANING[name]])
+    whole, bones = found["numbers"]["whole"], found["numbers"]["bones"]
+    limits = (f">= {1 - bodies.OUTSIDE:.0%}", f"<= {bodies.STRETCHED:.0%}")
+    for name, value, limit, n, meaning in (
+        ("whole", whole["share"], limits[0], whole, "frames in which the body is a person's (kinematics/wholeness.py)"),
+        ("bones", bones["stretched"], limits[1], bones, "how far the worst bone is from the person's length"),
+    ):
+        rows.append([name, f"{value:.1%}", limit, "", "ok" if n["passes"] else "FAIL", meaning])
+    return rows

@@ -1,0 +1,166 @@
+"""The rows of the suite `control`: ways to make a motion that meets a goal, each a function of targets and seeds."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Protocol as Interface
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.features import humanml
+from motionloom.kinematics.physics import Array
+from motionloom.motion import Motion
+from motionloom.requests.sampling import BATCH as ROWS
+from motionloom.runtime.prior import PriorSession
+from motionloom.tasks.sampling import Observed
+from motionloom.tasks.text import sample_features, smooth, to_motion
+from motionloom.weights.adapter import Adapter, adapted, adapters
+from motionloom.weights.prior import Prior
+from motionloom_lab.papers.diffusion_blending import control_features
+from motionloom_lab.suites.control_kinds import Kind, Target
+from motionloom_lab.suites.protocol import Drawing
+
+UNCONTROLLED, EXPORTED = "uncontrolled", "uncontrolled, as exported"
+INPAINTING, TUNED, BLENDING = "MDM inpainting", "fine-tuned", "DiffusionBlending"
+LOOSE, OURS = "ours without exact fit", "ours"
+METHODS = (UNCONTROLLED, EXPORTED, INPAINTING, TUNED, BLENDING, LOOSE, OURS)
+"""In the order of the table."""
+BASE = {
+    UNCONTROLLED: UNCONTROLLED,
+    INPAINTING: UNCONTROLLED,
+    TUNED: UNCONTROLLED,
+    BLENDING: UNCONTROLLED,
+    EXPORTED: EXPORTED,
+    LOOSE: EXPORTED,
+    OURS: EXPORTED,
+}
+"""The uncontrolled row that each is a ratio to: of motions as drawn, or of exported ones."""
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """One motion."""
+
+    positions: Array
+    """(frames, 22, 3) metres in the goal's world, at 20 frames per second."""
+    features: Array
+    """(frames, 263) not standardised, for the evaluator."""
+
+
+class Method(Interface):
+    """Motion i of the answer meets target i as well as it can, drawn from seed i alone."""
+
+    def __call__(self, targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]: ...
+
+
+Maker = Callable[[Kind, str], Method]
+"""(kind, name out of `METHODS`) to the method; MotionloomError where these weights have none of that name."""
+
+
+def fits(one: Kind, name: str) -> bool:
+    """Whether a method is a row of a kind: one control is fine-tuned, several are blended."""
+    return {TUNED: len(one.adapters) == 1, BLENDING: len(one.adapters) > 1}.get(name, True)
+
+
+def maker(prior: Prior, how: Drawing) -> Maker:
+    """The methods of a prior and its shipped adapters; a control that has none of its own takes ``any``."""
+    shipped = adapters()
+
+    @cache
+    def net(name: str):
+        return adapted(prior.net, Adapter.load(name if name in shipped else "any", prior))
+
+    def make(one: Kind, name: str) -> Method:
+        if name in (UNCONTROLLED, EXPORTED):
+            return uncontrolled(prior, how, exported=name == EXPORTED)
+        if name == INPAINTING:
+            return published(prior, how, [prior.net], noise_free=False)
+        if name in (TUNED, BLENDING):
+            return published(prior, how, [net(part) for part in one.adapters], noise_free=True)
+        if name in (LOOSE, OURS):
+            return ours(prior, how, exact=name == OURS)
+        raise MotionloomError(f"there is no way of control {name!r}; there are {', '.join(METHODS)}")
+
+    return make
+
+
+def uncontrolled(prior: Prior, how: Drawing, *, exported: bool) -> Method:
+    """Goals are ignored: motions from the words alone, as the network draws them or as they are exported."""
+
+    def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
+        drawn = sample_features(
+            prior, [target.prompt for target in targets], [len(target) for target in targets], seeds=seeds, **how
+        )
+        features = [one.astype(np.float64) for one in drawn]
+        return [of_motion(to_motion(one, prior.fps)) if exported else of_features(one) for one in features]
+
+    return draw
+
+
+def published(prior: Prior, how: Drawing, nets: Sequence[PriorSession], *, noise_free: bool) -> Method:
+    """Control in the representation: the fixed numbers are written into every estimate (`diffusion_blending`)."""
+
+    def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
+        result: dict[int, Made] = {}
+        for rows in groups([len(target) for target in targets]):
+            some = [targets[row] for row in rows]
+            mask = np.stack([target.mask for target in some])
+            given = np.stack([target.known for target in some]).astype(np.float32)
+            known = Observed((given - prior.mean) / prior.std, mask, noise_free)
+            prompts, own = [target.prompt for target in some], [seeds[row] for row in rows]
+            drawn = control_features(prior, nets, prompts, known, seeds=own, **how) * prior.std + prior.mean
+            if prior.net.config.patch > 1:
+                drawn = smooth(drawn)  # as everything that such a network draws
+            fixed = np.where(mask, given, drawn).astype(np.float64)
+            result |= {row: of_features(one) for row, one in zip(rows, fixed, strict=True)}
+        return [result[row] for row in range(len(targets))]
+
+    return draw
+
+
+def ours(prior: Prior, how: Drawing, *, exact: bool) -> Method:
+    """`tasks.control.control` as it is by default, with or without its exact fit; as exported."""
+
+    def draw(targets: Sequence[Target], *, seeds: Sequence[int]) -> list[Made]:
+        from motionloom.tasks.control import control
+
+        made = []
+        for target, seed in zip(targets, seeds, strict=True):
+            (one,) = control(
+                prior, target.prompt, target.goal, seed=seed, guidance=how["guidance"], steps=how["steps"], fit=exact
+            )
+            made.append(of_motion(one.motion))
+        return made
+
+    return draw
+
+
+def of_features(features: np.ndarray) -> Made:
+    """A motion as it is drawn; it starts at the origin facing +Z, as the real one does."""
+    return Made(humanml.decode_positions(features), features)
+
+
+def of_motion(motion: Motion) -> Made:
+    """A motion as it is exported, on 22 joints at 20 frames per second; the last frame's numbers are there twice."""
+    positions = motion.positions()
+    features = humanml.positions_to_features(positions, motion.fps).astype(np.float64)
+    return Made(positions, np.concatenate([features, features[-1:]]))  # a frame has a step only to the next one
+
+
+def groups(lengths: Sequence[int]) -> list[list[int]]:
+    """Rows of equal length, at most `ROWS` together."""
+    by_length: dict[int, list[int]] = {}
+    for row, length in enumerate(lengths):
+        by_length.setdefault(length, []).append(row)
+    return [rows[at : at + ROWS] for rows in by_length.values() for at in range(0, len(rows), ROWS)]
+
+
+def checked(made: Sequence[Made], targets: Sequence[Target]) -> list[Made]:
+    """The motions, if they have the lengths asked for; ValueError otherwise, since a number would be a lie."""
+    for one, target in zip(made, targets, strict=True):
+        if one.positions.shape != target.goal.positions.shape or len(one.features) != len(target):
+            raise ValueError(f"a motion of {one.positions.shape} for a goal of {target.goal.positions.shape}")
+        if not np.isfinite(one.positions).all():
+            raise ValueError("a motion has numbers that are not finite")
+    return list(made)

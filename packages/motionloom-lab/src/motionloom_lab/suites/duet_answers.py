@@ -1,0 +1,147 @@
+"""Answers to somebody: one of a held-out pair is given, and a partner is drawn; judged as duets from words are."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from motionloom.diffusion import row_seed
+from motionloom.features import pair as two
+from motionloom.ground import GroundPose
+from motionloom.kinematics.ik import motion_from_positions
+from motionloom.kinematics.physics import Array
+from motionloom.tasks.control import moved
+from motionloom.tasks.duet import react
+from motionloom.tasks.pair import Duet
+from motionloom.tasks.text import LARGEST_SEED, frames_in, generate
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
+from motionloom_lab.metrics import pair as mp
+from motionloom_lab.report.columns import columns
+from motionloom_lab.report.report import Report, Value
+from motionloom_lab.suites import duet_text as judged
+from motionloom_lab.suites.duet import HELD_OUT
+from motionloom_lab.suites.duet_text import KINDS, NOTES, DuetSettings, Make, Table
+from motionloom_lab.suites.harness import Run
+from motionloom_lab.suites.needs import NoData
+from motionloom_train.data.pairs import Pair
+
+FULL, QUICK = judged.FULL, judged.QUICK
+COLUMNS = (*judged.COLUMNS, *columns("duet-answers"))
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Random windows of held-out pairs, either person first."""
+
+    pairs: tuple[Pair, ...]
+    """All are long enough and have captions."""
+    frames: int
+
+    @staticmethod
+    def of(pairs: Sequence[Pair], how: DuetSettings) -> "Windows":
+        """Raises NoData where no held-out pair with a caption is long enough."""
+        frames = frames_in(how.seconds, mp.FPS)
+        found = tuple(p for p in pairs if p.split in HELD_OUT and p.frames >= frames and p.captions)
+        if not found:
+            raise NoData(
+                f"there is no held-out pair of {frames} frames with a caption to answer; ten pairs or more give one"
+            )
+        return Windows(found, frames)
+
+    def captions(self) -> tuple[str, ...]:
+        """What people do in them, each once."""
+        return tuple(dict.fromkeys(text for pair in self.pairs for text in pair.captions))
+
+    def draw(self, caption: str, count: int, seed: int) -> list[Array]:
+        """``count`` windows (2, frames, 22, 3) metres of pairs with that caption; the first person is given."""
+        rng, some = np.random.default_rng(seed), [pair.positions for pair in self.pairs if caption in pair.captions]
+        made = []
+        for _ in range(count):
+            positions = some[int(rng.integers(len(some)))]
+            start = int(rng.integers(positions.shape[1] - self.frames + 1))
+            made.append(positions[:: 1 if rng.random() < 0.5 else -1, start : start + self.frames])
+        return made
+
+    def all(self, how: DuetSettings) -> list[Array]:
+        """Those of a whole run, in its order."""
+        turns = judged.turns(self.captions(), how)
+        return [window for caption, count, seed in turns for window in self.draw(caption, count, seed)]
+
+
+def run(
+    run: Run, *, block: str | Path | None = None, how: DuetSettings | None = None, kinds: Sequence[str] = KINDS
+) -> Report:
+    """Measure a two-person block on people of the held-out pairs of ``run.data``; arguments as of `duet_text.run`."""
+    how = how or DuetSettings()
+    prior, found, pairs, about = judged.opened(run, block, kinds)
+    given = Windows.of(pairs, how)
+    return judged.measure(
+        pairs,
+        answers(prior, found, given, how),
+        alone(prior, given, how),
+        how,
+        table=table(given, how),
+        run=run,
+        kinds=kinds,
+        about=about | {"given": "one of the two in random windows of validation and test pairs"},
+    )
+
+
+def table(given: Windows, how: DuetSettings) -> Table:
+    """The columns of duets from words, and how far partners are from the real ones."""
+    silent = "The prior without communication does not know who is given; it begins where the real partner does."
+    return Table(
+        "duet-answers",
+        "Two people: answers to somebody",
+        given.captions(),
+        (*NOTES, silent),
+        columns=COLUMNS,
+        more=lambda duets: apart(duets, given.all(how)),
+    )
+
+
+def apart(duets: Sequence[Array], real: Sequence[Array]) -> Mapping[str, Value]:
+    """Metres on the ground from each duet's second root to the real partner's, at the end of each horizon."""
+    way = [np.linalg.norm((d[1, :, 0] - r[1, :, 0])[:, [0, 2]], axis=-1) for d, r in zip(duets, real, strict=True)]
+    at = {k: round(k * mp.FPS) - 1 for k in mp.HORIZONS}
+    return {f"root_{k}": Value.of([float(one[frame]) for one in way]) for k, frame in at.items() if frame < len(way[0])}
+
+
+def answers(prior: Prior, block: PairBlock, given: Windows, how: DuetSettings) -> Make:
+    """`react` to the first person of each window."""
+
+    def make(caption: str, count: int, seed: int) -> list[Duet]:
+        made = []
+        for number, window in enumerate(given.draw(caption, count, seed)):
+            made += react(
+                prior,
+                block,
+                motion_from_positions(window[0], mp.FPS),
+                caption,
+                seed=own_seed(seed, number),
+                **how.drawing,
+            )
+        return made
+
+    return make
+
+
+def alone(prior: Prior, given: Windows, how: DuetSettings) -> Make:
+    """Partners from the prior alone, who begin where the real partner does, facing as they do."""
+
+    def make(caption: str, count: int, seed: int) -> list[Duet]:
+        made = []
+        for number, window in enumerate(given.draw(caption, count, seed)):
+            (partner,) = generate(prior, caption, seconds=how.seconds, seed=own_seed(seed, number), **how.drawing)
+            begins = GroundPose.of_numbers(two.encode(window).poses[1])
+            made.append((motion_from_positions(window[0], mp.FPS), moved(partner, begins)))
+        return made
+
+    return make
+
+
+def own_seed(seed: int, number: int) -> int:
+    """A seed that may be asked for, unlike that of another caption or duet."""
+    return row_seed(seed, number) % (LARGEST_SEED // 2)

@@ -1,0 +1,120 @@
+"""Long duets of several captions: are partners still partners in the last seconds, or have they drifted apart?
+
+Their last stretch, and their first, are judged as duets from words are.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from motionloom.goals.segment import Segment
+from motionloom.ground import GroundPose
+from motionloom.motion import Motion
+from motionloom.tasks.control import moved
+from motionloom.tasks.duet import compose_pair
+from motionloom.tasks.long import compose
+from motionloom.tasks.pair import Duet
+from motionloom.tasks.splice import concatenated
+from motionloom.tasks.text import frames_in
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
+from motionloom_lab.metrics import pair as mp
+from motionloom_lab.report.report import Report
+from motionloom_lab.suites import duet_text as judged
+from motionloom_lab.suites.duet_answers import own_seed
+from motionloom_lab.suites.duet_text import KINDS, NOTES, Make, Table
+from motionloom_lab.suites.harness import Run
+from motionloom_lab.suites.protocol import check_ranges
+from motionloom_train.data.pairs import Pair
+
+MOST = 100
+"""Segments."""
+
+
+@dataclass(frozen=True)
+class LongDuetSettings(judged.DuetSettings):
+    """How long duets are made and measured; ``seconds`` is the length of a segment."""
+
+    segments: int = 3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_ranges(self, segments=(2, MOST))
+
+
+FULL, QUICK = LongDuetSettings(), LongDuetSettings(duets=2, steps=6, segments=2)
+
+
+def run(
+    run: Run, *, block: str | Path | None = None, how: LongDuetSettings | None = None, kinds: Sequence[str] = KINDS
+) -> Report:
+    """Measure a two-person block on long duets for the captions of train pairs; arguments as of `duet_text.run`."""
+    how = how or LongDuetSettings()
+    prior, found, pairs, about = judged.opened(run, block, kinds)
+    said = judged.captions_of(pairs)
+    return judged.measure(
+        pairs,
+        ours(prior, found, said, how),
+        alone(prior, pairs, said, how),
+        how,
+        table=table(said, how),
+        run=run,
+        kinds=kinds,
+        about=about | {"segments": how.segments, "whole": f"{how.segments * how.seconds:g} s"},
+    )
+
+
+def table(captions: tuple[str, ...], how: LongDuetSettings) -> Table:
+    """The last and the first stretch, as long as a segment."""
+    frames = frames_in(how.seconds, mp.FPS)
+    cuts = (
+        (f", last {how.seconds:g} s", lambda duet: duet[:, -frames:]),
+        (f", first {how.seconds:g} s", lambda duet: duet[:, :frames]),
+    )
+    silent = "The prior without communication begins where real partners do, and never hears of the other again."
+    return Table("duet-long", "Two people for long", captions, (*NOTES, silent), cuts)
+
+
+def ours(prior: Prior, block: PairBlock, captions: Sequence[str], how: LongDuetSettings) -> Make:
+    """`compose_pair` of captions in turn, from the one that is asked for."""
+
+    def make(caption: str, count: int, seed: int) -> list[Duet]:
+        made = []
+        for number in range(count):
+            pieces = list(
+                compose_pair(prior, block, timeline(captions, caption, how), seed=own_seed(seed, number), **how.drawing)
+            )
+            made.append((_whole(first for first, _ in pieces), _whole(second for _, second in pieces)))
+        return made
+
+    return make
+
+
+def alone(prior: Prior, pairs: Sequence[Pair], captions: Sequence[str], how: LongDuetSettings) -> Make:
+    """Two long motions of the prior alone, which begin where partners of random train windows stand."""
+    begun = judged.beginnings(pairs, how)
+
+    def one(caption: str, seed: int) -> Motion:
+        return _whole(compose(prior, timeline(captions, caption, how), seed=seed, **how.drawing))
+
+    def make(caption: str, count: int, seed: int) -> list[Duet]:
+        made = []
+        for number, poses in enumerate(begun(count, seed)):
+            first, second = (
+                moved(one(caption, own_seed(seed, 2 * number + i)), GroundPose.of_numbers(pose))
+                for i, pose in enumerate(poses)
+            )
+            made.append((first, second))
+        return made
+
+    return make
+
+
+def timeline(captions: Sequence[str], caption: str, how: LongDuetSettings) -> list[Segment]:
+    """``how.segments`` captions in turn, the first of which is ``caption``."""
+    first = captions.index(caption)
+    return [Segment(captions[(first + n) % len(captions)], how.seconds) for n in range(how.segments)]
+
+
+def _whole(pieces: Iterable[Motion]) -> Motion:
+    return concatenated(*pieces)

@@ -1,0 +1,343 @@
+"""Duets from words beside real pairs: where the two are to each other, what they touch, whether they move together.
+
+Each quantity that separates partners from shuffled people is held against how much real recordings differ from one
+another (`lab.metrics.pair_groups`); strangers, real and made, are rows of their own, and so is the prior without
+communication whose people at least begin where real partners do.
+"""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypedDict
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.features import pair as two
+from motionloom.ground import GroundPose
+from motionloom.kinematics.physics import Array
+from motionloom.tasks.control import moved
+from motionloom.tasks.pair import Duet, PairEdits, generate_pair, known_state, pair_features, person_seeds, stacked
+from motionloom.tasks.text import GUIDANCE, STEPS, finish, frames_in
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
+from motionloom_lab.metrics import pair as mp
+from motionloom_lab.metrics import pair_groups as groups
+from motionloom_lab.report.columns import columns
+from motionloom_lab.report.report import REAL, Column, Report, Row, Value
+from motionloom_lab.suites.duet import HELD_OUT, chosen_block
+from motionloom_lab.suites.duet_ways import no_communication_net
+from motionloom_lab.suites.harness import Run, Say, check_names
+from motionloom_lab.suites.needs import pairs_of
+from motionloom_lab.suites.protocol import SEEDS, check_ranges
+from motionloom_train.data.pairs import Pair, windows
+
+KINDS = ("real", "held-out", "strangers", "ours", "our-strangers", "silent")
+"""Rows of the table."""
+DEEP = 3.0
+"""Centimetres of mean penetration that no group may reach."""
+FEW = 24
+"""Duets whose synchrony is held against all their shuffles."""
+_STATS = {
+    "distance": ("distance", 1.0),
+    "looking_away": ("looking_away", 180 / np.pi),
+    "hand_contact": ("hand_contact", 1.0),
+    "touch": ("touch", 1.0),
+    "penetration": ("penetration", 100.0),
+    "skate_share": ("skate_share", 100.0),
+    "skate_speed": ("skate_speed", 1.0),
+    "skate_slide": ("skate_slide", 1.0),
+}
+"""Columns out of `PairStats`: which number, and times what."""
+COLUMNS = columns("duet-text")
+
+
+class DuetDrawing(TypedDict):
+    """How people are drawn, as the tasks take it."""
+
+    guidance: float
+    steps: int
+    foot_lock: bool
+
+
+@dataclass(frozen=True)
+class DuetSettings:
+    """How duets are made and measured."""
+
+    duets: int = 24
+    seconds: float = 6.0
+    steps: int = STEPS
+    guidance: float = GUIDANCE
+    seed: int = 0
+    clean: bool = True
+    """Feet cleaned up, as `motionloom duet` writes them."""
+
+    def __post_init__(self) -> None:
+        check_ranges(self, duets=(2, 10_000), seconds=(1, 30), seed=SEEDS)
+
+    @property
+    def drawing(self) -> "DuetDrawing":
+        """What every task that draws people is asked beside its seed."""
+        return {"guidance": self.guidance, "steps": self.steps, "foot_lock": self.clean}
+
+
+FULL, QUICK = DuetSettings(), DuetSettings(duets=4, steps=6)
+Make = Callable[[str, int, int], Sequence[Duet]]
+"""(caption, count, seed) to that many duets."""
+Cut = Callable[[Array], Array]
+"""A stretch of a duet (2, frames, 22, 3), of as many frames as the real windows have."""
+NOTES = (
+    "Real rows are windows of the same length; held-out pairs are held against the train pairs, all others against "
+    "all recordings.",
+    "Shuffled partners begin where the true partner began, facing as they did, and then do what they did elsewhere.",
+)
+
+
+def whole(duet: Array) -> Array:
+    """All of it."""
+    return duet
+
+
+@dataclass(frozen=True)
+class Table:
+    """Which duets are measured, and what of them."""
+
+    suite: str
+    title: str
+    captions: tuple[str, ...]
+    """What duets are made for, in turn."""
+    notes: tuple[str, ...] = NOTES
+    cuts: tuple[tuple[str, Cut], ...] = (("", whole),)
+    """Stretches that are rows, and what the rows' names end in; strangers are of the first, and so is the prior without
+    communication."""
+    columns: tuple[Column, ...] = COLUMNS
+    more: Callable[[Sequence[Array]], Mapping[str, Value]] = lambda duets: {}
+    """Further columns of all that was made, in the order of `turns`."""
+
+
+def run(
+    run: Run, *, block: str | Path | None = None, how: DuetSettings | None = None, kinds: Sequence[str] = KINDS
+) -> Report:
+    """Measure a two-person block against the pairs of ``run.data`` and their captions.
+
+    Args:
+        run: the prior and the data.
+        block: a shipped name or a file; None: the shipped one.
+        how: how duets are made and measured.
+        kinds: the rows, out of `KINDS`.
+    """
+    how = how or DuetSettings()
+    prior, found, pairs, about = opened(run, block, kinds)
+    ours: Make = lambda caption, count, seed: generate_pair(  # noqa: E731
+        prior, found, caption, seconds=how.seconds, count=count, seed=seed, **how.drawing
+    )
+    return measure(
+        pairs, ours, beside(prior, pairs, how), how, table=text_table(pairs), run=run, kinds=kinds, about=about
+    )
+
+
+def opened(
+    run: Run, block: str | Path | None, kinds: Sequence[str]
+) -> tuple[Prior, PairBlock, list[Pair], dict[str, Any]]:
+    """The prior, the block and the pairs with their captions, and what the protocol says of them."""
+    check_names(kinds, KINDS, "rows")
+    prior = Prior.load(run.weights, device=run.device)
+    found = PairBlock.load(chosen_block(block), prior)
+    about = {"weights": run.label, "block": found.name, "device": run.device}
+    return prior, found, pairs_of(run.data, say=run.progress), about
+
+
+def text_table(pairs: Sequence[Pair]) -> Table:
+    """Duets for the captions of the train pairs."""
+    silent = "The prior without communication does not know where the other is: it is given where real partners begin."
+    return Table("duet-text", "Two people from words", captions_of(pairs), (*NOTES, silent))
+
+
+def beside(prior: Prior, pairs: Sequence[Pair], how: DuetSettings) -> Make:
+    """The prior without communication, its people beginning where partners of random train windows stand."""
+    frames, net, begun = frames_in(how.seconds, prior.fps), no_communication_net(prior), beginnings(pairs, how)
+
+    def make(caption: str, count: int, seed: int) -> list[Duet]:
+        nothing = np.zeros((2, 0, len(prior.mean)), np.float32)
+        known = [known_state(prior, net, nothing, poses, frames) for poses in begun(count, seed)]
+        features, poses = pair_features(
+            prior,
+            net,
+            [caption] * (2 * count),
+            frames,
+            seeds=[s for number in range(count) for s in person_seeds(seed, number)],
+            edits=PairEdits(stacked(known)),
+            guidance=how.guidance,
+            steps=how.steps,
+        )
+        made = []
+        for numbers, standing in zip(features, poses.astype(np.float64), strict=True):
+            first, second = (
+                moved(finish(prior, f, foot_lock=how.clean), GroundPose.of_numbers(s))
+                for f, s in zip(numbers, standing, strict=True)
+            )
+            made.append((first, second))
+        return made
+
+    return make
+
+
+def beginnings(pairs: Sequence[Pair], how: DuetSettings) -> Callable[[int, int], list[Array]]:
+    """(count, seed) to ground poses (2, 4) of partners at the beginning of random train windows."""
+    frames = frames_in(how.seconds, mp.FPS)
+    real = [window for pair in pairs if pair.split == "train" for window in windows(pair, frames, frames // 2)]
+
+    def begun(count: int, seed: int) -> list[Array]:
+        rng = np.random.default_rng((how.seed, seed))
+        return [two.encode(real[int(rng.integers(len(real)))].positions).poses for _ in range(count)]
+
+    return begun
+
+
+def measure(
+    pairs: Sequence[Pair],
+    ours: Make,
+    silent: Make | None,
+    how: DuetSettings,
+    *,
+    table: Table,
+    run: Run | None = None,
+    kinds: Sequence[str] = KINDS,
+    about: dict[str, Any] | None = None,
+) -> Report:
+    """The report of duets made for captions, beside all pairs there are."""
+    run = run or Run()
+    recorded = _recorded(pairs, frames_in(how.seconds, mp.FPS))
+    real = list(recorded.values())
+    rows = _real_rows(recorded, {pair.name for pair in pairs if pair.split in HELD_OUT}, kinds)
+    for kind, make, name in (("ours", ours, "ours"), ("silent", silent, "prior without communication")):
+        if make is None or not {kind, "our-strangers" if kind == "ours" else kind} & set(kinds):
+            continue
+        made, seconds = _made(make, table.captions, how, lambda line, n=name: run.progress(f"{n}: {line}"))
+        for end, cut in table.cuts if kind == "ours" else table.cuts[:1]:
+            clips = [cut(duet) for duet in made]
+            if kind in kinds:
+                rows.append(_row(f"{name}{end}", clips, real, seconds=seconds, more=table.more(clips)))
+            if kind == "ours" and "our-strangers" in kinds and end == table.cuts[0][0]:
+                strangers = groups.shuffled(clips)
+                rows.append(_row(f"{name}{end}, partners shuffled", strangers, real, more=table.more(strangers)))
+    said = protocol_of(recorded, table.captions, how) | (about or {})
+    return Report(
+        table.suite, table.title, run.command, said, table.columns, tuple(rows), (*verdicts(rows), *table.notes)
+    )
+
+
+def _recorded(pairs: Sequence[Pair], frames: int) -> dict[str, list[Array]]:
+    """Half-overlapping windows of every recording that is long enough."""
+    found = {pair.name: [w.positions for w in windows(pair, frames, frames // 2)] for pair in pairs}
+    found = {name: clips for name, clips in found.items() if clips}
+    if len(found) < 2:
+        raise MotionloomError(f"fewer than two pairs have the {frames} frames of a duet; nothing can be compared")
+    return found
+
+
+def _real_rows(recorded: dict[str, list[Array]], held_out: set[str], kinds: Sequence[str]) -> list[Row]:
+    rows, real = [], list(recorded.values())
+    everything = [clip for clips in real for clip in clips]
+    if "real" in kinds:
+        rows.append(_row(REAL, everything, None))
+    rest = [clips for name, clips in recorded.items() if name not in held_out]
+    if "held-out" in kinds and 2 <= len(rest) < len(real):
+        held = [clip for name, clips in recorded.items() if name in held_out for clip in clips]
+        rows.append(_row("real, held-out pairs", held, rest))
+    if "strangers" in kinds:
+        away = max(map(len, real))  # to another recording
+        strangers = groups.shuffled(everything, shift=away if away % len(everything) else 1)
+        rows.append(_row("real, partners shuffled", strangers, real))
+    return rows
+
+
+def captions_of(pairs: Sequence[Pair]) -> tuple[str, ...]:
+    """What the train pairs are said to do, each once."""
+    found = tuple(dict.fromkeys(text for pair in pairs if pair.split == "train" for text in pair.captions))
+    if not found:
+        raise MotionloomError("the train pairs have no captions; duets are made for them, so add captions.txt")
+    return found
+
+
+def turns(captions: Sequence[str], how: DuetSettings) -> list[tuple[str, int, int]]:
+    """(caption, count, seed) of all duets, captions in turn."""
+    counts = [len(range(number, how.duets, len(captions))) for number in range(len(captions))]
+    return [
+        (caption, count, how.seed * len(captions) + number)
+        for number, (caption, count) in enumerate(zip(captions, counts, strict=True))
+        if count
+    ]
+
+
+def _made(make: Make, captions: Sequence[str], how: DuetSettings, say: Say) -> tuple[list[Array], float]:
+    """Positions of all duets, in the order of `turns`, and seconds for one."""
+    made, began = [], time.perf_counter()
+    for caption, count, seed in turns(captions, how):
+        say(f"{count} duets of {caption!r}")
+        made += [np.stack([person.positions() for person in duet]) for duet in make(caption, count, seed)]
+    return made, (time.perf_counter() - began) / how.duets
+
+
+def _row(
+    name: str,
+    clips: Sequence[Array],
+    real: Sequence[Sequence[Array]] | None,
+    *,
+    seconds: float | None = None,
+    more: Mapping[str, Value] | None = None,
+) -> Row:
+    stats = [mp.pair_stats(clip) for clip in clips]
+    values = {
+        column: Value.of([times * getattr(one, which) for one in stats]) for column, (which, times) in _STATS.items()
+    }
+    some = [clips[k] for k in np.unique(np.linspace(0, len(clips) - 1, min(FEW, len(clips))).round().astype(int))]
+    values["synchrony"] = Value.of([one.speed_synchrony for one in stats])
+    if len(some) > 1:
+        values["over_strangers"] = Value(groups.synchrony_against_shuffled(some).size)
+    if real is not None:
+        found = groups.compare(clips, real, names=groups.JUDGED)
+        values |= {f"ratio_{one}": Value(found[one].ratio) for one in groups.JUDGED}
+        inside = sum(found[one].within() for one in groups.JUDGED)
+        values["within"] = Value(inside / len(groups.JUDGED), count=len(groups.JUDGED))
+    if seconds is not None:
+        values["seconds"] = Value(seconds)
+    return Row(name, {**values, **(more or {})})
+
+
+def verdicts(rows: Sequence[Row]) -> tuple[str, ...]:
+    """What holds, in words."""
+    notes = []
+    for row in rows:
+        if not row.name.startswith("ours"):
+            continue
+        ratios = [(name, row.values[f"ratio_{name}"].mean) for name in groups.JUDGED]
+        said = ", ".join(f"{name.replace('_', ' ')} {ratio:.2f}" for name, ratio in ratios)
+        inside = "within" if all(ratio <= groups.LIMIT for _, ratio in ratios) else "not within"
+        notes.append(f"{row.name}: {inside} {groups.LIMIT:g} times of the real pairs' spread ({said}).")
+        depth = row.values["penetration"].mean
+        if "shuffled" not in row.name:
+            notes.append(
+                f"{row.name}: mean penetration {depth:.2f} cm, {'under' if depth < DEEP else 'not under'} {DEEP:g} cm."
+            )
+    return tuple(notes)
+
+
+def protocol_of(recorded: dict[str, list[Array]], captions: Sequence[str], how: DuetSettings) -> dict[str, Any]:
+    """The notes under the table."""
+    return {
+        "recordings": len(recorded),
+        "real windows": sum(map(len, recorded.values())),
+        "frames per second": mp.FPS,
+        "seconds": how.seconds,
+        "duets": how.duets,
+        "captions": list(captions),
+        "representation": "263 HumanML3D features a person; numbers from positions of people of one size",
+        "steps": how.steps,
+        "guidance": how.guidance,
+        "feet": "cleaned up" if how.clean else "as drawn",
+        "seed": how.seed,
+        "interval": "1.96 sigma / sqrt(duets or windows)",
+        "spread": "Wasserstein-1 of a real recording from all others, mean over recordings",
+    }

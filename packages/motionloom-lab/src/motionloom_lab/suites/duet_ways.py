@@ -1,0 +1,175 @@
+"""Ways of completing what two people did, for `lab.suites.duet`: each sees the first second of crops and says the rest.
+
+``way(crops, sample)``: `Crops` to (crops, 2, 80, 22, 3) metres in their world, the given frames first.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import torch
+from torch import nn
+
+from motionloom.diffusion import row_seed
+from motionloom.features import pair as two
+from motionloom.ground import GroundPose
+from motionloom.kinematics.physics import Array
+from motionloom.runtime.pair import PairSession
+from motionloom.tasks.long import Past
+from motionloom.tasks.pair import PairEdits, known_state, pair_features, person_seeds, stacked
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior, save_prior
+from motionloom_lab.metrics.pair import PREFIX
+from motionloom_lab.metrics.prediction import constant_velocity, zero_velocity
+from motionloom_lab.papers.mrt import Mrt, completed
+from motionloom_train.export import pair_graph
+from motionloom_train.modules import arrays, prior_module, prior_session
+from motionloom_train.nets.pair import Talk, fitting
+from motionloom_train.nets.prior import ModulatedBlock, PublishedBlock
+
+
+@dataclass(frozen=True, eq=False)
+class Crops:
+    """What two people did, to be completed."""
+
+    positions: Array
+    """(crops, 2, 81, 22, 3) metres in a world, +Y up, the floor at 0; the last frame is there for velocities alone."""
+    numbers: tuple[int, ...]
+    """Which crop of the run each is: its noise goes by that, whatever crops are beside it."""
+
+    def part(self, some: slice) -> "Crops":
+        """Some of them."""
+        return Crops(self.positions[some], self.numbers[some])
+
+
+Way = Callable[[Crops, int], Array]
+Features = Callable[..., tuple[np.ndarray, np.ndarray]]
+"""`tasks.pair.pair_features`, or what takes its place."""
+Given = Literal["past", "tool", "published"]
+FRAMES = 80
+"""Frames of a completion, the given ones included."""
+GIVEN: dict[str, tuple[int, bool]] = {"past": (PREFIX, False), "tool": (PREFIX, True), "published": (PREFIX - 1, True)}
+"""Feature frames known beside D, and whether the velocity out of the last one is the true one, a frame ahead."""
+_UP = np.array([0.0, 1.0, 0.0])
+
+
+def by_rule(rule: Callable[[np.ndarray, int], Array]) -> Way:
+    """A baseline of `lab.metrics.prediction` for each person."""
+
+    def way(crops: Crops, sample: int) -> Array:
+        past = crops.positions[:, :, :PREFIX]
+        ahead = [[rule(person, FRAMES - PREFIX)[0] for person in crop] for crop in past]
+        return np.concatenate([past, np.array(ahead)], axis=2)
+
+    return way
+
+
+def standing() -> Way:
+    """Both stay in their last given pose."""
+    return by_rule(zero_velocity)
+
+
+def gliding() -> Way:
+    """Every joint goes on as between the last two given frames."""
+    return by_rule(constant_velocity)
+
+
+def by_mrt(net: Mrt) -> Way:
+    """The multi-range transformer; every sample is the same."""
+
+    def way(crops: Crops, sample: int) -> Array:
+        past = crops.positions[:, :, :PREFIX].astype(np.float32)
+        return completed(net, past, FRAMES - PREFIX).astype(np.float64)
+
+    return way
+
+
+def seen(crop: np.ndarray, given: str) -> np.ndarray:
+    """What of a crop (2, 81, 22, 3) features are made of: (2, known frames + 1, 22, 3)."""
+    frames, true = GIVEN[given]
+    if true:
+        return crop[:, : frames + 1]
+    past = crop[:, :frames]
+    return np.concatenate([past, 2 * past[:, -1:] - past[:, -2:-1]], axis=1)
+
+
+def drawn(
+    prior: Prior,
+    net: PairSession,
+    *,
+    given: str = "past",
+    seed: int = 0,
+    steps: int,
+    guidance: float = 1.0,
+    prompt: str = "",
+    make: Features = pair_features,
+) -> Way:
+    """Two people from a prior and a block, with noise of (seed, sample, number of the crop).
+
+    With ``given`` "past" everything is as `tasks.pair.complete_pair` has it, and nothing after the given frames is
+    looked at; "tool" and "published" are the published tool and evaluation, which know the velocity out of the last
+    given frame, and have no smooth way out of the past.
+    """
+
+    def way(crops: Crops, sample: int) -> Array:
+        known = [two.encode(seen(crop, given)) for crop in crops.positions]
+        states = [known_state(prior, net, one.features, one.poses, FRAMES) for one in known]
+        people = [person for one in known for person in one.features]
+        leaving = [Past(person, GroundPose()).holder(prior, FRAMES) for person in people]
+        features, _ = make(
+            prior,
+            net,
+            [prompt] * len(people),
+            FRAMES,
+            seeds=[s for number in crops.numbers for s in person_seeds(row_seed(seed, sample), number)],
+            edits=PairEdits(stacked(states), leaving if given == "past" else None, frozen=[False] * len(people)),
+            guidance=guidance,
+            steps=steps,
+        )
+        poses, floors = np.stack([one.poses for one in known]), np.stack([one.floors for one in known])
+        return two.decode(features.astype(np.float64), poses) + floors[..., None, None, None] * _UP
+
+    return way
+
+
+def no_communication_net(prior: Prior) -> PairSession:
+    """The prior without communication: a block that says nothing, and two motions that know nothing of each other."""
+    silent = Talk(fitting(prior.net.config), prior.net.config)
+    graph = pair_graph(silent.config, prior.net.config)
+    return PairSession(silent.config, arrays(silent), graph, prior.net, prior.schedule, prior.mean, prior.std)
+
+
+def bare(prior: Prior) -> Prior:
+    """The prior with layers that do nothing: what stays is how motion, level and words come in and motion goes out.
+
+    A block trained over it (`motionloom train duet`) is "communication only": the paper's table 3 has such a row and
+    no text says what it was; here it is the communication block in place of the prior's layers.
+    """
+    net = prior_module(prior)
+    with torch.no_grad():
+        for block in net.blocks:
+            for layer in _outs(block):
+                layer.weight.zero_()
+                layer.bias.zero_()
+    return replace(prior, net=prior_session(net))
+
+
+def _outs(block: nn.Module) -> Sequence[nn.Linear]:
+    """What each part of a layer adds to the sum comes out of."""
+    assert isinstance(block, (ModulatedBlock, PublishedBlock))
+    heard = [block.heard] if isinstance(block, ModulatedBlock) else []
+    return [block.attention.out, block.linear2, *heard]
+
+
+def write_bare(prior: Prior, path: Path | str) -> Path:
+    """`bare` as a weight file, exact, for `motionloom train duet`."""
+    return save_prior(bare(prior), path, half=False)
+
+
+def only_communication(prior: Prior, block: PairBlock | Path | str) -> tuple[Prior, PairSession]:
+    """The bare prior and the network of a block that was trained over it; raises MotionloomError for another block."""
+    silent = bare(prior)
+    found = block if isinstance(block, PairBlock) else PairBlock.load(block, silent)
+    return silent, found.net(silent)

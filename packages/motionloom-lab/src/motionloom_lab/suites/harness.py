@@ -1,0 +1,215 @@
+"""What all suites share: where and how they measure, what is opened and refused first, and rows over replications."""
+
+import re
+import sys
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import FPS, WIDTH
+from motionloom.kinematics import physics
+from motionloom.kinematics.physics import Array
+from motionloom.weights.container import weights_digest
+from motionloom.weights.prior import Prior, find_weights
+from motionloom_lab.evaluator import evaluators, own
+from motionloom_lab.evaluator.evaluators import Evaluator
+from motionloom_lab.metrics import retrieval
+from motionloom_lab.metrics.skate import skate
+from motionloom_lab.report.report import Column, Row, Value
+from motionloom_lab.suites.parts import Parts, fingerprint
+
+Say = Callable[[str], None]
+"""Called with a line of progress now and then."""
+CHUNK = 64
+"""Motions embedded at once."""
+DIVERSITY_PAIRS = 300
+PHYSICAL = ("skate_share", "skate_speed", "skate_slide", "penetration", "jerk", "bone_error")
+"""Names of the numbers of `physical`, in order."""
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Generate(Protocol):
+    """Motions for prompts, row i from seed ``seed + i``."""
+
+    def __call__(self, prompts: Sequence[str], *, seconds: float, seed: int) -> tuple[list[Array], float]:
+        """One (frames, 22, 3) array in metres per prompt, and their frames per second."""
+        ...
+
+
+def silent(line: str) -> None:
+    """Say nothing."""
+
+
+def say(line: str) -> None:
+    """Report progress on stderr."""
+    print(line, file=sys.stderr, flush=True)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Where and how a suite measures. The report is given back, not written."""
+
+    weights: str | Path = "default"
+    """A shipped name or a file: a prior, or a predictor for suites of prediction."""
+    data: Path | str | None = None
+    """Real motion: a built set, recordings, or what a suite says."""
+    evaluator: str = "own"
+    """Who judges text: the shipped evaluator or a file."""
+    folder: Path | None = None
+    """Keeps what is done, so that the same run goes on after a stop; None: nothing is kept."""
+    device: str = "cpu"
+    command: str = ""
+    """The command line that measures the same again, for the report."""
+    progress: Say = silent
+
+    @property
+    def label(self) -> str:
+        """The weights in a row's name."""
+        return Path(self.weights).stem
+
+    def prior(self, steps: int) -> Prior:
+        """The weights; MotionloomError where they do not draw what the evaluators read, or not in so many steps."""
+        return readable(Prior.load(self.weights, device=self.device), steps)
+
+    def judge(self) -> Evaluator:
+        """The evaluator; MotionloomError for a file that is none."""
+        return evaluators.load_evaluator(self.evaluator)
+
+    def settings(self, judge: Evaluator) -> dict[str, Any]:
+        """What the weights, the evaluator and the device change, for `parts`."""
+        file = evaluator_file(self.evaluator)
+        return {
+            "weights": digest(find_weights(self.weights)),
+            "evaluator": [judge.name, dict(judge.about), digest(file) if file else ""],
+            "device": self.device,
+        }
+
+    def parts(self, settings: Mapping[str, Any]) -> Parts:
+        """Where pieces of this run are kept."""
+        return Parts(self.folder, fingerprint(settings))
+
+
+def readable(prior: Prior, steps: int) -> Prior:
+    """The prior; MotionloomError unless it draws HumanML3D features at 20 frames per second, in so many steps."""
+    if len(prior.mean) != WIDTH or prior.fps != FPS:
+        raise MotionloomError(
+            f"these weights draw {len(prior.mean)} numbers at {prior.fps:g} frames per second; the evaluators read "
+            f"{WIDTH} at {FPS:g}"
+        )
+    check_steps(steps, prior.schedule.steps)
+    return prior
+
+
+def check_steps(steps: int, most: int) -> None:
+    """Raise MotionloomError where weights cannot be sampled in so many steps."""
+    if not 1 <= steps <= most:
+        raise MotionloomError(f"{steps} steps cannot be taken; these weights take 1 to {most}")
+
+
+def check_names(names: Sequence[str], known: Collection[str], what: str) -> None:
+    """Raise MotionloomError for no name and for unknown ones; ``what`` they are, such as "rows"."""
+    if not names or not set(names) <= set(known):
+        raise MotionloomError(f"the {what} are {', '.join(known)}; got {', '.join(names)[:200] or 'none'}")
+
+
+def weight_marks(paths: Sequence[Path]) -> dict[str, str]:
+    """Name of each weight file and the first 12 digits of its SHA-256, by which pages say what they measured."""
+    return {path.stem: digest(path)[:12] for path in paths}
+
+
+def digest(path: Path) -> str:
+    """The beginning of the SHA-256 of a file; of weights without their graphs."""
+    return weights_digest(path)[:16]
+
+
+def evaluator_file(evaluator: str) -> Path | None:
+    """Where an evaluator lies, if it is there."""
+    path = own.evaluators().get(own.SHIPPED) if evaluator == "own" else Path(evaluator)
+    return path if path and path.is_file() else None
+
+
+def embedded(evaluator: Evaluator, motions: Sequence[np.ndarray]) -> Array:
+    """(motions, width) of motions (frames, 263) each."""
+    return np.concatenate([evaluator.motions(motions[k : k + CHUNK]) for k in range(0, len(motions), CHUNK)])
+
+
+def diversity(motions: Array, replication: int) -> float:
+    """Mean distance of random pairs of embedded motions (motions, width), at most `DIVERSITY_PAIRS`."""
+    return retrieval.diversity(motions, pairs=min(DIVERSITY_PAIRS, len(motions)), seed=replication)
+
+
+def plain_words(text: str) -> str:
+    """A caption in lower case without punctuation."""
+    return " ".join(re.findall(r"\w+", text.lower()))
+
+
+def physical(positions: np.ndarray) -> dict[str, float]:
+    """The numbers of `PHYSICAL` for one motion (frames, 22, 3) metres at 20 frames per second, the floor at y = 0.
+
+    Skate: share of frames in %, cm/s, mm per frame (`lab.metrics.skate`); cm under the floor; m/s³; mm.
+    """
+    found = skate(positions, FPS)
+    return {
+        "skate_share": 100 * found.share,
+        "skate_speed": found.speed,
+        "skate_slide": found.slide,
+        "penetration": 100 * physics.penetration(positions),
+        "jerk": physics.jerk(positions, FPS).mean,
+        "bone_error": 1000 * physics.bone_length_error(positions),
+    }
+
+
+def averaged(numbers: Sequence[Sequence[float]] | Array, frames: Sequence[int]) -> dict[str, float]:
+    """Means of (motions, numbers of `PHYSICAL`), weighted by length."""
+    return dict(zip(PHYSICAL, np.average(np.asarray(numbers), axis=0, weights=frames).tolist(), strict=True))
+
+
+def physical_mean(clips: Sequence[np.ndarray]) -> dict[str, float]:
+    """The numbers of `PHYSICAL` of several clips, weighted by length."""
+    return averaged([list(physical(clip).values()) for clip in clips], [len(clip) for clip in clips])
+
+
+def replicated(
+    name: str,
+    count: int,
+    measure: Callable[[int], Mapping[str, float]],
+    parts: Parts,
+    said: Callable[[Mapping[str, float]], str],
+    progress: Say = silent,
+) -> list[dict[str, float]]:
+    """The numbers of every replication of one row, each kept as it is done.
+
+    Args:
+        name: the row, in the names of what is kept and in lines of progress.
+        count: replications.
+        measure: the numbers of one.
+        parts: where they are kept; what is there already is not measured again.
+        said: the numbers in a few words.
+        progress: called with a line for each that was measured now.
+    """
+    return [
+        parts.once(
+            f"{name} {r}",
+            lambda r=r: measure(r),
+            lambda numbers, r=r: f"{name}, replication {r + 1} of {count}: {said(numbers)}",
+            progress,
+        )
+        for r in range(count)
+    ]
+
+
+def row_of(
+    name: str, found: Sequence[Mapping[str, float]], columns: Sequence[Column], constant: Collection[str] = ()
+) -> Row:
+    """Means and intervals over replications; numbers that are ``constant`` have no interval."""
+    samples = {c.name: [numbers[c.name] for numbers in found if c.name in numbers] for c in columns}
+    return Row(name, {k: Value(v[0]) if k in constant else Value.of(v) for k, v in samples.items() if v})
+
+
+def plain_row(name: str, numbers: Mapping[str, float]) -> Row:
+    """Numbers that were measured once."""
+    return Row(name, {key: Value(value) for key, value in numbers.items()})

@@ -1,0 +1,153 @@
+"""Ways to make one long motion of many prompts, by name: what the suite `transitions` holds against each other.
+
+Every way is asked for the same prompts and the same visible frames, and gives that many: frames of interval i stand
+between seam i - 1 and seam i. DoubleTake's rows share h frames, h / 2 on either side of a seam, so its rows are longer
+by h / 2 at each seam.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal, TypeAlias, Unpack
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.features import humanml
+from motionloom.features.layout import FPS
+from motionloom.goals.segment import Segment
+from motionloom.kinematics.ik import motion_from_positions
+from motionloom.tasks.long import compose, long_features
+from motionloom.tasks.text import sample_features
+from motionloom.weights.prior import Prior
+from motionloom_lab.papers.baselines import BLANK, slerp_joined
+from motionloom_lab.papers.double_take import TakeSettings, double_take_features
+from motionloom_lab.suites.protocol import Transitions
+
+Array: TypeAlias = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Long:
+    """One long motion at 20 frames per second."""
+
+    features: Array
+    """(frames, 263), not standardised: what the evaluator reads."""
+    positions: Array
+    """(frames, 22, 3) metres: what the physical numbers read."""
+
+
+Method: TypeAlias = Callable[[Sequence[str], Sequence[int], int], Long]
+"""(prompts, visible frames of each, seed) -> a motion of as many frames in all."""
+
+
+def methods(prior: Prior, how: Transitions, names: Sequence[str] | None = None) -> dict[str, Method]:
+    """The named ways (default `DEFAULT`), in that order; MotionloomError for a name there is not, and for none."""
+    wanted = list(dict.fromkeys(DEFAULT if names is None else names))
+    if not wanted:
+        raise MotionloomError(f"no method is named; the methods are {', '.join(_MAKERS)}")
+    for name in wanted:
+        if name not in _MAKERS:
+            raise MotionloomError(f"there is no method {name!r}; the methods are {', '.join(_MAKERS)}")
+
+    def method(name: str) -> Method:
+        return lambda prompts, frames, seed: _MAKERS[name][1](Wanted(prior, how, prompts, frames, seed))
+
+    return {name: method(name) for name in wanted}
+
+
+def rows_of(frames: Sequence[int], handshake: int) -> list[int]:
+    """Row lengths of DoubleTake whose unfolded frames and seams are those of the visible ``frames``."""
+    half, last = handshake // 2, len(frames) - 1
+    rest = handshake - half
+    return [n + (half if i > 0 else 0) + (rest if i < last else 0) for i, n in enumerate(frames)]
+
+
+def from_features(features: np.ndarray) -> Long:
+    """Features as the network draws them, decoded once."""
+    numbers = features.astype(np.float64)
+    return Long(numbers, humanml.decode_positions(numbers))
+
+
+def from_positions(positions: Array) -> Long:
+    """Positions (frames, 22, 3) with the features they encode to; the last frame, which has no next one, twice."""
+    found = humanml.encode(humanml.canonical(humanml.uniform(positions))).astype(np.float64)
+    return Long(np.concatenate([found, found[-1:]]), np.asarray(positions, dtype=np.float64))
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """One long motion that is asked for."""
+
+    prior: Prior
+    how: Transitions
+    prompts: Sequence[str]
+    frames: Sequence[int]
+    """Visible frames of each prompt."""
+    seed: int
+
+    @property
+    def segments(self) -> list[Segment]:
+        """The prompts with their seconds."""
+        return [Segment(text, n / FPS) for text, n in zip(self.prompts, self.frames, strict=True)]
+
+    def alone(self, frames: Sequence[int]) -> list[np.ndarray]:
+        """Every prompt by itself, (frames, 263) each."""
+        seeds = [self.seed + row for row in range(len(self.prompts))]
+        return sample_features(self.prior, self.prompts, frames, seeds=seeds, **self.how.drawing)
+
+
+def _ours(wanted: Wanted) -> Long:
+    pieces = long_features(wanted.prior, wanted.segments, seed=wanted.seed, **wanted.how.drawing)
+    return from_features(np.concatenate(list(pieces)))
+
+
+def _exported(wanted: Wanted) -> Long:
+    """What a user gets: constant bones, planted feet held still."""
+    blocks = compose(wanted.prior, wanted.segments, seed=wanted.seed, **wanted.how.drawing)
+    return from_positions(np.concatenate([block.positions() for block in blocks]))
+
+
+def _double_take(
+    wanted: Wanted, mode: Literal["published", "paper"] = "published", **more: Unpack[TakeSettings]
+) -> Long:
+    how = wanted.how
+    settings: TakeSettings = {**how.drawing, **more}
+    rows = rows_of(wanted.frames, how.handshake)
+    joins = {"handshake": how.handshake, "ramp": how.blend}
+    made, _ = double_take_features(wanted.prior, wanted.prompts, rows, mode=mode, seed=wanted.seed, **joins, **settings)
+    return from_features(made)
+
+
+def _concatenated(wanted: Wanted) -> Long:
+    return from_features(np.concatenate(wanted.alone(wanted.frames)))
+
+
+def _slerp(wanted: Wanted) -> Long:
+    """The blank frames belong to the later segment, which is generated so much shorter, as TEACH has it."""
+    alone = wanted.alone([n - (BLANK if row else 0) for row, n in enumerate(wanted.frames)])
+    motions = [motion_from_positions(from_features(features).positions, FPS) for features in alone]
+    return from_positions(slerp_joined(motions).positions())
+
+
+_MAKERS: Mapping[str, tuple[str, Callable[[Wanted], Long]]] = {
+    "ours": ("motionloom compose, as drawn", _ours),
+    "ours-exported": ("motionloom compose, as exported", _exported),
+    "published": ("DoubleTake, published", _double_take),
+    "paper": ("DoubleTake, paper", partial(_double_take, mode="paper")),
+    "first-take": ("first take only", partial(_double_take, first_take_only=True)),
+    "second-take": ("second take only", partial(_double_take, second_take_only=True)),
+    "concatenation": ("concatenation", _concatenated),
+    "slerp": ("segments + SLERP", _slerp),
+    "published-1000": ("DoubleTake, published", partial(_double_take, steps=1000)),
+    "paper-1000": ("DoubleTake, paper", partial(_double_take, mode="paper", steps=1000)),
+}
+DEFAULT = ("ours", "ours-exported", "published", "paper", "first-take", "concatenation", "slerp")
+"""Without second take only and without the slow ones of 1000 steps."""
+TITLES = {name: title for name, (title, _) in _MAKERS.items()}
+"""Names of the rows; the number of steps is said behind them."""
+
+
+def titled(name: str, steps: int) -> str:
+    """A row's name."""
+    return f"{TITLES.get(name, name)}, {1000 if name.endswith('-1000') else steps} steps"

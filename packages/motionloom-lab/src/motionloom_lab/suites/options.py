@@ -1,0 +1,94 @@
+"""The commands of `motionloom evaluate` and their options, as ``options.toml`` lists them; quick to import."""
+
+import shlex
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+NOT_TYPED = {"weights", "data", "out", "json", "device", "threads", "force", "quick", "keep", "rows-without-published"}
+"""Options that a command to measure the same again has in another place, or that change no number."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """One option, or one word without a name."""
+
+    name: str
+    """As it is typed, without the dashes."""
+    help: str
+    kind: str = "text"
+    choices: tuple[str, ...] = ()
+    many: str = ""
+    default: Any = None
+    metavar: str | None = None
+    dest: str = ""
+    """What the value is called."""
+    required: bool = False
+    positional: bool = False
+
+
+@dataclass(frozen=True)
+class Command:
+    """One command of `motionloom evaluate`."""
+
+    name: str
+    help: str
+    run: str
+    """The function of `lab.suites.commands` that is called with the options that were given."""
+    options: tuple[Option, ...]
+
+
+@cache
+def commands() -> dict[str, Command]:
+    """All commands by name."""
+    found = tomllib.loads((resources.files("motionloom_lab.suites") / "options.toml").read_text(encoding="utf-8"))
+    shared = found.pop("shared")
+    return {name: _command(name, row, shared | row.get("own", {})) for name, row in found.items()}
+
+
+def _command(name: str, row: Mapping[str, Any], rows: Mapping[str, Mapping[str, Any]]) -> Command:
+    options = [_option(option, rows[option]) for option in row["options"]]
+    return Command(name, row["help"], row.get("run", "measured"), tuple(options))
+
+
+def _option(name: str, row: Mapping[str, Any]) -> Option:
+    return Option(name, **{"dest": name.replace("-", "_"), **row, "choices": tuple(row.get("choices", ()))})
+
+
+def typed(command: Command, given: Mapping[str, Any]) -> str:
+    """What to type to measure the same again; where data lie differs between machines, so they are called SET."""
+    by_name = {option.name: option for option in command.options}
+    line = ["motionloom", "evaluate", command.name]
+    line += [str(given[option.dest]) for option in command.options if option.positional]
+    line += ["--weights", _word(given.get("weights", by_name["weights"].default))]
+    line += ["--data", by_name["data"].metavar or "SET"] if given.get("data") else []
+    for option in command.options:
+        line += ["--out", option.metavar or "FOLDER"] if option.name == "out" and option.required else []
+        value = given.get(option.dest)
+        if option.name in NOT_TYPED or option.positional or value in (None, False, [], option.default):
+            continue
+        line += _words(option, value)
+    return shlex.join([*line, *(["--quick"] if given.get("quick") else [])])
+
+
+def _words(option: Option, value: Any) -> list[str]:
+    """An option and its value as they are typed."""
+    name = f"--{option.name}"
+    if option.kind == "flag":
+        return [name]
+    if option.many == "append":
+        return [word for one in value for word in (name, _word(one))]
+    if option.many:
+        return [name, *map(_word, value)]
+    if isinstance(value, tuple):
+        return [name, ("x" if option.kind == "times" else ",").join(map(str, value))]
+    return [name, _word(value)]
+
+
+def _word(value: Any) -> str:
+    """A value; of a place no more than its name."""
+    return Path(value).name if "/" in str(value) else str(value)

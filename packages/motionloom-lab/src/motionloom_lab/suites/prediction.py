@@ -1,0 +1,259 @@
+"""How good predicted futures are: the tables of stochastic motion prediction, on data that somebody has.
+
+Rows: the real futures, both baselines that need no model, the weights as they are sampled by default and with many
+steps, and the same weights by the published recipe (`lab.papers.humanmac`). Every number is a mean over windows; see
+`motionloom_lab.metrics.prediction` for what each is. What others published stands apart (`published_rows`).
+"""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, get_args
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.tasks.completion import SOLVER, SPACING, STEPS, futures
+from motionloom.weights.predictor import Predictor, find_predictor
+from motionloom_lab.metrics import prediction as metrics
+from motionloom_lab.metrics.prediction import Singles
+from motionloom_lab.papers.humanmac import published_futures
+from motionloom_lab.report.columns import columns
+from motionloom_lab.report.published_rows import published
+from motionloom_lab.report.report import REAL, SAME, Report, Row
+from motionloom_lab.suites import prediction_trial as trials
+from motionloom_lab.suites.harness import Run, check_names, check_steps, digest, row_of
+from motionloom_lab.suites.prediction_trial import Array, PredictionTrial, Way
+from motionloom_lab.suites.protocol import GUIDANCES, SEEDS, check_ranges
+
+ZERO, CONSTANT = "zero velocity", "constant velocity"
+KINDS = ("real", "zero", "constant", "ours", "ours-many", "published")
+"""Rows of the table."""
+COLUMNS = columns("prediction")
+WHOLE = {"h36m": ("Human3.6M", 5168), "humaneva": ("HumanEva-I", None), "amass": ("AMASS", 12727)}
+"""Data sets whose published figures share our data if all of it is there: their names there and test windows."""
+
+
+@dataclass(frozen=True)
+class PredictionSettings:
+    """How it is measured."""
+
+    samples: int = 50
+    windows: int | None = None
+    """Evenly chosen test windows; None: all."""
+    steps: int = STEPS
+    guidance: float = 1.0
+    singles: Singles = "all"
+    published_steps: int = 100
+    """Steps of the published recipe, and of our own with many."""
+    replications: int = 1
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        some = (1, 1000)
+        check_ranges(self, samples=some, steps=some, published_steps=some, replications=some)
+        check_ranges(self, guidance=GUIDANCES, seed=SEEDS)
+        if self.singles not in get_args(Singles):
+            raise MotionloomError(f"singles are one of {', '.join(get_args(Singles))}; got {self.singles!r}")
+
+
+QUICK = PredictionSettings(samples=6, windows=6, published_steps=20)
+
+
+def run(
+    run: Run,
+    *,
+    name: str | None = None,
+    how: PredictionSettings | None = None,
+    kinds: Sequence[str] = KINDS,
+    with_published: bool = True,
+) -> Report:
+    """Measure a predictor on the test part of ``run.data``.
+
+    Args:
+        run: the predictor, the data, and where rows are kept.
+        name: which data set that is; None: recognised by its files.
+        how: how it is measured.
+        kinds: the rows, out of `KINDS`.
+        with_published: whether the report has what others published.
+    """
+    how = how or PredictionSettings()
+    check_names(kinds, KINDS, "rows")
+    if run.data is None:
+        raise MotionloomError("futures are compared with what came, and no recordings are shipped; name some: --data")
+    predictor = Predictor.load(run.weights, device=run.device)
+    for steps in (how.steps, how.published_steps):
+        check_steps(steps, predictor.schedule.steps - 1)
+    protocol = trials.read_test(run.data, name, say=run.progress)
+    trials.check_fit(predictor, protocol)
+    return measure(
+        predictor,
+        trials.prepare(protocol, count=how.windows, singles=how.singles),
+        how,
+        kinds,
+        run=run,
+        with_published=with_published,
+        about={"weights file": digest(find_predictor(run.weights))[:12], "device": run.device},
+    )
+
+
+def measure(
+    predictor: Predictor,
+    trial: PredictionTrial,
+    how: PredictionSettings,
+    kinds: Sequence[str] = KINDS,
+    *,
+    run: Run | None = None,
+    with_published: bool = True,
+    about: Mapping[str, Any] | None = None,
+) -> Report:
+    """The report of a predictor on a trial; ``about``: further settings that change the numbers."""
+    run = run or Run("predictor")
+    said = protocol_of(trial, how, predictor) | dict(about or {})
+    parts = run.parts({**said, **asdict(how), "windows chosen": _identity(trial)})
+    rows = []
+    for title, way, repeats in _ways(predictor, trial, how, kinds, label=run.label):
+        numbers = []
+        for k in range(repeats):
+
+            def scored(k: int = k, title: str = title, way: Callable[[int], Way] | None = way) -> dict[str, float]:
+                run.progress(f"{title}: {len(trial.windows)} windows")
+                return trials.score(
+                    trial,
+                    way(how.seed + k) if way else None,
+                    samples=how.samples,
+                    root=predictor.layout.root or title in (ZERO, CONSTANT),
+                    say=lambda line: run.progress(f"{title}: {line}"),
+                )
+
+            numbers.append(parts.once(f"{title} {k}", scored))
+        rows.append(row_of(title, numbers, COLUMNS))
+    others = _published(trial, how, [c.name for c in COLUMNS]) if with_published else ()
+    return Report(
+        "prediction",
+        "Prediction: many futures of what was seen",
+        run.command,
+        said,
+        COLUMNS,
+        (*rows, *others),
+        _notes(trial),
+    )
+
+
+def drawn(
+    predictor: Predictor,
+    seed: int,
+    *,
+    samples: int,
+    steps: int,
+    guidance: float = 1.0,
+    solver: str = SOLVER,
+    spacing: str = SPACING,
+) -> Way:
+    """Our own way of predicting."""
+    return lambda past: futures(
+        predictor,
+        past,
+        count=samples,
+        seed=seed,
+        steps=steps,
+        guidance=guidance,
+        batch_size=trials.ROWS,
+        solver=solver,
+        spacing=spacing,
+    )
+
+
+def as_published(predictor: Predictor, seed: int, *, samples: int, steps: int) -> Way:
+    """The published recipe; every past alone, since noise there goes by the number of a past in its call."""
+    how = {"count": samples, "seed": seed, "steps": steps, "rows": trials.ROWS}
+    return lambda past: np.concatenate([published_futures(predictor, one[None], **how) for one in past])
+
+
+def by_rule(rule: Callable[[np.ndarray, int], Array], frames: int) -> Way:
+    """A baseline of `motionloom_lab.metrics.prediction`, root included."""
+    return lambda past: np.stack([rule(one, frames) for one in past])
+
+
+def _ways(
+    predictor: Predictor, trial: PredictionTrial, how: PredictionSettings, kinds: Sequence[str], *, label: str
+) -> list[tuple[str, Callable[[int], Way] | None, int]]:
+    """Name, the way of each seed (None: real futures), and how often it is measured."""
+    frames, many = trial.protocol.future, how.published_steps
+    few, again = {"samples": how.samples, "guidance": how.guidance}, how.replications
+    found: dict[str, tuple[str, Callable[[int], Way] | None, int]] = {
+        "real": (REAL, None, 1),
+        "zero": (ZERO, lambda seed: by_rule(metrics.zero_velocity, frames), 1),
+        "constant": (CONSTANT, lambda seed: by_rule(metrics.constant_velocity, frames), 1),
+        "ours": (f"{label}, {how.steps} steps", lambda s: drawn(predictor, s, steps=how.steps, **few), again),
+        "ours-many": (f"{label}, {many} steps", lambda s: drawn(predictor, s, steps=many, **few), again),
+        "published": (
+            f"{label}, published sampler, {many} steps",
+            lambda s: as_published(predictor, s, samples=how.samples, steps=many),
+            again,
+        ),
+    }
+    same = how.steps == many
+    return [found[kind] for kind in KINDS if kind in kinds and not (same and kind == "ours-many" and "ours" in kinds)]
+
+
+def protocol_of(trial: PredictionTrial, how: PredictionSettings, predictor: Predictor) -> dict[str, Any]:
+    """What stands with every table."""
+    p = trial.protocol
+    classes = {recording.action for recording, _ in trial.windows}
+    return {
+        "data": p.name,
+        "licence": p.licence,
+        "split": "test",
+        "recordings": len(p.split("test")),
+        "test windows": len(trial.every),
+        "windows measured": len(trial.windows),
+        "windows with more than one future": trial.several,
+        "similar pasts": f"last poses nearer than {p.threshold:g} m",
+        "windows with one future": how.singles.replace("_", " "),
+        "frames per second": p.fps,
+        "frames": f"{p.observed} seen, {p.future} predicted",
+        "representation": f"places of {p.layout.joints - 1} joints from the root, metres, axes of the world",
+        "statistics": "those of the weights",
+        "trained on": predictor.card.data,
+        "variant": predictor.variant,
+        "bones": "ours: as long as the past's; published sampler: as drawn",
+        "CMD": f"{len(classes)} classes, speeds {'published' if classes <= p.speeds.keys() else 'of the real futures'}",
+        "samples": how.samples,
+        "sampler": f"{SOLVER}, {SPACING} spacing",
+        "steps": how.steps,
+        "many steps": how.published_steps,
+        "guidance": how.guidance,
+        "seed": how.seed,
+        "replications": how.replications,
+        "interval": "1.96 sigma / sqrt(replications)",
+    }
+
+
+def _identity(trial: PredictionTrial) -> str:
+    digest = hashlib.sha256()
+    for number, (recording, start) in enumerate(trial.windows):
+        digest.update(f"{recording.name} {start} {len(trial.alike[number])} ".encode())
+        digest.update(trial.future(number).astype(np.float32).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _notes(trial: PredictionTrial) -> tuple[str, ...]:
+    all_, several = len(trial.windows), trial.several
+    return (
+        "APD to MMFDE are distances of the whole flattened pose, not means over joints: numbers by the other "
+        "convention are about 15 times smaller, so compare zero velocity first.",
+        f"{several} of {all_} windows have more than one future; for the other {all_ - several} MMADE would be ADE.",
+    )
+
+
+def _published(trial: PredictionTrial, how: PredictionSettings, names: Sequence[str]) -> tuple[Row, ...]:
+    """What others published, marked where it was measured on what was measured here."""
+    called, windows = WHOLE.get(trial.protocol.name, ("", None))
+    whole = len(trial.windows) == len(trial.every) and windows in (None, len(trial.every))
+    same = bool(called) and whole and how.samples == 50 and how.singles == "all"
+    rows = published("prediction", names)
+    return tuple(
+        replace(row, measured_on=SAME + row.measured_on) if same and row.measured_on.startswith(called) else row
+        for row in rows
+    )

@@ -1,0 +1,248 @@
+"""What a predictor does over long times, with parts held, and on the way to a target: studies of given weights.
+
+Every function takes a predictor, a protocol with a test part and a budget, and gives columns, rows and what to say of
+the settings; `prediction_studies` writes them.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from motionloom.diffusion import row_seed
+from motionloom.errors import MotionloomError
+from motionloom.features.positions import SMPL_LAYOUT, Layout
+from motionloom.goals.hold import FixedJoints, FixedPart
+from motionloom.kinematics import physics
+from motionloom.kinematics.ik import motion_from_positions
+from motionloom.motion import Motion
+from motionloom.requests.sampling import PredictionSampling
+from motionloom.skeleton import SMPL22
+from motionloom.tasks.completion import Known, next_frames
+from motionloom.tasks.predict import predict, switch
+from motionloom.tasks.windows import WindowSampler
+from motionloom.weights.predictor import Predictor
+from motionloom_lab.metrics import prediction as metrics
+from motionloom_lab.metrics.prediction_body import seam
+from motionloom_lab.report.columns import columns
+from motionloom_lab.report.report import REAL, Column, Row
+from motionloom_lab.suites import prediction_trial as trials
+from motionloom_lab.suites.harness import Say, plain_row, silent
+from motionloom_lab.suites.prediction_trial import Array, PredictionTrial, from_root
+from motionloom_train.data.prediction import Protocol
+
+Found = tuple[tuple[Column, ...], list[Row], dict[str, Any]]
+POSES = 3000
+"""Training poses that others are compared with."""
+GROUPS = ("left_arm", "right_arm", "left_leg", "right_leg", "torso", "lower_body", "upper_body")
+TRANSITIONS = (0.5, 1.0, 2.0)
+
+
+def horizon(
+    predictor: Predictor, protocol: Protocol, *, windows: int, samples: int, seed: int, seconds: float, say: Say
+) -> Found:
+    """Futures that go on from themselves, second by second: do they freeze, do they drift."""
+    trial = trials.prepare(protocol, count=windows)
+    made = long_futures(predictor, trial, samples=samples, seed=seed, seconds=seconds, say=say)
+    known = _known_poses(protocol)
+    real = np.stack([trial.future(k) for k in range(len(trial.windows))])
+    rows = [plain_row(REAL, _lively(real, protocol, known) | {"spread": _spread(real[None], protocol.layout)})]
+    second = round(protocol.fps)
+    for start in range(0, made.shape[2] - second + 1, second):
+        part = made[:, :, start : start + second]
+        numbers = _lively(part.reshape(-1, *part.shape[2:]), protocol, known)
+        spread = {"spread": _spread(part, protocol.layout)} if samples > 1 else {}
+        rows.append(plain_row(f"second {start // second + 1}", numbers | spread))
+    return (
+        columns("study-horizon"),
+        rows,
+        {"weights": predictor.card.name, "seconds": seconds, "training poses": len(known)},
+    )
+
+
+def long_futures(
+    predictor: Predictor, trial: PredictionTrial, *, samples: int, seed: int, seconds: float, say: Say = silent
+) -> Array:
+    """(windows, samples, frames, joints, 3): every future goes on from its own end, as `tasks.predict` does."""
+    count, fps = len(trial.windows), predictor.fps
+    person = np.repeat(trial.pasts(0, count), samples, axis=0)
+    turns, made = int(np.ceil(seconds * fps / (predictor.frames - predictor.observed) - 1e-9)), []
+    sampler = WindowSampler(predictor, PredictionSampling())
+    for turn, new in enumerate(sampler.windows(person, [(seed, i) for i in range(len(person))], None, turns)):
+        say(f"window {turn + 1} of {turns}")
+        made.append(new)
+    whole = np.concatenate(made, axis=1)[:, : round(seconds * fps)]
+    return whole.reshape(count, samples, *whole.shape[1:])
+
+
+def _lively(motions: Array, protocol: Protocol, known: Array) -> dict[str, float]:
+    """Of motions (rows, frames, joints, 3)."""
+    body, fps = from_root(motions), protocol.fps
+    poses = own_poses(motions[:, ::5].reshape(-1, *motions.shape[2:]), protocol.layout)
+    return {
+        "speed": float(np.linalg.norm(np.diff(body, axis=1), axis=-1).mean() * fps),
+        "root_speed": float(np.linalg.norm(np.diff(motions[:, :, 0, [0, 2]], axis=1), axis=-1).mean() * fps),
+        "jerk": float(np.mean([physics.jerk(one, fps).mean for one in body])),
+        "height": float(motions[:, :, 0, 1].mean()),
+        "nearest": float(_nearest(poses, known).mean()),
+    }
+
+
+def own_poses(positions: Array, layout: Layout) -> Array:
+    """(poses, joints, 3) to (poses, 3 (joints - 1)): each from its own root and in its own facing."""
+    turned = layout.place(positions).into(positions[:, None])[:, 0]
+    return from_root(turned).reshape(len(positions), -1)
+
+
+def _known_poses(protocol: Protocol) -> Array:
+    recordings = protocol.split("train") or protocol.split("test")
+    places = np.concatenate([r.positions for r in recordings])
+    chosen = np.linspace(0, len(places) - 1, min(POSES, len(places))).round().astype(int)
+    return own_poses(places[chosen].astype(np.float64), protocol.layout)
+
+
+def _nearest(poses: Array, known: Array) -> Array:
+    """(poses,) metres per joint, root of the mean square."""
+    least = []
+    for first in range(0, len(poses), 1000):
+        own = poses[first : first + 1000]
+        square = np.square(own).sum(1)[:, None] + np.square(known).sum(1) - 2 * own @ known.T
+        least.append(np.sqrt(np.maximum(square, 0).min(1)))
+    return np.concatenate(least) / np.sqrt(poses.shape[1] / 3)
+
+
+def _spread(motions: Array, layout: Layout) -> float:
+    """Of (pasts, futures, frames, joints, 3): metres per joint between two futures of one past, mean."""
+    pasts, count, frames = motions.shape[:3]
+    poses = own_poses(motions[:, :, ::5].reshape(-1, *motions.shape[3:]), layout).reshape(
+        pasts, count, len(range(0, frames, 5)), -1
+    )
+    apart = [np.linalg.norm(poses[:, a] - poses[:, b], axis=-1).mean() for a in range(count) for b in range(a)]
+    return float(np.mean(apart) / np.sqrt(poses.shape[-1] / 3)) if apart else 0.0
+
+
+def hold(
+    predictor: Predictor, protocol: Protocol, *, windows: int, samples: int, seed: int, seconds: float, say: Say
+) -> Found:
+    """Each group of joints given in all of the future: how much nearer the others come, how they vary."""
+    _need_person(predictor)
+    trial = trials.prepare(protocol, count=windows)
+    rows = []
+    for group in GROUPS:
+        say(f"hold {group}: {len(trial.windows)} windows")
+        rows.append(plain_row(group, held_numbers(predictor, trial, group, samples=samples, seed=seed)))
+    return columns("study-hold"), rows, {"weights": predictor.card.name, "given": "as in the real future"}
+
+
+def held_numbers(
+    predictor: Predictor, trial: PredictionTrial, group: str, *, samples: int, seed: int
+) -> dict[str, float]:
+    """Means over windows, largest errors; joints of a group of the 22."""
+    joints = sorted(SMPL22.groups[group])
+    free = [j - 1 for j in range(1, 22) if j not in joints]
+    mask = np.zeros((trial.protocol.future, predictor.layout.parts), dtype=np.float32)
+    mask[:, [predictor.layout.part(j) for j in joints]] = 1
+    seeds = [row_seed(seed, i) for i in range(samples)]
+    rows: list[tuple[float, ...]] = []
+    for number in range(len(trial.windows)):
+        past, truth = trial.pasts(number, number + 1).repeat(samples, 0), trial.future(number)
+        without = next_frames(predictor, past, seeds=seeds, exact=False)
+        given = next_frames(predictor, past, seeds=seeds, known=Known(truth, mask), exact=False)
+        real, a, b = from_root(truth), from_root(without), from_root(given)
+        off = np.abs(b - real)[:, :, [j - 1 for j in joints if j]].max(initial=0.0)
+        off = max(off, np.abs(given[:, :, 0] - truth[:, 0]).max() if 0 in joints else 0.0)
+        rows.append(
+            (
+                metrics.ade(a[:, :, free], real[:, free]),
+                metrics.ade(b[:, :, free], real[:, free]),
+                metrics.apd(a[:, :, free]),
+                metrics.apd(b[:, :, free]),
+                float(off),
+                held_rotations(predictor, trial, number, group, seed=seed) if number < 3 else 0.0,
+            )
+        )
+    means, most = np.mean(rows, axis=0), np.max(rows, axis=0)
+    return dict(zip(("free", "given", "apd_free", "apd_given"), means.tolist())) | {
+        "held": float(most[4]),
+        "rotations": float(most[5]),
+    }
+
+
+def held_rotations(predictor: Predictor, trial: PredictionTrial, number: int, group: str, *, seed: int) -> float:
+    """Largest difference between a held rotation in the motion that `predict` gives and the one it was held to."""
+    seen, joints = trial.protocol.observed, [j for j in SMPL22.groups[group] if j]
+    whole = motion_from_positions(
+        np.concatenate([trial.pasts(number, number + 1)[0], trial.future(number)]), predictor.fps
+    )
+    source = whole.frames(seen, len(whole))
+    held = FixedJoints(source, (FixedPart((group,)),), align=False)
+    seconds = len(source) / predictor.fps
+    (made,) = predict(predictor, whole.frames(0, seen), count=1, seconds=seconds, seed=seed, hold=held)
+    got, wanted = made.rotations[seen:, joints], source.rotations[:, joints]
+    return float(np.minimum(np.abs(got - wanted).max(-1), np.abs(got + wanted).max(-1)).max())
+
+
+def arrive(
+    predictor: Predictor, protocol: Protocol, *, windows: int, samples: int, seed: int, seconds: float, say: Say
+) -> Found:
+    """The way from one recording to another, for transitions of several lengths."""
+    _need_person(predictor)
+    trial = trials.prepare(protocol, count=windows)
+    count = len(trial.windows)
+    if count < 2:
+        raise MotionloomError("a switch leads from one window to another; measure two or more")
+    clips = [
+        motion_from_positions(np.concatenate([trial.pasts(k, k + 1)[0], trial.future(k)]), predictor.fps)
+        for k in range(count)
+    ]
+    seen, pairs = protocol.observed, [(k, (k + count // 2) % count) for k in range(count)]
+    middle = seen + protocol.future // 2
+    rows = [plain_row(REAL, _mean([_ends(c.positions(), seen, middle, predictor.fps) for c in clips]))]
+    cut = []
+    for a, b in pairs:
+        p, q = clips[a].positions()[:seen], clips[b].positions()[seen:]
+        p, q = protocol.layout.place(p[-1]).into(p), protocol.layout.place(q[0]).into(q)
+        cut.append(_seam(np.concatenate([p, q]), seen, predictor.fps, "start"))
+    rows.append(plain_row("cut", _mean(cut)))
+    for length in TRANSITIONS:
+        say(f"switch in {length:g} s: {len(pairs)} pairs")
+        found = [
+            switched(
+                predictor, clips[a].frames(0, seen), clips[b].frames(seen, len(clips[b])), seconds=length, seed=seed + i
+            )
+            for a, b in pairs
+            for i in range(samples)
+        ]
+        rows.append(plain_row(f"{length:g} s", _mean(found)))
+    return columns("study-switch"), rows, {"weights": predictor.card.name, "pairs": len(pairs)}
+
+
+def switched(predictor: Predictor, past: Motion, target: Motion, *, seconds: float, seed: int) -> dict[str, float]:
+    """Numbers of one transition."""
+    (made,) = switch(predictor, past, target, count=1, seconds=seconds, seed=seed)
+    places, first, fps = made.positions(), len(made) - len(target), predictor.fps
+    own = own_poses(np.stack([places[first], target.positions()[0]]), SMPL_LAYOUT)
+    return _ends(places, len(past), first, fps) | {"target": float(np.abs(own[0] - own[1]).max())}
+
+
+def _ends(places: Array, start: int, end: int, fps: float) -> dict[str, float]:
+    between = from_root(places[start - 1 : end + 1])
+    speed = float(np.linalg.norm(np.diff(between, axis=0), axis=-1).mean() * fps)
+    return _seam(places, start, fps, "start") | _seam(places, end, fps, "end") | {"speed": speed}
+
+
+def _seam(places: Array, at: int, fps: float, name: str) -> dict[str, float]:
+    found = seam(from_root(places[:at]), from_root(places[at:])[None], fps)
+    return {f"{name}_velocity": found.velocity, f"{name}_acceleration": found.acceleration}
+
+
+def _mean(found: list[dict[str, float]]) -> dict[str, float]:
+    return {key: float(np.mean([one[key] for one in found])) for key in found[0]}
+
+
+def _need_person(predictor: Predictor) -> None:
+    if predictor.layout.names != SMPL_LAYOUT.names or not predictor.layout.root:
+        raise MotionloomError("this study needs weights that see the 22 joints and their way, such as the shipped ones")
+
+
+STUDIES: dict[str, Callable[..., Found]] = {"horizon": horizon, "hold": hold, "switch": arrive}

@@ -1,0 +1,280 @@
+"""The studies of motion prediction, each one command: what in a predictor matters, on data that somebody has.
+
+Some train small networks that differ in one thing (Chen et al. 2023, HumanMAC, tables 2 to 5 and 7), some look at given
+weights: steps, and those of `prediction_behaviour`. Each writes ``NAME.md``, ``NAME.json`` and ``NAME.png`` into a
+folder. A network that is finished is found again there, one that was stopped goes on.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from motionloom.diffusion import SCHEDULES
+from motionloom.errors import MotionloomError
+from motionloom.tasks.completion import SOLVER, SPACING, STEPS
+from motionloom.weights.predictor import Predictor, find_predictor, load_predictor
+from motionloom_lab.papers.benchmarks import find_protocol
+from motionloom_lab.report import files, plots, results
+from motionloom_lab.report import report as reports
+from motionloom_lab.report.report import REAL, Column, Report, Row, Value
+from motionloom_lab.suites import prediction, prediction_behaviour
+from motionloom_lab.suites import prediction_trial as trials
+from motionloom_lab.suites.harness import Run, Say, silent, weight_marks
+from motionloom_lab.suites.prediction_trial import PredictionTrial
+from motionloom_lab.suites.protocol import check_ranges
+from motionloom_train.data.prediction import Protocol
+from motionloom_train.loop import changed
+from motionloom_train.predictor import train_predictor
+from motionloom_train.recipe import Recipe
+
+BASE = {"kept": 24, "layers": 4, "width": 128, "heads": 4, "dropout": 0.1}
+"""The small network that studies change one thing of."""
+STUDIED: dict[str, tuple[str, tuple[Any, ...]]] = {
+    "coefficients": ("kept", (6, 12, 24, 45)),
+    "layers": ("layers", (2, 4, 6, 8)),
+    "schedules": ("schedule", tuple(SCHEDULES)),
+    "noising": ("levels", (100, 1000)),
+    "dct": ("dct", (True, False)),
+}
+"""What each training study changes, and to what."""
+TITLES = {
+    "coefficients": "Number of cosine coefficients",
+    "layers": "Layers",
+    "schedules": "Noise schedules",
+    "noising": "Noise levels in training, and sampling steps",
+    "dct": "With and without the cosine transform",
+    "steps": "Sampling steps, solvers and spacings",
+    "horizon": "A long horizon: window after window",
+    "hold": "Parts of the body held",
+    "switch": "Arriving at another motion",
+}
+MOST = 1_000_000
+WALKS = (2, 3, 4, 5, 8, 10, 20, 50, 100)
+SPREADS = ("index", "early", "snr")
+SHOWN = ("apd", "ade", "fde", "mmade", "mmfde", "jerk", "seam_velocity", "seconds")
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How much is measured."""
+
+    windows: int
+    samples: int
+    train_steps: int = 1000
+    seed: int = 0
+    seconds: float = 20.0
+    """Of a long horizon."""
+    walks: tuple[int, ...] = WALKS
+
+
+@dataclass(frozen=True, eq=False)
+class Lab:
+    """What a study works with."""
+
+    protocol: Protocol
+    budget: Budget
+    weights: Callable[[], Predictor]
+    keep: Path
+    """Where trained networks lie."""
+    device: str = "cpu"
+    progress: Say = silent
+
+
+def budget(name: str, *, quick: bool = False, **said: int) -> Budget:
+    """The usual budget of a study with what was said of `Budget`; raises MotionloomError for what cannot be."""
+    usual = {"steps": Budget(16, 10), "horizon": Budget(16, 4), "hold": Budget(16, 8), "switch": Budget(24, 1)}
+    found = Budget(4, 2, 20, seconds=4.0, walks=(2, 4)) if quick else usual.get(name, Budget(64, 20))
+    found = replace(found, **said)  # type: ignore[arg-type]
+    check_ranges(found, windows=(1, MOST), samples=(1, MOST), train_steps=(1, MOST))
+    return found
+
+
+def run(name: str, run: Run, *, protocol: str | None = None, keep: Path, budget: Budget) -> Report:
+    """Do a study and write its table and picture into ``run.folder``.
+
+    Args:
+        name: the study, out of `TITLES`.
+        run: the predictor, the data, and the folder.
+        protocol: which data set that is; None: recognised by its files.
+        keep: where trained networks lie.
+        budget: how much is measured.
+
+    Raises:
+        MotionloomError: before any work if it cannot be done.
+    """
+    if name not in TITLES:
+        raise MotionloomError(f"there is no study {name!r}; the studies are {', '.join(TITLES)}")
+    if run.data is None or run.folder is None:
+        raise MotionloomError("a study needs recordings and a folder for its table and picture")
+    files.check_report(run.folder / f"{name}.json")
+    trained = name in STUDIED
+    predictor = None if trained else Predictor.load(run.weights, device=run.device)
+    if trained or name == "horizon":
+        read = find_protocol(
+            run.data, name=protocol, say=run.progress, splits=("train", "val", "test") if trained else ("train", "test")
+        )
+    else:
+        read = trials.read_test(run.data, protocol, say=run.progress)
+    if predictor is not None:
+        trials.check_fit(predictor, read)
+    lab = Lab(
+        read,
+        budget,
+        lambda: predictor or Predictor.load(run.weights, device=run.device),
+        keep,
+        run.device,
+        run.progress,
+    )
+    found = replace(study(name, lab), command=run.command)
+    if not trained:
+        found = replace(found, protocol={**found.protocol, results.FILES: weight_marks([find_predictor(run.weights)])})
+    write(found, name, run.folder)
+    return found
+
+
+def study(name: str, lab: Lab) -> Report:
+    """The report of a study."""
+    if name in prediction_behaviour.STUDIES:
+        b = lab.budget
+        columns, rows, said = prediction_behaviour.STUDIES[name](
+            lab.weights(),
+            lab.protocol,
+            windows=b.windows,
+            samples=b.samples,
+            seed=b.seed,
+            seconds=b.seconds,
+            say=lab.progress,
+        )
+    elif name == "steps":
+        columns, rows, said = _steps(lab)
+    else:
+        columns, rows, said = _trained(name, lab)
+    p, b = lab.protocol, lab.budget
+    about = {
+        "data": p.name,
+        "licence": p.licence,
+        "split": "test",
+        "frames": f"{p.observed} seen, {p.future} predicted",
+        "frames per second": p.fps,
+        "windows": b.windows,
+        "samples": b.samples,
+        "seed": b.seed,
+        **said,
+    }
+    return Report(f"study-{name}", TITLES[name], "", about, tuple(columns), tuple(rows))
+
+
+def write(report: Report, name: str, folder: Path) -> None:
+    """``NAME.png``, ``NAME.md`` and ``NAME.json``, each whole or not at all.
+
+    Figures of given weights lie in a place that names these, as `tools/fill_readme.py` holds against those that ship.
+    """
+    path = files.check_report(folder / f"{name}.json")
+    plots.study(report, folder / f"{name}.png")
+    picture = f"\n![{report.title}]({name}.png)\n"
+    page = reports.markdown(report) + picture
+    if results.FILES in report.protocol:
+        place = f"{results.opening(report, 'figures')}{results.shown(report)}{picture}<!-- end -->\n"
+        page = f"# {report.title}\n\n{place}"
+    files.write_text(folder / f"{name}.md", page)
+    files.write_json(path, reports.encode(report))
+
+
+# Networks that differ in one thing
+
+
+def _trained(name: str, lab: Lab) -> tuple[list[Column], list[Row], dict[str, Any]]:
+    setting, values = STUDIED[name]
+    trial = trials.prepare(lab.protocol, count=lab.budget.windows)
+    rows = [_row(trial, REAL, trials.score(trial, None))]
+    for value in values:
+        if setting == "kept" and value > lab.protocol.frames:
+            continue
+        predictor = network(lab, setting, value)
+        size = sum(values.size for values in predictor.net.weights.values())
+        for steps in (10, 50) if name == "noising" else (STEPS,):
+            label = f"{setting} {value}" if name != "noising" else f"{value} levels, {steps} steps"
+            lab.progress(f"{label}: {len(trial.windows)} windows")
+            way = prediction.drawn(predictor, lab.budget.seed, samples=lab.budget.samples, steps=steps)
+            scored = trials.score(trial, way, samples=lab.budget.samples, say=lab.progress)
+            rows.append(_row(trial, label, scored | {"parameters": size / 1e6}))
+    size = Column("parameters", "M parameters", "", "millions", 2)
+    about = {
+        "networks": f"width {BASE['width']}, {BASE['layers']} layers, {BASE['kept']} coefficients unless said",
+        "training": f"{lab.budget.train_steps} steps of 64 windows, seed {lab.budget.seed}",
+        "sampler": f"{SOLVER}, {SPACING} spacing, {STEPS} steps unless said",
+    }
+    return [*_columns(SHOWN), size], rows, about
+
+
+def network(lab: Lab, setting: str, value: Any) -> Predictor:
+    """The small network with one thing changed: trained, trained further, or as it lies in ``lab.keep``."""
+    net = (
+        BASE
+        | ({setting: value} if setting in BASE else {})
+        | ({} if (setting, value) != ("dct", False) else {"dct": False})
+    )
+    net["kept"] = min(net["kept"], lab.protocol.frames)
+    other = {setting: value} if setting in ("schedule", "levels") else {}
+    schedule, levels = other.get("schedule", "cosine"), other.get("levels", 1000)
+    dct = "dct" if net.get("dct", True) else "frames"
+    name = f"{dct}{net['kept']}-layers{net['layers']}-{schedule}-{levels}-steps{lab.budget.train_steps}"
+    steps = lab.budget.train_steps
+    recipe = Recipe(
+        name=name,
+        steps=steps,
+        batch=64,
+        warmup=min(100, steps // 5),
+        cooldown=0.4,
+        ema=0.99,
+        schedule=schedule,
+        levels=levels,
+        seed=lab.budget.seed,
+        save_every=200,
+        predictor=net,
+    )
+    folder = lab.keep / name
+    if changed(folder, recipe):
+        raise MotionloomError(f"{folder} holds a network of other settings; name another folder with --keep")
+    place = folder / f"{name}.safetensors"
+    if not place.is_file() or load_predictor(place).card.notes.get("steps") != steps:
+        train_predictor(
+            recipe, lab.protocol, folder, device=lab.device, say=lambda line: lab.progress(f"{name}: {line}")
+        )
+    return load_predictor(place).to(lab.device)
+
+
+# Given weights
+
+
+def _steps(lab: Lab) -> tuple[list[Column], list[Row], dict[str, Any]]:
+    trial, predictor = trials.prepare(lab.protocol, count=lab.budget.windows), lab.weights()
+    walks = [n for n in lab.budget.walks if n < predictor.schedule.steps]
+    rows = [_row(trial, REAL, trials.score(trial, None))]
+    for solver in ("ddim", "dpm2m"):
+        for spacing in SPREADS:
+            found: dict[int, dict[str, float]] = {}
+            for steps in reversed(walks):
+                lab.progress(f"{solver}, {spacing}, {steps} steps")
+                way = prediction.drawn(
+                    predictor, lab.budget.seed, samples=lab.budget.samples, steps=steps, solver=solver, spacing=spacing
+                )
+                found[steps] = trials.score(trial, way, samples=lab.budget.samples, say=lab.progress)
+            most = found[max(walks)]
+            for steps in walks:
+                ratios = {f"{k}_ratio": found[steps][k] / most[k] for k in ("ade", "fde", "jerk") if most[k] > 0}
+                rows.append(_row(trial, f"{solver}, {spacing}, {steps} steps", found[steps] | ratios))
+    said = f"over {max(walks)} steps of the same solver and spacing"
+    ratios = [
+        Column(f"{k}_ratio", f"{k.upper() if k != 'jerk' else k} ratio", "", said) for k in ("ade", "fde", "jerk")
+    ]
+    return [*_columns(SHOWN), *ratios], rows, {"weights": predictor.card.name}
+
+
+def _columns(names: Sequence[str]) -> list[Column]:
+    return [c for c in prediction.COLUMNS if c.name in names]
+
+
+def _row(trial: PredictionTrial, name: str, numbers: dict[str, float]) -> Row:
+    return Row(name, {key: Value(value) for key, value in numbers.items() if key in SHOWN or key not in trials.KNOWN})

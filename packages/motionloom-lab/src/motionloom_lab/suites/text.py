@@ -1,0 +1,323 @@
+"""The text-to-motion suite: does a motion go with its words, does it look like real ones, what does it cost.
+
+Generation comes in as a function, so that a made-up one can be tested and any prior measured. Every replication of
+every row is kept in a small file as it is done; a run that was stopped goes on with the next one.
+"""
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol as Interface
+from typing import cast
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.kinematics.physics import Array
+from motionloom.tasks.text import sample_features
+from motionloom.weights.prior import Prior
+from motionloom_lab.evaluator.evaluators import Caption, Evaluator
+from motionloom_lab.metrics.frechet import fid, fid_bias
+from motionloom_lab.metrics.retrieval import matching_distance, multimodality_of, r_precision
+from motionloom_lab.report import published_rows
+from motionloom_lab.report.columns import columns
+from motionloom_lab.report.report import REAL, Report, Row, Value
+from motionloom_lab.suites import text_reference
+from motionloom_lab.suites.harness import (
+    PHYSICAL,
+    Run,
+    averaged,
+    diversity,
+    embedded,
+    plain_words,
+    readable,
+    replicated,
+    row_of,
+)
+from motionloom_lab.suites.items import fitting, pick, read_items, spread
+from motionloom_lab.suites.parts import Parts
+from motionloom_lab.suites.protocol import Protocol, Selection
+from motionloom_lab.suites.text_reference import TextReference
+
+MULTIMODAL_PAIRS = 10
+CHANCE_ROWS = 500
+"""Captions at most whose distances to all motions of others are averaged."""
+SHUFFLED, CHANCE = "real, captions shuffled", "chance"
+
+COLUMNS = columns("text")
+
+
+class Draw(Interface):
+    """Features (frames, 263), not standardised, one per prompt, row i from its own seed."""
+
+    def __call__(
+        self, prompts: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int
+    ) -> list[np.ndarray]:
+        """Motion i has ``frames[i]`` frames at 20 per second."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class TextTrial:
+    """Everything that a row is measured with."""
+
+    draw: Draw
+    evaluator: Evaluator
+    real: TextReference
+    protocol: Protocol
+    texts: tuple[Array, ...]
+    """For each item (captions, width): its captions as they are."""
+    read: tuple[Array, ...]
+    """The same as they are read beside generated motions, see `Protocol.caption_length`."""
+
+    def shuffle(self, replication: int) -> tuple[list[int], np.ndarray, np.random.Generator]:
+        """For one replication: a caption for each item, the order of the items, and what is drawn after that."""
+        rng = np.random.default_rng((self.protocol.seed, replication))
+        chosen = pick(self.real.captions, rng)
+        return chosen, rng.permutation(len(chosen)), rng
+
+    def said(self, chosen: Sequence[int]) -> list[str]:
+        """The chosen captions in words."""
+        return [several[k].text for several, k in zip(self.real.captions, chosen, strict=True)]
+
+
+def prepare(draw: Draw, evaluator: Evaluator, real: TextReference, protocol: Protocol) -> TextTrial:
+    """Choose the items and embed their captions; MotionloomError where that cannot be done as asked."""
+    chosen = real.chosen(protocol)
+    flat = [caption for several in chosen.captions for caption in several]
+    cuts = np.cumsum([len(several) for several in chosen.captions])[:-1]
+    texts = tuple(np.split(evaluator.texts(flat), cuts))
+    read = texts
+    if protocol.caption_length == "published":
+        read = tuple(np.split(_as_published(evaluator, flat), cuts))
+    return TextTrial(draw, evaluator, chosen, protocol, texts, read)
+
+
+def _as_published(evaluator: Evaluator, captions: Sequence[Caption]) -> Array:
+    other = getattr(evaluator, "with_caption_length", None)
+    if other is None:
+        raise MotionloomError(
+            f"the evaluator {evaluator.name!r} pads no captions, so it has no published caption length; use true"
+        )
+    return cast(Callable[[str], Evaluator], other)("published").texts(captions)
+
+
+# ---- the numbers of one replication ----------------------------------------------------------------------------------
+
+
+def matched(trial: TextTrial, texts: Array, motions: Array, said: Sequence[str]) -> dict[str, float]:
+    """How well (items, width) texts and motions in one order go together."""
+    batch = trial.protocol.batch
+    r1, r2, r3 = r_precision(texts, motions, top=3, batch=batch)
+    return {
+        "r1": float(r1),
+        "r2": float(r2),
+        "r3": float(r3),
+        "r3_same": same_words_precision(texts, motions, said, top=3, batch=batch),
+        "mm_dist": matching_distance(texts, motions, batch=batch),
+    }
+
+
+def same_words_precision(texts: Array, motions: Array, said: Sequence[str], *, top: int, batch: int | None) -> float:
+    """Share of texts with a motion of a caption of the same words among the ``top`` nearest of its batch.
+
+    Batches as in `r_precision`. A motion of other words exactly as near goes before: equal embeddings are no hits.
+    """
+    words = np.array([plain_words(text) for text in said])
+    size = batch or len(texts)
+    hits = []
+    for row in range(len(texts) // size * size):
+        part = slice(row // size * size, row // size * size + size)
+        distance = np.linalg.norm(motions[part] - texts[row], axis=1)  # a row at a time: the set may be one batch
+        same = words[part] == words[row]
+        hits.append((~same & (distance <= distance[same].min())).sum() < top)
+    return float(np.mean(hits))
+
+
+def of_real(trial: TextTrial, replication: int, *, shuffled: bool = False) -> dict[str, float]:
+    """Real motions with their captions, or with anybody's: the captions then are dealt out anew over all items."""
+    chosen, order, rng = trial.shuffle(replication)
+    texts = np.stack([several[k] for several, k in zip(trial.texts, chosen, strict=True)])
+    motions, said = trial.real.motions, trial.said(chosen)
+    if shuffled:
+        dealt = rng.permutation(len(texts))
+        return matched(trial, texts[dealt][order], motions[order], [said[k] for k in dealt[order]])
+    found = matched(trial, texts[order], motions[order], [said[k] for k in order])
+    physical = averaged(trial.real.physical, trial.real.frames)
+    return {**found, "fid": fid(motions, trial.real.motions), "diversity": diversity(motions, replication), **physical}
+
+
+def of_generated(trial: TextTrial, replication: int, steps: int) -> dict[str, float]:
+    """One motion per item, measured; the time goes to sampling alone."""
+    chosen, order, _ = trial.shuffle(replication)
+    said, frames = trial.said(chosen), trial.real.frames
+    start = time.perf_counter()
+    drawn = _drawn(trial, said, frames, seeds=trial.protocol.seeds(replication, len(said)), steps=steps)
+    seconds = time.perf_counter() - start
+    motions = embedded(trial.evaluator, drawn)
+    texts = np.stack([several[k] for several, k in zip(trial.read, chosen, strict=True)])
+    found = matched(trial, texts[order], motions[order], [said[k] for k in order])
+    found["fid"], found["diversity"] = fid(motions, trial.real.motions), diversity(motions, replication)
+    found |= averaged([list(text_reference.of_features(one).values()) for one in drawn], frames)
+    found |= {"ms": 1000 * seconds / len(said), "per_second": len(said) / max(seconds, 1e-9)}
+    captions, samples = trial.protocol.multimodality
+    if captions and replication < trial.protocol.multimodal_replications:
+        found["multimodality"] = _several(trial, replication, steps, captions=captions, samples=samples)
+    return found
+
+
+def _drawn(
+    trial: TextTrial, said: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int
+) -> list[np.ndarray]:
+    """Motions of the wanted lengths, cut to them where they are generated longer."""
+    padded = trial.protocol.lengths == "padded"
+    asked = [trial.real.selection.longest] * len(said) if padded else list(frames)
+    drawn = trial.draw(said, asked, seeds=seeds, steps=steps)
+    if [len(features) for features in drawn] != asked:
+        raise ValueError("the generator gave other lengths than asked for")
+    return [features[:length] for features, length in zip(drawn, frames, strict=True)]
+
+
+def _several(trial: TextTrial, replication: int, steps: int, *, captions: int, samples: int) -> float:
+    """MultiModality of different motions of one caption: unlike the published draw, none is paired with itself."""
+    chosen, order, rng = trial.shuffle(replication)
+    items = order[:captions]
+    said, frames = trial.said(chosen), trial.real.frames
+    seeds = trial.protocol.seeds(replication, len(items) * samples, after=len(said))
+    drawn = _drawn(
+        trial,
+        [said[k] for k in items for _ in range(samples)],
+        [frames[k] for k in items for _ in range(samples)],
+        seeds=seeds,
+        steps=steps,
+    )
+    motions = embedded(trial.evaluator, drawn).reshape(len(items), samples, -1)
+    pairs = min(MULTIMODAL_PAIRS, samples // 2)
+    mixed = rng.permutation(samples)
+    return multimodality_of(motions, mixed[:pairs], mixed[pairs : 2 * pairs])
+
+
+def of_chance(trial: TextTrial) -> dict[str, float]:
+    """What an evaluator that knows nothing would find: k of the batch, and captions against all other motions."""
+    size = trial.protocol.batch or len(trial.texts)
+    motions = trial.real.motions
+    rows = spread(CHANCE_ROWS, len(motions))
+    apart = [np.linalg.norm(trial.texts[k][0] - np.delete(motions, k, axis=0), axis=1).mean() for k in rows]
+    return {"r1": 1 / size, "r2": 2 / size, "r3": 3 / size, "mm_dist": float(np.mean(apart))}
+
+
+# ---- the run ---------------------------------------------------------------------------------------------------------
+
+
+def measure(
+    trial: TextTrial,
+    run: Run | None = None,
+    *,
+    parts: Parts | None = None,
+    memory: Callable[[int], float] | None = None,
+) -> Report:
+    """All rows. ``memory`` gives the peak in MB of generating with so many steps; ``run`` names what is measured."""
+    run, parts = run or Run(), parts or Parts(None, "")
+    protocol, count = trial.protocol, range(trial.protocol.replications)
+    rows = [
+        row_of(REAL, [of_real(trial, r) for r in count], COLUMNS, (*PHYSICAL, "fid")),
+        row_of(SHUFFLED, [of_real(trial, r, shuffled=True) for r in count], COLUMNS),
+        row_of(CHANCE, [of_chance(trial)], COLUMNS),
+    ]
+    for steps in protocol.steps:
+        found = replicated(
+            f"{steps} steps",
+            len(count),
+            lambda r, steps=steps: of_generated(trial, r, steps),
+            parts,
+            lambda n: f"R@3 {n['r3']:.3f}, FID {n['fid']:.3f}, {n['ms']:.0f} ms per motion",
+            run.progress,
+        )
+        values = dict(row_of("", found, COLUMNS).values)
+        if memory is not None:
+            peak = parts.once(f"{steps} steps memory", lambda steps=steps: {"memory": memory(steps)})
+            values["memory"] = Value(peak["memory"])
+        rows.append(Row(f"{run.label}, {steps} steps", values))
+    selection, data, judge = trial.real.selection, trial.real.data, trial.evaluator.name
+    described = protocol.described(selection, data=data, items=len(trial.texts), evaluator=judge)
+    others = published_rows.published("text", [column.name for column in COLUMNS])
+    title = f"Text to motion: {run.label}"
+    return Report("text", title, run.command, described, COLUMNS, (*rows, *others), _notes(trial))
+
+
+def _notes(trial: TextTrial) -> tuple[str, ...]:
+    real, protocol = trial.real, trial.protocol
+    half = len(real.motions) // 2
+    bias = fid_bias(real.motions, half, repeats=10, seed=protocol.seed)
+    said = [plain_words(caption.text) for several in real.captions for caption in several]
+    return (
+        f"FID compares {len(real.motions)} generated with {len(real.motions)} real motions in {real.motions.shape[1]} "
+        f"dimensions, and so few make it large: two random halves of the real motions ({half} each) are {bias:.3f} "
+        "apart. Compare it only with FIDs of the same count.",
+        f"{len(said)} captions, {len(said) - len(set(said))} of them in words that another has too: R@1 to R@3 count a "
+        "motion of such a caption as a miss, as the published code does; the column 'same words' counts it as a hit.",
+        f"{SHUFFLED.capitalize()}: captions dealt out anew over all items. {CHANCE.capitalize()}: k of the batch, and "
+        "the mean distance of a caption to motions of others.",
+        *_about(trial.evaluator),
+        "Time and memory depend on the machine and on what else it does.",
+    )
+
+
+def _about(evaluator: Evaluator) -> tuple[str, ...]:
+    said = "; ".join(f"{name}: {text}" for name, text in evaluator.about.items())
+    return (f"Evaluator {evaluator.name}. {said}",) if said else ()
+
+
+def run(
+    run: Run,
+    *,
+    selection: Selection | None = None,
+    protocol: Protocol | None = None,
+    memory: Callable[[int], float] | None = None,
+) -> Report:
+    """Measure weights against the shipped reference, or the real motions of ``run.data``.
+
+    Args:
+        run: the weights, the data, who judges, and where pieces are kept.
+        selection: which real motions of the data; None: the usual ones.
+        protocol: how motions are generated and judged.
+        memory: the peak in MB of generating with so many steps; None: not measured.
+    """
+    protocol = protocol or Protocol()
+    draw = drawer(run.prior(max(protocol.steps)), protocol)  # what is quickly seen to be wrong goes first
+    judge = run.judge()
+    if protocol.caption_length == "published":
+        _as_published(judge, [text_reference.SENTENCE])
+    trial = prepare(draw, judge, reference(judge, run.data, selection, run.progress), protocol)
+    parts = run.parts({**protocol.drawn(), **run.settings(judge), "real": identity(trial.real)})
+    return measure(trial, run, parts=parts, memory=memory)
+
+
+def reference(
+    judge: Evaluator, data: Path | str | None, selection: Selection | None, progress: Callable[[str], None]
+) -> TextReference:
+    """Real motions: those of ``data``, or the shipped numbers, which nobody can select from."""
+    if data is not None:
+        selection = fitting(data, selection)
+        return text_reference.measure(read_items(data, selection), judge, selection, progress)
+    return text_reference.load_shipped(judge, selection)
+
+
+def drawer(prior: Prior, protocol: Protocol) -> Draw:
+    """A prior as `Draw`; MotionloomError for one that does not draw HumanML3D features at 20 frames per second."""
+    readable(prior, max(protocol.steps))
+
+    def draw(prompts: Sequence[str], frames: Sequence[int], *, seeds: Sequence[int], steps: int) -> list[np.ndarray]:
+        drawn = sample_features(prior, prompts, frames, seeds=seeds, **protocol.drawing(steps))
+        return [features.astype(np.float64) for features in drawn]
+
+    return draw
+
+
+def identity(real: TextReference) -> str:
+    """Changes with the items; not with the embeddings, whose last digits depend on the number of threads."""
+    said = json.dumps([real.names, [[c.text for c in several] for several in real.captions], real.frames])
+    return hashlib.sha256(said.encode() + real.physical.astype(np.float32).tobytes()).hexdigest()[:16]

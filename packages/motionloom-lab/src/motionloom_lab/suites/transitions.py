@@ -1,0 +1,281 @@
+"""The suite of long motion: how good the middles of its segments are, and how smooth the transitions between them.
+
+Rows and columns of PriorMDM's tables 1 and 2 (Shafir et al. 2024) with FlowMDM's jerk (Barquero et al. 2024), foot
+skate and speed. A way to make a long motion comes in as a function (`long_baselines.Method`). Every replication of
+every way is kept in a small file as it is done; a run that was stopped goes on with the next one.
+"""
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import FPS, WIDTH
+from motionloom.kinematics.physics import Array
+from motionloom_lab.evaluator.evaluators import Caption, Evaluator
+from motionloom_lab.metrics.frechet import fid, fid_bias
+from motionloom_lab.metrics.retrieval import matching_distance, r_precision
+from motionloom_lab.metrics.transitions import (
+    JERK_HUMANML3D,
+    area_under_jerk,
+    jerk_curve,
+    sequence_jerk,
+    transition_distance,
+)
+from motionloom_lab.report import published_rows
+from motionloom_lab.report.columns import columns
+from motionloom_lab.report.report import REAL, Report
+from motionloom_lab.suites import harness, text_reference
+from motionloom_lab.suites.harness import Run, Say, diversity, embedded, replicated, row_of
+from motionloom_lab.suites.items import fitting, read_items
+from motionloom_lab.suites.long_baselines import Long, Method, methods, titled
+from motionloom_lab.suites.parts import Parts
+from motionloom_lab.suites.protocol import Selection, Transitions
+from motionloom_lab.suites.real_seams import PHYSICAL, SeamCrops, Shipped, averaged, jerks, load_shipped
+from motionloom_lab.suites.text import identity
+from motionloom_lab.suites.text_reference import TextReference
+
+LEAST_INSIDE = 8
+"""Frames: what is left of a segment between its transitions is measured from so many on."""
+
+COLUMNS = columns("transitions")
+
+
+@dataclass(frozen=True, eq=False)
+class SeamTrial:
+    """Everything that a way is measured with."""
+
+    evaluator: Evaluator
+    real: TextReference
+    how: Transitions
+    mean_jerk: float
+    """m/frame³ of the real windows."""
+    crops: SeamCrops | None
+    """Windows of real motion; None where only the shipped numbers are at hand."""
+    shipped: Shipped | None = None
+
+    def asked(self, replication: int) -> Iterator[tuple[list[int], list[Caption], list[int]]]:
+        """For each long motion of a replication: its items, their captions, and the visible frames."""
+        rng = np.random.default_rng((self.how.seed, replication))
+        order = rng.permutation(len(self.real.names))
+        for unfolding in range(self.how.unfoldings):
+            items = order[unfolding * self.how.intervals : (unfolding + 1) * self.how.intervals].tolist()
+            several = [self.real.captions[k] for k in items]
+            said = [captions[int(rng.integers(len(captions)))] for captions in several]
+            frames = [min(max(self.real.frames[k], self.how.shortest), self.how.longest) for k in items]
+            yield items, said, frames
+
+
+def prepare(
+    evaluator: Evaluator, real: TextReference, how: Transitions, crops: SeamCrops | None, shipped: Shipped | None = None
+) -> SeamTrial:
+    """Checks that there is enough real motion; MotionloomError where there is not."""
+    need = how.unfoldings * how.intervals
+    if how.intervals < 4:
+        raise MotionloomError(f"{how.intervals} intervals are too few for R@3; ask for at least 4")
+    if need > len(real.names):
+        raise MotionloomError(
+            f"{how.unfoldings} unfoldings of {how.intervals} intervals need {need} real items and there are "
+            f"{len(real.names)}; ask for fewer, or name more data"
+        )
+    if crops is not None and len(crops.embeddings) < max(2, how.seams):
+        raise MotionloomError(
+            f"there are {len(crops.embeddings)} real stretches of {how.window} frames and {how.seams} transitions are "
+            "compared with them; ask for fewer intervals, or name more data"
+        )
+    if crops is None and shipped is None:
+        raise MotionloomError("this copy ships no numbers of real transitions; name real motions with --data")
+    mean = crops.mean_jerk if crops is not None else shipped.mean_jerk  # type: ignore[union-attr]
+    return SeamTrial(evaluator, real, how, mean, crops, shipped)
+
+
+# ---- one replication -------------------------------------------------------------------------------------------------
+
+
+def cut(frames: Sequence[int], margin: int) -> list[slice]:
+    """Of each interval what lies at least ``margin`` frames from its seams; its open ends are kept."""
+    ends = np.cumsum(frames).tolist()
+    starts, last = [0, *ends[:-1]], len(frames) - 1
+    return [
+        slice(start + (margin if row > 0 else 0), end - (margin if row < last else 0))
+        for row, (start, end) in enumerate(zip(starts, ends, strict=True))
+    ]
+
+
+def windows(frames: Sequence[int], size: int) -> list[slice]:
+    """``size`` frames around each seam: from ``size`` // 2 before it on."""
+    return [slice(seam - size // 2, seam - size // 2 + size) for seam in np.cumsum(frames)[:-1].tolist()]
+
+
+def of_method(trial: SeamTrial, method: Method, replication: int) -> dict[str, float]:
+    """All columns for one way; the time goes to making the motions alone."""
+    how = trial.how
+    middles, seams, said, around, inside, steps = [], [], [], [], [], []
+    spent = total = 0.0
+    for unfolding, (_, captions, frames) in enumerate(trial.asked(replication)):
+        start = time.perf_counter()
+        made = method([caption.text for caption in captions], frames, how.first_seed(replication, unfolding))
+        spent, total = spent + time.perf_counter() - start, total + sum(frames) / FPS
+        _check(made, sum(frames))
+        said += captions
+        middles += [made.features[part] for part in cut(frames, how.handshake // 2)]
+        parts = windows(frames, how.window)
+        seams += [made.features[part] for part in parts]
+        around += [made.positions[part] for part in parts]
+        inside += [made.positions[p] for p in cut(frames, how.window // 2) if p.stop - p.start >= LEAST_INSIDE]
+        steps += transition_distance(made.positions, np.cumsum(frames)[:-1].tolist()).tolist()
+    found = _matched(trial, said, embedded(trial.evaluator, middles), replication)
+    found |= _around(trial, seams, np.stack(around), replication)
+    found |= {"step": 1000 * float(np.mean(steps)), "cost": spent / total}
+    if inside:
+        found |= {f"inside_{name}": value for name, value in averaged(inside).items()}
+        own = np.concatenate([sequence_jerk(part[None])[0] for part in inside]).mean()
+        found["auj_own"] = area_under_jerk(jerk_curve(np.stack(around)), float(own))
+    return found
+
+
+def of_real(trial: SeamTrial, replication: int) -> dict[str, float]:
+    """Real motions with their own captions; other random windows of real motion in place of transitions."""
+    rows = [item for items, _, _ in trial.asked(replication) for item in items]
+    said = [caption for _, captions, _ in trial.asked(replication) for caption in captions]
+    found = _matched(trial, said, trial.real.motions[rows], replication)
+    numbers = harness.averaged(trial.real.physical, trial.real.frames)
+    found |= {f"inside_{short}": numbers[name] for short, name in PHYSICAL.items()}
+    if trial.crops is not None:
+        other = trial.crops.again(trial.how.seams, seed=(trial.how.seed, replication, 1))
+        found |= _around(trial, other.features, other.positions, replication)
+        found["step"] = 1000 * other.step
+    elif trial.shipped is not None:
+        found |= trial.shipped.row(trial.how)
+    if "auj" in found:
+        found["auj_own"] = found["auj"]  # real windows are windows like any other
+    return found
+
+
+def _matched(trial: SeamTrial, said: Sequence[Caption], motions: Array, replication: int) -> dict[str, float]:
+    """Segments (segments, width), whatever is said of them."""
+    texts = trial.evaluator.texts(said)
+    return {
+        "r3": float(r_precision(texts, motions, top=3, batch=trial.how.intervals)[2]),
+        "mm_dist": matching_distance(texts, motions, batch=trial.how.intervals),
+        "fid": fid(motions, trial.real.motions),
+        "diversity": diversity(motions, replication),
+    }
+
+
+def _around(
+    trial: SeamTrial, features: Sequence[np.ndarray], positions: np.ndarray, replication: int
+) -> dict[str, float]:
+    """Numbers of windows: features of each, and positions (windows, frames, 22, 3)."""
+    found = {
+        **jerks(positions, trial.mean_jerk),
+        **{f"seam_{name}": value for name, value in averaged(list(positions)).items()},
+    }
+    if trial.crops is not None:
+        embeddings = embedded(trial.evaluator, features)
+        found["transition_fid"] = fid(embeddings, trial.crops.embeddings)
+        found["transition_diversity"] = diversity(embeddings, replication)
+    return found
+
+
+def _check(made: Long, frames: int) -> None:
+    if made.features.shape != (frames, WIDTH) or made.positions.shape != (frames, 22, 3):
+        raise ValueError(f"a method gave {made.features.shape} and {made.positions.shape} for {frames} frames")
+    if not (np.isfinite(made.features).all() and np.isfinite(made.positions).all()):
+        raise MotionloomError("a method drew numbers that are not finite; these weights cannot be measured so")
+
+
+# ---- the run ---------------------------------------------------------------------------------------------------------
+
+
+def measure(
+    trial: SeamTrial, ways: Mapping[str, Method], run: Run | None = None, *, parts: Parts | None = None
+) -> Report:
+    """All rows: real motion, then every way by the name it was given."""
+    run, parts, how = run or Run(), parts or Parts(None, ""), trial.how
+    real = [of_real(trial, r) for r in range(how.replications)]
+    looked_up = [name for name in real[0] if len({numbers.get(name) for numbers in real}) == 1]
+    rows = [row_of(REAL, real, COLUMNS, looked_up)]
+    for name, method in ways.items():
+        found = replicated(
+            name,
+            how.replications,
+            lambda r, method=method: of_method(trial, method, r),
+            parts,
+            lambda n: f"AUJ {n['auj']:.3f}, peak jerk {n['pj']:.4f}, FID {n['fid']:.3f}, {n['cost']:.2f} s per second",
+            run.progress,
+        )
+        rows.append(row_of(titled(name, how.steps), found, COLUMNS))
+    said = {
+        "data": trial.real.data,
+        **trial.real.selection.described(),
+        "items": len(trial.real.names),
+        "evaluator": trial.evaluator.name,
+        "representation": "HumanML3D at 20 frames per second, positions as the network draws them (not finished)",
+        **how.described(),
+    }
+    others = published_rows.published("long", [column.name for column in COLUMNS])
+    title = f"Long motion and its transitions: {run.label}"
+    return Report("transitions", title, run.command, said, COLUMNS, (*rows, *others), _notes(trial))
+
+
+def _notes(trial: SeamTrial) -> tuple[str, ...]:
+    how, segments = trial.how, trial.how.unfoldings * trial.how.intervals
+    half = len(trial.real.motions) // 2
+    bias = fid_bias(trial.real.motions, min(half, segments), other=half, repeats=10, seed=how.seed)
+    notes = [
+        f"A replication makes {how.unfoldings} long motions of {how.intervals} captions: {segments} segments and "
+        f"{how.seams} transitions of {how.window} frames. Their FIDs are large because they are few: "
+        f"{min(half, segments)} real motions against {half} others are {bias:.3f} apart. The row of real motion has "
+        "its segments among those it is compared with.",
+        f"AUJ sums |mean curve - reference| over {how.window - 3} frames and has a floor, since a mean of "
+        f"{how.seams} windows is not flat: read it beside the real row, which has as many. Reference: "
+        f"{trial.mean_jerk:.6f} m/frame³, the mean of the real windows here; HumanML3D's published one is "
+        f"{JERK_HUMANML3D}. A way that moves more smoothly than real people everywhere scores badly on it without any "
+        "seam: AUJ, own, takes the motion's own mean instead.",
+        "Segments are judged without half a handshake at each seam; what is called inside lies at least half a window "
+        "from every seam. SLERP's row is measured on positions of constant bones and on features made of them; "
+        "of the other rows what the network draws is measured.",
+    ]
+    if trial.crops is None:
+        notes.append(
+            "Without --data there are no real windows for the evaluator, so that FID and Diversity of the transitions "
+            "are left out; the real row's other numbers are the shipped ones."
+        )
+    return (*notes, "Time depends on the machine and on what else it does.")
+
+
+def run(
+    run: Run, *, selection: Selection | None = None, how: Transitions | None = None, names: Sequence[str] | None = None
+) -> Report:
+    """Measure weights by the named ways of making long motion (default `long_baselines.DEFAULT`).
+
+    Args:
+        run: the weights, the data, who judges, and where pieces are kept.
+        selection: which real motions of the data; None: the usual ones.
+        how: the protocol.
+        names: the rows.
+    """
+    how = how or Transitions()
+    ways = methods(run.prior(how.steps), how, names)
+    judge = run.judge()
+    trial = real_motion(judge, run.data, selection, how, run.progress)
+    windows = {"windows": trial.crops is not None}
+    parts = run.parts({**how.drawn(), **run.settings(judge), "real": identity(trial.real), **windows})
+    return measure(trial, ways, run, parts=parts)
+
+
+def real_motion(
+    judge: Evaluator, data: Path | str | None, selection: Selection | None, how: Transitions, progress: Say
+) -> SeamTrial:
+    """Real motions out of ``data``, or the shipped numbers."""
+    if data is None:
+        return prepare(judge, text_reference.load_shipped(judge, selection), how, None, load_shipped())
+    chosen = fitting(data, selection)
+    items = read_items(data, chosen)
+    real = text_reference.measure(items, judge, chosen, progress)
+    crops = SeamCrops.of([item.features for item in items], how.window, judge, seed=how.seed)
+    return prepare(judge, real, how, crops)

@@ -1,0 +1,69 @@
+"""A prior as a function: the network's own drawing, or what is exported."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+import torch
+
+from motionloom.diffusion import cosine
+from motionloom.features import humanml
+from motionloom.goals.timeline import timeline_of
+from motionloom.kinematics.physics import bone_length_error
+from motionloom.runtime.text.protocol import TextEmbedding
+from motionloom.tasks.long import compose
+from motionloom.tasks.splice import concatenated
+from motionloom.weights.prior import Card, Prior
+from motionloom_lab.suites.generator import generator
+from motionloom_train.modules import prior_session
+from motionloom_train.nets.prior import NetConfig, PriorNet
+from tests.kinematics.people import walking
+
+
+class Words:
+    """A text encoder that says the same about everything."""
+
+    name, width = "same", 8
+
+    def encode(self, texts: Sequence[str]) -> TextEmbedding:
+        rows = len(texts)
+        return TextEmbedding(
+            np.ones((rows, 3, 8), np.float32), np.ones((rows, 3), bool), np.ones((rows, 8), np.float32)
+        )
+
+
+@pytest.fixture
+def prior() -> Prior:
+    """An untrained network around the features of a walk: people that tremble."""
+    torch.manual_seed(0)
+    net = PriorNet(NetConfig(variant="modulated", width=16, layers=1, heads=2, hidden=16, text=8, patch=4))
+    features = humanml.encode(walking(1.0), heading="corrected")
+    return Prior(prior_session(net), cosine(50), features.mean(0), features.std(0) + 0.01, Words(), Card("tiny"))
+
+
+def test_row_i_comes_from_seed_plus_i_and_has_the_length_asked_for(prior: Prior) -> None:
+    make = generator(prior, steps=2)
+    both, fps = make(["a", "a"], seconds=2.0, seed=3)
+    (second,), _ = make(["a"], seconds=2.0, seed=4)
+    assert fps == 20
+    assert [p.shape for p in both] == [(40, 22, 3)] * 2
+    assert np.allclose(both[1], second, atol=1e-4)
+    assert not np.allclose(both[0], both[1], atol=1e-2)
+
+
+def test_finished_motions_have_constant_bones_and_drawn_ones_need_not(prior: Prior) -> None:
+    (drawn,), _ = generator(prior, steps=2)(["a"], seconds=2.0, seed=0)
+    (finished,), _ = generator(prior, steps=2, finished=True)(["a"], seconds=2.0, seed=0)
+    assert bone_length_error(finished) < 1e-9 < bone_length_error(drawn)
+
+
+def test_actions_that_follow_each_other_are_the_long_motion_that_generate_makes(prior: Prior) -> None:
+    prompt = "a person walks forward, then sits down"
+    made, _ = generator(prior, steps=2)(["a", prompt], seconds=4.0, seed=5)
+    segments = timeline_of(prompt, 4.0).segments
+    assert [segment.text for segment in segments] == ["a person walks forward", "a person sits down"]
+    expected = concatenated(*compose(prior, segments, seed=6, steps=2)).positions()
+    assert made[1].shape == (80, 22, 3)
+    np.testing.assert_array_equal(made[1], expected)
+    np.testing.assert_array_equal(generator(prior, steps=2)([prompt], seconds=4.0, seed=6)[0][0], expected)
+    np.testing.assert_allclose(made[0], generator(prior, steps=2)(["a"], seconds=4.0, seed=5)[0][0], atol=1e-5)

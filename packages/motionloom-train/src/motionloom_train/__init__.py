@@ -1,0 +1,1 @@
+"""Training: networks as PyTorch modules, data sets, recipes, and graphs for the runtime."""

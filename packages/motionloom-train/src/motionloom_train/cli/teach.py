@@ -1,0 +1,192 @@
+"""`motionloom teach`: an action or a style from a user's own few clips, as a small file for what draws."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from motionloom.cli.reading import as_rate, as_unit
+from motionloom.cli.sampling import fail
+from motionloom.cli.writing import add_force, check_overwriting
+from motionloom.formats import readable
+
+if TYPE_CHECKING:
+    from motionloom.motion import Motion
+    from motionloom_train.data.examples import CaptionedClip, Example
+
+
+def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Register `teach`."""
+    parser = subparsers.add_parser(
+        "teach",
+        help="teach the shipped weights an action or a style from a few clips",
+        description="Learn from 1 to 20 clips of one person, of any humanoid skeleton: see docs/teach.md. The file "
+        "that is written goes with --adapter into generate, compose, control, edit and duet.",
+    )
+    parser.add_argument(
+        "words",
+        nargs="+",
+        metavar="TEXT|CLIP",
+        help="what the clips show, such as 'a zombie walks', and motion files or folders of them",
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="the adapter (default taught.safetensors)")
+    parser.add_argument("--check", action="store_true", help="only say what is wrong with the clips")
+    parser.add_argument("--name", help="name on the adapter's card (default: that of the file)")
+    parser.add_argument("--licence", default="", help="what one may do with the adapter: the clips' owner says")
+    parser.add_argument("--steps", type=int, help="training steps (default 1300; more clips may need more)")
+    parser.add_argument("--rank", type=int, help="size of the change: 16 (default) makes a file of 1.5 MB")
+    parser.add_argument(
+        "--keep",
+        type=float,
+        metavar="SHARE",
+        help="share of the training on what the weights know already, 0 to 0.9 (default 0.5)",
+    )
+    parser.add_argument("--no-mirror", action="store_true", help="do not learn from the clips' mirror images")
+    parser.add_argument("--seed", type=int, default=0, help="the same seed teaches the same (default 0)")
+    parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="what is taught (default: default)")
+    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
+    parser.add_argument("--threads", type=int, help="CPU threads")
+    parser.add_argument(
+        "--amp",
+        choices=("auto", "bf16", "float32"),
+        default="auto",
+        help="what is multiplied in; auto takes what is quicker on this machine (default)",
+    )
+    parser.add_argument("--unit", type=as_unit, metavar="UNIT", help="unit of a BVH or ASF: m, cm, inch, or metres")
+    parser.add_argument("--up", choices=("y", "z"), default="y", help="the axis that is up in the files (default y)")
+    parser.add_argument("--source-fps", type=as_rate, metavar="N", help="take this rate for the files' (AMC: 120)")
+    parser.add_argument("--json", action="store_true", help="print what was made or found as JSON")
+    add_force(parser)
+    parser.set_defaults(run=run_teach)
+
+
+def run_teach(arguments: argparse.Namespace) -> int:
+    """``motionloom teach TEXT CLIP ...``."""
+    from motionloom.io.atomic import check_place
+    from motionloom_train.data.examples import find_examples
+
+    caption, places = _words(arguments.words)
+    out = arguments.out or Path("taught.safetensors")
+    if out.suffix.lower() != ".safetensors":
+        fail(f"adapters are written as .safetensors; {out.name} has another suffix")
+    if not arguments.check:
+        check_place(out)
+        check_overwriting(arguments, [out])
+    captioned = find_examples(places, caption)
+    motions, findings = _read(arguments, captioned)
+    if arguments.check:
+        return _report_check(arguments, captioned, findings)
+    _refuse(captioned, findings)
+    from motionloom_train.data.examples import make_examples
+
+    examples = [
+        example
+        for one, motion in zip(captioned, motions, strict=True)
+        for example in make_examples(motion, one, mirror=not arguments.no_mirror)
+    ]
+    _teach(arguments, examples, out, captioned)
+    return 0
+
+
+def _words(words: list[str]) -> tuple[str, list[str]]:
+    """The caption, which is no file and no folder and comes first or nowhere, and the clips."""
+    caption, places = ("", words)
+    first = words[0]
+    if not Path(first).exists() and Path(first).suffix.lower() not in readable():
+        caption, places = first, words[1:]
+    if not places:
+        fail(f"no clips behind {caption[:60]!r}; name files, as in: motionloom teach 'a zombie walks' clips/*.bvh")
+    return caption, places
+
+
+def _read(arguments: argparse.Namespace, captioned: "list[CaptionedClip]") -> "tuple[list[Motion], list[list[Any]]]":
+    """The clips, and what is wrong with each."""
+    from motionloom.errors import MotionloomError
+    from motionloom.io import load
+    from motionloom.retarget.upright import stood_up
+    from motionloom_train.data.clip_check import check_file
+
+    motions, findings = [], []
+    for one in captioned:
+        found: Motion | MotionloomError
+        try:
+            unit = arguments.unit if one.path.suffix.lower() in (".bvh", ".amc") else None
+            found = load(one.path, fps=arguments.source_fps, unit=unit)
+            found = stood_up(found) if arguments.up == "z" else found
+            motions.append(found)
+        except MotionloomError as error:
+            found = error
+        findings.append(check_file(found))
+    return motions, findings
+
+
+def _report_check(arguments: argparse.Namespace, captioned: "list[CaptionedClip]", findings: list[list[Any]]) -> int:
+    """Print what is wrong with which clip; the exit code is 2 where something cannot be learned from."""
+    fatal = sum(any(one.fatal for one in found) for found in findings)
+    if arguments.json:
+        rows = [
+            {
+                "clip": str(one.path),
+                "captions": list(one.captions),
+                "wrong": [f.sentence for f in found if f.fatal],
+                "remarks": [f.sentence for f in found if not f.fatal],
+            }
+            for one, found in zip(captioned, findings, strict=True)
+        ]
+        print(json.dumps({"clips": rows, "usable": len(captioned) - fatal}, indent=1, ensure_ascii=False))
+        return 2 if fatal else 0
+    for one, found in zip(captioned, findings, strict=True):
+        print(f"{one.path}: {'; '.join(one.captions)}")
+        for finding in found:
+            print(f"  {'wrong' if finding.fatal else 'remark'}: {finding.sentence}")
+    print(f"{len(captioned) - fatal} of {len(captioned)} clips can be learned from")
+    return 2 if fatal else 0
+
+
+def _refuse(captioned: "list[CaptionedClip]", findings: list[list[Any]]) -> None:
+    """Raise MotionloomError for the first clip that nothing can be learned from; say what else there is."""
+    for one, found in zip(captioned, findings, strict=True):
+        for finding in found:
+            if finding.fatal:
+                fail(f"{one.path}: {finding.sentence}; leave it out or mend it ('motionloom teach --check' lists all)")
+            print(f"motionloom: {one.path}: {finding.sentence}", file=sys.stderr)
+
+
+def _teach(
+    arguments: argparse.Namespace, examples: "list[Example]", out: Path, captioned: "list[CaptionedClip]"
+) -> None:
+    import time
+
+    from motionloom.weights.prior import Prior
+    from motionloom_train.teach import Lesson, teach
+    from motionloom_train.threads import set_threads
+
+    if arguments.threads is not None:
+        if arguments.threads < 1:
+            fail(f"--threads must be 1 or more; got {arguments.threads}")
+        set_threads(arguments.threads)
+    given = {key: getattr(arguments, key) for key in ("steps", "rank", "keep") if getattr(arguments, key) is not None}
+    if not 0 <= arguments.seed < 2**31:
+        fail(f"--seed must be 0 or more and below 2**31; got {arguments.seed}")
+    lesson = Lesson(
+        name=arguments.name or out.stem, licence=arguments.licence, seed=arguments.seed, amp=arguments.amp, **given
+    )
+    prior = Prior.load(arguments.weights, device=arguments.device)
+    began = time.perf_counter()
+    adapter = teach(prior, examples, lesson, device=arguments.device, say=lambda line: print(line, file=sys.stderr))
+    adapter.save(out)
+    about = {
+        "file": str(out),
+        "megabytes": round(out.stat().st_size / 1e6, 2),
+        "captions": list(adapter.captions),
+        "clips": [str(one.path) for one in captioned],
+        "licence": adapter.licence,
+        "base": adapter.base,
+        "seconds": round(time.perf_counter() - began, 1),
+    }
+    if arguments.json:
+        print(json.dumps(about, indent=1, ensure_ascii=False))
+        return
+    print(f"wrote {out}: {about['megabytes']} MB, {len(captioned)} clips, taught in {about['seconds']:.0f} s")
+    print(f"try: motionloom generate {adapter.captions[0]!r} --adapter {out}")

@@ -1,0 +1,121 @@
+"""`motionloom train`: models from recipes."""
+
+import argparse
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from motionloom_train.recipe import Recipe
+
+LABORATORY = "motionloom_lab"
+"""Reads the data sets and protocols that others published, and has the evaluator; opened where one is asked for."""
+
+
+def add(subparsers) -> None:
+    """Register `train prior`, `train evaluator`, `train control`, `train predictor` and `train duet`."""
+    train = subparsers.add_parser("train", help="train a model from a recipe; goes on where it was stopped")
+    commands = train.add_subparsers(metavar="MODEL", required=True)
+    prior = commands.add_parser("prior", help="a text-to-motion prior on a built set")
+    _options(prior, "default.toml")
+    prior.set_defaults(run=_prior)
+    evaluator = commands.add_parser("evaluator", help="a text-motion evaluator on a built set, by contrast")
+    _options(evaluator, "evaluator.toml")
+    evaluator.set_defaults(run=_evaluator)
+    control = commands.add_parser("control", help="an adapter (or a whole prior) that obeys what is given")
+    _options(control, "control.toml")
+    control.set_defaults(run=_control)
+    predictor = commands.add_parser("predictor", help="a model of what people do next, on recordings as they are")
+    _run_options(predictor, "predictor.toml", "the mocap pack, a folder of motion files, AMASS, data_3d_h36m.npz ...")
+    predictor.add_argument("--protocol", help="cmu, h36m, humaneva, amass or own (default: recognised)")
+    predictor.set_defaults(run=_predictor)
+    duet = commands.add_parser("duet", help="a block that makes two people out of a prior, from a few pairs")
+    pairs = "a folder of NAME_a.bvh, NAME_b.bvh and captions.txt, the mocap pack, or 3DPW"
+    _run_options(duet, "duet.toml", pairs, name="--pairs")
+    duet.set_defaults(run=_duet)
+
+
+def _options(parser: argparse.ArgumentParser, recipe: str) -> None:
+    _run_options(parser, recipe, "folder made by 'motionloom data build'")
+    parser.add_argument(
+        "--text", default="default", help="weights whose text encoder is used (default: the shipped ones)"
+    )
+
+
+def _run_options(parser: argparse.ArgumentParser, recipe: str, data: str, *, name: str = "--data") -> None:
+    parser.add_argument("--recipe", type=Path, required=True, help=f"a TOML file such as recipes/{recipe}")
+    parser.add_argument(name, type=Path, required=True, help=data)
+    parser.add_argument("--out", type=Path, required=True, help="folder of the run: state, weights, logs, pictures")
+    parser.add_argument("--device", help="cpu, cuda, cuda:1 ... (default: cuda where there is one)")
+    parser.add_argument("--threads", type=int, help="CPU threads")
+    parser.add_argument("--stop", type=int, help="end early after this many steps")
+    parser.add_argument(
+        "--set", nargs="+", default=[], metavar="KEY=VALUE", help="replace entries of the recipe (TOML values)"
+    )
+
+
+def _prior(arguments: argparse.Namespace) -> None:
+    from motionloom_train.prior import train_prior
+
+    _train(arguments, train_prior)
+
+
+def _evaluator(arguments: argparse.Namespace) -> None:
+    _train(arguments, import_module(f"{LABORATORY}.evaluator.training").train_evaluator)
+
+
+def _control(arguments: argparse.Namespace) -> None:
+    from motionloom_train.control import train_control
+
+    _train(arguments, train_control)
+
+
+def _predictor(arguments: argparse.Namespace) -> None:
+    from motionloom_train.predictor import train_predictor
+
+    recipe = _recipe(arguments)
+    benchmarks = import_module(f"{LABORATORY}.papers.benchmarks")
+    protocol = benchmarks.find_protocol(arguments.data, name=arguments.protocol, splits=("train", "val"), say=print)
+    place = train_predictor(recipe, protocol, arguments.out, device=arguments.device, stop=arguments.stop)
+    print(f"wrote {place}")
+
+
+def _duet(arguments: argparse.Namespace) -> None:
+    from motionloom_train.pair import Settings, train_pair
+
+    recipe = _recipe(arguments)
+    settings = Settings.parse(recipe.pair)
+    readers = import_module(f"{LABORATORY}.papers.readers")
+    pairs = readers.find_pairs(arguments.pairs, captions=settings.prefix + settings.react < 1, say=print)
+    place = train_pair(recipe, pairs, arguments.out, device=arguments.device, stop=arguments.stop)
+    print(f"wrote {place}")
+
+
+def _train(arguments: argparse.Namespace, make: Callable[..., Path]) -> None:
+    from motionloom_train.prior import text_encoder
+
+    recipe = _recipe(arguments)
+    place = make(
+        recipe,
+        arguments.data,
+        arguments.out,
+        text=text_encoder(arguments.text),
+        device=arguments.device,
+        stop=arguments.stop,
+    )
+    print(f"wrote {place}")
+
+
+def _recipe(arguments: argparse.Namespace) -> "Recipe":
+    """The recipe with its changes; checks and applies what is said about the run."""
+    from motionloom.errors import MotionloomError
+    from motionloom_train.recipe import changes, load_recipe
+    from motionloom_train.threads import set_threads
+
+    for option in ("threads", "stop"):
+        if getattr(arguments, option) is not None and getattr(arguments, option) < 1:
+            raise MotionloomError(f"--{option} must be 1 or more; got {getattr(arguments, option)}")
+    if arguments.threads:
+        set_threads(arguments.threads)
+    return load_recipe(arguments.recipe, changes(arguments.set))

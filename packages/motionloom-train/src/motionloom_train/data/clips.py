@@ -1,0 +1,135 @@
+"""The clips of a built set: features with what people say of them, one safetensors file each."""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import WIDTH
+from motionloom.io.tensors import check_head, save_tensors
+from motionloom.io.text import plain_json
+from motionloom_train.data.actions import PREFIX
+from motionloom_train.data.words import LABELS, check_caption
+
+MAX_BYTES = 256 << 20
+"""Of a clip's file: more than an hour and a half of features."""
+SHORTEST = 20
+"""Frames of the shortest stretch that is described."""
+THEN, MADE = "then", "made "
+"""Groups of notes besides those of `data.actions`: one action and then another; gestures of `data.made`."""
+KINDS = ("capture", "keyed", "made")
+STATES = (
+    "walk",
+    "walk slow",
+    "walk fast",
+    "jog",
+    "run",
+    "walk backward",
+    "jog backward",
+    "stand",
+    "dance",
+    "circle left",
+    "circle right",
+    "run circle",
+    "balance",
+    "sidestep left",
+    "sidestep right",
+    "sit",
+)
+"""Labels that stay true however long a window of them is: neighbouring windows join."""
+
+
+@dataclass(frozen=True)
+class Note:
+    """Frames ``first`` to ``last`` (half-open) of a clip and the words for them."""
+
+    first: int
+    last: int
+    kind: str
+    """``human``, ``index``, ``action:`` and a name of `data.actions`, or the measured label."""
+    texts: tuple[str, ...] = ()
+    """Sentences or verb phrases; empty for measured labels, whose wordings stand in `data.words`."""
+    core: tuple[int, int] | None = None
+    """Frames (first, end) of the clip that a training window must hold whole; None: any part shows what is said."""
+
+
+@dataclass(frozen=True)
+class Clip:
+    """One entry of a built set."""
+
+    name: str
+    source: str
+    licence: str
+    split: str
+    way: str
+    """``plain``, ``looped``, ``bent``, ``reversed``, ``held``, ``joined``, ``made`` or ``mixed``; mirrored copies begin
+    with M in their name."""
+    notes: tuple[Note, ...]
+    features: np.ndarray
+    """(frames, 263) float32, not standardised."""
+    kind: str = "capture"
+    """``capture``, ``keyed`` (animated by hand) or ``made`` (arms moved by rule on a recorded body)."""
+
+
+def write_clip(folder: Path, clip: Clip) -> None:
+    """One file ``folder/NAME.safetensors``, whole or not at all."""
+    about = {k: v for k, v in asdict(clip).items() if k != "features"}
+    save_tensors(
+        {"features": np.ascontiguousarray(clip.features)},
+        folder / f"{clip.name}.safetensors",
+        metadata={"clip": json.dumps(about)},
+    )
+
+
+def read_clip(path: Path) -> Clip:
+    """The inverse of `write_clip`; raises MotionloomError for a damaged file."""
+    try:
+        check_head(path, max_bytes=MAX_BYTES)
+        with safe_open(path, framework="numpy") as file:
+            about = plain_json(file.metadata()["clip"])
+            features = file.get_tensor("features")
+        notes = tuple(
+            Note(n["first"], n["last"], n["kind"], tuple(n["texts"]), tuple(n["core"]) if n.get("core") else None)
+            for n in about.pop("notes")
+        )
+        clip = Clip(**about, notes=notes, features=features)
+        _check_clip(clip)
+        return clip
+    except (SafetensorError, KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        raise MotionloomError(
+            f"{path} is not a clip of a built set ({error}); delete it and its name in done/, and build again"
+        ) from error
+
+
+def _check_clip(clip: Clip) -> None:
+    features = clip.features
+    if (
+        features.dtype != np.float32
+        or features.ndim != 2
+        or features.shape[1] != WIDTH
+        or not np.isfinite(features).all()
+    ):
+        raise ValueError(f"its features are not finite float32 numbers of shape (frames, {WIDTH})")
+    if not all(isinstance(v, str) for v in (clip.name, clip.source, clip.licence, clip.split, clip.way)):
+        raise ValueError("its name, source, licence, split or way is not text")
+    if clip.kind not in KINDS:
+        raise ValueError(f"its kind {clip.kind!r} is none of {', '.join(KINDS)}")
+    for note in clip.notes:
+        _check_note(note, len(features))
+
+
+def _check_note(note: Note, frames: int) -> None:
+    if not 0 <= note.first < note.last <= frames:
+        raise ValueError(f"a note spans frames {note.first} to {note.last} of {frames}")
+    written = note.kind in ("human", "index") or note.kind.startswith(PREFIX)
+    if note.core and not note.first <= note.core[0] < note.core[1] <= note.last:
+        raise ValueError(f"what a window must hold, frames {note.core}, is not within {note.first} to {note.last}")
+    if not all(isinstance(t, str) for t in note.texts) or (written and not note.texts):
+        raise ValueError(f"a note of kind {note.kind} lacks its texts")
+    for text in note.texts:
+        check_caption(text)
+    if not written and not all(label in LABELS for label in note.kind.split("+", 1)):
+        raise ValueError(f"there is no label {note.kind!r}")

@@ -1,0 +1,394 @@
+"""Training clips made from others: short changes held, actions joined, gestures made, arms of one on another's walk."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from motionloom.features import humanml as hml
+from motionloom.features.layout import FPS, LAYOUT
+from motionloom.kinematics import physics as ph
+from motionloom.kinematics.physics import Array
+from motionloom_train.data import augment
+from motionloom_train.data.actions import ACTIONS, PREFIX, Action, sentences, side_of, turned_to
+from motionloom_train.data.clips import MADE, SHORTEST, THEN, Clip, Note
+from motionloom_train.data.idle import Idle
+from motionloom_train.data.made import GESTURES, hands_up, lower_arms, perform, words_for
+from motionloom_train.data.person import at_origin
+from motionloom_train.data.postures import Posture, assume, postures
+from motionloom_train.data.words import sentence
+
+LOOPED = 200
+"""Frames that a cycle is repeated to."""
+POSTURES = (
+    "sit down",
+    "stand up",
+    "sit down and stand up",
+    "lie down",
+    "get up",
+    "crouch to lie",
+    "lie to crouch",
+    "kneel",
+    "crouch",
+    "bow",
+    "fall",
+)
+"""Actions that end (and begin) in a posture which people keep, though many a recording is cut a moment before."""
+BRIEFLY = 20
+"""Frames for which a pose is held in which nobody stays."""
+SEATED = ("sit down", "stand up", "sit down and stand up")
+
+
+def looped(clip: Clip) -> Iterator[Clip]:
+    """Short cycles and exercises of a recorded clip that go on."""
+    for note in _actions(clip):
+        if _is_cycle(note):
+            longer = augment.loop(clip.features[note.first : note.last], LOOPED, limit=0.12)
+            if longer is not None:
+                yield _derived(clip, longer, "looped", (replace(note, first=0, last=len(longer), core=None),))
+
+
+def held_clips(clips: Sequence[Clip], idle: Idle) -> Iterator[Clip]:
+    """Short examples of an action at the lengths that are asked for: somebody stands, or stays, before and after.
+
+    clips: of one licence; of the recorded ones for training. What runs backwards as another action (sitting down as
+    standing up) does so too.
+    """
+    for clip in clips:
+        if clip.way != "plain" or clip.split != "train" or clip.name.startswith("M"):
+            continue
+        positions = hml.decode_positions(clip.features.astype(np.float64))
+        seed = int.from_bytes(clip.name.encode(), "little") % 2**32
+        made = 0
+        for number, note in enumerate(_actions(clip)):
+            for longer in _held_ways(clip, note, positions, seed=seed + 2 * number, idle=idle):
+                yield replace(longer, name=f"held_{made}_{clip.name}")
+                made += 1
+
+
+def _actions(clip: Clip) -> list[Note]:
+    return [n for n in clip.notes if n.kind.startswith(PREFIX) and n.last - n.first <= LOOPED - 40]
+
+
+def _is_cycle(note: Note) -> bool:
+    return ACTIONS[note.kind.removeprefix(PREFIX)].kind in ("cycle", "repeats") and note.last - note.first < 160
+
+
+def _held_ways(clip: Clip, note: Note, positions: Array, *, seed: int, idle: Idle) -> Iterator[Clip]:
+    if _is_cycle(note) and augment.loop(clip.features[note.first : note.last], LOOPED, limit=0.12) is not None:
+        return
+    action = ACTIONS[note.kind.removeprefix(PREFIX)]
+    first, last = note.core or (note.first, note.last)
+    cut = positions[first : last + 1]
+    for reverse in (False, True)[: 1 + bool(action.reverse)]:
+        shown = augment.reversed_in_time(cut) if reverse else cut
+        texts = sentences(ACTIONS[action.reverse]) if reverse else note.texts
+        name = action.reverse if reverse else action.name
+        if name in SEATED and hands_up(shown):
+            shown, texts = lower_arms(shown), sentences(ACTIONS[name])
+        yield from _held(clip, shown, PREFIX + name, texts, seed=seed + reverse, idle=idle)
+
+
+def _held(
+    clip: Clip, shown: Array, kind: str, texts: tuple[str, ...], *, seed: int, idle: Idle = augment.NO_IDLE
+) -> Iterator[Clip]:
+    posture = kind.removeprefix(PREFIX) in POSTURES
+    fastest = 1.2 if posture else 0.45
+    start, end = (augment.can_hold(shown, FPS, end=at_end, fastest=fastest) for at_end in (False, True))
+    if not (start or end) or len(shown) < SHORTEST:
+        return
+    rng = np.random.default_rng(seed)
+    room = max(150 - len(shown), 30)
+    before = int(rng.integers(8, min(55, room))) if start else 0
+    after = max(room - before, 25) if end else 0
+    if not posture:  # nobody stays in the middle of a movement
+        before = before if augment.stands_on(shown[0], idle) else min(before, BRIEFLY)
+        after = after if augment.stands_on(shown[-1], idle) else min(after, BRIEFLY)
+    longer = augment.held(shown, before, after, fps=FPS, seed=seed, idle=idle)
+    features = hml.encode(at_origin(hml.uniform(longer)), heading="corrected")
+    whole = (max(before - 3, 0), min(before + len(shown) + 2, len(features)))
+    yield _derived(clip, features, "held", (Note(0, len(features), kind, texts, whole),))
+
+
+def _derived(clip: Clip, features: np.ndarray, way: str, notes: tuple[Note, ...]) -> Clip:
+    return replace(clip, name=f"{clip.name}_{way}", way=way, notes=notes, features=features.astype(np.float32))
+
+
+def laid_down(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
+    """From standing to lying, out of a crouch and of lying down from one, and the same film backwards: getting up."""
+    parts = {
+        name: [
+            (c, n)
+            for c in clips
+            for n in c.notes
+            if n.kind == PREFIX + name and c.way == "plain" and c.split == "train"
+        ]
+        for name in ("crouch", "crouch to lie")
+    }
+    rng, made = np.random.default_rng(seed), 0
+    pairs = [(a, b) for a in parts["crouch"] for b in parts["crouch to lie"]]
+    for number in rng.permutation(len(pairs)):
+        if made >= count:
+            return
+        first, second = (_core_positions(clip, note, rng) for clip, note in pairs[number])
+        first = first[: int(first[:, 0, 1].argmin()) + 1]
+        both = augment.joined(first, second, blend=14, limit=0.3)
+        if both is None or not 30 <= len(both) <= 180:
+            continue
+        clip = pairs[number][1][0]
+        for name, shown in (("lie down", both), ("get up", augment.reversed_in_time(both))):
+            texts = sentences(ACTIONS[name])
+            for longer in _held(clip, shown, PREFIX + name, texts, seed=seed * 100_003 + int(number), idle=idle):
+                yield replace(longer, name=f"joined_{seed}_{name.replace(' ', '_')}{made}", way="joined")
+        made += 1
+
+
+def joined_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
+    """One action and then another, where the poses in between agree; training clips of one licence."""
+    rng = np.random.default_rng(seed)
+    pool = _by_action(clips)
+    names, made = sorted(pool), 0
+    for number in range(60 * count if names else 0):
+        if made == count:
+            return
+        pair = [ACTIONS[names[i]] for i in rng.integers(len(names), size=2)]
+        if pair[0] is pair[1] or not all(action.says for action in pair):
+            continue
+        picked = [pool[action.name][rng.integers(len(pool[action.name]))] for action in pair]
+        parts = [_core_positions(clip, note, rng) for clip, note in picked]
+        both = augment.joined(*parts)
+        if both is None or not 40 <= len(both) <= 180:
+            continue
+        first, second = (_phrases(action, note) for action, (_, note) in zip(pair, picked))
+        texts = _linked(first, second, rng)
+        name = f"joined_{seed}_{made:04d}"
+        keyed = "keyed" if any(clip.kind == "keyed" for clip, _ in picked) else "capture"
+        base = Clip(
+            name, picked[0][0].source, picked[0][0].licence, "train", "joined", (), picked[0][0].features, keyed
+        )
+        for clip in _held(base, both, PREFIX + THEN, texts, seed=seed * 100_003 + number, idle=idle):
+            made += 1
+            yield replace(clip, name=name, way="joined")
+
+
+def _by_action(clips: Sequence[Clip]) -> dict[str, list[tuple[Clip, Note]]]:
+    """Training clips and their notes, by the name of the action that the note says they show."""
+    pool: dict[str, list[tuple[Clip, Note]]] = {}
+    for clip in clips:
+        for note in clip.notes:
+            if note.kind.startswith(PREFIX) and clip.split == "train" and clip.way in ("plain", "held"):
+                pool.setdefault(note.kind.removeprefix(PREFIX), []).append((clip, note))
+    return pool
+
+
+def _linked(first: Sequence[str], second: Sequence[str], rng: np.random.Generator) -> tuple[str, ...]:
+    """Sentences of one action and then another, each with phrases drawn anew."""
+    texts = []
+    for link in ("and then", "and", "then"):
+        a, b = rng.choice(first), rng.choice(second)
+        texts.append(sentence(f"{a} {link} {b}", rng))
+    return tuple(texts)
+
+
+def _phrases(action: Action, note: Note) -> list[str]:
+    side = side_of(note.texts)
+    return [*action.says, *(phrase.format(side=side) for phrase in action.sided if side)]
+
+
+def _core_positions(clip: Clip, note: Note, rng: np.random.Generator) -> Array:
+    first, last = note.core or (note.first, note.last)
+    if note.core is None and last - first > 70:
+        first += int(rng.integers(last - first - 60))
+        last = first + 60
+    return hml.decode_positions(clip.features[first:last].astype(np.float64))
+
+
+def made_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
+    """Gestures of the arms (`data.made`) on people who stand, sit or walk; training clips of one licence."""
+    rng = np.random.default_rng(seed)
+    bodies = _labelled(clips, ("stand", "walk", "sit"))
+    leads = {"stand": "", "walk": "walks", "sit": "sits"}
+    for number in range(count if bodies.get("stand") else 0):
+        gesture = GESTURES[sorted(GESTURES)[number % len(GESTURES)]]
+        where = str(rng.choice([k for k in ("stand", "stand", "stand", "walk", "sit") if k in bodies]))
+        where = "stand" if gesture.times else where
+        below, note = bodies[where][rng.integers(len(bodies[where]))]
+        length = min(note.last - note.first, int(rng.integers(70, 160)))
+        first = note.first + int(rng.integers(note.last - note.first - length + 1))
+        side = str(rng.choice(["left", "right"]))
+        alive = idle.body(length, rng) if where == "stand" else None
+        body = hml.decode_positions(below.features[first : first + length].astype(np.float64))
+        body = at_origin(body if alive is None else alive)
+        if where == "stand" and alive is None and rng.random() < 0.7:
+            body = lower_arms(body)
+        begin = float(rng.uniform(0.8, 1.0))
+        needed = round(FPS * (begin + 1.5 * gesture.times))
+        if needed > len(body):
+            body = augment.held(body, 0, needed - len(body), fps=FPS, seed=seed * 100_003 + number, idle=idle)
+        positions = perform(body, gesture, side, fps=FPS, begin=begin, rng=rng)
+        features = hml.encode(positions, heading="corrected")
+        texts = words_for(gesture, side, leads[where], rng)
+        if texts:
+            group = PREFIX + MADE + gesture.name
+            first = round(FPS * begin)
+            whole = (first, min(first + 30 * max(1, gesture.times), len(features)))
+            notes = (Note(0, len(features), group, texts, whole),)
+            yield Clip(
+                f"made_{seed}_{number:04d}", below.source, below.licence, "train", "made", notes, features, "made"
+            )
+
+
+def mixed_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
+    """Arms of a gesture on the body of a gait, both from training clips of one licence."""
+    rng = np.random.default_rng(seed)
+    bodies = _labelled(
+        clips,
+        ("walk", "walk slow", "jog", "walk backward", "circle left", "circle right", "sidestep left", "sidestep right"),
+    )
+    arms = _labelled(clips, ("wave", "arms up", "punch"))
+    for number in range(count if bodies and arms else 0):
+        body_label, gesture = rng.choice(sorted(bodies)), rng.choice(sorted(arms))
+        below, note = bodies[body_label][rng.integers(len(bodies[body_label]))]
+        above, gesture_note = arms[gesture][rng.integers(len(arms[gesture]))]
+        if below.licence != above.licence:
+            continue
+        worn = augment.wear_arms(_positions(below, note), _positions(above, gesture_note))
+        features = hml.encode(worn, heading="corrected")
+        features[:, LAYOUT["root_height"]] = below.features[
+            note.first : note.first + len(features), LAYOUT["root_height"]
+        ]
+        yield Clip(
+            f"mixed_{seed}_{number:04d}",
+            below.source,
+            below.licence,
+            "train",
+            "mixed",
+            (Note(0, len(features), f"{body_label}+{gesture}"),),
+            features,
+        )
+
+
+def _labelled(clips: Sequence[Clip], labels: Sequence[str]) -> dict[str, list[tuple[Clip, Note]]]:
+    found: dict[str, list[tuple[Clip, Note]]] = {}
+    for clip in clips:
+        for note in clip.notes:
+            if note.kind in labels and clip.split == "train" and note.last - note.first >= 50:
+                found.setdefault(note.kind, []).append((clip, note))
+    return found
+
+
+def _positions(clip: Clip, note: Note) -> Array:
+    return hml.decode_positions(clip.features[note.first : note.last].astype(np.float64))
+
+
+def posture_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
+    """Changes of the whole body (`data.postures`) on people who stand with hanging arms; training clips of one licence.
+
+    A tenth of ``count`` of each posture.
+    """
+    rng = np.random.default_rng(seed)
+    bodies = [found for found in _labelled(clips, ("stand",)).get("stand", []) if _stands_plainly(*found)]
+    for number in range(round(count / 10) if bodies else 0):
+        below, note = bodies[rng.integers(len(bodies))]
+        body = idle.body(LOOPED, rng)
+        if body is None:
+            body = hml.decode_positions(below.features[note.first : note.first + 60].astype(np.float64))
+            if rng.random() < 0.7:
+                body = lower_arms(body)
+        body = augment.held(body, 0, max(0, LOOPED - len(body)), fps=FPS, seed=seed * 100_003 + number, idle=idle)
+        for kind, posture in enumerate(postures(body, rng)):
+            begin = float(rng.uniform(0.8, 1.0))
+            frames = min(len(body), round(FPS * (begin + posture.seconds(kept=float(rng.uniform(1.5, 4.0))))))
+            features = hml.encode(at_origin(_assumed(body[:frames], posture, begin, rng)), heading="corrected")
+            action = ACTIONS[posture.action]
+            texts = sentences(action, side=posture.side)
+            shown = 2.0 if action.kind == "cycle" else posture.seconds(kept=0.5)
+            start, end = round(FPS * begin), min(round(FPS * (begin + shown)), len(features))
+            whole = None if action.kind == "repeats" else (start, end)
+            notes = (Note(0, len(features), PREFIX + action.name, texts, whole),)
+            name = f"posture_{seed}_{number:03d}{kind}"
+            yield Clip(name, below.source, below.licence, "train", "made", notes, features.astype(np.float32), "made")
+
+
+def _assumed(body: Array, posture: Posture, begin: float, rng: np.random.Generator) -> Array:
+    shown = assume(body, posture, fps=FPS, begin=begin)
+    if not posture.arms_out:
+        return shown
+    return perform(shown, GESTURES["arms out"], "", fps=FPS, begin=begin, rng=rng)
+
+
+def _stands_plainly(clip: Clip, note: Note) -> bool:
+    """Both feet side by side and both hands down."""
+    if clip.way not in ("plain", "held"):
+        return False
+    p = ph.in_body(hml.decode_positions(clip.features[note.first : note.first + 60].astype(np.float64)))
+    step = np.abs(p[:, 7, 2] - p[:, 8, 2]).max()
+    return bool(step < 0.12 and p[:, [20, 21], 1].max() < p[:, 6, 1].min() and p[..., 1].min() > -0.02)
+
+
+def there_and_back(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
+    """Walks that turn right round and come back: a walk, somebody's turn, another walk; training clips of one licence.
+
+    Recordings hold only a few. A tenth of ``count``.
+    """
+    rng = np.random.default_rng(seed)
+    found = _labelled(clips, ("walk",))
+    walks = [f for f in found.get("walk", []) if f[0].way in ("plain", "looped")]
+    turns = [turn for clip in clips for turn in _half_turns(clip)]
+    action, made = ACTIONS["walk turn around"], 0
+    for _ in range(4 * count if walks and turns else 0):
+        if made == round(count / 10):
+            return
+        base, turn = turns[rng.integers(len(turns))]
+        ends = [_walk(*walks[rng.integers(len(walks))], rng) for _ in range(2)]
+        cut = _alike(ends[0], turn[0], 45, len(ends[0]))
+        whole = _between(ends[0][:cut], turn, ends[1])
+        if whole is None or not 80 <= len(whole) <= 196 or np.ptp(whole[:, 0, 1]) > 0.15:
+            continue
+        features = hml.encode(at_origin(whole), heading="corrected").astype(np.float32)
+        turns_at = (max(0, cut - 32), len(features))  # about 2.4 s into every window
+        texts = sentences(action, side=turned_to(whole))
+        notes = (Note(0, len(features), PREFIX + action.name, texts, turns_at),)
+        yield replace(base, name=f"there_{seed}_{made:03d}", way="joined", notes=notes, features=features)
+        made += 1
+
+
+def _walk(clip: Clip, note: Note, rng: np.random.Generator) -> Array:
+    length = min(note.last - note.first, 80)
+    first = note.first + int(rng.integers(note.last - note.first - length + 1))
+    return hml.decode_positions(clip.features[first : first + length].astype(np.float64))
+
+
+def _half_turns(clip: Clip) -> Iterator[tuple[Clip, Array]]:
+    """Stretches of a training recording within which somebody who walks turns right round and walks on."""
+    if clip.split != "train" or clip.way != "plain" or not any(n.kind.startswith("walk turn back") for n in clip.notes):
+        return
+    p = hml.decode_positions(clip.features.astype(np.float64))
+    heading = np.degrees(ph.smooth(np.unwrap(ph.heading(p)), 21))
+    for length in (30, 40, 50, 60):
+        for first in range(15, len(p) - length - 15, 8):
+            end = first + length
+            turned = heading[end] - heading[first]
+            aside = max(abs(heading[first] - heading[first - 15]), abs(heading[end + 14] - heading[end]))
+            upright = p[first:end, 0, 1].min() > 0.75
+            paces = (ph.speed(p[a : a + 15], FPS).mean() for a in (first - 15, end))
+            if 160 < abs(turned) < 200 and aside < 20 and upright and min(paces) > 0.5:
+                yield clip, p[first - 8 : end + 8]
+                return
+
+
+def _between(first: Array, middle: Array, last: Array) -> Array | None:
+    """``middle`` behind ``first``, and ``last`` from where its pose is most like the end of ``middle``."""
+    both = augment.joined(first, middle)
+    if both is None:
+        return None
+    begin = _alike(last, middle[-1], 0, len(last) - 25)
+    return augment.joined(both, last[begin:])
+
+
+def _alike(p: Array, pose: Array, low: int, high: int) -> int:
+    """The frame of ``p`` from ``low`` to before ``high`` whose pose is most like ``pose`` (22, 3), seen from itself."""
+    own = ph.in_body(p)
+    other = ph.in_body(np.stack([pose, pose]))[0]
+    gap = np.sqrt(((own - other) ** 2).sum(-1).mean(-1))[low : max(high, low + 1)]
+    return low + int(gap.argmin())

@@ -1,0 +1,182 @@
+"""A user's own few clips with their captions, as examples that an adapter learns from (`motionloom_train.teach`).
+
+A clip of any skeleton that the readers know becomes features of the uniform person. Clips shorter than what will be
+asked for are lengthened: a gait goes on as a loop, anything else is held at both ends.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.features import humanml as hml
+from motionloom.features.layout import FPS
+from motionloom.formats import readable
+from motionloom.kinematics.physics import Array
+from motionloom.motion import Motion
+from motionloom.reading import read_bytes
+from motionloom.retarget import to_smpl22
+from motionloom_train.data import augment
+from motionloom_train.data.person import uniform_person
+from motionloom_train.data.words import mirror_text
+
+MOST_CLIPS = 20
+LENGTH = 200
+"""Frames at 20 per second that a clip is lengthened to, 10 s: no window of training is longer."""
+MOST_FRAMES = 20 * 300
+"""Frames that are learned from in one clip."""
+MAX_CAPTION, MAX_CAPTIONS = 300, 64
+MAX_BYTES = 1 << 20
+ONE_SIDED = re.compile(r"\b(salut|violin|guitar|handshak|shak\w+ hands|writ(?:es|ing)|steering)", re.IGNORECASE)
+"""What people do with a certain hand although nobody says so: not mirrored."""
+
+
+@dataclass(frozen=True)
+class CaptionedClip:
+    """A clip's file and what is said of it."""
+
+    path: Path
+    captions: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """A clip as it is learned from."""
+
+    name: str
+    captions: tuple[str, ...]
+    features: np.ndarray
+    """(frames, 263) float32, not standardised."""
+    shown: tuple[int, int]
+    """The frames (half-open) that were recorded; the rest holds the pose. A window shows all of them if it can."""
+    looped: bool = False
+
+
+# Which clips, and what they show
+
+
+def find_examples(places: Sequence[Path | str], caption: str = "") -> list[CaptionedClip]:
+    """The clips among files and folders, in order, with what is said of each.
+
+    Of a clip speaks, first come first served: ``NAME.txt`` beside it, a caption on each line; lines ``NAME: caption``
+    in a ``captions.txt`` in its folder; ``caption``; and, for clips found in a folder that is named, the name of the
+    clip's own folder (``a_zombie_walks/01.bvh``). Raises `MotionloomError` for places without clips, for too many of
+    them, for clips that nothing is said of, and for captions that are none.
+    """
+    if caption:
+        _check_caption(caption, "the caption")
+    files: dict[Path, bool] = {}
+    for place in map(Path, places):
+        if place.is_dir():
+            inside = (path for path in sorted(place.rglob("*")) if path.suffix.lower() in readable() and path.is_file())
+            files.update(dict.fromkeys(inside, True))
+        elif place.is_file() and place.suffix.lower() in readable():
+            files.setdefault(place, False)
+        elif place.is_file():
+            raise MotionloomError(f"{place} is no motion file; give {', '.join(readable())} or folders of them")
+        else:
+            raise MotionloomError(f"there is no clip {place}; give motion files ({', '.join(readable())}) or folders")
+        if len(files) > MOST_CLIPS:
+            raise MotionloomError(
+                f"more than {MOST_CLIPS} clips are not taught but trained: see 'motionloom train prior'; give 1 to "
+                f"{MOST_CLIPS} clips of one action or style"
+            )
+    if not files:
+        raise MotionloomError("there is no clip; give 1 to 20 motion files, or folders of them")
+    return [CaptionedClip(path, _captions_of(path, caption, in_folder=found)) for path, found in files.items()]
+
+
+def _captions_of(path: Path, caption: str, *, in_folder: bool) -> tuple[str, ...]:
+    own, shared = path.with_suffix(".txt"), path.parent / "captions.txt"
+    if own.is_file() and own != shared:
+        lines = [line for line in _lines(own) if line.strip() and not line.lstrip().startswith("#")]
+        return tuple(_check_caption(line, str(own)) for line in lines[:MAX_CAPTIONS]) or _none(path)
+    if shared.is_file():
+        found = [words for name, words in map(_named, _lines(shared)) if name in (path.name, path.stem)]
+        if found:
+            return tuple(_check_caption(words, str(shared)) for words in found[:MAX_CAPTIONS])
+    if caption:
+        return (" ".join(caption.split()),)
+    if in_folder:
+        return (_check_caption(re.sub(r"[_\s]+", " ", path.parent.name), f"the folder {path.parent}"),)
+    return _none(path)
+
+
+def _none(path: Path) -> tuple[str, ...]:
+    raise MotionloomError(
+        f"nothing is said of {path}; give one caption for all clips first, such as 'a zombie walks', or write it into "
+        f"{path.with_suffix('.txt').name} beside it"
+    )
+
+
+def _named(line: str) -> tuple[str, str]:
+    name, _, words = line.partition("\t") if "\t" in line else line.partition(":")
+    return name.strip(), words
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return read_bytes(path, max_bytes=MAX_BYTES, empty=True).decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise MotionloomError(f"{path} is not text in UTF-8 ({type(error).__name__}); save it again as text") from None
+
+
+def _check_caption(words: str, place: str) -> str:
+    said = " ".join(words.split())
+    if not said or len(said) > MAX_CAPTION or not said.isprintable() or not any(c.isalpha() for c in said):
+        raise MotionloomError(
+            f"{place} says {said[:60]!r}, which is no caption; write a sentence of at most {MAX_CAPTION} letters"
+        )
+    return said
+
+
+# A clip as features
+
+
+def make_examples(motion: Motion, captioned: CaptionedClip, *, mirror: bool = True) -> list[Example]:
+    """A clip as one example, or as two with its mirror image.
+
+    motion: anybody's, on a humanoid skeleton, in metres. The mirror image is left out where ``mirror`` is False or a
+    caption names what is done with a certain hand; left and right change places in its captions. Raises
+    `MotionloomError` for a skeleton that is no person's.
+    """
+    plain = _example(motion, captioned)
+    if not mirror or any(ONE_SIDED.search(caption) for caption in captioned.captions):
+        return [plain]
+    captions = tuple(mirror_text(caption) for caption in captioned.captions)
+    return [
+        plain,
+        Example("M" + plain.name, captions, hml.mirror(plain.features), plain.shown, plain.looped),
+    ]
+
+
+def uniform_positions(motion: Motion) -> Array:
+    """Joints (frames, 22, 3) of the uniform person who does what ``motion`` does: at 20 per second, from the origin,
+    facing +Z, the lowest point at y = 0."""
+    person = to_smpl22(motion)
+    return uniform_person(person.positions(), person.fps)
+
+
+def _example(motion: Motion, captioned: CaptionedClip) -> Example:
+    positions = uniform_positions(motion)[: MOST_FRAMES + 1]
+    name = captioned.path.stem
+    count = len(positions) - 1
+    if count >= LENGTH:
+        return Example(name, captioned.captions, hml.encode(positions, heading="corrected"), (0, count))
+    features = hml.encode(positions, heading="corrected")
+    looped = augment.loop(features, LENGTH) if _goes_on(positions) else None
+    if looped is not None:
+        return Example(name, captioned.captions, looped, (0, len(looped)), looped=True)
+    more = LENGTH - count
+    longer = augment.held(positions, more, more, fps=FPS, seed=0)
+    return Example(name, captioned.captions, hml.encode(longer, heading="corrected"), (more, more + count))
+
+
+def _goes_on(positions: Array) -> bool:
+    """Whether somebody goes somewhere all the time, or does the same again and again, so that a loop is true."""
+    way = np.linalg.norm(np.diff(positions[:, 0][:, [0, 2]], axis=0), axis=-1) * FPS
+    third = max(1, len(way) // 3)
+    return bool(min(way[:third].mean(), way[-third:].mean()) > 0.25)

@@ -1,0 +1,436 @@
+"""A built set in memory, and the training batches drawn from it."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from motionloom.errors import MotionloomError
+from motionloom.features import humanml as hml
+from motionloom.features.layout import FPS, LAYOUT
+from motionloom.io.atomic import finished
+from motionloom.io.text import parse_json, read_utf8
+from motionloom_train.data.actions import ACTIONS, PREFIX, side_of, strike
+from motionloom_train.data.actions import rests as rests_of
+from motionloom_train.data.clips import MADE, STATES, Clip, Note, read_clip
+from motionloom_train.data.made import GESTURES
+from motionloom_train.data.sayings import sayings
+from motionloom_train.data.words import phrases, sentence
+
+WORDINGS = 48
+"""Sentences made per measured label."""
+SHARE = {"action": 0.74, "human": 0.06, "index": 0.02, "label": 0.18}
+"""How often a training sample shows a named action, a written caption, an index description, a measured label."""
+WEIGHT = {"capture": 1.0, "made": 0.7, "keyed": 0.4}
+"""How often a stretch is drawn among those of its action: animated by hand it teaches what, not how."""
+
+FAVOUR: dict[str, float] = {
+    **dict.fromkeys(("climb", "climb stairs", "descend", "kick", "walk slow", "punch"), 2.5),
+    "walk fast": 3.5,
+    **dict.fromkeys(("hop", "turn around", "turn around right"), 3.0),
+    **dict.fromkeys(("circle left", "jump"), 2.5),
+    **dict.fromkeys(("kick left", "kick right"), 4.0),
+    **dict.fromkeys(("punch left", "punch right"), 2.0),
+    **dict.fromkeys(("sit down", "stand up", "jog", "turn left", "turn right"), 1.5),
+    # windows of many squats (made ones show one and two), and a body that lies knotted
+    **dict.fromkeys(("squat once", "squat twice", "action:lie with crossed legs"), 0.02),
+    **{
+        f"action:{name}": weight
+        for weight, names in {
+            8.0: ("made punch", "made hands on hips", "made open door", "made swing arms", "lie down"),
+            7.0: ("get up", "walk turn around", "kick"),
+            5.0: (
+                "sit down",
+                "stand up",
+                "push-up",
+                "lunge",
+                "duck",
+                "sway",
+                "crouch",
+                "touch toes",
+                "punch",
+                "balance with arms out",
+                "hop",
+                "made drink",
+                "throw",
+                "high step",
+                "slow down",
+                "stop running",
+                "bow",
+                "pick up",
+                "cartwheel",
+                "run and jump",
+            ),
+            4.0: (
+                "kneel",
+                "sit down and stand up",
+                "stop walking",
+                "crawl",
+                "then",
+                "squat",
+                "made arm up twice",
+            ),
+            2.5: (
+                "climb ladder",
+                "start running",
+                "walk and pick up",
+                "made clap",
+                "made arms out",
+                "made arms up twice",
+                "raise arm",
+                "made arm up",
+                "kneel and rise",
+                "bend over",
+                "stairs",
+                "fall",
+                "leg raise",
+                "side lunge",
+                "dance",
+                "jump forward",
+                "jump up",
+                "start walking",
+                "made point",
+                "one squat",
+                "two squats",
+                "three squats",
+            ),
+            0.5: ("sword", "basketball", "laugh", "wash", "arm back", "rotate arm", "soccer", "carry", "drink"),
+        }.items()
+        for name in names
+    },
+}
+"""Groups drawn more or less often than the others: what came out last, and what is asked for most. A mixture of two
+labels is drawn 0.4 times as often, a made gesture `MADE_SHARE` times."""
+MADE_SHARE = 0.6
+
+EVENTS = {
+    "kick": "kick",
+    "kick ball": "kick",
+    "punch": "punch|box",
+    "jump": "jump|leap",
+    "jump forward": "jump|leap",
+    "jump repeatedly": "jump|leap",
+    "hop": r"\bhop",
+    "climb": "climb|stairs|ladder",
+    "wave": r"\bwav",
+    "sit down": r"\bsits? down|takes a seat|sitting down",
+    "stand up": r"stands? up|gets? up|rises",
+    "cartwheel": "cartwheel",
+}
+"""Measured labels of something that happens at one moment, and how captions speak of it."""
+STRIKES = {"kick": "foot", "punch": "hand"}
+"""How the measured labels begin that name a strike, and the limb that strikes."""
+_MAX_SUMMARY = 64 << 20
+MOMENTS = 3
+"""Windows shown for a caption that names an event."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """A described stretch of one clip."""
+
+    start: int
+    """First frame in `MotionSet.features`."""
+    frames: int
+    group: str
+    """``human``, ``index``, ``action:NAME`` or the measured label."""
+    texts: tuple[int, ...]
+    """Numbers of its sentences in `MotionSet.texts`."""
+    core: tuple[int, int] | None = None
+    """Frames of `MotionSet.features` (first, end) without which a window does not show what is said, such as a jump."""
+    weight: float = 1.0
+    """How often it is drawn among those of its group."""
+    rests: tuple[int, ...] = ()
+    """Frames of `MotionSet.features` at which a repetition of an exercise begins; windows begin there."""
+
+
+@dataclass(frozen=True)
+class MotionSet:
+    """Clips laid end to end, with what they show."""
+
+    features: Tensor
+    """(frames of all clips, 263) float32, standardised."""
+    mean: Tensor
+    std: Tensor
+    items: tuple[Item, ...]
+    texts: tuple[str, ...]
+    licences: tuple[str, ...]
+    minutes: float
+    """Minutes of motion as recorded, without mirrored and made-up copies."""
+
+
+def read_clips(folder: Path | str, *, sources: Sequence[str] = (), splits: Sequence[str] = ("train",)) -> list[Clip]:
+    """The clips of a built set; ``sources`` keeps those whose source begins with one of the words."""
+    folder = Path(folder)
+    if not (folder / "set.json").is_file():
+        raise MotionloomError(
+            f"{folder} is not a built set (it has no set.json); make one with 'motionloom data build'"
+        )
+    clips = (read_clip(path) for path in finished(folder / "clips", "*.safetensors"))
+    kept = [c for c in clips if c.split in splits and (not sources or c.source.startswith(tuple(sources)))]
+    if not kept:
+        raise MotionloomError(f"{folder} holds no clips of source {', '.join(sources) or 'any'} in {', '.join(splits)}")
+    return kept
+
+
+def statistics(clips: Sequence[Clip]) -> tuple[np.ndarray, np.ndarray]:
+    """Mean per number and standard deviation averaged within the blocks of the layout, as published (263,) each."""
+    frames = np.concatenate([c.features for c in clips]).astype(np.float64)
+    mean, std = frames.mean(0), frames.std(0)
+    for block in LAYOUT.values():
+        std[block] = max(std[block].mean(), 1e-4)
+    return mean.astype(np.float32), std.astype(np.float32)
+
+
+def load_set(folder: Path | str, *, sources: Sequence[str] = (), seed: int = 0, cache: Path | None = None) -> MotionSet:
+    """Read the training split of a built set. ``seed`` fixes the wordings of measured labels."""
+    clips = read_clips(folder, sources=sources)
+    mean, std = statistics(clips)
+    rng = np.random.default_rng(seed)
+    texts: dict[str, int] = {}
+    wordings: dict[str, tuple[int, ...]] = {}
+    items, start = [], 0
+    for clip in clips:
+        for note in clip.notes:
+            said = _worded(note, texts, wordings, rng)
+            moments = _moments(clip, note)
+            for first, last in ((note.first, note.last), *moments):
+                core = note.core or ((first, last) if moments or _is_event(note) else None)
+                core, rests = _when(clip, note.kind, core, first, last)
+                kept = (start + core[0], start + core[1]) if core else None
+                begins = tuple(start + rest for rest in rests)
+                items.append(
+                    Item(start + first, last - first, note.kind, said, kept, WEIGHT.get(clip.kind, 1.0), begins)
+                )
+        start += len(clip.features)
+    features = torch.from_numpy(np.concatenate([c.features for c in clips]))
+    features = (features - torch.from_numpy(mean)) / torch.from_numpy(std)
+    recorded = sum(len(c.features) for c in clips if c.way == "plain" and not c.name.startswith("M")) / 20 / 60
+    return MotionSet(
+        features,
+        torch.from_numpy(mean),
+        torch.from_numpy(std),
+        tuple(items),
+        tuple(texts),
+        tuple(sorted({c.licence for c in clips})),
+        recorded,
+    )
+
+
+def _worded(
+    note: Note, texts: dict[str, int], wordings: dict[str, tuple[int, ...]], rng: np.random.Generator
+) -> tuple[int, ...]:
+    """Numbers of a note's captions in ``texts``, which grows; ``wordings`` are those of the labels met so far."""
+    if note.kind == "human" or note.kind.startswith(PREFIX):
+        return tuple(_number(texts, text) for text in _of_its_side(note, (*note.texts, *sayings(note))))
+    if note.kind == "index":
+        return tuple(dict.fromkeys(_number(texts, sentence(p, rng)) for p in note.texts for _ in range(3)))
+    if note.kind not in wordings:
+        made = {sentence(p, rng) for _ in range(WORDINGS) for p in [rng.choice(list(phrases(note.kind)))]}
+        wordings[note.kind] = tuple(_number(texts, text) for text in (*sorted(made), *sayings(note)))
+    return wordings[note.kind]
+
+
+def _of_its_side(note: Note, said: tuple[str, ...]) -> tuple[str, ...]:
+    """What is said of an action of one hand, one leg or to one side; of the left one only what names that side.
+
+    So "a person punches" means the right hand: the average of both would be a body that keeps its guard.
+    """
+    name = note.kind.removeprefix(PREFIX)
+    gesture = GESTURES.get(name.removeprefix(MADE))
+    action = ACTIONS.get(name)
+    one = gesture.hands == "one" or bool(gesture.thrust[2]) if gesture else action and action.sided and not action.turns
+    if not one or side_of(note.texts) != "left":
+        return said
+    return tuple(text for text in said if side_of([text]) == "left") or said
+
+
+def _when(
+    clip: Clip, kind: str, core: tuple[int, int] | None, first: int, last: int
+) -> tuple[tuple[int, int] | None, list[int]]:
+    """The frames that a window must hold, drawn in to the strike where there is one; and where repetitions begin."""
+    action = ACTIONS.get(kind.removeprefix(PREFIX)) if kind.startswith(PREFIX) else None
+    limb = action.limb if action else next((limb for word, limb in STRIKES.items() if kind.startswith(word)), "")
+    repeats = action is not None and action.kind == "repeats"
+    if not limb and not repeats:
+        return core, []
+    positions = hml.decode_positions(clip.features[first:last].astype(np.float64))
+    if repeats:
+        return None, [first + rest for rest in rests_of(positions, FPS)]
+    (begin, end), _ = strike(positions, FPS, limb)
+    return (first + begin, first + end), []
+
+
+def _is_event(note: Note) -> bool:
+    return note.kind not in ("human", "index", *STATES) and "+" not in note.kind and not note.kind.startswith(PREFIX)
+
+
+def _moments(clip: Clip, note: Note) -> list[tuple[int, int]]:
+    """At most `MOMENTS` windows within a captioned stretch that measurably show the event its caption names.
+
+    A caption for ten seconds says "kicks"; most crops of two or four seconds of it show somebody who stands there.
+    """
+    if note.kind not in ("human", "index"):
+        return []
+    said = " ".join(note.texts).lower()
+    named = {label for label, words in EVENTS.items() if re.search(words, said)}
+    spans = sorted(
+        {
+            (n.first, n.last)
+            for n in clip.notes
+            if n.kind in named
+            and _is_event(n)
+            and note.first <= n.first
+            and n.last <= note.last
+            and (n.first, n.last) != (note.first, note.last)
+        }
+    )
+    return [spans[round(k)] for k in np.linspace(0, len(spans) - 1, min(MOMENTS, len(spans)))]
+
+
+def _number(texts: dict[str, int], text: str) -> int:
+    return texts.setdefault(text.strip(), len(texts))
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Windows of motion with their sentences."""
+
+    features: Tensor
+    """(rows, frames, 263) standardised; zeros behind each row's length."""
+    lengths: Tensor
+    """(rows,) valid frames."""
+    texts: Tensor
+    """(rows,) numbers of sentences."""
+
+
+class Batches:
+    """Draws batches; the draw of a step depends on the seed and the step alone, so that training resumes exactly.
+
+    All rows of a batch share a window (one of ``windows`` frames, drawn by ``shares``); items shorter than the window
+    but at least 60 % of it are taken whole and padded. First the kind of text is drawn (`SHARE`), then for actions and
+    measured labels the group, evenly over groups, then the item: rare actions are seen as often as walks. What an item
+    needs to show what is said of it (`Item.core`) is always within the window.
+    """
+
+    def __init__(
+        self,
+        data: MotionSet,
+        *,
+        windows: Sequence[int] = (48, 80, 120, 196),
+        shares: Sequence[float] = (0.2, 0.3, 0.35, 0.15),
+        favour: Mapping[str, float] = FAVOUR,
+    ) -> None:
+        self.favour = dict(favour)
+        self.data, self.windows = data, tuple(windows)
+        self.shares = np.array(shares) / np.sum(shares)
+        self._pools = {w: self._pool(w) for w in self.windows}
+        for window, share in zip(self.windows, self.shares, strict=True):
+            if share > 0 and not self._pools[window]:
+                raise MotionloomError(
+                    f"no described stretch of the set is long enough for windows of {window} frames (60 % is needed); "
+                    "give the recipe shorter windows"
+                )
+
+    def _pool(self, window: int) -> dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
+        fitting: dict[str, dict[str, list[int]]] = {}
+        for number, item in enumerate(self.data.items):
+            kind = item.group if item.group in SHARE else "action" if item.group.startswith(PREFIX) else "label"
+            if item.frames >= 0.6 * window and (item.core is None or item.core[1] - item.core[0] <= 1.05 * window):
+                fitting.setdefault(kind, {}).setdefault(item.group, []).append(number)
+        return {
+            kind: {g: (np.array(numbers), self._weights(numbers)) for g, numbers in groups.items()}
+            for kind, groups in fitting.items()
+        }
+
+    def _favour(self, name: str) -> float:
+        usual = 0.4 if "+" in name else MADE_SHARE if name.startswith(PREFIX + MADE) else 1.0
+        return self.favour.get(name, usual)
+
+    def _weights(self, numbers: list[int]) -> np.ndarray:
+        """How often each item of a group is drawn, as a cumulative share."""
+        total = np.cumsum([self.data.items[number].weight for number in numbers])
+        return total / total[-1]
+
+    def draw(self, seed: int, step: int, rows: int) -> Batch:
+        """The batch of one step."""
+        rng = np.random.default_rng((seed, step))
+        window = int(rng.choice(self.windows, p=self.shares))
+        pools = self._pools[window]
+        kinds = [k for k in SHARE if k in pools]
+        share = np.array([SHARE[k] for k in kinds])
+        picked = rng.choice(len(kinds), size=rows, p=share / share.sum())
+        features = torch.zeros(rows, window, self.data.features.shape[1])
+        lengths, texts = [], []
+        for row, kind in enumerate(picked):
+            groups = pools[kinds[kind]]
+            names = list(groups)
+            weights = np.array([self._favour(name) for name in names])
+            group = rng.choice(len(names), p=weights / weights.sum())
+            numbers, shares = groups[names[group]]
+            item = self.data.items[numbers[np.searchsorted(shares, rng.random())]]
+            length = min(item.frames, window)
+            start = _start(item, length, rng)
+            shown = self.data.features[start : start + length]
+            features[row, :length] = self._from_floor(shown) if names[group] in CLIMBS else shown
+            lengths.append(length)
+            texts.append(item.texts[rng.integers(len(item.texts))])
+        return Batch(features, torch.tensor(lengths), torch.tensor(texts))
+
+    def _from_floor(self, shown: Tensor) -> Tensor:
+        """The window (frames, 263) standardised, lowered so that its first frame touches the floor.
+
+        Windows begin anywhere in a climb. Were they as high as they are in the recording, some would begin four metres
+        up, and a motion of the same words would be drawn up to there.
+        """
+        mean, std = self.data.mean[HEIGHTS], self.data.std[HEIGHTS]
+        lowest = (shown[0, HEIGHTS] * std + mean).min().clamp(min=0)
+        lowered = shown.clone()
+        lowered[:, HEIGHTS] -= lowest / std
+        return lowered
+
+
+CLIMBS = {"climb", "climb stairs", f"{PREFIX}climb ladder", f"{PREFIX}stairs"}
+"""Groups of items that go up."""
+HEIGHTS = [LAYOUT["root_height"].start, *range(LAYOUT["ric"].start + 1, LAYOUT["ric"].stop, 3)]
+"""Features that are heights over the floor."""
+BEFORE, ABOUT = 16, 2
+"""Frames of a window before a change begins (people begin soon after they are told to), give or take so many."""
+
+
+def _start(item: Item, length: int, rng: np.random.Generator) -> int:
+    """Where a window of so many frames begins: a little before a repetition, or as `_starts` says."""
+    low, high = item.start, item.start + item.frames - length
+    fitting = [rest for rest in item.rests if low <= rest - 2 <= high]
+    if fitting:
+        return max(low, fitting[rng.integers(len(fitting))] - int(rng.integers(2, 11)))
+    return int(rng.integers(*_starts(item, length)))
+
+
+def _starts(item: Item, length: int) -> tuple[int, int]:
+    """Where a window of so many frames may begin, half-open: within the item, with its core inside.
+
+    The core begins at about the same time in every window (`BEFORE`, give or take `ABOUT`): were it anywhere, the
+    average over what a window may show would be a person who stays halfway, and a small network under much noise draws
+    averages.
+    """
+    low, high = item.start, item.start + item.frames - length
+    if item.core is None:
+        return low, high + 1
+    first, end = item.core
+    low, high = max(low, min(end - length, high)), min(high, max(first, low))
+    begin, last = max(low, min(first - BEFORE - ABOUT, high)), min(high, max(first - BEFORE + ABOUT, low))
+    return begin, max(begin, last) + 1
+
+
+def summary(folder: Path | str) -> dict:
+    """What ``set.json`` says; raises MotionloomError where there is none or it is damaged."""
+    path = Path(folder) / "set.json"
+    about = parse_json(read_utf8(path, max_bytes=_MAX_SUMMARY), path)
+    if not isinstance(about, dict):
+        raise MotionloomError(f"{path} is not what 'motionloom data build' writes; build the set again")
+    return about

@@ -1,0 +1,353 @@
+"""The one training loop: mixed precision, averaged weights, exact resume, several processes.
+
+Everything random in a step follows from (seed, step, rank), and the state file is replaced whole, so a run that was
+killed at any moment goes on with the losses it would have had.
+"""
+
+import hashlib
+import json
+import math
+import os
+import time
+import warnings
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import torch.distributed as dist
+from torch import Tensor, nn
+from torch.nn.attention import SDPBackend, sdpa_kernel
+
+from motionloom.errors import MotionloomError
+from motionloom.io.tensors import save_tensors
+from motionloom.io.text import plain_json
+from motionloom.weights.prior import read_tensors
+from motionloom_train.objectives import Objective
+from motionloom_train.precision import choose
+from motionloom_train.recipe import Recipe
+
+STATE = "state.safetensors"
+
+
+@dataclass(frozen=True)
+class World:
+    """This process among those of ``torchrun``; alone by default."""
+
+    rank: int = 0
+    size: int = 1
+    device: str = "cpu"
+
+    @staticmethod
+    def join(device: str | None = None) -> "World":
+        """Join the process group that torchrun's environment describes, if there is one."""
+        size = int(os.environ.get("WORLD_SIZE", "1"))
+        local = int(os.environ.get("LOCAL_RANK", "0"))
+        device = device or (f"cuda:{local}" if torch.cuda.is_available() else "cpu")
+        if size > 1 and not dist.is_initialized():
+            dist.init_process_group("nccl" if device.startswith("cuda") else "gloo")
+        if device.startswith("cuda"):
+            torch.cuda.set_device(device)
+        return World(int(os.environ.get("RANK", "0")), size, device)
+
+
+def rate_at(recipe: Recipe, step: int) -> float:
+    """Learning rate of a step: linear warm-up, constant, linear to zero in the cool-down."""
+    warm = min(1.0, (step + 1) / max(recipe.warmup, 1))
+    left = (recipe.steps - step) / max(recipe.cooldown * recipe.steps, 1e-9)
+    return recipe.rate * min(warm, left, 1.0)
+
+
+class Average:
+    """Exponential moving average of a module's weights; early on it forgets faster, so that it starts useful."""
+
+    def __init__(self, net: nn.Module, decay: float) -> None:
+        self.decay = decay
+        self.weights = {k: v.detach().clone() for k, v in net.state_dict().items()}
+
+    @torch.no_grad()
+    def update(self, net: nn.Module, step: int) -> None:
+        """Take in the weights after ``step``."""
+        decay = min(self.decay, (step + 1) / (step + 10))
+        for key, value in net.state_dict().items():
+            if value.is_floating_point():
+                self.weights[key].lerp_(value, 1 - decay)
+            else:
+                self.weights[key].copy_(value)
+
+
+def make_optimizer(net: nn.Module, recipe: Recipe) -> torch.optim.AdamW:
+    """AdamW; weight decay on matrices only."""
+    trained = [p for p in net.parameters() if p.requires_grad]
+    groups = [
+        {"params": [p for p in trained if p.ndim >= 2], "weight_decay": recipe.decay},
+        {"params": [p for p in trained if p.ndim < 2], "weight_decay": 0.0},
+    ]
+    return torch.optim.AdamW(groups, lr=recipe.rate, betas=(0.9, 0.99))
+
+
+def save_state(
+    folder: Path, net: nn.Module, average: Average, optimizer: torch.optim.Optimizer, *, step: int, recipe: Recipe
+) -> None:
+    """Everything a run needs to go on, in one file without pickle."""
+    tensors = {f"net.{k}": v for k, v in net.state_dict().items()}
+    tensors |= {f"average.{k}": v for k, v in average.weights.items()}
+    for number, state in optimizer.state_dict()["state"].items():
+        tensors |= {f"optimizer.{number}.{k}": torch.as_tensor(v) for k, v in state.items()}
+    tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
+    metadata = {"step": str(step), "recipe": json.dumps(asdict(recipe))}
+    metadata["checksum"] = _checksum(tensors, metadata)
+    save_tensors({k: v.numpy() for k, v in tensors.items()}, folder / STATE, metadata=metadata)
+
+
+def _checksum(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str:
+    """Of all that a state file says, so that a byte that turned over is noticed."""
+    found = hashlib.blake2b(digest_size=32)
+    for key in ("step", "recipe"):
+        found.update(f"{key}={metadata[key]};".encode())
+    for name in sorted(tensors):
+        value = tensors[name].contiguous()
+        found.update(f"{name} {value.dtype} {tuple(value.shape)};".encode())
+        if value.numel():  # an empty one has no bytes, and cannot be seen as such
+            found.update(value.reshape(-1).view(torch.uint8).numpy().data)
+    return found.hexdigest()
+
+
+def load_state(path: Path, net: nn.Module, average: Average, optimizer: torch.optim.Optimizer) -> int:
+    """Fill the run's parts from a state file; returns the number of steps done.
+
+    Raises MotionloomError, and fills nothing, where the file is damaged or of another recipe.
+    """
+    arrays, metadata = read_tensors(path)
+    tensors = {key: torch.from_numpy(np.array(value)) for key, value in arrays.items()}
+    if not {"step", "recipe"} <= metadata.keys():
+        raise MotionloomError(f"{path} is no state of a training run; train into another folder")
+    if "checksum" not in metadata:
+        warnings.warn(f"{path} was saved without a checksum by an older version; it is taken as it is", stacklevel=2)
+    elif metadata["checksum"] != _checksum(tensors, metadata):
+        raise MotionloomError(f"{path} is damaged: its checksum is another; train into another folder")
+    try:
+        step = _step_count(metadata["step"])
+        _check_state(tensors, net, average, optimizer)
+        net.load_state_dict(_part(tensors, "net."))
+        for key, value in average.weights.items():
+            value.copy_(tensors[f"average.{key}"])
+        state: dict[int, dict[str, Tensor]] = {}
+        for key, value in _part(tensors, "optimizer.").items():
+            number, _, name = key.partition(".")
+            state.setdefault(int(number), {})[name] = value
+        optimizer.load_state_dict({"state": state, "param_groups": optimizer.state_dict()["param_groups"]})
+        return step
+    except (KeyError, RuntimeError, ValueError, TypeError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise MotionloomError(f"{path} does not belong to this recipe ({reason}); train into another folder") from None
+
+
+def _part(tensors: Mapping[str, Tensor], beginning: str) -> dict[str, Tensor]:
+    return {key.removeprefix(beginning): value for key, value in tensors.items() if key.startswith(beginning)}
+
+
+def _step_count(said: str) -> int:
+    if not (said.isascii() and said.isdigit() and len(said) <= 10):
+        raise ValueError(f"its step is {said[:20]!r}")
+    return int(said)
+
+
+def _check_state(
+    tensors: Mapping[str, Tensor], net: nn.Module, average: Average, optimizer: torch.optim.Optimizer
+) -> None:
+    """Raise ValueError unless every tensor is finite, and has the shape and kind of what it is to fill."""
+    wanted = {f"net.{k}": v for k, v in net.state_dict().items()}
+    wanted |= {f"average.{k}": v for k, v in average.weights.items()}
+    places = [p for group in optimizer.param_groups for p in group["params"]]
+    moments = {"exp_avg": places, "exp_avg_sq": places, "step": [torch.tensor(0.0)] * len(places)}
+    for key in _part(tensors, "optimizer."):
+        number, _, name = key.partition(".")
+        if not (number.isascii() and number.isdigit() and int(number) < len(places) and name in moments):
+            raise ValueError(f"the optimiser has no {key[:40]}")
+        wanted |= {f"optimizer.{number}.{each}": values[int(number)] for each, values in moments.items()}
+    lacking = sorted(wanted.keys() - tensors.keys()) or sorted(tensors.keys() - wanted.keys())
+    if lacking:
+        raise ValueError(f"{lacking[0][:80]} is {'missing' if lacking[0] in wanted else 'not needed'}")
+    for key, value in tensors.items():
+        if value.shape != wanted[key].shape or value.dtype != wanted[key].dtype:
+            raise ValueError(f"{key} is {value.dtype} of the shape {tuple(value.shape)}")
+        if value.is_floating_point() and not bool(value.isfinite().all()):
+            raise ValueError(f"{key} has numbers that are not finite")
+
+
+def changed(folder: Path, recipe: Recipe) -> list[str]:
+    """What of the recipe differs from the one that the run in ``folder`` was last saved under, one line each."""
+    if not (folder / STATE).is_file():
+        return []
+    try:
+        before = plain_json(read_tensors(folder / STATE)[1]["recipe"])
+        now = asdict(recipe)
+        if recipe.amp == "auto":
+            del now["amp"]  # goes on as it was
+        return [f"{key} is now {now[key]!r} and was {before.get(key)!r}" for key in now if before.get(key) != now[key]]
+    except (KeyError, ValueError, AttributeError, RecursionError):
+        return []
+
+
+def train(
+    objective: Objective,
+    recipe: Recipe,
+    folder: Path | str,
+    *,
+    world: World | None = None,
+    wrap: Callable[[nn.Module], nn.Module] = lambda net: net,
+    on_save: Callable[[nn.Module, Average, int], None] | None = None,
+    on_step: Callable[[int, float, float], None] | None = None,
+    stop: int | None = None,
+    say: Callable[[str], None] = lambda line: None,
+) -> Average:
+    """Run a recipe in ``folder``, going on from the state found there; returns the averaged weights.
+
+    ``wrap`` turns the trained module into what is called in a step (binding, compiling). ``on_save(net, average,
+    step)`` and ``on_step(step, loss, seconds)`` run in the first process. ``stop``: end early after so many steps.
+    ``say`` hears what is multiplied in where the recipe leaves that open, and after the first steps how long the run
+    will take. A run that goes on multiplies in what it did, unless the recipe says otherwise.
+    """
+    world, folder = world or World(), Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    net = objective.net.to(world.device)
+    average = Average(net, recipe.ema)
+    optimizer = make_optimizer(net, recipe)
+    done = load_state(folder / STATE, net, average, optimizer) if (folder / STATE).is_file() else 0
+    recipe = replace(recipe, amp=_precision(recipe, folder, net, world, say=say))
+    called = wrap(net)
+    if world.size > 1:
+        places = [world.device] if world.device.startswith("cuda") else None
+        called = nn.parallel.DistributedDataParallel(called, device_ids=places)
+    net.train()
+    last = min(recipe.steps, stop or recipe.steps)
+    if done >= last and world.rank == 0 and on_save:  # stopped between the last state and its weights
+        on_save(net, average, done)
+    pace = Pace(done, last, say)
+    for step in range(done, last):
+        began = time.perf_counter()
+        loss = _step(objective, called, optimizer, recipe, step=step, world=world)
+        average.update(net, step)
+        if world.rank == 0:
+            seconds = time.perf_counter() - began
+            pace(seconds)
+            if on_step:
+                on_step(step, loss, seconds)
+            if (step + 1) % recipe.save_every == 0 or step + 1 == last:
+                save_state(folder, net, average, optimizer, step=step + 1, recipe=recipe)
+                if on_save:
+                    on_save(net, average, step + 1)
+    return average
+
+
+def _precision(recipe: Recipe, folder: Path, net: nn.Module, world: World, *, say: Callable[[str], None]) -> str:
+    """What the run multiplies in, ``bf16`` or ``float32``, the same in all processes."""
+    said = recipe.amp
+    if said == "auto" and (folder / STATE).is_file():
+        said = str(plain_json(read_tensors(folder / STATE)[1]["recipe"])["amp"])
+    if said != "auto":
+        return "bf16" if said == "bf16" else "float32"
+    chosen = "float32"
+    if world.rank == 0:
+        chosen, why = choose(net, world.device)
+        say(why)
+    if world.size > 1:
+        half = torch.tensor(chosen == "bf16", dtype=torch.uint8, device=world.device)
+        dist.broadcast(half, 0)
+        chosen = "bf16" if half else "float32"
+    return chosen
+
+
+class Pace:
+    """Says once, after the first steps, how long the rest will take."""
+
+    STEPS, SECONDS = 10, 20.0
+    """It is said after so many steps, or earlier once these seconds have gone by."""
+
+    def __init__(self, done: int, last: int, say: Callable[[str], None]) -> None:
+        self.left, self.say, self.told = last - done, say, False
+        self.seen: list[float] = []
+
+    def __call__(self, seconds: float) -> None:
+        """Take in how long a step took. The first one counts only while there is no other: much is set up in it."""
+        self.left -= 1
+        if self.told:
+            return
+        self.seen.append(seconds)
+        if len(self.seen) == self.STEPS or sum(self.seen) >= self.SECONDS:
+            self.told = True
+            usual = self.seen[1:] or self.seen
+            mean = sum(usual) / len(usual)
+            self.say(f"{self.left:,} more steps of about {mean:.2g} s: {_span(mean * self.left)}")
+
+
+def _span(seconds: float) -> str:
+    """A length of time in words."""
+    minutes = round(seconds / 60)
+    if minutes < 2:
+        return f"about {max(round(seconds), 1)} s"
+    return f"about {minutes} minutes" if minutes < 100 else f"about {minutes // 60} h {minutes % 60} min"
+
+
+def _step(
+    objective: Objective, net: nn.Module, optimizer: torch.optim.Optimizer, recipe: Recipe, *, step: int, world: World
+) -> float:
+    for group in optimizer.param_groups:
+        group["lr"] = rate_at(recipe, step)
+    seed = recipe.seed * 1_000_003 + world.rank
+    torch.manual_seed(seed * 7919 + step)  # dropout
+    kind = world.device.split(":")[0]
+    # on a CPU the plain attention is faster backward than the fused kernel for sequences this short (benchmarks/)
+    with (
+        torch.autocast(kind, torch.bfloat16) if recipe.amp == "bf16" else nullcontext(),
+        sdpa_kernel(SDPBackend.MATH) if kind == "cpu" else nullcontext(),
+    ):
+        loss = objective.loss(net, seed, step, recipe.batch)
+    value = float(loss.detach())
+    if not math.isfinite(value):
+        raise MotionloomError(f"the loss of step {step} is not finite; lower the rate and go on from the saved state")
+    optimizer.zero_grad(set_to_none=True)
+    loss.backward()
+    nn.utils.clip_grad_norm_(net.parameters(), recipe.clip)
+    optimizer.step()
+    return value
+
+
+class Log:
+    """A progress line with loss, throughput and remaining time; TensorBoard files where that is installed."""
+
+    def __init__(self, folder: Path, recipe: Recipe, *, every: int = 50, say: Callable[[str], None] = print) -> None:
+        self.recipe, self.every, self.say = recipe, every, say
+        self.losses: list[float] = []
+        self.seconds = 0.0
+        self.writer: Any = None
+        try:
+            from torch.utils.tensorboard import SummaryWriter
+
+            self.writer = SummaryWriter(str(folder / "tensorboard"))
+        except ImportError:
+            pass
+
+    def __call__(self, step: int, loss: float, seconds: float) -> None:
+        """Take in one step; see `train`."""
+        self.losses.append(loss)
+        self.seconds += seconds
+        if (step + 1) % self.every and step + 1 != self.recipe.steps:
+            return
+        count, mean = len(self.losses), sum(self.losses) / len(self.losses)
+        pace = count / self.seconds
+        left = (self.recipe.steps - step - 1) / pace
+        self.say(
+            f"step {step + 1}/{self.recipe.steps}  loss {mean:.4f}  {pace * self.recipe.batch:.0f} windows/s  "
+            f"{int(left // 3600)}:{int(left % 3600 // 60):02d}:{int(left % 60):02d} left"
+        )
+        if self.writer:
+            self.writer.add_scalar("loss", mean, step + 1)
+            self.writer.add_scalar("rate", rate_at(self.recipe, step), step + 1)
+            self.writer.add_scalar("windows_per_second", pace * self.recipe.batch, step + 1)
+            self.writer.flush()
+        self.losses, self.seconds = [], 0.0

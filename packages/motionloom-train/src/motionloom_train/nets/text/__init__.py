@@ -1,0 +1,10 @@
+"""Networks of text encoders, in PyTorch.
+
+`ClipText` and `DistilBert` serve the published weights; they need the extras `clip` and `distilbert`, and files that
+are already on this machine. The embedded default is `motionloom.runtime.text.minilm`, whose network is `bert.Bert`.
+"""
+
+from motionloom_train.nets.text.clip import ClipText
+from motionloom_train.nets.text.distilbert import DistilBert
+
+__all__ = ["ClipText", "DistilBert"]

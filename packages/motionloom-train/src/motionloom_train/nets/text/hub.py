@@ -1,0 +1,71 @@
+"""Open a published Hugging Face text model from a folder or from the hub's local cache; never downloads.
+
+`lab.papers.text_model` turns a folder's pytorch_model.bin into the model.safetensors that is wanted here.
+"""
+
+import importlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from motionloom.errors import MotionloomError
+
+
+@dataclass(frozen=True)
+class Pretrained:
+    """A frozen float32 model in evaluation mode and its tokenizer (types of the optional transformers package)."""
+
+    model: Any
+    tokenizer: Any
+
+
+def open_pretrained(model_class: str, place: Path | str, *, extra: str) -> Pretrained:
+    """Load `transformers.<model_class>` and its tokenizer from a folder, or by hub name from the local cache.
+
+    Only safetensors weights are read. Raises MotionloomError where transformers, the files or some weights are
+    missing; `extra` is the name of the optional dependency to install.
+    """
+    try:
+        transformers = importlib.import_module("transformers")
+    except ImportError as error:
+        raise MotionloomError(
+            f"The text encoder {place} needs the package transformers, which is not installed; "
+            f"pip install 'motionloom-train[{extra}]'."
+        ) from error
+    options = {"local_files_only": True, "trust_remote_code": False}
+    with _quiet(transformers):
+        try:
+            tokenizer = transformers.AutoTokenizer.from_pretrained(str(place), **options)
+            model, report = getattr(transformers, model_class).from_pretrained(
+                str(place), use_safetensors=True, output_loading_info=True, **options
+            )
+        except Exception as error:  # whatever transformers meets in files from outside
+            reason = " ".join(str(error).split())[:160]
+            raise MotionloomError(
+                f"The text encoder {place} could not be opened ({reason}); fetch it once with `hf download {place}` "
+                "or name a folder with its config.json, tokenizer files and model.safetensors (made from a "
+                "pytorch_model.bin by `python -m motionloom_lab.papers.text_model FOLDER`)."
+            ) from error
+    if report["missing_keys"]:
+        missing = sorted(report["missing_keys"])
+        raise MotionloomError(
+            f"The text encoder {place} lacks {len(missing)} of its weights ({missing[0]} first); fetch it again."
+        )
+    return Pretrained(model.float().eval().requires_grad_(False), tokenizer)
+
+
+@contextmanager
+def _quiet(transformers: Any) -> Iterator[None]:
+    """No progress bar and no list of unused weights: the text half of CLIP is all that is wanted."""
+    logging = transformers.utils.logging
+    level, bar = logging.get_verbosity(), logging.is_progress_bar_enabled()
+    logging.set_verbosity_error()
+    logging.disable_progress_bar()
+    try:
+        yield
+    finally:
+        logging.set_verbosity(level)
+        if bar:
+            logging.enable_progress_bar()

@@ -1,0 +1,194 @@
+"""What a step of training minimises. An objective owns the modules and turns a batch into one number."""
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from motionloom.diffusion import Schedule
+from motionloom.features.humanml import displacements
+from motionloom.features.layout import FEET, LAYOUT
+from motionloom.runtime.text.protocol import TextEncoder
+from motionloom_train.data.sets import Batch, Batches
+from motionloom_train.low_rank import AdapterNet
+from motionloom_train.nets.prior import Condition, PriorNet, condition
+from motionloom_train.tensors import noised, tensor
+
+WEIGHTS = {
+    "yaw_velocity": 6.0,
+    "root_velocity": 6.0,
+    "root_height": 6.0,
+    "ric": 1.5,
+    "rot6d": 0.4,
+    "joint_velocity": 1.0,
+    "contacts": 0.5,
+}
+"""Weights of the feature blocks in the loss: the few numbers of the root decide where a person goes, the 126 of the
+rotations are read by nobody when motions are exported. 1 everywhere is the published loss."""
+
+
+class Objective(Protocol):
+    """One kind of training for `train.loop.train`."""
+
+    @property
+    def net(self) -> nn.Module:
+        """The trained weights."""
+        ...
+
+    def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
+        """The loss of one step, drawn from ``(seed, step)`` alone; ``net`` may be a wrapped `self.net`."""
+        ...
+
+
+class WordBank:
+    """Token states of all sentences of a set, encoded once, float16."""
+
+    def __init__(
+        self, encoder: TextEncoder, texts: tuple[str, ...], *, room: int = 40, progress: Callable[[str], None] = print
+    ) -> None:
+        self.starts = [0]
+        tokens, pooled = [], []
+        progress(f"encoding {len(texts)} sentences")
+        for first in range(0, len(texts), 256):
+            said = encoder.encode(texts[first : first + 256])
+            pooled.append(said.pooled)
+            for row, mask in zip(said.tokens, said.mask, strict=True):
+                count = min(int(mask.sum()), room)
+                tokens.append(row[:count].astype(np.float16))
+                self.starts.append(self.starts[-1] + count)
+        self.tokens, self.pooled = tensor(np.concatenate(tokens)), tensor(np.concatenate(pooled))
+
+    def condition(self, texts: Tensor, lengths: Tensor) -> Condition:
+        """The condition of a batch."""
+        spans = [(self.starts[i], self.starts[i + 1]) for i in texts.tolist()]
+        count = max(b - a for a, b in spans)
+        tokens = self.tokens.new_zeros(len(spans), count, self.tokens.shape[1])
+        words = torch.zeros(len(spans), count, dtype=torch.bool)
+        for row, (a, b) in enumerate(spans):
+            tokens[row, : b - a] = self.tokens[a:b]
+            words[row, : b - a] = True
+        return condition(self.pooled[texts], tokens=tokens.float(), words=words, lengths=lengths)
+
+
+class Drawn(NamedTuple):
+    """One step's samples."""
+
+    clean: Tensor
+    """(rows, frames, features) standardised."""
+    level: Tensor
+    """(rows,)"""
+    noise: Tensor
+    cond: Condition
+
+
+class CleanError:
+    """Mean squared error of the estimate of x0 at a uniformly drawn level (Tevet et al. 2023, eq. 2), blocks weighted.
+
+    The mean is over valid frames and numbers of each row, then over rows, as published (specification of MDM's loss).
+    ``early``: share of the samples whose level is drawn as often as samplers go there, most of them near pure noise,
+    where it is decided what a motion will show. ``displacement`` times the `displacement_error` comes on top: MDM's
+    geometric losses (eq. 4 and 5), which its published text models leave out.
+    """
+
+    def __init__(
+        self,
+        net: nn.Module,
+        schedule: Schedule,
+        batches: Batches,
+        words: WordBank,
+        *,
+        drop_text: float = 0.1,
+        weights: dict[str, float] = WEIGHTS,
+        displacement: float = 0.0,
+        early: float = 0.0,
+        heights: float = 1.0,
+        device: str = "cpu",
+    ) -> None:
+        self.net, self.schedule, self.batches, self.words = net, schedule, batches, words
+        self.drop_text, self.displacement, self.early_share, self.device = drop_text, displacement, early, device
+        self.mean, self.std = batches.data.mean.to(device), batches.data.std.to(device)
+        self.scale = feature_scale(weights, heights).to(device)
+
+    def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
+        """See `Objective.loss`."""
+        drawn = self.drawn(seed, step, rows)
+        state = noised(self.schedule, drawn.clean, drawn.level, drawn.noise)
+        return self.error(net(state, drawn.level, drawn.cond), drawn)
+
+    def drawn(self, seed: int, step: int, rows: int) -> Drawn:
+        """What a step looks at, from ``(seed, step)`` alone, on the objective's device."""
+        batch: Batch = self.batches.draw(seed, step, rows)
+        generator = torch.Generator().manual_seed(int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0]))
+        level = self.drawn_levels(rows, generator)
+        noise = torch.randn(batch.features.shape, generator=generator)
+        keep = torch.rand(rows, generator=generator) >= self.drop_text
+        cond = self.words.condition(batch.texts, batch.lengths).choose(keep)
+        cond = Condition(*(part.to(self.device) for part in cond))
+        return Drawn(batch.features.to(self.device), level.to(self.device), noise.to(self.device), cond)
+
+    def drawn_levels(self, rows: int, generator: torch.Generator) -> Tensor:
+        """(rows,) levels: a share ``early`` as the sampler's spacing of that name goes, the rest evenly."""
+        level = torch.randint(1, self.schedule.steps + 1, (rows,), generator=generator)
+        if not self.early_share:
+            return level
+        often = (self.schedule.steps * (1 - torch.rand(rows, generator=generator) ** 2)).ceil().clamp(min=1).long()
+        return torch.where(torch.rand(rows, generator=generator) < self.early_share, often, level)
+
+    def error(self, denoised: Tensor, drawn: Drawn) -> Tensor:
+        """What an estimate of the clean data costs."""
+        error = masked_error(denoised, drawn.clean, drawn.cond.lengths, self.scale)
+        if self.displacement:
+            moved = displacement_error(denoised, drawn.clean, drawn.cond.lengths, self.mean, self.std)
+            error = error + self.displacement * moved
+        return error
+
+
+def feature_scale(weights: dict[str, float] = WEIGHTS, heights: float = 1.0) -> Tensor:
+    """(263,) how much each feature's error counts, 1 on average; ``heights``: how much more that of a height does."""
+    scale = torch.ones(max(block.stop for block in LAYOUT.values()))
+    for name, block in LAYOUT.items():
+        scale[block] = weights[name]
+    scale[LAYOUT["root_height"]] *= heights
+    scale[LAYOUT["ric"]][1::3] *= heights
+    return scale / scale.mean()
+
+
+class Conditioned(nn.Module):
+    """A network that binds its condition in the same call, so that wrappers (DDP, compile) see one forward."""
+
+    def __init__(self, net: PriorNet | AdapterNet) -> None:
+        super().__init__()
+        self.net = net
+
+    def forward(self, x: Tensor, level: Tensor, cond: Condition) -> Tensor:
+        return self.net(x, level, self.net.bind(cond))
+
+
+def masked_error(denoised: Tensor, clean: Tensor, lengths: Tensor, scale: Tensor) -> Tensor:
+    """Weighted squared error over valid frames: (rows, frames, features) twice, (rows,), (features,) to one number."""
+    valid = torch.arange(clean.shape[1], device=clean.device) < lengths[:, None]
+    error = ((denoised.float() - clean) ** 2 * scale).mean(-1)
+    return ((error * valid).sum(1) / lengths.clamp(min=1)).mean()
+
+
+PLANTED = 4.0
+"""How much more a foot that is planted counts in `displacement_error`."""
+
+
+def displacement_error(denoised: Tensor, clean: Tensor, lengths: Tensor, mean: Tensor, std: Tensor) -> Tensor:
+    """Squared error of how far each joint goes from frame to frame, as positions decode it, in units of its spread.
+
+    (rows, frames, features) standardised twice, (rows,), (features,) twice, to one number. Four frames share a token:
+    this is what makes neighbouring tokens agree, and planted feet stay.
+    """
+    block = LAYOUT["joint_velocity"]
+    wanted = (clean[:, :-1, block] * std[block] + mean[block]).unflatten(-1, (22, 3))
+    error = ((displacements(denoised.float() * std + mean) - wanted) ** 2).sum(-1) / (3 * std[block].mean() ** 2)
+    planted = clean[:, :-1, LAYOUT["contacts"]] * std[LAYOUT["contacts"]] + mean[LAYOUT["contacts"]] > 0.5
+    weight = torch.ones_like(error)
+    weight[..., list(FEET)] += (PLANTED - 1) * planted
+    valid = torch.arange(1, clean.shape[1], device=clean.device) < lengths[:, None]
+    error = (error * weight).mean(-1)
+    return ((error * valid).sum(1) / (lengths - 1).clamp(min=1)).mean()

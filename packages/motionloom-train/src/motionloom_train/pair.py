@@ -1,0 +1,397 @@
+"""Training a communication block on recordings of two people (Shafir et al. 2024, section 3.2), over a frozen prior.
+
+One block learns three tasks: two people from a text; how both go on from a shared beginning, whose frames and places
+are given free of noise, as published; and how one reacts to the other, who is given whole. The loss is over both
+people's free numbers (published: one person's, over all of them), over the places D, and, where little noise leaves
+them decided, over where each sees the other's pelvis, head and wrists (ours).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any, NamedTuple, get_type_hints
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import FPS, LAYOUT
+from motionloom.runtime.text.known import known_sentences
+from motionloom.weights.adapter import fingerprint
+from motionloom.weights.pair import PairBlock
+from motionloom.weights.prior import Prior
+from motionloom_train.data.pairs import Pair
+from motionloom_train.duets import Crops, Duets, Sight
+from motionloom_train.export import pair_graph
+from motionloom_train.loop import STATE, Average, Log, World, changed, train
+from motionloom_train.modules import arrays, pair_module, prior_module
+from motionloom_train.nets.pair import PLACE, PairConfig, PairNet, Talk, fitting, join, part
+from motionloom_train.nets.prior import Condition
+from motionloom_train.objectives import WEIGHTS, WordBank, displacement_error
+from motionloom_train.recipe import Recipe
+from motionloom_train.tensors import find_device, noised, tensor
+
+BEGUN, LONGEST_BEGUN, SHORTEST_BEGUN = 20, 40, 10
+"""Frames of a given beginning: the commonest, the most and the fewest."""
+HELD_FRAMES, HELD_ROWS = 80, 12
+"""Frames of the held-out windows that are reported on, and how many are taken of each held-out pair."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The ``[pair]`` table of a recipe."""
+
+    layers: int = 1
+    split: int = -1
+    """The block sits after so many layers of the prior; -1: after the last."""
+    aware: bool = False
+    dropout: float = 0.1
+    prefix: float = 0.35
+    """Share of the samples whose beginning is given."""
+    react: float = 0.15
+    """Share of the samples one of whose people is given; the others are drawn from a text alone."""
+    silent: float = 0.5
+    """Share of the former two without their text, which nobody needs to say there."""
+    early: float = 0.5
+    """Share of the samples at levels as samplers take them, most near pure noise; the others even (published)."""
+    place: float = 1.0
+    """Weight of the places D."""
+    sight: float = 1.0
+    """Weight of where the two see each other, at the cleanest levels."""
+    faint: float = 0.25
+    """How much of that weight is left near pure noise: there it is decided whether they stay together."""
+
+    @staticmethod
+    def parse(values: dict[str, Any]) -> "Settings":
+        """From a recipe's table; raises MotionloomError for what there is not and for values out of range."""
+        hints = get_type_hints(Settings)
+        for key, value in values.items():
+            if key not in hints:
+                known = ", ".join(f.name for f in fields(Settings))
+                raise MotionloomError(f"[pair] has no setting {key!r}; the settings are {known}")
+            fits = isinstance(value, (int, float) if hints[key] is float else hints[key])
+            if not fits or (hints[key] is not bool and isinstance(value, bool)):
+                raise MotionloomError(f"[pair] {key} must be of kind {hints[key].__name__}; got {value!r}")
+        made = Settings(**values)
+        shares = (made.prefix, made.react, made.prefix + made.react, made.silent, made.early, made.faint)
+        if not all(0 <= share <= 1 for share in shares) or not all(0 <= w <= 1e3 for w in (made.place, made.sight)):
+            raise MotionloomError("[pair] prefix, react, silent, early and faint are shares, place and sight weights")
+        return made
+
+    def config(self, prior: Prior) -> PairConfig:
+        """The block's sizes for a prior."""
+        split = None if self.split < 0 else self.split
+        made = fitting(prior.net.config, layers=self.layers, split=split, aware=self.aware)
+        return replace(made, dropout=self.dropout)
+
+
+class Drawn(NamedTuple):
+    """Samples of one step; rows 2k and 2k + 1 are two people."""
+
+    clean: Tensor
+    """(rows, 1 + frames, 263) states: D in the first slot, standardised frames behind it."""
+    noise: Tensor
+    given: Tensor
+    """(rows, 1 + frames) bool: slots that are given, free of noise."""
+    level: Tensor
+    """(rows,) the same for both people."""
+    cond: Condition
+    lengths: Tensor
+    """(rows,) valid frames, without the slot."""
+
+
+class Parts(NamedTuple):
+    """What an estimate costs."""
+
+    motion: Tensor
+    place: Tensor
+    sight: Tensor
+    displacement: Tensor
+
+
+class PairError:
+    """Squared error of the denoised estimate of two people: see `train.objectives.Objective`."""
+
+    def __init__(
+        self, net: PairNet, prior: Prior, duets: Duets, *, settings: Settings, recipe: Recipe, device: str = "cpu"
+    ) -> None:
+        self._net, self.schedule, self.duets = net, prior.schedule, duets
+        self.settings, self.recipe, self.device = settings, recipe, device
+        self.mean, self.std = tensor(prior.mean, device), tensor(prior.std, device)
+        self.words = WordBank(prior.text, duets.texts, progress=lambda line: None)
+        self.sight = Sight(net.talk.config.places)
+        scale = torch.ones_like(self.mean)
+        for name, block in LAYOUT.items():
+            scale[block] = WEIGHTS[name]
+        self.scale = scale / scale.mean()
+        self.shares = settings.faint + (1 - settings.faint) * tensor(self.schedule.alpha_bar).to(self.mean)
+
+    @property
+    def net(self) -> nn.Module:
+        """The trained weights: the block's."""
+        return self._net
+
+    def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
+        """See `Objective.loss`; rows: pairs."""
+        drawn = self.drawn(seed, step, rows)
+        return self.total(self.parts(self.denoised(net, drawn), drawn))
+
+    def drawn(self, seed: int, step: int, pairs: int) -> Drawn:
+        """What a step looks at, from ``(seed, step)`` alone."""
+        rng = np.random.default_rng((seed, step))
+        windows = self.recipe.windows
+        window = int(rng.choice(windows, p=np.array(self.recipe.shares) / sum(self.recipe.shares)))
+        return self.noised(rng, self.duets.draw(rng, window, pairs))
+
+    def noised(self, rng: np.random.Generator, crops: Crops) -> Drawn:
+        """Crops with a task, a text or none, a level and noise each."""
+        pairs, said = len(crops.texts), self.settings
+        frames = crops.features.shape[2]
+        kind = rng.random(pairs)
+        begun, react = kind < said.prefix, (kind >= said.prefix) & (kind < said.prefix + said.react)
+        given = given_slots(rng, begun, react, crops.lengths, frames)
+        dropped = np.where(begun | react, said.silent, self.recipe.drop_text)
+        keep = (rng.random(pairs) >= dropped) & (crops.texts > 0)
+        at = rng.random(pairs)
+        at = np.where(rng.random(pairs) < said.early, 1 - (1 - at) ** 2, at)
+        level = np.clip(np.ceil(at * self.schedule.steps), 1, self.schedule.steps).astype(np.int64)
+        both = [torch.from_numpy(np.repeat(x, 2)) for x in (crops.lengths, crops.texts, keep, level)]
+        lengths, texts, keeps, levels = (x.to(self.device) for x in both)
+        cond = self.words.condition(texts.cpu(), lengths.cpu()).choose(keeps.cpu())
+        places = self._net.talk.config.places.encode(crops.ground).flatten(0, 1)
+        clean = join(places.to(self.mean), ((crops.features.to(self.mean) - self.mean) / self.std).flatten(0, 1))
+        valid = torch.arange(frames, device=self.device) < lengths[:, None]
+        clean[:, 1:] *= valid[..., None]
+        noise = torch.from_numpy(rng.standard_normal(clean.shape, dtype=np.float32)).to(self.device)
+        cond = Condition(*(x.to(self.device) for x in cond))
+        return Drawn(clean, noise, torch.from_numpy(given).to(self.device), levels, cond, lengths)
+
+    def denoised(self, net: nn.Module, drawn: Drawn) -> Tensor:
+        """The network's estimate of the clean states."""
+        state = noised(self.schedule, drawn.clean, drawn.level, drawn.noise * ~drawn.given[..., None])
+        return net(state, drawn.level, self._net.bind(drawn.cond))
+
+    def parts(self, denoised: Tensor, drawn: Drawn) -> Parts:
+        """What an estimate of the clean states costs; given slots are as they are given."""
+        shown = torch.where(drawn.given[..., None], drawn.clean, denoised.float())
+        valid = torch.arange(shown.shape[1] - 1, device=shown.device) < drawn.lengths[:, None]
+        free = valid & ~drawn.given[:, 1:]
+        error = ((shown - drawn.clean) ** 2)[:, 1:]
+        motion = _over_rows((error * self.scale).mean(-1), free)
+        place = _over_rows(((shown - drawn.clean) ** 2)[:, :1, :PLACE].mean(-1), ~drawn.given[:, :1])
+        (d0, x0), (d1, x1) = part(drawn.clean), part(shown)
+        sight = displacement = torch.zeros(())
+        if self.settings.sight:
+            away = self.sight.error(d1, x1 * self.std + self.mean, d0, x0 * self.std + self.mean)
+            anyone = free | free.unflatten(0, (-1, 2)).flip(1).flatten(0, 1)
+            sight = _over_rows(away * self.shares[drawn.level][:, None], anyone)
+        if self.recipe.displacement:
+            displacement = displacement_error(x1, x0, drawn.lengths, self.mean, self.std)
+        return Parts(motion, place, sight, displacement)
+
+    def total(self, parts: Parts) -> Tensor:
+        """The loss."""
+        said = self.settings
+        total = parts.motion + said.place * parts.place + said.sight * parts.sight
+        return total + self.recipe.displacement * parts.displacement
+
+
+def _over_rows(error: Tensor, free: Tensor) -> Tensor:
+    """(rows, frames) twice: mean over the free frames of each row, then over the rows that have any."""
+    count = free.sum(1)
+    mean = (error * free).sum(1) / count.clamp(min=1)
+    return mean.sum() / (count > 0).sum().clamp(min=1)
+
+
+def given_slots(
+    rng: np.random.Generator, begun: np.ndarray, react: np.ndarray, lengths: np.ndarray, frames: int
+) -> np.ndarray:
+    """(2 * pairs, 1 + frames) bool, what is given: D and a beginning of 10 to 40 frames (half of the time 20, and at
+    most half of the window), or one person whole; begun, react (pairs,) bool, lengths (pairs,) valid frames."""
+    pairs, slots = len(begun), np.arange(frames + 1)
+    count = np.where(rng.random(pairs) < 0.5, BEGUN, rng.integers(SHORTEST_BEGUN, LONGEST_BEGUN + 1, pairs))
+    count = np.minimum(count, lengths // 2)
+    given = np.zeros((pairs, 2, frames + 1), dtype=bool)
+    given |= (begun[:, None] & (slots <= count[:, None]))[:, None]
+    given[np.arange(pairs), rng.integers(0, 2, pairs)] |= react[:, None] & (slots > 0) & (slots <= lengths[:, None])
+    return given.reshape(2 * pairs, -1)
+
+
+# Held-out pairs ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Report:
+    """Errors of estimates on held-out pairs, at fixed windows, levels and noise."""
+
+    loss: float
+    motion: float
+    """Squared, standardised and weighted, of the free numbers."""
+    place: float
+    """Squared, of D."""
+    root: float
+    """Metres on the ground from where a partner is seen to where that is estimated, mean over free frames."""
+
+    def __str__(self) -> str:
+        return f"motion {self.motion:.4f}, places {self.place:.4f}, partner {self.root:.3f} m off"
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Windows of pairs that no training saw."""
+
+    objective: PairError
+    drawn: Drawn
+
+    @torch.no_grad()
+    def report(self, net: PairNet) -> Report:
+        """How well a block does on them."""
+        denoised = self.objective.denoised(net.eval(), self.drawn)
+        parts, drawn = self.objective.parts(denoised, self.drawn), self.drawn
+        shown = torch.where(drawn.given[..., None], drawn.clean, denoised.float())
+        mean, std = self.objective.mean, self.objective.std
+        ways = [self.objective.sight.partner(d, x * std + mean) for d, x in (part(shown), part(drawn.clean))]
+        off = (ways[0] - ways[1])[..., 2:].norm(dim=-1)[~drawn.given[:, 1:]].mean()
+        return Report(float(self.objective.total(parts)), float(parts.motion), float(parts.place), float(off))
+
+
+def held_out(objective: PairError, pairs: Sequence[Pair]) -> Held | None:
+    """Windows of the pairs for validation; None where there are none."""
+    pairs = [pair for pair in pairs if pair.split == "val"]
+    frames = min([HELD_FRAMES, *(pair.frames - 1 for pair in pairs)])
+    if not pairs:
+        return None
+    own = Duets(pairs, mirror=False, texts=objective.duets.texts)
+    which = np.repeat(np.arange(len(pairs)), HELD_ROWS)
+    starts = [np.linspace(0, pair.frames - 1 - frames, HELD_ROWS).round().astype(int) for pair in pairs]
+    rng = np.random.default_rng(2)
+    return Held(objective, objective.noised(rng, own.crops(which, np.concatenate(starts), frames)))
+
+
+# A run ---------------------------------------------------------------------------------------------------------------
+
+
+def train_pair(
+    recipe: Recipe,
+    pairs: Sequence[Pair],
+    folder: Path | str,
+    *,
+    device: str | None = None,
+    stop: int | None = None,
+    say: Callable[[str], None] = print,
+) -> Path:
+    """Train (or go on training) a block for the prior ``recipe.start``; returns ``folder/NAME.safetensors``.
+
+    That file holds the averaged weights of the saved step that did best on the pairs for validation (without such
+    pairs the last), and ``folder/last.safetensors`` those of the last. ``recipe.batch`` counts pairs.
+
+    Raises MotionloomError for settings that cannot be, and pairs that are all too short, or all for tests, or that
+    nobody described where a share of the samples is drawn from a text alone.
+    """
+    if device:
+        find_device(device)
+    world, folder = World.join(device), Path(folder)
+    settings = Settings.parse(recipe.pair)
+    prior = Prior.load(recipe.start or "default")
+    seen = _usable([pair for pair in pairs if pair.split == "train"], recipe, settings)
+    torch.manual_seed(recipe.seed)
+    config = settings.config(prior)
+    mean, std = tensor(prior.mean, world.device), tensor(prior.std, world.device)
+    base, talk = prior_module(prior).to(world.device), Talk(config, prior.net.config).to(world.device)
+    net = PairNet(base, talk, prior.schedule, mean=mean, std=std)
+    objective = PairError(net, prior, Duets(seen), settings=settings, recipe=recipe, device=world.device)
+    seconds = sum(pair.frames for pair in seen) / FPS
+    say(f"{sum(p.numel() for p in net.parameters()):,} trained parameters, {len(seen)} pairs of {seconds:.0f} s")
+    for line in changed(folder, recipe) if world.rank == 0 else ():
+        say(f"going on with another recipe than before: {line}")
+    export = _Export(recipe, prior, config, held_out(objective, pairs), seen, folder=folder, say=say)
+    log = Log(folder, recipe, say=say) if world.rank == 0 else None
+    train(objective, recipe, folder, world=world, wrap=_wrap(recipe), on_save=export, on_step=log, stop=stop, say=say)
+    return export.place
+
+
+def _wrap(recipe: Recipe) -> Callable[[nn.Module], nn.Module]:
+    return lambda net: torch.compile(net, dynamic=True) if recipe.compile else net  # type: ignore[return-value]
+
+
+def _usable(pairs: Sequence[Pair], recipe: Recipe, settings: Settings) -> list[Pair]:
+    if not pairs:
+        raise MotionloomError("no pair is for training; give pairs of the split train")
+    shortest = min(recipe.windows)
+    long = [pair for pair in pairs if pair.frames > shortest]
+    if not long:
+        frames = max(pair.frames for pair in pairs)
+        raise MotionloomError(
+            f"the longest pair to train on has {frames} frames at 20 per second, and the recipe's shortest window "
+            f"needs {shortest + 1}; give the recipe shorter windows, or longer pairs"
+        )
+    if settings.prefix + settings.react < 1 and not any(pair.captions for pair in long):
+        raise MotionloomError(
+            "no pair says what its people do; write captions.txt, or learn completion alone with pair.prefix=1 and "
+            "pair.react=0"
+        )
+    return long
+
+
+class _Export:
+    """Writes the weights at every save, and those that do best on the held-out pairs under the run's name."""
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        prior: Prior,
+        config: PairConfig,
+        held: Held | None,
+        pairs: Sequence[Pair],
+        *,
+        folder: Path,
+        say: Callable[[str], None],
+    ) -> None:
+        self.recipe, self.prior, self.config, self.held, self.say = recipe, prior, config, held, say
+        self.place, self.last = folder / f"{recipe.name}.safetensors", folder / "last.safetensors"
+        self.licences = "; ".join(sorted({pair.licence for pair in pairs}))
+        self.names = [pair.name for pair in pairs]
+        texts = [text for pair in pairs for text in pair.captions]
+        self.known = known_sentences(texts, {}, prior.text) if texts else None
+        self.digest = fingerprint(prior.net)
+        going_on = (folder / STATE).is_file() and self.place.is_file()
+        self.best = _loss_of(PairBlock.load(self.place, prior)) if going_on and held else float("inf")
+        self.fresh = held.report(pair_module(self._block({}, 0), prior)) if held else None
+
+    def __call__(self, _: nn.Module, average: Average, step: int) -> None:
+        weights = {key.removeprefix("talk."): value.cpu().numpy() for key, value in average.weights.items()}
+        block = self._block(weights, step)
+        now = self.held.report(pair_module(block, self.prior)) if self.held else None
+        if now:
+            block.notes.update(held_out=asdict(now), fresh=asdict(self.fresh) if self.fresh else {})
+        block.save(self.last)
+        better = now is None or now.loss < self.best
+        if better:
+            self.best = now.loss if now else self.best
+            block.save(self.place)
+        if now:
+            best = " (the best so far)" if better else ""
+            self.say(f"step {step}: held-out pairs: loss {now.loss:.4f}, {now}; fresh block: {self.fresh}{best}")
+
+    def _block(self, weights: dict[str, np.ndarray], step: int) -> PairBlock:
+        recipe = self.recipe
+        weights = weights or arrays(Talk(self.config, self.prior.net.config))
+        notes = {"steps": step, "batch": recipe.batch, "seed": recipe.seed, "pairs": self.names}
+        return PairBlock(
+            recipe.name,
+            self.config,
+            weights,
+            self.prior.card.name,
+            self.digest,
+            recipe.licence or self.licences,
+            self.licences,
+            notes,
+            pair_graph(self.config, self.prior.net.config),
+            self.known,
+        )
+
+
+def _loss_of(block: PairBlock) -> float:
+    held = block.notes.get("held_out")
+    return float(held["loss"]) if isinstance(held, dict) and "loss" in held else float("inf")

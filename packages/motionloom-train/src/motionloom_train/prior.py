@@ -1,0 +1,126 @@
+"""Training a prior from a recipe: the data, the network, the text encoder, and the weight file that comes out."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from motionloom.diffusion import SCHEDULES
+from motionloom.errors import MotionloomError
+from motionloom.runtime.text.protocol import TextEncoder
+from motionloom.weights.container import read_tensors
+from motionloom.weights.prior import (
+    Card,
+    Prior,
+    find_weights,
+    load_prior,
+    save_prior,
+)
+from motionloom_train.data.sets import FAVOUR, Batches, MotionSet, load_set
+from motionloom_train.known import known_table
+from motionloom_train.loop import Average, Log, World, changed, train
+from motionloom_train.modules import prior_module, prior_session
+from motionloom_train.modules import text_encoder as embedded
+from motionloom_train.nets.prior import NetConfig, PriorNet
+from motionloom_train.objectives import CleanError, Conditioned, WordBank
+from motionloom_train.recipe import Recipe
+from motionloom_train.tensors import find_device, tensor
+
+
+def train_prior(
+    recipe: Recipe,
+    data: Path | str,
+    folder: Path | str,
+    *,
+    text: TextEncoder,
+    device: str | None = None,
+    stop: int | None = None,
+    say: Callable[[str], None] = print,
+) -> Path:
+    """Train (or go on training) a prior on a built set; returns the weight file ``folder/NAME.safetensors``."""
+    if device:
+        find_device(device)
+    world, folder = World.join(device), Path(folder)
+    motions = load_set(data, sources=recipe.sources, seed=recipe.seed)
+    torch.manual_seed(recipe.seed)
+    net = PriorNet(NetConfig.parse(recipe.net))
+    if recipe.start:
+        start = Prior.load(recipe.start)
+        if replace(start.net.config, dropout=net.config.dropout) != net.config:
+            raise MotionloomError(
+                f"the recipe's network {net.config} is not that of {recipe.start!r}, {start.net.config}; copy its [net]"
+            )
+        net.load_state_dict(prior_module(start).state_dict())
+        motions = restandardised(motions, tensor(start.mean), tensor(start.std))
+    schedule = SCHEDULES[recipe.schedule](recipe.levels)
+    batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
+    words = WordBank(text, motions.texts, progress=say if world.rank == 0 else lambda line: None)
+    objective = CleanError(
+        net,
+        schedule,
+        batches,
+        words,
+        drop_text=recipe.drop_text,
+        displacement=recipe.displacement,
+        early=recipe.early,
+        heights=recipe.heights,
+        device=world.device,
+    )
+    say(
+        f"{sum(p.numel() for p in net.parameters()):,} parameters, {len(motions.items):,} described stretches, "
+        f"{len(motions.texts):,} sentences, {motions.minutes:.0f} minutes recorded"
+    )
+    for line in changed(folder, recipe) if world.rank == 0 else ():
+        say(f"going on with another recipe than before: {line}")
+    place, known = folder / f"{recipe.name}.safetensors", known_table(motions, text)
+
+    def export(_: nn.Module, average: Average, step: int) -> None:
+        prior = replace(_prior(recipe, motions, average, step, text), known=known)
+        save_prior(prior, place)
+        if recipe.show_every and step % recipe.show_every == 0:
+            _show(prior, recipe, folder / f"step_{step:07d}.png")
+
+    def wrap(module: nn.Module) -> nn.Module:
+        assert isinstance(module, PriorNet)
+        called: nn.Module = Conditioned(module)
+        return torch.compile(called, dynamic=True) if recipe.compile else called  # type: ignore[return-value]
+
+    log = Log(folder, recipe, say=say) if world.rank == 0 else None
+    train(objective, recipe, folder, world=world, wrap=wrap, on_save=export, on_step=log, stop=stop, say=say)
+    return place
+
+
+def restandardised(motions: MotionSet, mean: Tensor, std: Tensor) -> MotionSet:
+    """The same motions under other statistics, (features,) each."""
+    features = (motions.features * motions.std + motions.mean - mean) / std
+    return replace(motions, features=features, mean=mean, std=std)
+
+
+def text_encoder(weights: str) -> TextEncoder:
+    """The text encoder inside a prior's weight file, or of a file that holds nothing but an encoder."""
+    path = find_weights(weights)
+    tensors, _ = read_tensors(path)
+    if "vocabulary" in tensors:
+        return embedded(tensors)
+    return load_prior(path).text
+
+
+def _prior(recipe: Recipe, motions: MotionSet, average: Average, step: int, text: TextEncoder) -> Prior:
+    config = NetConfig.parse(recipe.net)
+    net = PriorNet(config)
+    net.load_state_dict({k: v.cpu() for k, v in average.weights.items()})
+    notes: dict[str, Any] = {"steps": step, "recipe": recipe.name, "seed": recipe.seed}
+    notes |= {"minutes": round(motions.minutes, 1)} | ({"start": recipe.start} if recipe.start else {})
+    card = Card(recipe.name, recipe.licence or "; ".join(motions.licences), "; ".join(motions.licences), notes)
+    schedule = SCHEDULES[recipe.schedule](recipe.levels)
+    return Prior(prior_session(net), schedule, motions.mean.numpy(), motions.std.numpy(), text, card)
+
+
+def _show(prior: Prior, recipe: Recipe, path: Path) -> None:
+    from motionloom.tasks.text import generate
+    from motionloom.viz.video import draw_sheet
+
+    draw_sheet(generate(prior, recipe.prompts, seconds=4.0), path, captions=recipe.prompts)

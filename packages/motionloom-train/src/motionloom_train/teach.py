@@ -1,0 +1,341 @@
+"""Teaching a prior an action or a style from a few clips: a low-rank adapter, and what was known stays.
+
+A step sees two kinds of rows. Some show a clip, with its caption, and cost what a clip costs in training a prior. The
+others show what the prior itself draws for sentences it knows, some of them without their sentence, and cost what the
+changed network's estimate differs from the unchanged one's (learning without forgetting, Li & Hoiem 2016; prior
+preservation, Ruiz et al. 2023). Since nothing is taught without words, guidance strengthens what was taught.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from motionloom.arrays import unit
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import FPS, LAYOUT, WIDTH
+from motionloom.runtime.text.known import bare
+from motionloom.tasks.text import sample_features
+from motionloom.weights.adapter import TAUGHT, Adapter, origin
+from motionloom.weights.prior import Prior
+from motionloom_train.data.examples import Example
+from motionloom_train.data.words import LABELS, imperative
+from motionloom_train.loop import Average, World, train
+from motionloom_train.low_rank import AdapterNet, tensors_of
+from motionloom_train.modules import prior_module
+from motionloom_train.nets.prior import Condition
+from motionloom_train.objectives import WEIGHTS, Conditioned, WordBank, displacement_error, masked_error
+from motionloom_train.precision import CHOICES, choose
+from motionloom_train.recipe import Recipe
+from motionloom_train.tensors import find_device, noised, tensor
+
+RANK = 16
+STEPS, BATCH = 1300, 16
+RATE = 1e-3
+WINDOWS, SHARES = (60, 100, 160, 196), (0.2, 0.4, 0.25, 0.15)
+"""Frames of the windows that a step sees, and how often."""
+DRAWS, DRAWN_FRAMES, DRAWN_STEPS = 96, 100, 12
+"""Motions that the prior draws of what it knows, their frames and the steps each takes."""
+OTHERS, FAR = 2000, 0.9
+"""Known sentences besides those of the drawn motions. Above this share of the levels, where hardly anything of a motion
+is left and it is decided what will be shown, one of these is kept instead of the motion's own."""
+UNLIKE = 0.6
+"""Cosine under which they must be to what is taught, so that other words for it may change as well."""
+KEEP = 0.5
+"""Share of the rows that show what the prior drew."""
+KEEP_WEIGHT = 2.0
+"""How much their error counts."""
+SILENT = 0.25
+"""Share of those without their sentence."""
+SAME = 0.9
+"""Cosine of vectors from which on a known sentence says what is taught, and is not kept as it was."""
+LIKE = 16
+"""Known sentences that are likest to what is taught: they are kept in any case."""
+AGAIN = 0.5
+"""A pose is the first one again if it is this near to it, beside the median distance of the clip's poses."""
+APART = 8
+"""Frames on each side among which it is the nearest."""
+BEFORE = 16
+"""Frames of a held pose that a window shows at most before a short clip begins."""
+DISPLACEMENT = 0.5
+"""Weight of `displacement_error`, which keeps planted feet in their places."""
+
+_WHOLE = re.compile(r"(an?|the|he|she|they|my|our|his|her|some\w*|[a-z]+ing)\b")
+"""How a known sentence begins that needs no subject before it."""
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """How something is taught."""
+
+    name: str = "adapter"
+    licence: str = ""
+    """What one may do with the adapter; empty: what the owner of the clips and that of the prior allow."""
+    steps: int = STEPS
+    batch: int = BATCH
+    rank: int = RANK
+    rate: float = RATE
+    keep: float = KEEP
+    """Share of the rows, 0 to 0.9, on what the prior knows already."""
+    seed: int = 0
+    amp: str = "auto"
+    """What is multiplied in; see `motionloom_train.precision`."""
+
+    def __post_init__(self) -> None:
+        limits = (("steps", 1, 100_000), ("batch", 2, 1024), ("rank", 1, 128), ("rate", 1e-6, 0.1), ("keep", 0, 0.9))
+        for key, low, high in limits:
+            if not low <= getattr(self, key) <= high:
+                raise MotionloomError(f"{key} must be {low:g} to {high:g}; got {getattr(self, key)!r}")
+        if self.amp not in CHOICES:
+            raise MotionloomError(f"amp must be one of {', '.join(CHOICES)}; got {self.amp!r}")
+
+
+def teach(
+    prior: Prior,
+    examples: Sequence[Example],
+    lesson: Lesson | None = None,
+    *,
+    device: str = "cpu",
+    say: Say = lambda line: None,
+) -> Adapter:
+    """An adapter that makes ``prior`` show what the examples show where their captions are asked for.
+
+    device: PyTorch's, that is taught on; motions are sampled where the prior is.
+    The same seed teaches the same on the same machine with as many threads and the same `Lesson.amp`, which the
+    adapter's notes tell. Raises `MotionloomError` where there is nothing to learn from, and for a prior that does not
+    draw 263 numbers a frame at 20 per second.
+    """
+    find_device(device)
+    lesson = lesson or Lesson()
+    if len(prior.mean) != WIDTH or prior.fps != FPS:
+        raise MotionloomError(
+            f"these weights make {len(prior.mean)} numbers a frame at {prior.fps:g} fps; those of {WIDTH} at {FPS:g} "
+            "fps can be taught"
+        )
+    if not examples:
+        raise MotionloomError("there is no clip; give at least one to learn from")
+    captions = list(dict.fromkeys(text for example in examples for text in example.captions))
+    kept, others = known_prompts(prior, captions, lesson.seed)
+    say(f"drawing {len(kept)} motions that are known already")
+    drawn = sample_features(
+        prior, kept, [DRAWN_FRAMES] * len(kept), seeds=[lesson.seed + i for i in range(len(kept))], steps=DRAWN_STEPS
+    )
+    torch.manual_seed(lesson.seed)
+    net = AdapterNet(prior_module(prior), lesson.rank, given_rank=0, taught=True)
+    amp = lesson.amp
+    if amp == "auto":
+        amp, why = choose(net, device)
+        say(why)
+    known = list(zip(kept, drawn, strict=True))
+    objective = Teaching(net, prior, examples, known, others, keep=lesson.keep, device=device)
+    recipe = Recipe(
+        name=lesson.name,
+        steps=lesson.steps,
+        batch=lesson.batch,
+        rate=lesson.rate,
+        seed=lesson.seed,
+        warmup=40,
+        cooldown=0.5,
+        ema=0.99,
+        decay=0.0,
+        save_every=lesson.steps,
+        amp=amp,
+    )
+    with TemporaryDirectory(prefix="motionloom-teach-") as folder:
+        progress = _progress(lesson, say)
+        average = train(objective, recipe, folder, world=World(device=device), wrap=_wrap, on_step=progress, say=say)
+    return _adapter(prior, examples, captions, replace(lesson, amp=amp), average)
+
+
+def known_prompts(prior: Prior, captions: Sequence[str], seed: int) -> tuple[list[str], list[str]]:
+    """`DRAWS` sentences that the prior knows and that do not say what ``captions`` say; up to `OTHERS` further ones.
+
+    Of the former those that are likest to the captions come first: from them the new action must be told apart. The
+    latter are unlike the captions. The sentences are those of the prior's file, or of measured labels where it has
+    none.
+    """
+    rng = np.random.default_rng((seed, 17))
+    pool = list(prior.known.sentences) if prior.known else [phrase for said in LABELS.values() for phrase in said]
+    vectors = prior.text.encode([bare(text) for text in pool]).pooled if not prior.known else prior.known.vectors
+    asked = prior.text.encode([bare(text) for text in captions]).pooled
+    like = (unit(vectors) @ unit(asked).T).max(1)
+    order = [int(i) for i in (-like).argsort(stable=True) if like[i] < SAME]
+    if not order:
+        raise MotionloomError("these weights know no other sentences than the captions; describe the clips otherwise")
+    rest = rng.permutation(order[LIKE:]).tolist()
+    chosen = [*order[:LIKE], *rest]
+    chosen = [chosen[i % len(chosen)] for i in range(DRAWS)]
+    others = [i for i in rest if like[i] < UNLIKE][:OTHERS]
+    said = [text if _WHOLE.match(text) else f"a person {text}" for text in pool]
+    return [said[i] for i in chosen], [said[i] for i in others]
+
+
+def wordings(caption: str) -> tuple[str, ...]:
+    """A caption in a few other words that mean the same: another subject, a command."""
+    action = bare(caption)
+    if action == " ".join(caption.lower().split()).strip(" .!?"):  # its subject, if any, is part of what is taught
+        return (caption,)
+    return (caption, caption, f"a person {action}", f"someone {action}", f"a man {action}", action, imperative(action))
+
+
+class Teaching:
+    """What a step of teaching minimises; see the module. What a step sees follows from (seed, step)."""
+
+    def __init__(
+        self,
+        net: AdapterNet,
+        prior: Prior,
+        examples: Sequence[Example],
+        drawn: Sequence[tuple[str, np.ndarray]],
+        others: Sequence[str] = (),
+        *,
+        keep: float,
+        device: str = "cpu",
+    ) -> None:
+        self.net, self.schedule, self.base = net, prior.schedule, prior_module(prior).to(device)
+        self.keep, self.device = keep, device
+        self.mean, self.std = tensor(prior.mean, device), tensor(prior.std, device)
+        self.examples = examples
+        shown = [((e.features - prior.mean) / prior.spread).astype(np.float32) for e in examples]
+        self.shown = [tensor(one, device) for one in shown]
+        self.begins = [_beginnings(e, one) for e, one in zip(examples, shown)]
+        self.drawn = torch.stack([tensor((f - prior.mean) / prior.spread, device) for _, f in drawn])
+        texts = dict.fromkeys(text for e in examples for caption in e.captions for text in wordings(caption))
+        texts |= dict.fromkeys([*(prompt for prompt, _ in drawn), *others])
+        self.numbers = {text: number for number, text in enumerate(texts)}
+        self.prompts = [self.numbers[prompt] for prompt, _ in drawn]
+        self.others = [self.numbers[prompt] for prompt in others]
+        self.words = WordBank(prior.text, tuple(texts), progress=lambda line: None)
+        scale = torch.ones(len(prior.mean))
+        for name, block in LAYOUT.items():
+            scale[block] = WEIGHTS[name]
+        self.scale = (scale / scale.mean()).to(self.device)
+
+    def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
+        """See `motionloom_train.objectives.Objective`."""
+        rng = np.random.default_rng((seed, step))
+        window = int(rng.choice(WINDOWS, p=SHARES))
+        kept = min(round(self.keep * rows), rows - 1)
+        clean, texts, lengths = self._rows(rng, window, rows, kept)
+        generator = torch.Generator().manual_seed(int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0]))
+        even = torch.rand(rows, generator=generator, dtype=torch.float64)
+        level = (self.schedule.steps * (1 - even**2)).ceil().long().clamp(1, self.schedule.steps)  # as samplers go
+        noise = torch.randn(clean.shape, generator=generator).to(clean)
+        for row in range(rows - kept, rows if self.others else 0):
+            if level[row] > FAR * self.schedule.steps:
+                texts[row] = int(rng.choice(self.others))
+        speaks = torch.ones(rows, dtype=torch.bool)
+        speaks[rows - kept :] = torch.rand(kept, generator=generator) >= SILENT
+        cond = self.words.condition(torch.tensor(texts), torch.tensor(lengths)).choose(speaks)
+        cond = Condition(*(part.to(self.device) for part in cond))
+        state = noised(self.schedule, clean, level, noise)
+        denoised, before = net(state, level, cond), clean[rows - kept :]
+        if kept:
+            with torch.no_grad():
+                old = Condition(*(part[rows - kept :] for part in cond))
+                before = self.base(state[rows - kept :], level[rows - kept :], self.base.bind(old))
+        return self._error(denoised, clean, before, cond.lengths, rows - kept)
+
+    def _rows(self, rng: np.random.Generator, window: int, rows: int, kept: int) -> tuple[Tensor, list[int], list[int]]:
+        """Windows (rows, window, 263), first those of examples, then what the prior drew; their texts and lengths."""
+        clean = torch.zeros(rows, window, self.drawn.shape[2], device=self.device)
+        texts, lengths = [], []
+        for row in range(rows - kept):
+            number = int(rng.integers(len(self.examples)))
+            first = _first(self.examples[number], self.begins[number], window, rng)
+            part = self.shown[number][first : first + window]
+            clean[row, : len(part)] = part
+            said = wordings(str(rng.choice(self.examples[number].captions)))
+            texts.append(self.numbers[said[int(rng.integers(len(said)))]])
+            lengths.append(len(part))
+        for row in range(rows - kept, rows):
+            number = int(rng.integers(len(self.drawn)))
+            length = min(window, self.drawn.shape[1])
+            clean[row, :length] = self.drawn[number, :length]
+            texts.append(self.prompts[number])
+            lengths.append(length)
+        return clean, texts, lengths
+
+    def _error(self, denoised: Tensor, clean: Tensor, before: Tensor, lengths: Tensor, own: int) -> Tensor:
+        error = masked_error(denoised[:own], clean[:own], lengths[:own], self.scale)
+        error = error + DISPLACEMENT * displacement_error(
+            denoised[:own], clean[:own], lengths[:own], self.mean, self.std
+        )
+        if own == len(denoised):
+            return error
+        changed = masked_error(denoised[own:], before.float(), lengths[own:], self.scale)
+        return error + KEEP_WEIGHT * changed
+
+
+def _beginnings(example: Example, features: np.ndarray) -> np.ndarray:
+    """Frames at which what is repeated begins anew; none in a clip that repeats nothing.
+
+    features: (frames, 263) of the example, standardised. Windows that begin anywhere in a repetition show the same
+    sentence with every phase, and the mean of all phases is a body that hardly moves.
+    """
+    begin, end = example.shown
+    poses = features[begin:end, LAYOUT["ric"]]
+    far = np.sqrt(((poses - poses[0]) ** 2).mean(axis=1))
+    far = np.convolve(np.pad(far, 2, "edge"), np.full(5, 0.2), "valid")
+    near = [
+        at
+        for at in range(APART, len(far) - APART)
+        if far[at] < AGAIN * np.median(far) and far[at] == far[at - APART : at + APART + 1].min()
+    ]
+    return begin + np.array([0, *near]) if near else np.zeros(0, int)
+
+
+def _first(example: Example, begins: np.ndarray, window: int, rng: np.random.Generator) -> int:
+    """Where a window begins: with a repetition; else anywhere in a loop or a long clip, or so that it shows all of what
+    was recorded, soon."""
+    begin, end = example.shown
+    frames = len(example.features)
+    if end - begin >= window or example.looped:
+        if (fits := begins[begins <= end - window]).size:
+            return int(rng.choice(fits))
+        return int(rng.integers(begin, max(end - window, begin) + 1))
+    low, high = max(0, end - window, min(begin - BEFORE, frames - window)), min(begin, frames - window)
+    return int(rng.integers(low, max(low, high) + 1)) if frames > window else 0
+
+
+def _wrap(net: nn.Module) -> nn.Module:
+    assert isinstance(net, AdapterNet)
+    return Conditioned(net)
+
+
+def _progress(lesson: Lesson, say: Say) -> Callable[[int, float, float], None]:
+    losses: list[float] = []
+
+    def on_step(step: int, loss: float, seconds: float) -> None:
+        losses.append(loss)
+        if (step + 1) % 50 == 0 or step + 1 == lesson.steps:
+            say(f"step {step + 1} of {lesson.steps}  loss {np.mean(losses[-50:]):.4f}  {seconds:.2f} s a step")
+
+    return on_step
+
+
+def _adapter(
+    prior: Prior, examples: Sequence[Example], captions: list[str], lesson: Lesson, average: Average
+) -> Adapter:
+    recorded = [e for e in examples if not e.name.startswith("M")]
+    seconds = sum(e.shown[1] - e.shown[0] for e in recorded if not e.looped) / FPS
+    notes = {
+        "captions": captions[:64],
+        "clips": len(recorded),
+        "seconds": round(seconds, 1),
+        "steps": lesson.steps,
+        "batch": lesson.batch,
+        "rate": lesson.rate,
+        "keep": lesson.keep,
+        "seed": lesson.seed,
+        "amp": lesson.amp,
+    }
+    licence = lesson.licence or f"as the owner of the clips allows, and as the prior's: {prior.card.licence}"
+    data = f"{len(recorded)} clips of the user's own: {'; '.join(captions)[:500]}"
+    tensors = tensors_of({key: value.cpu() for key, value in average.weights.items()})
+    return Adapter(lesson.name, TAUGHT, lesson.rank, tensors, prior.card.name, origin(prior), licence, data, notes)

@@ -1,0 +1,39 @@
+"""From arrays, which sampling computes with, to the tensors that training computes with."""
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from motionloom.diffusion import Schedule
+from motionloom.errors import MotionloomError
+from motionloom.runtime import prior_condition
+from motionloom_train.nets.prior import Condition
+
+
+def tensor(array: np.ndarray, device: str | torch.device = "cpu") -> Tensor:
+    """A tensor of its own with the numbers of an array."""
+    return torch.from_numpy(np.array(array)).to(device)
+
+
+def conditions(cond: prior_condition.Condition, device: str | torch.device = "cpu") -> Condition:
+    """A condition for a module."""
+    return Condition(*(tensor(part, device) for part in cond))
+
+
+def noised(schedule: Schedule, clean: Tensor, level: Tensor, noise: Tensor) -> Tensor:
+    """Clean data (rows, ...) taken to levels (rows,), whole numbers: `Schedule.noised` on tensors."""
+    shape = (-1,) + (1,) * (clean.ndim - 1)
+    tables = (tensor(table).to(clean) for table in (schedule.signal, schedule.noise))
+    signal, spread = (table[level.to(clean.device)].view(shape) for table in tables)
+    return signal * clean + spread * noise
+
+
+def find_device(name: str) -> torch.device:
+    """The device of that name; raises MotionloomError where this machine or this PyTorch has none."""
+    try:
+        device = torch.device(name)
+        torch.empty(1, device=device).cpu()
+        return device
+    except (RuntimeError, AssertionError, NotImplementedError) as error:
+        reason = " ".join(str(error).split())[:80]
+        raise MotionloomError(f"the device {name!r} cannot be used ({reason}); cpu always can") from None

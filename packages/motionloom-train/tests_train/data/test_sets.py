@@ -1,0 +1,169 @@
+"""What training is shown of a built set."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from motionloom.features import humanml as hml
+from motionloom_train.data.clips import Clip, Note, write_clip
+from motionloom_train.data.sets import Batches, _start, _starts, load_set
+from tests.kinematics import people
+
+
+def kicking(folder: Path) -> Path:
+    """A built set of one clip of ten seconds: a caption for all of it, and a kick from frame 100 to 150."""
+    features = hml.encode(hml.canonical(people.walking(1.0, 10.0)), heading="corrected")
+    notes = (
+        Note(0, len(features), "human", ("a person walks and kicks",)),
+        Note(0, len(features), "walk"),
+        Note(100, 150, "kick"),
+        Note(20, 70, "punch"),
+    )
+    (folder / "clips").mkdir(parents=True)
+    write_clip(folder / "clips", Clip("one", "cmu", "free", "train", "plain", notes, features))
+    (folder / "set.json").write_text("{}")
+    return folder
+
+
+def starts(batches: Batches, kind: str) -> set[int]:
+    """Where the items of a kind begin that a window of 48 frames is taken from."""
+    data = batches.data
+    return {data.items[i].start for group, _ in batches._pools[48][kind].values() for i in group}
+
+
+def test_a_caption_that_names_an_event_is_shown_with_the_event(tmp_path: Path) -> None:
+    batches = Batches(load_set(kicking(tmp_path / "set")), windows=(48,), shares=(1.0,))
+    assert starts(batches, "human") == {100}
+
+
+def test_events_are_shown_whole_and_states_in_part(tmp_path: Path) -> None:
+    batches = Batches(load_set(jumping(tmp_path / "set")), windows=(32, 48), shares=(0.5, 0.5))
+    small = {batches.data.items[i].group for group, _ in batches._pools[32]["label"].values() for i in group}
+    assert small == {"walk"}
+    assert starts(batches, "label") == {0, 20, 100}
+    lengths = batches.draw(0, 1, 64).lengths
+    np.testing.assert_array_equal(np.unique(lengths), [32] if lengths.max() == 32 else [48])
+
+
+def jumping(folder: Path) -> Path:
+    """As `kicking`, with a jump and a hop, which are no strikes."""
+    features = hml.encode(hml.canonical(people.walking(1.0, 10.0)), heading="corrected")
+    return described(folder, Note(0, len(features), "walk"), Note(100, 150, "jump"), Note(20, 70, "hop"))
+
+
+def test_windows_of_strikes_hold_the_moment_of_the_strike(tmp_path: Path) -> None:
+    """A hand that shoots forward once in eight seconds, at frame 100: every window begins about 1.3 s before."""
+    body = people.walking(0.0, 8.0)
+    body[:, 21, 2] += 0.5 * np.exp(-(((np.arange(len(body)) - 100) / 2.5) ** 2))
+    features = hml.encode(hml.canonical(body), heading="corrected")
+    note = Note(0, len(features), "action:punch", ("a person punches",), (0, len(features)))
+    folder = described(tmp_path / "set", note)
+    write_clip(folder / "clips", Clip("one_capture", "cmu", "free", "train", "plain", (note,), features))
+    item = load_set(folder).items[0]
+    assert item.core is not None
+    assert 80 <= item.core[0] <= 95
+    assert 100 <= item.core[1] <= 112
+    low, high = _starts(item, 48)
+    assert 65 <= low < high <= 85
+
+
+def test_windows_of_exercises_begin_before_a_repetition(tmp_path: Path) -> None:
+    """Squats whose upright moments are 50 frames apart: windows begin 2 to 10 frames before one of them."""
+    body = people.walking(0.0, 10.0)
+    frames = np.arange(len(body))
+    body[..., 1] -= (0.3 * (0.5 - 0.5 * np.cos(2 * np.pi * frames / 50)))[:, None] * (body[..., 1] > 0.5)
+    features = hml.encode(hml.canonical(body), heading="corrected")
+    note = Note(0, len(features), "action:squat", ("a person squats",))
+    folder = described(tmp_path / "set", note)
+    write_clip(folder / "clips", Clip("one_capture", "cmu", "free", "train", "plain", (note,), features))
+    data = load_set(folder)
+    upright = {0, 50, 100, 150, 199}
+    assert all(min(abs(rest - u) for u in upright) <= 10 for rest in data.items[0].rests)
+    assert {0, 50, 100, 150} <= set(data.items[0].rests)
+    begun = [_start(data.items[0], 48, np.random.default_rng(seed)) for seed in range(60)]
+    assert all(any(rest - 10 <= at <= rest - 2 for rest in data.items[0].rests) or at == 0 for at in begun)
+    assert len(set(begun)) > 8
+
+
+def described(folder: Path, *notes: Note, kind: str = "capture", frames: int = 10) -> Path:
+    """A built set of one walk of so many seconds with these notes."""
+    features = hml.encode(hml.canonical(people.walking(1.0, float(frames))), heading="corrected")
+    (folder / "clips").mkdir(parents=True, exist_ok=True)
+    write_clip(folder / "clips", Clip(f"one_{kind}", "cmu", "free", "train", "plain", notes, features, kind))
+    (folder / "set.json").write_text("{}")
+    return folder
+
+
+def test_every_window_of_a_change_holds_the_change(tmp_path: Path) -> None:
+    note = Note(0, 190, "action:sit down", ("a person sits down",), (90, 120))
+    batches = Batches(load_set(described(tmp_path / "set", note)), windows=(48,), shares=(1.0,))
+    item = batches.data.items[0]
+    low, high = _starts(item, 48)
+    assert (low, high) == (90 - 18, 90 - 16 + 2 + 1)  # 16 frames before it, give or take two; 18 are free
+    marked = replace(batches.data, features=torch.arange(190.0)[:, None].expand(-1, 263))
+    drawn = Batches(marked, windows=(48,), shares=(1.0,)).draw(0, 3, 400).features
+    assert set(drawn[:, 0, 0].int().tolist()) == set(range(low, high))
+
+
+def test_a_change_longer_than_the_window_is_not_shown(tmp_path: Path) -> None:
+    note = Note(0, 190, "action:sit down", ("a person sits down",), (10, 120))
+    data = load_set(described(tmp_path / "set", note, Note(0, 190, "walk")))
+    batches = Batches(data, windows=(48, 120), shares=(0.5, 0.5))
+    assert "action" not in batches._pools[48]
+    assert "action" in batches._pools[120]
+
+
+def test_actions_are_drawn_evenly_and_captures_more_often_than_keyed_clips(tmp_path: Path) -> None:
+    folder = tmp_path / "set"
+    described(folder, *[Note(i, i + 100, "action:eat", ("a person eats",)) for i in range(9)])
+    described(folder, Note(0, 100, "action:eat", ("an animated person eats",)), kind="keyed")
+    described(folder, Note(0, 100, "action:nod", ("a person nods",)), kind="made")
+    batches = Batches(load_set(folder), windows=(48,), shares=(1.0,))
+    said = np.array([batches.data.texts[i] for i in batches.draw(0, 0, 40_000).texts.tolist()])
+    nods = [batches.data.texts[i] for i in batches.data.items[-1].texts]
+    assert abs(np.isin(said, nods).mean() - 0.5) < 0.02
+    keyed = (said == "an animated person eats").sum() / np.isin(
+        said, ["an animated person eats", "a person eats"]
+    ).sum()
+    assert abs(keyed - 0.4 / 9.4) < 0.03
+
+
+def test_windows_of_a_climb_begin_on_the_floor(tmp_path: Path) -> None:
+    """Half a metre a second for ten seconds, of which the end is shown: as a climb from the floor."""
+    body = people.standing(10.0)
+    body[..., 1] += np.linspace(0, 5, len(body))[:, None]
+    features = hml.encode(hml.canonical(body), heading="corrected")
+    for group, lowest in (("climb", 0.0), ("descend", 150 * 5 / 199)):
+        note = Note(150, 198, group)
+        folder = described(tmp_path / group, note)
+        write_clip(folder / "clips", Clip("one_capture", "cmu", "free", "train", "plain", (note,), features))
+        batches = Batches(load_set(folder), windows=(48,), shares=(1.0,))
+        shown = batches.draw(0, 0, 1).features * batches.data.std + batches.data.mean
+        places = hml.decode_positions(shown[0].numpy().astype(np.float64))
+        assert abs(places[0, :, 1].min() - lowest) < 0.05
+        np.testing.assert_allclose(places[-1, 0, 1] - places[0, 0, 1], 47 * 5 / 199, atol=0.02)
+
+
+def said_of(folder: Path, note: Note) -> tuple[str, ...]:
+    """The sentences that the only item of a set is shown with."""
+    data = load_set(described(folder, note))
+    return tuple(data.texts[number] for number in data.items[0].texts)
+
+
+def test_a_strike_without_a_side_in_words_is_one_of_the_right_hand(tmp_path: Path) -> None:
+    """The average of a punch by either hand would be a guard."""
+    said = {
+        side: said_of(tmp_path / side, Note(0, 190, "action:made punch", (f"he punches with the {side} hand",)))
+        for side in ("left", "right")
+    }
+    assert len(said["left"]) > 5
+    assert all("left" in text for text in said["left"])
+    assert sum("right" not in text for text in said["right"]) > 5
+
+
+def test_a_kick_by_nobody_knows_which_foot_keeps_all_its_words(tmp_path: Path) -> None:
+    said = said_of(tmp_path / "set", Note(0, 190, "action:kick", ("she kicks",)))
+    assert "she kicks" in said
+    assert len(said) > 5

@@ -1,0 +1,316 @@
+"""`motionloom batch`: a file of jobs to a folder of motions."""
+
+import argparse
+import sys
+from contextlib import ExitStack
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from motionloom.cli.options import add_options
+from motionloom.cli.reading import as_unit
+from motionloom.cli.sampling import add_adapters, fail
+from motionloom.cli.skeletons import HANDS
+from motionloom.cli.terminal import escaping, unescaped
+from motionloom.requests.batch import Batch
+
+if TYPE_CHECKING:
+    from motionloom.bulk.batch import Where
+    from motionloom.bulk.jobs import Jobs
+    from motionloom.bulk.maker import Options
+    from motionloom.bulk.shard import Report
+
+JUDGE = "motionloom_lab.metrics.obedience:obeys"
+SHOWN = 10
+"""Failed rows listed at the end; the records list all."""
+PAUSE = 10.0
+"""Seconds between two lines of progress where there is no terminal."""
+SHORTEST = 3.0
+"""Seconds over which a rate is measured at least: rows come several at a time."""
+
+
+def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Register `batch`."""
+    parser = subparsers.add_parser(
+        "batch",
+        help="make many motions, on one machine or a cluster",
+        description="Make a motion of every row of JOBS (.jsonl, .csv, .parquet) into a folder of shards. The same "
+        "command goes on with what is missing. See docs/batch.md.",
+    )
+    parser.add_argument(
+        "jobs", nargs="?", type=Path, metavar="JOBS", help="a row per motion: prompt, seconds, seed ..."
+    )
+    parser.add_argument(
+        "--prompts", type=Path, metavar="FILE", help="a text file with a prompt per line, instead of JOBS"
+    )
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="the folder of the batch")
+    parser.add_argument(
+        "--verify", type=Path, metavar="FOLDER", help="only say whether a batch's files are still as they were written"
+    )
+    parser.add_argument(
+        "--format",
+        default="npz",
+        choices=("npz", "bvh", "glb", "webdataset", "parquet"),
+        help="single files, or shards that hold many (default npz)",
+    )
+    parser.add_argument("--shard-rows", type=int, metavar="N", help="rows of a shard (default: by the job, up to 1000)")
+    parser.add_argument("--filter", metavar="CONDITION", help="keep what passes, such as 'skate < 0.2 and obeys'")
+    add_options(parser, Batch)
+    parser.add_argument("--skeleton", metavar="FILE|smpl22", help="put the motions on this skeleton")
+    parser.add_argument("--hands", choices=HANDS, default="as-is", help="pose of the hands, on skeletons with fingers")
+    parser.add_argument(
+        "--out-unit", type=as_unit, default=1.0, metavar="UNIT", help="unit of --format bvh: m (default), cm, inch ..."
+    )
+    parser.add_argument("--fps", type=float, help="frame rate of the files (default: the model's 20)")
+    parser.add_argument(
+        "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
+    )
+    parser.add_argument(
+        "--pair-weights", default="duet", metavar="NAME|PATH", help="what makes two people of one (default duet)"
+    )
+    add_adapters(parser)
+    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
+    parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one per core, or per GPU)")
+    parser.add_argument(
+        "--shard", metavar="I/N", help="make only every N-th shard from I on (default: as the Slurm array says)"
+    )
+    parser.add_argument(
+        "--ray", nargs="?", const="local", metavar="ADDRESS", help="run on a Ray cluster, or a local one"
+    )
+    parser.add_argument("--force", action="store_true", help="make the folder this job's, whatever job made it")
+    parser.add_argument("--dry-run", action="store_true", help="only say how many, how long and how large")
+    parser.add_argument("--json", action="store_true", help="print what was made as JSON")
+    parser.set_defaults(run=run_batch)
+
+
+def run_batch(arguments: argparse.Namespace) -> int:
+    """``motionloom batch JOBS --out FOLDER``; exit code 0 where every row was made or dropped, else 1.
+
+    ``--verify FOLDER``: 2 where something is damaged.
+    """
+    from motionloom.bulk.batch import check_jobs, check_options
+
+    if arguments.verify is not None:
+        return _verify(arguments)
+    if arguments.out is None:
+        fail("name the folder of the batch with --out")
+    options, where, jobs = _options(arguments), _where(arguments), _jobs(arguments)
+    check_options(options)
+    rows = jobs.count()
+    check_jobs(jobs, rows)
+    if arguments.dry_run:
+        _estimate(arguments, jobs, options, where)
+        return 0
+    return _make(arguments, jobs, options, where=where, rows=rows)
+
+
+def _verify(arguments: argparse.Namespace) -> int:
+    from motionloom.bulk.verify import verify
+
+    if arguments.jobs is not None or arguments.prompts is not None or arguments.out is not None:
+        fail("--verify FOLDER looks at a batch and makes nothing; give it without jobs and --out")
+    found = verify(arguments.verify)
+    if arguments.json:
+        import json
+
+        print(json.dumps(vars(found) | {"damaged": [str(path) for path in found.damaged]}, indent=1))
+    else:
+        for path in found.damaged:
+            print(f"{path} is {'not as it was written' if path.exists() else 'lost'}")
+        if not found.damaged:
+            print(f"{arguments.verify} is as it was written: {found.shards:,} of {found.of:,} shards")
+        if found.sizes_only:
+            print(f"of {found.sizes_only:,} older shards there are no hashes, and only sizes were compared")
+    if found.damaged:
+        count = len(found.damaged)
+        fail(
+            f"{count:,} {'file' if count == 1 else 'files'} of {arguments.verify} {'is' if count == 1 else 'are'} "
+            "damaged; run the command that made the batch again: it makes anew what was damaged, and nothing else"
+        )
+    return 0
+
+
+def _jobs(arguments: argparse.Namespace) -> "Jobs":
+    from motionloom.bulk.jobs import Jobs
+
+    if (arguments.jobs is None) == (arguments.prompts is None):
+        fail("give either a file of jobs or --prompts with a file of prompts")
+    if arguments.prompts is not None:
+        return Jobs.of_prompts(arguments.prompts, variants=arguments.variants or 1, seed=arguments.seed)
+    if arguments.variants is not None:
+        fail("--variants goes with --prompts; rows of a file of jobs have their own seeds")
+    return Jobs.of(arguments.jobs)
+
+
+def _options(arguments: argparse.Namespace) -> "Options":
+    from motionloom.bulk.maker import Options
+    from motionloom.bulk.measures import Filter
+
+    obeys = arguments.filter is not None and "obeys" in Filter(arguments.filter).names
+    if obeys:
+        import_module(JUDGE.partition(":")[0])  # before any work: without the laboratory nobody judges
+    return Options(
+        weights=arguments.weights,
+        adapters=arguments.adapter,
+        device=arguments.device,
+        raw=not arguments.foot_lock,
+        steps=arguments.steps,
+        guidance=arguments.guidance,
+        solver=arguments.solver,
+        fps=arguments.fps,
+        pair_weights=arguments.pair_weights,
+        pair_guidance=arguments.pair_guidance,
+        shard_rows=arguments.shard_rows,
+        hands=arguments.hands,
+        unit=arguments.out_unit,
+        seconds=arguments.seconds,
+        literal=arguments.literal,
+        best_of=arguments.best_of,
+        seed=arguments.seed,
+        skeleton=arguments.skeleton,
+        format=arguments.format,
+        filter=arguments.filter,
+        judge=JUDGE if obeys else None,
+    )
+
+
+def _where(arguments: argparse.Namespace) -> "Where":
+    from motionloom.bulk.batch import Where, array_task
+
+    if arguments.workers is not None and not 1 <= arguments.workers <= 10_000:
+        fail(f"--workers must be 1 to 10000; got {arguments.workers}")
+    if arguments.ray is not None:
+        if arguments.shard is not None:
+            fail("--shard shares the work out without Ray; give one of --shard and --ray")
+        return Where(arguments.workers, None, arguments.ray)
+    if arguments.shard is None:
+        return Where(arguments.workers, array_task())
+    first, slash, count = arguments.shard.partition("/")
+    if not (slash and first.isdecimal() and count.isdecimal() and int(first) < int(count)):
+        fail(f"--shard must be i/n with i from 0 to n - 1, such as 0/4; got {arguments.shard!r}")
+    return Where(arguments.workers, (int(first), int(count)))
+
+
+def _estimate(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", where: "Where") -> None:
+    from motionloom.bulk.batch import processes
+    from motionloom.bulk.estimate import estimate
+    from motionloom.runtime import set_threads
+
+    set_threads(1)
+    found = estimate(jobs, options, workers=(where.workers or processes(options)) * (where.shard or (0, 1))[1])
+    if arguments.json:
+        import json
+
+        about = vars(found) | {"hours": found.hours, "gigabytes": found.gigabytes}
+        print(json.dumps(about, indent=1))
+        return
+    on = "processes" if options.device == "cuda" else "cores"
+    print(
+        f"{found.rows:,} motions: {_time(found.hours * 3600)} on {found.workers} {on}, {found.gigabytes:.3g} GB "
+        f"({found.seconds_each:.2f} s and {found.bytes_each / 1000:.0f} kB each, by {found.sampled} of the rows)"
+    )
+    if found.usable < 1:
+        print(f"{found.usable:.0%} of the rows looked at would be kept")
+
+
+def _make(arguments: argparse.Namespace, jobs: "Jobs", options: "Options", *, where: "Where", rows: int) -> int:
+    from collections import Counter
+
+    from motionloom.bulk.batch import run
+
+    counts: Counter[str] = Counter()
+    problems: list[str] = []
+    made = 0
+    with _Progress(rows if where.shard is None else -(-rows // where.shard[1])) as progress:
+        reports = run(
+            jobs, arguments.out, options=options, where=where, moved=progress.moved, rows=rows, force=arguments.force
+        )
+        for report in reports:
+            counts.update(report.counts)
+            made += report.made
+            problems += report.problems[: SHOWN - len(problems)]
+            progress.done(report)
+    for problem in problems:
+        print(f"motionloom: {problem}", file=sys.stderr)
+    if arguments.json:
+        import json
+
+        print(json.dumps({"folder": str(arguments.out), "tried": made, **counts}, indent=1))
+    else:
+        _say(arguments.out, counts, made)
+    return 1 if counts["failed"] else 0
+
+
+def _say(out: Path, counts: "dict[str, int]", made: int) -> None:
+    said = [f"{counts['made']:,} motion{' is' if counts['made'] == 1 else 's are'} in {out}"]
+    said += [f"{counts['dropped']:,} were dropped by the filter"] if counts["dropped"] else []
+    said += (
+        [f"{counts['repeated']:,} {'row repeats' if counts['repeated'] == 1 else 'rows repeat'} another"]
+        if counts["repeated"]
+        else []
+    )
+    said += (
+        [f"{counts['failed']:,} failed (rows count from 0; mend them; the same command tries again what may go well)"]
+        if counts["failed"]
+        else []
+    )
+    print(("nothing was left to make: " if counts["made"] and not made else "") + ", ".join(said))
+
+
+class _Progress:
+    """How far a batch is, at which rate, and how long it will take: a bar on a terminal, else a line now and then."""
+
+    def __init__(self, rows: int) -> None:
+        import time
+
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self.rows, self.there, self.made, self.clock = rows, 0, 0, time.monotonic
+        self.began = self.reported = self.clock()
+        self.since = 0  # rows made before the clock of the rate began: a worker first loads its weights
+        screen = Console(file=unescaped(sys.stderr))
+        columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn())
+        self.bar = Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal)
+        self.quiet = not screen.is_terminal
+        self.task = self.bar.add_task("batch", total=rows, rate="")
+        self.shown = ExitStack()
+
+    def __enter__(self) -> "_Progress":
+        self.shown.enter_context(self.bar)
+        self.shown.enter_context(escaping())  # the bar has put streams of its own in between
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.shown.close()
+
+    def moved(self, rows: int) -> None:
+        """So many rows more were made."""
+        if not self.made:
+            self.began, self.since = self.clock(), rows
+        self.made += rows
+        self._show()
+
+    def done(self, report: "Report") -> None:
+        """A shard is whole; its rows that were not made now were there before."""
+        self.there += report.rows - report.made
+        self._show()
+
+    def _show(self) -> None:
+        now = self.clock()
+        known = now - self.began > SHORTEST and self.made > self.since
+        rate = (self.made - self.since) / (now - self.began) if known else 0.0
+        done = min(self.there + self.made, self.rows)
+        self.bar.update(self.task, completed=done, rate=f"{60 * rate:.0f} a minute" if known else "")
+        if self.quiet and now - self.reported > PAUSE and known:
+            self.reported = now
+            left = _time((self.rows - done) / rate)
+            print(f"{done:,} of {self.rows:,} rows, {60 * rate:.0f} a minute, {left} left", file=sys.stderr)
+
+
+def _time(seconds: float) -> str:
+    """A duration in the unit that suits it."""
+    for size, unit in ((86_400, "days"), (3600, "hours"), (60, "minutes")):
+        if seconds >= 1.5 * size:
+            return f"{seconds / size:.1f} {unit}"
+    return f"{seconds:.0f} seconds"

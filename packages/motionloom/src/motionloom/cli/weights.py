@@ -1,0 +1,225 @@
+"""`motionloom weights`: what a weight file holds, which ones ship, and older files as ones of today."""
+
+import argparse
+import json
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from motionloom.cli.writing import add_force, check_overwriting
+
+if TYPE_CHECKING:
+    from motionloom.weights.predictor import Predictor
+    from motionloom.weights.prior import Prior
+
+
+TRAINING = "motionloom_train.convert"
+"""The module that writes graphs, which needs PyTorch."""
+
+
+def add(subparsers) -> None:
+    """Register `weights`."""
+    parser = subparsers.add_parser(
+        "weights", help="what a weight file holds, or which ones ship with motionloom; older files as ones of today"
+    )
+    parser.add_argument(
+        "weights",
+        nargs="*",
+        metavar="NAME|FILE",
+        help="a shipped name or a file (default: list the shipped); or: convert OLD.safetensors NEW.safetensors, which "
+        "writes the graphs of its networks into a file that has none",
+    )
+    parser.add_argument(
+        "--prior", type=Path, metavar="FILE", help="to convert a two-person block: the prior it belongs to, if not ours"
+    )
+    add_force(parser)
+    parser.add_argument("--actions", action="store_true", help="list what a prior has learned, with seconds of each")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.set_defaults(run=_weights)
+
+
+def _weights(arguments: argparse.Namespace) -> None:
+    from motionloom.errors import MotionloomError
+    from motionloom.weights.pair import blocks
+    from motionloom.weights.predictor import shipped_predictors
+    from motionloom.weights.prior import find_weights, shipped
+
+    if arguments.weights[:1] == ["convert"]:
+        _convert(arguments)
+        return
+    if len(arguments.weights) > 1:
+        raise MotionloomError(f"one weight file at a time; got {', '.join(arguments.weights)}")
+    if arguments.prior is not None:
+        raise MotionloomError(
+            "--prior belongs to 'motionloom weights convert', which makes files of today from older ones"
+        )
+    if arguments.actions:
+        _actions(arguments)
+        return
+    names = blocks() | shipped_predictors() | shipped()
+    if not arguments.weights:
+        described = [describe(path, name) for name, path in names.items()]
+        if arguments.json:
+            print(json.dumps(described, indent=1))
+            return
+        for about in described:
+            print(f"{about['name']:<12} {about['kind']:<17} {about['megabytes']:6.1f} MB  {about['licence']}")
+        if not described:
+            print("no weights ship with this installation; name a file")
+        return
+    [asked] = arguments.weights
+    about = describe(names.get(asked) or find_weights(asked), asked if asked in names else None)
+    print(json.dumps(about, indent=1) if arguments.json else _card(about))
+
+
+def _convert(arguments: argparse.Namespace) -> None:
+    """Write an older file again with graphs; raises MotionloomError where it cannot be, or PyTorch is missing."""
+    from motionloom.errors import MotionloomError
+    from motionloom.io.atomic import check_place
+
+    if len(arguments.weights) != 3 or arguments.actions or arguments.json:
+        raise MotionloomError(
+            "say which file to read and which to write: motionloom weights convert OLD NEW.safetensors"
+        )
+    old, new = map(Path, arguments.weights[1:])
+    if new.suffix != ".safetensors":
+        raise MotionloomError(f"weights are written as .safetensors; {new.name} has another suffix")
+    if not old.is_file():
+        raise MotionloomError(f"there is no file {old} to convert")
+    check_place(new)
+    check_overwriting(arguments, [new], also=[old])
+    convert = import_module(TRAINING).convert
+    print(f"wrote {convert(old, new, prior=arguments.prior)}")
+
+
+def _actions(arguments: argparse.Namespace) -> None:
+    """Print what a prior has learned; raises MotionloomError for weights that do not say."""
+    from motionloom.errors import MotionloomError
+    from motionloom.weights.prior import Prior
+
+    weights = arguments.weights[0] if arguments.weights else "default"
+    known = Prior.load(weights).known
+    if known is None:
+        raise MotionloomError(
+            f"the weights {weights!r} do not say what they have learned: they are older than "
+            "such tables; their card says which recordings they know"
+        )
+    if arguments.json:
+        about = {"seconds": dict(known.seconds), "sentences": list(known.sentences)}
+        print(json.dumps(about, indent=1, ensure_ascii=False))
+        return
+    for action, seconds in known.seconds.items():
+        print(f"{seconds:9.1f} s  {action}")
+    print(f"{len(known.sentences):,} sentences for them are in the file; --json lists them")
+
+
+def describe(path: Path, name: str | None = None) -> dict[str, Any]:
+    """What a weight file says and holds; the whole file is read and checked. ``name``: the shipped one."""
+    from motionloom.weights.adapter import is_adapter
+    from motionloom.weights.pair import is_block
+    from motionloom.weights.predictor import is_predictor
+
+    kinds = ((is_predictor, _predictor), (is_block, _block), (is_adapter, _adapter))
+    said = next((read for kind, read in kinds if kind(path)), _prior)(path)
+    about = {"name": said["name"], "file": str(path), "megabytes": round(path.stat().st_size / 1e6, 1)} | said
+    return about if name is None else about | {"name": name}
+
+
+def _prior(path: Path) -> dict[str, Any]:
+    from motionloom.weights.prior import load_prior
+
+    prior = load_prior(path)
+    config = prior.net.config
+    about = _network(prior, "prior", config.variant, sizes={"patch": config.patch}, seen={"features": config.features})
+    return about | {"text": prior.text.name, "notes": prior.card.notes}
+
+
+def _predictor(path: Path) -> dict[str, Any]:
+    from motionloom.weights.predictor import load_predictor
+
+    predictor = load_predictor(path)
+    frames = {"observed": predictor.observed, "predicted": predictor.frames - predictor.observed}
+    seen = {"joints": list(predictor.layout.names), "frames": frames}
+    sizes = {"frequencies": predictor.net.config.kept}
+    return _network(predictor, "predictor", predictor.variant, sizes=sizes, seen=seen) | {"notes": predictor.card.notes}
+
+
+def _network(
+    whole: "Prior | Predictor", kind: str, variant: str, *, sizes: dict[str, int], seen: dict[str, Any]
+) -> dict[str, Any]:
+    """What there is to say of both kinds of networks, with their own ``sizes`` and what they see of a motion."""
+    config = whole.net.config
+    return {
+        "name": whole.card.name,
+        "kind": kind,
+        "licence": whole.card.licence,
+        "data": whole.card.data,
+        "variant": variant,
+        "parameters": sum(value.size for value in whole.net.weights.values()),
+        "sizes": {"layers": config.layers, "width": config.width, "heads": config.heads} | sizes,
+        **seen,
+        "frames_per_second": whole.fps,
+        "schedule": {"name": whole.schedule.name, "steps": whole.schedule.steps},
+    }
+
+
+def _block(path: Path) -> dict[str, Any]:
+    from motionloom.weights.pair import read_block
+
+    block = read_block(path)
+    config = block.config
+    return {
+        "name": block.name,
+        "kind": "two-person block",
+        "licence": block.licence,
+        "data": block.data,
+        "variant": "aware" if config.aware else f"corrects {config.adds}",
+        "parameters": sum(value.size for value in block.tensors.values()),
+        "sizes": {"layers": config.layers, "behind": config.split, "width": config.width, "heads": config.heads},
+        "belongs_to": {"name": block.base, "fingerprint": block.fingerprint},
+        "notes": block.notes,
+    }
+
+
+def _adapter(path: Path) -> dict[str, Any]:
+    from motionloom.weights.adapter import read_adapter
+
+    adapter = read_adapter(path)
+    return {
+        "name": adapter.name,
+        "kind": "taught adapter" if adapter.taught else "control adapter",
+        "licence": adapter.licence,
+        "data": adapter.data,
+        "variant": "low rank" if adapter.taught else f"low rank, {adapter.control}",
+        "parameters": sum(value.size for value in adapter.tensors.values()),
+        "sizes": {"rank": adapter.rank} | ({"given rank": adapter.given_rank} if adapter.sees_given else {}),
+        "belongs_to": {"name": adapter.base, "fingerprint": adapter.fingerprint},
+        "notes": adapter.notes,
+    }
+
+
+def _card(about: dict[str, Any]) -> str:
+    sizes = ", ".join(f"{key} {value}" for key, value in about["sizes"].items())
+    rows = {
+        "name": about["name"],
+        "kind": about["kind"],
+        "file": f"{about['file']} ({about['megabytes']} MB)",
+        "licence": about["licence"],
+        "data": about["data"],
+        "network": f"{about['variant']}, {about['parameters']:,} parameters ({sizes})",
+    }
+    if "belongs_to" in about:
+        rows["prior"] = f"{about['belongs_to']['name']} ({about['belongs_to']['fingerprint'][:12]}), no other"
+    if "schedule" in about:
+        rows["motion"] = f"{_seen(about)}, {about['frames_per_second']:g} frames per second"
+        rows["schedule"] = f"{about['schedule']['name']}, {about['schedule']['steps']} levels"
+    if "text" in about:
+        rows["text"] = about["text"]
+    rows["notes"] = json.dumps(about["notes"], ensure_ascii=False) if about["notes"] else "none"
+    return "\n".join(f"{key:<9} {value}" for key, value in rows.items())
+
+
+def _seen(about: dict[str, Any]) -> str:
+    if "joints" not in about:
+        return f"{about['features']} numbers per frame"
+    return f"{len(about['joints'])} joints, {about['frames']['predicted']} frames after {about['frames']['observed']}"

@@ -1,0 +1,135 @@
+"""Mask files: which parts of a predicted person move as in another motion and when, line by line what is wrong with it.
+
+`docs/predict.md` explains the keys, `motionloom predict --schema` prints them as a JSON Schema
+(`packages/motionloom/src/motionloom/schemas/mask.schema.json`). JSON is YAML, so both are read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from motionloom.errors import MotionloomError, meant
+from motionloom.goals.lined_file import LinedFile
+from motionloom.io.lined_yaml import Lined, read_lined
+from motionloom.io.text import shown
+from motionloom.skeleton import SMPL22
+
+if TYPE_CHECKING:
+    from motionloom.goals.hold import FixedPart
+
+SCHEMA = Path(__file__).parents[1] / "schemas" / "mask.schema.json"
+KEYS = ("hold",)
+PART_KEYS = ("joints", "from", "to", "frames")
+JOINTS = ("root", *SMPL22.groups, *SMPL22.names)
+"""What can be held: the root's way through the world, groups and joints of the 22."""
+LONGEST = 86_400.0
+"""Seconds."""
+MAX_PARTS, MAX_NAMES, MAX_SPANS = 1000, 100, 100_000
+MAX_FRAME = 100_000_000
+MAX_BYTES = 4_000_000
+BESIDE = 0.25
+"""Of a frame: so far behind a frame a stretch of frames ends, and the next one may begin."""
+
+
+def read_mask(path: Path | str, *, fps: float) -> tuple[FixedPart, ...]:
+    """Read a mask file; its frames are of rate ``fps``, the past's, and become seconds from the end of the past.
+
+    Raises `MotionloomError` with file and line for whatever is wrong.
+    """
+    path = Path(path)
+    return _Reader(path, fps).parts(read_lined(path, max_bytes=MAX_BYTES))
+
+
+def check_names(names: Iterable[str]) -> tuple[str, ...]:
+    """The names, if all are of joints, groups or the root; raises `MotionloomError` that lists what there is."""
+    found = tuple(names)
+    if not found:
+        raise MotionloomError(f"no joint is named; there are {', '.join(JOINTS)}")
+    for name in found:
+        if problem := _name_problem(name):
+            raise MotionloomError(problem)
+    return found
+
+
+def all_held(parts: Sequence[FixedPart], seconds: float) -> bool:
+    """Whether all 22 joints are held at every moment from 0 to ``seconds``, so that nothing is left to predict."""
+    spans: dict[int, list[tuple[float, float]]] = {joint: [] for joint in range(len(SMPL22))}
+    for part in parts:
+        for joint in SMPL22.resolve(name for name in part.joints if name != "root"):
+            spans[joint] += part.spans
+    return all(_reach(of_one) >= seconds for of_one in spans.values())
+
+
+def _reach(spans: list[tuple[float, float]]) -> float:
+    """How far from 0 the stretches lead without a gap."""
+    reached = 0.0
+    for begin, end in sorted(spans):
+        if begin > reached:
+            break
+        reached = max(reached, end)
+    return reached
+
+
+def _name_problem(name: str) -> str:
+    if name in JOINTS:
+        return ""
+    return f"no joint or group is called {shown(name)}{meant(name, JOINTS)}; there are {', '.join(JOINTS)}"
+
+
+@dataclass(frozen=True)
+class _Reader(LinedFile):
+    fps: float
+
+    def parts(self, document: Lined) -> tuple[FixedPart, ...]:
+        top = self.mapping(document, KEYS, "a mask")
+        if "hold" not in top:
+            self.fail(document.line, "there is no 'hold'; list the parts that are held")
+        return tuple(self.part(item) for item in self.items(top["hold"], "hold", most=MAX_PARTS))
+
+    def part(self, item: Lined) -> FixedPart:
+        from motionloom.goals.hold import FixedPart
+
+        given = self.mapping(item, PART_KEYS, "a held part")
+        if "joints" not in given:
+            self.fail(item.line, "a held part has no 'joints'; name joints, groups or root")
+        names = tuple(self.joint(one) for one in self.items(given["joints"], "joints", most=MAX_NAMES))
+        if "frames" in given:
+            if "from" in given or "to" in given:
+                self.fail(given["frames"].key_line, "a held part has either 'frames' or 'from' and 'to', not both")
+            rows = self.items(given["frames"], "frames", most=MAX_SPANS)
+            return FixedPart(names, tuple(self.stretch(row) for row in rows))
+        begin = self.seconds(given.get("from"), "from", 0.0)
+        end = self.seconds(given.get("to"), "to", math.inf)
+        if end <= begin:
+            self.fail(given["to"].line, f"'to' must be after 'from', {begin:g} s; got {end:g}")
+        return FixedPart(names, ((begin, end),))
+
+    def joint(self, found: Lined) -> str:
+        if not isinstance(found.value, str):
+            self.fail(found.line, f"a joint is named by a word; got {found.kind}")
+        if problem := _name_problem(found.value):
+            self.fail(found.line, problem)
+        return found.value
+
+    def stretch(self, row: Lined) -> tuple[float, float]:
+        """Two frames as seconds: frame k lies (k + 1) / fps behind the past's end; a stretch ends beside a frame."""
+        if not isinstance(row.value, list) or len(row.value) != 2:
+            self.fail(row.line, f"'frames' lists pairs such as [0, 10]; got {row.kind}")
+        first, behind = (self.frame(item) for item in row.value)
+        if behind <= first:
+            self.fail(row.line, f"frames [{first}, {behind}] end before they begin; the second is the one behind them")
+        return (first + BESIDE) / self.fps if first else 0.0, (behind + BESIDE) / self.fps
+
+    def frame(self, found: Lined) -> int:
+        value = found.value
+        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MAX_FRAME:
+            self.fail(found.line, f"a frame is a whole number of 0 to {MAX_FRAME:,}; got {found.kind}")
+        return value
+
+    def seconds(self, found: Lined | None, name: str, otherwise: float) -> float:
+        value = self.number(found, name, low=0, high=LONGEST, unit="seconds")
+        return otherwise if value is None else float(value)

@@ -1,0 +1,410 @@
+"""Timeline files: what happens when, as YAML that says line by line what is wrong with it.
+
+`docs/compose.md` explains the keys, `motionloom compose --schema` prints them as a JSON Schema
+(`packages/motionloom/src/motionloom/schemas/timeline.schema.json`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from motionloom.errors import MotionloomError
+from motionloom.goals.fields import Field
+from motionloom.goals.lined_file import LinedFile
+from motionloom.io.lined_yaml import MAX_ITEMS, Lined, lined_of, read_lined
+from motionloom.requests.fields import specs
+from motionloom.requests.shared import LONGEST, LONGEST_PROMPT
+from motionloom.requests.timeline import SECONDS, SegmentKeys, TimelineKeys
+
+if TYPE_CHECKING:
+    from motionloom.goals.amounts import Amount
+    from motionloom.goals.goal import Goal
+    from motionloom.goals.segment import Segment
+    from motionloom.goals.sequence import Part
+
+SCHEMA = Path(__file__).parents[1] / "schemas" / "timeline.schema.json"
+TRANSITION = 1.0
+"""What two neighbours share where the file does not say."""
+SHORTEST = specs(SegmentKeys)["seconds"].low
+MAX_SEGMENTS = MAX_ITEMS
+MAX_GOAL_FRAMES = 1_000_000
+"""Frames with targets in one timeline, 0.6 GB of them."""
+FPS = 20.0
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A number that was read in the words."""
+
+    amount: Amount
+    first: int
+    end: int
+    """Half-open range of the segments that do it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """What `motionloom.tasks.long.compose` is asked, as read from a file."""
+
+    segments: tuple[Segment, ...]
+    seed: int | None = None
+    guidance: float | None = None
+    """Strength of the text where a segment does not say; None: the default."""
+    start: Path | None = None
+    """A motion file that the motion goes on from; it is there, and not yet read."""
+    path: Goal | None = None
+    """Targets for the whole motion in the world, one row per frame."""
+    readings: tuple[Reading, ...] = ()
+    """Numbers in the words of segments, which their goals and lengths come of."""
+
+    @property
+    def begins(self) -> tuple[int, ...]:
+        """The frame at which each segment begins, and at last the number of frames; 20 per second."""
+        at = [0]
+        for segment in self.segments:
+            at.append(at[-1] + _frames(segment.seconds))
+        return tuple(at)
+
+    @property
+    def frames(self) -> int:
+        """Length at 20 frames per second."""
+        return sum(_frames(segment.seconds) for segment in self.segments)
+
+    @property
+    def seconds(self) -> float:
+        """Length of the whole: the sum of the segments', each a whole number of frames."""
+        return self.frames / FPS
+
+
+def read_timeline(path: Path | str) -> Timeline:
+    """Read a timeline file.
+
+    Seconds; goals in metres as `motionloom.goals.goal` defines them. Files that the timeline names lie in its own
+    folder or below. Raises `MotionloomError` with file and line for whatever is wrong.
+    """
+    path = Path(path)
+    return _Reader(path).timeline(read_lined(path))
+
+
+def timeline_from(value: Any, *, folder: Path) -> Timeline:
+    """The timeline of plain values, such as JSON; mistakes name the keys that lead to them.
+
+    folder: where the files that it names lie, or below.
+    """
+    document, places = lined_of(value)
+    return _Reader(folder / "the timeline", places=places).timeline(document)
+
+
+def plain_timeline(texts: Sequence[str], *, seconds: float = SECONDS, transition: float | None = None) -> Timeline:
+    """A timeline of equally long segments; `MotionloomError` for what a file could not ask either."""
+    from motionloom.goals.segment import Segment
+
+    if not texts:
+        raise MotionloomError("there is no segment; say what the person does, such as: motionloom compose walk jump")
+    if len(texts) > MAX_SEGMENTS:
+        raise MotionloomError(f"{len(texts):,} segments are too many; at most {MAX_SEGMENTS:,} are made in one call")
+    for number, text in enumerate(texts, start=1):
+        if problem := _text_problem(text):
+            raise MotionloomError(f"segment {number}: {problem}")
+    specs(SegmentKeys)["seconds"].check(seconds, "a segment's length")
+    least = specs(SegmentKeys)["transition"].low
+    if transition is not None and not least <= transition <= seconds / 2 + 1e-9:
+        raise MotionloomError(
+            f"a transition takes {least:g} s to half of a segment, {seconds / 2:g} s; got {transition:g}"
+        )
+    shared = min(TRANSITION, seconds / 2) if transition is None else transition
+    return Timeline(tuple(Segment(text, seconds, transition=shared) for text in texts))
+
+
+def whole(text: str, seconds: float) -> Timeline:
+    """One segment, of any length that one motion may have."""
+    from motionloom.goals.segment import Segment
+
+    return Timeline((Segment(text, seconds),))
+
+
+def timeline_of(text: str, seconds: float | None = None, *, amounts: bool = False) -> Timeline:
+    """One sentence as segments, one for each action that follows another (`motionloom.goals.sequence`).
+
+    seconds: of the whole, shared out as the actions' own lengths are; None: those lengths. A sentence that says one
+    thing, or several at once, is one segment of 5 s. amounts: numbers with units in the words become lengths and goals
+    of their segments (`motionloom.goals.amounts`). Raises `MotionloomError` for what cannot be asked.
+    """
+    from motionloom.goals.sequence import split_actions
+
+    if problem := _text_problem(text):
+        raise MotionloomError(problem)
+    parts = split_actions(text)
+    if amounts:
+        return _with_amounts(text, parts, seconds)
+    return _of_parts(text, parts, seconds)
+
+
+def _with_amounts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeline:
+    """As long as the numbers in the words need, with their goals; without one as `_of_parts`."""
+    from motionloom.goals.amount_goal import seconds_for
+    from motionloom.goals.amounts import read_amount, read_seconds
+
+    read = [read_amount(part.text) for part in parts]
+    found = [one if one is not None and seconds_for(one) <= LONGEST else None for one in read]
+    own = [read_seconds(part.text) or (one and seconds_for(one)) for part, one in zip(parts, found, strict=True)]
+    if not any(own):
+        return _of_parts(text, parts, seconds)
+    natural = [replace(part, seconds=length or part.seconds) for part, length in zip(parts, own, strict=True)]
+    if seconds is None and len(parts) == 1:
+        seconds = min(natural[0].seconds, LONGEST)
+    segments, readings = [], []
+    for segment, amount in zip(_of_parts(text, natural, seconds).segments, found, strict=True):
+        several = (segment,) if amount is None else with_amount(segment, amount)
+        if amount is not None:
+            readings.append(Reading(amount, len(segments), len(segments) + len(several)))
+        segments += several
+    return Timeline(tuple(segments), readings=tuple(readings))
+
+
+def with_amount(segment: Segment, amount: Amount, share: float = 1.0) -> tuple[Segment, ...]:
+    """A segment with the goal that an amount in its words is; repetitions of slow strokes as a segment each.
+
+    share: of the way of steps, and of the time of a stroke, where another than the usual comes nearer to the number.
+    """
+    from motionloom.goals.amount_goal import CHAINED, STROKES, goal_for
+    from motionloom.goals.amounts import once
+
+    if amount.kind != "count":
+        asked = replace(amount, stride=amount.stride * share)
+        return (replace(segment, goal=goal_for(asked, segment.seconds)),)
+    assert amount.of is not None
+    text, number = once(segment.text), int(amount.size)
+    stroke, each = STROKES[amount.of] * share, segment.seconds / number
+    if STROKES[amount.of] < CHAINED:
+        return (replace(segment, text=text, seconds=_whole(min(segment.seconds, LONGEST) * share)),)
+    stroke = _whole(min(stroke, each * share))
+    between = min(TRANSITION, segment.transition, stroke / 2)
+    return (replace(segment, text=text, seconds=stroke, transition=between),) * number
+
+
+def _of_parts(text: str, parts: Sequence[Part], seconds: float | None) -> Timeline:
+    from motionloom.goals.segment import Segment
+    from motionloom.goals.sequence import lengths
+
+    if len(parts) == 1:
+        return plain_timeline([text], seconds=SECONDS if seconds is None else seconds)
+    if seconds is not None and not SHORTEST * len(parts) <= seconds <= LONGEST:
+        raise MotionloomError(
+            f"{len(parts)} actions one after the other take {SHORTEST * len(parts):g} to {LONGEST:g} seconds; got "
+            f"{seconds:g}"
+        )
+    shares = lengths(parts, seconds, fps=FPS)
+    shared = [min(TRANSITION, one / 2, other / 2) for one, other in zip(shares, [*shares[1:], shares[-1]], strict=True)]
+    return Timeline(
+        tuple(
+            Segment(part.text, share, transition=overlap)
+            for part, share, overlap in zip(parts, shares, shared, strict=True)
+        )
+    )
+
+
+def _whole(seconds: float) -> float:
+    """Seconds in whole frames."""
+    return max(1, _frames(seconds)) / FPS
+
+
+def _frames(seconds: float) -> int:
+    return round(seconds * FPS)
+
+
+def _text_problem(text: str) -> str:
+    if not text.strip():
+        return "the text is empty; say in words what the person does"
+    if len(text) > LONGEST_PROMPT:
+        return f"the text has {len(text):,} characters; say it in at most {LONGEST_PROMPT:,}"
+    return ""
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A segment as written; None where nothing is."""
+
+    line: int
+    text: str
+    seconds: float = SECONDS
+    guidance: float | None = None
+    transition: float | None = None
+    transition_line: int = 0
+    goals: tuple[Lined, ...] = ()
+    adapters: tuple[tuple[Path, float], ...] = ()
+
+
+class _Reader(LinedFile):
+    def timeline(self, document: Lined) -> Timeline:
+        top = self.mapping(document, tuple(specs(TimelineKeys)), "a timeline")
+        if "segments" not in top:
+            self.fail(document.line, "there are no 'segments'; list what the person does, one after the other")
+        rows = [self.row(item) for item in self.items(top["segments"], "segments", of="segment")]
+        shared = self.field(top, TimelineKeys, "transition")
+        transitions = self.transitions(rows, shared)
+        total = sum(_frames(row.seconds) for row in rows)
+        targets = sum(_frames(row.seconds) for row in rows if row.goals) + (total if "path" in top else 0)
+        if targets > MAX_GOAL_FRAMES:
+            self.fail(
+                document.line, f"goals for {targets:,} frames are too many; at most {MAX_GOAL_FRAMES:,} in one file"
+            )
+        return Timeline(
+            self.segments(rows, transitions),
+            self.field(top, TimelineKeys, "seed"),
+            self.field(top, TimelineKeys, "guidance"),
+            self.start(top.get("start")),
+            self.goal(top["path"], "path", total) if "path" in top else None,
+        )
+
+    def row(self, item: Lined) -> _Row:
+        if isinstance(item.value, str):
+            return _Row(item.line, self.text(item))
+        given = self.mapping(item, tuple(specs(SegmentKeys)), "a segment")
+        if "text" not in given:
+            self.fail(item.line, "a segment has no 'text'; say in words what the person does")
+        if "goal" in given and "goals" in given:
+            self.fail(given["goals"].key_line, "a segment has either 'goal' or 'goals'; put them all into 'goals'")
+        seconds = self.field(given, SegmentKeys, "seconds")
+        transition = given.get("transition")
+        return _Row(
+            item.line,
+            self.text(given["text"]),
+            SECONDS if seconds is None else seconds,
+            self.field(given, SegmentKeys, "guidance"),
+            self.field(given, SegmentKeys, "transition"),
+            transition.line if transition else 0,
+            self.goals(given),
+            self.adapters(given.get("adapters")),
+        )
+
+    def adapters(self, found: Lined | None) -> tuple[tuple[Path, float], ...]:
+        """``FILE`` or ``FILE:FACTOR``, one or a list of them; the files lie in the timeline's folder."""
+        if found is None:
+            return ()
+        from motionloom.goals.adapters import MOST_ADAPTERS, parse_adapter
+
+        given = [found] if isinstance(found.value, str) else self.items(found, "adapters", of="adapter")
+        if len(given) > MOST_ADAPTERS:
+            self.fail(found.line, f"{len(given)} adapters at once are too many; at most {MOST_ADAPTERS}")
+        result = []
+        for one in given:
+            if not isinstance(one.value, str):
+                self.fail(one.line, f"an adapter is written FILE or FILE:FACTOR; got {self.got(one)}")
+            try:
+                name, factor = parse_adapter(one.value)
+                result.append((Field(str(name), "adapters").file(self.path.parent), factor))
+            except MotionloomError as error:
+                self.fail(one.line, str(error))
+        return tuple(result)
+
+    def goals(self, given: dict[str, Lined]) -> tuple[Lined, ...]:
+        if "goal" in given:
+            return (given["goal"],)
+        if "goals" not in given:
+            return ()
+        return tuple(self.items(given["goals"], "goals", of="goal"))
+
+    def transitions(self, rows: list[_Row], shared: float | None) -> list[float]:
+        """Each segment's transition to the next; what nobody asked for is shortened to what fits."""
+        result = []
+        for row, following in zip(rows, [*rows[1:], None], strict=True):
+            asked = shared if row.transition is None and following else row.transition
+            following = following or row
+            most = min(row.seconds, following.seconds) / 2
+            if asked is not None and asked > most + 1e-9:
+                short = row if row.seconds <= following.seconds else following
+                self.fail(
+                    row.transition_line or row.line,
+                    f"the transition takes {asked:g} s and the segment of {self.at(short.line)} {short.seconds:g} s; "
+                    f"it may take at most half of that, {most:g} s",
+                )
+            result.append(min(TRANSITION, most) if asked is None else asked)
+        return result
+
+    def segments(self, rows: list[_Row], transitions: list[float]) -> tuple[Segment, ...]:
+        from motionloom.goals.segment import Segment
+
+        def segment(row: _Row, transition: float) -> Segment:
+            goal = self.merged(row.goals, _frames(row.seconds))
+            return Segment(row.text, row.seconds, row.guidance, transition, goal, row.adapters)
+
+        return tuple(map(segment, rows, transitions))
+
+    def merged(self, goals: tuple[Lined, ...], frames: int) -> Goal | None:
+        if not goals:
+            return None
+        from motionloom.goals.goal import merged
+
+        whole = self.goal(goals[0], "goal", frames)
+        for other in goals[1:]:
+            try:
+                whole = merged(whole, self.goal(other, "goal", frames))
+            except MotionloomError as error:
+                self.fail(other.line, str(error))
+        return whole
+
+    def goal(self, found: Lined, name: str, frames: int) -> Goal:
+        from motionloom.goals.goal_file import read_goal
+
+        what: Any = found.value
+        if isinstance(what, str):
+            what = self.file(found, name)
+        elif isinstance(what, dict):
+            for key in ("points", "svg", "curve"):
+                if name == "path" and key in what:
+                    self.fail(what[key].key_line, f"'path' holds a goal; write it as path: {{path: {{{key}: ...}}}}")
+            what = found.plain()
+        else:
+            self.fail(found.line, f"'{name}' must be a mapping or the name of a goal file; got {self.got(found)}")
+        try:
+            return read_goal(what, frames=frames, fps=FPS, folder=self.path.parent)
+        except MotionloomError as error:
+            self.fail(_line(found, str(error)), f"{name}: {error}")
+
+    def start(self, found: Lined | None) -> Path | None:
+        if found is None:
+            return None
+        from motionloom.formats import readable
+
+        place = self.file(found, "start")
+        if place.suffix.lower() not in readable():
+            self.fail(found.line, f"'start' must name a motion, one of {', '.join(readable())}; got {self.got(found)}")
+        return place
+
+    def file(self, found: Lined, name: str) -> Path:
+        """A file in the timeline's folder or below it; a timeline from an untrusted source reads nothing else."""
+        try:
+            return Field(found.value, name).file(self.path.parent)
+        except MotionloomError as error:
+            self.fail(found.line, str(error))
+
+    def text(self, found: Lined) -> str:
+        if not isinstance(found.value, str):
+            self.fail(found.line, f"the text must be words; got {self.got(found)} (put quotes around it if it is one)")
+        if problem := _text_problem(found.value):
+            self.fail(found.line, problem)
+        return found.value
+
+    def got(self, found: Lined) -> str:
+        return "an empty list" if found.value == [] else found.kind
+
+
+def _line(found: Lined, message: str) -> int:
+    """The line of what a message names as ``'joints[1].points[3].time'``; that of the whole where it names none."""
+    named = re.match(r"'([\w.\[\]]+)' ", message)
+    line = found.key_line or found.line
+    for step in re.findall(r"\w+", named[1]) if named else ():
+        inner = found.value
+        if isinstance(inner, dict) and step in inner:
+            found = inner[step]
+        elif isinstance(inner, list) and step.isdecimal() and int(step) < len(inner):
+            found = inner[int(step)]
+        else:
+            return line
+        line = found.key_line or found.line
+    return line

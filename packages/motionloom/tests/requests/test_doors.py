@@ -1,0 +1,86 @@
+"""Every door opens on the same fields: the command line, the server, the page's types, the tools of assistants."""
+
+import argparse
+import inspect
+import runpy
+from pathlib import Path
+
+import pytest
+
+from motionloom.cli import parser
+from motionloom.cli.options import option
+from motionloom.requests.fields import specs
+from motionloom.requests.tasks import REQUESTS
+
+ROOT = Path(__file__).parents[4]
+READ_ELSEWHERE = {
+    "generate": set(),
+    "compose": {"count"},
+    "control": set(),
+    "edit": {"person"},
+    "predict": {"person", "start", "end"},
+    "switch": {"start", "end"},
+    "duet": {"person"},
+}
+"""Fields that a command has an option of its own for, or none: it reads files, where people are one each."""
+
+
+@pytest.mark.parametrize("task", REQUESTS)
+def test_a_command_has_an_option_for_every_field_that_can_be_typed(task: str) -> None:
+    commands = next(one.choices for one in parser()._actions if isinstance(one, argparse._SubParsersAction))
+    options = {name: action for action in commands[task]._actions for name in action.option_strings}
+    for name, spec in specs(REQUESTS[task]).items():
+        typed = spec.kind in ("number", "whole", "flag", "word", "text") and name != "prompt"
+        if not typed or name in READ_ELSEWHERE[task]:
+            continue
+        action = options[option(name, spec)]
+        if spec.kind != "flag":
+            assert action.spec == spec  # type: ignore[attr-defined]
+            assert action.default == spec.default
+
+
+@pytest.mark.parametrize("task", REQUESTS)
+def test_the_server_describes_the_fields(task: str) -> None:
+    pytest.importorskip("starlette", reason="needs the extra 'studio'")
+    from motionloom.server.components import components, request_of
+    from motionloom.server.limits import Limits
+
+    limits = Limits()
+    keys = components(limits)[request_of(task)]["properties"]
+    for name, spec in specs(REQUESTS[task]).items():
+        schema = keys[name]
+        if "$ref" in schema and spec.kind != "word":
+            continue
+        if spec.kind == "word":
+            assert components(limits)[schema["$ref"].rsplit("/", 1)[-1]]["enum"] == list(spec.words)
+            continue
+        assert spec.help in schema["description"]
+        if spec.kind in ("number", "whole") and not spec.many:
+            assert schema.get("minimum", schema.get("exclusiveMinimum")) == spec.low
+            assert schema["maximum"] <= spec.high
+
+
+def test_the_page_has_the_types_that_the_server_says() -> None:
+    pytest.importorskip("starlette", reason="needs the extra 'studio'")
+    written = runpy.run_path(str(ROOT / "tools" / "write_types.py"))
+    assert written["PLACE"].read_text(encoding="utf-8") == written["types"](), "run tools/write_types.py"
+
+
+def test_assistants_have_a_tool_for_every_task(tmp_path: Path) -> None:
+    pytest.importorskip("mcp", reason="needs the extra 'mcp'", exc_type=ImportError)
+    from motionloom.server.assistant import Assistant
+    from motionloom.server.limits import Limits
+    from motionloom.server.project import Project
+    from motionloom.server.worker import Worker
+
+    limits = Limits()
+    project = Project(tmp_path, limits)
+    tools = Assistant(project, Worker(project, limits))
+    for task, request in REQUESTS.items():
+        assert set(inspect.signature(tools.tool(task)).parameters) == set(specs(request))
+
+
+def test_the_schema_of_timeline_files_is_what_the_fields_say() -> None:
+    pytest.importorskip("starlette", reason="needs the extra 'studio'")
+    written = runpy.run_path(str(ROOT / "tools" / "write_types.py"))
+    assert written["SCHEMA"].read_text(encoding="utf-8") == written["timelines"](), "run tools/write_types.py"

@@ -1,1 +1,0 @@
-"""The fuzzer over what training and the laboratory read: `python -m tests.lab.fuzz` runs every reader there is."""
