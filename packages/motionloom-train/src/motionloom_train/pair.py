@@ -17,6 +17,7 @@ from torch import Tensor, nn
 
 from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, LAYOUT
+from motionloom.goals.roles import without_two
 from motionloom.runtime.text.known import known_sentences
 from motionloom.weights.adapter import fingerprint
 from motionloom.weights.pair import PairBlock
@@ -352,7 +353,7 @@ class _Export:
         self.place, self.last = folder / f"{recipe.name}.safetensors", folder / "last.safetensors"
         self.licences = "; ".join(sorted({pair.licence for pair in pairs}))
         self.names = [pair.name for pair in pairs]
-        texts = [text for pair in pairs for text in pair.captions]
+        texts = [without_two(text) for pair in pairs for text in pair.captions]
         self.known = known_sentences(texts, {}, prior.text) if texts else None
         self.digest = fingerprint(prior.net)
         going_on = (folder / STATE).is_file() and self.place.is_file()

@@ -15,8 +15,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
+from motionloom import Prior, generate
 from motionloom.bulk import batch as batch_module
 from motionloom.bulk import on_ray
 from motionloom.bulk.batch import Where, array_task, batch, run
@@ -43,6 +45,19 @@ def exact(weights: str) -> dict[Any, Any]:
     """Every motion made by this process alone."""
     found = batch(rows(COUNT), options=options(weights))
     return {(one.about["text"], one.about["seed"]): one.motion.positions() for one in found if one.motion}
+
+
+def test_the_best_of_several_is_that_of_a_single_call(weights: str) -> None:
+    """Whatever rows are beside: what `generate` keeps."""
+    row = {"prompt": "a person bows", "seconds": 1.0, "seed": 2, "best_of": 4}
+    (found,) = [
+        one.motion for one in batch([row, *rows(3)], options=options(weights)) if one.about["text"] == row["prompt"]
+    ]
+    (alone,) = generate(Prior.load(weights), "a person bows", seconds=1.0, seed=2, best_of=4, steps=2)
+    (first,) = generate(Prior.load(weights), "a person bows", seconds=1.0, seed=2, steps=2)
+    assert found is not None
+    assert np.abs(found.positions() - alone.positions()).max() < 3e-6
+    assert np.abs(found.positions() - first.positions()).max() > 1e-3
 
 
 def check_whole(out: Path, exact: dict[Any, Any]) -> None:

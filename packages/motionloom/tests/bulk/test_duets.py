@@ -57,6 +57,21 @@ def test_a_duet_is_that_of_the_single_task_whatever_is_beside_it(ready: Maker) -
     assert apart(both[1].people, single) > 0.01
 
 
+def test_motions_of_one_and_of_two_loop_where_that_is_asked(weights: str, pair_weights: str, ready: Maker) -> None:
+    """The last half second is another, and it goes over into the first frame; rows of less than that are refused."""
+    looping = Maker(options(weights, pair_weights=pair_weights, loop=0.5), folder=Path())
+    assert looping.options.of_motions("") != ready.options.of_motions("")
+    rows = (DUET | {"seconds": 2}, {"prompt": "a person walks", "seconds": 2})
+    for plain, loop in zip(made(ready, *rows), made(looping, *rows), strict=True):
+        assert len(plain.people) == len(loop.people)
+        for one, other in zip(plain.people, loop.people, strict=True):
+            assert np.array_equal(one.rotations[:-10], other.rotations[:-10])
+            seam, open_seam = (np.abs((m.rotations[-1] * m.rotations[0]).sum(-1)).min() for m in (other, one))
+            assert seam > open_seam  # cosines of half the largest turn of a joint from the last frame to the first
+    ((_, refused),) = looping.make([ask(looping, {"prompt": "a person walks", "seconds": 0.5})])
+    assert "a loop of a clip of 0.50 s" in str(refused)
+
+
 @pytest.mark.parametrize(
     ("kind", "files"),
     [

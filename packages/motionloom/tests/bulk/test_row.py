@@ -64,6 +64,15 @@ def test_numbers_in_a_prompt_are_read_unless_they_are_left_literal() -> None:
     assert key({"prompt": "a person walks"}) == key({"prompt": "a person walks"}, literal=True)
 
 
+def test_the_id_of_a_row_without_the_best_of_several_is_as_it_was() -> None:
+    row = {"prompt": "a person walks", "seed": 7}
+    assert key(row) == "e8bbc60dcbb26cb823371c1c56e4c869"  # recorded before rows had it
+    assert key(row | {"best_of": 1}) == key(row, best_of=1) == key(row)
+    assert key(row | {"best_of": 4}) == key(row, best_of=4) != key(row)
+    with pytest.raises(MotionloomError, match="'best_of' chooses among motions of a prompt"):
+        parse(json.dumps({"prompt": "a", "goal": {"path": {"points": [[0, 0], [0, 2]]}}, "best_of": 2}).encode())
+
+
 def test_the_id_changes_with_what_a_named_file_holds(folder: Path) -> None:
     row = {"prompt": "a person walks", "goal": "goal.json"}
     found = set()
@@ -98,6 +107,7 @@ def test_the_id_changes_with_a_timeline_and_with_a_skeleton(folder: Path) -> Non
         {"prompt": "a", "seed": -1},
         {"prompt": "a", "seed": 1.5},
         {"prompt": "a", "seed": 2**62},
+        {"prompt": "a", "best_of": 17},
         {"prompt": "a", "id": "../b"},
         {"prompt": "a", "id": "a.b"},
         {"prompt": "a", "id": ""},

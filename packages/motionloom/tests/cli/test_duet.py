@@ -9,6 +9,7 @@ import pytest
 
 from motionloom import io
 from motionloom.cli import main
+from motionloom.runtime.text.known import known_sentences
 from motionloom.tasks import pair
 from motionloom.weights.prior import save_prior
 from tests.io.motions import largest_distance
@@ -95,6 +96,51 @@ def test_a_path_in_a_file_is_walked_by_the_person_it_is_for(files: Path) -> None
     root = io.load("b.npz").root
     assert np.linalg.norm(root[0, [0, 2]] - [1, 2]) < 0.05
     assert np.linalg.norm(root[-1, [0, 2]] - [1, 4]) < 0.3
+
+
+def test_each_of_the_two_has_a_path(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("a.yaml").write_text("points: [[1, 2], [1, 4]]\n", encoding="utf-8")
+    Path("b.yaml").write_text("points: [[3, 2], [3, 4]]\n", encoding="utf-8")
+    words = ("two people walk", "--path", "a.yaml", "--path", "b.yaml", "--seconds", "2", "--no-foot-lock")
+    assert duet(files, *words, "--out", "a.npz", "--out", "b.npz") == 0
+    for name, x in (("a.npz", 1), ("b.npz", 3)):
+        root = io.load(name).root
+        assert np.linalg.norm(root[0, [0, 2]] - [x, 2]) < 0.05
+        assert np.linalg.norm(root[-1, [0, 2]] - [x, 4]) < 0.3
+    assert duet(files, *words, "--path", "a.yaml", "--out", "d.glb") == 2
+    assert "--path is given 3 times" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "remark"),
+    [
+        ("one person bows and the other waves", "read as: 'a person bows :: a person waves'"),
+        ("two people shake hands", "read as: the two shake hands, facing each other, for 1.2 s"),
+        ("two people walk", ""),
+    ],
+)
+def test_how_the_words_are_read_is_said(
+    files: Path, capsys: pytest.CaptureFixture[str], words: str, remark: str
+) -> None:
+    assert duet(files, words, "--seconds", "0.5", "--out", "d.glb") == 0
+    said = capsys.readouterr().err
+    assert remark in said
+    assert bool(remark) == ("read as" in said)
+
+
+def test_words_that_no_pair_was_called_are_remarked_on(
+    files: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("motionloom.runtime.text.known.SAME", 0.999)  # to the tiny encoder all texts are alike
+    monkeypatch.setattr("motionloom.runtime.text.known.NEAR", 1.1)
+    prior = tiny.prior()
+    known = known_sentences(["dance salsa together"], {}, prior.text)
+    replace(block(prior), known=known).save(files / "dancers.safetensors", half=False)
+    assert duet(files, "two people dance salsa together", "--seconds", "0.5", "--out", "a.glb", block="dancers") == 0
+    assert "of two people" not in capsys.readouterr().err
+    assert duet(files, "two people fix a car", "--seconds", "0.5", "--out", "b.glb", block="dancers") == 0
+    said = capsys.readouterr().err
+    assert "of two people these weights have seen nothing like 'fix a car'; nearest: 'dance salsa together'" in said
 
 
 def test_a_timeline_is_one_duet_of_all_its_segments(files: Path) -> None:

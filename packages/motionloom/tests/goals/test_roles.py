@@ -3,7 +3,7 @@
 import pytest
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.roles import prompts_of
+from motionloom.goals.roles import prompts_of, without_two
 
 
 @pytest.mark.parametrize(
@@ -41,3 +41,15 @@ def test_what_is_for_both(words: str) -> None:
 def test_a_part_without_words_is_refused(wrong: str) -> None:
     with pytest.raises(MotionloomError, match="around one ::"):
         prompts_of(wrong)
+
+
+def test_what_two_do_without_who_they_are() -> None:
+    said = (
+        "two people dance salsa",
+        "A couple dances salsa",
+        "both wave",
+        "two dancers perform a salsa",
+        "a person waves",
+    )
+    expected = ["dance salsa", "dances salsa", "wave", "perform a salsa", "a person waves"]
+    assert [without_two(text) for text in said] == expected

@@ -68,6 +68,27 @@ def test_numbers_in_the_words_are_kept_and_measured_as_on_the_command_line(serve
     assert literal["results"][0]["frames"] == 100
 
 
+def test_the_best_of_several_is_that_of_the_library(server: Server) -> None:
+    made = server.draw(task="generate", prompt="a person jumps", seconds=1.0, seed=5, best_of=3, steps=6)
+    (expected,) = generate(Prior.load(), "a person jumps", seconds=1.0, seed=5, best_of=3, steps=6)
+    assert np.abs(poses(server, made["results"][0]["id"]) - expected.positions()).max() < 1e-3
+
+
+def test_a_loop_begins_as_it_ends_and_its_last_frames_are_seen_as_no_level(server: Server) -> None:
+    asked = {"task": "generate", "prompt": "a person waves", "seconds": 3.0, "seed": 3, "steps": 6}
+    job = server.submit(**asked, loop=True)
+    events = list(server.events(job))
+    assert [data["level"] for _, kind, data in events if kind == "level"] == [1, 2, 3, 4, 5, 6]
+    closed, free = (poses(server, one) for one in (_made(events[-1][2]), _made(server.draw(**asked))))
+    assert np.abs(closed[:30] - free[:30]).max() < 1e-3
+    ends = [np.linalg.norm((one[-1] - one[-1, 0]) - (one[0] - one[0, 0]), axis=-1).mean() for one in (closed, free)]
+    assert ends[0] < 0.5 * ends[1]
+
+
+def _made(job: dict[str, Any]) -> str:
+    return job["results"][0]["id"]
+
+
 def test_compose_follows_the_path_of_its_timeline(server: Server) -> None:
     timeline = {"segments": [{"text": "a person walks", "seconds": 2}] * 2, "path": PATH, "seed": 4}
     made = server.draw(task="compose", timeline=timeline, steps=6)

@@ -237,7 +237,7 @@ def test_a_row_is_led_from_where_it_begins_and_shows_the_noised_state(prior: Pri
         return clean + 1
 
     row = tasks._PairRow((), net, lead, None, None)
-    denoiser = tasks._PairDenoiser(prior, net, [50, 1], 1.0)
+    denoiser = tasks._PairDenoiser(prior, net, [50, 1], 1.0, True)
     state, motion = normal((2, 2, 30, 263), 0)
     begin = np.array([[1.0, 0.0, 0.0, 0.0], [0.6, 0.8, 1.0, 2.0]])
     assert np.array_equal(denoiser._moved(row, 50, motion, begin, state=state), motion + 1)

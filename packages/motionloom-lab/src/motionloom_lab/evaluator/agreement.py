@@ -14,8 +14,8 @@ from motionloom.weights.prior import Prior
 from motionloom_lab.evaluator.evaluators import Caption, Evaluator
 from motionloom_lab.metrics.actions import measure
 from motionloom_lab.metrics.obedience import CHECKS, Check
-from motionloom_lab.report.columns import columns
 from motionloom_lab.report.report import Report, Row, Value
+from motionloom_lab.report.tables import columns
 
 SETTINGS: dict[str, dict[str, Any]] = {
     "as generate": {},

@@ -23,8 +23,8 @@ from motionloom_lab.evaluator.net import Embedder, is_embedder, load_embedder
 from motionloom_lab.evaluator.pairs import TIMED, backwards
 from motionloom_lab.metrics.frechet import fid, fid_bias
 from motionloom_lab.metrics.retrieval import matching_distance, r_precision
-from motionloom_lab.report.columns import columns
 from motionloom_lab.report.report import Report, Row, Value
+from motionloom_lab.report.tables import columns
 from motionloom_train.data.clips import Clip
 from motionloom_train.data.sets import read_clips
 from motionloom_train.data.words import LABELS, mirror_text

@@ -4,11 +4,10 @@ Shafir et al., "Human Motion Diffusion as a Generative Prior" (PriorMDM), 2024, 
 one batch. First take: neighbouring rows are averaged over a handshake after every step. Second take: every transition,
 with the middles of both its intervals, is noised again and refined, held to the first take by a keep weight per frame.
 
-Two modes, both presets of one builder of keep weights (`Keep`): ``published`` gives what the released code gives (keep
-the handshake, refine only the ramps, restart at 900 of 1000, padding attended); ``paper`` what the paper says.
-
-States are (repetitions * intervals, frames, features), the intervals of one repetition one after the other. Everything
-above `double_take_features` is plain tensors over any denoiser. `motionloom.tasks.long` is the better default.
+Two modes, both presets of `Keep`: ``published`` gives what the released code gives (keep the handshake, refine only
+the ramps, restart at 900 of 1000, padding attended); ``paper`` what the paper says. States are (repetitions *
+intervals, frames, features). What is above `double_take_features` is plain arrays over any denoiser.
+`motionloom.tasks.long` is the better default.
 """
 
 import warnings

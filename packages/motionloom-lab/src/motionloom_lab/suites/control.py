@@ -26,11 +26,11 @@ from motionloom_lab.metrics.control import ControlError
 from motionloom_lab.metrics.frechet import fid, fid_bias
 from motionloom_lab.metrics.retrieval import r_precision
 from motionloom_lab.report import published_rows
-from motionloom_lab.report.columns import columns
 from motionloom_lab.report.report import REAL, Report
+from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import control_kinds, text_reference
 from motionloom_lab.suites.control_kinds import Kind, Target
-from motionloom_lab.suites.control_methods import BASE, METHODS, OURS, Made, Maker, checked, fits, maker
+from motionloom_lab.suites.control_methods import BASE, METHODS, Made, Maker, checked, fits, maker
 from motionloom_lab.suites.harness import Run, check_names, digest, diversity, physical_mean, row_of
 from motionloom_lab.suites.items import Item, fitting, pick, read_items, spread
 from motionloom_lab.suites.parts import Parts
@@ -235,8 +235,8 @@ def measure(
         "fid": f"of {len(trial.items)} motions to all {len(trial.everyone)} real ones",
     }
     others = published_rows.published("control", [column.name for column in COLUMNS])
-    notes, title = (*_notes(trial), *missing), f"Control: {run.label}"
-    return Report("control", title, run.command, described, COLUMNS, (*rows, *others), notes)
+    said, title = (*_notes(trial), *missing), f"Control: {run.label}"
+    return Report("control", title, run.command, described, COLUMNS, (*rows, *others), said)
 
 
 def _new(
@@ -268,18 +268,7 @@ def _notes(trial: ControlTrial) -> tuple[str, ...]:
     if every > count + 1:
         floor = fid_bias(trial.everyone, count, other=every - count, repeats=5, seed=trial.protocol.seed)
         bias += f", and so few make it large: {count} real motions and the {every - count} others are {floor:.3f} apart"
-    return (
-        "Goals are real motions' places in the world: each starts at the origin and faces +Z. A joint without the "
-        "trajectory is asked for in the world all the same; the published ways, whose numbers are relative to the "
-        "pelvis, are given its place relative to the pelvis, as in the paper.",
-        f"'{OURS}' and 'ours without exact fit' are measured as exported (bones constant, feet held still), the "
-        "published ways as drawn; ratios are to the uncontrolled motions of the same words and seeds in the same "
-        "manner.",
-        f"{bias}. Compare it only with FIDs of the same counts.",
-        "Between keyframes and in between, only the asked frames count in errors. In-between motions are given a "
-        "second, or a quarter of a short one, at either end.",
-        "Time depends on the machine and on what else it does.",
-    )
+    return (*notes("control", bias=bias), *notes("time"))
 
 
 def run(

@@ -20,9 +20,9 @@ from motionloom.weights.pair import PairBlock, blocks
 from motionloom.weights.prior import Prior
 from motionloom_lab.metrics import pair as mp
 from motionloom_lab.papers.mrt import MrtFile
-from motionloom_lab.report.columns import columns
 from motionloom_lab.report.published_rows import published
 from motionloom_lab.report.report import REAL, Report, Row, Value
+from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import duet_blocks
 from motionloom_lab.suites import duet_ways as ways
 from motionloom_lab.suites.duet_blocks import Beside
@@ -216,17 +216,8 @@ def measure(
         said,
         COLUMNS,
         (*rows, *others),
-        (*verdicts(errors), *NOTES),
+        (*verdicts(errors), *notes("duet-completion")),
     )
-
-
-NOTES = (
-    "Crops overlap, and all come from few recordings: intervals over crops are too narrow for other recordings.",
-    "Published rows see the velocity out of the last given frame (as --given tool and published do here), and the "
-    "errors of one sample.",
-    "Communication only: a block trained over the prior without its layers; the paper names the row and does not say "
-    "what it was.",
-)
 
 
 def _row(name: str, numbers: Mapping[str, Array]) -> Row:

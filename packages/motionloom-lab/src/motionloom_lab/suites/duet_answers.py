@@ -18,8 +18,8 @@ from motionloom.tasks.text import LARGEST_SEED, frames_in, generate
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from motionloom_lab.metrics import pair as mp
-from motionloom_lab.report.columns import columns
 from motionloom_lab.report.report import Report, Value
+from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import duet_text as judged
 from motionloom_lab.suites.duet import HELD_OUT
 from motionloom_lab.suites.duet_text import KINDS, NOTES, DuetSettings, Make, Table
@@ -91,12 +91,11 @@ def run(
 
 def table(given: Windows, how: DuetSettings) -> Table:
     """The columns of duets from words, and how far partners are from the real ones."""
-    silent = "The prior without communication does not know who is given; it begins where the real partner does."
     return Table(
         "duet-answers",
         "Two people: answers to somebody",
         given.captions(),
-        (*NOTES, silent),
+        (*NOTES, *notes("duet-answers")),
         columns=COLUMNS,
         more=lambda duets: apart(duets, given.all(how)),
     )

@@ -20,6 +20,7 @@ from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from motionloom_lab.metrics import pair as mp
 from motionloom_lab.report.report import Report
+from motionloom_lab.report.tables import notes
 from motionloom_lab.suites import duet_text as judged
 from motionloom_lab.suites.duet_answers import own_seed
 from motionloom_lab.suites.duet_text import KINDS, NOTES, Make, Table
@@ -71,8 +72,7 @@ def table(captions: tuple[str, ...], how: LongDuetSettings) -> Table:
         (f", last {how.seconds:g} s", lambda duet: duet[:, -frames:]),
         (f", first {how.seconds:g} s", lambda duet: duet[:, :frames]),
     )
-    silent = "The prior without communication begins where real partners do, and never hears of the other again."
-    return Table("duet-long", "Two people for long", captions, (*NOTES, silent), cuts)
+    return Table("duet-long", "Two people for long", captions, (*NOTES, *notes("duet-long")), cuts)
 
 
 def ours(prior: Prior, block: PairBlock, captions: Sequence[str], how: LongDuetSettings) -> Make:

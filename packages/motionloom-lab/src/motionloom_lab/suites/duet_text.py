@@ -24,8 +24,8 @@ from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 from motionloom_lab.metrics import pair as mp
 from motionloom_lab.metrics import pair_groups as groups
-from motionloom_lab.report.columns import columns
 from motionloom_lab.report.report import REAL, Column, Report, Row, Value
+from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites.duet import HELD_OUT, chosen_block
 from motionloom_lab.suites.duet_ways import no_communication_net
 from motionloom_lab.suites.harness import Run, Say, check_names
@@ -87,11 +87,7 @@ Make = Callable[[str, int, int], Sequence[Duet]]
 """(caption, count, seed) to that many duets."""
 Cut = Callable[[Array], Array]
 """A stretch of a duet (2, frames, 22, 3), of as many frames as the real windows have."""
-NOTES = (
-    "Real rows are windows of the same length; held-out pairs are held against the train pairs, all others against "
-    "all recordings.",
-    "Shuffled partners begin where the true partner began, facing as they did, and then do what they did elsewhere.",
-)
+NOTES = notes("duets")
 
 
 def whole(duet: Array) -> Array:
@@ -150,8 +146,7 @@ def opened(
 
 def text_table(pairs: Sequence[Pair]) -> Table:
     """Duets for the captions of the train pairs."""
-    silent = "The prior without communication does not know where the other is: it is given where real partners begin."
-    return Table("duet-text", "Two people from words", captions_of(pairs), (*NOTES, silent))
+    return Table("duet-text", "Two people from words", captions_of(pairs), (*NOTES, *notes("duet-text")))
 
 
 def beside(prior: Prior, pairs: Sequence[Pair], how: DuetSettings) -> Make:

@@ -12,8 +12,8 @@ from motionloom.kinematics.physics import Array
 from motionloom_lab.metrics.obedience import CHECKS, Check
 from motionloom_lab.metrics.realism import NUMBERS, average, speed_distance
 from motionloom_lab.metrics.realism import realism as numbers_of
-from motionloom_lab.report.columns import columns
 from motionloom_lab.report.report import REAL, Column, Report, Row, Value
+from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import bodies, obey, realism
 from motionloom_lab.suites.clips import real_clips
 from motionloom_lab.suites.reference import known
@@ -105,13 +105,10 @@ def realism_report(
         if not isinstance(real, Mapping) and fps == FPS:
             values["speed_distance"] = Value(speed_distance(list(clips), list(real), FPS))
         rows.append(Row(name, values))
-    notes = (
-        *said,
-        f"'{AS_DRAWN}' is what the network draws; '{AS_EXPORTED}' has constant bones and planted feet held still.",
-        "Intervals are 1.96 standard errors by the bootstrap over clips; the count is the number of clips.",
-    )
     title = "Realism: does it move like real people"
-    return Report("realism", title, command, protocol, (*shown, *columns("realism-body")), tuple(rows), notes)
+    return Report(
+        "realism", title, command, protocol, (*shown, *columns("realism-body")), tuple(rows), (*said, *notes("realism"))
+    )
 
 
 def body_values(held: Mapping[str, Any], count: int) -> dict[str, Value]:

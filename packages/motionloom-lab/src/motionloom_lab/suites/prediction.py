@@ -18,9 +18,9 @@ from motionloom.weights.predictor import Predictor, find_predictor
 from motionloom_lab.metrics import prediction as metrics
 from motionloom_lab.metrics.prediction import Singles
 from motionloom_lab.papers.humanmac import published_futures
-from motionloom_lab.report.columns import columns
 from motionloom_lab.report.published_rows import published
 from motionloom_lab.report.report import REAL, SAME, Report, Row
+from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import prediction_trial as trials
 from motionloom_lab.suites.harness import Run, check_names, check_steps, digest, row_of
 from motionloom_lab.suites.prediction_trial import Array, PredictionTrial, Way
@@ -239,12 +239,8 @@ def _identity(trial: PredictionTrial) -> str:
 
 
 def _notes(trial: PredictionTrial) -> tuple[str, ...]:
-    all_, several = len(trial.windows), trial.several
-    return (
-        "APD to MMFDE are distances of the whole flattened pose, not means over joints: numbers by the other "
-        "convention are about 15 times smaller, so compare zero velocity first.",
-        f"{several} of {all_} windows have more than one future; for the other {all_ - several} MMADE would be ADE.",
-    )
+    count, several = len(trial.windows), trial.several
+    return notes("prediction", several=several, count=count, single=count - several)
 
 
 def _published(trial: PredictionTrial, how: PredictionSettings, names: Sequence[str]) -> tuple[Row, ...]:

@@ -23,8 +23,8 @@ from motionloom_lab.evaluator.evaluators import Caption, Evaluator
 from motionloom_lab.metrics.frechet import fid, fid_bias
 from motionloom_lab.metrics.retrieval import matching_distance, multimodality_of, r_precision
 from motionloom_lab.report import published_rows
-from motionloom_lab.report.columns import columns
 from motionloom_lab.report.report import REAL, Report, Row, Value
+from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import text_reference
 from motionloom_lab.suites.harness import (
     PHYSICAL,
@@ -249,21 +249,13 @@ def measure(
 
 
 def _notes(trial: TextTrial) -> tuple[str, ...]:
-    real, protocol = trial.real, trial.protocol
-    half = len(real.motions) // 2
-    bias = fid_bias(real.motions, half, repeats=10, seed=protocol.seed)
+    real = trial.real
+    count, half = len(real.motions), len(real.motions) // 2
+    bias = fid_bias(real.motions, half, repeats=10, seed=trial.protocol.seed)
     said = [plain_words(caption.text) for several in real.captions for caption in several]
-    return (
-        f"FID compares {len(real.motions)} generated with {len(real.motions)} real motions in {real.motions.shape[1]} "
-        f"dimensions, and so few make it large: two random halves of the real motions ({half} each) are {bias:.3f} "
-        "apart. Compare it only with FIDs of the same count.",
-        f"{len(said)} captions, {len(said) - len(set(said))} of them in words that another has too: R@1 to R@3 count a "
-        "motion of such a caption as a miss, as the published code does; the column 'same words' counts it as a hit.",
-        f"{SHUFFLED.capitalize()}: captions dealt out anew over all items. {CHANCE.capitalize()}: k of the batch, and "
-        "the mean distance of a caption to motions of others.",
-        *_about(trial.evaluator),
-        "Time and memory depend on the machine and on what else it does.",
-    )
+    numbers = {"captions": len(said), "repeated": len(said) - len(set(said)), "width": real.motions.shape[1]}
+    found = notes("text", count=count, half=half, bias=bias, **numbers)
+    return (*found, *_about(trial.evaluator), *notes("cost"))
 
 
 def _about(evaluator: Evaluator) -> tuple[str, ...]:

@@ -26,8 +26,8 @@ from motionloom_lab.metrics.transitions import (
     transition_distance,
 )
 from motionloom_lab.report import published_rows
-from motionloom_lab.report.columns import columns
 from motionloom_lab.report.report import REAL, Report
+from motionloom_lab.report.tables import columns, notes
 from motionloom_lab.suites import harness, text_reference
 from motionloom_lab.suites.harness import Run, Say, diversity, embedded, replicated, row_of
 from motionloom_lab.suites.items import fitting, read_items
@@ -225,27 +225,11 @@ def measure(
 def _notes(trial: SeamTrial) -> tuple[str, ...]:
     how, segments = trial.how, trial.how.unfoldings * trial.how.intervals
     half = len(trial.real.motions) // 2
-    bias = fid_bias(trial.real.motions, min(half, segments), other=half, repeats=10, seed=how.seed)
-    notes = [
-        f"A replication makes {how.unfoldings} long motions of {how.intervals} captions: {segments} segments and "
-        f"{how.seams} transitions of {how.window} frames. Their FIDs are large because they are few: "
-        f"{min(half, segments)} real motions against {half} others are {bias:.3f} apart. The row of real motion has "
-        "its segments among those it is compared with.",
-        f"AUJ sums |mean curve - reference| over {how.window - 3} frames and has a floor, since a mean of "
-        f"{how.seams} windows is not flat: read it beside the real row, which has as many. Reference: "
-        f"{trial.mean_jerk:.6f} m/frame³, the mean of the real windows here; HumanML3D's published one is "
-        f"{JERK_HUMANML3D}. A way that moves more smoothly than real people everywhere scores badly on it without any "
-        "seam: AUJ, own, takes the motion's own mean instead.",
-        "Segments are judged without half a handshake at each seam; what is called inside lies at least half a window "
-        "from every seam. SLERP's row is measured on positions of constant bones and on features made of them; "
-        "of the other rows what the network draws is measured.",
-    ]
-    if trial.crops is None:
-        notes.append(
-            "Without --data there are no real windows for the evaluator, so that FID and Diversity of the transitions "
-            "are left out; the real row's other numbers are the shipped ones."
-        )
-    return (*notes, "Time depends on the machine and on what else it does.")
+    some = min(half, segments)
+    bias = fid_bias(trial.real.motions, some, other=half, repeats=10, seed=how.seed)
+    jerk = {"frames": how.window - 3, "jerk": trial.mean_jerk, "published": JERK_HUMANML3D}
+    found = notes("transitions", how=how, segments=segments, some=some, half=half, bias=bias, **jerk)
+    return (*found, *(notes("transitions-without-data") if trial.crops is None else ()), *notes("time"))
 
 
 def run(

@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from motionloom.errors import MotionloomError
+from motionloom.requests.batch import RowKeys
+from motionloom.requests.fields import specs
 
 READS = (".jsonl", ".ndjson", ".csv", ".parquet")
 MAX_COLUMNS = 200
@@ -186,9 +188,10 @@ def _csv(path: Path) -> Iterator[bytes]:
 
 def _value(column: str, text: str, point: str) -> Any:
     """Numbers of the columns that hold numbers; what is none is reported by `row.parse`. point: the decimal one."""
-    kinds = {"seconds": float, "seed": int, "person": int}
+    spec = specs(RowKeys).get(column)
+    reader = {"number": float, "whole": int}.get(spec.kind if spec else "", str)
     try:
-        return kinds[column](text.replace(point, ".")) if column in kinds else text
+        return reader(text if reader is str else text.replace(point, "."))
     except ValueError:
         return text
 

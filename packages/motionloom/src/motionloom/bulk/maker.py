@@ -27,6 +27,7 @@ from motionloom.tasks.adapting import adapt
 from motionloom.tasks.best import with_best_seeds
 from motionloom.tasks.control import Controlled, judged, moved, steered_features
 from motionloom.tasks.duet import compose_pair
+from motionloom.tasks.edit import Loop, edit
 from motionloom.tasks.long import compose, with_loaded
 from motionloom.tasks.pair import Duet, generate_pair
 from motionloom.tasks.sampling import Rows
@@ -62,6 +63,9 @@ class Options:
     solver: str = SOLVER
     raw: bool = False
     """Leave the feet as the network drew them."""
+    loop: float | None = None
+    """Seconds at the end of each motion that are drawn anew, so that its beginning can follow; None: it ends as it
+    will."""
     fps: float | None = None
     """Frames per second of the files; None: the weights' own."""
     seconds: float = 5.0
@@ -91,6 +95,7 @@ class Options:
             "hands": (self.hands, "as-is"),
             "unit": (self.unit, 1.0),
             "literal": (self.literal, False),
+            "loop": (self.loop, None),
         }  # left out as they always were: old ids hold
         return {name: value for name, (value, usual) in later.items() if value != usual} | {
             "weights": weights,
@@ -304,7 +309,9 @@ class Maker:
 
     def _duet(self, asked: Asked) -> Made:
         """Two people, one pair at a time: what is drawn beside it would change the last bits."""
-        duet, texts = self._two(asked), (asked.text, asked.text) if asked.timeline else prompts_of(asked.row.prompt)
+        texts = (asked.text, asked.text) if asked.timeline else prompts_of(asked.row.prompt)
+        first, second = self._two(asked)
+        duet = self._looped(asked, first, ""), self._looped(asked, second, "")
         measured = measure_two(duet, texts, self.judge)
         if asked.goal is not None:
             person = asked.row.person - 1
@@ -352,7 +359,17 @@ class Maker:
         if self.options.solver != SOLVER:
             raise MotionloomError(f"the task {asked.row.task} is made with the solver {SOLVER}")
 
+    def _looped(self, asked: Asked, motion: Motion, text: str) -> Motion:
+        """As ``motionloom generate --loop``: ``text`` is what is done at the end."""
+        if self.options.loop is None:
+            return motion
+        settings = Sampling(seed=asked.seed, steps=self.options.steps, guidance=self.options.guidance)
+        foot_lock = not self.options.raw
+        return edit(self.prior, motion, text, Loop(self.options.loop), foot_lock=foot_lock, sampling=settings)[0]
+
     def _alone(self, asked: Asked, motion: Motion, **measured: float) -> Made:
+        last = asked.row.prompt if asked.timeline is None else asked.timeline.segments[-1].text
+        motion = self._looped(asked, motion, last)
         return self._finished(asked, [motion], [{**measure(motion, asked.text, self.judge), **measured}])
 
     def _finished(self, asked: Asked, people: Sequence[Motion], measured: Sequence[Values]) -> Made:

@@ -154,6 +154,7 @@ def _options(arguments: argparse.Namespace) -> "Options":
         adapters=arguments.adapter,
         device=arguments.device,
         raw=not arguments.foot_lock,
+        loop=arguments.blend if arguments.loop else None,
         steps=arguments.steps,
         guidance=arguments.guidance,
         solver=arguments.solver,

@@ -384,7 +384,7 @@ def _remarks_on_words(prior: "Prior", block: "PairBlock", texts: list[str]) -> l
     Of a block whose file has no table of what it knows nothing is said.
     """
     from motionloom.goals.contact import read_contact
-    from motionloom.goals.roles import MARK, prompts_of
+    from motionloom.goals.roles import MARK, prompts_of, without_two
     from motionloom.runtime.text.known import nearest
 
     asked = {text: prompts_of(text) for text in texts}
@@ -395,9 +395,8 @@ def _remarks_on_words(prior: "Prior", block: "PairBlock", texts: list[str]) -> l
         contact = read_contact(said)
         lines += [] if contact is None else [f"read as: {contact}"]
     if block.known is not None and texts:
-        lines += [
-            f"of two people {found.remark()}" for found in nearest(block.known, texts, prior.text) if not found.near
-        ]
+        found = nearest(block.known, [without_two(text) for text in texts], prior.text)
+        lines += [f"of two people {one.remark()}" for one in found if not one.near]
     return _printed(lines) + remark_unknown(prior, [prompt for said in asked.values() for prompt in said])
 
 

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from motionloom.cli.finished import finished_motions
 from motionloom.cli.looping import check_loop, looped
@@ -85,12 +85,21 @@ def _generate(arguments: argparse.Namespace) -> int:
             "seed": arguments.seed + i,
             "segments": _segments(worded[i].timeline),
             "seats": [asdict(seat) for seat in seats],
+            "stairs": stairs_under(worded[i].motion),
             "amounts": [asdict(one) for one in worded[i].amounts],
             "still_from": worded[i].still_from,
         }
         for i, (caption, seats) in enumerate(zip(captions[: made.count], seated))
     ]
     _remark_seats(seated[: made.count])
+    for number, motion in enumerate(motions, start=1):
+        if under := motion["stairs"]:
+            whose = f"motion {number} " if len(motions) > 1 else ""
+            print(
+                f"motionloom: {whose}goes over {under['steps']} steps of {under['rise']:.2f} m, which are not drawn; "
+                "--json has their places",
+                file=sys.stderr,
+            )
     length = SECONDS if arguments.seconds is None else arguments.seconds
     about = {
         "motions": motions,
@@ -110,6 +119,25 @@ def _noting(seated: "list[list[Seat]]", motions: "Iterator[Motion]", target: "Ta
         found = seats(motion.positions(), motion.fps)
         seated.append(found if target is None else [_moved(seat, target, motion) for seat in found])
         yield motion
+
+
+def stairs_under(motion: "Motion") -> dict[str, Any] | None:
+    """The steps under somebody who climbs: their number and rise, and when and where each foot stands on one."""
+    import numpy as np
+
+    from motionloom.kinematics.physics import TOES
+    from motionloom.kinematics.stairs import stairs
+
+    places = motion.positions()
+    found = stairs(places, motion.fps)
+    if found is None:
+        return None
+    holds = []
+    for hold, level in zip(found.holds, found.levels, strict=True):
+        x, _, z = np.median(places[hold.first : hold.end, TOES[hold.side]], axis=0).tolist()
+        times = {"begin": hold.first / motion.fps, "end": hold.end / motion.fps}
+        holds.append(times | {"x": round(x, 3), "z": round(z, 3), "height": round(level * found.rise, 3)})
+    return {"steps": found.steps, "rise": found.rise, "footholds": holds}
 
 
 def _moved(seat: "Seat", target: "Target", motion: "Motion") -> "Seat":

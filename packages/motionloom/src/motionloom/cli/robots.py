@@ -284,10 +284,10 @@ def run_batch(arguments: argparse.Namespace) -> int:
 
 def _jobs(folder: Path) -> "Iterator[Job]":
     """The motions of a batch's folder, or every motion file below a folder."""
+    from motionloom import formats
     from motionloom.bulk.batch import read_batch
     from motionloom.bulk.folder import MANIFEST
     from motionloom.errors import MotionloomError
-    from motionloom.io import READS
     from motionloom.robots.many import Job
 
     if not folder.is_dir():
@@ -297,9 +297,9 @@ def _jobs(folder: Path) -> "Iterator[Job]":
             if result.state == "made" and len(result.people) == 1:
                 yield Job(str(result.id), result.people[0], {"text": result.about.get("text")})
         return
-    files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in READS and path.is_file())
+    files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in formats.readable() and path.is_file())
     if not files:
-        raise MotionloomError(f"{folder} holds no motion files ({', '.join(READS)})")
+        raise MotionloomError(f"{folder} holds no motion files ({', '.join(formats.readable())})")
     for path in files:
         name = "_".join(path.relative_to(folder).with_suffix("").parts)
         yield Job(name, path, {"source": str(path.relative_to(folder))})

@@ -17,8 +17,6 @@ from motionloom.kinematics.physics import J
 
 Array = NDArray[np.float64]
 
-TOUCH = 0.0
-"""Metres of overlap that are left."""
 COMMON, SLOW, WIDTH = 0.2, 0.12, 20
 """Standard deviations, in metres, of how far one goes from the other all the time and for a while, and the frames of
 such a while."""
@@ -116,7 +114,7 @@ def _need(first: Array, second: Array, line: Array) -> Array:
     at = np.arange(len(line))
     for _ in range(STEPS):
         moved = second[at] + _level(need[at, None] * line[at])[:, None, None]
-        deep = -gaps(first[at], RADII[_CORE], moved, RADII[_CORE]).min(axis=(1, 2)) - TOUCH
+        deep = -gaps(first[at], RADII[_CORE], moved, RADII[_CORE]).min(axis=(1, 2))
         at, deep = at[deep > 1e-3], deep[deep > 1e-3]
         if not len(at):
             break

@@ -31,7 +31,7 @@ LATE = 0.1
 """Metres that being at the end of that stretch, instead of in the middle, counts like."""
 GAP = 0.04
 """Metres between two wrists that touch."""
-OFFERED = 0.1
+OFFERED = 0.03
 """Metres below and above where hands meet at which a given person's hand is reached for."""
 LEFT_OF = 0.06
 """Metres that each of two people in each other's arms stands to the left of the middle: heads and arms pass."""

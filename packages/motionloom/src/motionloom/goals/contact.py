@@ -94,11 +94,11 @@ _CONTACTS: tuple[tuple[str, Contact], ...] = (
     ),
     (
         rf"(?:push|shov)(?:es|e|ing)? {_EACH_OTHER}",
-        Contact("touch as the first pushes", (_AGAINST,), (0.42, 0.55), seconds=0.3),
+        Contact("touch as the first pushes", (_AGAINST,), (0.5, 0.6), seconds=0.3),
     ),
     (
         r"(?:hold|tak|join)(?:s|ing|es|e)? (?:each other'?s )?hands|hand in hand",
-        Contact("hold hands", _ANY, (0.4, 0.7), "any", (0.75, 1.0), seconds=3.0),
+        Contact("hold hands", _ANY, (0.5, 0.7), "any", (0.75, 1.0), seconds=3.0),
     ),
     (
         r"danc(?:e|es|ing) (?:\w+ )?(?:together|with each other|with one another)",

@@ -16,6 +16,11 @@ _SECOND = re.compile(
     r"(?:\s*[,;.]\s*(?:and |while |but |then )*|\s+(?:and|while|whilst|as|but|whereas) (?:then )?)"
     rf"(?:the other|the second|another)(?: one)?(?! (?:{_PARTS})\b)(?: ({_NOUN}))? "
 )
+_TWO = re.compile(
+    r"^\W*(?:(?:a|the) couple|(?:the |these )?(?:two|both)(?: of them)?"
+    r"(?: \w*(?:people|persons|men|women|dancers|friends))?) ",
+    re.I,
+)
 _ALIKE = re.compile(r"(?:does (?:the same|so|it|likewise)|follows suit)\b")
 
 
@@ -43,3 +48,8 @@ def read_roles(text: str) -> tuple[str, str] | None:
     if _ALIKE.match(does[1].lower()):
         return None
     return f"a {first[1] or first[2] or 'person'} {does[0]}", f"a {second[1] or 'person'} {does[1]}"
+
+
+def without_two(text: str) -> str:
+    """The sentence without "two people", "a couple" and such at its beginning, which say nothing of what is done."""
+    return _TWO.sub("", text)

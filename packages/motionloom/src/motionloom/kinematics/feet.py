@@ -187,8 +187,7 @@ def _pieces(steps: Array, standing: Flags, hole: int) -> Iterator[tuple[int, Arr
 
 
 def bridge(values: Array, pieces: list[tuple[int, int]], ease: int) -> None:
-    """Fill the frames between pieces of ``values`` (frames, 3), in place: across short gaps directly, else by way of
-    zero, in ``ease`` frames."""
+    """Fill the frames between pieces of ``values`` (frames, 3), in place: short gaps directly, else by way of zero."""
     frames = len(values)
     ends = [(-ease, -ease), *pieces, (frames + ease, frames + ease)]
     for (first, stop), (start, last) in pairwise(ends):

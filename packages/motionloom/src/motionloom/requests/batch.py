@@ -28,10 +28,9 @@ class RowKeys(Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Batch(Checked):
+class Batch(Finish):
     """What is said of all rows."""
 
-    foot_lock: bool = like(Finish, "foot_lock")
     seconds: float = like(Generate, "seconds", "length of rows that do not say", default=5.0)
     seed: int = like(Sampling, "seed", "seed of rows that do not say, of the first variant")
     guidance: float = like(Sampling, "guidance")

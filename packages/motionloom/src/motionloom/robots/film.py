@@ -16,8 +16,8 @@ from motionloom.robots.engine import load_mujoco
 from motionloom.viz.film import film_rate, film_size, write_film
 
 Array = NDArray[np.float64]
-SIZE, CELL, COLUMNS = (640, 480), (150, 240), 8
-_GREY = (0.55, 0.57, 0.6, 1.0)
+SIZE, CELL, COLUMNS = (640, 480), (150, 200), 8
+_GREY, _SKY = (0.55, 0.57, 0.6, 1.0), (0.93, 0.94, 0.96)
 _THICK = 0.07
 """Radius of a capsule in lengths of a thigh, where a robot has no meshes."""
 
@@ -67,7 +67,7 @@ class _Renderer:
         shown = read_robot(robot.file.path, meshes=True, override=robot.map)
         self.model = _clothed(shown)
         self.data, self.camera = mujoco.MjData(self.model), mujoco.MjvCamera()
-        self.camera.distance, self.camera.azimuth, self.camera.elevation = 2.6 * _tall(robot), 130, -12
+        self.camera.distance, self.camera.azimuth, self.camera.elevation = 1.9 * _tall(robot), 130, -12
         try:
             self.renderer = mujoco.Renderer(self.model, size[1], size[0])
         except Exception as error:  # each backend of OpenGL has exceptions of its own
@@ -123,5 +123,17 @@ def _clothed(robot: Robot) -> Any:
     if not any(geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in spec.worldbody.geoms):
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], rgba=[0.86, 0.87, 0.88, 1])
         spec.worldbody.add_light(pos=[0, 0, 4], dir=[0, 0, -1])
+    for texture in list(spec.textures):
+        if texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
+            spec.delete(texture)
+    spec.add_texture(
+        name="motionloom sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+        rgb1=_SKY,
+        rgb2=_SKY,
+        width=32,
+        height=32,
+    )
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
     return spec.compile()

@@ -44,7 +44,10 @@ class Weight:
 PLANTED, SWINGING = Weight(300.0, 20.0), Weight(15.0, 2.0)
 PELVIS, TRUNK, HEAD = Weight(3.0, 1.0), Weight(0.0, 1.5), Weight(0.0, 0.5)
 HAND, ELBOW = Weight(5.0, 0.1), Weight(2.0, 0.0)
-POSTURE = 0.02
+POSTURE, CALM = 0.02, 0.3
+"""What a radian away from the robot's preferred pose costs, and one from the frame before: where a limb's twist hardly
+shows, as on a straight arm, it stays."""
+_SETTLED = 1e-4
 
 
 class Solver:
@@ -57,7 +60,7 @@ class Solver:
         self.robot, self.fps = robot, fps
         self.configuration = mink.Configuration(robot.model, q=robot.home)
         self.tasks = _tasks(robot)
-        self.posture = mink.PostureTask(robot.model, cost=_posture(robot))
+        self.posture, self.calm = (mink.PostureTask(robot.model, cost=_posture(robot, c)) for c in (POSTURE, CALM))
         self.posture.set_target(robot.home)
         lower, upper = robot.file.lower + _MARGIN, robot.file.upper - _MARGIN
         step = np.minimum(STEP if speed is None else speed, STEP) / fps
@@ -79,16 +82,20 @@ class Solver:
             self.tasks[f"{side}_ankle"].set_orientation_cost(weight.turn)
         if not self.begun:
             self._place_root(targets, number)
-        self.limit.before = None if not self.begun else self.configuration.q[7:].copy()
+        self.limit.before = self.configuration.q[7:].copy() if self.begun else None
+        if self.begun:
+            self.calm.set_target(self.configuration.q)
         for _ in range(self.rounds if self.begun else FIRST_ROUNDS):
-            self._round()
+            if self._round() < _SETTLED:
+                break
         self.begun = True
         return self.configuration.q.copy()
 
-    def _round(self) -> None:
+    def _round(self) -> float:
+        """One step; gives how far it went, in radians and metres."""
         import mink
 
-        tasks = [*self.tasks.values(), self.posture]
+        tasks = [*self.tasks.values(), self.posture, *([self.calm] if self.begun else [])]
         try:
             velocity = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", _DAMPING, limits=self.limits)
         except mink.NoSolutionFound:  # parts that cannot be kept apart within the limits
@@ -96,6 +103,7 @@ class Solver:
         pose = self.configuration.integrate(velocity, 1.0)
         pose[7:] = np.clip(pose[7:], *self.limit.bounds())
         self.configuration.update(pose)
+        return float(np.abs(velocity).max())
 
     def _place_root(self, targets: Targets, number: int) -> None:
         """Begin beside the first target, so that what is far away is not walked to."""
@@ -145,9 +153,9 @@ def _tasks(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _posture(robot: Robot) -> Array:
-    """(nv,) how strongly each hinge is drawn to the pose that the robot prefers."""
-    cost = np.full(robot.model.nv, POSTURE)
+def _posture(robot: Robot, each: float) -> Array:
+    """(nv,) what a radian of each hinge costs; the root is free."""
+    cost = np.full(robot.model.nv, each)
     cost[:6] = 0
     return cost
 

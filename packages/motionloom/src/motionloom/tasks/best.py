@@ -1,10 +1,10 @@
 """Best of several: which of a few seeds a motion is sampled from.
 
 Several seeds are sampled half way. There the denoised estimates show what each becomes. Kept is one that does the most
-of what its words allow to check (`motionloom.goals.expected`), then one whose body is whole, then one of the livelier
-half. Of those that are left it is the one whose joint rotations lie nearest to the mean of what the words ask for,
-which is what the network answers to pure noise: odd motions lie far from it, and so do those that move, which is why
-the mean comes last. docs/decisions/0024 says what it is worth.
+of what its words allow to check (`motionloom.goals.expected`), then one whose body is whole, then one that moves
+about as much as the others. Of those that are left it is the one whose joint rotations lie nearest to the mean of what
+the words ask for, which is what the network answers to pure noise: odd motions lie far from it, and so do those that
+move, which is why the mean comes last. docs/decisions/0024 says what it is worth.
 """
 
 from dataclasses import replace
@@ -20,6 +20,9 @@ from motionloom.kinematics.wholeness import ENOUGH, wholeness
 from motionloom.requests.sampling import Sampling
 from motionloom.tasks.sampling import Progress, Rows, sample, to_features
 from motionloom.weights.prior import Prior
+
+STILLER = 0.8
+"""Share of the middle candidate's pace below which another one counts as one that stands."""
 
 
 def with_best_seeds(
@@ -53,7 +56,7 @@ def _looked_at(prior: Prior, prompt: str, estimates: np.ndarray) -> list[tuple[f
         return [()] * len(estimates)
     bodies = humanml.decode_positions(to_features(prior, estimates))
     pace = np.linalg.norm(np.diff(bodies, axis=1), axis=-1).mean(axis=(1, 2))
-    still = np.zeros(len(pace)) if asks_for_rest(prompt) else pace < np.median(pace)
+    still = np.zeros(len(pace)) if asks_for_rest(prompt) else pace < STILLER * np.median(pace)
     return [
         (-share_met(prompt, body, prior.fps), float(wholeness(body) < ENOUGH), float(slow))
         for body, slow in zip(bodies, still, strict=True)

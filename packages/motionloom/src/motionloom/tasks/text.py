@@ -26,6 +26,7 @@ from motionloom.requests.shared import LONGEST
 from motionloom.tasks.best import with_best_seeds
 from motionloom.tasks.sampling import Progress, Rows, sample, to_features
 from motionloom.tasks.sampling import smooth as smooth
+from motionloom.tasks.supported import supported
 from motionloom.tasks.watching import View
 from motionloom.weights.prior import Prior
 
@@ -208,7 +209,8 @@ def check_features(prior: Prior) -> None:
 def finish(prior: Prior, features: np.ndarray, *, foot_lock: bool = True) -> Motion:
     """Features (frames, numbers) of this prior, not standardised, to a motion at its frame rate.
 
-    With ``foot_lock`` the planted feet hold still: as the features say (263), else by height and speed (135).
+    With ``foot_lock`` the planted feet hold still: as the features say (263), else by height and speed (135); and who
+    climbs (263) has steps of one height under the feet, or stays on the floor (`motionloom.tasks.supported`).
     Frame 0 stands over the origin; the person starts facing +Z. Raises MotionloomError as `check_features` does.
     """
     check_features(prior)
@@ -216,7 +218,8 @@ def finish(prior: Prior, features: np.ndarray, *, foot_lock: bool = True) -> Mot
 
 
 def _from_humanml(features: np.ndarray, fps: float, foot_lock: bool) -> Motion:
-    return to_motion(features, fps, foot_lock=foot_lock)
+    motion = to_motion(features, fps, foot_lock=foot_lock)
+    return supported(motion) if foot_lock else motion
 
 
 def _from_babel(features: np.ndarray, fps: float, foot_lock: bool) -> Motion:

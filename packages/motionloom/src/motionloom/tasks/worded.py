@@ -27,6 +27,7 @@ from motionloom.tasks.control import control
 from motionloom.tasks.long import compose
 from motionloom.tasks.sampling import Progress
 from motionloom.tasks.splice import concatenated
+from motionloom.tasks.supported import supported
 from motionloom.tasks.text import check_prompts, frames_in, generate_each
 from motionloom.weights.prior import Prior
 
@@ -230,7 +231,8 @@ def _shared(asked: Timeline, shares: Sequence[float]) -> Timeline:
 def _drawn(prior: Prior, asked: Timeline, sampling: Sampling, foot_lock: bool) -> Motion:
     segment, *more = asked.segments
     if more:
-        return concatenated(*compose(prior, asked.segments, foot_lock=foot_lock, sampling=sampling))
+        motion = concatenated(*compose(prior, asked.segments, foot_lock=foot_lock, sampling=sampling))
+        return supported(motion) if foot_lock else motion
     if segment.goal is not None:
         (made,) = control(prior, segment.text, segment.goal, foot_lock=foot_lock, sampling=sampling)
         return made.motion

@@ -1,0 +1,26 @@
+"""What every suite's table has: its columns (``lab/suites/columns.toml``) and the notes under it (``notes.toml``)."""
+
+import tomllib
+from functools import cache
+from importlib import resources
+from typing import Any
+
+from motionloom_lab.report.report import Column
+
+
+@cache
+def _rows(file: str) -> dict[str, Any]:
+    return tomllib.loads((resources.files("motionloom_lab.suites") / file).read_text(encoding="utf-8"))
+
+
+def columns(table: str) -> tuple[Column, ...]:
+    """The columns of a table, in order."""
+    return tuple(
+        Column(name, title, better, meaning, digits, bool(share))
+        for name, (title, better, digits, meaning, *share) in _rows("columns.toml")[table].items()
+    )
+
+
+def notes(table: str, **numbers: Any) -> tuple[str, ...]:
+    """The notes under a table, with the numbers that they name put in."""
+    return tuple(note.format(**numbers) for note in _rows("notes.toml")[table])

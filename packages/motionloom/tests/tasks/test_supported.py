@@ -1,0 +1,68 @@
+"""Nobody hangs in the air or sinks into the floor, on bodies that do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from motionloom import rotations as rot
+from motionloom.kinematics.physics import WRISTS, J
+from motionloom.kinematics.stairs import hovering, stairs
+from motionloom.motion import Motion
+from motionloom.skeleton import SMPL22
+from motionloom.tasks.supported import supported
+
+FPS = 20.0
+
+
+def lifted(height: np.ndarray) -> Motion:
+    """Somebody who stands in the rest pose, so many metres (frames,) above the floor."""
+    rest = SMPL22.rest_positions()
+    root = np.zeros((len(height), 3))
+    root[:, 1] = rest[0, 1] - rest[[7, 8, 10, 11], 1].min() + height
+    return Motion(SMPL22, FPS, root, np.tile([1.0, 0, 0, 0], (len(height), 22, 1)))
+
+
+def climbing(*heights: float, seconds: float = 1.0) -> Motion:
+    """From one height to the next in a fifth of a second, with a rest on each."""
+    times = np.arange(0, seconds * len(heights), 1 / FPS)
+    marks = [
+        (number * seconds + shift, height) for number, height in enumerate(heights) for shift in (0.0, seconds - 0.2)
+    ]
+    return lifted(np.interp(times, *np.array(marks).T))
+
+
+@pytest.mark.parametrize("heights", [(0, 0.2, 0.33, 0.55, 0.66), (0, 0.4, 0.9, 1.3), (0.7, 0.5, 0.36, 0.19, 0)])
+def test_feet_come_onto_steps_of_one_height_one_after_the_other(heights: tuple[float, ...]) -> None:
+    made = supported(climbing(*heights))
+    found = stairs(made.positions(), FPS)
+    assert found is not None
+    assert 0.14 < found.rise < 0.21
+    assert np.abs(np.diff(found.levels)).max() <= 1
+    off = [abs(hold.height - level * found.rise) for hold, level in zip(found.holds, found.levels, strict=True)]
+    assert max(off) < 0.03
+    assert len(heights) - 2 <= found.steps < len(heights)  # two that are nearly as high are one
+
+
+def test_who_hovers_comes_down_and_who_stands_or_sits_high_stays() -> None:
+    """Rising without a foothold for longer than a jump; a jump and a seat above the floor are left alone."""
+    rising = lifted(np.arange(60) / FPS)
+    assert hovering(rising.positions(), FPS)
+    assert not hovering(supported(rising).positions(), FPS)
+    t = np.arange(60) / FPS
+    jump = lifted(np.maximum(0.0, 2.5 * (t - 1) - 9.81 / 2 * (t - 1) ** 2) * (t > 1))
+    for other in (jump, lifted(np.zeros(60)), lifted(np.full(60, 0.3))):
+        assert supported(other) is other
+
+
+def test_hands_come_out_of_the_floor() -> None:
+    """Face down, an arm through the floor."""
+    lying = lifted(np.zeros(40))
+    rotations = lying.rotations.copy()
+    rotations[:, 0] = rot.rotvec_to_quat(np.array([np.pi / 2, 0.0, 0.0]))
+    rotations[:, J["left_shoulder"]] = rot.rotvec_to_quat(np.array([0.0, -0.5, 0.0]))
+    root = lying.root.copy()
+    root[:, 1] = 0.15
+    lying = replace(lying, root=root, rotations=rotations)
+    assert lying.positions()[:, WRISTS[0], 1].max() < -0.05
+    assert supported(lying).positions()[:, WRISTS, 1].min() > 0.0
