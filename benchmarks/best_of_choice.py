@@ -12,8 +12,9 @@ import numpy as np
 from motionloom.diffusion.sampling import row_seed
 from motionloom.goals.sequence import split_actions
 from motionloom.kinematics.physics import jerk, velocity
+from motionloom.requests.sampling import Sampling
 from motionloom.tasks import best
-from motionloom.tasks.sampling import Rows, Sampling, sample
+from motionloom.tasks.sampling import Rows, sample
 from motionloom.tasks.text import finish, frames_in, sample_features
 from motionloom.weights.prior import Prior, find_weights
 from motionloom_lab.metrics.obedience import EVERYDAY, Check

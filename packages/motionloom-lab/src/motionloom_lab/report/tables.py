@@ -1,6 +1,7 @@
 """What every suite's table has: its columns (``lab/suites/columns.toml``) and the notes under it (``notes.toml``)."""
 
 import tomllib
+from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -21,6 +22,6 @@ def columns(table: str) -> tuple[Column, ...]:
     )
 
 
-def notes(table: str, **numbers: Any) -> tuple[str, ...]:
+def notes(table: str, numbers: Mapping[str, Any] | None = None) -> tuple[str, ...]:
     """The notes under a table, with the numbers that they name put in."""
-    return tuple(note.format(**numbers) for note in _rows("notes.toml")[table])
+    return tuple(note.format(**(numbers or {})) for note in _rows("notes.toml")[table])

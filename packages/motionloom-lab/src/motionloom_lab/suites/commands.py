@@ -141,7 +141,7 @@ def study(asked: Asked) -> None:
 
     name, out = asked["name"], asked["out"]
     names = ("quick", "windows", "samples", "train_steps", "seed")
-    budget = studies.budget(name, **{key: asked[key] for key in names if key in asked})
+    budget = studies.budget(name, changes={key: asked[key] for key in names if key in asked})
     run = job_of(asked, options.typed(options.commands()["study"], asked), out).run("study")
     keep = asked.get("keep", out / "networks")
     found = studies.run(name, run, protocol=asked.get("protocol"), keep=keep, budget=budget)

@@ -268,7 +268,7 @@ def _notes(trial: ControlTrial) -> tuple[str, ...]:
     if every > count + 1:
         floor = fid_bias(trial.everyone, count, other=every - count, repeats=5, seed=trial.protocol.seed)
         bias += f", and so few make it large: {count} real motions and the {every - count} others are {floor:.3f} apart"
-    return (*notes("control", bias=bias), *notes("time"))
+    return (*notes("control", {"bias": bias}), *notes("time"))
 
 
 def run(

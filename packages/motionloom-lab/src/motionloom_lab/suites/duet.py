@@ -66,7 +66,9 @@ class CompletionSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        check_ranges(self, crops=(1, 10_000), samples=(1, 100), steps=(1, 1000), guidance=GUIDANCES, seed=SEEDS)
+        check_ranges(
+            self, {"crops": (1, 10_000), "samples": (1, 100), "steps": (1, 1000), "guidance": GUIDANCES, "seed": SEEDS}
+        )
         if self.given not in GIVEN:
             raise MotionloomError(f"what is given is one of {', '.join(GIVEN)}; got {self.given[:40]!r}")
 

@@ -40,7 +40,7 @@ class LongDuetSettings(judged.DuetSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_ranges(self, segments=(2, MOST))
+        check_ranges(self, {"segments": (2, MOST)})
 
 
 FULL, QUICK = LongDuetSettings(), LongDuetSettings(duets=2, steps=6, segments=2)

@@ -74,7 +74,7 @@ class DuetSettings:
     """Feet cleaned up, as `motionloom duet` writes them."""
 
     def __post_init__(self) -> None:
-        check_ranges(self, duets=(2, 10_000), seconds=(1, 30), seed=SEEDS)
+        check_ranges(self, {"duets": (2, 10_000), "seconds": (1, 30), "seed": SEEDS})
 
     @property
     def drawing(self) -> "DuetDrawing":

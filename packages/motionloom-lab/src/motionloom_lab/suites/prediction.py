@@ -51,8 +51,8 @@ class PredictionSettings:
 
     def __post_init__(self) -> None:
         some = (1, 1000)
-        check_ranges(self, samples=some, steps=some, published_steps=some, replications=some)
-        check_ranges(self, guidance=GUIDANCES, seed=SEEDS)
+        check_ranges(self, {"samples": some, "steps": some, "published_steps": some, "replications": some})
+        check_ranges(self, {"guidance": GUIDANCES, "seed": SEEDS})
         if self.singles not in get_args(Singles):
             raise MotionloomError(f"singles are one of {', '.join(get_args(Singles))}; got {self.singles!r}")
 
@@ -240,7 +240,7 @@ def _identity(trial: PredictionTrial) -> str:
 
 def _notes(trial: PredictionTrial) -> tuple[str, ...]:
     count, several = len(trial.windows), trial.several
-    return notes("prediction", several=several, count=count, single=count - several)
+    return notes("prediction", {"several": several, "count": count, "single": count - several})
 
 
 def _published(trial: PredictionTrial, how: PredictionSettings, names: Sequence[str]) -> tuple[Row, ...]:

@@ -5,7 +5,7 @@ weights: steps, and those of `prediction_behaviour`. Each writes ``NAME.md``, ``
 folder. A network that is finished is found again there, one that was stopped goes on.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -81,12 +81,12 @@ class Lab:
     progress: Say = silent
 
 
-def budget(name: str, *, quick: bool = False, **said: int) -> Budget:
-    """The usual budget of a study with what was said of `Budget`; raises MotionloomError for what cannot be."""
+def budget(name: str, *, quick: bool = False, changes: Mapping[str, int] | None = None) -> Budget:
+    """The usual budget of a study with ``changes`` of `Budget`; raises MotionloomError for what cannot be."""
     usual = {"steps": Budget(16, 10), "horizon": Budget(16, 4), "hold": Budget(16, 8), "switch": Budget(24, 1)}
     found = Budget(4, 2, 20, seconds=4.0, walks=(2, 4)) if quick else usual.get(name, Budget(64, 20))
-    found = replace(found, **said)  # type: ignore[arg-type]
-    check_ranges(found, windows=(1, MOST), samples=(1, MOST), train_steps=(1, MOST))
+    found = replace(found, **(changes or {}))  # type: ignore[arg-type]
+    check_ranges(found, {"windows": (1, MOST), "samples": (1, MOST), "train_steps": (1, MOST)})
     return found
 
 

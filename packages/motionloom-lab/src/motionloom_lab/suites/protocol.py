@@ -4,6 +4,7 @@ The published protocol (Guo et al. 2022, as MDM and PriorMDM ran it) in its own 
 batches of 32, replications with a 95 % interval of 1.96 sigma / sqrt(replications).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypedDict
 
@@ -83,9 +84,12 @@ class Transitions:
 
     def __post_init__(self) -> None:
         frames, several = (0, 100), (1, 1000)
-        check_ranges(self, handshake=(1, 100), margin=frames, blend=frames, unfoldings=several, intervals=several)
-        check_ranges(self, replications=(1, MOST_REPLICATIONS), steps=(1, 1000), guidance=GUIDANCES)
-        check_ranges(self, seed=(0, LARGEST_SEED - 1 - (self.replications + 1) * STRIDE))
+        check_ranges(
+            self,
+            {"handshake": (1, 100), "margin": frames, "blend": frames, "unfoldings": several, "intervals": several},
+        )
+        check_ranges(self, {"replications": (1, MOST_REPLICATIONS), "steps": (1, 1000), "guidance": GUIDANCES})
+        check_ranges(self, {"seed": (0, LARGEST_SEED - 1 - (self.replications + 1) * STRIDE)})
 
     @property
     def window(self) -> int:
@@ -189,8 +193,8 @@ class Protocol:
             0 < len(steps) <= MOST_STEPS and len(set(steps)) == len(steps) and min(steps) >= 1,
             f"steps are 1 to {MOST_STEPS} different numbers of 1 or more; got {', '.join(map(str, steps)) or 'none'}",
         )
-        check_ranges(self, replications=(1, MOST_REPLICATIONS), guidance=GUIDANCES)
-        check_ranges(self, seed=(0, LARGEST_SEED - 1 - (self.replications + 1) * STRIDE))
+        check_ranges(self, {"replications": (1, MOST_REPLICATIONS), "guidance": GUIDANCES})
+        check_ranges(self, {"seed": (0, LARGEST_SEED - 1 - (self.replications + 1) * STRIDE)})
         _need(self.batch is None or 4 <= self.batch <= 4096, f"a batch is 4 to 4096 motions, or all; got {self.batch}")
         least = self.batch or 4
         _need(
@@ -273,7 +277,7 @@ def quick_transitions(how: Transitions) -> Transitions:
     return replace(how, intervals=min(how.intervals, 8), unfoldings=1, replications=min(how.replications, 2))
 
 
-def check_ranges(settings: object, **ranges: tuple[float, float]) -> None:
+def check_ranges(settings: object, ranges: Mapping[str, tuple[float, float]]) -> None:
     """Raise MotionloomError where a setting of that name is not from the first to the second number."""
     for name, (least, most) in ranges.items():
         value = getattr(settings, name)

@@ -254,7 +254,7 @@ def _notes(trial: TextTrial) -> tuple[str, ...]:
     bias = fid_bias(real.motions, half, repeats=10, seed=trial.protocol.seed)
     said = [plain_words(caption.text) for several in real.captions for caption in several]
     numbers = {"captions": len(said), "repeated": len(said) - len(set(said)), "width": real.motions.shape[1]}
-    found = notes("text", count=count, half=half, bias=bias, **numbers)
+    found = notes("text", dict(count=count, half=half, bias=bias, **numbers))
     return (*found, *_about(trial.evaluator), *notes("cost"))
 
 

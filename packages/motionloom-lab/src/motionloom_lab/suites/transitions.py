@@ -228,7 +228,7 @@ def _notes(trial: SeamTrial) -> tuple[str, ...]:
     some = min(half, segments)
     bias = fid_bias(trial.real.motions, some, other=half, repeats=10, seed=how.seed)
     jerk = {"frames": how.window - 3, "jerk": trial.mean_jerk, "published": JERK_HUMANML3D}
-    found = notes("transitions", how=how, segments=segments, some=some, half=half, bias=bias, **jerk)
+    found = notes("transitions", dict(how=how, segments=segments, some=some, half=half, bias=bias, **jerk))
     return (*found, *(notes("transitions-without-data") if trial.crops is None else ()), *notes("time"))
 
 

@@ -23,6 +23,7 @@ from motionloom.cli.sampling import (
     take_text_anywhere,
 )
 from motionloom.cli.skeletons import CHARACTERS, Target, add_skeleton, own_outs, read_target
+from motionloom.cli.two_bodies import two_body_measures, two_body_remarks
 from motionloom.cli.writing import add_writing, at_rate, check_overwriting, check_rate, check_unit
 from motionloom.formats import writable
 from motionloom.requests.duet import Duet
@@ -43,8 +44,6 @@ SECONDS, ADDED = 6.0, 3.0
 """Length of a duet, and what is added to a past, unless asked otherwise."""
 PAIRS = 8
 """Duets that are drawn together: those of a group that is finished stay where the next one is interrupted."""
-DEEP = 0.02
-"""Metres of overlap that are no touch any more: skin and cloth give way as much."""
 SINGLE = writable(single=True)
 """Files of one person each."""
 REMARKED = 64
@@ -142,12 +141,15 @@ def run_duet(arguments: argparse.Namespace) -> int:
                     [looped(arguments, prior, person, "", seed=seed + number) for person in duet]
                     for number, duet in enumerate(duets)
                 ]
-                measures.extend(_measures(duet) for duet in duets)
+                measures.extend(two_body_measures(duet) for duet in duets)
                 yield duets
 
     interrupted = made.take(drawn())
     about = _about(arguments, made.count, seconds)
-    about |= {"measures": measures[: made.count], "remarks": remarks + _printed(_remarks(measures[: made.count]))}
+    about |= {
+        "measures": measures[: made.count],
+        "remarks": remarks + _printed(two_body_remarks(measures[: made.count])),
+    }
     report(arguments, about, made.written, made.sampling)
     note_rate(arguments, _inputs(arguments))
     return made.ended(interrupted)
@@ -455,31 +457,3 @@ def _about(arguments: argparse.Namespace, count: int, seconds: float) -> dict[st
         "weights": str(arguments.weights),
         "block": str(arguments.pair_weights),
     }
-
-
-def _measures(duet: "Sequence[Motion]") -> dict[str, float]:
-    """How near the two bodies and their hands come, and how deep and in how many frames they are in each other."""
-    from motionloom.kinematics.capsules import overlap, trunk_distance, wrist_distance
-    from motionloom.retarget import joints22
-
-    first, second = (joints22(person) for person in duet)
-    apart, depth = trunk_distance(first, second), overlap(first, second)
-    hands = wrist_distance(first, second)
-    return {
-        "least_trunk_distance": round(float(apart.min()), 4),
-        "trunk_distance": round(float(sorted(apart)[len(apart) // 2]), 4),
-        "deepest_overlap": round(float(depth.max()), 4),
-        "overlapping_frames": int((depth > DEEP).sum()),
-        "least_wrist_distance": round(float(hands.min()), 4),
-        "least_wrist_distance_at": round(float(hands.argmin()) / duet[0].fps, 3),
-    }
-
-
-def _remarks(measures: "Sequence[dict[str, float]]") -> list[str]:
-    """A sentence for each duet whose bodies are in each other."""
-    return [
-        f"{f'duet {number}: ' if len(measures) > 1 else ''}the two are in each other by "
-        f"{100 * one['deepest_overlap']:.0f} cm in {one['overlapping_frames']} frames"
-        for number, one in enumerate(measures, 1)
-        if one["overlapping_frames"]
-    ]

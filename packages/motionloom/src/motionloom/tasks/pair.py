@@ -109,16 +109,13 @@ def pair_features(
     bodies = [Bodies.of(mask[2 * i : 2 * i + 2], frozen[2 * i : 2 * i + 2], one) for i, one in enumerate(meetings)]
 
     def corrected(state: np.ndarray, batch: Sequence[int], level: int) -> np.ndarray:
-        some = [changes[i] for i in batch]
-        if not any(some):
-            return state
-        return np.concatenate([state[:, :1], corrected_rows(state[:, 1:], some, level)], axis=1)
+        return _corrected(state, [changes[i] for i in batch], level)
 
     def two_bodies(state: np.ndarray, batch: list[int], level: int) -> np.ndarray:
         if not chosen.bodies or net.silent:
             return state
-        made = _two_bodies(prior, net, [bodies[row // 2] for row in batch[::2]], state, level)
-        return np.where(mask[batch], state, made)
+        apart = _two_bodies(prior, net, [bodies[row // 2] for row in batch[::2]], state, level)
+        return np.where(mask[batch], state, apart)
 
     def edit(denoise: Denoiser, batch: Batch) -> Denoiser:
         guided = relative_pose_guidance(
@@ -137,8 +134,8 @@ def pair_features(
 
         return changed
 
-    silent = not any(prompt.strip() for prompt in prompts)
-    how = replace(chosen, batch_size=2 * chosen.batch(PAIRS), guidance=1.0 if silent else chosen.guidance)
+    guidance = chosen.guidance if any(prompt.strip() for prompt in prompts) else 1.0
+    how = replace(chosen, batch_size=2 * chosen.batch(PAIRS), guidance=guidance)
     asked = Rows(prompts, [1 + frames] * rows, seeds, pair_noise)
     walk = sample(
         prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress, view=_view(prior, net)
@@ -151,6 +148,13 @@ def pair_features(
         state = np.where(mask, given.observed.values, state)
     places, motion = part(two_bodies(corrected(state, range(rows), 0), list(range(rows)), 0))
     return people(motion * prior.std + prior.mean), net.places.decode(people(places))
+
+
+def _corrected(state: np.ndarray, corrections: Sequence[Correction | None], level: int) -> np.ndarray:
+    """Denoised states (rows, 1 + frames, 263) with the motion of each row corrected, if it is."""
+    if not any(corrections):
+        return state
+    return np.concatenate([state[:, :1], corrected_rows(state[:, 1:], corrections, level)], axis=1)
 
 
 def _two_bodies(prior: Prior, net: PairSession, bodies: list[Bodies], state: np.ndarray, level: int) -> np.ndarray:
