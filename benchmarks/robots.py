@@ -24,6 +24,8 @@ from motionloom.motion import Motion
 from motionloom.robots.body import Robot, read_robot
 from motionloom.robots.clip import Clip, put_on_robot
 from motionloom.robots.figures import Figures, measure
+from motionloom.weights.container import weights_digest
+from motionloom.weights.prior import find_weights
 
 KINDS = (
     "a person walks forward",
@@ -122,7 +124,8 @@ def main() -> int:
     lines += ["", *summary(found)]
     print("\n".join(["", *summary(found)]))
     if arguments.out is not None:
-        arguments.out.write_text("\n".join(lines) + "\n")
+        found_weights = f"{arguments.weights} {weights_digest(find_weights(arguments.weights))[:12]}"
+        arguments.out.write_text("\n".join([*lines, "", f"Weights: {found_weights}"]) + "\n")
     return 0
 
 

@@ -16,10 +16,10 @@ from motionloom.goals.hold import FixedJoints, FixedPart
 from motionloom.kinematics import physics
 from motionloom.kinematics.ik import motion_from_positions
 from motionloom.motion import Motion
+from motionloom.requests.sampling import PredictionSampling
 from motionloom.skeleton import SMPL22
 from motionloom.tasks.completion import Known, next_frames
 from motionloom.tasks.predict import predict, switch
-from motionloom.tasks.sampling import PredictionSampling
 from motionloom.tasks.windows import WindowSampler
 from motionloom.weights.predictor import Predictor
 from motionloom_lab.metrics import prediction as metrics

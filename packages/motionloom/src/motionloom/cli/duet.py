@@ -10,7 +10,7 @@ from motionloom.cli.looping import looped
 from motionloom.cli.options import add_options
 from motionloom.cli.reading import add_reading, crop, note_rate, read_clip
 from motionloom.cli.sampling import (
-    add_adapters,
+    add_sampling,
     bar,
     check_prompt,
     fail,
@@ -22,9 +22,9 @@ from motionloom.cli.sampling import (
     sampling_of,
     take_text_anywhere,
 )
-from motionloom.cli.skeletons import CHARACTERS, Target, add_skeleton, own_outs, read_target
+from motionloom.cli.skeletons import CHARACTERS, Target, own_outs, read_target
 from motionloom.cli.two_bodies import two_body_measures, two_body_remarks
-from motionloom.cli.writing import add_writing, at_rate, check_overwriting, check_rate, check_unit
+from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check_unit
 from motionloom.formats import writable
 from motionloom.requests.duet import Duet
 from motionloom.requests.shared import FINISH, SAMPLED
@@ -79,28 +79,17 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument(
         "--pair-weights", default="duet", metavar="NAME|PATH", help="what makes two of one (default duet)"
     )
-    _add_sampling(parser)
+    given = "those of the motions given"
+    add_sampling(
+        parser,
+        own_rate=f"20, or {given}",
+        own_skeleton=f"the uniform person's, or {given}",
+        own_unit=f"m, or {given}",
+        out="both people in a .glb .mp4 .gif .png, or two .bvh or .npz, one for each (default duet.glb)",
+    )
     add_reading(parser)
     take_text_anywhere(parser)
     parser.set_defaults(run=run_duet)
-
-
-def _add_sampling(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--out",
-        type=Path,
-        action="append",
-        metavar="NAME",
-        help="file to write, repeatable: both people in a .glb .mp4 .gif .png, or two .bvh or .npz, one for each "
-        "(default duet.glb)",
-    )
-    parser.add_argument("--weights", default="default", metavar="NAME|PATH", help="the prior (default: default)")
-    add_adapters(parser)
-    parser.add_argument("--fps", type=float, help="frame rate of the files (default 20, or that of the motions given)")
-    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
-    parser.add_argument("--json", action="store_true", help="print what was made as JSON")
-    add_skeleton(parser, own="the uniform person's, or those of the motions given")
-    add_writing(parser, unit="m, or those of the motions given")
 
 
 def run_duet(arguments: argparse.Namespace) -> int:

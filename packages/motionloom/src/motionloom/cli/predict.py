@@ -12,9 +12,9 @@ from motionloom.cli.futures import Target as Files
 from motionloom.cli.looping import all_looped, check_loop_behind
 from motionloom.cli.options import add_options
 from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, note_rate, read_clip
-from motionloom.cli.sampling import bar, fail, sampling_of
-from motionloom.cli.skeletons import Target, add_skeleton, read_target
-from motionloom.cli.writing import add_writing, at_rate, check_overwriting, check_rate, check_unit
+from motionloom.cli.sampling import add_sampling, bar, fail, sampling_of
+from motionloom.cli.skeletons import Target, read_target
+from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check_unit
 from motionloom.formats import readable
 from motionloom.requests.fields import specs
 from motionloom.requests.predict import NAMES, Predict, Switch
@@ -94,34 +94,22 @@ def _add_switch(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]
     switch.add_argument("past", type=Path, metavar="PAST")
     switch.add_argument("target", type=Path, metavar="TARGET")
     add_options(switch, Switch, "seconds", "facing", *OPTIONS, helps={"count": "versions to make"})
-    switch.add_argument(
-        "--out",
-        type=Path,
-        action="append",
-        metavar="NAME",
-        help="file to write, repeatable; .bvh .glb .npz .mp4 .gif .png (default switch.bvh)",
-    )
-    _add_sampling(switch, "TARGET")
+    _add_sampling(switch, "TARGET", out=".bvh .glb .npz .mp4 .gif .png (default switch.bvh)")
     switch.set_defaults(run=run_switch)
 
 
-def _add_sampling(parser: argparse.ArgumentParser, other: str) -> None:
+def _add_sampling(parser: argparse.ArgumentParser, other: str, *, out: str | None = None) -> None:
     """How and where is sampled, how files are read; ``other`` is the second motion, in words."""
     parser.add_argument("--retarget", action="store_true", help=f"put {other} on PAST's skeleton if it has another")
-    parser.add_argument(
-        "--weights", default="predictor", metavar="NAME|PATH", help="shipped name or file (default: predictor)"
-    )
-    parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
-    parser.add_argument("--json", action="store_true", help="print what was made as JSON")
-    parser.add_argument("--fps", type=float, metavar="N", help="frame rate of the files (default: PAST's)")
     parser.add_argument(
         "--loop-weights",
         default="default",
         metavar="NAME|PATH",
         help="what draws the end for --loop (default: default)",
     )
-    add_skeleton(parser, own="PAST's")
-    add_writing(parser, unit="PAST's, else m")
+    add_sampling(
+        parser, own_rate="PAST's", own_skeleton="PAST's", own_unit="PAST's, else m", out=out, weights="predictor"
+    )
     add_reading(parser)
 
 

@@ -26,28 +26,35 @@ def add_sampling(
     own_rate: str = "the model's 20",
     own_skeleton: str = "the uniform person's",
     own_unit: str = "m",
+    out: str | None = "",
+    weights: str = "default",
 ) -> None:
     """``--out``, what motions are sampled with and where, and ``--skeleton``.
 
     ``own_rate``, ``own_skeleton`` and ``own_unit`` are those of the files without ``--fps``, ``--skeleton`` and
-    ``--out-unit``, in words.
+    ``--out-unit``, in words. out: what ``--out`` may be, in words; None: the command has its own. weights: a shipped
+    name; adapters are of the prior alone.
     """
+    if out is not None:
+        meaning = out or f"{' '.join(writable())} (default motion.bvh; motion.glb for a character)"
+        add_out(parser, meaning)
     parser.add_argument(
-        "--out",
-        type=Path,
-        action="append",
-        metavar="NAME",
-        help=f"file to write, repeatable; {' '.join(writable())} (default motion.bvh; motion.glb for a character)",
+        "--weights", default=weights, metavar="NAME|PATH", help=f"shipped name or file (default: {weights})"
     )
-    parser.add_argument(
-        "--weights", default="default", metavar="NAME|PATH", help="shipped name or file (default: default)"
-    )
-    add_adapters(parser)
+    if weights == "default":
+        add_adapters(parser)
     parser.add_argument("--fps", type=float, help=f"frame rate of the files (default: {own_rate})")
     parser.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
     parser.add_argument("--json", action="store_true", help="print what was made as JSON")
     add_skeleton(parser, own=own_skeleton)
     add_writing(parser, unit=own_unit)
+
+
+def add_out(parser: argparse.ArgumentParser, meaning: str) -> None:
+    """``--out``; ``meaning``: what it may be, in words."""
+    parser.add_argument(
+        "--out", type=Path, action="append", metavar="NAME", help=f"file to write, repeatable; {meaning}"
+    )
 
 
 def sampling_of(arguments: argparse.Namespace) -> dict[str, Any]:

@@ -15,14 +15,16 @@ from motionloom.motion import Motion
 GLTF = (".glb", ".gltf", ".vrm", ".vrma")
 _OWN = "that is written for a character of such a file: --skeleton hero{0} --out moving{0}; else write a .glb"
 _BLENDER = "Blender turns it into a .glb (docs/blender.md)"
+_ROBOT = "joint angles of a robot go with its model: --robot (docs/robots.md)"
 _WAYS_OUT = {
     ".gltf": _OWN.format(".gltf"),
     ".vrm": _OWN.format(".vrm"),
     **dict.fromkeys((".usd", ".usdc", ".usdz"), "write a .usda, which USD's own usdcat turns into the others"),
     ".dae": "write a .glb or .bvh",
+    ".csv": _ROBOT,
     ".blend": "write a .glb and import it in Blender (docs/blender.md)",
 }
-_WAYS_IN = dict.fromkeys((".dae", ".blend", ".usd", ".usda", ".usdc", ".usdz"), _BLENDER)
+_WAYS_IN = dict.fromkeys((".dae", ".blend", ".usd", ".usda", ".usdc", ".usdz"), _BLENDER) | {".csv": _ROBOT}
 
 
 def load(

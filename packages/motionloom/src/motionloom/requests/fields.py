@@ -85,13 +85,11 @@ class Spec:
     def _number(self, value: Any, place: str) -> float:
         if not isinstance(value, Real) or isinstance(value, bool):
             _wrong(place, f"must be a {'whole ' * (self.kind == 'whole')}number", value)
-        if (
-            not self.low <= value <= self.high
-            or (self.above and value == self.low)
-            or (self.kind == "whole" and value != int(value))
-        ):
+        one: Any = value
+        inside = self.low <= one <= self.high and not (self.above and one == self.low)
+        if not inside or (self.kind == "whole" and one != int(one)):
             _wrong(place, f"must be {self.range}{self.hint and f', {self.hint}'}", value)
-        return int(value) if self.kind == "whole" else float(value)
+        return int(one) if self.kind == "whole" else float(one)
 
     def _text(self, value: Any, place: str) -> str:
         if not isinstance(value, str):
@@ -112,7 +110,6 @@ class Bounds(TypedDict, total=False):
     """The rest of a `Spec`, as keywords."""
 
     needed: bool
-    default: Any
     low: float
     high: float
     above: bool
@@ -124,13 +121,19 @@ class Bounds(TypedDict, total=False):
     pair: bool
 
 
+class Changes(Bounds, total=False):
+    """What may be another one where a field is taken over."""
+
+    default: Any
+
+
 def declare(kind: str, help: str, default: Any = None, **more: Unpack[Bounds]) -> Any:
     """A field of a request: the values of its `Spec`."""
-    spec = Spec(kind, help, **{"default": default, **more})
+    spec = Spec(kind, help, default, **more)
     return field(metadata={"spec": spec}, **({} if spec.needed else {"default": default}))
 
 
-def like(source: type, name: str, help: str = "", **changes: Unpack[Bounds]) -> Any:
+def like(source: type, name: str, help: str = "", **changes: Unpack[Changes]) -> Any:
     """A field as another request has it, with another sentence or default."""
     spec = specs(source)[name]
     spec = replace(spec, help=help or spec.help, **changes)

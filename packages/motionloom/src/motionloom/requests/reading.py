@@ -16,7 +16,8 @@ def make(request: type[R], values: Mapping[str, Any]) -> R:
     own: dict[str, Any] = {}
     for one in fields(request):  # type: ignore[arg-type]
         if names := one.metadata.get("group"):
-            own[one.name] = replace(one.default, **{name: values[name] for name in names if name in values})
+            usual: Any = one.default
+            own[one.name] = replace(usual, **{name: values[name] for name in names if name in values})
         elif one.name in values:
             own[one.name] = values[one.name]
     return request(**own)

@@ -116,8 +116,8 @@ def _read_csv(path: Path, robot: Robot) -> Array:
         if set(header) == set(names) and tuple(header) != names:
             raise MotionloomError(f"{path} has the joints of {robot.name} in another order; put {names[0]} first")
         if tuple(header) != names:
-            other = next(word for word in header if word not in names)
-            raise MotionloomError(f"{path} is not of {robot.name}: it has no joint {other[:60]!r}")
+            other = next((word for word in header if word not in names), "one joint twice")
+            raise MotionloomError(f"{path} is not of {robot.name}: among its joints is {other[:60]!r}")
         lines = lines[1:]
     try:
         values = np.array(lines, dtype=np.float64).reshape(-1, columns)
@@ -146,7 +146,7 @@ def _read_npz(path: Path, robot: Robot) -> tuple[Array, float | None, NDArray[np
             f"and {len(robot.file.hinges)} joints"
         )
     named = arrays.get("joint_names")
-    if named is not None and tuple(named.tolist()) != robot.file.joint_names():
+    if named is not None and tuple(np.atleast_1d(named).reshape(-1).tolist()) != robot.file.joint_names():
         raise MotionloomError(f"{path} is of a robot with other joints than {robot.name}; give its own model")
     rate = arrays.get("fps")
     contacts = arrays.get("contacts")

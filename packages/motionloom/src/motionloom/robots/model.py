@@ -80,6 +80,7 @@ def read_model(path: Path | str, *, meshes: bool = False) -> Model:
     mujoco = load_mujoco()
 
     try:
+        text.decode("utf-8")
         spec = mujoco.MjSpec.from_file(str(path))
         notes = [*_without_meshes(spec, path, meshes), *_free_root(spec, path)]
         model = spec.compile()

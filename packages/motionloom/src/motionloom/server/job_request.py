@@ -13,7 +13,6 @@ from motionloom.goals.fields import Field
 from motionloom.goals.timeline import Timeline, timeline_of
 from motionloom.requests.fields import Spec, specs
 from motionloom.requests.reading import read
-from motionloom.requests.sampling import Sampling
 from motionloom.requests.tasks import REQUESTS
 from motionloom.requests.timeline import SECONDS
 from motionloom.server.limits import Limits
@@ -38,8 +37,8 @@ class JobRequest:
     task: str
     values: Any
     """The task's request."""
-    sampling: Sampling
-    """The request's, with what its timeline says."""
+    sampling: Any
+    """The request's `Sampling`, with what its timeline says."""
     levels: int = 0
     """Poses are kept for event streams after every so many network calls; 0: not at all."""
     seconds: float = 0.0
