@@ -104,7 +104,7 @@ TIMELINE = {
         "path": {"path": {"points": [[0, 0], [1, 2]]}},
     },
 }
-EDIT = {"task": "edit", "motion": NAME, "prompt": "a person waves", "keep": ["lower_body"], "redraw": [[0, 0.1]]}
+EDIT = {"task": "edit", "motion": NAME, "prompt": "a person waves", "keep": ["lower_body"], "between": [[0, 0.1]]}
 MESSAGES: list[dict[str, Any]] = [
     {
         "type": "hello",
@@ -163,8 +163,7 @@ def read_project(folder: Path) -> None:
 
 def read_request(name: str) -> Callable[[Path], None]:
     def read(folder: Path) -> None:
-        from motionloom.server.asking import read_request
-
+        from motionloom.server.job_request import read_request
         from motionloom.server.project import Limits
 
         body = parse_json((folder / name).read_bytes(), "the request")
@@ -175,9 +174,8 @@ def read_request(name: str) -> Callable[[Path], None]:
 
 
 def read_timeline_text(folder: Path) -> None:
-    from motionloom.server.asking import timeline_json
-
     from motionloom.server.project import Limits
+    from motionloom.server.timelines import timeline_json
 
     with opened(folder) as found:
         timeline_json((folder / "timeline.yaml").read_bytes().decode("utf-8", "replace"), found, Limits())
