@@ -160,7 +160,7 @@ def test_what_places_are_asked_with_is_not_what_the_duet_begins_as() -> None:
 
 
 def test_exchanged_people_stay_together_exchanged(prior: Prior, block: PairBlock) -> None:
-    net, shared = block.net(prior), {"steps": 3}
+    net, shared = block.net(prior), {"steps": 3, "bodies": False}
     one, _ = pair_features(prior, net, SAID, 70, seeds=[1, 2], **shared)
     other, _ = pair_features(prior, net, SAID[::-1], 70, seeds=[2, 1], **shared)
     free, _ = pair_features(prior, net, SAID, 70, seeds=[1, 2], pair_guidance=0.0, **shared)

@@ -122,9 +122,9 @@ def test_shipped_adapters_of_other_weights_and_damaged_ones_are_said(
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"count": 0}, "a count of 0"),
+        ({"count": 0}, "count must be a whole number from 1"),
         ({"seed": -1}, "seed"),
-        ({"steps": 0}, "0 steps"),
+        ({"steps": 0}, "steps must be a whole number from 1"),
         ({"guidance": np.nan}, "guidance"),
     ],
     ids=["count", "seed", "steps", "guidance"],

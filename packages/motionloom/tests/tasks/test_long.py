@@ -249,7 +249,7 @@ def test_the_place_behind_features_is_where_the_next_ones_begin() -> None:
         ([1.0], {"path": Goal.nothing(20)}, "in every frame"),
         ([1.0], {"seed": -1}, "seed"),
         ([1.0], {"seed": 2**62}, "seed"),
-        ([1.0], {"steps": 0}, "0 steps"),
+        ([1.0], {"steps": 0}, "steps must be a whole number from 1"),
         ([1.0], {"steps": 51}, "51 steps"),
         ([1.0], {"guidance": float("nan")}, "guidance"),
         ([1.0], {"start": person(0.9)}, "0.90 s long; at least 1 s"),

@@ -211,7 +211,7 @@ def test_the_other_one_stands_as_drawn_beside_who_follows_a_path(
     monkeypatch.setattr(pair, "pair_features", lambda *a, **k: drawn.append(real(*a, **k)) or drawn[-1])
     numbers = humanml.motion_to_features(one_person(2.0))
     human = replace(prior, mean=numbers.mean(0), std=np.full(263, 0.02, np.float32))  # whom a body can be fitted to
-    [duet] = generate_pair(human, block, SAID[0], goals=(None, walk(40)), steps=3, foot_lock=False)
+    [duet] = generate_pair(human, block, SAID[0], goals=(None, walk(40)), steps=3, foot_lock=False, bodies=False)
     stands = drawn[0][1][0].astype(np.float64)
     there = np.array([np.cos(np.pi / 2), np.sin(np.pi / 2), 1.0, 2.0])
     other = GroundPose.of_numbers(two.compose(there, two.relative(stands[1], stands[0])))
@@ -301,7 +301,7 @@ def test_whose_guesses_are_changed_is_still_unless_said_otherwise(
     with pytest.raises(MotionloomError):
         pair_features(prior, block.net(prior), SAID * 9, FRAMES, edits=PairEdits(frozen=[False]), **how)
     monkeypatch.undo()
-    with pytest.raises(MotionloomError, match="kept together"):
+    with pytest.raises(MotionloomError, match="pair_guidance must be 0 to 1"):
         pair_features(prior, block.net(prior), SAID * 9, FRAMES, **how | {"pair_guidance": 1.5})
 
 
@@ -347,7 +347,7 @@ def test_what_nothing_can_be_made_of_is_refused(prior: Prior, block: PairBlock) 
     wrong = [
         ({"seconds": 0.0}, "cannot be made"),
         ({"seconds": float("nan")}, "cannot be made"),
-        ({"count": 0}, "1 or more"),
+        ({"count": 0}, "count must be a whole number from 1"),
         ({"count": 10_000}, "10000 duets"),
         ({"seed": -1}, "seed"),
         ({"seed": (1, 2**62)}, "seed"),

@@ -321,7 +321,7 @@ MISTAKES = {
     "an hour at once": {"seconds": 3600.0},
     "too much at once": {"seconds": 500.0, "count": 100},
     "no futures": {"count": 0},
-    "a thousand and one": {"count": 1001},
+    "ten thousand and one": {"count": 10_001},
     "a negative seed": {"seed": -1},
     "no steps": {"steps": 0},
     "half a step": {"steps": 0.5},

@@ -103,10 +103,9 @@ def pair_features(
         raise MotionloomError(
             f"two people need two prompts and seeds a pair; got {rows} prompts and {len(seeds)} seeds"
         )
-    shape = rows, 1 + frames, len(prior.mean)
-    mask = np.broadcast_to(False if given.observed is None else given.observed.mask, shape)
-    meetings = given.meetings or [None] * (rows // 2)
-    bodies = [Bodies.of(mask[2 * i : 2 * i + 2], frozen[2 * i : 2 * i + 2], one) for i, one in enumerate(meetings)]
+    known = False if given.observed is None else given.observed.mask
+    mask = np.broadcast_to(known, (rows, 1 + frames, len(prior.mean)))
+    bodies = _bodies(mask, frozen, given.meetings)
 
     def corrected(state: np.ndarray, batch: Sequence[int], level: int) -> np.ndarray:
         return _corrected(state, [changes[i] for i in batch], level)
@@ -136,10 +135,8 @@ def pair_features(
 
     guidance = chosen.guidance if any(prompt.strip() for prompt in prompts) else 1.0
     how = replace(chosen, batch_size=2 * chosen.batch(PAIRS), guidance=guidance)
-    asked = Rows(prompts, [1 + frames] * rows, seeds, pair_noise)
-    walk = sample(
-        prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress, view=_view(prior, net)
-    )
+    asked, view = Rows(prompts, [1 + frames] * rows, seeds, pair_noise), _view(prior, net)
+    walk = sample(prior, asked, how, network=net, edits=[edit], observed=given.observed, progress=progress, view=view)
     made = dict(walk)
     state = np.stack([made[row] for row in range(rows)])
     if prior.net.config.patch > 1:
@@ -148,6 +145,15 @@ def pair_features(
         state = np.where(mask, given.observed.values, state)
     places, motion = part(two_bodies(corrected(state, range(rows), 0), list(range(rows)), 0))
     return people(motion * prior.std + prior.mean), net.places.decode(people(places))
+
+
+def _bodies(mask: np.ndarray, frozen: Sequence[bool], meetings: Sequence[Meeting | None] | None) -> list[Bodies]:
+    """How the two of each pair are kept apart, and how they touch."""
+    pairs = [slice(row, row + 2) for row in range(0, len(mask), 2)]
+    return [
+        Bodies.of(mask[pair], list(frozen[pair]), meeting)
+        for pair, meeting in zip(pairs, meetings or [None] * len(pairs), strict=True)
+    ]
 
 
 def _corrected(state: np.ndarray, corrections: Sequence[Correction | None], level: int) -> np.ndarray:
