@@ -256,5 +256,5 @@ def test_clip_is_not_opened_before_a_prompt_is_encoded(monkeypatch: pytest.Monke
     monkeypatch.setitem(sys.modules, "transformers", None)  # importing it fails
     text = PublishedText("clip-77")
     assert text.width == 512
-    with pytest.raises(MotionloomError, match=r"motionloom\[clip\]"):
+    with pytest.raises(MotionloomError, match=r"motionloom-train\[clip\]"):
         text.encode(["a"])

@@ -56,6 +56,7 @@ def run(words: Sequence[str], folder: Path, *, at: int = 0, number: int = 0) -> 
     words: of a command of `motionloom`'s, or ``MODULE:FUNCTION`` and what that function is called with.
     """
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # of the server, which is started by the first of these calls
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # for what it imports before it is sent a path
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(PRELOADED)
     folder.mkdir(parents=True, exist_ok=True)

@@ -3,6 +3,7 @@
 ONNX Runtime asks the processor which kernels it takes; no variable of the environment tells it otherwise.
 """
 
+import os
 import platform
 import shutil
 import subprocess
@@ -37,6 +38,7 @@ def test_another_kind_of_processor_makes_what_is_recorded(processor: str, name: 
     """One with SSE4.2 alone, which rounds each product before it is added, and one with AVX2."""
     made = tmp_path / "made.npy"
     words = [str(QEMU), "-cpu", processor, sys.executable, "-c", CODE, str(made), name, str(tmp_path)]
-    subprocess.run(words, check=True, cwd=ROOT, capture_output=True, timeout=900)
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    subprocess.run(words, check=True, cwd=ROOT, env=env, capture_output=True, timeout=900)
     with np.load(RECORDED, allow_pickle=False) as recorded:
         np.testing.assert_allclose(np.load(made), recorded[name], rtol=0, atol=METRES)

@@ -140,8 +140,9 @@ def study(asked: Asked) -> None:
     from motionloom_lab.suites import prediction_studies as studies
 
     name, out = asked["name"], asked["out"]
-    names = ("quick", "windows", "samples", "train_steps", "seed")
-    budget = studies.budget(name, changes={key: asked[key] for key in names if key in asked})
+    names = ("windows", "samples", "train_steps", "seed")
+    changes = {key: asked[key] for key in names if key in asked}
+    budget = studies.budget(name, quick=bool(asked.get("quick")), changes=changes)
     run = job_of(asked, options.typed(options.commands()["study"], asked), out).run("study")
     keep = asked.get("keep", out / "networks")
     found = studies.run(name, run, protocol=asked.get("protocol"), keep=keep, budget=budget)

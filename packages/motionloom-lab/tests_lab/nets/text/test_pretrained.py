@@ -125,9 +125,9 @@ def test_both_are_text_encoders_of_arrays(clip_folder: Path, bert_folder: Path) 
 
 def test_without_transformers_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "transformers", None)
-    with pytest.raises(MotionloomError, match=r"motionloom\[clip\]"):
+    with pytest.raises(MotionloomError, match=r"motionloom-train\[clip\]"):
         ClipText.open("nowhere")
-    with pytest.raises(MotionloomError, match=r"motionloom\[distilbert\]"):
+    with pytest.raises(MotionloomError, match=r"motionloom-train\[distilbert\]"):
         DistilBert.open("nowhere")
 
 
