@@ -49,6 +49,7 @@ def read(
 
 def narrowed(request: type, most: Mapping[str, float]) -> dict[str, Spec]:
     """The fields of a request where a door takes less: ``most`` has largest numbers by name."""
-    return {
-        name: replace(spec, high=min(spec.high, most.get(name, spec.high))) for name, spec in specs(request).items()
-    }
+    known = dict(specs(request))
+    for name in known.keys() & most.keys():
+        known[name] = replace(known[name], high=min(known[name].high, most[name]))
+    return known
