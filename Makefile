@@ -87,7 +87,7 @@ PROCESSORS := packages/motionloom/tests/outputs/test_processors.py
 
 outputs: $(VENV)/.dev  ## what is recorded, as two other kinds of processors make it (needs Debian's qemu-user)
 	$(OLDEST) $(PYTEST) -m 'not slow' packages/motionloom-lab/tests_lab/conformance $(PYTEST_FLAGS)
-	$(PYTEST) $(PROCESSORS) $(PYTEST_FLAGS)
+	$(PYTEST) --dist load $(PROCESSORS) $(PYTEST_FLAGS)
 
 fuzz: $(VENV)/.dev  ## mutated files for every reader (SECONDS=3600, SEED=1); those that fail go to out/fuzz
 	$(ONE_THREAD) $(TESTS_PATH) $(BIN)/python -m tests_lab.fuzz --seconds $(SECONDS) --seed $(SEED)

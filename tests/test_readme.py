@@ -197,6 +197,18 @@ def test_no_figure_of_the_readme_stands_outside_of_a_marked_place() -> None:
     assert all(places(README).values()), "a table of the README is empty"
 
 
+MEASURED_SHARE = re.compile(
+    r"±|\b\d+ of (?:the )?\d+ (?:draws|seeds|prompts|sentences|motions|commands|skeletons|characters|clips|rigs)\b"
+)
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda path: path.stem)
+def test_no_measured_share_of_a_page_stands_outside_of_a_marked_place(page: Path) -> None:
+    """Who measures writes the table or the marked place; examples of notation are in backticks."""
+    plain = FILLER["PLACE"].sub("", page.read_text())
+    assert not MEASURED_SHARE.findall(re.sub(r"```.*?```|`[^`\n]*`", "", plain, flags=re.DOTALL))
+
+
 def test_a_changed_weight_file_is_noticed(tmp_path: Path) -> None:
     """A place of other weights begins with a sentence, once; measured again on what ships it loses it."""
     weights = tmp_path / "packages" / "motionloom" / "src" / "motionloom" / "weights"

@@ -16,7 +16,7 @@ from motionloom.io.atomic import finished
 from motionloom_train.data import build
 from motionloom_train.data.clips import read_clip
 from tests.kills import programs
-from tests.kills.programs import SEED, ended_by, kills, moments, needs_signals, parts, run
+from tests.kills.programs import SEED, ended_by, kills, moments, needs_signals, parts, run, uninterrupted
 from tests_train import runs
 from tests_train.data import people as made
 
@@ -45,7 +45,7 @@ def pack(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_data_build_goes_on_where_it_was_killed(pack: Path, tmp_path: Path, workers: str) -> None:
     """The set is the one of an uninterrupted build, and nothing of the killed ones is taken for a clip, or stays."""
     words = ["data", "build", str(pack), "--out", "set", "--workers", workers, "--mixed", "2"]
-    _, chosen = moments(words, tmp_path / "whole", kills(4), seed=SEED)
+    chosen = moments(uninterrupted(words, tmp_path / "whole"), kills(4), seed=SEED)
     right = json.loads((tmp_path / "whole" / "set" / "set.json").read_text())
     folder = tmp_path / "killed"
     for turn, at in enumerate(chosen):
@@ -69,7 +69,7 @@ def test_training_goes_on_bit_for_bit(tmp_path: Path) -> None:
     """Ended at random moments, again and again: the losses and the last state are those of an uninterrupted run."""
     data = runs.write_set(tmp_path / "data")
     words = [f"{__name__}:train", str(data), "run", "14"]
-    whole, _ = moments(words, tmp_path / "whole", 2, seed=SEED)
+    whole = uninterrupted(words, tmp_path / "whole")
     right = dict(line.split() for line in whole.out.splitlines())
     state = (tmp_path / "whole" / "run" / "state.safetensors").read_bytes()
     for turn in range(kills(2)):

@@ -30,6 +30,10 @@ SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGKILL]
 PRELOADED = [
     "tests.kills.programs",
     "motionloom.cli.generate",
+    "motionloom.cli.control",
+    "motionloom.cli.edit",
+    "motionloom.cli.futures",
+    "motionloom.cli.duet",
     "motionloom.tasks.long",
     "motionloom.tasks.text",
 ]
@@ -85,13 +89,18 @@ def ended_by(number: int, ended: Ended) -> bool:
     return ended.code == 130 and ended.said.count("\n") <= 1 and "Traceback" not in ended.said
 
 
-def moments(words: Sequence[str], folder: Path, count: int, *, seed: int) -> tuple[Ended, list[int]]:
-    """The command uninterrupted, and some of the marks that it passes, at random, half of them about files."""
+def uninterrupted(words: Sequence[str], folder: Path) -> Ended:
+    """The command as it ends when nobody ends it."""
     whole = run(words, folder)
     assert whole.code == 0, whole.said
+    return whole
+
+
+def moments(whole: Ended, count: int, *, seed: int) -> list[int]:
+    """Some of the marks that an uninterrupted command passes, at random, half of them about files."""
     rng = random.Random(seed)
     around = rng.choices(whole.files, k=count // 2)
-    return whole, sorted({*around, *rng.sample(range(1, whole.marks + 1), count - len(around))})
+    return sorted({*around, *rng.sample(range(1, whole.marks + 1), count - len(around))})
 
 
 def parts(folder: Path) -> list[str]:

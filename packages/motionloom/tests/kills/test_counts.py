@@ -7,6 +7,8 @@ import json
 import os
 import shutil
 import signal
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,7 +18,18 @@ from motionloom.io.atomic import finished
 from motionloom.weights.predictor import save_predictor
 from motionloom.weights.prior import save_prior
 from tests.cli.predict.clips import tiny_predictor
-from tests.kills.programs import SEED, SIGNALS, ended_by, kills, moments, needs_signals, parts, run
+from tests.kills.programs import (
+    SEED,
+    SIGNALS,
+    Ended,
+    ended_by,
+    kills,
+    moments,
+    needs_signals,
+    parts,
+    run,
+    uninterrupted,
+)
 from tests.recorded import tiny
 from tests.tasks.test_edit import person
 from tests.tasks.two_people import block
@@ -77,6 +90,22 @@ def counted(command: str, inputs: Path, weights: str) -> tuple[list[str], int]:
     return [command, *words, "--count", str(count), "--steps", "3", *own, *out], int(count)
 
 
+Whole = tuple[list[str], int, Ended, Path]
+
+
+@pytest.fixture(scope="module")
+def wholes(inputs: Path, weights: str, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Whole]:
+    """By command: its words, how many motions it makes, how it ends uninterrupted, and the folder of what it made."""
+
+    @cache
+    def whole(command: str) -> Whole:
+        words, count = counted(command, inputs, weights)
+        folder = tmp_path_factory.mktemp(command) / "whole"
+        return words, count, uninterrupted(words, folder), folder
+
+    return whole
+
+
 EACH = [
     (command, number)
     for place, command in enumerate(COUNTED)
@@ -88,21 +117,20 @@ EACH = [
 
 @pytest.mark.parametrize(("command", "number"), EACH, ids=[f"{command}-{number.name}" for command, number in EACH])
 def test_every_command_with_a_count_keeps_what_was_finished(
-    command: str, inputs: Path, weights: str, tmp_path: Path, number
+    command: str, wholes: Callable[[str], Whole], tmp_path: Path, number
 ) -> None:
     """Several are drawn at a time: the first ones, those that were finished, are there, bit for bit."""
-    words, count = counted(command, inputs, weights)
-    _, chosen = moments(words, tmp_path / "whole", kills(8 if command == "generate" else 3), seed=SEED)
-    names = sorted(path.name for path in finished(tmp_path / "whole", "*"))
+    words, count, whole, right = wholes(command)
+    names = sorted(path.name for path in finished(right, "*"))
     assert len(names) == count
-    for at in chosen:
+    for at in moments(whole, kills(8 if command == "generate" else 3), seed=SEED):
         folder = tmp_path / f"at {at}"
         ended = run(words, folder, at=at, number=number)
         found = finished(folder, "*")
         done = ended.code == 0 and len(found) == count  # Python drops what is raised while an object is cleaned up
         assert done or ended_by(number, ended), (at, ended)
         for path in found:
-            assert path.read_bytes() == (tmp_path / "whole" / path.name).read_bytes()
+            assert path.read_bytes() == (right / path.name).read_bytes()
         if number != signal.SIGKILL:
             assert [path.name for path in found] == names[: len(found)], at
             assert parts(folder) == []
@@ -111,10 +139,11 @@ def test_every_command_with_a_count_keeps_what_was_finished(
 
 
 @pytest.mark.parametrize("command", COUNTED)
-def test_an_interruption_late_keeps_the_first_ones(command: str, inputs: Path, weights: str, tmp_path: Path) -> None:
+def test_an_interruption_late_keeps_the_first_ones(
+    command: str, wholes: Callable[[str], Whole], tmp_path: Path
+) -> None:
     """Late enough some are finished, whatever the command; looked for from behind, since the last marks are writing."""
-    words, count = counted(command, inputs, weights)
-    whole = run(words, tmp_path / "whole")
+    words, count, whole, _ = wholes(command)
     for part in (8, 7, 6, 5, 9):
         ended = run(words, tmp_path / f"cut{part}", at=whole.marks * part // 10, number=signal.SIGTERM)
         if 0 < len(finished(tmp_path / f"cut{part}", "m*")) < count:

@@ -11,32 +11,39 @@ import pytest
 
 from motionloom import io
 from motionloom.io.atomic import finished
-from tests.kills.programs import SEED, SIGNALS, ended_by, kills, moments, needs_signals, parts, run
+from tests.kills.programs import (
+    SEED,
+    SIGNALS,
+    Ended,
+    ended_by,
+    kills,
+    moments,
+    needs_signals,
+    parts,
+    run,
+    uninterrupted,
+)
 
 pytestmark = needs_signals
+Whole = tuple[list[str], Ended, Path]
+
+
+@pytest.fixture(scope="module")
+def whole(weights: str, tmp_path_factory: pytest.TempPathFactory) -> Whole:
+    """The words of the command, how it ends uninterrupted, and the folder that it wrote to."""
+    words = ["compose", *["walk", "jump", "sit"] * 6, "--seconds", "1", "--steps", "3", "--weights", weights]
+    words += ["--out", "a.bvh", "--out", "b.npz"]
+    folder = tmp_path_factory.mktemp("compose") / "whole"
+    return words, uninterrupted(words, folder), folder
 
 
 @pytest.mark.parametrize("number", SIGNALS, ids=lambda number: number.name)
-def test_compose_keeps_what_was_finished_and_shows_nothing_half_written(weights: str, tmp_path: Path, number) -> None:
+def test_compose_keeps_what_was_finished_and_shows_nothing_half_written(whole: Whole, tmp_path: Path, number) -> None:
     """SIGINT and SIGTERM end it alike: the file has the frames that were finished, the same as without them."""
-    words = [
-        "compose",
-        *["walk", "jump", "sit"] * 6,
-        "--seconds",
-        "1",
-        "--steps",
-        "3",
-        "--weights",
-        weights,
-        "--out",
-        "a.bvh",
-        "--out",
-        "b.npz",
-    ]
-    _, chosen = moments(words, tmp_path / "whole", kills(10), seed=SEED)
-    right = {name: io.load(tmp_path / "whole" / name) for name in ("a.bvh", "b.npz")}
+    words, uncut, made = whole
+    right = {name: io.load(made / name) for name in ("a.bvh", "b.npz")}
     some = 0
-    for at in chosen:
+    for at in moments(uncut, kills(10), seed=SEED):
         folder = tmp_path / f"at {at}"
         ended = run(words, folder, at=at, number=number)
         assert ended_by(number, ended), (at, ended)

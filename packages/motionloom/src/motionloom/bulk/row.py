@@ -33,7 +33,7 @@ MAX_DUET = 3600.0
 """Seconds of a timeline of two people."""
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 _KEPT = 64
-"""Files named by rows that are kept in memory."""
+"""Files named by rows, and as many prompts and goals, that are kept in memory."""
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ class Sources:
         self.folder, self.fps, self.seconds, self.seed, self.skeleton = folder, fps, seconds, seed, skeleton
         self._pair = dict(pair or {})
         self._common = json.dumps({**common, "format": FORMAT}, sort_keys=True)
-        self._cache: OrderedDict[Any, Any] = OrderedDict()
+        self._cache, self._written = _Kept(), _Kept()
 
     def ask(self, row: Row) -> Asked:
         """The row with the files it names; raises `MotionloomError` for what is wrong in them."""
@@ -233,23 +233,23 @@ class Sources:
             raise unexpected(error) from error
 
     def _ask(self, row: Row) -> Asked:
-        timeline = start = goal = None
+        timeline = start = target = None
+        goal: tuple[Goal | None, str | None] = (None, None)
         seed = self.seed if row.seed is None else row.seed
         if row.timeline is not None:
             timeline = self._read("timeline", row.timeline, read_timeline)
             start = None if timeline.start is None else self._kept("start", timeline.start, load)
             _check_timeline(row.task, timeline)
             seed = next(s for s in (row.seed, timeline.seed, self.seed) if s is not None)
-            frames = timeline.frames
-        elif (timeline := self._worded(row)) is not None:
-            frames = timeline.frames
+            frames, digest = timeline.frames, digest_timeline(timeline, start)
         else:
-            frames = frames_in(self.seconds if row.seconds is None else row.seconds, self.fps)
-        if isinstance(row.goal, dict):
-            goal = read_goal(row.goal, frames=frames, folder=self.folder)
-        elif row.goal is not None:
-            goal = self._read("goal", row.goal, lambda path: read_goal(path, frames=frames, folder=path.parent), frames)
-        target = self._skeleton(row.skeleton, Field(row.skeleton, "skeleton")) if row.skeleton else None
+            timeline, digest = self._worded(row)
+            length = self.seconds if row.seconds is None else row.seconds
+            frames = frames_in(length, self.fps) if timeline is None else timeline.frames
+        if row.goal is not None:
+            goal = self._goal(row.goal, frames)
+        if row.skeleton:
+            target = self._skeleton(row.skeleton, Field(row.skeleton, "skeleton"))
         if row.skeleton is None and self.skeleton is not None:
             target = self._skeleton(self.skeleton, None)
         said = {
@@ -258,8 +258,8 @@ class Sources:
             "prompt": row.prompt,
             "frames": frames,
             "seed": seed,
-            "goal": goal and digest_goal(goal),
-            "timeline": timeline and digest_timeline(timeline, start),
+            "goal": goal[1],
+            "timeline": digest,
             "skeleton": target and digest_skeleton(target),
         }
         best_of = self._best_of(row) if timeline is None else 1
@@ -268,21 +268,34 @@ class Sources:
         if row.task == "duet":
             said |= {"pair": self._pair, "person": row.person}
         key = hashlib.sha256(json.dumps(said, sort_keys=True).encode("utf-8", "surrogatepass")).hexdigest()[:32]
-        return Asked(row, key, frames, seed, goal, timeline, start, target, best_of)
+        return Asked(row, key, frames, seed, goal[0], timeline, start, target, best_of)
 
     def _best_of(self, row: Row) -> int:
         if row.task != "generate":
             return 1
         return self.best_of if row.best_of is None else row.best_of
 
-    def _worded(self, row: Row) -> Timeline | None:
-        """The row's prompt as a timeline, where numbers in it are kept; as long as they need where no time is said."""
+    def _worded(self, row: Row) -> tuple[Timeline | None, str | None]:
+        """The row's prompt as a timeline, where numbers in it are kept, and its hash.
+
+        It is as long as the numbers need where no time is said. Many rows have the same words: they are read once.
+        """
         if row.task != "generate" or self.literal or self.fps != FPS or not row.prompt.strip():
-            return None
+            return None, None
         if row.seconds is not None and not SHORTEST <= row.seconds <= LONGEST:
-            return None
-        found = timeline_of(row.prompt, row.seconds, amounts=True)
-        return found if found.readings else None
+            return None, None
+        return self._written.get((row.prompt, row.seconds), lambda: _timeline_in(row.prompt, row.seconds))
+
+    def _goal(self, goal: str | dict[str, Any], frames: int) -> tuple[Goal, str]:
+        """A goal and its hash; rows with the same goal share it."""
+
+        def read(source: Any, folder: Path) -> tuple[Goal, str]:
+            found = read_goal(source, frames=frames, folder=folder)
+            return found, digest_goal(found)
+
+        if isinstance(goal, str):
+            return self._read("goal", goal, lambda path: read(path, path.parent), frames)
+        return self._written.get((json.dumps(goal), frames), lambda: read(goal, self.folder))
 
     def _skeleton(self, name: str, field: Field | None) -> Skeleton | None:
         if name.lower() == "smpl22":
@@ -296,11 +309,38 @@ class Sources:
     def _kept(self, column: str, path: Path, read: Callable[[Path], Any], *more: Any) -> Any:
         about = path.stat()
         key = (column, str(path), about.st_size, about.st_mtime_ns, *more)
-        if key not in self._cache:
-            self._cache[key] = read(path)
-            if len(self._cache) > _KEPT:
-                self._cache.popitem(last=False)
-        return self._cache[key]
+        return self._cache.get(key, lambda: read(path))
+
+
+class _Kept:
+    """The values that were asked for last, by what they are made of; what was refused is refused again unread."""
+
+    def __init__(self) -> None:
+        self._values: OrderedDict[Any, tuple[Any, MotionloomError | None]] = OrderedDict()
+
+    def get(self, key: Any, make: Callable[[], Any]) -> Any:
+        """The value of a key, made where it is not kept; raises what ``make`` raises."""
+        if key not in self._values:
+            try:
+                self._values[key] = make(), None
+            except MotionloomError as error:
+                self._values[key] = None, error
+            if len(self._values) > _KEPT:
+                self._values.popitem(last=False)
+        self._values.move_to_end(key)
+        value, error = self._values[key]
+        if error is not None:
+            raise error.with_traceback(None)
+        return value
+
+    def clear(self) -> None:
+        """Forget all of them."""
+        self._values.clear()
+
+
+def _timeline_in(prompt: str, seconds: float | None) -> tuple[Timeline | None, str | None]:
+    found = timeline_of(prompt, seconds, amounts=True)
+    return (found, digest_timeline(found, None)) if found.readings else (None, None)
 
 
 def _check_timeline(task: str, timeline: Timeline) -> None:

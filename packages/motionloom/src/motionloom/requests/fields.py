@@ -159,11 +159,18 @@ def specs(request: type) -> Mapping[str, Spec]:
     return found
 
 
+@cache
+def _own(request: type) -> tuple[tuple[str, Spec, bool], ...]:
+    """Name and spec of each field that is no group, and whether it may be None."""
+    declared = [(one, one.metadata.get("spec")) for one in fields(request)]
+    return tuple((one.name, spec, one.default is None) for one, spec in declared if spec)
+
+
 class Checked:
     """Checks its own fields when it is made; raises `MotionloomError` that begins with the field's name."""
 
     def __post_init__(self) -> None:
-        for one in fields(self):  # type: ignore[arg-type]
-            spec, value = one.metadata.get("spec"), getattr(self, one.name)
-            if spec and (value is not None or one.default is not None):
-                object.__setattr__(self, one.name, spec.check(value, one.name))
+        for name, spec, empty in _own(type(self)):
+            value = getattr(self, name)
+            if value is not None or not empty:
+                object.__setattr__(self, name, spec.check(value, name))

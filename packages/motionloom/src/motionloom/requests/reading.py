@@ -47,8 +47,10 @@ def read(
     return make(request, {name: known[name].check(value, place(name)) for name, value in given.items()})
 
 
-def narrowed(request: type, most: Mapping[str, float]) -> dict[str, Spec]:
+def narrowed(request: type, most: Mapping[str, float]) -> Mapping[str, Spec]:
     """The fields of a request where a door takes less: ``most`` has largest numbers by name."""
+    if not most:
+        return specs(request)
     known = dict(specs(request))
     for name in known.keys() & most.keys():
         known[name] = replace(known[name], high=min(known[name].high, most[name]))
