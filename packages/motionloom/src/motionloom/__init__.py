@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from motionloom.goals.hold import FixedJoints, FixedPart, HeldPart, Hold
     from motionloom.goals.segment import Segment
     from motionloom.io import load, save
+    from motionloom.kinematics.deeds import Deeds, measure_deeds
     from motionloom.live.live import Live
     from motionloom.live.pair import LivePair
     from motionloom.motion import Motion
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from motionloom.tasks.pair import complete_pair, generate_pair
     from motionloom.tasks.predict import predict, switch
     from motionloom.tasks.text import generate
+    from motionloom.tasks.worded import generate_worded
     from motionloom.weights.pair import PairBlock
     from motionloom.weights.predictor import Predictor, save_predictor
     from motionloom.weights.prior import Prior, save_prior
@@ -46,6 +48,8 @@ _PLACES = {
     "MotionloomError": "errors",
     "Live": "live.live",
     "LivePair": "live.pair",
+    "Deeds": "kinematics.deeds",
+    "measure_deeds": "kinematics.deeds",
     "load": "io",
     "save": "io",
     "Motion": "motion",
@@ -80,11 +84,13 @@ _PLACES = {
     "PredictionSampling": "requests.sampling",
     "Sampling": "requests.sampling",
     "generate": "tasks.text",
+    "generate_worded": "tasks.worded",
 }
 
 __all__ = [
     "SMPL22",
     "Controlled",
+    "Deeds",
     "Extend",
     "FixedJoints",
     "FixedPart",
@@ -114,7 +120,9 @@ __all__ = [
     "from_smpl22",
     "generate",
     "generate_pair",
+    "generate_worded",
     "load",
+    "measure_deeds",
     "predict",
     "react",
     "read_batch",

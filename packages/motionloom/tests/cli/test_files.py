@@ -151,8 +151,21 @@ def test_info_tells_what_was_put_in(walk, capsys):
     assert info["height"] == pytest.approx(np.ptp(walk.positions()[0, :, 1]), abs=0.05)
     assert info["floor"] == pytest.approx(0, abs=1e-4)
     assert not info["problems"]
+    assert info["happened"]["sentence"] == "moves 1.9 m forward"
+    assert info["happened"]["counts"] == {}
     assert main(["info", "walk.bvh"]) == 0
-    assert "60 frames, 2.00 s at 30 frames per second" in said(capsys)
+    text = said(capsys)
+    assert "60 frames, 2.00 s at 30 frames per second" in text
+    assert "  happens   moves 1.9 m forward\n" in text
+
+
+def test_info_of_what_is_no_person_tells_no_deeds(capsys):
+    chain = Skeleton(("a", "b"), (-1, 0), np.ones((2, 3)))
+    io.save(Motion(chain, 20, np.zeros((30, 3)), np.tile(IDENTITY, (30, 2, 1))), "chain.npz")
+    assert main(["info", "chain.npz", "--json"]) == 0
+    assert json.loads(said(capsys))["happened"] is None
+    assert main(["info", "chain.npz"]) == 0
+    assert "happens" not in said(capsys)
 
 
 @pytest.mark.parametrize(

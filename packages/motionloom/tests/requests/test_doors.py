@@ -84,3 +84,12 @@ def test_the_schema_of_timeline_files_is_what_the_fields_say() -> None:
     pytest.importorskip("starlette", reason="needs the extra 'studio'")
     written = runpy.run_path(str(ROOT / "tools" / "write_types.py"))
     assert written["SCHEMA"].read_text(encoding="utf-8") == written["timelines"](), "run tools/write_types.py"
+
+
+def test_goals_that_assistants_are_shown_are_goals(tmp_path: Path) -> None:
+    from motionloom.goals.goal_file import read_goal
+    from motionloom.server.assistant import KINDS
+
+    assert KINDS["goals"]["examples"]
+    for one in KINDS["goals"]["examples"]:
+        assert not read_goal(one, frames=100, folder=tmp_path).empty

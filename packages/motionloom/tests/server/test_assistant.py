@@ -1,6 +1,7 @@
 """MCP through the SDK's own client: a process of its own, spoken to over its standard input and output."""
 
 import asyncio
+import base64
 import json
 import os
 import sys
@@ -21,7 +22,10 @@ Call = tuple[str, dict[str, Any]]
 
 
 def talk(project: Path, *calls: Call | Callable[[list[Any]], Call]) -> tuple[list[str], list[Any]]:
-    """Names of the tools, and what each call answers; a call may be made of the answers before it."""
+    """Names of the tools, and what each call answers; a call may be made of the answers before it.
+
+    A call of a resource has its address for a name.
+    """
 
     async def session() -> tuple[list[str], list[Any]]:
         from mcp.client.stdio import StdioServerParameters
@@ -33,7 +37,8 @@ def talk(project: Path, *calls: Call | Callable[[list[Any]], Call]) -> tuple[lis
             answers: list[Any] = []
             for call in calls:
                 name, given = call(answers) if callable(call) else call
-                answers.append(await client.call_tool(name, given))
+                resource = name.startswith("motionloom://")
+                answers.append(await (client.read_resource(name) if resource else client.call_tool(name, given)))
             return [tool.name for tool in listed.tools], answers
 
     with ThreadPoolExecutor(1) as thread:  # a browser's tests may have a loop running in this one
@@ -51,18 +56,37 @@ def test_an_assistant_makes_motion_and_exports_it(tmp_path: Path) -> None:
     def long_one(answers: list[Any]) -> str:
         return plain(answers[1])[0]["id"]
 
-    names, (one, _, written, refused, escaped, wrong) = talk(
+    names, (one, long, written, refused, escaped, wrong, actions, goals) = talk(
         tmp_path,
         ("generate_motion", {"prompt": "a person jumps", "seconds": 1.0, "seed": 3, "count": 2}),
         (
             "compose",
-            {"timeline": {"segments": [{"text": f"a person {verb}", "seconds": 1} for verb in ("walks", "waves")]}},
+            {
+                "timeline": {
+                    "segments": [
+                        {"text": "a person walks", "seconds": 1},
+                        {"text": "a person waves", "seconds": 1, "goal": {"path": {"points": [[0, 0], [0, 0.5]]}}},
+                    ]
+                }
+            },
         ),
         lambda made: ("export", {"motion": long_one(made), "format": "bvh", "name": "walk-and-wave"}),
         ("export", {"motion": "0" * 16}),
         lambda made: ("export", {"motion": long_one(made), "name": "../evil"}),
         ("generate_motion", {"prompt": "a person jumps", "best_of": 99}),
+        ("motionloom://actions", {}),
+        ("motionloom://schemas/goal", {}),
     )
+    said, *_, picture = one.content
+    (did,) = json.loads(said.text)["happened"]
+    assert did == plain(one)[0]["happened"][0]
+    assert set(did) >= {"sentence", "way", "turn", "steps", "counts", "pelvis", "contacts"}
+    assert picture.mime_type == "image/png"
+    assert base64.b64decode(picture.data).startswith(b"\x89PNG")
+    assert not list(tmp_path.rglob("*.png"))
+    assert plain(long)[0]["remarks"] == []
+    assert json.loads(actions.contents[0].text)["sentences"]
+    assert json.loads(goals.contents[0].text)["title"] == "motionloom goal"
     assert set(names) == {"generate_motion", *REQUESTS, "export"} - {"generate"}
     assert [take["seed"] for take in plain(one)] == [3, 4]
     file = Path(plain(written)["file"])

@@ -54,6 +54,9 @@ def test_a_stream_goes_on_behind_the_event_that_was_seen_last(server: Server) ->
 
 def test_a_sentence_of_two_actions_is_parted_as_on_the_command_line(server: Server) -> None:
     one = server.draw(task="generate", prompt="a person walks, then jumps", seconds=4.0, steps=4)
+    (line,) = one["remarks"]
+    assert line.startswith("one after the other: 'a person walks' ")
+    assert "'a person jumps' " in line
     listed = [{"text": "a person walks", "seconds": 2.0}, {"text": "a person jumps", "seconds": 2.0}]
     assert one["results"][0]["frames"] == sum(round(20 * part["seconds"]) for part in listed)
 
@@ -64,8 +67,24 @@ def test_numbers_in_the_words_are_kept_and_measured_as_on_the_command_line(serve
     expected = generate(Prior.load(), "turn left 90 degrees", seed=5, steps=6)[0]
     assert np.abs(poses(server, result["id"]) - expected.positions()).max() < 1e-3
     assert [one["read"] for one in result["measures"]["amounts"]] == ["a turn of 90 degrees to the left"]
+    assert made["remarks"][0].startswith("read as: a turn of 90 degrees to the left, ")
+    (did,) = result["happened"]
+    assert did["turn"] == pytest.approx(result["measures"]["amounts"][0]["measured"], abs=15)
+    assert "turns" in did["sentence"]
+    assert "to the left" in did["sentence"]
+    status, stored = server.json("GET", f"/motions/{result['id']}")
+    assert (status, stored["about"]["happened"]) == (200, [did])
     literal = server.draw(task="generate", prompt="turn left 90 degrees", seed=5, steps=6, literal=True)
     assert literal["results"][0]["frames"] == 100
+
+
+def test_words_that_nobody_learned_are_remarked_on(server: Server) -> None:
+    foreign = "eine Person geht vorwärts"
+    for asked in ({"task": "generate", "prompt": foreign, "seconds": 1.0}, {"task": "duet", "prompt": foreign}):
+        made = server.draw(**asked | {"seconds": 1.0, "steps": 2})
+        assert any("does not look like English" in line for line in made["remarks"])
+    plain = server.draw(task="generate", prompt="a person walks", seconds=1.0, steps=2)
+    assert plain["remarks"] == []
 
 
 def test_the_best_of_several_is_that_of_the_library(server: Server) -> None:
@@ -165,6 +184,7 @@ def test_a_switch_has_both_motions_and_what_is_between(server: Server, walk: str
 
 def test_a_duet_has_two_people_and_one_answers_somebody(server: Server, walk: str) -> None:
     (two,) = server.draw(task="duet", prompt="two people dance", seconds=2.0, steps=4)["results"]
+    assert len([one["sentence"] for one in two["happened"]]) == 2
     (answer,) = server.draw(task="duet", react_to=walk, steps=4)["results"]
     assert (two["people"], answer["people"]) == (2, 2)
     assert np.abs(poses(server, answer["id"], 0) - poses(server, walk)).max() < 1e-5

@@ -211,6 +211,12 @@ def test_a_mistake_in_a_timeline_is_reported_with_its_place(server: Server) -> N
     assert (status, answer["error"].startswith("the timeline, segments[0].transition: ")) == (400, True)
     status, answer = server.json("POST", "/timeline.json", b"segments: [a\n")
     assert (status, "the timeline" in answer["error"]) == (400, True)
+    status, answer = server.json("POST", "/timeline.json", b"segments:\n  - text: a person walks\n    secnds: 3\n")
+    assert (status, answer["error"].startswith("the timeline, line 3: unknown key 'secnds'")) == (400, True)
+    status, answer = server.json("POST", "/timeline.json", b"segments: [a\0]")
+    assert (status, answer["error"]) == (400, "the timeline is not a text file: it holds binary data")
+    assert not list((server.project / "motions").glob("*.yaml"))
+    assert not list((server.project / "motions").glob(".*.yaml"))
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,6 @@ from motionloom.cli.sampling import (
     load_prior,
     moves,
     places,
-    remark_unknown,
     report,
     sampling_of,
     take_text_anywhere,
@@ -374,21 +373,9 @@ def _remarks_on_words(prior: "Prior", block: "PairBlock", texts: list[str]) -> l
 
     Of a block whose file has no table of what it knows nothing is said.
     """
-    from motionloom.goals.contact import read_contact
-    from motionloom.goals.roles import MARK, prompts_of, without_two
-    from motionloom.runtime.text.known import nearest
+    from motionloom.goals.remarks import remarks_on_two
 
-    asked = {text: prompts_of(text) for text in texts}
-    lines = []
-    for text, said in asked.items():
-        if MARK not in text and said[0] != said[1]:
-            lines.append(f"read as: '{said[0]} {MARK} {said[1]}'")
-        contact = read_contact(said)
-        lines += [] if contact is None else [f"read as: {contact}"]
-    if block.known is not None and texts:
-        found = nearest(block.known, [without_two(text) for text in texts], prior.text)
-        lines += [f"of two people {one.remark()}" for one in found if not one.near]
-    return _printed(lines) + remark_unknown(prior, [prompt for said in asked.values() for prompt in said])
+    return _printed(remarks_on_two(texts, block.known, prior.known, prior.text))
 
 
 def _printed(lines: list[str]) -> list[str]:

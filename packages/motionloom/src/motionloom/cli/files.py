@@ -60,7 +60,9 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     view.set_defaults(run=run_view)
 
     info = subparsers.add_parser(
-        "info", help="say what a motion file holds", description="Say what a motion file holds and what looks wrong."
+        "info",
+        help="say what a motion file holds and what happens in it",
+        description="Say what a motion file holds, what happens in it and what looks wrong.",
     )
     info.add_argument("input", metavar="FILE", type=Path)
     add_reading(info)
@@ -144,14 +146,17 @@ def run_info(arguments: argparse.Namespace) -> None:
     from dataclasses import asdict
 
     from motionloom.io.info import describe
+    from motionloom.kinematics.deeds import measure_deeds
 
     motion, unit, _ = read_clip(arguments, arguments.input)
     clips = _clips(arguments.input)
-    info = describe(crop(motion, arguments))
+    motion = crop(motion, arguments)
+    info, did = describe(motion), measure_deeds(motion)
     problems = [*info.problems, *([RATE_ASSUMED] if rate_assumed(arguments, [arguments.input]) else [])]
     if arguments.json:
         about = {"file": str(arguments.input), "unit": unit, "clips": clips}
-        print(json.dumps({**about, **asdict(info), "problems": problems}, indent=2))
+        happened = did and did.public()
+        print(json.dumps({**about, **asdict(info), "happened": happened, "problems": problems}, indent=2))
         return
     low, high = info.lowest, info.highest
     box = " x ".join(f"{h - l:.2f}" for l, h in zip(low, high))
@@ -161,6 +166,8 @@ def run_info(arguments: argparse.Namespace) -> None:
     print(f"  body      {info.height:.2f} m tall; the feet are at {info.floor:+.2f} m")
     print(f"  way       {info.path:.2f} m along the floor, ends {info.travel:.2f} m from the start")
     print(f"  space     {box} m (x, y up, z)")
+    if did is not None:
+        print(f"  happens   {did.sentence}")
     if unit is not None:
         print(f"  unit      {unit:g} m in the file{'' if arguments.unit else ', by the length of its bones'}")
     for number, (name, seconds) in enumerate(clips, start=1):

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from motionloom.tasks.worded import Worded
     from motionloom.weights.prior import Prior
 
-ENDS_STILL, MOSTLY_STILL = 0.3, 0.8
-"""Shares of a motion at whose end somebody who stands still is told: of words that are not known, and of all."""
 SECONDS = 5.0
 """Length of one action where nothing is said of it."""
 MAX_PROMPTS = 1000
@@ -75,7 +73,7 @@ def _generate(arguments: argparse.Namespace) -> int:
     worded: list[Worded] = []
     drawn = (
         looped(arguments, prior, motion, asked[number].segments[-1].text, seed=arguments.seed + number)
-        for number, motion in enumerate(_drawn(arguments, prior, asked, worded, unknown=frozenset(remarks)))
+        for number, motion in enumerate(_drawn(arguments, prior, asked, worded, unknown=remarks))
     )
     seated: list[list[Seat]] = []
     interrupted = made.take([motion] for motion in _noting(seated, drawn, target))
@@ -161,6 +159,7 @@ def _remark_seats(seated: "list[list[Seat]]") -> None:
 
 def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str) -> "Timeline":
     """What a prompt asks, one segment or several; says so where there are several."""
+    from motionloom.goals.remarks import numbers_read, parts_read
     from motionloom.tasks.worded import read
 
     found = read(
@@ -170,19 +169,14 @@ def _timeline(arguments: argparse.Namespace, prior: "Prior", prompt: str) -> "Ti
         parted=not arguments.as_one,
         amounts=not (arguments.literal or arguments.as_one),
     )
-    said = [
-        f"{one.amount}, {sum(segment.seconds for segment in found.segments[one.first : one.end]):g} s"
-        for one in found.readings
-    ]
-    if said:
+    if said := numbers_read(found):
         if arguments.best_of > 1 and len(found.segments) == 1:
             print("motionloom: --best-of is not for numbers that are kept; this is drawn as it comes", file=sys.stderr)
-        print(f"motionloom: read as: {'; '.join(said)}; --literal leaves numbers to the network", file=sys.stderr)
-    if len(found.segments) > 1 and [(one.first, one.end) for one in found.readings] != [(0, len(found.segments))]:
+        print(f"motionloom: {said}; --literal leaves numbers to the network", file=sys.stderr)
+    if said := parts_read(found):
         if arguments.solver != SOLVER:
             fail("--solver is for one action at a time; give --as-one to leave the sentence whole")
-        listed = ", ".join(f"'{segment.text}' {segment.seconds:.1f} s" for segment in found.segments)
-        print(f"motionloom: one after the other: {listed}; --as-one leaves the sentence whole", file=sys.stderr)
+        print(f"motionloom: {said}; --as-one leaves the sentence whole", file=sys.stderr)
         if arguments.best_of > 1:
             print("motionloom: --best-of is for one action; these are drawn as they come", file=sys.stderr)
     return found
@@ -234,7 +228,7 @@ def _drawn(
     asked: "list[Timeline]",
     worded: "list[Worded]",
     *,
-    unknown: frozenset[str],
+    unknown: dict[str, str],
 ) -> "Iterator[Motion]":
     """The motions in order, each from its own seed, as they are finished; ``worded`` gets them with what was read."""
     from motionloom.requests.sampling import Sampling
@@ -251,11 +245,9 @@ def _drawn(
             progress=progress,
         )
         for number, one in enumerate(made, start=1):
-            worded.append(one)
-            said = [amount.problem for amount in one.amounts]
-            last = one.timeline.segments[-1].text in unknown
-            said.append(one.stillness(of=ENDS_STILL if last else MOSTLY_STILL))
-            for line in filter(None, said):
+            one = replace(one, unknown=unknown)
+            for line in one.shortfalls:
                 whose = f"motion {number}: " if len(asked) > 1 else ""
                 print(f"motionloom: {whose}{line}", file=sys.stderr)
+            worded.append(one)
             yield one.motion

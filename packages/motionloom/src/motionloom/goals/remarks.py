@@ -1,12 +1,18 @@
-"""What is said of words before anything is drawn: that they are not English, or like nothing that was learned."""
+"""What is said of words before anything is drawn: how they are read, that they are not English or not known."""
 
 import re
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
+from motionloom.goals.contact import read_contact
 from motionloom.goals.english import is_english
+from motionloom.goals.roles import MARK, prompts_of, without_two
 from motionloom.goals.verbs import subject_of
 from motionloom.runtime.text.known import Known, Nearest, bare, nearest, stem
 from motionloom.runtime.text.protocol import TextEncoder
+
+if TYPE_CHECKING:
+    from motionloom.goals.timeline import Timeline
 
 _LIGHT = frozenset(
     map(
@@ -27,6 +33,46 @@ _SMALL = frozenset(
     while""",
     )
 )
+
+
+def numbers_read(timeline: "Timeline") -> str:
+    """A line with the numbers that were read in the words of a timeline, and the seconds of each; empty for none."""
+    said = [
+        f"{one.amount}, {sum(segment.seconds for segment in timeline.segments[one.first : one.end]):g} s"
+        for one in timeline.readings
+    ]
+    return f"read as: {'; '.join(said)}" if said else ""
+
+
+def parts_read(timeline: "Timeline") -> str:
+    """A line with the actions that a sentence was parted into; empty for one action, repeated or not."""
+    if len(timeline.segments) < 2:
+        return ""
+    if [(one.first, one.end) for one in timeline.readings] == [(0, len(timeline.segments))]:
+        return ""
+    listed = ", ".join(f"'{segment.text}' {segment.seconds:.1f} s" for segment in timeline.segments)
+    return f"one after the other: {listed}"
+
+
+def remarks_on_two(
+    texts: Sequence[str], block_known: Known | None, known: Known | None, encoder: TextEncoder
+) -> list[str]:
+    """Lines about the words of two people: who is read to do what, and what neither block nor prior has learned.
+
+    texts: one per segment. block_known: what the block says that it knows; None: of pairs nothing is said. known: what
+    the prior knows. Raises `MotionloomError` as the encoder does.
+    """
+    asked = {text: prompts_of(text) for text in texts if text.strip()}
+    lines = []
+    for text, said in asked.items():
+        if MARK not in text and said[0] != said[1]:
+            lines.append(f"read as: '{said[0]} {MARK} {said[1]}'")
+        contact = read_contact(said)
+        lines += [] if contact is None else [f"read as: {contact}"]
+    if block_known is not None and asked:
+        found = nearest(block_known, [without_two(text) for text in asked], encoder)
+        lines += [f"of two people {one.remark()}" for one in found if not one.near]
+    return lines + list(remarks_on([prompt for said in asked.values() for prompt in said], known, encoder).values())
 
 
 def remarks_on(texts: Sequence[str], known: Known | None, encoder: TextEncoder) -> dict[str, str]:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 from motionloom.errors import MotionloomError
 from motionloom.goals.fields import Field
 from motionloom.goals.lined_file import LinedFile
-from motionloom.io.lined_yaml import MAX_ITEMS, Lined, lined_of, read_lined
+from motionloom.io.lined_yaml import MAX_ITEMS, Lined, lined_of, parse_lined, read_lined
+from motionloom.io.text import plain_text
 from motionloom.requests.fields import specs
 from motionloom.requests.shared import LONGEST, LONGEST_PROMPT
 from motionloom.requests.timeline import SECONDS, SegmentKeys, TimelineKeys
@@ -88,6 +89,18 @@ def read_timeline(path: Path | str) -> Timeline:
     """
     path = Path(path)
     return _Reader(path).timeline(read_lined(path))
+
+
+def timeline_of_yaml(text: str, *, folder: Path) -> tuple[Timeline, Any]:
+    """The timeline that a file's text holds, and its plain values; mistakes name the line.
+
+    folder: where the files that it names lie, or below.
+    """
+    document = parse_lined(plain_text(text.encode(errors="replace"), "the timeline"), "the timeline")
+    try:
+        return _Reader(folder / "the timeline").timeline(document), document.plain()
+    except MotionloomError as error:
+        raise MotionloomError(str(error).replace(str(folder / "the timeline"), "the timeline")) from None
 
 
 def timeline_from(value: Any, *, folder: Path) -> Timeline:

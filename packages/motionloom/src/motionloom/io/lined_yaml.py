@@ -81,9 +81,13 @@ def fail(path: Path | str, line: int, message: str) -> NoReturn:
 
 def read_lined(path: Path | str, *, max_bytes: int = 32_000_000) -> Lined:
     """The one document of a YAML file; `MotionloomError` with the line for whatever is wrong with it."""
+    return parse_lined(read_text(path, max_bytes=max_bytes), path)
+
+
+def parse_lined(data: bytes, path: Path | str) -> Lined:
+    """The one document of YAML in plain text (`motionloom.io.text.plain_text`); ``path``: its file, or what it is."""
     import yaml  # here, since commands that read no such file need not wait for it
 
-    data = read_text(path, max_bytes=max_bytes)
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:

@@ -25,9 +25,13 @@ _CHUNK = 4 * 1024**2
 
 def read_text(path: Path | str, *, max_bytes: int = MAX_BYTES, empty: bool = False) -> bytes:
     """The bytes of a text file with plain line ends (``\\n``) and without a byte-order mark; refuses binary junk."""
-    data = read_bytes(path, max_bytes=max_bytes, empty=empty)
+    return plain_text(read_bytes(path, max_bytes=max_bytes, empty=empty), path)
+
+
+def plain_text(data: bytes, what: Path | str) -> bytes:
+    """The same of bytes that are there; ``what``: their file's name, or what they are."""
     if b"\0" in data:
-        raise MotionloomError(f"{path} is not a text file: it holds binary data")
+        raise MotionloomError(f"{what} is not a text file: it holds binary data")
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return data.removeprefix(b"\xef\xbb\xbf")

@@ -4,7 +4,9 @@ What the tools take is what the requests say (`motionloom.requests`).
 Needs the extra ``mcp``. Nothing but the protocol may be written to standard output.
 """
 
+import base64
 import inspect
+import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
@@ -28,11 +30,21 @@ from motionloom.server.worker import Worker
 CLIENT = "assistant"
 WHAT = (
     "Human motion from plain English, on a skeleton of 22 joints at 20 frames per second. Make motion with "
-    "generate_motion (one action), compose (several, one after the other) or another task; write files with export."
+    "generate_motion (one action), compose (several, one after the other) or another task; write files with export. "
+    "An answer says what happened in each motion, measured on its joints, and shows it: compare that with what was "
+    "wanted, and try again with other words, goals or another seed. motionloom://actions lists what is known."
 )
+SCHEMAS = Path(__file__).parents[1] / "schemas"
 
 
-_GOALS: Schema = {"type": "object", "description": "paths, joints and poses that are kept to (docs/control.md)"}
+_GOALS: Schema = {
+    "type": "object",
+    "description": "paths, joints and poses that are kept to, in metres and seconds, +Y up: motionloom://schemas/goal",
+    "examples": [
+        {"path": {"points": [[0, 0], [1, 2], [0, 4]]}},
+        {"joints": [{"joint": "right_wrist", "points": [{"time": 2.0, "position": [-0.3, 1.6, 0.4]}]}]},
+    ],
+}
 _PARTS: Mapping[str, Schema] = {"goal": _GOALS, "adapters": {}, "motion file": {"type": "string"}}
 _SEGMENT: Schema = {
     "type": "object",
@@ -63,12 +75,12 @@ class Assistant:
         """What makes motion of a task's request, with its fields as arguments."""
         from pydantic import WithJsonSchema
 
-        async def call(**given: Any) -> list[dict[str, Any]]:
+        async def call(**given: Any) -> Any:
             return await self._drawn({"task": task} | given)
 
         known = narrowed(REQUESTS[task], most(task, self.worker.limits))
         call.__name__ = "generate_motion" if task == "generate" else task
-        call.__doc__ = f"{inspect.getdoc(REQUESTS[task])} Gives an id for each motion."
+        call.__doc__ = f"{inspect.getdoc(REQUESTS[task])} Answers what happened in each motion, and shows it."
         call.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
             [
                 inspect.Parameter(
@@ -109,18 +121,49 @@ class Assistant:
 
         return await _said(anyio.to_thread.run_sync(write))
 
-    async def _drawn(self, asked: dict[str, Any]) -> list[dict[str, Any]]:
+    async def actions(self) -> str:
+        """What the prior has learned: seconds of recordings for each action, and sentences that tell of them."""
         import anyio
 
-        def draw() -> list[dict[str, Any]]:
+        known = (await anyio.to_thread.run_sync(self.worker.prior)).known
+        found = {} if known is None else {"seconds": dict(known.seconds), "sentences": list(known.sentences)}
+        return json.dumps(found, ensure_ascii=False)
+
+    def goal_schema(self) -> str:
+        """The JSON Schema of goals."""
+        return (SCHEMAS / "goal.schema.json").read_text(encoding="utf-8")
+
+    async def _drawn(self, asked: dict[str, Any]) -> Any:
+        """The results of a job, as values, as text, and as a picture."""
+        import anyio
+
+        def draw() -> tuple[list[dict[str, Any]], bytes]:
             request = read_request(asked | {"levels": False}, self.project, self.worker.limits)
             job = self.worker.submit(request, CLIENT)
             job.wait()
             if job.state != "done":
                 raise MotionloomError(job.error or "the job was cancelled")
-            return job.public()["results"]
+            found = job.public()
+            results = [one | {"remarks": [*found["remarks"], *one["remarks"]]} for one in found["results"]]
+            return results, self._picture(results)
 
-        return await _said(anyio.to_thread.run_sync(draw))
+        results, picture = await _said(anyio.to_thread.run_sync(draw))
+        types = import_module("mcp.types")
+        told = [types.TextContent(type="text", text=json.dumps(one, ensure_ascii=False)) for one in results]
+        image = types.ImageContent(type="image", data=base64.b64encode(picture).decode(), mime_type="image/png")
+        return types.CallToolResult(content=[*told, image], structured_content={"result": results})
+
+    def _picture(self, results: Sequence[Mapping[str, Any]]) -> bytes:
+        """A PNG with a row for every person of the motions."""
+        from motionloom.viz.video import draw_sheet
+
+        rows = [(one, motion) for one in results for motion in self.project.motion(one["id"]).people]
+        part = self.project.part(".png")
+        try:
+            draw_sheet([motion for _, motion in rows], part, captions=[one["id"] for one, _ in rows], columns=6)
+            return part.read_bytes()
+        finally:
+            part.unlink(missing_ok=True)
 
 
 async def _said(call: Any) -> Any:
@@ -147,6 +190,8 @@ def run(folder: Path, *, weights: str = "default", device: str = "cpu", adapters
     tools = Assistant(worker.project, worker)
     for tool in (*map(tools.tool, TASKS), tools.export):
         server.tool()(tool)
+    for name, resource in (("actions", tools.actions), ("schemas/goal", tools.goal_schema)):
+        server.resource(f"motionloom://{name}", mime_type="application/json")(resource)
     worker.start()
     try:
         server.run("stdio")

@@ -115,6 +115,8 @@ def _jobs() -> dict[str, Schema]:
             "frames": WHOLE,
             "people": WHOLE,
             "measures": ref("Measures"),
+            "happened": _list({"anyOf": [ref("Deeds"), _NULL]}, description="of each person"),
+            "remarks": _list(TEXT, description="what was missed"),
         },
         "id",
         "number",
@@ -123,6 +125,8 @@ def _jobs() -> dict[str, Schema]:
         "frames",
         "people",
         "measures",
+        "happened",
+        "remarks",
     )
     job = _object(
         {
@@ -131,6 +135,7 @@ def _jobs() -> dict[str, Schema]:
             "state": ref("JobState"),
             "progress": _number(minimum=0, maximum=1),
             "error": {"anyOf": [TEXT, _NULL]},
+            "remarks": _list(TEXT, description="how the words were read, and which of them nobody learned"),
             "results": _list(ref("Result")),
         },
         "id",
@@ -138,16 +143,29 @@ def _jobs() -> dict[str, Schema]:
         "state",
         "progress",
         "error",
+        "remarks",
         "results",
     )
     return {
         "Task": {"enum": list(TASKS)},
         "JobState": {"enum": ["queued", "running", *FINAL]},
         "Measures": {"type": "object", "description": "how far a motion is from its goals, by their names"},
+        "Deeds": _deeds(),
+        "DeedCounts": {"type": "object", "additionalProperties": WHOLE, "description": "how often what was done"},
+        "Contacts": {"type": "object", "additionalProperties": _number(), "description": "shares of the time"},
         "Result": result,
         "Job": job,
         "NewJob": _object({"id": ID}, "id"),
     }
+
+
+def _deeds() -> Schema:
+    """`motionloom.kinematics.deeds.Deeds`, as `public` gives it."""
+    numbers = ("seconds", "way", "forward", "left", "up", "turn", "pace", "highest_hand", "highest_foot")
+    keys = {"sentence": TEXT, **{name: _number() for name in numbers}}
+    keys |= {"steps": _list(WHOLE), "pelvis": _list(_number()), "ends": TEXT}
+    keys |= {"counts": ref("DeedCounts"), "contacts": ref("Contacts")}
+    return _object(keys, *keys, about="what a person did: metres, degrees (to the left), seconds (docs/files.md)")
 
 
 def _stored() -> dict[str, Schema]:

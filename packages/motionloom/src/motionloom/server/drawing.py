@@ -58,6 +58,8 @@ class Result:
     people: tuple[Motion, ...]
     seed: int
     measures: dict[str, Any] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+    """What was missed, a sentence each."""
 
 
 def draw(models: Models, request: JobRequest, progress: Progress) -> Iterator[Result]:
@@ -147,7 +149,7 @@ def _worded(models: Models, request: JobRequest, progress: Progress) -> Iterator
     made = draw_worded(models.prior, asked, foot_lock=lock, sampling=request.sampling, progress=progress)
     for number, one in enumerate(made):
         measures = {"amounts": [asdict(amount) for amount in one.amounts]}
-        yield Result(number, (one.motion,), request.seed + number, measures)
+        yield Result(number, (one.motion,), request.seed + number, measures, one.shortfalls)
 
 
 def _controlled(models: Models, request: JobRequest, progress: Progress) -> Iterator[Result]:
@@ -163,7 +165,7 @@ def _controlled(models: Models, request: JobRequest, progress: Progress) -> Iter
     )
     for number, one in enumerate(made):
         measures = measured(one.motion, request.parts) | {"missed": list(one.missed)}
-        yield Result(number, (one.motion,), request.seed + number, measures)
+        yield Result(number, (one.motion,), request.seed + number, measures, list(one.missed))
 
 
 def _edited(models: Models, request: JobRequest, progress: Progress) -> Iterator[Result]:

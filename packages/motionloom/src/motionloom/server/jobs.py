@@ -47,6 +47,8 @@ class Job:
     done: int = 0
     of: int = 0
     error: str | None = None
+    remarks: list[str] = field(default_factory=list)
+    """What is to be said of its words."""
     results: list[dict[str, Any]] = field(default_factory=list)
     log_bytes: int = 0
     _number: int = 0
@@ -71,6 +73,7 @@ class Job:
                 "state": self.state,
                 "progress": round(min(share, 1.0), 4),
                 "error": self.error,
+                "remarks": list(self.remarks),
                 "results": list(self.results),
             }
 

@@ -7,8 +7,7 @@ from typing import Any
 import yaml
 
 from motionloom.errors import MotionloomError
-from motionloom.goals.timeline import Timeline, read_timeline, timeline_from
-from motionloom.io.lined_yaml import read_lined
+from motionloom.goals.timeline import Timeline, timeline_from, timeline_of_yaml
 from motionloom.server.limits import Limits
 from motionloom.server.project import Project
 
@@ -44,15 +43,9 @@ def timeline_yaml(value: Any, project: Project, limits: Limits) -> str:
 
 def timeline_json(text: str, project: Project, limits: Limits) -> Any:
     """A timeline file's text, once it has been read as a timeline, as the JSON that `timeline_yaml` takes."""
-    place = project.motions / f".{project.part().name}.yaml"
-    try:
-        place.write_text(text, encoding="utf-8")
-        _checked(read_timeline(place), limits)
-        return read_lined(place).plain()
-    except MotionloomError as error:
-        raise MotionloomError(str(error).replace(str(place), "the timeline")) from None
-    finally:
-        place.unlink(missing_ok=True)
+    timeline, plain = timeline_of_yaml(text, folder=project.motions)
+    _checked(timeline, limits)
+    return plain
 
 
 def _checked(timeline: Timeline, limits: Limits) -> Timeline:

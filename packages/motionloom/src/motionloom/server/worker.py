@@ -169,7 +169,10 @@ class Worker:
 
     def _finish(self, models: "Models", jobs: Sequence[Job], progress: Callable[[int, int], None]) -> None:
         from motionloom.server.drawing import batch_key, draw, draw_together
+        from motionloom.server.remarks import remarks_of
 
+        for job in jobs:
+            job.remarks = remarks_of(models, job.request)
         if batch_key(jobs[0].request) is not None:
             for index, result in draw_together(models, [job.request for job in jobs], progress):
                 if not jobs[index].finished:
@@ -182,8 +185,13 @@ class Worker:
             job.end("done")
 
     def _keep(self, job: Job, result: "Result") -> None:
+        from motionloom.kinematics.deeds import measure_deeds
+
         request = job.request
+        did = [measure_deeds(one) for one in result.people]
+        happened = [one and one.public() for one in did]
         about = {"task": request.task, "prompt": request.prompt, "seed": result.seed, "measures": result.measures}
+        about["happened"] = happened
         stored = self.project.add(result.people, about)
         motion = result.people[0]
         job.add_result(
@@ -195,6 +203,8 @@ class Worker:
                 "frames": len(motion),
                 "people": len(result.people),
                 "measures": result.measures,
+                "happened": happened,
+                "remarks": result.remarks,
             }
         )
 

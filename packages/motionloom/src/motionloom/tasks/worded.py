@@ -6,8 +6,8 @@ another seed, with a shorter or longer way or stroke, `TRIES` times at most. The
 """
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from typing import Unpack
 
@@ -18,6 +18,7 @@ from motionloom.errors import MotionloomError
 from motionloom.features.layout import FPS, WIDTH
 from motionloom.goals import timeline as timelines
 from motionloom.goals.amount_goal import kept, measured
+from motionloom.goals.remarks import numbers_read, parts_read, remarks_on
 from motionloom.goals.timeline import Timeline
 from motionloom.goals.verbs import base_of, kind_of_verb
 from motionloom.kinematics.gestures import still_from
@@ -33,6 +34,8 @@ from motionloom.weights.prior import Prior
 
 TRIES = 6
 STILL = 1.5
+ENDS_STILL, MOSTLY_STILL = 0.3, 0.8
+"""Shares of a motion at whose end somebody who stands still is told: of words that are not known, and of all."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,21 @@ class Worded:
     """What was drawn, segment by segment."""
     amounts: tuple[Measured, ...]
     """What was read of numbers in the words, in their order."""
+    unknown: Mapping[str, str] = field(default_factory=dict)
+    """The texts that the weights do not know, each with a sentence about it (`motionloom.goals.remarks`)."""
+
+    @property
+    def remarks(self) -> list[str]:
+        """One sentence each: how the words were read, which are not known, what of them was missed."""
+        texts = dict.fromkeys(segment.text for segment in self.timeline.segments)
+        unknown = [self.unknown[text] for text in texts if text in self.unknown]
+        return [*filter(None, (numbers_read(self.timeline), parts_read(self.timeline))), *unknown, *self.shortfalls]
+
+    @property
+    def shortfalls(self) -> list[str]:
+        """A sentence for each number that was missed, and for an end where nothing happens any more."""
+        share = ENDS_STILL if self.timeline.segments[-1].text in self.unknown else MOSTLY_STILL
+        return [*filter(None, [*(amount.problem for amount in self.amounts), self.stillness(of=share)])]
 
     @property
     def still_from(self) -> float | None:
@@ -115,7 +133,7 @@ def generate_worded(
     progress: Progress | None = None,
     **settings: Unpack[Settings],
 ) -> list[Worded]:
-    """The motions of `motionloom.generate`, each with what was read of numbers in its words and what was drawn of them.
+    """The motions of `motionloom.generate`, each with what was read in its words, what was drawn of it, and remarks.
 
     Arguments and errors as there.
     """
@@ -139,7 +157,8 @@ def generate_worded(
     ]
     settled = replace(chosen, seed=chosen.seeds(1)[0], first=0)
     made = draw(prior, asked, foot_lock=foot_lock, best_of=best_of, sampling=settled, progress=progress)
-    return list(made)
+    unknown = remarks_on([segment.text for one in asked for segment in one.segments], prior.known, prior.text)
+    return [replace(one, unknown=unknown) for one in made]
 
 
 def draw(
