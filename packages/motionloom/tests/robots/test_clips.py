@@ -11,9 +11,9 @@ from motionloom import io
 from motionloom import rotations as rot
 from motionloom.cli import main
 from motionloom.errors import MotionloomError
-from motionloom.motion import Motion
 from motionloom.skeleton import SMPL22
 from tests.robots import models
+from tests.robots.people import marching
 from tests.shared import shared
 
 pytest.importorskip("mink")
@@ -26,26 +26,6 @@ from motionloom.robots.physics import track
 
 RECORDINGS = ("data/cmu/bvh/07_04.bvh", "data/cmu/asf_amc/135/135_04.amc")
 ROBOTS = ("robots/unitree_g1/g1_29dof_without_meshes.xml", "robots/booster_t1/t1_mocap.xml")
-
-
-def marching(seconds: float = 1.5, fps: float = 30.0) -> Motion:
-    """A person who lifts one foot and then the other, and swings the arms."""
-    count = round(seconds * fps)
-    phase = 2 * np.pi * np.arange(count) / fps
-    turns = np.tile(rot.IDENTITY, (count, 22, 1))
-
-    def bend(joint: str, angles: np.ndarray, axis: tuple[float, float, float] = (1.0, 0.0, 0.0)) -> None:
-        turns[:, SMPL22.index(joint)] = rot.rotvec_to_quat(angles[:, None] * np.array(axis))
-
-    for side, lift in (("left", np.sin(phase).clip(0)), ("right", (-np.sin(phase)).clip(0))):
-        bend(f"{side}_hip", -0.8 * lift)
-        bend(f"{side}_knee", 1.4 * lift)
-        bend(f"{side}_ankle", -0.5 * lift)
-    bend("left_shoulder", -1.1 + 0.5 * np.sin(phase), (0.0, 0.0, 1.0))
-    bend("right_shoulder", 1.1 + 0.5 * np.sin(phase), (0.0, 0.0, 1.0))
-    rest = SMPL22.rest_positions()
-    root = np.tile(rest[0] - [0, rest[:, 1].min(), 0], (count, 1))
-    return Motion(SMPL22, fps, root, turns)
 
 
 @pytest.fixture(scope="module")
@@ -209,27 +189,6 @@ def test_physics_holds_the_hinges_and_lets_it_fall(robot: Robot, clip: Clip) -> 
     lying = clip.qpos.copy()
     lying[:, 3:7] = rot.rotvec_to_quat(np.array([1.4, 0.0, 0.0]))
     assert track(replace(clip, qpos=lying), robot).free_seconds < 0.1
-
-
-def test_a_folder_of_motions_becomes_clips_and_a_manifest(robot: Robot, tmp_path: Path) -> None:
-    """What is damaged has its sentence in the manifest; a second call makes nothing anew."""
-    folder, out = tmp_path / "motions", tmp_path / "clips"
-    (folder / "more").mkdir(parents=True)
-    io.save(marching(0.5), folder / "one.bvh")
-    io.save(marching(0.5), folder / "more" / "two.npz")
-    (folder / "three.bvh").write_text("no motion")
-    line = ["robot-batch", str(folder), "--robot", str(robot.file.path), "--out", str(out)]
-    assert main(line) == 1
-    rows = [json.loads(row) for row in (out / "manifest.jsonl").read_text().splitlines()]
-    assert rows[0]["joint_names"] == list(robot.file.joint_names())
-    assert {row["name"]: row.get("limits_broken") for row in rows[1:]} == {"more_two": 0, "one": 0, "three": None}
-    assert "BVH" in next(row["error"] for row in rows[1:] if row["name"] == "three")
-    before = (out / "one.npz").stat().st_mtime_ns
-    (folder / "three.bvh").unlink()
-    assert main(line) == 0
-    assert (out / "one.npz").stat().st_mtime_ns == before
-    assert len(load_clip(out / "more_two.npz", robot)) == 24
-    assert main([*line, "--fps", "30"]) == 2
 
 
 def test_the_command_line_writes_checks_and_reads_back(

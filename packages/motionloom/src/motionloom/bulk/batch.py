@@ -13,12 +13,15 @@ from motionloom.bulk.jobs import MOST, Jobs, parquet, shard_size
 from motionloom.bulk.maker import FORMATS, Made, Maker, Options
 from motionloom.bulk.measures import Filter
 from motionloom.bulk.metadata import Result, damaged_table, read_batch, result, write_table
+from motionloom.bulk.on_robot import check_format
 from motionloom.bulk.row import parse
 from motionloom.bulk.shard import Batch, Report, Task, problems
 from motionloom.errors import MotionloomError
 from motionloom.goals.adapters import parse_adapter
 from motionloom.requests.fields import specs
 from motionloom.requests.sampling import PairSampling
+from motionloom.robots.clip import FPS
+from motionloom.robots.clip import check_settings as check_rate
 
 Source = Jobs | Path | str | Mapping[str, Any] | Iterable[Mapping[str, Any]]
 LOCAL = "local"
@@ -130,6 +133,7 @@ def check_options(options: Options) -> None:
             raise MotionloomError(
                 "the filter asks whether motions obey, and there is no judge; name one in the options"
             )
+    check_robot(options)
     specs(PairSampling)["pair_guidance"].check(options.pair_guidance, "pair_guidance")
     if options.shard_rows is not None and not 1 <= options.shard_rows <= MOST:
         raise MotionloomError(f"a shard has 1 to {MOST:,} rows; got {options.shard_rows:,}")
@@ -139,6 +143,19 @@ def check_options(options: Options) -> None:
         raise MotionloomError(f"the frame rate must be 1 to 1000; got {options.fps:g}")
     if options.skeleton is not None and options.skeleton != "smpl22" and not Path(options.skeleton).is_file():
         raise MotionloomError(f"there is no file {options.skeleton}; name a skeleton (.bvh, .glb, .asf) or smpl22")
+
+
+def check_robot(options: Options) -> None:
+    """Raise `MotionloomError` for a robot that cannot be, or does not go with the other options."""
+    check_rate(options.fps or FPS, options.max_speed)
+    if options.robot is None and options.robot_map is not None:
+        raise MotionloomError("--robot-map goes with a --robot; name its model")
+    if options.robot is None:
+        return
+    check_format(options.format, robot=True)
+    if options.skeleton is not None or options.hands != "as-is":
+        raise MotionloomError("--skeleton and --hands are for characters; leave them out with --robot")
+    options.on_robot()
 
 
 def check_jobs(jobs: Jobs, rows: int) -> None:
@@ -222,9 +239,10 @@ def _found(options: Options) -> Options:
         return str(Path(name).resolve()) if name is not None and Path(name).is_file() else name
 
     adapters = [f"{path.resolve()}:{factor!r}" for path, factor in map(parse_adapter, options.adapters)]
+    files = {name: whole(getattr(options, name)) for name in ("skeleton", "robot", "robot_map")}
     weights = whole(options.weights) or "default"
     pair = whole(options.pair_weights) or "duet"
-    return replace(options, weights=weights, pair_weights=pair, adapters=adapters, skeleton=whole(options.skeleton))
+    return replace(options, weights=weights, pair_weights=pair, adapters=adapters, **files)
 
 
 def processes(options: Options) -> int:
@@ -266,7 +284,8 @@ def _words(raw: bytes, seed: int) -> tuple[str, int] | None:
         row = parse(raw)
     except MotionloomError:
         return "", -1
-    return None if row.timeline is not None else (row.prompt, seed if row.seed is None else row.seed)
+    said = row.prompt or row.motion or ""
+    return None if row.timeline is not None else (said, seed if row.seed is None else row.seed)
 
 
 def _finish(store: Store, shards: int, *, changed: bool) -> None:

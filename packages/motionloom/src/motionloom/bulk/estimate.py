@@ -64,7 +64,7 @@ def estimate(jobs: Jobs, options: Options, *, workers: int, sample: int = 16) ->
         unique = {one.id: one for one in asked}
         for one, made in maker.make(list(unique.values())):
             if isinstance(made, Made) and made.passes(passes):
-                file.add(made.people, entry_of(one, made))
+                file.add(made.people, entry_of(one, made), made.angles)
                 kept += 1
         file.close()
         seconds, size = time.perf_counter() - began, sizes(Path(folder) / "data")["bytes"]

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from motionloom.bulk.maker import Options, hash_weights
-from motionloom.bulk.measures import MEANING
+from motionloom.bulk.measures import MEANING, ROBOT
 from motionloom.bulk.row import FORMAT, hash_file
 from motionloom.bulk.writers import hashes, json_line, sizes, suffix, sync
 from motionloom.errors import MotionloomError
@@ -208,13 +208,18 @@ def about(options: Options, *, rows: int, shard_rows: int) -> dict[str, Any]:
         "weights": {"name": card.name, "sha256": weights, "licence": card.licence},
         "motions": options.of_motions(weights),
         "duets": options.of_duets(),
-        "defaults": {"seconds": options.seconds, "seed": options.seed, "skeleton": _skeleton(options)},
+        "defaults": {
+            "seconds": options.seconds,
+            "seed": options.seed,
+            "skeleton": _hash(options.skeleton),
+            **_of_robot(options),
+        },
         "files": options.format,
         "filter": options.filter,
         "judge": options.judge,
         "rows": rows,
         "shard_rows": shard_rows,
-        "measures": MEANING,
+        "measures": MEANING | ROBOT,
     }
     return found | {CHECK: _hash_manifest(found)}
 
@@ -224,10 +229,15 @@ def _hash_manifest(found: dict[str, Any]) -> str:
     return hashlib.sha256(json.dumps(others, sort_keys=True).encode()).hexdigest()
 
 
-def _skeleton(options: Options) -> str | None:
-    return (
-        None if options.skeleton is None or not Path(options.skeleton).is_file() else hash_file(Path(options.skeleton))
-    )
+def _of_robot(options: Options) -> dict[str, Any]:
+    """What is said of robots; nothing where nothing is: older folders hold."""
+    said = {"robot": _hash(options.robot), "robot_map": _hash(options.robot_map), **options.of_robots()}
+    return {name: value for name, value in said.items() if value}
+
+
+def _hash(name: str | None) -> str | None:
+    """Of the file of this name, where there is one."""
+    return None if name is None or not Path(name).is_file() else hash_file(Path(name))
 
 
 def read_manifest(out: Path, *, anew: bool = False) -> dict[str, Any] | None:

@@ -7,6 +7,7 @@ keeps more rows than one shard has.
 import csv
 import importlib
 import json
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -14,11 +15,13 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from motionloom import formats
 from motionloom.errors import MotionloomError
 from motionloom.requests.batch import RowKeys
 from motionloom.requests.fields import specs
 
 READS = (".jsonl", ".ndjson", ".csv", ".parquet")
+_FLAGS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 MAX_COLUMNS = 200
 """Columns of a table of jobs."""
 MAX_LINE = 4_000_000
@@ -38,7 +41,7 @@ class Jobs:
     path: Path | None = None
     """JSON lines, CSV or Parquet; or, with ``variants``, a text file with one prompt per line."""
     rows: tuple[Mapping[str, Any], ...] = ()
-    """The rows themselves, where there is no file."""
+    """The rows themselves, where there is no file; ``path`` is the folder of the files that they name then."""
     variants: int | None = None
     """Motions per line of a file of prompts; variant i has the seed ``seed + i``."""
     seed: int = 0
@@ -73,14 +76,36 @@ class Jobs:
             raise MotionloomError(f"{path} is a file of jobs by its name; give it without --prompts")
         return Jobs(_found(Path(path)), variants=variants, seed=seed)
 
+    @staticmethod
+    def of_recordings(folder: Path | str) -> "Jobs":
+        """A row for every motion file in a folder and below it, which goes onto the job's robot or skeleton as it is.
+
+        Raises `MotionloomError` where there is none.
+        """
+        folder = Path(folder)
+        kinds = formats.readable()
+        found = sorted(one for one in folder.rglob("*") if one.suffix.lower() in kinds and one.is_file())
+        if not found:
+            raise MotionloomError(f"{folder} holds no motion files ({', '.join(kinds)}); name a folder that does")
+        names = [one.relative_to(folder) for one in found]
+        ids = [re.sub(r"[^A-Za-z0-9_-]", "_", "_".join(one.with_suffix("").parts))[:90] for one in names]
+        seen: Counter[str] = Counter()
+        rows = []
+        for name, one in zip(names, ids):
+            seen[one] += 1
+            rows.append({"motion": name.as_posix(), "id": one if seen[one] == 1 else f"{one}-{seen[one]}"})
+        return Jobs(folder, tuple(rows))
+
     @property
     def folder(self) -> Path:
         """Where the files that rows name lie, or below it."""
-        return Path() if self.path is None else self.path.parent
+        if self.path is None or self.rows:
+            return self.path or Path()
+        return self.path.parent
 
     def read(self) -> Iterator[bytes]:
         """Rows in their order, each the bytes of a JSON object (a damaged line of JSON lines as it is)."""
-        if self.path is None:
+        if self.path is None or self.rows:
             yield from (_json(dict(row)) for row in self.rows)
         elif self.variants is not None:
             yield from self._prompts(self.path, self.variants)
@@ -93,6 +118,8 @@ class Jobs:
 
     def count(self) -> int:
         """How many rows there are, in one pass through the file."""
+        if self.rows:
+            return len(self.rows)
         if self.path is not None and self.path.suffix.lower() == ".parquet" and self.variants is None:
             return parquet().ParquetFile(self.path).metadata.num_rows
         if self.path is not None and self.variants is not None:
@@ -189,10 +216,10 @@ def _csv(path: Path) -> Iterator[bytes]:
 def _value(column: str, text: str, point: str) -> Any:
     """Numbers of the columns that hold numbers; what is none is reported by `row.parse`. point: the decimal one."""
     spec = specs(RowKeys).get(column)
-    reader = {"number": float, "whole": int}.get(spec.kind if spec else "", str)
+    reader = {"number": float, "whole": int, "flag": _FLAGS.__getitem__}.get(spec.kind if spec else "", str)
     try:
-        return reader(text if reader is str else text.replace(point, "."))
-    except ValueError:
+        return reader(text.strip().lower().replace(point, ".") if reader is not str else text)
+    except (ValueError, KeyError):
         return text
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from motionloom.bulk.measures import Filter, Judge, Values, find_judge, in_one, measure, measure_two
+from motionloom.bulk.on_robot import OnRobot, Save, check_format, on_robot
 from motionloom.bulk.row import Asked, Sources, hash_adapters, unexpected
 from motionloom.bulk.sampling import draw_group, groups
 from motionloom.edits.fitting import fit
@@ -18,11 +19,13 @@ from motionloom.goals.adapters import parse_adapter
 from motionloom.goals.goal import start_of
 from motionloom.goals.roles import prompts_of
 from motionloom.goals.timeline import Timeline
+from motionloom.io import load
 from motionloom.io.stream import joined
 from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
-from motionloom.retarget import from_smpl22
+from motionloom.retarget import retarget, to_smpl22
 from motionloom.retarget.hands import HandPose, pose_hands
+from motionloom.skeleton import SMPL22
 from motionloom.tasks.adapting import adapt
 from motionloom.tasks.best import with_best_seeds
 from motionloom.tasks.control import Controlled, judged, moved, steered_features
@@ -39,7 +42,7 @@ from motionloom.weights.prior import Prior, find_weights
 
 TOGETHER = {"cpu": 8, "cuda": 128}
 """Rows of a network call, by the kind of device."""
-FORMATS = ("npz", "bvh", "glb", "webdataset", "parquet")
+FORMATS = ("npz", "csv", "bvh", "glb", "webdataset", "parquet")
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,12 @@ class Options:
     """A file with the skeleton of rows that name none; None: the 22-joint person."""
     hands: HandPose = "as-is"
     """Pose of the hands; a row whose skeleton has no fingers then fails."""
+    robot: str | None = None
+    """A robot's model, onto which motions of rows go that name none and no skeleton; None: no robot."""
+    robot_map: str | None = None
+    max_speed: float | None = None
+    """Radians per second that no joint of a robot exceeds, where a row does not say."""
+    avoid_collisions: bool = False
     format: str = "npz"
     """One of `FORMATS`."""
     shard_rows: int | None = None
@@ -106,6 +115,16 @@ class Options:
             "fps": self.fps,
         }
 
+    def of_robots(self) -> dict[str, Any]:
+        """What no joint of a robot exceeds, and whether its parts are kept apart, where rows do not say."""
+        return {"max_speed": self.max_speed, "avoid_collisions": self.avoid_collisions}
+
+    def on_robot(self) -> OnRobot | None:
+        """The job's robot; raises `MotionloomError` as `motionloom.bulk.on_robot.on_robot` does."""
+        if self.robot is None:
+            return None
+        return on_robot(Path(self.robot), None if self.robot_map is None else Path(self.robot_map))
+
     def of_duets(self) -> dict[str, Any]:
         """What else determines motions of two people; raises `MotionloomError` for a file that is not there."""
         return {"weights": weights_digest(PAIRS.find(self.pair_weights)), "guidance": self.pair_guidance}
@@ -118,7 +137,9 @@ class Made:
     people: tuple[Motion, ...]
     """One person, or two in one world."""
     measured: tuple[Values, ...]
-    """`motionloom.bulk.measures.MEANING` of each 22-joint person, before it came onto another skeleton."""
+    """`motionloom.bulk.measures.MEANING` of each 22-joint person, before it came onto another skeleton; and `ROBOT`."""
+    angles: tuple[Save, ...] = ()
+    """What writes the joint angles of each, where they are a robot."""
 
     @property
     def motion(self) -> Motion:
@@ -178,6 +199,8 @@ class Maker:
             skeleton=options.skeleton,
             literal=options.literal,
             best_of=options.best_of,
+            robot=options.on_robot(),
+            limits=options.of_robots(),
         )
         self.judge: Judge | None = find_judge(options.judge) if options.judge else None
         self.together = TOGETHER.get(options.device.partition(":")[0], TOGETHER["cpu"])
@@ -206,7 +229,7 @@ class Maker:
                 same.setdefault(id(one.goal), []).append(one)
         for rows in same.values():
             yield from (rows[at : at + together] for at in range(0, len(rows), together))
-        yield from ([one] for one in asked if one.row.task == "duet" or one.timeline is not None)
+        yield from ([one] for one in asked if one.row.task in ("duet", "export") or one.timeline is not None)
 
     def _try(self, rows: list[Asked]) -> Iterator[tuple[Asked, Made | str]]:
         try:
@@ -222,6 +245,10 @@ class Maker:
             yield from self._try([row])
 
     def _made(self, rows: list[Asked]) -> list[Made]:
+        for one in rows:
+            check_format(self.options.format, robot=one.robot is not None)
+        if rows[0].clip is not None:
+            return [self._export(rows[0], rows[0].clip)]
         if rows[0].row.task == "duet":
             return [self._duet(rows[0])]
         if rows[0].row.task == "compose":
@@ -257,6 +284,12 @@ class Maker:
         sampling = Sampling(steps=options.steps, guidance=options.guidance, solver=options.solver)
         (seed,) = with_best_seeds(self.prior, rows, asked.best_of, sampling).seeds
         return seed
+
+    def _export(self, asked: Asked, clip: Path) -> Made:
+        """A recording as it is, on the row's skeleton or robot."""
+        motion = load(clip)
+        person = motion if motion.skeleton == SMPL22 else to_smpl22(motion)
+        return self._finished(asked, [motion], [measure(person, asked.text, self.judge)])
 
     def _worded(self, asked: Asked, timeline: Timeline) -> Made:
         """A prompt with numbers that are kept."""
@@ -373,8 +406,14 @@ class Maker:
         return self._finished(asked, [motion], [{**measure(motion, asked.text, self.judge), **measured}])
 
     def _finished(self, asked: Asked, people: Sequence[Motion], measured: Sequence[Values]) -> Made:
+        if asked.robot is not None:
+            if self.options.hands != "as-is":
+                raise MotionloomError("--hands poses fingers of a skeleton; leave it out with a robot")
+            found = [asked.robot.put(motion, self.options.fps) for motion in people]
+            measured = [{**own, **figures} for own, (_, figures, _) in zip(measured, found, strict=True)]
+            return Made(tuple(one for one, _, _ in found), tuple(measured), tuple(save for _, _, save in found))
         if asked.target is not None:
-            people = [from_smpl22(motion, asked.target) for motion in people]
+            people = [retarget(motion, asked.target) for motion in people]
         people = [pose_hands(motion, self.options.hands) for motion in people]
         if self.options.fps is not None:
             people = [motion.resample(self.options.fps) for motion in people]

@@ -35,6 +35,23 @@ MEANING: dict[str, str] = {
     "nearest": "metres between the nearest joints of two people, where they are nearest (rows of the task duet)",
 }
 """What each measure is."""
+ROBOT: dict[str, str] = {
+    "slowed_seconds": "seconds that a robot's clip is longer than the motion, so that its joints keep their speeds",
+    "float_cm": "centimetres of a robot's planted soles above the ground (95th percentile)",
+    "slide_cm": "centimetres that a robot's planted soles move in a frame (95th percentile)",
+    "sunk_cm": "centimetres of a robot's soles in the ground, at the most",
+    "planted_share": "share of frames with a robot's foot on the ground",
+    "limits_broken": "angles of a robot that are out of range",
+    "at_limit_share": "share of frames with a robot's joint at its limit",
+    "largest_step": "radians that a robot's joint moves in a frame, at the most",
+    "top_speed": "rad/s of a robot's fastest joint",
+    "speed_share": "that in shares of the joint's own limit (robots whose model states speeds)",
+    "effector_cm": "centimetres of a robot's hands and feet from where they were to be (median)",
+    "outside_support_share": "share of frames in which a robot could not hold its pose",
+    "collision_frames": "frames in which a robot touches itself",
+    "faults": "figures of a robot's clip that are over the limits of docs/robots.md",
+}
+"""Of rows with a robot, as `motionloom.robots.figures` has them."""
 SHARED = ("apart", "nearest")
 """Measures of two people together."""
 SECOND = "second_"
@@ -88,7 +105,8 @@ def find_judge(name: str) -> Judge:
 
 
 class Filter:
-    """A condition on measures: comparisons, ``and``, ``or``, ``not``, ``+ - * /``, numbers and names of `MEANING`.
+    """A condition on measures: comparisons, ``and``, ``or``, ``not``, ``+ - * /``, numbers and names of `MEANING`
+    and `ROBOT`.
 
     A measure that has no meaning for a motion makes what is said of it unknown, and unknown holds: ``obeys`` lets
     motions pass whose prompt no check knows.
@@ -144,8 +162,9 @@ def _check(node: ast.expr, text: str, depth: int = 0) -> None:
         case ast.Constant(value=bool() | int() | float()):
             parts = []
         case ast.Name(id=name):
-            if name not in MEANING:
-                raise MotionloomError(f"the filter {text!r} asks for {name!r}; the measures are {', '.join(MEANING)}")
+            if name not in MEANING and name not in ROBOT:
+                known = ", ".join((*MEANING, *ROBOT))
+                raise MotionloomError(f"the filter {text!r} asks for {name!r}; the measures are {known}")
             parts = []
         case _:
             said = (ast.get_source_segment(text.strip(), node) or "")[:40]

@@ -3,7 +3,7 @@
 import json
 import tarfile
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 
 from motionloom.bulk.folder import RECORDS, Entry, Store, damaged_shard, read_manifest
 from motionloom.bulk.jobs import arrow, parquet
+from motionloom.bulk.measures import ROBOT
 from motionloom.bulk.row import hash_file
 from motionloom.bulk.writers import file_names, json_line, parquet_schema
 from motionloom.errors import MotionloomError
@@ -24,7 +25,7 @@ from motionloom.skeleton import Skeleton
 TABLE, ABOUT_TABLE = "metadata", "table.json"
 _BLOCK = 10_000
 """Rows of the table in memory at once."""
-_ABOUT = {"row": "int64", "state": "string", "shard": "int32", "error_text": "string"}
+_ABOUT = {"row": "int64", "state": "string", "shard": "int32", "error_text": "string", "robot": "string"}
 
 
 def write_table(store: Store, shards: int) -> Path:
@@ -80,7 +81,7 @@ def _about_table(store: Store) -> dict[str, Any]:
 
 def _write_parquet(path: Path, entries: Iterator[Entry]) -> None:
     pa = arrow()
-    known = [field for field in parquet_schema() if not pa.types.is_list(field.type) and field.name != "joints"]
+    known = [field for field in parquet_schema(ROBOT) if not pa.types.is_list(field.type) and field.name != "joints"]
     schema = pa.schema([*((name, getattr(pa, kind)()) for name, kind in _ABOUT.items()), *known])
     with parquet().ParquetWriter(path, schema, compression="zstd") as file:
         while part := list(islice(entries, _BLOCK)):
@@ -111,7 +112,8 @@ class Result:
     about: dict[str, Any]
     """Words, seed, frames, measures."""
     people: tuple[Motion, ...] = ()
-    """Everybody in a row that was made, where motions are read: one person, or two in one world."""
+    """Everybody in a row that was made, where motions are read: one person, or two in one world. Files of joint angles
+    are not read (`motionloom.robots.files.load_clip`)."""
 
     @property
     def motion(self) -> Motion | None:
@@ -145,7 +147,7 @@ def read_batch(out: Path | str, *, motions: bool = True) -> Iterator[Result]:
                 raise damaged_shard(store, shard)
             continue
         entries = list(store.entries(shard))
-        made = {entry["id"]: entry.get("people", 1) for entry in entries if entry["state"] == "made"}
+        made = {e["id"]: e.get("people", 1) for e in entries if e["state"] == "made" and "robot" not in e}
         read = _motions(store, shard, made) if motions else {}
         yield from (result(entry, read.get(entry.get("id"), ())) for entry in entries)
 
@@ -157,7 +159,7 @@ def _motions(store: Store, shard: int, made: dict[str, int]) -> dict[Any, People
     """The motions of these ids, of which each has so many people."""
     place = store.data(shard)
     if store.kind == "webdataset":
-        return _from_tar(place) if place.exists() else {}
+        return _from_tar(place, made) if place.exists() else {}
     if store.kind == "parquet":
         return _from_parquet(place) if place.exists() else {}
     if store.kind == "glb":
@@ -168,16 +170,15 @@ def _motions(store: Store, shard: int, made: dict[str, int]) -> dict[Any, People
     }
 
 
-def _from_tar(place: Path) -> dict[Any, People]:
+def _from_tar(place: Path, made: Collection[str]) -> dict[Any, People]:
     found: dict[str, People] = {}
     try:
         with tarfile.open(place, "r:") as tar, tempfile.TemporaryDirectory(prefix="motionloom-") as folder:
             for member in tar:
-                data = tar.extractfile(member)
-                if member.name.endswith(".npz") and data is not None:
+                data, name = tar.extractfile(member), member.name.partition(".")[0]
+                if member.name.endswith(".npz") and data is not None and name in made:
                     part = Path(folder) / "motion.npz"
                     part.write_bytes(data.read())
-                    name = member.name.partition(".")[0]
                     found[name] = (*found.get(name, ()), load(part))
     except (tarfile.TarError, KeyError, OSError) as error:
         reason = " ".join(str(error).split())[:120]

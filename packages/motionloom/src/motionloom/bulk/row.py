@@ -5,12 +5,14 @@ import json
 import re
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from motionloom.bulk.on_robot import OnRobot, on_robot
 from motionloom.errors import MotionloomError
 from motionloom.goals.fields import Field
 from motionloom.goals.goal import FPS, Goal
@@ -52,13 +54,20 @@ class Row:
     skeleton: str | None = None
     best_of: int | None = None
     """Seeds that are tried for the motion of a prompt; None: as the job says."""
+    motion: str | None = None
+    """A file with a recording, which is put on a skeleton or a robot."""
+    robot: str | None = None
+    """A robot's model that the motion is put on, and how; what is None is as the job says."""
+    robot_map: str | None = None
+    max_speed: float | None = None
+    avoid_collisions: bool | None = None
     name: str | None = None
     """The user's own ``id``: the name of the motion's files."""
 
     @property
     def names_files(self) -> bool:
         """Whether what it asks also depends on what other files hold."""
-        return self.timeline is not None or self.goal is not None or self.skeleton is not None
+        return any(one is not None for one in (self.timeline, self.goal, self.skeleton, self.motion, self.robot))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +87,10 @@ class Asked:
     target: Skeleton | None = None
     best_of: int = 1
     """Seeds that are tried."""
+    clip: Path | None = None
+    """The recording of a row that has one."""
+    robot: OnRobot | None = None
+    """What the motion is put on instead of a skeleton."""
 
     @property
     def id(self) -> str:
@@ -88,7 +101,7 @@ class Asked:
     def text(self) -> str:
         """What the motion shows, in words."""
         if self.timeline is None or self.row.prompt:
-            return self.row.prompt
+            return self.row.prompt or self.row.motion or ""
         return "; ".join(" ".join(segment.text.split()) for segment in self.timeline.segments)[:LONGEST_PROMPT]
 
 
@@ -122,8 +135,8 @@ def _parsed(raw: bytes) -> Row:
     if type(row.get("id")) is int:
         row["id"] = str(row["id"])
     keys = read(RowKeys, row, "the row")
-    task = _task(keys.task, goal is not None, keys.timeline is not None)
-    if keys.timeline is None and keys.prompt is None:
+    task = _task(keys.task, goal is not None, keys.timeline is not None, keys.motion is not None)
+    if keys.timeline is None and keys.prompt is None and keys.motion is None:
         raise MotionloomError("the row has no prompt; say in words what the person does")
     if keys.timeline is not None and (keys.prompt is not None or keys.seconds is not None):
         raise MotionloomError("a row with a timeline has no prompt and no seconds; write them into the timeline")
@@ -134,20 +147,21 @@ def _parsed(raw: bytes) -> Row:
         )
     if keys.person is not None and (task != "duet" or (goal is None and keys.timeline is None)):
         raise MotionloomError("'person' says whose a goal or a timeline's path is, in rows of the task duet")
-    person = keys.person or 1
+    if keys.motion is not None and (keys.seconds, keys.seed) != (None, None):
+        raise MotionloomError("a row with a motion draws nothing; leave out its seconds and its seed")
+    if keys.skeleton is not None and (keys.robot, keys.max_speed, keys.avoid_collisions) != (None, None, None):
+        raise MotionloomError("the row has a skeleton, and columns of a robot; leave one of them out")
     if keys.best_of is not None and task != "generate":
         raise MotionloomError(f"'best_of' chooses among motions of a prompt; the row asks for {task}")
+    same = ("seconds", "seed", "timeline", "skeleton", "best_of", "motion", "robot", "robot_map", "max_speed")
     return Row(
         task,
         keys.prompt or "",
-        keys.seconds,
-        keys.seed,
-        keys.timeline,
-        goal,
-        person,
-        keys.skeleton,
-        keys.best_of,
-        keys.id,
+        goal=goal,
+        person=keys.person or 1,
+        avoid_collisions=keys.avoid_collisions,
+        name=keys.id,
+        **{name: getattr(keys, name) for name in same},
     )
 
 
@@ -169,12 +183,20 @@ def _goal(goal: Any) -> str | dict[str, Any] | None:
     return _mapping(goal) if isinstance(goal, str) and goal.lstrip().startswith("{") else goal
 
 
-def _task(given: str | None, goal: bool, timeline: bool) -> str:
+def _task(given: str | None, goal: bool, timeline: bool, motion: bool) -> str:
     meant = "duet" if given == "duet" else "compose" if timeline else "control" if goal else "generate"
+    if motion and (goal or timeline or given not in (None, "export")):
+        raise MotionloomError("a row with a motion is of the task export, without a goal and a timeline")
+    meant = "export" if motion else meant
     if goal and timeline:
         raise MotionloomError("the row has a goal and a timeline; write the goal into the timeline")
     if given is not None and given != meant:
-        needs = {"compose": "a timeline", "control": "a goal", "generate": "neither goal nor timeline"}
+        needs = {
+            "compose": "a timeline",
+            "control": "a goal",
+            "generate": "neither goal nor timeline",
+            "export": "a motion",
+        }
         raise MotionloomError(f"the task {given} needs {needs[given]}, and the row asks for {meant}")
     return meant
 
@@ -210,13 +232,17 @@ class Sources:
         skeleton: str | None = None,
         literal: bool = False,
         best_of: int = 1,
+        robot: OnRobot | None = None,
+        limits: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         """``folder``: where these files lie, or below. ``common``: what determines every motion (weights, settings).
 
         pair: what else determines motions of two people. fps: of the weights. seconds, seed, skeleton: of rows that do
         not say; a skeleton may lie anywhere. literal: no numbers are read in prompts. best_of:
-        of rows that do not say.
+        of rows that do not say. robot: of rows that name none, and no skeleton; limits:
+        ``max_speed`` and ``avoid_collisions`` of a robot whose row does not say.
         """
+        self.robot, self._limits = robot, limits
         self.literal, self.best_of = literal, best_of
         self.folder, self.fps, self.seconds, self.seed, self.skeleton = folder, fps, seconds, seed, skeleton
         self._pair = dict(pair or {})
@@ -233,7 +259,7 @@ class Sources:
             raise unexpected(error) from error
 
     def _ask(self, row: Row) -> Asked:
-        timeline = start = target = None
+        timeline = start = target = clip = None
         goal: tuple[Goal | None, str | None] = (None, None)
         seed = self.seed if row.seed is None else row.seed
         if row.timeline is not None:
@@ -242,6 +268,8 @@ class Sources:
             _check_timeline(row.task, timeline)
             seed = next(s for s in (row.seed, timeline.seed, self.seed) if s is not None)
             frames, digest = timeline.frames, digest_timeline(timeline, start)
+        elif row.motion is not None:
+            frames, clip, digest = 0, Field(row.motion, "motion").file(self.folder), None
         else:
             timeline, digest = self._worded(row)
             length = self.seconds if row.seconds is None else row.seconds
@@ -250,7 +278,10 @@ class Sources:
             goal = self._goal(row.goal, frames)
         if row.skeleton:
             target = self._skeleton(row.skeleton, Field(row.skeleton, "skeleton"))
-        if row.skeleton is None and self.skeleton is not None:
+        robot = self._robot(row)
+        if robot is not None and goal[0] is not None:
+            goal = (goal[0].scaled(1 / robot.metre), goal[1])
+        if robot is None and row.skeleton is None and self.skeleton is not None:
             target = self._skeleton(self.skeleton, None)
         said = {
             "common": self._common,
@@ -262,13 +293,15 @@ class Sources:
             "timeline": digest,
             "skeleton": target and digest_skeleton(target),
         }
+        said |= {} if clip is None else {"motion": hash_file(clip)}  # left out as they always were: old ids hold
+        said |= {} if robot is None else {"robot": robot.determined()}
         best_of = self._best_of(row) if timeline is None else 1
-        if best_of > 1:  # left out as it always was: old ids hold
+        if best_of > 1:
             said["best_of"] = best_of
         if row.task == "duet":
             said |= {"pair": self._pair, "person": row.person}
         key = hashlib.sha256(json.dumps(said, sort_keys=True).encode("utf-8", "surrogatepass")).hexdigest()[:32]
-        return Asked(row, key, frames, seed, goal[0], timeline, start, target, best_of)
+        return Asked(row, key, frames, seed, goal[0], timeline, start, target, best_of, clip, robot)
 
     def _best_of(self, row: Row) -> int:
         if row.task != "generate":
@@ -296,6 +329,17 @@ class Sources:
         if isinstance(goal, str):
             return self._read("goal", goal, lambda path: read(path, path.parent), frames)
         return self._written.get((json.dumps(goal), frames), lambda: read(goal, self.folder))
+
+    def _robot(self, row: Row) -> OnRobot | None:
+        """The robot that the row's motion is put on; what it does not say is as the job says."""
+        own = {"max_speed": row.max_speed, "avoid_collisions": row.avoid_collisions}
+        said = {**self._limits, **{name: value for name, value in own.items() if value is not None}}
+        if row.robot is None:
+            if row.robot_map is not None or (self.robot is None and any(one is not None for one in own.values())):
+                raise MotionloomError("columns about a robot go with a 'robot' of the row; name its model")
+            return None if self.robot is None or row.skeleton is not None else replace(self.robot, **said)
+        mapped = None if row.robot_map is None else Field(row.robot_map, "robot_map").file(self.folder)
+        return replace(self._read("robot", row.robot, lambda path: on_robot(path, mapped), str(mapped)), **said)
 
     def _skeleton(self, name: str, field: Field | None) -> Skeleton | None:
         if name.lower() == "smpl22":

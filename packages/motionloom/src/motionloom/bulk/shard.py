@@ -231,7 +231,7 @@ class _Shard:
                     passed = made.passes(passes)
                     if passed:
                         file = file or self._writer(place)
-                        file.add(made.people, about)
+                        file.add(made.people, about, made.angles)
                     self.entries[number] = self._entry(number, "made" if passed else "dropped", one, **about)
                 except Exception as error:
                     if _of_disk(error):

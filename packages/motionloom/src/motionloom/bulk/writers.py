@@ -10,6 +10,7 @@ import shutil
 import tarfile
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import numpy as np
 
 from motionloom.bulk.jobs import arrow, parquet
 from motionloom.bulk.measures import MEANING, SECOND, SHARED
+from motionloom.bulk.on_robot import Save
 from motionloom.bulk.row import hash_file
 from motionloom.io import save, save_scene
 from motionloom.io.bvh_writer import save_bvh
@@ -38,8 +40,9 @@ class Writer(ABC):
         self.path = path
 
     @abstractmethod
-    def add(self, people: Sequence[Motion], about: dict[str, Any]) -> None:
-        """One motion, of one person or two; ``about`` has its ``id`` and what is to be known of it."""
+    def add(self, people: Sequence[Motion], about: dict[str, Any], angles: Sequence[Save] = ()) -> None:
+        """One motion, of one person or two; ``about`` has its ``id`` and what is to be known of it. angles: what writes
+        the joint angles of each, of a robot, which are kept instead."""
 
     @abstractmethod
     def carry(self, old: Path, ids: Collection[str]) -> None:
@@ -58,16 +61,20 @@ class Files(Writer):
         self.kind, self.unit = suffix, unit
         path.mkdir()
 
-    def add(self, people: Sequence[Motion], about: dict[str, Any]) -> None:
+    def add(self, people: Sequence[Motion], about: dict[str, Any], angles: Sequence[Save] = ()) -> None:
         places = [self.path / name for name in file_names(about["id"], self.kind, len(people))]
         try:
-            self._save(people, places)
+            self._save(people, places, angles)
         except BaseException:
             for place in places:  # all that there is of a motion, or none
                 place.unlink(missing_ok=True)
             raise
 
-    def _save(self, people: Sequence[Motion], places: Sequence[Path]) -> None:
+    def _save(self, people: Sequence[Motion], places: Sequence[Path], angles: Sequence[Save]) -> None:
+        for write, place in zip(angles, places):
+            write(place)
+        if angles:
+            return
         if len(places) < len(people):
             save_scene(people, places[0], names=PEOPLE)
             return
@@ -97,10 +104,11 @@ class Tar(Writer):
         self._tar = tarfile.open(path, "w", format=tarfile.USTAR_FORMAT)  # noqa: SIM115
         self._part = path.with_name(f"{path.name}.npz")
 
-    def add(self, people: Sequence[Motion], about: dict[str, Any]) -> None:
+    def add(self, people: Sequence[Motion], about: dict[str, Any], angles: Sequence[Save] = ()) -> None:
         found = {}
-        for motion, name in zip(people, file_names(about["id"], ".npz", len(people)), strict=True):
-            save_npz(motion, self._part)
+        writes = angles or [partial(save_npz, motion) for motion in people]
+        for write, name in zip(writes, file_names(about["id"], ".npz", len(people)), strict=True):
+            write(self._part)
             found[name] = self._part.read_bytes()
         found[f"{about['id']}.json"] = json_line(dict(sorted(about.items())))
         for name, data in found.items():  # all that there is of a motion, or none
@@ -133,7 +141,7 @@ class Parquet(Writer):
         self._rows: list[dict[str, Any]] = []
         self._file = parquet().ParquetWriter(path, parquet_schema(), compression="zstd")
 
-    def add(self, people: Sequence[Motion], about: dict[str, Any]) -> None:
+    def add(self, people: Sequence[Motion], about: dict[str, Any], angles: Sequence[Save] = ()) -> None:
         self._rows.append(parquet_row(people, about))
         if len(self._rows) == ROWS:
             self._flush()
@@ -157,12 +165,12 @@ class Parquet(Writer):
         self._rows = []
 
 
-def parquet_schema() -> Any:
+def parquet_schema(more: Collection[str] = ()) -> Any:
     """Columns of a Parquet shard, arrays flat: positions (people, frames, joints, 3), rotations (people, frames,
-    joints, 4), root (people, frames, 3)."""
+    joints, 4), root (people, frames, 3); more: names of further measures."""
     pa = arrow()
-    floats = pa.list_(pa.float32())
-    measures = [*MEANING, *(f"{SECOND}{name}" for name in MEANING if name not in SHARED)]
+    floats, names = pa.list_(pa.float32()), (*MEANING, *more)
+    measures = [*names, *(f"{SECOND}{name}" for name in names if name not in SHARED)]
     return pa.schema(
         [
             *((name, pa.string()) for name in ("id", "key", "task", "text")),

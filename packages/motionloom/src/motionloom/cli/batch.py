@@ -43,6 +43,12 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument(
         "--prompts", type=Path, metavar="FILE", help="a text file with a prompt per line, instead of JOBS"
     )
+    parser.add_argument(
+        "--recordings",
+        type=Path,
+        metavar="FOLDER",
+        help="a folder of motion files instead of JOBS, which go onto the --robot or --skeleton as they are",
+    )
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="the folder of the batch")
     parser.add_argument(
         "--verify", type=Path, metavar="FOLDER", help="only say whether a batch's files are still as they were written"
@@ -50,8 +56,8 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument(
         "--format",
         default="npz",
-        choices=("npz", "bvh", "glb", "webdataset", "parquet"),
-        help="single files, or shards that hold many (default npz)",
+        choices=("npz", "csv", "bvh", "glb", "webdataset", "parquet"),
+        help="single files, or shards that hold many (default npz); joint angles of a robot: npz, csv, webdataset",
     )
     parser.add_argument("--shard-rows", type=int, metavar="N", help="rows of a shard (default: by the job, up to 1000)")
     parser.add_argument("--filter", metavar="CONDITION", help="keep what passes, such as 'skate < 0.2 and obeys'")
@@ -96,6 +102,9 @@ def run_batch(arguments: argparse.Namespace) -> int:
         fail("name the folder of the batch with --out")
     options, where, jobs = _options(arguments), _where(arguments), _jobs(arguments)
     check_options(options)
+    robot = options.on_robot()
+    for note in () if robot is None else robot.robot.told():
+        print(f"note: {note}", file=sys.stderr)
     rows = jobs.count()
     check_jobs(jobs, rows)
     if arguments.dry_run:
@@ -107,7 +116,7 @@ def run_batch(arguments: argparse.Namespace) -> int:
 def _verify(arguments: argparse.Namespace) -> int:
     from motionloom.bulk.verify import verify
 
-    if arguments.jobs is not None or arguments.prompts is not None or arguments.out is not None:
+    if any(one is not None for one in (arguments.jobs, arguments.prompts, arguments.recordings, arguments.out)):
         fail("--verify FOLDER looks at a batch and makes nothing; give it without jobs and --out")
     found = verify(arguments.verify)
     if arguments.json:
@@ -133,8 +142,11 @@ def _verify(arguments: argparse.Namespace) -> int:
 def _jobs(arguments: argparse.Namespace) -> "Jobs":
     from motionloom.bulk.jobs import Jobs
 
-    if (arguments.jobs is None) == (arguments.prompts is None):
-        fail("give either a file of jobs or --prompts with a file of prompts")
+    given = [one for one in (arguments.jobs, arguments.prompts, arguments.recordings) if one is not None]
+    if len(given) != 1:
+        fail("give one of a file of jobs, --prompts with a file of prompts, and --recordings with a folder of motions")
+    if arguments.recordings is not None:
+        return Jobs.of_recordings(arguments.recordings)
     if arguments.prompts is not None:
         return Jobs.of_prompts(arguments.prompts, variants=arguments.variants or 1, seed=arguments.seed)
     if arguments.variants is not None:
@@ -169,6 +181,10 @@ def _options(arguments: argparse.Namespace) -> "Options":
         best_of=arguments.best_of,
         seed=arguments.seed,
         skeleton=arguments.skeleton,
+        robot=arguments.robot,
+        robot_map=arguments.robot_map,
+        max_speed=arguments.max_speed,
+        avoid_collisions=arguments.avoid_collisions,
         format=arguments.format,
         filter=arguments.filter,
         judge=JUDGE if obeys else None,

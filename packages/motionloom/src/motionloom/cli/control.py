@@ -94,7 +94,10 @@ def run_control(arguments: argparse.Namespace) -> int:
         fail("no prompt; say what the person does, such as: motionloom control 'a person walks' --goal goal.json")
     check_prompt(arguments.prompt)
     files = places(outs, arguments.count, target=target)
-    goal = _goal(arguments)
+    metre = 1.0 if target is None else target.metre
+    goal = _goal(arguments, metre)
+    if metre != 1.0:
+        print(f"note: {_told(goal, metre)}", file=sys.stderr)
     if arguments.loop:
         from motionloom.goals.goal import FPS
 
@@ -109,12 +112,28 @@ def run_control(arguments: argparse.Namespace) -> int:
     judged: list[Controlled] = []
     interrupted = made.take(_made(arguments, prior, goal, judged))
     written = [[file for file in several if file in made.written] for several in files]
-    _report(arguments, judged[: made.count], written, seconds=made.sampling, remarks=remarks)
+    _report(arguments, judged[: made.count], written, metre=metre, seconds=made.sampling, remarks=remarks)
     return made.ended(interrupted)
 
 
-def _goal(arguments: argparse.Namespace) -> "Goal":
-    """All that is asked on the line as one goal."""
+def _told(goal: "Goal", metre: float) -> str:
+    """How a path in a robot's metres is walked by the person that is drawn."""
+    import numpy as np
+
+    from motionloom.goals.goal import FPS
+
+    said = "goals are in the robot's metres"
+    asked = np.flatnonzero(goal.asked[:, 0, [0, 2]].all(axis=1))
+    if len(asked) < 2:
+        return f"{said}; the person that is drawn has them {1 / metre:.2f} times as far away"
+    way = float(np.linalg.norm(np.diff(goal.positions[asked, 0][:, [0, 2]], axis=0), axis=1).sum())
+    pace = way * FPS / (asked[-1] - asked[0])
+    return f"{said}: it goes {metre * way:.2f} m at {metre * pace:.2f} m/s, as a person would at {pace:.2f} m/s"
+
+
+def _goal(arguments: argparse.Namespace, metre: float) -> "Goal":
+    """All that is asked on the line as one goal of the person that is drawn, whose metre becomes ``metre``; a drawing
+    that is as large as is walked in the time and a clip that is followed are the person's anyway."""
     from dataclasses import replace
 
     from motionloom.goals.goal import FPS, merged
@@ -132,9 +151,10 @@ def _goal(arguments: argparse.Namespace) -> "Goal":
     clip = None if arguments.clip is None else load(arguments.clip)
     usual = 5.0 if clip is None else (len(clip) - 1) / clip.fps + 1 / FPS
     frames = frames_in(usual if arguments.seconds is None else arguments.seconds, FPS)
-    goals = [read_goal(file, frames=frames, folder=file.parent) for file in arguments.goal]
+    goals = [read_goal(file, frames=frames, folder=file.parent).scaled(1 / metre) for file in arguments.goal]
     if arguments.path is not None:
-        goals.append(_drawn(arguments.path, arguments.width, frames))
+        drawn = _drawn(arguments.path, arguments.width, frames)
+        goals.append(drawn if arguments.width is None else drawn.scaled(1 / metre))
     if clip is not None:
         goals.append(follow(clip, arguments.follow, frames=frames))
     whole = goals[0]
@@ -203,6 +223,7 @@ def _report(
     made: "list[Controlled]",
     written: list[list[Path]],
     *,
+    metre: float,
     seconds: float,
     remarks: list[str],
 ) -> None:
@@ -215,8 +236,8 @@ def _report(
             {
                 "prompt": arguments.prompt,
                 "seed": arguments.seed + number,
-                "error_cm": round(100 * one.error, 3),
-                "worst_cm": round(100 * one.worst, 3),
+                "error_cm": round(100 * metre * one.error, 3),
+                "worst_cm": round(100 * metre * one.worst, 3),
                 "missed": one.missed,
             }
             for number, one in enumerate(made)
@@ -233,4 +254,4 @@ def _report(
         for number, path in enumerate(several):
             of = made if len(several) == 1 else [made[number]]
             mean, worst = sum(one.error for one in of) / len(of), max(one.worst for one in of)
-            print(f"wrote {path}: {100 * mean:.1f} cm from its goals, at most {100 * worst:.1f} cm")
+            print(f"wrote {path}: {100 * metre * mean:.1f} cm from its goals, at most {100 * metre * worst:.1f} cm")

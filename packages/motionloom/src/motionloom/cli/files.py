@@ -21,6 +21,7 @@ from motionloom.formats import readable, writable
 
 if TYPE_CHECKING:
     from motionloom.cli.skeletons import Target
+    from motionloom.kinematics.deeds import Deeds
     from motionloom.motion import Motion
 
 
@@ -174,6 +175,17 @@ def run_info(arguments: argparse.Namespace) -> None:
         print(f"  {'clips' if number == 1 else '':9} {number:3}  {name or '(without a name)'}, {seconds:.2f} s")
     for problem in problems:
         print(f"  problem   {problem}")
+
+
+def _deeds(motion: "Motion") -> "Deeds | None":
+    """What the person of a motion does; None where there is none."""
+    from motionloom.errors import MotionloomError
+    from motionloom.kinematics.deeds import measure_deeds
+
+    try:
+        return measure_deeds(motion)
+    except MotionloomError:
+        return None
 
 
 def _clips(path: Path) -> list[tuple[str, float]]:

@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from motionloom.motion import Motion
     from motionloom.robots.body import Robot
     from motionloom.robots.clip import Clip
-    from motionloom.robots.many import Job
 
 OUTS = (".csv", ".npz")
 PICTURES = (".png", ".mp4", ".gif")
@@ -44,6 +43,11 @@ class RobotTarget(Target):
     def suffixes(self) -> tuple[str, ...]:
         """Files that hold one robot."""
         return OUTS
+
+    @property
+    def metre(self) -> float:
+        """Goals are in the robot's metres."""
+        return self.size
 
     def writes(self, path: Path) -> bool:
         """No file of a robot is a character's with one more animation."""
@@ -122,7 +126,7 @@ def read_robot_target(arguments: argparse.Namespace) -> RobotTarget:
     fps = arguments.fps or FPS
     check_settings(fps, arguments.max_speed)
     robot = opened(arguments)
-    print(f"note: {robot.name}: {robot.parts.told()} (--robot-map says otherwise)", file=sys.stderr)
+    print(f"note: {robot.told()[-1]}", file=sys.stderr)
     return RobotTarget(
         name=str(arguments.robot),
         skeleton=robot.skeleton,
@@ -196,20 +200,6 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(run=run_check, fps=None)
 
-    parser = subparsers.add_parser(
-        "robot-batch",
-        help="put a folder of motions on a robot",
-        description="Put every motion of a folder, or of a batch's folder, on a robot: a file of joint angles each, "
-        "and manifest.jsonl with how good each is. Started again, it goes on where it was stopped.",
-    )
-    parser.add_argument("input", metavar="FOLDER", type=Path)
-    parser.add_argument("--out", type=Path, metavar="FOLDER", required=True, help="where the clips go")
-    add_robot(parser)
-    parser.add_argument("--format", choices=("npz", "csv"), default="npz", help="of the clips (default npz)")
-    parser.add_argument("--fps", type=float, default=50.0, help="frames per second of the clips (default 50)")
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes (default 1)")
-    parser.set_defaults(run=run_batch)
-
 
 def run_check(arguments: argparse.Namespace) -> int:
     """``motionloom robot-check FILE --robot MODEL``; 0 where every figure is within its limit, else 1."""
@@ -248,61 +238,6 @@ def run_check(arguments: argparse.Namespace) -> int:
     else:
         _print(found)
     return 1 if found["faults"] else 0
-
-
-def run_batch(arguments: argparse.Namespace) -> int:
-    """``motionloom robot-batch FOLDER --robot MODEL --out CLIPS``; 1 where a motion could not be made."""
-    from motionloom.errors import MotionloomError
-    from motionloom.robots.clip import check_settings
-    from motionloom.robots.many import Settings, make_many
-
-    if arguments.robot is None:
-        raise MotionloomError("robot-batch needs the robot's model; name it with --robot")
-    check_settings(arguments.fps, arguments.max_speed)
-    if not 1 <= arguments.workers <= 256:
-        raise MotionloomError(f"--workers must be 1 to 256; got {arguments.workers}")
-    robot_map = None if arguments.robot_map is None else str(arguments.robot_map)
-    settings = Settings(
-        str(arguments.robot),
-        robot_map,
-        arguments.format,
-        arguments.fps,
-        arguments.max_speed,
-        arguments.avoid_collisions,
-    )
-    opened(arguments)
-    count, failed, faulty = 0, 0, 0
-    for line in make_many(_jobs(arguments.input), arguments.out, settings, workers=arguments.workers):
-        count += 1
-        failed += "error" in line
-        faulty += bool(line.get("faults"))
-        if "error" in line:
-            print(f"note: {line['name']}: {line['error']}", file=sys.stderr)
-    print(f"{arguments.out}: {count - failed} clips made, {faulty} of them with faults; {failed} could not be made")
-    return 1 if failed else 0
-
-
-def _jobs(folder: Path) -> "Iterator[Job]":
-    """The motions of a batch's folder, or every motion file below a folder."""
-    from motionloom import formats
-    from motionloom.bulk.batch import read_batch
-    from motionloom.bulk.folder import MANIFEST
-    from motionloom.errors import MotionloomError
-    from motionloom.robots.many import Job
-
-    if not folder.is_dir():
-        raise MotionloomError(f"{folder} is no folder; name one with motion files, or that of a batch")
-    if (folder / MANIFEST).is_file():
-        for result in read_batch(folder):
-            if result.state == "made" and len(result.people) == 1:
-                yield Job(str(result.id), result.people[0], {"text": result.about.get("text")})
-        return
-    files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in formats.readable() and path.is_file())
-    if not files:
-        raise MotionloomError(f"{folder} holds no motion files ({', '.join(formats.readable())})")
-    for path in files:
-        name = "_".join(path.relative_to(folder).with_suffix("").parts)
-        yield Job(name, path, {"source": str(path.relative_to(folder))})
 
 
 def _print(found: dict) -> None:

@@ -51,6 +51,14 @@ def _options(parser: argparse.ArgumentParser) -> None:
         metavar="URL",
         help="a page's origin, such as http://localhost:5173, that may ask too, repeatable",
     )
+    parser.add_argument(
+        "--robot",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="MODEL",
+        help="a humanoid robot's model whose joint angles live sessions may ask for by the file's name, repeatable",
+    )
     _model(parser)
 
 
@@ -98,6 +106,7 @@ def run_serve(arguments: argparse.Namespace) -> None:
             arguments.weights,
             arguments.device,
             adapters,
+            tuple(arguments.robot),
             arguments.show,
         )
     )

@@ -146,6 +146,11 @@ class Target:
         return HERE if place is None else world_of(ground_pose(motion.thinned(1).positions()[0] * self.size), place)
 
     @property
+    def metre(self) -> float:
+        """Metres of goals that one of the uniform person's becomes: goals are the person's, but for a robot."""
+        return 1.0
+
+    @property
     def size(self) -> float:
         """How long its legs are, in those of the uniform person: a walk goes so much further on it."""
         from motionloom.retarget.anatomy import read_body

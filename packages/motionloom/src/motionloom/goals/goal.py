@@ -64,6 +64,12 @@ class Goal:
         """Names of the joints that are asked anywhere, in the skeleton's order."""
         return tuple(SMPL22.names[joint] for joint in np.flatnonzero(self.asked.any(axis=(0, 2))))
 
+    def scaled(self, size: float) -> "Goal":
+        """With every place so many times as far from the world's origin."""
+        start = self.start
+        start = start if start is None else replace(start, x=size * start.x, z=size * start.z)
+        return replace(self, positions=size * self.positions, start=start)
+
     @staticmethod
     def nothing(frames: int) -> "Goal":
         """No targets for so many frames."""

@@ -1,10 +1,11 @@
 """The JSON messages of a live connection: what a client may say, checked, and what it is answered (docs/live.md)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motionloom.errors import MotionloomError
 from motionloom.io.text import parse_json
@@ -16,9 +17,12 @@ from motionloom.requests.live import Hello
 from motionloom.retarget.named import named_skeleton
 from motionloom.skeleton import Skeleton
 
+Array = NDArray[np.float64]
 VERSION = 1
 LARGEST = 256 * 1024
 """Bytes of one message."""
+ROBOT_FPS = 50.0
+"""Frames per second of joint angles, unless hello says otherwise."""
 MOST_JOINTS = 300
 
 
@@ -36,8 +40,14 @@ def hello(said: Mapping[str, Any]) -> Hello:
     """The first message of a client; `MotionloomError` names what is wrong with it."""
     if said.get("type") != "hello":
         raise MotionloomError('the first message is {"type": "hello"}')
-    found = reading.read(Hello, {key: value for key, value in said.items() if key != "type"}, "hello")
-    return replace(found, skeleton=skeleton(found.skeleton))
+    given = {key: value for key, value in said.items() if key != "type"}
+    found = reading.read(Hello, given, "hello")
+    if found.robot and "skeleton" in given:
+        raise MotionloomError("a robot has its own skeleton; leave one of 'robot' and 'skeleton' out of hello")
+    if not found.robot and (found.max_speed, found.avoid_collisions) != (None, None):
+        raise MotionloomError("'max_speed' and 'avoid_collisions' go with a 'robot'; name one in hello")
+    fps = ROBOT_FPS if found.robot and "fps" not in given else found.fps
+    return replace(found, skeleton=skeleton(found.skeleton), fps=fps)
 
 
 def skeleton(said: Any) -> Skeleton:
@@ -60,8 +70,8 @@ def skeleton(said: Any) -> Skeleton:
     return Skeleton(tuple(names), tuple(parents), places)
 
 
-def welcome(begun: Hello, key: str, number: int) -> dict[str, Any]:
-    """The answer to hello; ``number``: of the frame that comes first."""
+def welcome(begun: Hello, key: str, number: int, hinges: Sequence[str] = ()) -> dict[str, Any]:
+    """The answer to hello; ``number``: of the frame that comes first; hinges: of a robot, in the order of angles."""
     bones = begun.skeleton
     return {
         "type": "welcome",
@@ -74,17 +84,20 @@ def welcome(begun: Hello, key: str, number: int) -> dict[str, Any]:
         "joints": list(bones.names),
         "parents": list(bones.parents),
         "offsets": bones.offsets.round(6).tolist(),
+        **({"robot": begun.robot, "joint_names": list(hinges)} if begun.robot else {}),
     }
 
 
-def frame(shown: Frame | tuple[Frame, Frame], late: float) -> dict[str, Any]:
+def frame(shown: Frame | tuple[Frame, Frame], late: float, angles: Sequence[Array] = ()) -> dict[str, Any]:
     """One pose, or those of two people: root in metres, rotations (w, x, y, z) in the parent's frame; late: seconds
-    behind its time."""
+    behind its time; angles: (7 + hinges,) of each, of a robot."""
     first = first_of(shown)
     poses = [
         {"root": one.root.round(5).tolist(), "rotations": one.rotations.round(6).tolist(), "words": one.words}
         for one in ((shown,) if isinstance(shown, Frame) else shown)
     ]
+    for pose, one in zip(poses, angles):
+        pose["qpos"] = one.round(6).tolist()
     about = {"type": "frame", "frame": first.number, "time": round(first.time, 6), "late": round(late, 4)}
     return {**about, **poses[0]} if len(poses) == 1 else {**about, "people": poses}
 

@@ -3,19 +3,26 @@
 import secrets
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any
 
-from motionloom.errors import MotionloomError
+import numpy as np
+from numpy.typing import NDArray
+
+from motionloom.errors import MotionloomError, quoted
 from motionloom.live.clock import Player
-from motionloom.live.live import Frame, Live
+from motionloom.live.live import Frame, Live, motion_of
 from motionloom.live.messages import Hello
 from motionloom.live.pair import LivePair
 from motionloom.live.settings import Settings
+from motionloom.robots.body import Robot
+from motionloom.robots.follow import Follower
 from motionloom.weights.pair import PairBlock
 from motionloom.weights.prior import Prior
 
+Array = NDArray[np.float64]
 MOST = 4
 """Sessions at once, those that wait for their client included."""
 KEPT = 120.0
@@ -29,12 +36,26 @@ class Session:
     key: str
     begun: Hello
     player: Player[Any]
+    robots: tuple[Follower, ...] = ()
+    """What follows each of the people with a robot's joints."""
     number: int = 0
     """Of the frame that is sent next."""
     pending: Frame | tuple[Frame, Frame] | None = None
     """A frame that was taken from the player and could not be sent."""
+    angles: list[Array] = field(default_factory=list)
+    """The robots' joint angles in that frame."""
     left: float | None = None
     """When the client was lost; None while there is one."""
+
+    @property
+    def hinges(self) -> tuple[str, ...]:
+        """Names of the robot's hinges, where there is one."""
+        return self.robots[0].robot.file.joint_names() if self.robots else ()
+
+    def follow(self, found: Frame | tuple[Frame, ...]) -> list[Array]:
+        """(7 + hinges,) for each of the people: what the robots do in a frame, which comes after the one before."""
+        people = (found,) if isinstance(found, Frame) else found
+        return [robot.pose(motion_of([one], robot.fps)) for robot, one in zip(self.robots, people, strict=True)]
 
 
 class Sessions:
@@ -47,10 +68,14 @@ class Sessions:
         block: Callable[[Prior], PairBlock] = lambda prior: PairBlock.load("duet", prior),
         most: int = MOST,
         settings: Settings | None = None,
+        robots: Mapping[str, Robot] = MappingProxyType({}),
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         """prior: gives the weights, called in the thread of the first session (it may take seconds). block: gives what
-        makes two people of them; `MotionloomError` where there is none for these weights."""
+        makes two people of them; `MotionloomError` where there is none for these weights. robots: those that a
+        client may name.
+        """
+        self._robots = robots
         self._prior, self._block, self._most, self._settings, self._now = prior, block, most, settings, now
         self._open: dict[str, Session] = {}
         self._lock = threading.Lock()
@@ -61,9 +86,11 @@ class Sessions:
             self._forget()
             if asked.session:
                 return self._again(asked.session)
+            robots = self._followers(asked)
             if len(self._open) >= self._most and not self._make_room():
                 raise MotionloomError(f"this server plays {self._most} live sessions and no more; come back later")
-            session = Session(secrets.token_urlsafe(16), asked, self._player(asked).start())
+            asked = replace(asked, skeleton=robots[0].robot.skeleton) if robots else asked
+            session = Session(secrets.token_urlsafe(16), asked, self._player(asked).start(), robots)
             self._open[session.key] = session
             return session
 
@@ -85,6 +112,16 @@ class Sessions:
 
     def __len__(self) -> int:
         return len(self._open)
+
+    def _followers(self, asked: Hello) -> tuple[Follower, ...]:
+        """A robot for each of the people, where one is asked for."""
+        if not asked.robot:
+            return ()
+        if asked.robot not in self._robots:
+            there = ", ".join(self._robots) or "none (motionloom serve --robot MODEL)"
+            raise MotionloomError(f"this server has no robot {quoted(asked.robot)}; it has {there}")
+        how = {"max_speed": asked.max_speed, "avoid_collisions": bool(asked.avoid_collisions)}
+        return tuple(Follower(self._robots[asked.robot], asked.fps, **how) for _ in range(asked.people))
 
     def _player(self, asked: Hello) -> Player[Any]:
         prior = self._prior()

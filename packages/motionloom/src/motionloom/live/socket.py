@@ -55,7 +55,7 @@ async def live_session(websocket: Socket, sessions: Sessions) -> None:
             first = await _text(websocket)
         asked = messages.hello(messages.read(first))
         session = await asyncio.to_thread(sessions.begin, asked)
-        await _send(websocket, messages.welcome(session.begun, session.key, session.number))
+        await _send(websocket, messages.welcome(session.begun, session.key, session.number, session.hinges))
         await _both(_listen(websocket, session), _play(websocket, session))
         await asyncio.to_thread(sessions.end, session)
         session = None
@@ -129,11 +129,13 @@ async def _play(websocket: Socket, session: Session) -> None:
             await asyncio.sleep(LOOK)
         await asyncio.sleep(pace.until(first_of(found)))
         # what was taken is kept until it is sent: the client may go in between
-        session.pending = found = session.pending or player.take() or found
+        if session.pending is None:
+            session.pending = found = player.take() or found
+            session.angles = await asyncio.to_thread(session.follow, found) if session.robots else []
         frame = first_of(found)
         late = pace.late(frame)
         player.shown(late)
-        await _send(websocket, messages.frame(found, late))
+        await _send(websocket, messages.frame(found, late, session.angles))
         session.number, session.pending = frame.number + 1, None
         if time.monotonic() - reported > EVERY:
             reported = time.monotonic()

@@ -3,16 +3,16 @@
 from dataclasses import dataclass
 from typing import Any
 
-from motionloom.requests.fields import Checked, declare, like
+from motionloom.requests.fields import declare, like
 from motionloom.requests.generate import Generate
 from motionloom.requests.sampling import PairSampling, Sampling
-from motionloom.requests.shared import LONGEST_PROMPT, Finish
+from motionloom.requests.shared import LONGEST_PROMPT, Finish, OnRobot
 
-TASKS = ("generate", "control", "compose", "duet")
+TASKS = ("generate", "control", "compose", "duet", "export")
 
 
 @dataclass(frozen=True, kw_only=True)
-class RowKeys(Checked):
+class RowKeys(OnRobot):
     """The columns of one row."""
 
     task: str | None = declare("word", "what is made; without it what the other columns mean", words=TASKS)
@@ -22,13 +22,14 @@ class RowKeys(Checked):
     best_of: int | None = like(Generate, "best_of", default=None)
     timeline: str | None = declare("text", "name of a timeline file", high=LONGEST_PROMPT)
     goal: Any = declare("goal", "name of a goal file, or a mapping of its keys")
+    motion: str | None = declare("text", "name of a file with a recording, which is put on", high=LONGEST_PROMPT)
     person: int | None = declare("whole", "whose the goal is of two people, or a timeline's path", low=1, high=2)
     skeleton: str | None = declare("text", "file with the skeleton that the motion is put on", high=LONGEST_PROMPT)
     id: str | None = declare("text", "name of the motion's files", high=LONGEST_PROMPT)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Batch(Finish):
+class Batch(Finish, OnRobot):
     """What is said of all rows."""
 
     seconds: float = like(Generate, "seconds", "length of rows that do not say", default=5.0)

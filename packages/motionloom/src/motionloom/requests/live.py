@@ -5,7 +5,7 @@ from typing import Any
 
 from motionloom.requests.fields import Checked, declare, like
 from motionloom.requests.sampling import Sampling
-from motionloom.requests.shared import Looping
+from motionloom.requests.shared import Looping, OnRobot
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,6 +16,9 @@ class Hello(Checked):
     fps: float = declare("number", "frames per second that are shown", 20.0, low=1, high=120)
     people: int = declare("whole", "1 or 2", 1, low=1, high=2)
     skeleton: Any = declare("skeleton", "a name, or an object with names, parents and offsets in metres", "smpl22")
+    robot: str = declare("text", "a robot of the server: joint angles come too, of its skeleton", "", high=100)
+    max_speed: float | None = like(OnRobot, "max_speed")
+    avoid_collisions: bool | None = like(OnRobot, "avoid_collisions")
     session: str = declare("text", "the key that the welcome of a session gave, to go on with it", "", high=100)
 
 

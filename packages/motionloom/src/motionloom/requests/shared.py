@@ -25,6 +25,18 @@ def seconds(help: str, default: float | None = None, *, high: float = LONGEST) -
 
 
 @dataclass(frozen=True, kw_only=True)
+class OnRobot(Checked):
+    """A humanoid robot that motions are put on, and how."""
+
+    robot: str | None = declare("text", "a humanoid robot's model: joint angles are made", high=LONGEST_PROMPT)
+    robot_map: str | None = declare("text", "JSON file: which joints of the robot are which", high=LONGEST_PROMPT)
+    max_speed: float | None = declare(
+        "number", "speed that no joint of the robot exceeds; without it the model's", low=0.1, high=1000, unit="rad/s"
+    )
+    avoid_collisions: bool | None = declare("flag", "keep the robot's parts out of each other")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Looping(Checked):
     """What becomes of the end of a motion that was sampled."""
 

@@ -15,6 +15,7 @@ keeps the bone from twisting:
 the same pose when these agree. In a sensible rest pose (T, A or arms down; upright) they can be read off it.
 """
 
+from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -108,12 +109,27 @@ class Body:
         return 0.0 if child is None else float(np.linalg.norm(self.rest[child] - self.rest[joint]))
 
 
+_LAST: deque[tuple[Skeleton, Body]] = deque(maxlen=8)
+"""Of skeletons that many motions are put on, such as the uniform person's."""
+
+
 def read_body(skeleton: Skeleton, override: Override | None = None, *, poses: Poses | None = None) -> Body:
-    """Find the person in a skeleton.
+    """Find the person in a skeleton; of the skeletons that were read last it is known.
 
     poses: what is measured where the rest pose is no standing person; else the skeleton's own `Skeleton.poses`.
     Errors as `joint_map`.
     """
+    if override is not None or poses is not None:
+        return _read_body(skeleton, override, poses)
+    for known, body in tuple(_LAST):
+        if known is skeleton:
+            return body
+    body = _read_body(skeleton, None, None)
+    _LAST.append((skeleton, body))
+    return body
+
+
+def _read_body(skeleton: Skeleton, override: Override | None, poses: Poses | None) -> Body:
     poses = poses or skeleton.poses
     found = joint_map(skeleton, override)
     points = found.matrix(skeleton)

@@ -52,6 +52,10 @@ class Robot:
         """What the model calls itself."""
         return self.file.name
 
+    def told(self) -> tuple[str, ...]:
+        """What a user should know: which hinges are which, and what the file lacks."""
+        return (*self.notes, f"{self.name}: {self.parts.told()} (--robot-map says otherwise)")
+
     def site(self, joint: str) -> str:
         """The name of a joint's site in the model."""
         return f"motionloom {joint}"

@@ -11,7 +11,7 @@ from motionloom.errors import MotionloomError
 from motionloom.kinematics.feet import envelope
 from motionloom.motion import Motion
 from motionloom.retarget.joint_map import Override
-from motionloom.robots.body import Robot, from_mujoco, to_motion
+from motionloom.robots.body import Robot
 from motionloom.robots.engine import load_mujoco
 from motionloom.robots.joints import SIDES
 from motionloom.robots.solve import solve
@@ -69,10 +69,9 @@ def put_on_robot(
     """
     check_settings(fps, max_speed)
     targets = aim(motion, robot, fps=fps, source_map=source_map)
-    poses = solve(robot, targets, avoid=avoid_collisions, progress=progress)
-    reached = to_motion(robot, poses, fps).positions()
+    poses, reached = solve(robot, targets, avoid=avoid_collisions, watched=EFFECTORS, progress=progress)
     rows = [targets.joints.index(joint) for joint in EFFECTORS]
-    errors = np.linalg.norm(reached[:, rows] - from_mujoco(targets.places[:, rows]), axis=-1)
+    errors = np.linalg.norm(reached - targets.places[:, rows], axis=-1)
     speeds = robot.file.speed if max_speed is None else np.minimum(robot.file.speed, max_speed)
     return _paced(Clip(fps, poses, targets.planted, errors), speeds)
 

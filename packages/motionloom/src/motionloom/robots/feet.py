@@ -16,7 +16,7 @@ EASE = 0.25
 """Seconds over which a correction of a foot comes and goes."""
 _DRIFT, _TURN = 0.07, 0.35
 """Metres and radians: a planted foot that strays further from the middle of its stance means to move."""
-_ROLLING = 0.15
+ROLLING = 0.15
 """Radians: a foot that points down or up by more stands on its toes or its heel."""
 _ROLL = 0.08
 """Seconds in which a foot that is flat begins to roll over heel or toes."""
@@ -37,19 +37,19 @@ def plant(places: Array, turns: Array, planted: Flags, sole: Array, fps: float) 
     pieces = list(_stances(places, turns, planted, max(2, round(EASE * fps / 2))))
     for start, stop in pieces:
         some = slice(start, stop)
-        yaw, pitch = _angles(turns[some])
+        yaw, pitch = angles(turns[some])
         flat = planted[some].all(axis=1)
         level = float(np.median(pitch[flat])) if flat.any() else 0.0
         pitch = pitch - level
-        flat &= np.abs(pitch) < _ROLLING
+        flat &= np.abs(pitch) < ROLLING
         on_toes = planted[some, 1] & ~flat & (pitch > 0)
         on_heel = planted[some, 0] & ~flat & (pitch < 0)
         calm = flat if flat.any() else np.ones(stop - start, dtype=bool)
         heading = float(np.arctan2(np.sin(yaw[calm]).mean(), np.cos(yaw[calm]).mean()))
         pitch = np.where(on_toes | on_heel, pitch, 0.0) * _away(flat, max(1, round(_ROLL * fps)))
-        turned[some] = _turns(heading, pitch)
+        turned[some] = turned_by(heading, pitch)
         pivot = np.where(pitch[:, None] < 0, heel, toes)
-        under = rot.rotate(_turns(heading, np.zeros(1)), pivot)
+        under = rot.rotate(turned_by(heading, np.zeros(1)), pivot)
         own = places[some] + rot.rotate(turns[some], pivot) - under  # the ankle if the foot were flat on that pivot
         middle = own[calm].mean(axis=0)
         middle[2] = -float(sole[:, 2].min())
@@ -71,7 +71,7 @@ def _above_ground(places: Array, turns: Array, sole: Array) -> Array:
 
 def _stances(places: Array, turns: Array, planted: Flags, hole: int) -> Iterator[tuple[int, int]]:
     """Frames in which one foot stands, in order; where it strays, it is split at its fastest."""
-    yaw = np.unwrap(_angles(turns)[0])
+    yaw = np.unwrap(angles(turns)[0])
     waiting = true_spans(planted.any(axis=1))[::-1]
     while waiting:
         start, stop = waiting.pop()
@@ -98,13 +98,13 @@ def _away(flat: Flags, ease: int) -> Array:
     return smoothstep(np.minimum(nearest / ease, 1.0))
 
 
-def _angles(turns: Array) -> tuple[Array, Array]:
+def angles(turns: Array) -> tuple[Array, Array]:
     """Heading to the left and pitch, toes down, in radians, of feet (frames, 4)."""
     ahead = rot.rotate(turns, np.array([1.0, 0.0, 0.0]))
     return np.arctan2(ahead[..., 1], ahead[..., 0]), np.arcsin(np.clip(-ahead[..., 2], -1, 1))
 
 
-def _turns(heading: float, pitch: Array) -> Array:
+def turned_by(heading: float, pitch: Array) -> Array:
     """(frames, 4) orientations of feet without roll."""
     about_z = rot.rotvec_to_quat(np.array([0.0, 0.0, heading]))
     return rot.multiply(about_z, rot.rotvec_to_quat(pitch[:, None] * np.array([0.0, 1.0, 0.0])))

@@ -4,7 +4,7 @@ Each frame starts from the one before. The quadratic program holds every hinge w
 that its speed allows; planted feet outweigh all else; then come feet in the air, pelvis and trunk, hands, elbows.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,9 @@ from motionloom.robots.targets import Targets
 Array = NDArray[np.float64]
 STEP = 15.0
 """Radians per second that no hinge exceeds from frame to frame: 0.3 rad at 50 frames per second."""
+_CATCHES_UP = np.array([2.0, 4.0])
+"""Metres and radians per second by which the root moves and turns faster at most than it is asked to: where a leg is
+too slow for its foot, the foot is late and the body does not jump to it."""
 ROUNDS, AVOIDING_ROUNDS, FIRST_ROUNDS = 2, 4, 40
 """How often a frame's program is linearised anew; the first frame starts from the robot's own pose."""
 _SHORT = 0.08
@@ -68,6 +71,8 @@ class Solver:
         self.limits = [self.limit, _ground(robot), *([_apart(robot)] if avoid else [])]
         self.rounds = AVOIDING_ROUNDS if avoid else ROUNDS
         self.begun = False
+        self.asked = np.zeros(7)
+        """Where the pelvis was to be, and how turned, in the frame before."""
 
     def frame(self, targets: Targets, number: int) -> Array:
         """(nq,) the robot's pose at a frame of the targets."""
@@ -82,7 +87,11 @@ class Solver:
             self.tasks[f"{side}_ankle"].set_orientation_cost(weight.turn)
         if not self.begun:
             self._place_root(targets, number)
-        self.limit.before = self.configuration.q[7:].copy() if self.begun else None
+        self.limit.before = self.configuration.q.copy() if self.begun else None
+        asked = np.concatenate([targets.place("pelvis")[number], targets.turn("pelvis")[number]])
+        steps = _between(self.asked, asked)
+        self.limit.reach = np.abs(steps) + np.repeat(_CATCHES_UP, 3) / self.fps
+        self.asked = asked
         if self.begun:
             self.calm.set_target(self.configuration.q)
         for _ in range(self.rounds if self.begun else FIRST_ROUNDS):
@@ -121,16 +130,27 @@ def solve(
     targets: Targets,
     *,
     avoid: bool = False,
+    watched: Sequence[str] = (),
     progress: Callable[[int, int], None] | None = None,
-) -> Array:
-    """(frames, nq) poses of the robot; the same targets give the same numbers, bit for bit."""
+) -> tuple[Array, Array]:
+    """(frames, nq) poses of the robot, and where (frames, joints, 3) the ``watched`` joints are in them; the same
+    targets give the same numbers, bit for bit."""
+    sites = [robot.model.site(robot.site(joint)).id for joint in watched]
+    reached = np.empty((len(targets), len(sites), 3))
     solver = Solver(robot, targets.fps, avoid=avoid)
     poses = np.empty((len(targets), robot.model.nq))
     for number in range(len(targets)):
         poses[number] = solver.frame(targets, number)
+        reached[number] = solver.configuration.data.site_xpos[sites]
         if progress is not None:
             progress(number + 1, len(targets))
-    return poses
+    return poses, reached
+
+
+def _between(before: Array, after: Array) -> Array:
+    """(6,) metres, and radians in the frame of the first, from one place and turn (7,) to another."""
+    turned = rot.multiply(rot.inverse(before[3:7]), after[3:7]) if before[3:7].any() else rot.IDENTITY
+    return np.concatenate([after[:3] - before[:3], rot.quat_to_rotvec(turned * np.sign(turned[0] or 1.0))])
 
 
 def _tasks(robot: Robot) -> dict[str, Any]:
@@ -161,23 +181,29 @@ def _posture(robot: Robot, each: float) -> Array:
 
 
 def _box(robot: Robot, lower: Array, upper: Array, step: Array | float, *, at_once: float) -> Any:
-    """mink's limit of the hinges' places and of their steps since the frame before, in one."""
+    """mink's limit of the hinges' places and of their and the root's steps since the frame before, in one."""
     import mink
 
     class Box(mink.Limit):
         before: Array | None = None
-        rows = np.eye(robot.model.nv)[6:]
-        matrix = np.vstack([rows, -rows])
+        reach = np.zeros(6)
+        matrix = np.vstack([np.eye(robot.model.nv), -np.eye(robot.model.nv)])
 
         def bounds(self) -> tuple[Array, Array]:
+            """Of the hinges' places in this frame."""
             if self.before is None:
                 return lower, upper
-            return np.maximum(lower, self.before - step), np.minimum(upper, self.before + step)
+            return np.maximum(lower, self.before[7:] - step), np.minimum(upper, self.before[7:] + step)
 
         def compute_qp_inequalities(self, configuration: Any, dt: float) -> Any:
             low, high = self.bounds()
-            now = configuration.q[7:]
-            room = np.concatenate([high - now, now - low]).clip(0, at_once)
+            now, root = configuration.q[7:], np.full(6, np.inf)
+            gone = np.zeros(6)
+            if self.before is not None:
+                root, gone = self.reach, _between(self.before[:7], configuration.q[:7])
+            room = np.concatenate([root - gone, high - now, root + gone, now - low]).clip(0)
+            hinges = np.tile(np.arange(len(now) + 6) >= 6, 2)
+            room[hinges] = room[hinges].clip(0, at_once)
             known = np.isfinite(room)
             return mink.Constraint(self.matrix[known], room[known])
 

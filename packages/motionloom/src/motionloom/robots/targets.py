@@ -86,6 +86,11 @@ def _stepping(targets: Targets, robot: Robot) -> Targets:
 
 def _reaching(targets: Targets, robot: Robot) -> Targets:
     """With the body lowered so that no leg is stretched out."""
+    return lowered(targets, envelope(lack(targets, robot), round(0.1 * targets.fps)))
+
+
+def lack(targets: Targets, robot: Robot) -> Array:
+    """(frames,) metres by which the pelvis is too high for legs that reach, up to a quarter of their length."""
     skeleton, need = robot.skeleton, np.zeros(len(targets))
     pelvis, around = targets.place("pelvis"), targets.turn("pelvis")
     leg = 1.0
@@ -97,7 +102,11 @@ def _reaching(targets: Targets, robot: Robot) -> Targets:
         line = targets.place(f"{side}_ankle") - hip
         most = (STRAIGHTEST * leg) ** 2 - (line[:, :2] ** 2).sum(axis=-1)
         need = np.maximum(need, -line[:, 2] - np.sqrt(most.clip(0)))
-    down = envelope(need.clip(0, _LOWEST * leg), round(0.1 * targets.fps))
+    return need.clip(0, _LOWEST * leg)
+
+
+def lowered(targets: Targets, down: Array) -> Targets:
+    """With all but the legs lower by ``down`` (frames,) metres."""
     places = targets.places.copy()
     legs = [j for j, name in enumerate(targets.joints) if name.endswith(("ankle", "foot", "knee"))]
     upper = [j for j in range(len(targets.joints)) if j not in legs]

@@ -6,7 +6,7 @@ import socket
 import sys
 import threading
 import webbrowser
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -30,6 +30,7 @@ from motionloom.server.worker import Worker
 
 if TYPE_CHECKING:
     from motionloom.live.sessions import Sessions
+    from motionloom.robots.body import Robot
     from motionloom.weights.prior import Prior
 
 
@@ -47,6 +48,8 @@ class Options:
     device: str = "cpu"
     adapters: Sequence[Applied] = ()
     """What was taught from clips, merged into the prior."""
+    robots: Sequence[Path] = ()
+    """Models of robots that live sessions may name, by their files' names."""
     show: bool = False
     """Open the page in a browser."""
 
@@ -62,7 +65,7 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
     project = Project(options.project, limits)
     worker = Worker(project, limits, weights=options.weights, device=options.device, adapters=options.adapters)
     known = door(options.host, token, hosts=options.hosts, origins=options.origins, page=page.files())
-    live = _Live(worker)
+    live = _Live(worker, read_robots(options.robots))
     app = build(project, worker, known, more=[WebSocketRoute("/live", live.answer)])
     bound = _bound(options.host, options.port)
     address = _address(options.host, bound.getsockname()[1], token)
@@ -88,6 +91,22 @@ def serve(options: Options, *, limits: Limits | None = None) -> None:
         live.close()
 
 
+def read_robots(models: Sequence[Path]) -> "dict[str, Robot]":
+    """Robots by the names of their files; what a model lacks is told."""
+    if not models:
+        return {}
+    from motionloom.robots.body import read_robot
+
+    found = {}
+    for path in models:
+        if path.stem in found:
+            raise MotionloomError(f"two robots are called {path.stem}; give their files names of their own")
+        found[path.stem] = read_robot(path)
+        for note in found[path.stem].told():
+            print(f"note: {note}", file=sys.stderr)
+    return found
+
+
 class _Live:
     """Somebody who is steered while he moves (docs/live.md), behind the same door as everything else.
 
@@ -95,7 +114,8 @@ class _Live:
     the first client that asks; the worker's thread imports it meanwhile, while the page is answered already.
     """
 
-    def __init__(self, worker: Worker) -> None:
+    def __init__(self, worker: Worker, robots: "Mapping[str, Robot]") -> None:
+        self._robots = robots
         self._worker, self._sessions, self._lock = worker, None, threading.Lock()
 
     async def answer(self, websocket: WebSocket) -> None:
@@ -114,7 +134,7 @@ class _Live:
         from motionloom.live.socket import live_session
 
         with self._lock:
-            self._sessions = self._sessions or Sessions(self._prior)
+            self._sessions = self._sessions or Sessions(self._prior, robots=self._robots)
             return live_session, self._sessions
 
     def _prior(self) -> "Prior":

@@ -1,0 +1,27 @@
+"""People whose motion is put on robots in tests."""
+
+import numpy as np
+
+from motionloom import rotations as rot
+from motionloom.motion import Motion
+from motionloom.skeleton import SMPL22
+
+
+def marching(seconds: float = 1.5, fps: float = 30.0) -> Motion:
+    """A person who lifts one foot and then the other, and swings the arms."""
+    count = round(seconds * fps)
+    phase = 2 * np.pi * np.arange(count) / fps
+    turns = np.tile(rot.IDENTITY, (count, 22, 1))
+
+    def bend(joint: str, angles: np.ndarray, axis: tuple[float, float, float] = (1.0, 0.0, 0.0)) -> None:
+        turns[:, SMPL22.index(joint)] = rot.rotvec_to_quat(angles[:, None] * np.array(axis))
+
+    for side, lift in (("left", np.sin(phase).clip(0)), ("right", (-np.sin(phase)).clip(0))):
+        bend(f"{side}_hip", -0.8 * lift)
+        bend(f"{side}_knee", 1.4 * lift)
+        bend(f"{side}_ankle", -0.5 * lift)
+    bend("left_shoulder", -1.1 + 0.5 * np.sin(phase), (0.0, 0.0, 1.0))
+    bend("right_shoulder", 1.1 + 0.5 * np.sin(phase), (0.0, 0.0, 1.0))
+    rest = SMPL22.rest_positions()
+    root = np.tile(rest[0] - [0, rest[:, 1].min(), 0], (count, 1))
+    return Motion(SMPL22, fps, root, turns)
