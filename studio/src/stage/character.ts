@@ -1,23 +1,10 @@
 /** The user's own character: the motion as the server puts it on that character, played beside the playhead. */
 
-import * as THREE from "three";
-import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { type App, problemOf } from "../app/app";
 import { keptTake } from "../project/model";
 import { bytes, motionFile } from "../server/api";
+import { type Actor, actorOf, parsed, placed } from "./actor";
 import type { Scene } from "./scene";
-
-/** A character loads nothing from elsewhere: a picture that it names outside of its own file is a white one. */
-const WHITE =
-  "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg==";
-const inside = new THREE.LoadingManager();
-inside.setURLModifier((url) => (/^(blob|data):/.test(url) ? url : WHITE));
-
-interface Actor {
-  readonly root: THREE.Object3D;
-  readonly mixer: THREE.AnimationMixer;
-  readonly seconds: number;
-}
 
 export class Character {
   private key = "";
@@ -41,10 +28,7 @@ export class Character {
 
   /** Put the character where it is at a time, or hide it; false: it is not to be seen. */
   at(time: number, isShown: boolean): boolean {
-    for (const { root, mixer, seconds } of this.actors) {
-      root.visible = isShown;
-      if (isShown) mixer.setTime(Math.min(time, seconds - 1e-3));
-    }
+    placed(this.actors, time, isShown);
     return isShown && this.actors.length > 0;
   }
 
@@ -66,14 +50,8 @@ export class Character {
 
   private async actor(motion: string, character: string, person: number | undefined): Promise<Actor> {
     const file = await bytes(motionFile(motion, "glb", { skeleton: character, person }));
-    const gltf = await new GLTFLoader(inside).parseAsync(await file.arrayBuffer(), "");
-    const mixer = new THREE.AnimationMixer(gltf.scene);
-    for (const clip of gltf.animations) mixer.clipAction(clip).play();
-    gltf.scene.traverse((one) => {
-      one.castShadow = one.receiveShadow = true;
-      one.frustumCulled = false;
-    });
-    return { root: gltf.scene, mixer, seconds: Math.max(...gltf.animations.map((one) => one.duration), 0.05) };
+    const gltf = await parsed(await file.arrayBuffer());
+    return actorOf(gltf.scene, gltf.animations);
   }
 
   private leave(): void {

@@ -30,6 +30,8 @@ export class Scene {
   /** When the last picture was drawn, and whether it has fewer pixels than it could have. */
   private drawn = 0;
   private isCoarse = false;
+  private next = 0;
+  private readonly sizes = new ResizeObserver(() => this.resize());
 
   /** True: processors are needed elsewhere; a picture that nobody waits for is drawn sharp a second later. */
   busy: () => boolean = () => false;
@@ -64,9 +66,18 @@ export class Scene {
     this.orbit.addEventListener("change", () => this.invalidate());
     this.look(theme);
     if (isSoftware(this.renderer.getContext())) this.coarsen(COARSEST);
-    new ResizeObserver(() => this.resize()).observe(canvas.parentElement!);
+    this.sizes.observe(canvas.parentElement!);
     this.resize();
-    requestAnimationFrame((now) => this.frame(now));
+    this.next = requestAnimationFrame((now) => this.frame(now));
+  }
+
+  /** Draw no more, and give back what the graphics card holds. */
+  dispose(): void {
+    cancelAnimationFrame(this.next);
+    this.sizes.disconnect();
+    this.orbit.dispose();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
   }
 
   invalidate(): void {
@@ -141,7 +152,7 @@ export class Scene {
   }
 
   private frame(now: number): void {
-    requestAnimationFrame((next) => this.frame(next));
+    this.next = requestAnimationFrame((next) => this.frame(next));
     const elapsed = Math.min(now - this.last, 250);
     this.last = now;
     const moved = this.step(elapsed);

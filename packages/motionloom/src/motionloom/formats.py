@@ -35,6 +35,8 @@ class Format:
     """It holds one person: the writer takes one motion instead of several."""
     labels: str = ""
     """The keyword by which the writer takes a word for each motion: ``names``, ``captions``, or none."""
+    scene: str | Callable[..., Any] = ""
+    """``(motions, path, caption) -> path`` for people of one world, where the writer would show them apart."""
     needs: str | Callable[..., Any] = ""
     """Raises `MotionloomError` where a program that the writer needs is missing; asked before long work."""
 
@@ -84,6 +86,13 @@ FORMATS = {
         _picture(".mp4", "draw_video", "motionloom.viz.film:find_ffmpeg"),
         _picture(".gif", "draw_video"),
         _picture(".png", "draw_sheet"),
+        Format(
+            ".html",
+            writer="motionloom.viz.page:save_page",
+            labels="captions",
+            scene="motionloom.viz.page:save_people",
+            needs="motionloom.viz.page:find_viewer",
+        ),
     )
 }
 """Every format, by its suffix."""

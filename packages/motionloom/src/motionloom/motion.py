@@ -5,6 +5,7 @@ frames before joints before coordinates.
 """
 
 from dataclasses import dataclass, replace
+from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,10 @@ class Motion:
     def seconds(self) -> float:
         """Length in seconds: frames / fps."""
         return len(self) / self.fps
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows of the motion: the viewer, in a frame (`motionloom.viz.page.framed`)."""
+        return import_module("motionloom.viz.page").framed(self)
 
     def world_rotations(self) -> Array:
         """(frames, joints, 4): world_from_joint."""

@@ -12,18 +12,23 @@ from tests.studio.studio import Studio
 
 
 @pytest.fixture(scope="session")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[started.Server]:
-    """A server of its own, with an empty project."""
+def all_there() -> None:
+    """Whatever a test of a page needs; skips it, with what is missing."""
     try:
         started.check()
     except started.Missing as missing:
         pytest.skip(str(missing))
+
+
+@pytest.fixture(scope="session")
+def server(all_there: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[started.Server]:
+    """A server of its own, with an empty project."""
     with started.server(tmp_path_factory.mktemp("project")) as running:
         yield running
 
 
 @pytest.fixture(scope="session")
-def browser(server: started.Server) -> Iterator:
+def browser(all_there: None) -> Iterator:
     """One browser for all tests."""
     with started.browser() as opened:
         yield opened

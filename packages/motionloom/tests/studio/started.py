@@ -35,7 +35,7 @@ def check() -> None:
         raise Missing("this installation has no server")
     if importlib.util.find_spec("uvicorn") is None or importlib.util.find_spec("starlette") is None:
         raise Missing("the server's packages are not installed (pip install 'motionloom[studio]')")
-    if not (page_folder() / "index.html").is_file():
+    if not (page_folder() / "index.html").is_file() or not (page_folder().parents[1] / "viz/viewer.html").is_file():
         raise Missing("the page is not built (make page)")
 
 

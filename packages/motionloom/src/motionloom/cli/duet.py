@@ -406,6 +406,9 @@ def write_pairs(
         seen: dict[str, int] = {}
         for out in (several[number] for several in files):
             suffix = out.suffix.lower()
+            if skin is not None and skin.plays_in(out):
+                written.append(skin.save_page([(caption, duet)], out))
+                continue
             if suffix not in _single(skin):
                 written.append(save_scene(duet, out, names=["first", "second"], captions=[caption] * 2))
                 continue

@@ -15,12 +15,11 @@ from motionloom.cli.reading import (
     rate_assumed,
     read_clip,
 )
-from motionloom.cli.skeletons import add_skeleton, read_target
+from motionloom.cli.skeletons import Target, add_skeleton, read_target
 from motionloom.cli.writing import add_force, add_writing, at_rate, check_overwriting, check_rate
 from motionloom.formats import readable, writable
 
 if TYPE_CHECKING:
-    from motionloom.cli.skeletons import Target
     from motionloom.kinematics.deeds import Deeds
     from motionloom.motion import Motion
 
@@ -51,12 +50,18 @@ def add(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
     export.set_defaults(run=run_export)
 
     view = subparsers.add_parser(
-        "view", help="draw a motion file", description="Draw motions as a contact sheet (.png) or a film (.mp4, .gif)."
+        "view",
+        help="draw a motion file, or make a page that plays it",
+        description="Draw motions as a contact sheet (.png) or a film (.mp4, .gif), or make one page of HTML (.html) "
+        "that plays them in any browser, without a network.",
     )
     view.add_argument("inputs", metavar="FILE", type=Path, nargs="+")
     add_reading(view)
     view.add_argument("--out", metavar="PICTURE", type=Path, help="(default: FILE's name with .png, in this folder)")
-    view.add_argument("--fps", type=float, metavar="N", help="frame rate of a film (default: as read)")
+    view.add_argument("--fps", type=float, metavar="N", help="frame rate of a film or a page (default: as read)")
+    view.add_argument(
+        "--skeleton", metavar="FILE", help="a .glb or .vrm character, which becomes part of an .html and plays in it"
+    )
     add_force(view)
     view.set_defaults(run=run_view)
 
@@ -109,7 +114,7 @@ def run_export(arguments: argparse.Namespace) -> None:
 
 
 def _exported(
-    arguments: argparse.Namespace, path: Path, skin: "Target | None"
+    arguments: argparse.Namespace, path: Path, skin: Target | None
 ) -> "tuple[Motion, float | None, dict[str, str]]":
     """A motion as it is to be written, and the unit and the orders of rotations of a BVH."""
     motion, unit, orders = read_clip(arguments, path)
@@ -130,15 +135,52 @@ def run_view(arguments: argparse.Namespace) -> None:
     from motionloom.errors import MotionloomError
 
     target = arguments.out or Path(f"{arguments.inputs[0].stem}.png")
-    if target.suffix.lower() not in (".png", ".mp4", ".gif"):
-        raise MotionloomError(f"a picture ends in .png and a film in .mp4 or .gif; got {target}")
+    if target.suffix.lower() not in (".png", ".mp4", ".gif", ".html"):
+        raise MotionloomError(f"a picture ends in .png, a film in .mp4 or .gif and a page in .html; got {target}")
+    if arguments.skeleton and target.suffix.lower() != ".html":
+        raise MotionloomError(f"--skeleton is for a page, an .html; got {target}")
     io.check_output(target)
     check_rate(arguments)
     check_overwriting(arguments, [target])
-    motions = [crop(read_clip(arguments, path)[0], arguments) for path in arguments.inputs]
-    io.save(at_rate(motions, arguments.fps), target, captions=[path.stem for path in arguments.inputs])
+    if target.suffix.lower() == ".html":
+        _write_page(arguments, target)
+    else:
+        motions = [crop(read_clip(arguments, path)[0], arguments) for path in arguments.inputs]
+        io.save(at_rate(motions, arguments.fps), target, captions=[path.stem for path in arguments.inputs])
     print(f"wrote {target}")
     note_rate(arguments, arguments.inputs)
+
+
+def _write_page(arguments: argparse.Namespace, target: Path) -> None:
+    """A take for each file, with everybody in it, on the character that the line names."""
+    from motionloom.io.character import load_character
+    from motionloom.viz.page import MAX_BYTES, Take, write_page
+
+    character, put = None, None
+    if arguments.skeleton is not None:
+        character = load_character(arguments.skeleton)
+        put = Target(arguments.skeleton, character.skeleton, character=character)
+    takes = []
+    for path in arguments.inputs:
+        motions = at_rate((crop(motion, arguments) for motion in _people(arguments, path)), arguments.fps)
+        if put is not None:
+            motions = [put.put(motions[0], source=str(path))] if len(motions) == 1 else put.put_together(motions)
+        takes.append(Take(path.stem, motions))
+    write_page(takes, target, character=character)
+    if target.stat().st_size > MAX_BYTES:
+        print(
+            f"note: {target} is {target.stat().st_size / 1e6:.1f} MB with {arguments.skeleton} in it", file=sys.stderr
+        )
+
+
+def _people(arguments: argparse.Namespace, path: Path) -> "list[Motion]":
+    """Everybody in a file, or the one motion that the line picks of it."""
+    from motionloom import io
+    from motionloom.formats import find
+
+    if find(path).people and arguments.animation is None and arguments.unit is None:
+        return io.load_scene(path)
+    return [read_clip(arguments, path)[0]]
 
 
 def run_info(arguments: argparse.Namespace) -> None:

@@ -148,13 +148,13 @@ def numbered(out: Path, count: int) -> list[Path]:
 def places(outs: Sequence[Path], count: int, *, sheets: bool = True, target: Target | None = None) -> list[list[Path]]:
     """The files of ``count`` motions for each ``--out``, refused where nothing can be written.
 
-    sheets: a picture shows all motions, and so is one file; so is a character's own file with ``--one-file``.
+    sheets: a picture or a page shows all motions, and so is one file; so is a character's own file with ``--one-file``.
     """
     from motionloom.io import check_output
 
     def whole(out: Path) -> bool:
         own = target is not None and target.one_file and target.writes(out)
-        return own or (sheets and out.suffix.lower() == ".png")
+        return own or (sheets and out.suffix.lower() in (".png", ".html"))
 
     several = [[out] if whole(out) else numbered(out, count) for out in outs]
     for place in (place for one in several for place in one):
@@ -180,6 +180,8 @@ def write(
         return [target.save(one, file, caption=said) for one, file, said in zip(motions, files, captions, strict=True)]
     if unit is not None and files[0].suffix.lower() == ".bvh":
         return [save_bvh(one, file, unit=unit) for one, file in zip(motions, files, strict=True)]
+    if target is not None and target.plays_in(files[0]):
+        return [target.save_page([(said, [one]) for said, one in zip(captions, motions, strict=True)], files[0])]
     if len(files) == 1:
         return [save(list(motions), files[0], captions=captions)]
     return [save(one, file, captions=[said]) for one, file, said in zip(motions, files, captions, strict=True)]

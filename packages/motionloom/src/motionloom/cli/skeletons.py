@@ -200,11 +200,23 @@ class Target:
             from motionloom.io.usda import save_usda
 
             return save_usda([motion], path, surfaces=self.character.surfaces(remark=True) or None)
+        if self.plays_in(path):
+            return self.save_page([(caption or "", [motion])], path)
         if path.suffix.lower() == ".bvh":
             from motionloom.io.bvh_writer import save_bvh
 
             return save_bvh(motion, path, order=self.orders, unit=self.unit)
         return io.save(motion, path, captions=None if caption is None else [caption])
+
+    def plays_in(self, path: Path) -> bool:
+        """Whether a file of this name is a page in which the character plays."""
+        return self.character is not None and path.suffix.lower() == ".html"
+
+    def save_page(self, takes: "Sequence[tuple[str, Sequence[Motion]]]", path: Path) -> Path:
+        """Write takes, names and people that are `put` on the skeleton, as a page in which the character plays."""
+        from motionloom.viz.page import Take, write_page
+
+        return write_page([Take(name, people) for name, people in takes], path, character=self.character)
 
     def save_clips(self, motions: "Sequence[Motion]", path: Path, names: Sequence[str]) -> Path:
         """Write motions that are `put` on the skeleton as animations of the character's own file."""

@@ -99,10 +99,10 @@ def check_program(path: Path | str) -> None:
 
 def save(motions: Motion | Sequence[Motion], path: Path | str, *, captions: Sequence[str] | None = None) -> Path:
     """Write one motion or several; the suffix picks BVH (in metres), GLB, VRMA, USDA, FBX (through Blender),
-    NPZ, MP4, GIF or PNG; gives the path back.
+    NPZ, MP4, GIF, PNG or HTML, a page that plays them; gives the path back.
 
-    ``captions`` label pictures and films, one per motion. BVH and NPZ files hold one person. The file appears whole
-    or not at all. Raises `MotionloomError` for another suffix or a place that cannot be written.
+    ``captions`` label pictures, films and pages, one per motion. BVH and NPZ files hold one person. The file appears
+    whole or not at all. Raises `MotionloomError` for another suffix or a place that cannot be written.
     """
     path = check_output(path)
     several = [motions] if isinstance(motions, Motion) else list(motions)
@@ -124,7 +124,7 @@ def save_scene(
     names: Sequence[str] | None = None,
     captions: Sequence[str] | None = None,
 ) -> Path:
-    """Write people who share one world frame as one scene: GLB, USDA, or one MP4, GIF or PNG with everybody in it.
+    """Write people who share one world frame as one scene: GLB, USDA, or one MP4, GIF, PNG or HTML with all of them.
 
     ``names``, one per person, name them in a GLB or USDA and in a picture's legend; ``captions``, one per person, stand
     over pictures and films (one only where all are the same). `save` would draw the same people side by side instead.
@@ -141,12 +141,14 @@ def save_scene(
         return save(motions, path)
     if found.labels == "names":
         return _call(found.writer, motions, path, names=names)
+    title = "   |   ".join(dict.fromkeys(c for c in captions or () if c))
+    if found.scene:
+        return _call(found.scene, motions, path, caption=title)
     from motionloom.viz.overlay import draw_scene, tint
     from motionloom.viz.scene import Actor
 
     labels = names if names is not None else [""] * len(motions)
     actors = [Actor(m, tint(i), label=label) for i, (m, label) in enumerate(zip(motions, labels))]
-    title = "   |   ".join(dict.fromkeys(c for c in captions or () if c))
     return draw_scene(actors, path, caption=title)
 
 

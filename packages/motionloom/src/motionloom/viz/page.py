@@ -1,0 +1,181 @@
+"""Motions as one page of HTML that plays them: the studio's viewer (`studio/src/viewer`) with the motions in it.
+
+The page loads nothing from anywhere, and nothing in it that comes from outside is markup or code: names and numbers
+stand in it as JSON, of which every character that HTML knows is written as an escape.
+"""
+
+import base64
+import html
+import json
+import math
+import tempfile
+import warnings
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from motionloom.errors import MotionloomError
+from motionloom.io.atomic import atomic_path
+from motionloom.io.character import Character
+from motionloom.motion import Motion
+from motionloom.retarget import joints22, to_smpl22
+from motionloom.skeleton import SMPL22
+from motionloom.viz.film import caption
+
+VIEWER = Path(__file__).with_name("viewer.html")
+MISSING = (
+    "the viewer is not built into this installation: run 'make page' in a clone of motionloom, or install it again "
+    "('pip install .') with Node.js 20.19 or later on the PATH"
+)
+MAX_BYTES = 1_500_000
+"""Of a page without a character; longer motions are shown at a lower frame rate."""
+MAX_PEOPLE = 8
+UNIT = 0.00025
+"""Metres: places are whole numbers of it."""
+_MOTION = '<script type="application/json" id="motion">', "</script>"
+_TITLE = "<title>motionloom</title>"
+
+
+@dataclass(frozen=True)
+class Take:
+    """People who share one world, under one name."""
+
+    name: str
+    people: Sequence[Motion]
+
+
+def find_viewer() -> Path:
+    """Where the viewer lies; raises `MotionloomError` where it was not built."""
+    if not VIEWER.is_file():
+        raise MotionloomError(MISSING)
+    return VIEWER
+
+
+def save_page(motions: Sequence[Motion], path: Path | str, *, captions: Sequence[str] | None = None) -> Path:
+    """Write motions as takes of one page of HTML, under their captions; gives the path back.
+
+    Raises `MotionloomError` as `page` does, and for captions of another count.
+    """
+    names = [""] * len(motions) if captions is None else list(captions)
+    if len(names) != len(motions):
+        raise MotionloomError(f"{len(motions)} motions need as many captions; got {len(names)}")
+    return write_page([Take(name, [motion]) for name, motion in zip(names, motions)], path)
+
+
+def save_people(motions: Sequence[Motion], path: Path | str, *, caption: str = "") -> Path:
+    """Write people who share one world frame as one take of one page."""
+    return write_page([Take(caption, motions)], path)
+
+
+def write_page(takes: Sequence[Take], path: Path | str, *, character: Character | None = None) -> Path:
+    """Write `page` as a file, whole or not at all; gives the path back."""
+    text = page(takes, character=character)
+    with atomic_path(Path(path)) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return Path(path)
+
+
+def page(takes: Sequence[Take], *, character: Character | None = None, most: int = MAX_BYTES) -> str:
+    """The text of a page of HTML that plays takes, with nothing else to load.
+
+    takes: of humanoids; without a character the uniform person plays them, whatever body they have.
+    character: a .glb or .vrm whose skeleton the motions have; its file becomes part of the page, with its pictures.
+    most: bytes of the page without the character; frames are left out, which is said, until it is no larger.
+
+    Raises `MotionloomError` where the viewer is not built, there is nothing to play or nobody in it, for more than
+    `MAX_PEOPLE` in a take, and for a character in another kind of file.
+    """
+    people = [motion for take in takes for motion in take.people]
+    if not people or not all(1 <= len(take.people) <= MAX_PEOPLE for take in takes):
+        counts = ", ".join(str(len(take.people)) for take in takes) or "none"
+        raise MotionloomError(f"a page shows takes of 1 to {MAX_PEOPLE} people; got {counts}")
+    template = find_viewer().read_text(encoding="utf-8")
+    body = None if character is None else _animated(character, people)
+    places = [_places(motion) if character is None else joints22(motion) for motion in people]
+    room = most - len(template.encode()) - sum(6 * len(caption(take.name)) for take in takes) * 2
+    step, data = 1, _packed(places, 1)
+    while sum(map(len, data)) > room and step < max(map(len, places)):
+        step = max(step + 1, math.ceil(step * sum(map(len, data)) / max(room, 1)))
+        data = _packed(places, step)
+    if step > 1:
+        warnings.warn(
+            f"one frame in {step} is kept, so that the page stays under {most / 1e6:g} MB; cut the motion for all of "
+            "them (--start, --end)",
+            stacklevel=2,
+        )
+    given = iter(zip((len(one[::step]) for one in places), data))
+    listed = [
+        {
+            "name": caption(take.name),
+            "fps": take.people[0].fps / step,
+            "people": [{"frames": frames, "data": text} for frames, text in islice(given, len(take.people))],
+        }
+        for take in takes
+    ]
+    title = " | ".join(dict.fromkeys(take["name"] for take in listed if take["name"]))[:200]
+    return _filled(template, title or "motionloom", {"takes": listed, "unit": UNIT, "character": body})
+
+
+def framed(motion: Motion, *, height: int = 420) -> str:
+    """A motion for a notebook: its page in a frame that may run the viewer and nothing else, at most 1.2 MB.
+
+    Where it cannot be shown a sentence says why.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            text = page([Take("", [motion])], most=1_000_000)
+    except MotionloomError as error:
+        about = f"{len(motion)} frames, {motion.seconds:.2f} s, {len(motion.skeleton)} joints"
+        return f"<p>Motion: {about}. It is not shown: {html.escape(str(error))}</p>"
+    return (
+        f'<iframe srcdoc="{html.escape(text)}" sandbox="allow-scripts" title="motion" '
+        f'style="width: 100%; height: {height}px; border: 0" allowfullscreen></iframe>'
+    )
+
+
+def _places(motion: Motion) -> np.ndarray:
+    """(frames, 22, 3) metres of the uniform person."""
+    return (motion if motion.skeleton == SMPL22 else to_smpl22(motion)).positions()
+
+
+def _packed(places: Sequence[np.ndarray], step: int) -> list[str]:
+    """For each person base64 of deflated differences from frame to frame: the root's places, the others' from it.
+
+    Whole numbers of `UNIT`, joint after joint, all low bytes before all higher ones, so that equal ones are near.
+    """
+    found = []
+    for one in places:
+        kept = one[::step].copy()
+        kept[:, 1:] -= kept[:, :1]
+        whole = np.rint(kept.reshape(len(kept), -1) / UNIT).clip(-(2**30), 2**30).astype("<i4")
+        changes = np.ascontiguousarray(np.diff(whole, axis=0, prepend=0).astype("<i4").T)
+        planes = changes.view(np.uint8).reshape(-1, 4).T.tobytes()
+        found.append(base64.b64encode(zlib.compress(planes, 9)).decode())
+    return found
+
+
+def _animated(character: Character, people: Sequence[Motion]) -> str:
+    """Base64 of the character's file with these motions as its animations, in their order."""
+    if ".glb" not in character.suffixes:
+        raise MotionloomError(
+            f"a page carries a character of one file, a .glb or .vrm; got {character.path}: export it as one"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        clips = [(motion, f"motion {number}") for number, motion in enumerate(people)]
+        data = character.save_clips(clips, Path(folder) / "character.glb", replace=True).read_bytes()
+    return base64.b64encode(data).decode()
+
+
+def _filled(template: str, title: str, given: dict) -> str:
+    """The viewer with a title and with what it shows; letters that are none (half of a pair) become question marks."""
+    if template.count("".join(_MOTION)) != 1 or template.count(_TITLE) != 1:
+        raise MotionloomError(f"{VIEWER} is not the viewer of this version; build it again by 'make page'")
+    text = json.dumps(given).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    whole = template.replace("".join(_MOTION), text.join(_MOTION))
+    shown = html.escape(title.encode("utf-8", "replace").decode())
+    return whole.replace(_TITLE, f"<title>{shown}</title>", 1)
