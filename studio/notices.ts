@@ -28,31 +28,33 @@ export function readPackage(folder: string): Package {
     string,
     string
   >;
-  const files = readdirSync(folder).filter((file) => /^(licen[cs]e|notice|copying)/i.test(file));
+  const files = readdirSync(folder)
+    .filter((file) => /^(licen[cs]e|notice|copying)/i.test(file))
+    .sort()
+    .map((file) => join(folder, file));
+  const ours = join(import.meta.dirname, "licences", `${name}.txt`); // of a package that forgot its own
+  if (files.length === 0 && existsSync(ours)) files.push(ours);
   if (!name || !version || !license || files.length === 0)
     throw new Error(`${folder} is bundled into the page and has no licence text; leave it out or add its text`);
-  const text = files
-    .sort()
-    .map((file) => readFileSync(join(folder, file), "utf8").trim())
-    .join("\n\n");
+  const text = files.map((file) => readFileSync(file, "utf8").trim()).join("\n\n");
   return { name, version, licence: license, text };
 }
 
 /** The page of notices, one package after the other. */
 export function notices(packages: Package[]): string {
   const rule = "-".repeat(80);
-  const head = "The studio's page of motionloom (MIT) contains the following works of others.";
+  const head = "This page of motionloom (MIT) contains the following works of others.";
   const parts = packages.map((one) => `${rule}\n${one.name} ${one.version} (${one.licence})\n\n${one.text}`);
   return [head, ...parts].join("\n\n") + "\n";
 }
 
-/** Writes the notices beside the page, from what the bundler took. */
-export function thirdPartyNotices(): Plugin {
+/** Writes the notices beside the page, from what the bundler took, and of packages that its workers are made of. */
+export function thirdPartyNotices(inWorkers: readonly string[] = []): Plugin {
   return {
     name: "third-party-notices",
     apply: "build",
     generateBundle(_, bundle) {
-      const folders = new Set<string>();
+      const folders = new Set(inWorkers.map((name) => join(import.meta.dirname, "node_modules", name)));
       for (const chunk of Object.values(bundle)) {
         if (chunk.type !== "chunk") continue;
         for (const [id, module] of Object.entries(chunk.modules)) {

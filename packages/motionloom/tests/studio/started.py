@@ -25,12 +25,14 @@ class Missing(Exception):
     """Something that cannot be installed by a test is not there; the message says what, and how to get it."""
 
 
-def check() -> None:
-    """Raise `Missing` for the first of browser, driver, server and page that is not there."""
+def check(*, page: bool = True) -> None:
+    """Raise `Missing` for the first of browser, driver and, unless another ``page`` is looked at, server and page."""
     if importlib.util.find_spec("playwright") is None:
         raise Missing("playwright is not installed (pip install playwright)")
     if chromium() is None:
         raise Missing("no chromium is installed (apt-get install chromium)")
+    if not page:
+        return
     if importlib.util.find_spec("motionloom.server") is None:
         raise Missing("this installation has no server")
     if importlib.util.find_spec("uvicorn") is None or importlib.util.find_spec("starlette") is None:

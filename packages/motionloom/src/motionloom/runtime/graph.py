@@ -50,7 +50,7 @@ def outline(data: bytes) -> Outline:
     if len(data) > MAX_BYTES:
         raise ValueError(f"a graph of {len(data)} bytes, more than {MAX_BYTES}")
     graphs: list[memoryview] = []
-    for number, value in _fields(memoryview(data)):
+    for number, value in fields(memoryview(data)):
         if number == 7:
             graphs.append(_part(value))
         elif number == 8:
@@ -66,7 +66,7 @@ def _outline(graph: memoryview) -> Outline:
     names: dict[int, list[str]] = {11: [], 12: []}
     weights: dict[str, tuple[int, ...]] = {}
     nodes = constants = 0
-    for number, value in _fields(graph):
+    for number, value in fields(graph):
         if number == 1:
             nodes += 1
             constants += _check_node(_part(value))
@@ -85,7 +85,7 @@ def _outline(graph: memoryview) -> Outline:
 
 
 def _check_opset(opset: memoryview) -> None:
-    for number, value in _fields(opset):
+    for number, value in fields(opset):
         if number == 1 and bytes(_part(value)) not in (b"", b"ai.onnx"):
             raise ValueError(f"operators of {_text(value)!r}, which are not ONNX's own")
 
@@ -93,7 +93,7 @@ def _check_opset(opset: memoryview) -> None:
 def _check_node(node: memoryview) -> int:
     """Bytes of the constants in a node."""
     inside = 0
-    for number, value in _fields(node):
+    for number, value in fields(node):
         if number == 4 and _text(value) not in OPERATORS:
             raise ValueError(f"the operator {_text(value)!r}, which no network here has")
         if number == 7 and bytes(_part(value)) not in (b"", b"ai.onnx"):
@@ -105,7 +105,7 @@ def _check_node(node: memoryview) -> int:
 
 def _check_attribute(attribute: memoryview) -> int:
     inside = 0
-    for number, value in _fields(attribute):
+    for number, value in fields(attribute):
         if number == 5:
             _, shape, size = _initialiser(_part(value))
             inside += size
@@ -122,7 +122,7 @@ def _initialiser(tensor: memoryview) -> tuple[str, tuple[int, ...] | None, int]:
     name, kind, elsewhere, places = "", 0, False, []
     raw = b""
     whole: list[int] = []
-    for number, value in _fields(tensor):
+    for number, value in fields(tensor):
         if number == 1:
             shape += _numbers(value)
         elif number == 2:
@@ -134,7 +134,7 @@ def _initialiser(tensor: memoryview) -> tuple[str, tuple[int, ...] | None, int]:
         elif number in (5, 7):
             whole += _numbers(value)
         elif number == 13:
-            places.append(dict(_fields(_part(value))))
+            places.append(dict(fields(_part(value))))
         elif number == 14:
             elsewhere = _whole(value) != 0
         elif number not in (4, 12):
@@ -164,7 +164,7 @@ def _unpacked(raw: bytes, kind: int) -> list[int]:
 
 
 def _name(value_info: memoryview) -> str:
-    return next((_text(value) for number, value in _fields(value_info) if number == 1), "")
+    return next((_text(value) for number, value in fields(value_info) if number == 1), "")
 
 
 def _text(value: Field) -> str:
@@ -198,7 +198,7 @@ def _signed(number: int) -> int:
     return number - (1 << 64) if number >= 1 << 63 else number
 
 
-def _fields(message: memoryview) -> Iterator[tuple[int, Field]]:
+def fields(message: memoryview) -> Iterator[tuple[int, Field]]:
     """Numbers and values of a message's fields; raises ValueError where it is none."""
     place = 0
     while place < len(message):

@@ -1,0 +1,105 @@
+"""What Python draws, written for `studio/tests/prior.test.ts` to compare with what the page's own code draws."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from motionloom.diffusion import generator, guide
+from motionloom.goals.segment import Segment
+from motionloom.motion import Motion
+from motionloom.requests.sampling import Sampling
+from motionloom.runtime.text.minilm import MiniLM
+from motionloom.runtime.text.protocol import as_rows
+from motionloom.tasks.long import compose, long_features
+from motionloom.tasks.text import sample_features, to_motion
+from motionloom.weights.prior import Prior
+
+SENTENCES = (
+    "a person walks forward",
+    "someone jumps twice, then waves",
+    "a man sits down",
+    "she kicks with the right leg",
+    "a dancer spins around",
+    "a person crawls on the floor",
+    "he throws a ball",
+    "somebody does a cartwheel",
+    "a person runs in a circle to the left",
+    "a person stands still and looks around",
+)
+CHAINS: tuple[tuple[tuple[str, float], ...], ...] = (
+    (("a person walks forward", 3.0), ("a person jumps up", 2.0), ("a person dances", 2.55)),
+)
+ODD_TEXTS = (
+    "",
+    "  Ünïcode  CAFÉ—naïve\t(won't) stop!? 中文 x́y \u200b\x07 ﬁ İstanbul ΣΊΣΥΦΟΣ",
+    "supercalifragilisticexpialidocious " * 40,
+    "a" * 101 + " walks \ud800 ok",
+)
+
+
+class Numbers:
+    """Arrays of float32 in one file, by name."""
+
+    def __init__(self) -> None:
+        self.parts: list[np.ndarray] = []
+        self.index: dict[str, tuple[int, int]] = {}
+        self.count = 0
+
+    def add(self, name: str, array: np.ndarray) -> None:
+        """Put an array behind the others."""
+        self.parts.append(np.ascontiguousarray(array, np.float32).reshape(-1))
+        self.index[name] = self.count, self.parts[-1].size
+        self.count += self.parts[-1].size
+
+    def motion(self, name: str, motion: Motion) -> None:
+        """Put places and rotations of a motion."""
+        self.add(f"{name}.places", motion.positions())
+        self.add(f"{name}.turns", motion.rotations)
+
+
+def write(prior: Prior, folder: Path, *, precise: bool, weights: dict[str, np.ndarray] | None = None) -> None:
+    """Write `expected.json` and `expected.bin` beside the exported weights.
+
+    weights: other numbers of the network than the prior's own, which the page has too.
+    """
+    if weights is not None:
+        prior = replace(prior, net=replace(prior.net, weights=weights))
+    found = Numbers()
+    _one_call(prior, found)
+    for seed, text in enumerate(SENTENCES if precise else SENTENCES[:1]):
+        seconds = 2.0 + 0.35 * seed
+        [features] = sample_features(prior, [text], [round(seconds * 20)], seeds=[seed])
+        found.add(f"sentence {seed}.features", features)
+        found.motion(f"sentence {seed}", to_motion(features.astype(np.float64), prior.fps))
+    for number, chain in enumerate(CHAINS if precise else ()):
+        _chain(prior, found, f"chain {number}", chain)
+    if precise:
+        for seed in (0, 7, 2**40 + 5):
+            found.add(f"noise {seed}", generator(seed).standard_normal(200_000, np.float32))
+    np.concatenate(found.parts).tofile(folder / "expected.bin")
+    assert isinstance(prior.text, MiniLM)
+    texts = (*SENTENCES, *ODD_TEXTS)
+    said = {"index": found.index, "sentences": SENTENCES if precise else SENTENCES[:1], "chains": CHAINS}
+    tokens = [[text, prior.text.ids(text)] for text in as_rows(texts)]
+    (folder / "expected.json").write_text(json.dumps({**said, "tokens": tokens, "precise": precise}))
+
+
+def _one_call(prior: Prior, found: Numbers) -> None:
+    """A guided answer of the network to noise, at three levels."""
+    cond = prior.condition([SENTENCES[0]])
+    denoise = guide(prior.net, prior.net.bind(cond), prior.net.bind(cond.null()), 2.5)
+    noise = generator(1).standard_normal((1, 42, 263), np.float32)
+    found.add("state", noise)
+    for level in (1000, 500, 3):
+        found.add(f"denoised {level}", denoise(noise, level))
+
+
+def _chain(prior: Prior, found: Numbers, name: str, chain: Sequence[tuple[str, float]]) -> None:
+    segments = [Segment(text, seconds) for text, seconds in chain]
+    pieces = list(long_features(prior, segments, sampling=Sampling(seed=4)))
+    found.add(f"{name}.features", np.concatenate(pieces))
+    [motion] = compose(prior, segments, sampling=Sampling(seed=4))
+    found.motion(name, motion)

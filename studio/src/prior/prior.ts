@@ -1,0 +1,212 @@
+/**
+ * Sentences to motion, as `motionloom generate --literal` and `motionloom compose` draw it: takes of one sentence, or a
+ * chain of several whose ends overlap.
+ */
+
+import { bodyOf } from "./body";
+import { ORIGIN, WIDTH, contacts, decoded, smooth } from "./features";
+import { cleanFeet } from "./feet";
+import { Noise } from "./noise";
+import type { Asked, Network } from "./network";
+import type { Body } from "./person";
+import { cosine, levels, move } from "./schedule";
+import { type Vec, rounded } from "./turns";
+
+export interface Segment {
+  readonly text: string;
+  readonly seconds: number;
+}
+
+/** Called behind each network call with the denoised features of each take; a rejection ends the drawing. */
+export type Watcher = (done: number, of: number, takes: () => Float32Array[]) => Promise<void>;
+
+/** Seconds over which one segment becomes the next. */
+export const TRANSITION = 1;
+
+export class Prior {
+  private readonly mean: Float32Array;
+  private readonly std: Float32Array;
+
+  constructor(readonly network: Network) {
+    this.mean = network.packed.tensor("mean");
+    this.std = network.packed.tensor("std");
+  }
+
+  get fps(): number {
+    return this.network.packed.about.fps;
+  }
+
+  /** Features (frames * 263) of each take; take i is sampled from `seed + i`. */
+  async features(segments: readonly Segment[], seed: number, takes: number, watch?: Watcher): Promise<Float32Array[]> {
+    return segments.length === 1
+      ? this.single(segments[0]!, seed, takes, watch)
+      : this.chain(segments, seed, takes, watch);
+  }
+
+  /** Frames of a motion of so many seconds. */
+  frames(seconds: number): number {
+    return Math.max(rounded(seconds * this.fps), 4);
+  }
+
+  private async single(
+    { text, seconds }: Segment,
+    seed: number,
+    takes: number,
+    watch?: Watcher,
+  ): Promise<Float32Array[]> {
+    const asked = await this.network.ask(text);
+    const rows = Array.from({ length: takes }, (_, n) => new Link(this.frames(seconds), 0, 0, asked, seed + n));
+    return await this.walk(rows, false, watch, (states) => states.map((state) => smooth(this.plain(state))));
+  }
+
+  private async chain(
+    segments: readonly Segment[],
+    seed: number,
+    takes: number,
+    watch?: Watcher,
+  ): Promise<Float32Array[]> {
+    const half = Math.max(1, rounded((TRANSITION * this.fps) / 2));
+    const asked = await Promise.all(segments.map(({ text }) => this.network.ask(text)));
+    const rows: Link[] = [];
+    for (let take = 0; take < takes; take += 1) {
+      segments.forEach(({ text, seconds }, n) => {
+        const [before, after, frames] = [n ? half : 0, n < segments.length - 1 ? half : 0, rounded(seconds * this.fps)];
+        if (frames < before + after || frames < 2)
+          throw new Error(
+            `"${text.slice(0, 40)}" of ${seconds} s is shorter than half its transitions; make it longer`,
+          );
+        rows.push(new Link(before + frames + after, before, after, asked[n]!, seed + take + n));
+      });
+    }
+    const cut = (states: readonly Float32Array[]): Float32Array[] =>
+      Array.from({ length: takes }, (_, take) =>
+        joined(
+          segments.map((__, n) => {
+            const [row, state] = [rows[take * segments.length + n]!, states[take * segments.length + n]!];
+            return this.plain(state.subarray(row.before * WIDTH, (row.length - row.after) * WIDTH));
+          }),
+        ),
+      );
+    return this.walk(rows, true, watch, cut);
+  }
+
+  /** Rows from noise to clean states; the ends of a chain's rows are kept alike at every level. */
+  private async walk(
+    rows: readonly Link[],
+    average: boolean,
+    watch: Watcher | undefined,
+    finish: (states: readonly Float32Array[]) => Float32Array[],
+  ): Promise<Float32Array[]> {
+    const { schedule, sampling } = this.network.packed.about;
+    const [table, way] = [cosine(schedule.steps), levels(schedule.steps, sampling.steps)];
+    let states = noiseOf(rows);
+    for (let n = 0; n + 1 < way.length; n += 1) {
+      const [t, s] = [way[n]!, way[n + 1]!];
+      const last = n + 2 === way.length;
+      const clean = average && last ? await this.averaged(rows, states, t) : await this.estimated(rows, states, t);
+      const [ofClean, ofState, ofNoise] = move(table, t, s);
+      const fresh = noiseOf(rows);
+      states = states.map((state, r) =>
+        state.map((x, k) => ofClean * clean[r]![k]! + ofState * x + ofNoise * fresh[r]![k]!),
+      );
+      shake(rows, states);
+      await watch?.(n + 1, way.length - 1, () => finish(clean));
+    }
+    return finish(states);
+  }
+
+  private estimated(rows: readonly Link[], states: readonly Float32Array[], level: number): Promise<Float32Array[]> {
+    const asked = rows.map((row, r) => ({ state: states[r]!, level, asked: row.asked }));
+    return this.network.guided(asked, this.network.packed.about.sampling.guidance);
+  }
+
+  /** Averages over all ways to divide the frames into the network's tokens, so that none leaves small steps. */
+  private async averaged(
+    rows: readonly Link[],
+    states: readonly Float32Array[],
+    level: number,
+  ): Promise<Float32Array[]> {
+    const sums = await this.estimated(rows, states, level);
+    const { patch } = this.network.packed.about.net;
+    for (let shift = 1; shift < patch; shift += 1) {
+      const parts = await this.estimated(
+        rows,
+        states.map((state) => state.slice(shift * WIDTH)),
+        level,
+      );
+      parts.forEach((part, r) => part.forEach((x, k) => (sums[r]![k + shift * WIDTH]! += x)));
+    }
+    return sums.map((sum) => sum.map((x, k) => x / Math.min(Math.floor(k / WIDTH) + 1, patch)));
+  }
+
+  private plain(state: Float32Array): Float32Array {
+    return state.map((x, n) => Math.fround(x * this.std[n % WIDTH]!) + this.mean[n % WIDTH]!);
+  }
+}
+
+/** A row of a chain, or one alone: `before` and `after` are the halves of its transitions. */
+class Link {
+  private readonly noise: Noise;
+
+  constructor(
+    readonly length: number,
+    readonly before: number,
+    readonly after: number,
+    readonly asked: Asked,
+    seed: number,
+  ) {
+    this.noise = new Noise(seed);
+  }
+
+  normals(): Float32Array {
+    return this.noise.normals(this.length * WIDTH);
+  }
+}
+
+/** Noise of all rows; where two overlap both have that of the first one. */
+function noiseOf(rows: readonly Link[]): Float32Array[] {
+  const own = rows.map((row) => row.normals());
+  return own.map((noise, r) => {
+    const result = noise.slice();
+    const shared = 2 * rows[r]!.before * WIDTH;
+    if (shared) result.set(own[r - 1]!.subarray(own[r - 1]!.length - shared), 0);
+    return result;
+  });
+}
+
+/** Make the copies of each overlap equal, in place: the first row fades into the second. */
+function shake(rows: readonly Link[], states: readonly Float32Array[]): void {
+  rows.forEach(({ before }, r) => {
+    const overlap = 2 * before;
+    if (!overlap) return;
+    const [second, end] = [states[r]!, states[r - 1]!];
+    const first = end.subarray(end.length - overlap * WIDTH);
+    first.forEach((x, k) => {
+      const share = Math.floor(k / WIDTH) / overlap;
+      first[k] = second[k] = x + share * (second[k]! - x);
+    });
+  });
+}
+
+function joined(parts: readonly Float32Array[]): Float32Array {
+  const all = new Float32Array(parts.reduce((sum, part) => sum + part.length, 0));
+  parts.reduce((at, part) => {
+    all.set(part, at);
+    return at + part.length;
+  }, 0);
+  return all;
+}
+
+/** Features to a person with constant bones and still feet, who begins at the origin facing +Z. */
+export function finished(features: ArrayLike<number>, fps: number): Body {
+  return cleanFeet(bodyOf(decoded(features, ORIGIN).places, fps), contacts(features));
+}
+
+/** Places that the network predicted, whose bones may breathe, (frames * 22 * 3) metres. */
+export function sketched(features: ArrayLike<number>): Float32Array {
+  return flat(decoded(features).places);
+}
+
+export function flat(places: readonly (readonly Vec[])[]): Float32Array {
+  return Float32Array.from(places.flat(2));
+}

@@ -1,0 +1,88 @@
+/** The worker as the page uses it. */
+
+import { Signal } from "../app/signal";
+import { type MotionClip, motionClip } from "../body/clip";
+import type { Body } from "../prior/person";
+import type { Project } from "./link";
+import type { About, Draw, Said } from "./messages";
+
+export interface Drawn {
+  readonly project: Project;
+  readonly bodies: readonly Body[];
+  readonly clips: readonly MotionClip[];
+}
+
+export interface State {
+  /** Null until the weights are there. */
+  readonly about: About | null;
+  readonly threads: number;
+  /** From 0 to 1; null: nothing is under way. */
+  readonly progress: number | null;
+  readonly says: string;
+  readonly error: string;
+  /** What is guessed while it is drawn. */
+  readonly sketch: readonly MotionClip[];
+  readonly drawn: Drawn | null;
+}
+
+const FPS = 20;
+
+export class Artist {
+  readonly state = new Signal<State>({
+    about: null,
+    threads: 0,
+    progress: 0,
+    says: "loading the weights",
+    error: "",
+    sketch: [],
+    drawn: null,
+  });
+  private readonly worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+  private asked: Project | null = null;
+  private id = 0;
+
+  constructor() {
+    this.worker.onmessage = ({ data }: MessageEvent<Said>) => this.hear(data);
+    this.worker.onerror = () => this.fail("the part of the page that draws does not start; load the page again");
+    this.worker.postMessage(document.baseURI.split("#")[0]);
+  }
+
+  /** Draw a project; what is being drawn is given up. */
+  draw(project: Project): void {
+    this.asked = project;
+    this.id += 1;
+    if (this.state.value.about) this.state.update({ progress: 0, says: "drawing", error: "", sketch: [] });
+    const { segments, seed, takes } = project;
+    this.worker.postMessage({ id: this.id, segments, seed, takes } satisfies Draw);
+  }
+
+  private hear(said: Said): void {
+    if (said.kind === "loading") {
+      const [done, of] = [said.done / 1e6, said.of / 1e6];
+      this.state.update({
+        progress: done / of,
+        says: `loading the weights: ${done.toFixed(0)} of ${of.toFixed(0)} MB`,
+      });
+    } else if (said.kind === "ready") {
+      const { about, threads } = said;
+      this.state.update({
+        about,
+        threads,
+        ...(this.asked ? { progress: 0, says: "drawing" } : { progress: null, says: "" }),
+      });
+    } else if (said.id !== null && said.id !== this.id) return;
+    else if (said.kind === "failed") this.fail(said.message);
+    else if (said.kind === "sketch") {
+      const sketch = said.takes.map((places) => motionClip(FPS, [places]));
+      this.state.update({ progress: said.done / said.of, ...(sketch.length ? { sketch } : {}) });
+    } else {
+      const clips = said.takes.map((places) => motionClip(FPS, [places]));
+      const project = { ...this.asked!, weights: this.state.value.about!.weights };
+      this.state.update({ progress: null, says: "", sketch: [], drawn: { project, bodies: said.bodies, clips } });
+    }
+  }
+
+  private fail(message: string): void {
+    this.state.update({ progress: null, says: "", sketch: [], error: message });
+  }
+}

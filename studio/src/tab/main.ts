@@ -1,0 +1,308 @@
+/** The page that needs no server: words to motion in the browser. */
+
+import "../style/base.css";
+import "../style/panels.css";
+import "./tab.css";
+import { h, morph } from "../app/dom";
+import { Signal } from "../app/signal";
+import { icon } from "../panels/icons";
+import { textButton } from "../panels/parts";
+import type { Segment } from "../prior/prior";
+import { Artist } from "./artist";
+import { bvh } from "./bvh";
+import { glb } from "./glb";
+import {
+  FIRST,
+  LARGEST,
+  LETTERS,
+  LONGEST,
+  MOST,
+  type Project,
+  SHORTEST,
+  SHORTEST_OF_SEVERAL,
+  ofAddress,
+  toAddress,
+} from "./link";
+import { Player } from "./player";
+
+const THEME = "motionloom-theme";
+
+const part = <T extends HTMLElement = HTMLElement>(id: string): T => document.getElementById(id) as T;
+const root = document.documentElement;
+const isDark = (): boolean => root.dataset.theme === "dark";
+
+class Page {
+  private readonly project = new Signal<Project>(FIRST);
+  /** What the page says besides what is drawn, such as why a link was refused. */
+  private readonly notice = new Signal("");
+  private readonly artist = new Artist();
+  private readonly player = new Player(part<HTMLCanvasElement>("canvas"), part("player"), isDark());
+
+  constructor() {
+    this.open(true);
+    addEventListener("hashchange", () => this.open());
+    this.project.subscribe(() => this.show());
+    this.notice.subscribe(() => this.show());
+    this.artist.state.subscribe((now, before) => {
+      if (now.sketch.length) this.player.show(now.sketch, true);
+      else if (now.drawn && now.drawn !== before.drawn) this.drawn();
+      else if (before.sketch.length) this.player.show(now.drawn?.clips ?? [], false);
+      this.show();
+    });
+    this.player.take.subscribe(() => this.show());
+    this.show();
+  }
+
+  /** What the address says, drawn; where it says nothing, at the beginning, what there is. */
+  private open(begin = false): void {
+    try {
+      const found = ofAddress(location.hash) ?? (begin ? FIRST : null);
+      if (!found || (!begin && toAddress(found) === toAddress(this.project.value))) return;
+      this.notice.value = "";
+      this.project.value = found;
+      this.draw();
+    } catch (error) {
+      this.notice.value = (error as Error).message;
+    }
+  }
+
+  private draw(): void {
+    const { segments } = this.project.value;
+    const least = segments.length > 1 ? SHORTEST_OF_SEVERAL : SHORTEST;
+    if (segments.some((one) => !one.text.trim())) {
+      this.notice.value = "A sentence is empty; say in words what the person does, or remove it.";
+      return;
+    }
+    if (segments.some((one) => one.seconds < least)) {
+      this.notice.value = `Each of several sentences takes ${least} s or more; make the short one longer.`;
+      return;
+    }
+    this.notice.value = "";
+    this.artist.draw(this.project.value);
+  }
+
+  private drawn(): void {
+    const { project, clips } = this.artist.state.value.drawn!;
+    const old = this.project.value.weights;
+    if (old && !project.weights.startsWith(old))
+      this.notice.value = "This link was made with other weights; the motion is not the one that was sent.";
+    this.player.take.value = Math.min(this.player.take.value, clips.length - 1);
+    this.player.show(clips, false);
+    if (toAddress({ ...this.project.value, weights: "" }) === toAddress({ ...project, weights: "" }))
+      this.project.value = project;
+    history.replaceState(null, "", `#${toAddress(project)}`);
+  }
+
+  private change(change: Partial<Project>): void {
+    this.project.value = { ...this.project.value, ...change, weights: "" };
+  }
+
+  private segment(index: number, change: Partial<Segment> | null): void {
+    const { segments } = this.project.value;
+    this.change({
+      segments: segments.flatMap((one, n) => (n !== index ? [one] : change ? [{ ...one, ...change }] : [])),
+    });
+  }
+
+  private show(): void {
+    const { progress, says, error, about, drawn } = this.artist.state.value;
+    const { segments, seed, takes } = this.project.value;
+    const message = this.notice.value || error;
+    morph(part("top"), [
+      h("strong", { class: "brand" }, "motionloom"),
+      h("span", { class: "quiet grow ellipsis" }, "in a tab: nothing is sent anywhere"),
+      h(
+        "button",
+        { class: "icon", "aria-label": "Dark or light", title: "Dark or light", onclick: () => this.theme() },
+        icon("theme"),
+      ),
+      h(
+        "button",
+        { class: "icon", "aria-label": "About this page", title: "About this page", onclick: () => this.help() },
+        icon("help"),
+      ),
+    ]);
+    morph(part("notices"), message ? [h("p", { class: "notice", role: "alert" }, message)] : []);
+    morph(
+      part("asked"),
+      [
+        ...segments.map((one, index) => this.sentence(one, index)),
+        h(
+          "div",
+          { class: "line" },
+          textButton("+ what comes next", () => this.more(), { disabled: segments.length >= MOST }),
+        ),
+        h(
+          "div",
+          { class: "line" },
+          number("Seed", seed, 0, LARGEST, 1, (value) => this.change({ seed: Math.round(value) })),
+          textButton("other", () => this.another(), { title: "Draw with the next seed" }),
+          h("span", { class: "grow" }),
+          h("span", { class: "quiet" }, "Takes"),
+          ...[1, 4].map((count) =>
+            textButton(String(count), () => this.change({ takes: count }), { pressed: takes === count }),
+          ),
+        ),
+        textButton("Draw", () => this.draw(), { strong: true }),
+        h("progress", {
+          max: 1,
+          value: progress ?? 0,
+          class: progress === null ? "idle" : null,
+          "aria-label": says || "Progress",
+        }),
+        h("p", { class: "quiet", id: "says", role: "status" }, says || (drawn ? "drawn" : about ? "ready" : "")),
+        drawn && drawn.clips.length > 1 && this.choose(drawn.clips.length),
+        drawn && this.exports(),
+        h("p", { class: "quiet foot" }, "The address of this page holds the motion: copy it to share it."),
+      ].filter((one): one is HTMLElement => one instanceof HTMLElement),
+    );
+    document.body.dataset.state = progress === null ? (drawn ? "drawn" : about ? "ready" : "failed") : "busy";
+    document.body.dataset.threads = String(this.artist.state.value.threads);
+  }
+
+  private sentence({ text, seconds }: Segment, index: number): HTMLElement {
+    const name = `Sentence ${index + 1}`;
+    const change = (event: Event): void => this.segment(index, { text: (event.target as HTMLTextAreaElement).value });
+    const send = (event: KeyboardEvent): void => {
+      if (event.key !== "Enter" || event.shiftKey) return;
+      event.preventDefault();
+      this.draw();
+    };
+    const words = h("textarea", { rows: 2, maxlength: LETTERS, "aria-label": name, oninput: change, onkeydown: send });
+    (words as HTMLTextAreaElement).value = text;
+    return h(
+      "div",
+      { class: "sentence" },
+      words,
+      h(
+        "div",
+        { class: "line" },
+        number("Seconds", seconds, SHORTEST, LONGEST, 0.5, (value) =>
+          this.segment(index, { seconds: Math.round(value * 20) / 20 }),
+        ),
+        h("span", { class: "grow" }),
+        this.project.value.segments.length > 1 &&
+          textButton("remove", () => this.segment(index, null), { title: `Remove sentence ${index + 1}` }),
+      ),
+    );
+  }
+
+  private choose(count: number): HTMLElement {
+    const { take, compare } = this.player;
+    const buttons = Array.from({ length: count }, (_, n) =>
+      textButton(String(n + 1), () => (take.value = n), { pressed: take.value === n, title: `Take ${n + 1}` }),
+    );
+    const toggle = (): void => {
+      compare.value = !compare.value;
+      this.show();
+    };
+    const beside = textButton("compare", toggle, { pressed: compare.value, title: "Show the other takes too" });
+    return h(
+      "div",
+      { class: "line" },
+      h("span", { class: "quiet" }, "Take"),
+      ...buttons,
+      h("span", { class: "grow" }),
+      beside,
+    );
+  }
+
+  private exports(): HTMLElement {
+    const { bodies, project } = this.artist.state.value.drawn!;
+    const body = bodies[this.player.take.value] ?? bodies[0]!;
+    const name =
+      project.segments[0]!.text.toLowerCase()
+        .replace(/[^a-z0-9]+/g, "_")
+        .slice(0, 40) || "motion";
+    const write = async (): Promise<void> => saved(`${name}.glb`, await glb(body, name));
+    return h(
+      "div",
+      { class: "line" },
+      h("span", { class: "quiet grow" }, "Save as"),
+      textButton("BVH", () => saved(`${name}.bvh`, bvh(body))),
+      textButton("GLB", () => void write()),
+    );
+  }
+
+  private more(): void {
+    const segments = this.project.value.segments.map((one) => ({
+      ...one,
+      seconds: Math.max(one.seconds, SHORTEST_OF_SEVERAL),
+    }));
+    this.change({ segments: [...segments, { text: "", seconds: 4 }] });
+    document.querySelector<HTMLTextAreaElement>(".sentence:last-of-type textarea")?.focus();
+  }
+
+  private another(): void {
+    const { seed, takes } = this.project.value;
+    this.change({ seed: (seed + takes) % LARGEST });
+    this.draw();
+  }
+
+  private theme(): void {
+    root.dataset.theme = isDark() ? "light" : "dark";
+    localStorage.setItem(THEME, root.dataset.theme);
+    this.player.look(isDark());
+  }
+
+  private help(): void {
+    const { about, threads } = this.artist.state.value;
+    const dialog = part<HTMLDialogElement>("help");
+    const link = (file: string, text: string): HTMLElement =>
+      h("p", {}, h("a", { href: file, target: "_blank" }, text));
+    dialog.replaceChildren(
+      h("h2", {}, "motionloom in a tab"),
+      h(
+        "p",
+        {},
+        "Words become motion on this computer, by a small network that came with the page. It works without a network once it was loaded. Drag to look around, roll to come nearer, space plays and pauses.",
+      ),
+      h(
+        "p",
+        {},
+        about
+          ? `Weights ${about.name} ${about.weights.slice(0, 12)}; drawn with ${threads} thread${threads === 1 ? "" : "s"}.`
+          : "The weights are not there yet.",
+      ),
+      h("p", {}, about ? `${about.licence}. Made of: ${about.data}` : ""),
+      link("third-party-notices.txt", "Notices of the works of others in this page"),
+      link("onnxruntime-notices.txt", "Notices of the works of others in ONNX Runtime"),
+      textButton("Close", () => dialog.close()),
+    );
+    dialog.showModal();
+  }
+}
+
+function number(
+  name: string,
+  value: number,
+  min: number,
+  max: number,
+  step: number,
+  change: (value: number) => void,
+): HTMLElement {
+  const changed = (event: Event): void => {
+    const field = event.target as HTMLInputElement;
+    const said = field.value === "" ? NaN : Number(field.value);
+    const next = Number.isFinite(said) ? Math.min(Math.max(said, min), max) : value;
+    field.value = String(next);
+    change(next);
+  };
+  return h("label", {}, name, h("input", { type: "number", min, max, step, value: String(value), onchange: changed }));
+}
+
+function saved(name: string, content: string | ArrayBuffer): void {
+  const address = URL.createObjectURL(new Blob([content]));
+  (h("a", { href: address, download: name }) as HTMLAnchorElement).click();
+  setTimeout(() => URL.revokeObjectURL(address), 60_000);
+}
+
+root.dataset.theme =
+  localStorage.getItem(THEME) ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+new Page();
+if ("serviceWorker" in navigator)
+  navigator.serviceWorker
+    .register("sw.js")
+    .then(() => navigator.serviceWorker.ready)
+    .then(() => (document.body.dataset.offline = "true"))
+    .catch(() => undefined); // without one the page needs the network the next time

@@ -1,0 +1,38 @@
+/** What the page and its worker say to each other. */
+
+import type { Body } from "../prior/person";
+import type { Segment } from "../prior/prior";
+
+export interface Draw {
+  readonly id: number;
+  readonly segments: readonly Segment[];
+  readonly seed: number;
+  readonly takes: number;
+}
+
+export interface About {
+  readonly weights: string;
+  readonly name: string;
+  readonly licence: string;
+  readonly data: string;
+}
+
+export type Said =
+  | { readonly kind: "loading"; readonly done: number; readonly of: number }
+  | { readonly kind: "ready"; readonly about: About; readonly threads: number }
+  | {
+      readonly kind: "sketch";
+      readonly id: number;
+      readonly done: number;
+      readonly of: number;
+      /** Places of each take as they are guessed so far; none early on. */
+      readonly takes: readonly Float32Array[];
+    }
+  | {
+      readonly kind: "drawn";
+      readonly id: number;
+      readonly bodies: readonly Body[];
+      readonly takes: readonly Float32Array[];
+    }
+  /** id null: nothing can be drawn at all. */
+  | { readonly kind: "failed"; readonly id: number | null; readonly message: string };

@@ -1,0 +1,109 @@
+/** The stage and the bar below it: who is shown when. */
+
+import { h, morph } from "../app/dom";
+import { Signal } from "../app/signal";
+import { type MotionClip, jointAt } from "../body/clip";
+import { icon } from "../panels/icons";
+import { Cast } from "../stage/cast";
+import { Scene } from "../stage/scene";
+import { DARK, GHOSTS, LIGHT } from "../stage/theme";
+
+export class Player {
+  /** Number of the take that is shown. */
+  readonly take = new Signal(0);
+  /** Whether the other takes are shown too. */
+  readonly compare = new Signal(false);
+  private readonly scene: Scene;
+  private readonly cast: Cast;
+  private clips: readonly MotionClip[] = [];
+  private time = 0;
+  private playing = true;
+  /** Whether what is shown is a guess that changes. */
+  private rough = false;
+
+  constructor(
+    canvas: HTMLCanvasElement,
+    private readonly bar: HTMLElement,
+    dark: boolean,
+  ) {
+    const theme = dark ? DARK : LIGHT;
+    this.scene = new Scene(canvas, theme);
+    this.cast = new Cast(this.scene.scene, theme);
+    this.scene.busy = () => this.rough;
+    this.scene.step = (elapsed) => this.step(elapsed);
+    this.take.subscribe(() => this.place());
+    this.compare.subscribe(() => this.place());
+    addEventListener("keydown", (event) => {
+      const typing = event.target instanceof HTMLElement && event.target.matches("input, textarea, button, a");
+      if (event.key !== " " || typing) return;
+      event.preventDefault();
+      this.toggle();
+    });
+    this.place();
+  }
+
+  show(clips: readonly MotionClip[], rough: boolean): void {
+    if (!this.rough && rough) this.time = 0;
+    [this.clips, this.rough] = [clips, rough];
+    this.place();
+  }
+
+  look(dark: boolean): void {
+    const theme = dark ? DARK : LIGHT;
+    this.scene.look(theme);
+    this.cast.look(theme);
+    this.place();
+  }
+
+  private get clip(): MotionClip | null {
+    return this.clips[this.take.value] ?? this.clips[0] ?? null;
+  }
+
+  private toggle(): void {
+    this.playing = !this.playing;
+    this.place();
+  }
+
+  private step(elapsed: number): boolean {
+    const { clip } = this;
+    if (!clip) return false;
+    if (this.playing) {
+      this.time = (this.time + elapsed / 1000) % clip.seconds;
+      this.place();
+    }
+    const [x, , z] = jointAt(clip, 0, 0, this.time);
+    const before = this.scene.orbit.target.clone();
+    this.scene.centre(x, z, true, 1 - Math.exp(-elapsed / 220));
+    return this.playing || before.distanceToSquared(this.scene.orbit.target) > 1e-7;
+  }
+
+  private place(): void {
+    const { clip, time } = this;
+    this.cast.show(clip, time);
+    const others = this.compare.value ? this.clips.filter((one) => one !== clip) : [];
+    this.cast.showGhosts(
+      others.map((one, n) => ({ clip: one, color: GHOSTS[n]! })),
+      time,
+    );
+    this.scene.invalidate();
+    const label = this.playing ? "Pause" : "Play";
+    const seek = (event: Event): void => {
+      [this.time, this.playing] = [Number((event.target as HTMLInputElement).value), false];
+      this.place();
+    };
+    const last = clip ? clip.seconds : 0;
+    const button = {
+      class: "icon",
+      "aria-label": label,
+      title: `${label} (space)`,
+      disabled: !clip,
+      onclick: () => this.toggle(),
+    };
+    const range = { type: "range", min: 0, max: last, step: 0.05, value: time.toFixed(2), disabled: !clip };
+    morph(this.bar, [
+      h("button", button, icon(this.playing ? "pause" : "play")),
+      h("input", { ...range, "aria-label": "Time, seconds", oninput: seek }),
+      h("span", { class: "clock" }, `${time.toFixed(1)} / ${last.toFixed(1)} s`),
+    ]);
+  }
+}

@@ -1,0 +1,36 @@
+import { expect, test } from "vitest";
+import { type Project, ofAddress, toAddress } from "../src/tab/link";
+
+const PROJECT: Project = {
+  segments: [
+    { text: "walks & turns #1, 100 % = ü", seconds: 2.5 },
+    { text: "jumps", seconds: 10 },
+  ],
+  seed: 2 ** 40,
+  takes: 4,
+  weights: "0123456789ab",
+};
+
+test("a project comes back from its address", () => {
+  expect(ofAddress(`#${toAddress(PROJECT)}`)).toEqual(PROJECT);
+  expect(ofAddress("")).toBeNull();
+  expect(ofAddress("#")).toBeNull();
+});
+
+test("what is no project is refused", () => {
+  const bad: [string, string, string][] = [
+    ["seed=1099511627776", "seed=1.5", "seed is"],
+    ["seed=1099511627776", "seed=1099511627777", "seed is"],
+    ["takes=4", "takes=0", "takes is"],
+    ["s=10+jumps", "s=10+", "0 letters"],
+    ["s=10+jumps", `s=10+${"a".repeat(401)}`, "401 letters"],
+    ["s=10+jumps", "s=1e9+jumps", "has no length"],
+    ["s=10+jumps", "s=1+jumps", "shorter than 2 s"],
+    ["s=10+jumps", "s=2+jumps&".repeat(12), "13 sentences"],
+    ["w=0123456789ab", "w=%22", "names no weights"],
+  ];
+  for (const [old, next, says] of bad) {
+    const address = `#${toAddress(PROJECT).replace(old, next)}`;
+    expect(() => ofAddress(address), next.slice(0, 40)).toThrow(says);
+  }
+});

@@ -1,0 +1,121 @@
+/** The page's own prior against Python's numbers, which `packages/motionloom/tests/tab` writes and names in the environment. */
+
+import { readFileSync } from "node:fs";
+import { join } from "node:path";
+import * as ort from "onnxruntime-web/wasm";
+import { beforeAll, describe, expect, test } from "vitest";
+import { Network, type Runtime } from "../src/prior/network";
+import { Noise } from "../src/prior/noise";
+import { type Body, placesOf } from "../src/prior/person";
+import { Prior, type Segment, finished, flat, sketched } from "../src/prior/prior";
+import { type Manifest, Packed } from "../src/prior/weights";
+
+const FOLDER = process.env.MOTIONLOOM_TAB ?? "";
+
+interface Expected {
+  index: Record<string, [number, number]>;
+  sentences: string[];
+  chains: [string, number][][];
+  tokens: [string, number[]][];
+}
+
+const read = (name: string): ArrayBuffer => new Uint8Array(readFileSync(join(FOLDER, name))).buffer;
+const json = <T>(name: string): T => JSON.parse(readFileSync(join(FOLDER, name), "utf8")) as T;
+
+/** The largest difference, of numbers as they are or in units of something. */
+function off(found: ArrayLike<number>, wanted: ArrayLike<number>, unit = (_: number): number => 1): number {
+  expect(found.length).toBe(wanted.length);
+  let most = 0;
+  for (let n = 0; n < wanted.length; n += 1) {
+    const difference = Math.abs(found[n]! - wanted[n]!) / unit(n);
+    if (!(difference <= most)) most = difference;
+  }
+  return most;
+}
+
+/** The largest angle between turns, in degrees. */
+function apart(found: Body, wanted: Float32Array): number {
+  const turns = found.turns.flat();
+  expect(turns.length * 4).toBe(wanted.length);
+  let most = 0;
+  turns.forEach((turn, n) => {
+    const sign = turn.reduce((sum, x, k) => sum + x * wanted[n * 4 + k]!, 0) < 0 ? -1 : 1;
+    const chord = Math.hypot(...turn.map((x, k) => x - sign * wanted[n * 4 + k]!));
+    most = Math.max(most, (4 * Math.asin(Math.min(chord / 2, 1)) * 180) / Math.PI);
+  });
+  return most;
+}
+
+describe.skipIf(!FOLDER)("as Python draws", () => {
+  let said: Expected;
+  let numbers: Float32Array;
+  let prior: Prior;
+  const wanted = (name: string): Float32Array => {
+    const [at, count] = said.index[name]!;
+    return numbers.subarray(at, at + count);
+  };
+
+  beforeAll(async () => {
+    ort.env.wasm.numThreads = 1;
+    ort.env.wasm.wasmBinary = new Uint8Array(
+      readFileSync("node_modules/onnxruntime-web/dist/ort-wasm-simd-threaded.wasm"),
+    ).buffer;
+    said = json("expected.json");
+    numbers = new Float32Array(read("expected.bin"));
+    prior = new Prior(
+      await Network.open(ort as unknown as Runtime, new Packed(json<Manifest>("prior.json"), read("prior.bin"))),
+    );
+  }, 600_000);
+
+  test("tokens are the same", () => {
+    for (const [text, ids] of said.tokens) expect(prior.network.tokens(text), JSON.stringify(text)).toEqual(ids);
+  });
+
+  test("the noise of a seed is the same", () => {
+    const names = Object.keys(said.index).filter((name) => name.startsWith("noise "));
+    for (const name of names)
+      expect(off(new Noise(Number(name.slice(6))).normals(200_000), wanted(name)), name).toBeLessThan(1e-6);
+  }, 600_000);
+
+  test("denoised states are the same", async () => {
+    const asked = await prior.network.ask(said.sentences[0]!);
+    for (const level of [1000, 500, 3]) {
+      const [clean] = await prior.network.guided([{ state: wanted("state").slice(), level, asked }], 2.5);
+      expect(off(clean!, wanted(`denoised ${level}`)), `level ${level}`).toBeLessThan(1e-3);
+    }
+  }, 600_000);
+
+  /**
+   * The walk adds up the last bits of 24 calls; so that no foot counts as planted here and not there, bodies are made of
+   * Python's features.
+   */
+  const drawn = async (name: string, segments: Segment[], seed: number): Promise<void> => {
+    const std = prior.network.packed.tensor("std");
+    const theirs = wanted(`${name}.features`);
+    const [features] = await prior.features(segments, seed, 1);
+    const unlike = off(features!, theirs, (n) => std[n % 263]! || 1);
+    const sketch = off(sketched(features!), sketched(theirs));
+    const body = finished(theirs, prior.fps);
+    const far = off(flat(placesOf(body)), wanted(`${name}.places`));
+    const turned = apart(body, wanted(`${name}.turns`));
+    expect(unlike, `${name}: features, standard deviations`).toBeLessThan(1e-2);
+    expect(sketch, `${name}: metres as predicted`).toBeLessThan(1e-3);
+    expect(far, `${name}: metres`).toBeLessThan(1e-3);
+    expect(turned, `${name}: degrees`).toBeLessThan(0.1);
+  };
+
+  test("sentences are the same motions", async () => {
+    for (const [seed, text] of said.sentences.entries())
+      await drawn(`sentence ${seed}`, [{ text, seconds: 2 + 0.35 * seed }], seed);
+  }, 600_000);
+
+  test("a chain is the same motion", async () => {
+    const chains = said.chains.filter((_, n) => `chain ${n}.features` in said.index);
+    for (const [n, chain] of chains.entries())
+      await drawn(
+        `chain ${n}`,
+        chain.map(([text, seconds]) => ({ text, seconds })),
+        4,
+      );
+  }, 600_000);
+});
