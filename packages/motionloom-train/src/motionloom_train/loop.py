@@ -209,8 +209,8 @@ def train(
 
     ``wrap`` turns the trained module into what is called in a step (binding, compiling). ``on_save(net, average,
     step)`` and ``on_step(step, loss, seconds)`` run in the first process. ``stop``: end early after so many steps.
-    ``say`` hears what is multiplied in where the recipe leaves that open, and after the first steps how long the run
-    will take. A run that goes on multiplies in what it did, unless the recipe says otherwise.
+    ``say`` is called with the number format if the recipe leaves that open, and after the first steps with how long
+    the run will take. A run that goes on multiplies in what it did, unless the recipe says otherwise.
     """
     world, folder = world or World(), Path(folder)
     folder.mkdir(parents=True, exist_ok=True)

@@ -217,7 +217,7 @@ def _check_whole_numbers(path: Path, values: dict[str, Any]) -> None:
 
 
 def _shown(value: object) -> str:
-    """A value as messages tell it; one of thousands of digits has no decimal text at all."""
+    """A value as messages write it; a number of thousands of digits has no decimal text at all."""
     try:
         return repr(value)[:80]
     except ValueError:

@@ -123,7 +123,7 @@ def run_mcp(arguments: argparse.Namespace) -> None:
 
 
 def _adapters(arguments: argparse.Namespace) -> "tuple[Applied, ...]":
-    """Those of the line; a file that is not there is told before anything is started."""
+    """Those of the command line; a file that does not exist is reported before anything is started."""
     from motionloom.goals.adapters import parse_adapter
 
     adapters = tuple(parse_adapter(word) for word in arguments.adapter)

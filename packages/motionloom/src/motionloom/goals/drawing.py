@@ -153,7 +153,7 @@ def _number(said: str, at: int) -> tuple[float, int]:
     match = _NUMBER.match(said, at)
     value = None if match is None else text.number(match[0])
     if match is None or value is None:
-        raise _BadShape(f"{text.shown(said[at : at + 20])} stands where a number below 1e9 is due")
+        raise _BadShape(f"{text.shown(said[at : at + 20])} is where a number below 1e9 is expected")
     return value, match.end()
 
 
@@ -210,7 +210,7 @@ def _commands(said: str):
         if said[at].upper() in _TAKES:
             letter, at = said[at], at + 1
         elif letter.upper() in ("", "Z"):
-            raise _BadShape(f"{text.shown(said[at : at + 20])} stands where a command such as M or L is due")
+            raise _BadShape(f"{text.shown(said[at : at + 20])} is where a command such as M or L is expected")
         elif letter in "Mm":
             letter = "L" if letter == "M" else "l"
         values = []
@@ -218,7 +218,7 @@ def _commands(said: str):
             at = _BLANK.match(said, at).end()  # type: ignore[union-attr]
             if letter in "Aa" and place in (3, 4):  # a flag is one digit and may touch the next number
                 if said[at : at + 1] not in ("0", "1"):
-                    raise _BadShape(f"{text.shown(said[at : at + 20])} stands where an arc's flag, 0 or 1, is due")
+                    raise _BadShape(f"{text.shown(said[at : at + 20])} is where an arc's flag, 0 or 1, is expected")
                 value, at = float(said[at]), at + 1
             else:
                 value, at = _number(said, at)

@@ -73,7 +73,7 @@ def _parsed(path: Path) -> Any:
         found = dict(pairs)
         if len(found) < len(pairs):
             twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
-            raise MotionloomError(f"{path}: the key {twice[:40]!r} stands in one mapping twice; drop one of them")
+            raise MotionloomError(f"{path}: the key {twice[:40]!r} appears twice in one mapping; remove one of them")
         return found
 
     def constant(word: str) -> float:

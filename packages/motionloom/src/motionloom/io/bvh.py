@@ -392,7 +392,7 @@ def _orders(joints: list[_Joint]) -> dict[str, list[tuple[int, list[int]]]]:
 def unit_that_reads_back(motion: Motion, unit: float) -> float:
     """The unit to write a motion in, so that `guess_unit` finds its size again: ``unit``, else metres or another.
 
-    Where no unit does, as for a giant, ``unit`` itself: who reads the file has to be told so.
+    Where no unit does, as for a giant, ``unit`` itself: the reader of the file has to be given it.
     """
     offsets, moving = moving_offsets(motion)
     lengths = np.where(np.isin(np.arange(len(offsets)), list(moving))[:, None], 0.0, offsets)

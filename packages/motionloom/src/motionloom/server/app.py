@@ -292,7 +292,7 @@ async def _refused(request: Request, error: Exception) -> Response:
 
 
 async def _unwritten(request: Request, error: Exception) -> Response:
-    """A full disk is told; any other error of the system is one of the program."""
+    """A full disk is reported to the client; any other error of the operating system is one of the program."""
     if (refusal := full_disk(error)) is None:
         raise error
     return await _refused(request, refusal)

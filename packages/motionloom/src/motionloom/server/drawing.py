@@ -1,4 +1,4 @@
-"""A `JobRequest` to motions, by the functions that the command line calls; and where its poses are meanwhile."""
+"""A `JobRequest` to motions, by the functions that the command line calls, and its poses while they are computed."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
