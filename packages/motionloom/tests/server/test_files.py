@@ -11,7 +11,12 @@ from motionloom.io import load_scene, save
 from motionloom.io.character import load_character
 from motionloom.io.gltf import load_glb
 from motionloom.motion import Motion
+from motionloom.retarget import MODES
 from motionloom.retarget.named import named_skeleton
+from motionloom.server.files import export
+from motionloom.server.limits import Limits
+from motionloom.server.project import Project
+from motionloom.server.refusal import Refusal
 from motionloom.skeleton import SMPL22
 from tests.io.rigged import Hero
 from tests.io.test_bind_pose import place
@@ -60,6 +65,25 @@ def test_rotations_and_root_give_the_places(server: Server, walk: str) -> None:
 def test_a_named_skeleton_is_that_of_the_file(server: Server, walk: str, tmp_path: Path) -> None:
     back = load(fetched(server, f"/motions/{walk}.bvh?skeleton=mixamo", tmp_path / "walk.bvh"))
     assert set(named_skeleton("mixamo").names) <= set(back.skeleton.names)
+
+
+def test_the_way_is_carried_by_what_is_asked(tmp_path: Path) -> None:
+    """Without a server: a person who glides 1 m/s, on a skeleton with a root bone on the ground."""
+    project = Project(tmp_path, Limits())
+    root = np.tile(SMPL22.offsets[0], (40, 1))
+    root[:, 2] += np.arange(40) / 20
+    stored = project.add((Motion(SMPL22, 20, root, np.tile([1.0, 0, 0, 0], (40, 22, 1))),), {})
+    ways = {}
+    for mode in (*MODES, None):
+        back = load(export(project, stored, "npz", skeleton="unreal", person=None, root=mode))
+        where = back.positions()[:, [back.skeleton.index(name) for name in ("root", "pelvis")]]
+        ways[mode] = np.linalg.norm((where[-1] - where[0])[:, [0, 2]], axis=-1)
+    assert ways["motion"].min() > 1.5
+    assert ways["hips"][0] < 0.01 < 1.5 < ways["hips"][1]
+    assert ways["in-place"].max() < 0.01
+    for skeleton, mode in ((None, "hips"), ("unreal", "feet")):
+        with pytest.raises(Refusal, match=f"a root is one of motion, hips, in-place.*got '{mode}'"):
+            export(project, stored, "npz", skeleton=skeleton, person=None, root=mode)
 
 
 def test_both_people_of_a_duet_are_in_one_file_or_alone(server: Server, tmp_path: Path) -> None:

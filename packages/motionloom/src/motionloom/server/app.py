@@ -215,10 +215,10 @@ async def motion(request: Request) -> Response:
         return JSONResponse(about)
     if kind not in FORMATS:
         raise Refusal(404, f"motions are given as {', '.join(FORMATS)}; got {kind[:20]!r}")
-    person, skeleton = _person(request), request.query_params.get("skeleton")
+    person, skeleton, root = _person(request), *map(request.query_params.get, ("skeleton", "root"))
 
     def made() -> Path:
-        return files.export(studio.project, stored, kind, skeleton=skeleton, person=person)
+        return files.export(studio.project, stored, kind, skeleton=skeleton, person=person, root=root)
 
     part = await _with_file(studio, made)
     return file_once(part, media_type=files.FORMATS[kind], name=f"motion-{name[:8]}{part.suffix}")

@@ -96,12 +96,18 @@ class Assistant:
         return call
 
     async def export(
-        self, motion: str, format: str = "bvh", skeleton: str | None = None, name: str | None = None
+        self,
+        motion: str,
+        format: str = "bvh",
+        skeleton: str | None = None,
+        name: str | None = None,
+        root: str | None = None,
     ) -> dict[str, Any]:
         """Write a motion to a file in the project folder and give its path.
 
         motion: an id that another tool gave. format: bvh, glb, npz, mp4 or png. skeleton: smpl22, mixamo,
-        unreal, vrm or rigify. name: of the file, letters, digits, - and _ only; without it the motion's id.
+        unreal, vrm or rigify. root: what carries the way on a skeleton with a root bone: motion (that bone), hips
+        or in-place (nothing). name: of the file, letters, digits, - and _ only; without it the motion's id.
         """
         import anyio
 
@@ -113,7 +119,8 @@ class Assistant:
             stem = motion if name is None else name
             if not 0 < len(stem) <= 80 or not stem.replace("-", "").replace("_", "").isalnum() or not stem.isascii():
                 raise MotionloomError(f"a file's name has letters, digits, - and _ only; got {stem[:40]!r}")
-            part = files.export(self.project, self.project.motion(motion), format, skeleton=skeleton, person=None)
+            stored = self.project.motion(motion)
+            part = files.export(self.project, stored, format, skeleton=skeleton, person=None, root=root)
             place = self.project.folder / "exports" / f"{stem}.{format}"
             place.parent.mkdir(exist_ok=True)
             os.replace(part, place)

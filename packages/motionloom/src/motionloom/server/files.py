@@ -3,7 +3,7 @@
 import base64
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from motionloom.io import load, load_scene, save, save_scene
 from motionloom.io.character import load_character
 from motionloom.io.text import parse_json
 from motionloom.motion import Motion
-from motionloom.retarget import joint_map, retarget, to_smpl22
+from motionloom.retarget import MODES, RootMode, joint_map, retarget, to_smpl22
 from motionloom.retarget.anatomy import read_body
 from motionloom.retarget.named import NAMED, named_skeleton
 from motionloom.retarget.stand import HERE, started
@@ -87,8 +87,18 @@ def _decoded(found: Field, width: int) -> np.ndarray:
     return values
 
 
-def export(project: Project, stored: Stored, kind: str, *, skeleton: str | None, person: int | None) -> Path:
-    """A file of a motion in the project's temporary folder; whoever asks for it removes it."""
+def export(
+    project: Project, stored: Stored, kind: str, *, skeleton: str | None, person: int | None, root: str | None = None
+) -> Path:
+    """A file of a motion in the project's temporary folder; whoever asks for it removes it.
+
+    kind: of `FORMATS`. skeleton: a name or the id of a character; None: the motion's own. person: one of several,
+    counted from 0; None: all. root: what carries the way over the ground, as ``--root``; None: all joints above the
+    hips go along. Raises `Refusal` and `MotionloomError` for what cannot be.
+    """
+    if root is not None and (skeleton is None or root not in MODES):
+        raise Refusal(400, f"a root is one of {', '.join(MODES)}, for a skeleton that is named; got {root[:20]!r}")
+    mode = cast("RootMode | None", root)
     people = list(stored.people)
     if person is not None and not 0 <= person < len(people):
         raise Refusal(400, f"the motion has {len(people)} people, counted from 0; there is no person {person}")
@@ -96,16 +106,18 @@ def export(project: Project, stored: Stored, kind: str, *, skeleton: str | None,
         people = [people[person or 0]]
     caption = str(stored.about.get("prompt") or stored.about.get("name") or "")
     if skeleton is not None and skeleton not in NAMED:
-        return _on_character(project, people, kind, skeleton, caption)
+        return _on_character(project, people, kind, skeleton, caption, mode)
     if skeleton is not None:
-        people = [retarget(one, named_skeleton(skeleton)) for one in people]
+        people = [retarget(one, named_skeleton(skeleton), root=mode) for one in people]
     part = project.part(f".{kind}")
     if len(people) > 1:
         return save_scene(people, part, names=_names(people), captions=[caption] * len(people))
     return save(people[0], part, captions=[caption])
 
 
-def _on_character(project: Project, people: Sequence[Motion], kind: str, skeleton: str, caption: str) -> Path:
+def _on_character(
+    project: Project, people: Sequence[Motion], kind: str, skeleton: str, caption: str, root: RootMode | None
+) -> Path:
     path, _ = project.character(skeleton)
     suffix, character = path.suffix, None
     if suffix == ".bvh":
@@ -120,7 +132,7 @@ def _on_character(project: Project, people: Sequence[Motion], kind: str, skeleto
         if kind == "glb" and len(people) > 1:
             raise MotionloomError("a character's file holds one person; name one with person=0 or person=1")
     body = read_body(target)
-    moved = [bend_toes(retarget(one, target), body) for one in people]
+    moved = [bend_toes(retarget(one, target, root=root), body) for one in people]
     if character is not None and character.stand != HERE and len(moved) == 1:
         moved = [started(moved[0], body, character.stand)]
     if character is not None and kind == "glb":

@@ -75,6 +75,7 @@ def _about_motions() -> dict[str, dict[str, dict[str, Any]]]:
     kind = _with("format", "of the file", ref("MotionFormat"), place="path")
     options = (
         _with("skeleton", "smpl22, mixamo, unreal, vrm, rigify or a character's id"),
+        _with("root", "what carries the way on a skeleton with a root bone: motion, hips or in-place"),
         _with("person", "0, 1, ...", WHOLE),
     )
     file, body = _answered("the file; its own media type is in the answer", FILE, kind=BYTES), _asked(FILE, BYTES)

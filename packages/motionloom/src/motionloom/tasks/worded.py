@@ -35,7 +35,7 @@ from motionloom.weights.prior import Prior
 TRIES = 6
 STILL = 1.5
 ENDS_STILL, MOSTLY_STILL = 0.3, 0.8
-"""Shares of a motion at whose end somebody who stands still is told: of words that are not known, and of all."""
+"""Shares of a motion after which standing still at its end is reported: with unknown words, and with any."""
 
 
 @dataclass(frozen=True)
