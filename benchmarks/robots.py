@@ -1,9 +1,10 @@
 """Recordings and drawn clips on humanoid robots: figures of each, limits that a table states, and how fast it is.
 
 python benchmarks/robots.py g1.xml t1.xml --recordings FOLDER [--count 30] [--drawn 100] [--weights default]
-    [--sheets FOLDER] [--out benchmarks/robots.txt]
+    [--source-fps 30] [--out benchmarks/robots.txt]
 
-FOLDER holds motion files (.bvh, .amc), of which every so many-th is taken, at most 8 s of each. Drawn clips are of
+FOLDER holds motion files (.bvh, .amc), of which every so many-th is taken, at most 8 s of each; AMC files state no rate
+(--source-fps, else 120). Drawn clips are of
 twenty kinds, by seed, 4 s each. Times are processor seconds of one core, reading the robot not counted.
 """
 
@@ -53,11 +54,11 @@ LONGEST = 8.0
 """Seconds of a recording."""
 
 
-def recordings(folder: Path, count: int) -> Iterator[tuple[str, Motion]]:
-    """Every so many-th motion file below a folder."""
+def recordings(folder: Path, count: int, fps: float | None) -> Iterator[tuple[str, Motion]]:
+    """Every so many-th motion file below a folder; fps: of AMC files."""
     files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in (".bvh", ".amc"))
     for path in files[:: max(1, len(files) // count)][:count]:
-        motion = io.load(path)
+        motion = io.load(path, fps=fps if path.suffix.lower() == ".amc" else None)
         yield path.stem, motion.frames(0, min(len(motion), round(LONGEST * motion.fps)))
 
 
@@ -80,13 +81,14 @@ def row(name: str, robot: Robot, figures: Figures, clip: Clip, times: float) -> 
         f"{name[:34]:34} {robot.name[:9]:9} {figures.limits_broken:6} {figures.float_cm:6.2f} {figures.slide_cm:6.2f} "
         f"{figures.sunk_cm:5.2f} {figures.largest_step:5.2f} {figures.effector_cm or 0:6.2f} "
         f"{100 * np.percentile(clip.errors if clip.errors is not None else 0, 95):6.2f} "
+        f"{np.abs(np.diff(clip.qpos[:, :3], axis=0)).max(initial=0.0) * clip.fps:6.1f} "
         f"{figures.at_limit_share:6.2f} {figures.outside_support_share:8.2f} {touches:>7} {times:6.1f}"
     )
 
 
 HEAD = (
     f"{'clip':34} {'robot':9} {'broken':>6} {'float':>6} {'slide':>6} {'sunk':>5} {'step':>5} {'hands':>6} {'95 %':>6} "
-    f"{'limit':>6} {'unheld':>8} {'touches':>7} {'times':>6}"
+    f"{'root':>6} {'limit':>6} {'unheld':>8} {'touches':>7} {'times':>6}"
 )
 
 
@@ -95,6 +97,7 @@ def main() -> int:
     parser.add_argument("robots", nargs="+", type=Path)
     parser.add_argument("--recordings", type=Path)
     parser.add_argument("--count", type=int, default=30)
+    parser.add_argument("--source-fps", type=float)
     parser.add_argument("--drawn", type=int, default=0)
     parser.add_argument("--weights", default="default")
     parser.add_argument("--avoid-collisions", action="store_true")
@@ -104,7 +107,9 @@ def main() -> int:
     put_on_robot(Motion(robots[0].skeleton, 50.0, *_still(robots[0])), robots[0])  # what is loaded once
     lines, found = [HEAD], {"recordings": [], "drawn": []}
     sources = {
-        "recordings": recordings(arguments.recordings, arguments.count) if arguments.recordings else (),
+        "recordings": recordings(arguments.recordings, arguments.count, arguments.source_fps)
+        if arguments.recordings
+        else (),
         "drawn": drawn(arguments.drawn, arguments.weights) if arguments.drawn else (),
     }
     for kind, clips in sources.items():

@@ -15,7 +15,35 @@ UNITREE = (
     "{side}_shoulder_yaw_joint",
     "{side}_elbow_joint",
 )
-"""Legs pitch, roll, yaw, knee, ankle pitch and roll; waist; arms pitch, roll, yaw, elbow: G1, H1-2, N1."""
+"""Legs pitch, roll, yaw, knee, ankle pitch and roll; waist; arms pitch, roll, yaw, elbow: G1, H1-2."""
+H1 = (
+    "{side}_hip_yaw_joint",
+    "{side}_hip_roll_joint",
+    "{side}_hip_pitch_joint",
+    "{side}_knee_joint",
+    "{side}_ankle_joint",
+    "",
+    "torso_joint",
+    "{side}_shoulder_pitch_joint",
+    "{side}_shoulder_roll_joint",
+    "{side}_shoulder_yaw_joint",
+    "{side}_elbow_joint",
+)
+"""Ankles of one hinge, and the waist is called torso."""
+FOURIER = (
+    "{side}_hip_pitch_joint",
+    "{side}_hip_roll_joint",
+    "{side}_hip_yaw_joint",
+    "{side}_knee_pitch_joint",
+    "{side}_ankle_roll_joint",
+    "{side}_ankle_pitch_joint",
+    "waist_yaw_joint",
+    "{side}_shoulder_pitch_joint",
+    "{side}_shoulder_roll_joint",
+    "{side}_shoulder_yaw_joint",
+    "{side}_elbow_pitch_joint",
+)
+"""N1."""
 BOOSTER = (
     "{Side}_Hip_Pitch",
     "{Side}_Hip_Roll",
@@ -60,9 +88,12 @@ NAMELESS = (*(f"m{i}_{{s}}x" for i in range(6)), "m6", *(f"m{i}_{{s}}x" for i in
 
 
 def humanoid(names: Sequence[str] = UNITREE, *, size: float = 1.0, free: str = "<freejoint/>", extra: str = "") -> str:
-    """A robot 1.1 m tall, times ``size``, that stands with straight legs, its arms hanging, its elbows straight."""
+    """A robot 1.1 m tall, times ``size``, that stands with straight legs, its arms hanging, its elbows straight; without
+    the hinges whose names are empty."""
 
     def joint(number: int, side: str, axis: str, span: str) -> str:
+        if not names[number]:
+            return ""
         name = names[number].format(side=side, Side=side.title(), s=side[0], S=side[0].upper())
         return f'<joint name="{name}" axis="{axis}" range="{span}"/>'
 

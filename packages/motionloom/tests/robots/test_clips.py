@@ -67,6 +67,25 @@ def test_the_same_motion_gives_the_same_bits(robot: Robot, clip: Clip) -> None:
     assert np.array_equal(put_on_robot(marching(), robot).qpos, clip.qpos)
 
 
+def test_ankles_of_one_hinge_are_enough(tmp_path: Path) -> None:
+    """As an H1 has them: soles cannot roll to the side, and yet stand."""
+    (tmp_path / "h1.xml").write_text(models.humanoid(models.H1))
+    robot = read_robot(tmp_path / "h1.xml")
+    figures = measure(put_on_robot(marching(0.8), robot), robot)
+    assert figures.limits_broken == 0
+    assert max(figures.float_cm, figures.slide_cm) < 0.3
+
+
+def test_the_root_does_not_jump_to_feet_that_are_late(robot: Robot) -> None:
+    """A body that is elsewhere from one frame to the next, its feet planted, is caught up with step by step."""
+    motion = marching()
+    root = motion.root.copy()
+    root[20:, 0] += 0.2
+    made = put_on_robot(replace(motion, root=root), robot)
+    asked = np.abs(np.diff(root[:, 0])).max() * 30 / 50
+    assert np.abs(np.diff(made.qpos[:, :3], axis=0)).max() <= asked + 2.0 / 50 + 0.01
+
+
 def test_a_speed_is_kept_by_slowing_down(robot: Robot, clip: Clip) -> None:
     """No joint exceeds the speed, the clip is longer by what is told, and goes through the same poses."""
     slow = put_on_robot(marching(), robot, max_speed=2.0)
@@ -217,7 +236,7 @@ def test_the_command_line_writes_checks_and_reads_back(
 @pytest.mark.parametrize("recording", RECORDINGS, ids=["walk", "kicks"])
 def test_recordings_reach_the_figures(path: str, recording: str) -> None:
     """Limits 0, float 1 cm, slide 0.3 cm a frame, hands and feet 6 cm, steps 0.3 rad, on both published robots."""
-    robot, motion = read_robot(shared(path)), io.load(shared(recording))
+    robot, motion = read_robot(shared(path)), io.load(shared(recording), fps=30)
     figures = measure(put_on_robot(motion.frames(0, min(len(motion), 150)), robot), robot)
     assert figures.limits_broken == 0
     assert figures.float_cm <= 1.0
