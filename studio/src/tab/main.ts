@@ -140,7 +140,7 @@ class Page {
           h("span", { class: "grow" }),
           h("span", { class: "quiet" }, "Takes"),
           ...[1, 4].map((count) =>
-            textButton(String(count), () => this.change({ takes: count }), { pressed: takes === count }),
+            textButton(count > 1 ? "four" : "one", () => this.change({ takes: count }), { pressed: takes === count }),
           ),
         ),
         textButton("Draw", () => this.draw(), { strong: true }),
@@ -230,7 +230,7 @@ class Page {
       seconds: Math.max(one.seconds, SHORTEST_OF_SEVERAL),
     }));
     this.change({ segments: [...segments, { text: "", seconds: 4 }] });
-    document.querySelector<HTMLTextAreaElement>(".sentence:last-of-type textarea")?.focus();
+    [...document.querySelectorAll<HTMLTextAreaElement>(".sentence textarea")].at(-1)?.focus();
   }
 
   private another(): void {

@@ -63,7 +63,11 @@ async function open(base: string): Promise<Prior> {
   const { wasm: settings } = ort.env;
   settings.numThreads = self.crossOriginIsolated ? Math.min(navigator.hardwareConcurrency, MOST_THREADS) : 1;
   settings.wasmPaths = { mjs: new URL(glue, base).href, wasm: new URL(wasm, base).href };
-  const prior = new Prior(await Network.open(ort as unknown as Runtime, await download(base)));
+  const packed = await download(base);
+  const network = await Network.open(ort as unknown as Runtime, packed).catch((error: Error) => {
+    throw new Error(`this browser cannot run the network (${error.message.slice(0, 200)}); use a newer one`);
+  });
+  const prior = new Prior(network);
   const { weights, name, licence, data } = prior.network.packed.about;
   say({ kind: "ready", about: { weights, name, licence, data }, threads: settings.numThreads });
   return prior;

@@ -71,9 +71,10 @@ def test_words_takes_and_what_comes_next_by_keyboard(tab: Tab):
     """Enter draws; the address says what was drawn; four takes can be seen one by one."""
     tab.open((0.5, "a person waves"), takes=4)
     tab.drawn()
-    tab.page.get_by_role("button", name="3", exact=True).focus()
+    tab.button("3").focus()
     tab.page.keyboard.press("Enter")
     assert tab.button("3").get_attribute("aria-pressed") == "true"
+    tab.button("one").click()
     tab.button("+ what comes next").focus()
     tab.page.keyboard.press("Enter")
     assert tab.page.evaluate("document.activeElement.getAttribute('aria-label')") == "Sentence 2"
