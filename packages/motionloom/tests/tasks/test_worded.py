@@ -83,3 +83,15 @@ def test_who_ends_standing_still_is_told(prior: Prior, text: str, told: bool) ->
     assert one.still_from == pytest.approx(2.0, abs=0.2)
     assert bool(one.stillness(of=0.3)) == told
     assert not one.stillness(of=0.8)
+
+
+def test_python_gets_the_remarks_of_the_command_line(prior: Prior) -> None:
+    few = Sampling(steps=2, seed=3)
+    turn, foreign = worded.generate_worded(
+        prior, ["turn left 90 degrees", "eine Person geht vorwärts"], seconds=1.0, sampling=few
+    )
+    assert turn.remarks[0].startswith("read as: a turn of 90 degrees to the left, ")
+    assert not turn.unknown
+    assert "does not look like English" in foreign.remarks[0]
+    assert list(foreign.unknown) == ["eine Person geht vorwärts"]
+    assert set(foreign.shortfalls) <= set(foreign.remarks)

@@ -158,7 +158,10 @@ def generate_worded(
     settled = replace(chosen, seed=chosen.seeds(1)[0], first=0)
     made = draw(prior, asked, foot_lock=foot_lock, best_of=best_of, sampling=settled, progress=progress)
     unknown = remarks_on([segment.text for one in asked for segment in one.segments], prior.known, prior.text)
-    return [replace(one, unknown=unknown) for one in made]
+    return [
+        replace(one, unknown={part.text: unknown[part.text] for part in one.timeline.segments if part.text in unknown})
+        for one in made
+    ]
 
 
 def draw(
