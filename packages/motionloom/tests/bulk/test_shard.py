@@ -186,7 +186,7 @@ def test_whatever_goes_wrong_with_a_row_is_its_error_once(
             "parse": (row_module, "_columns", lambda raw: raw),
             "ask": (row_module.Sources, "_ask", lambda self, row: row.seed),
             "passes": (Made, "passes", lambda self, _: "99" if len(self.motion) == 19 else ""),
-            "add": (writers_module.Files, "add", lambda self, people, about: about["seed"]),
+            "add": (writers_module.Files, "add", lambda self, people, about, angles: about["seed"]),
             "groups": (maker_module, "groups", lambda prior, frames, most: "99" if 19 in frames else ""),
         }[at]
     )

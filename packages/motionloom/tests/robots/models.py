@@ -88,8 +88,8 @@ NAMELESS = (*(f"m{i}_{{s}}x" for i in range(6)), "m6", *(f"m{i}_{{s}}x" for i in
 
 
 def humanoid(names: Sequence[str] = UNITREE, *, size: float = 1.0, free: str = "<freejoint/>", extra: str = "") -> str:
-    """A robot 1.1 m tall times ``size``, that stands with straight legs, its arms hanging, its elbows straight; without
-    the hinges whose names are empty."""
+    """A robot 1.1 m tall, times ``size``, that stands with straight legs, its arms hanging, its elbows straight;
+    without the hinges whose names are empty."""
 
     def joint(number: int, side: str, axis: str, span: str) -> str:
         if not names[number]:

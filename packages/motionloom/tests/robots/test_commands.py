@@ -27,7 +27,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (place / "tin.xml").write_text(models.humanoid())
     save_prior(people.prior(), place / "tiny.safetensors")
     robot = read_robot(place / "tin.xml")
-    save_clip(put_on_robot(marching(1.5), robot), robot, place / "march.npz")
+    march = put_on_robot(marching(1.5), robot)
+    save_clip(march, robot, place / "march.npz")
+    save_clip(march, robot, place / "march.csv")
     (place / "path.json").write_text(json.dumps({"path": {"points": [[0, 0], [0, 1.2], [0.4, 1.6]]}}))
     return place
 
@@ -68,7 +70,7 @@ def test_an_edit_keeps_what_it_is_to_keep(robot: Robot) -> None:
     ("line", "seconds"),
     [
         (["predict", "march.npz", "--count", "1", "--seconds", "0.5", "--out", "next.csv"], 2.0),
-        (["switch", "march.npz", "march.npz", "--seconds", "0.5", "--out", "next.csv"], 3.5),
+        (["switch", "march.npz", "march.csv", "--seconds", "0.5", "--out", "next.csv"], 3.5),
     ],
     ids=["predict", "switch"],
 )
@@ -81,3 +83,17 @@ def test_what_comes_after_a_robots_clip_is_a_clip(line: list[str], seconds: floa
     assert figures.limits_broken == 0
     assert figures.largest_step <= 0.3 + 1e-6
     assert np.median(np.abs(after.qpos[5:50, 7:] - before.qpos[5:50, 7:])) < 0.05
+
+
+def test_joint_angles_go_with_a_robot(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
+    """Commands that read or write them without one say so before anything is drawn."""
+    for line in (
+        ["predict", "march.npz", "--out", "next.bvh"],
+        ["predict", "march.bvh", "--out", "folder", "--format", "csv"],
+        ["control", "a person walks", "--follow", "left_wrist", "--from", "march.csv"],
+        ["control", "a person walks", "--goal", "path.json", "--max-speed", "3"],
+    ):
+        assert main(line) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert "robot" in said

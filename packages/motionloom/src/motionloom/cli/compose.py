@@ -151,10 +151,10 @@ def _write(pieces: Iterable["Motion"], streams: Sequence["Stream"], fps: float |
 
 
 def _pieces(arguments: argparse.Namespace, prior: "Prior", timeline: "Timeline") -> Generator["Motion", None, None]:
-    from motionloom.io import load
+    from motionloom.cli.reading import load_motion
     from motionloom.tasks import long
 
-    start = None if timeline.start is None else load(timeline.start)
+    start = None if timeline.start is None else load_motion(arguments, timeline.start)
     named = {"guidance": timeline.guidance, "seed": timeline.seed}
     settings: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
     with bar("composing") as move:

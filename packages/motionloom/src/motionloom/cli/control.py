@@ -136,10 +136,10 @@ def _goal(arguments: argparse.Namespace, metre: float) -> "Goal":
     that is as large as is walked in the time and a clip that is followed are the person's anyway."""
     from dataclasses import replace
 
+    from motionloom.cli.reading import load_motion
     from motionloom.goals.goal import FPS, merged
     from motionloom.goals.goal_file import follow, read_goal
     from motionloom.goals.reach import check_reach
-    from motionloom.io import load
     from motionloom.tasks.text import frames_in
 
     if bool(arguments.follow) != (arguments.clip is not None):
@@ -148,7 +148,7 @@ def _goal(arguments: argparse.Namespace, metre: float) -> "Goal":
         fail("--width is that of the drawing of --path; give both or none")
     if not (arguments.goal or arguments.follow or arguments.path):
         fail("nothing to keep to; give --goal FILE, --path SVG, or --follow JOINT --from CLIP")
-    clip = None if arguments.clip is None else load(arguments.clip)
+    clip = None if arguments.clip is None else load_motion(arguments, arguments.clip)
     usual = 5.0 if clip is None else (len(clip) - 1) / clip.fps + 1 / FPS
     frames = frames_in(usual if arguments.seconds is None else arguments.seconds, FPS)
     goals = [read_goal(file, frames=frames, folder=file.parent).scaled(1 / metre) for file in arguments.goal]

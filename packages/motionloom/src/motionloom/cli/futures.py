@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from motionloom.io.stream import Stream
     from motionloom.motion import Motion
 
-FORMATS = ("bvh", "glb", "vrma", "usda", "fbx", "npz", "mp4", "gif", "png")
+FORMATS = ("bvh", "glb", "vrma", "usda", "fbx", "npz", "csv", "mp4", "gif", "png")
 OVERLAYS = (".png", ".mp4", ".gif")
 SHOWN = 50
 """Futures that pictures show, the first ones."""

@@ -94,14 +94,14 @@ def _live(arguments: argparse.Namespace) -> int:
 
 
 def _made(arguments: argparse.Namespace, script: "Script", prior: "Prior", seed: int) -> "Stage":
-    from motionloom.io import load
+    from motionloom.cli.reading import load_motion
     from motionloom.live.live import Live
     from motionloom.live.pair import LivePair
     from motionloom.live.settings import Settings
     from motionloom.weights.pair import PairBlock
 
     settings = Settings(steps=arguments.steps, guidance=arguments.guidance)
-    starts = [load(path) for path in arguments.start or ()]
+    starts = [load_motion(arguments, path) for path in arguments.start or ()]
     shared: dict[str, Any] = {"seed": seed, "fps": arguments.fps or 20.0, "settings": settings}
     if script.people == 1:
         return Live(prior, start=starts[0] if starts else None, **shared)

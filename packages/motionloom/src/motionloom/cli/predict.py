@@ -11,7 +11,7 @@ from motionloom.cli.futures import FORMATS, Long, Writing, targets, write_future
 from motionloom.cli.futures import Target as Files
 from motionloom.cli.looping import all_looped, check_loop_behind
 from motionloom.cli.options import add_options
-from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, note_rate, read_clip
+from motionloom.cli.reading import add_reading, as_seconds, check_size, crop, load_motion, note_rate, read_clip
 from motionloom.cli.sampling import add_sampling, bar, fail, sampling_of
 from motionloom.cli.skeletons import Target, read_target
 from motionloom.cli.writing import at_rate, check_overwriting, check_rate, check_unit
@@ -125,6 +125,8 @@ def run_predict(arguments: argparse.Namespace) -> int:
     if skin is not None:
         skin.names(["future"])
     own = skin and skin.suffix
+    if arguments.robot is None and "csv" in (arguments.format or ()):
+        fail("--format csv is for a robot's joint angles; name its model with --robot")
     formats = arguments.format or [own[1:] if own else "bvh"]
     wanted = targets(outs, arguments.count, formats, pictures=not arguments.no_picture, own=own)
     check_unit(arguments, [file for one in wanted for file in one.files])
@@ -319,11 +321,10 @@ def _like_past(arguments: argparse.Namespace, path: Path, past: "Motion") -> "Mo
 
     import numpy as np
 
-    from motionloom import io
     from motionloom.retarget import retarget
 
     alike = path.suffix.lower() == arguments.past.suffix.lower()
-    motion = read_clip(arguments, path)[0] if alike else io.load(path)
+    motion = read_clip(arguments, path)[0] if alike else load_motion(arguments, path)
     difference = _difference(motion, past)
     if not difference:
         motion = replace(motion, skeleton=past.skeleton)

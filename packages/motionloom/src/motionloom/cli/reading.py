@@ -135,6 +135,14 @@ def read_clip(arguments: argparse.Namespace, path: Path) -> "tuple[Motion, float
     return _upright(motion, path, arguments), unit, orders
 
 
+def load_motion(arguments: argparse.Namespace, path: Path) -> "Motion":
+    """A motion whose file needs no options; a robot's joint angles with the robot of the line."""
+    from motionloom import io
+    from motionloom.cli.robots import read_motion, reads_as_clip
+
+    return read_motion(arguments, path) if reads_as_clip(arguments, path) else io.load(path)
+
+
 def _upright(motion: "Motion", path: Path, arguments: argparse.Namespace) -> "Motion":
     """The motion with +Y up, as the line says or as people stand; a remark where the file was turned."""
     from motionloom.errors import MotionloomError

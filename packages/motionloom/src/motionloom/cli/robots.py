@@ -170,8 +170,9 @@ def read_motion(arguments: argparse.Namespace, path: Path) -> "Motion":
     from motionloom.robots.files import load_clip
 
     robot = opened(arguments)
-    clip = load_clip(path, robot, fps=arguments.source_fps)
-    if path.suffix.lower() == ".csv" and arguments.source_fps is None:
+    rate = getattr(arguments, "source_fps", None)
+    clip = load_clip(path, robot, fps=rate)
+    if path.suffix.lower() == ".csv" and rate is None:
         print(
             f"note: {path} states no rate; {clip.fps:g} frames per second are assumed (--source-fps)", file=sys.stderr
         )
