@@ -85,9 +85,11 @@ def test_a_page_holds_the_places_of_everybody(tmp_path: Path) -> None:
     assert [(one["name"], one["fps"]) for one in given["takes"]] == [("a walk", 20.0), ("a turn", 30.0)]
     for number, motion in enumerate((walk, turn)):
         assert np.abs(places(given, number, 0) - motion.positions()).max() < 0.0003
-    together = io.save_scene([walk, turn.at(np.arange(40), 20.0)], tmp_path / "scene.html", captions=["both"] * 2)
-    [take] = Reader(together.read_text()).given["takes"]
-    assert (take["name"], len(take["people"])) == ("both", 2)
+    together = Reader(io.save_scene([walk, turn], tmp_path / "scene.html", captions=["both"] * 2).read_text()).given
+    [take] = together["takes"]
+    assert (take["name"], [one["frames"] for one in take["people"]]) == ("both", [40, 40])
+    assert np.abs(places(together, 0, 1)[2] - turn.positions()[3]).max() < 0.0003, "a tenth of a second in"
+    assert np.abs(places(together, 0, 1)[30:] - turn.positions()[-1]).max() < 0.0003, "who ended before stays"
 
 
 @pytest.mark.usefixtures("viewer")

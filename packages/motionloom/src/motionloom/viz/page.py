@@ -89,6 +89,7 @@ def page(takes: Sequence[Take], *, character: Character | None = None, most: int
     Raises `MotionloomError` where the viewer is not built, there is nothing to play or nobody in it, for more than
     `MAX_PEOPLE` in a take, and for a character in another kind of file.
     """
+    takes = [Take(caption(take.name), _in_step(take.people)) for take in takes]
     people = [motion for take in takes for motion in take.people]
     if not people or not all(1 <= len(take.people) <= MAX_PEOPLE for take in takes):
         counts = ", ".join(str(len(take.people)) for take in takes) or "none"
@@ -96,7 +97,7 @@ def page(takes: Sequence[Take], *, character: Character | None = None, most: int
     template = find_viewer().read_text(encoding="utf-8")
     body = None if character is None else _animated(character, people)
     places = [_places(motion) if character is None else joints22(motion) for motion in people]
-    room = most - len(template.encode()) - sum(6 * len(caption(take.name)) for take in takes) * 2
+    room = most - len(template.encode()) - sum(12 * len(take.name) for take in takes)
     step, data = 1, _packed(places, 1)
     while sum(map(len, data)) > room and step < max(map(len, places)):
         step = max(step + 1, math.ceil(step * sum(map(len, data)) / max(room, 1)))
@@ -110,7 +111,7 @@ def page(takes: Sequence[Take], *, character: Character | None = None, most: int
     given = iter(zip((len(one[::step]) for one in places), data))
     listed = [
         {
-            "name": caption(take.name),
+            "name": take.name,
             "fps": take.people[0].fps / step,
             "people": [{"frames": frames, "data": text} for frames, text in islice(given, len(take.people))],
         }
@@ -136,6 +137,15 @@ def framed(motion: Motion, *, height: int = 420) -> str:
         f'<iframe srcdoc="{html.escape(text)}" sandbox="allow-scripts" title="motion" '
         f'style="width: 100%; height: {height}px; border: 0" allowfullscreen></iframe>'
     )
+
+
+def _in_step(people: Sequence[Motion]) -> list[Motion]:
+    """Everybody at the rate of the first, until the last one ends; who ends before stays as they are."""
+    if len({(len(motion), motion.fps) for motion in people}) < 2:
+        return list(people)
+    fps = people[0].fps
+    frames = max(round(motion.seconds * fps) for motion in people)
+    return [motion.at(np.arange(frames) * (motion.fps / fps), fps) for motion in people]
 
 
 def _places(motion: Motion) -> np.ndarray:
