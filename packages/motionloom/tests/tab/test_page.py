@@ -1,6 +1,5 @@
 """The page that needs no server, in a browser."""
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from tests.tab import made
 from tests.tab.tab import Tab
 
 pytestmark = pytest.mark.slow
-CORES = os.cpu_count() or 1
 
 
 def test_a_link_is_drawn_on_one_thread_and_again_without_a_network(tab: Tab, prior: Prior, tmp_path: Path):
@@ -40,7 +38,7 @@ def test_a_link_is_drawn_on_one_thread_and_again_without_a_network(tab: Tab, pri
     tab.page.context.set_offline(True)
     tab.page.reload()
     tab.drawn()
-    assert tab.threads == min(CORES, 4)
+    assert tab.threads == tab.page.evaluate("Math.min(navigator.hardwareConcurrency, 4)")
     again = load(tab.save("bvh", tmp_path))
     assert np.abs(again.positions() - first.positions()).max() < 1e-3
     assert tab.alert() == ""
