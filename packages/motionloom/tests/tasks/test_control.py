@@ -153,7 +153,7 @@ def test_the_shipped_prior_walks_a_bent_path_to_a_centimetre() -> None:
     ("words", "least", "most"), [("a person stands", -0.02, 0.14), ("a person jumps up", 0.3, 0.7)]
 )
 def test_a_hand_that_is_asked_too_high_lifts_nobody_but_who_jumps(words: str, least: float, most: float) -> None:
-    """2.9 m is beyond both: the feet stay on the floor, on tiptoe (12 cm), or leave it as far as people jump, and it is said."""
+    """2.9 m is beyond both: the feet stay on the floor, if on tiptoe, or leave it as people jump, and it is said."""
     goal, wrist = Goal.nothing(60), SMPL22.index("right_wrist")
     goal.positions[30, wrist], goal.asked[30, wrist] = [-0.2, 2.9, 0.3], True
     (made,) = control(Prior.load(), words, goal, seed=1, steps=12)
