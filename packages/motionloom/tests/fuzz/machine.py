@@ -7,6 +7,7 @@ hide. What a reader answers with anything but a value or one sentence is a failu
 """
 
 import contextlib
+import gc
 import io
 import multiprocessing
 import multiprocessing.connection
@@ -39,7 +40,7 @@ LONGEST = 900
 """Characters of a message."""
 EACH = 4000
 """Files that one process tries."""
-WAIT = 600
+WAIT = 120
 """Seconds after which a process that says nothing is taken to wait for something that never comes."""
 HIDDEN = ("MemoryError", "Unable to allocate", "RecursionError", "can't allocate", "not enough memory")
 """What a message says that was made of such an error."""
@@ -84,10 +85,13 @@ def fuzz(
             reader.make(folder)
             reader.read(folder)
         prepare()
+        gc.collect()
+        gc.freeze()  # a session of ONNX Runtime that the child collects waits for threads that a fork leaves behind
         end = time.monotonic() + seconds
         job = _Job(Path(place), turns, end, seed, keep)
         while number < first + files and time.monotonic() < end:
             number = _one_process(job, result, number, min(first + files, number + EACH))
+    gc.unfreeze()
     return result
 
 
