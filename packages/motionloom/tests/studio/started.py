@@ -128,11 +128,17 @@ def server(folder: Path) -> Iterator[Server]:
 
 @contextmanager
 def browser() -> Iterator:
-    """A browser without a window."""
+    """A browser without a window; the one that this process has open already, since Playwright opens no second."""
     from playwright.sync_api import sync_playwright
 
+    if _OPEN:
+        yield _OPEN[0]
+        return
     flags = os.environ.get("CHROMIUM_FLAGS", "").split() or list(FLAGS)
     with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=chromium(), args=flags)
-        yield opened
-        opened.close()
+        _OPEN.append(playwright.chromium.launch(executable_path=chromium(), args=flags))
+        yield _OPEN[0]
+        _OPEN.pop().close()
+
+
+_OPEN: list[Any] = []
