@@ -1,6 +1,8 @@
 /** The page that needs no server: words to motion in the browser. */
 
+import "../style/colors.css";
 import "../style/base.css";
+import "../style/buttons.css";
 import "../style/panels.css";
 import "./tab.css";
 import { h, morph } from "../app/dom";
@@ -137,8 +139,11 @@ class Page {
           { class: "line" },
           number("Seed", seed, 0, LARGEST, 1, (value) => this.change({ seed: Math.round(value) })),
           textButton("other", () => this.another(), { title: "Draw with the next seed" }),
-          h("span", { class: "grow" }),
-          h("span", { class: "quiet" }, "Takes"),
+        ),
+        h(
+          "div",
+          { class: "line" },
+          h("span", { class: "quiet grow" }, "Takes"),
           ...[1, 4].map((count) =>
             textButton(count > 1 ? "four" : "one", () => this.change({ takes: count }), { pressed: takes === count }),
           ),
