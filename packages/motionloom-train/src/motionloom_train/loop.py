@@ -67,16 +67,16 @@ class Average:
     def __init__(self, net: nn.Module, decay: float) -> None:
         self.decay = decay
         self.weights = {k: v.detach().clone() for k, v in net.state_dict().items()}
+        self.smoothed = [key for key, value in self.weights.items() if value.is_floating_point()]
 
     @torch.no_grad()
     def update(self, net: nn.Module, step: int) -> None:
         """Take in the weights after ``step``."""
         decay = min(self.decay, (step + 1) / (step + 10))
-        for key, value in net.state_dict().items():
-            if value.is_floating_point():
-                self.weights[key].lerp_(value, 1 - decay)
-            else:
-                self.weights[key].copy_(value)
+        now = net.state_dict()
+        torch._foreach_lerp_([self.weights[k] for k in self.smoothed], [now[k] for k in self.smoothed], 1 - decay)
+        for key in now.keys() - set(self.smoothed):
+            self.weights[key].copy_(now[key])
 
 
 def make_optimizer(net: nn.Module, recipe: Recipe) -> torch.optim.AdamW:
@@ -86,7 +86,7 @@ def make_optimizer(net: nn.Module, recipe: Recipe) -> torch.optim.AdamW:
         {"params": [p for p in trained if p.ndim >= 2], "weight_decay": recipe.decay},
         {"params": [p for p in trained if p.ndim < 2], "weight_decay": 0.0},
     ]
-    return torch.optim.AdamW(groups, lr=recipe.rate, betas=(0.9, 0.99))
+    return torch.optim.AdamW(groups, lr=recipe.rate, betas=(0.9, 0.99), fused=trained[0].is_cuda or None)
 
 
 def save_state(
@@ -228,20 +228,43 @@ def train(
     if done >= last and world.rank == 0 and on_save:  # stopped between the last state and its weights
         on_save(net, average, done)
     pace = Pace(done, last, say)
+    losses: list[Tensor] = []
+    began = time.perf_counter()
     for step in range(done, last):
-        began = time.perf_counter()
-        loss = _step(objective, called, optimizer, recipe, step=step, world=world)
+        losses.append(_step(objective, called, optimizer, recipe, step=step, world=world))
         average.update(net, step)
+        saves = (step + 1) % recipe.save_every == 0 or step + 1 == last
+        if len(losses) < (BEHIND if world.device.startswith("cuda") else 1) and not saves:
+            continue
+        values = _finite(losses, step)
+        seconds, began = (time.perf_counter() - began) / len(values), time.perf_counter()
+        losses.clear()
         if world.rank == 0:
-            seconds = time.perf_counter() - began
-            pace(seconds)
-            if on_step:
-                on_step(step, loss, seconds)
-            if (step + 1) % recipe.save_every == 0 or step + 1 == last:
+            for number, value in enumerate(values, step + 1 - len(values)):
+                pace(seconds)
+                if on_step:
+                    on_step(number, value, seconds)
+            if saves:
                 save_state(folder, net, average, optimizer, step=step + 1, recipe=recipe)
                 if on_save:
                     on_save(net, average, step + 1)
+                began = time.perf_counter()
     return average
+
+
+BEHIND = 16
+"""Steps after which losses are read from a GPU, which computes meanwhile; on a CPU they are read at once."""
+
+
+def _finite(losses: list[Tensor], step: int) -> list[float]:
+    """The losses up to ``step``; raises MotionloomError, before anything of them is saved, if one is not finite."""
+    values: list[float] = torch.stack(losses).tolist()
+    for number, value in enumerate(values, step + 1 - len(values)):
+        if not math.isfinite(value):
+            raise MotionloomError(
+                f"the loss of step {number} is not finite; lower the rate and go on from the saved state"
+            )
+    return values
 
 
 def _precision(recipe: Recipe, folder: Path, net: nn.Module, world: World, *, say: Callable[[str], None]) -> str:
@@ -295,7 +318,7 @@ def _span(seconds: float) -> str:
 
 def _step(
     objective: Objective, net: nn.Module, optimizer: torch.optim.Optimizer, recipe: Recipe, *, step: int, world: World
-) -> float:
+) -> Tensor:
     for group in optimizer.param_groups:
         group["lr"] = rate_at(recipe, step)
     seed = recipe.seed * 1_000_003 + world.rank
@@ -307,14 +330,11 @@ def _step(
         sdpa_kernel(SDPBackend.MATH) if kind == "cpu" else nullcontext(),
     ):
         loss = objective.loss(net, seed, step, recipe.batch)
-    value = float(loss.detach())
-    if not math.isfinite(value):
-        raise MotionloomError(f"the loss of step {step} is not finite; lower the rate and go on from the saved state")
     optimizer.zero_grad(set_to_none=True)
     loss.backward()
     nn.utils.clip_grad_norm_(net.parameters(), recipe.clip)
     optimizer.step()
-    return value
+    return loss.detach()
 
 
 class Log:

@@ -1,7 +1,7 @@
 """What a step of training minimises. An objective owns the modules and turns a batch into one number."""
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import torch
@@ -43,12 +43,18 @@ class Objective(Protocol):
 
 
 class WordBank:
-    """Token states of all sentences of a set, encoded once, float16."""
+    """Token states of all sentences of a set, encoded once, float16, on the device that computes."""
 
     def __init__(
-        self, encoder: TextEncoder, texts: tuple[str, ...], *, room: int = 40, progress: Callable[[str], None] = print
+        self,
+        encoder: TextEncoder,
+        texts: tuple[str, ...],
+        *,
+        room: int = 40,
+        device: str = "cpu",
+        progress: Callable[[str], None] = print,
     ) -> None:
-        self.starts = [0]
+        starts = [0]
         tokens, pooled = [], []
         progress(f"encoding {len(texts)} sentences")
         for first in range(0, len(texts), 256):
@@ -57,19 +63,21 @@ class WordBank:
             for row, mask in zip(said.tokens, said.mask, strict=True):
                 count = min(int(mask.sum()), room)
                 tokens.append(row[:count].astype(np.float16))
-                self.starts.append(self.starts[-1] + count)
-        self.tokens, self.pooled = tensor(np.concatenate(tokens)), tensor(np.concatenate(pooled))
+                starts.append(starts[-1] + count)
+        self.starts = torch.tensor(starts)
+        self.tokens, self.pooled = tensor(np.concatenate(tokens), device), tensor(np.concatenate(pooled), device)
 
     def condition(self, texts: Tensor, lengths: Tensor) -> Condition:
-        """The condition of a batch."""
-        spans = [(self.starts[i], self.starts[i + 1]) for i in texts.tolist()]
-        count = max(b - a for a, b in spans)
-        tokens = self.tokens.new_zeros(len(spans), count, self.tokens.shape[1])
-        words = torch.zeros(len(spans), count, dtype=torch.bool)
-        for row, (a, b) in enumerate(spans):
-            tokens[row, : b - a] = self.tokens[a:b]
-            words[row, : b - a] = True
-        return condition(self.pooled[texts], tokens=tokens.float(), words=words, lengths=lengths)
+        """The condition of a batch: numbers of sentences (rows,) and valid frames (rows,), both on the CPU."""
+        device = self.tokens.device
+        first, counts = self.starts[texts], self.starts[texts + 1] - self.starts[texts]
+        # a GPU computes in few shapes: its kernels and graphs are made for each
+        most = int(counts.max()) if device.type == "cpu" else int((self.starts[1:] - self.starts[:-1]).max())
+        place = torch.arange(most)
+        words = (place < counts[:, None]).to(device)
+        taken = (first[:, None] + place).clamp(max=len(self.tokens) - 1).to(device)
+        tokens = self.tokens[taken].float() * words[..., None]
+        return condition(self.pooled[texts.to(device)], tokens=tokens, words=words, lengths=lengths)
 
 
 class Drawn(NamedTuple):
@@ -110,31 +118,38 @@ class CleanError:
         self.drop_text, self.displacement, self.early_share, self.device = drop_text, displacement, early, device
         self.mean, self.std = batches.data.mean.to(device), batches.data.std.to(device)
         self.scale = feature_scale(weights, heights).to(device)
+        self.cost: Callable[[Tensor, Drawn], Tensor] = self.error
+
+    def compile(self) -> None:
+        """Compute `error` by compiled code."""
+        self.cost = torch.compile(self.error, dynamic=True)
 
     def loss(self, net: nn.Module, seed: int, step: int, rows: int) -> Tensor:
         """See `Objective.loss`."""
         drawn = self.drawn(seed, step, rows)
         state = noised(self.schedule, drawn.clean, drawn.level, drawn.noise)
-        return self.error(net(state, drawn.level, drawn.cond), drawn)
+        return self.cost(net(state, drawn.level, drawn.cond), drawn)
 
     def drawn(self, seed: int, step: int, rows: int) -> Drawn:
         """What a step looks at, from ``(seed, step)`` alone, on the objective's device."""
         batch: Batch = self.batches.draw(seed, step, rows)
-        generator = torch.Generator().manual_seed(int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0]))
+        number = int(np.random.SeedSequence((seed, step, 1)).generate_state(1)[0])
+        generator = torch.Generator(self.device).manual_seed(number)
         level = self.drawn_levels(rows, generator)
-        noise = torch.randn(batch.features.shape, generator=generator)
-        keep = torch.rand(rows, generator=generator) >= self.drop_text
-        cond = self.words.condition(batch.texts, batch.lengths).choose(keep)
-        cond = Condition(*(part.to(self.device) for part in cond))
-        return Drawn(batch.features.to(self.device), level.to(self.device), noise.to(self.device), cond)
+        noise = torch.randn(batch.features.shape, generator=generator, device=self.device)
+        keep = torch.rand(rows, generator=generator, device=self.device) >= self.drop_text
+        cond = self.words.condition(batch.texts, batch.lengths)
+        cond = Condition(*(part.to(self.device) for part in cond)).choose(keep)
+        return Drawn(batch.features.to(self.device), level, noise, cond)
 
     def drawn_levels(self, rows: int, generator: torch.Generator) -> Tensor:
         """(rows,) levels: a share ``early`` as the sampler's spacing of that name goes, the rest evenly."""
-        level = torch.randint(1, self.schedule.steps + 1, (rows,), generator=generator)
+        how: dict[str, Any] = {"generator": generator, "device": generator.device}
+        level = torch.randint(1, self.schedule.steps + 1, (rows,), **how)
         if not self.early_share:
             return level
-        often = (self.schedule.steps * (1 - torch.rand(rows, generator=generator) ** 2)).ceil().clamp(min=1).long()
-        return torch.where(torch.rand(rows, generator=generator) < self.early_share, often, level)
+        often = (self.schedule.steps * (1 - torch.rand(rows, **how) ** 2)).ceil().clamp(min=1).long()
+        return torch.where(torch.rand(rows, **how) < self.early_share, often, level)
 
     def error(self, denoised: Tensor, drawn: Drawn) -> Tensor:
         """What an estimate of the clean data costs."""

@@ -56,8 +56,9 @@ def train_prior(
         net.load_state_dict(prior_module(start).state_dict())
         motions = restandardised(motions, tensor(start.mean), tensor(start.std))
     schedule = SCHEDULES[recipe.schedule](recipe.levels)
+    motions = replace(motions, features=motions.features.to(world.device))
     batches = Batches(motions, windows=recipe.windows, shares=recipe.shares, favour=recipe.favour or FAVOUR)
-    words = WordBank(text, motions.texts, progress=say if world.rank == 0 else lambda line: None)
+    words = WordBank(text, motions.texts, device=world.device, progress=say if world.rank == 0 else lambda line: None)
     objective = CleanError(
         net,
         schedule,
@@ -86,7 +87,11 @@ def train_prior(
     def wrap(module: nn.Module) -> nn.Module:
         assert isinstance(module, PriorNet)
         called: nn.Module = Conditioned(module)
-        return torch.compile(called, dynamic=True) if recipe.compile else called  # type: ignore[return-value]
+        if not recipe.compile:
+            return called
+        objective.compile()
+        # on a GPU every window has a shape of its own; on a CPU sentences have many lengths
+        return torch.compile(called, dynamic=not world.device.startswith("cuda"))  # type: ignore[return-value]
 
     log = Log(folder, recipe, say=say) if world.rank == 0 else None
     train(objective, recipe, folder, world=world, wrap=wrap, on_save=export, on_step=log, stop=stop, say=say)

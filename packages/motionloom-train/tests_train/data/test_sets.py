@@ -8,7 +8,7 @@ import torch
 
 from motionloom.features import humanml as hml
 from motionloom_train.data.clips import Clip, Note, write_clip
-from motionloom_train.data.sets import Batches, _start, _starts, load_set
+from motionloom_train.data.sets import Batches, Item, _starts, load_set
 from tests.kinematics import people
 
 
@@ -27,22 +27,20 @@ def kicking(folder: Path) -> Path:
     return folder
 
 
-def starts(batches: Batches, kind: str) -> set[int]:
-    """Where the items of a kind begin that a window of 48 frames is taken from."""
-    data = batches.data
-    return {data.items[i].start for group, _ in batches._pools[48][kind].values() for i in group}
+def shown(batches: Batches, window: int) -> list[Item]:
+    """The items that windows of so many frames are taken from."""
+    return [batches.data.items[number] for number in batches._pools[window].numbers]
 
 
 def test_a_caption_that_names_an_event_is_shown_with_the_event(tmp_path: Path) -> None:
     batches = Batches(load_set(kicking(tmp_path / "set")), windows=(48,), shares=(1.0,))
-    assert starts(batches, "human") == {100}
+    assert {item.start for item in shown(batches, 48) if item.group == "human"} == {100}
 
 
 def test_events_are_shown_whole_and_states_in_part(tmp_path: Path) -> None:
     batches = Batches(load_set(jumping(tmp_path / "set")), windows=(32, 48), shares=(0.5, 0.5))
-    small = {batches.data.items[i].group for group, _ in batches._pools[32]["label"].values() for i in group}
-    assert small == {"walk"}
-    assert starts(batches, "label") == {0, 20, 100}
+    assert {item.group for item in shown(batches, 32)} == {"walk"}
+    assert {item.start for item in shown(batches, 48)} == {0, 20, 100}
     lengths = batches.draw(0, 1, 64).lengths
     np.testing.assert_array_equal(np.unique(lengths), [32] if lengths.max() == 32 else [48])
 
@@ -82,7 +80,8 @@ def test_windows_of_exercises_begin_before_a_repetition(tmp_path: Path) -> None:
     upright = {0, 50, 100, 150, 199}
     assert all(min(abs(rest - u) for u in upright) <= 10 for rest in data.items[0].rests)
     assert {0, 50, 100, 150} <= set(data.items[0].rests)
-    begun = [_start(data.items[0], 48, np.random.default_rng(seed)) for seed in range(60)]
+    marked = replace(data, features=torch.arange(float(len(body)))[:, None].expand(-1, 263))
+    begun = Batches(marked, windows=(48,), shares=(1.0,)).draw(0, 0, 400).features[:, 0, 0].tolist()
     assert all(any(rest - 10 <= at <= rest - 2 for rest in data.items[0].rests) or at == 0 for at in begun)
     assert len(set(begun)) > 8
 
@@ -111,8 +110,8 @@ def test_a_change_longer_than_the_window_is_not_shown(tmp_path: Path) -> None:
     note = Note(0, 190, "action:sit down", ("a person sits down",), (10, 120))
     data = load_set(described(tmp_path / "set", note, Note(0, 190, "walk")))
     batches = Batches(data, windows=(48, 120), shares=(0.5, 0.5))
-    assert "action" not in batches._pools[48]
-    assert "action" in batches._pools[120]
+    assert {item.group for item in shown(batches, 48)} == {"walk"}
+    assert {item.group for item in shown(batches, 120)} == {"walk", "action:sit down"}
 
 
 def test_actions_are_drawn_evenly_and_captures_more_often_than_keyed_clips(tmp_path: Path) -> None:

@@ -2,8 +2,9 @@
 
 import asyncio
 import json
-from collections.abc import Awaitable, Callable, Iterator, Mapping
-from typing import Any
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
@@ -69,6 +70,15 @@ def sessions() -> Iterator[Sessions]:
     found.close()
 
 
+T = TypeVar("T")
+
+
+def run(coroutine: Coroutine[Any, Any, T]) -> T:
+    """What a coroutine returns. In a thread of its own: an open browser of other tests has this one's event loop."""
+    with ThreadPoolExecutor(1) as thread:
+        return thread.submit(asyncio.run, coroutine).result()
+
+
 def talk(sessions: Sessions, *clients: Callable[[Client], Awaitable[None]]) -> list[Client]:
     """Connections one beside the other, each led by a function of its client; the clients when all are over."""
 
@@ -85,7 +95,7 @@ def talk(sessions: Sessions, *clients: Callable[[Client], Awaitable[None]]) -> l
         await asyncio.gather(*(one(lead, client) for lead, client in zip(clients, there, strict=True)))
         return there
 
-    return asyncio.run(everybody())
+    return run(everybody())
 
 
 def test_poses_come_in_order_and_make_a_motion(sessions: Sessions) -> None:
@@ -268,8 +278,8 @@ def test_who_says_nothing_or_takes_nothing_is_sent_away(sessions: Sessions, monk
         client.say(type="hello")
         await asyncio.wait_for(live_session(client, sessions), PATIENCE)
 
-    assert asyncio.run(silent()).code == socket.NOT_ALLOWED
-    asyncio.run(stuck())
+    assert run(silent()).code == socket.NOT_ALLOWED
+    run(stuck())
     assert all(session.left is not None for session in sessions._open.values())
 
 

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -301,7 +302,7 @@ class Batch:
     """Windows of motion with their sentences."""
 
     features: Tensor
-    """(rows, frames, 263) standardised; zeros behind each row's length."""
+    """(rows, frames, 263) standardised; zeros behind each row's length; on the device of the set's features."""
     lengths: Tensor
     """(rows,) valid frames."""
     texts: Tensor
@@ -312,9 +313,8 @@ class Batches:
     """Draws batches; the draw of a step depends on the seed and the step alone, so that training resumes exactly.
 
     All rows of a batch share a window (one of ``windows`` frames, drawn by ``shares``); items shorter than the window
-    but at least 60 % of it are taken whole and padded. First the kind of text is drawn (`SHARE`), then for actions and
-    measured labels the group, evenly over groups, then the item: rare actions are seen as often as walks. What an item
-    needs to show what is said of it (`Item.core`) is always within the window.
+    but at least 60 % of it are taken whole and padded. What an item needs to show what is said of it (`Item.core`) is
+    always within the window. Batches lie on the device of the set's features; what is random is drawn on the CPU.
     """
 
     def __init__(
@@ -325,73 +325,124 @@ class Batches:
         shares: Sequence[float] = (0.2, 0.3, 0.35, 0.15),
         favour: Mapping[str, float] = FAVOUR,
     ) -> None:
-        self.favour = dict(favour)
         self.data, self.windows = data, tuple(windows)
         self.shares = np.array(shares) / np.sum(shares)
-        self._pools = {w: self._pool(w) for w in self.windows}
+        self._pools = {w: Pool.of(data.items, w, favour) for w in self.windows}
         for window, share in zip(self.windows, self.shares, strict=True):
-            if share > 0 and not self._pools[window]:
+            if share > 0 and not len(self._pools[window].numbers):
                 raise MotionloomError(
                     f"no described stretch of the set is long enough for windows of {window} frames (60 % is needed); "
                     "give the recipe shorter windows"
                 )
 
-    def _pool(self, window: int) -> dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
-        fitting: dict[str, dict[str, list[int]]] = {}
-        for number, item in enumerate(self.data.items):
-            kind = item.group if item.group in SHARE else "action" if item.group.startswith(PREFIX) else "label"
-            if item.frames >= 0.6 * window and (item.core is None or item.core[1] - item.core[0] <= 1.05 * window):
-                fitting.setdefault(kind, {}).setdefault(item.group, []).append(number)
-        return {
-            kind: {g: (np.array(numbers), self._weights(numbers)) for g, numbers in groups.items()}
-            for kind, groups in fitting.items()
-        }
-
-    def _favour(self, name: str) -> float:
-        usual = 0.4 if "+" in name else MADE_SHARE if name.startswith(PREFIX + MADE) else 1.0
-        return self.favour.get(name, usual)
-
-    def _weights(self, numbers: list[int]) -> np.ndarray:
-        """How often each item of a group is drawn, as a cumulative share."""
-        total = np.cumsum([self.data.items[number].weight for number in numbers])
-        return total / total[-1]
-
     def draw(self, seed: int, step: int, rows: int) -> Batch:
         """The batch of one step."""
         rng = np.random.default_rng((seed, step))
         window = int(rng.choice(self.windows, p=self.shares))
-        pools = self._pools[window]
-        kinds = [k for k in SHARE if k in pools]
-        share = np.array([SHARE[k] for k in kinds])
-        picked = rng.choice(len(kinds), size=rows, p=share / share.sum())
-        features = torch.zeros(rows, window, self.data.features.shape[1])
-        lengths, texts = [], []
-        for row, kind in enumerate(picked):
-            groups = pools[kinds[kind]]
-            names = list(groups)
-            weights = np.array([self._favour(name) for name in names])
-            group = rng.choice(len(names), p=weights / weights.sum())
-            numbers, shares = groups[names[group]]
-            item = self.data.items[numbers[np.searchsorted(shares, rng.random())]]
-            length = min(item.frames, window)
-            start = _start(item, length, rng)
-            shown = self.data.features[start : start + length]
-            features[row, :length] = self._from_floor(shown) if names[group] in CLIMBS else shown
-            lengths.append(length)
-            texts.append(item.texts[rng.integers(len(item.texts))])
-        return Batch(features, torch.tensor(lengths), torch.tensor(texts))
+        starts, lengths, texts, climbs = (torch.from_numpy(part) for part in self._pools[window].draw(rng, rows))
+        features, place = self.data.features, self.data.features.device
+        frames = torch.arange(window)
+        taken = (starts[:, None] + frames).clamp(max=len(features) - 1).to(place)
+        shown = features[taken]
+        if bool(climbs.any()):
+            shown = torch.where(climbs.to(place)[:, None, None], self._from_floor(shown), shown)
+        return Batch(shown * (frames < lengths[:, None]).to(place)[..., None], lengths, texts)
 
     def _from_floor(self, shown: Tensor) -> Tensor:
-        """The window (frames, 263) standardised, lowered so that its first frame touches the floor.
+        """Windows (rows, frames, 263) standardised, lowered so that their first frames touch the floor.
 
         Windows begin anywhere in a climb. Were they as high as they are in the recording, some would begin four metres
         up, and a motion of the same words would be drawn up to there.
         """
-        mean, std = self.data.mean[HEIGHTS], self.data.std[HEIGHTS]
-        lowest = (shown[0, HEIGHTS] * std + mean).min().clamp(min=0)
+        mean, std = self.data.mean[HEIGHTS].to(shown.device), self.data.std[HEIGHTS].to(shown.device)
+        lowest = (shown[:, 0, HEIGHTS] * std + mean).amin(-1, keepdim=True).clamp(min=0)
         lowered = shown.clone()
-        lowered[:, HEIGHTS] -= lowest / std
+        lowered[..., HEIGHTS] -= (lowest / std)[:, None]
         return lowered
+
+
+class Pool(NamedTuple):
+    """The items that windows of one length may show, and how often each of them is drawn."""
+
+    numbers: np.ndarray
+    """(items,) their places in `MotionSet.items`."""
+    often: np.ndarray
+    """(items,) cumulative share of the draws."""
+    lengths: np.ndarray
+    """(items,) frames that a window shows of them."""
+    spans: np.ndarray
+    """(items, 2) the frames at which a window may begin, half-open."""
+    rests: "Ragged"
+    """Frames of repetitions at which a window may begin instead, a little before."""
+    texts: "Ragged"
+    climbs: np.ndarray
+    """(items,) bool: lowered to the floor."""
+
+    @staticmethod
+    def of(items: Sequence[Item], window: int, favour: Mapping[str, float]) -> "Pool":
+        """The kind of text is drawn first (`SHARE`), then for actions and measured labels the group, evenly but for
+        ``favour``, then the item by its weight: rare actions are seen as often as walks."""
+        fitting: dict[str, dict[str, list[int]]] = {}
+        for number, item in enumerate(items):
+            kind = item.group if item.group in SHARE else "action" if item.group.startswith(PREFIX) else "label"
+            if item.frames >= 0.6 * window and (item.core is None or item.core[1] - item.core[0] <= 1.05 * window):
+                fitting.setdefault(kind, {}).setdefault(item.group, []).append(number)
+        often: dict[int, float] = {}
+        for kind, groups in fitting.items():
+            kinds = SHARE[kind] / sum(SHARE[each] for each in fitting)
+            favoured = {name: _favour(name, favour) for name in groups}
+            for name, inside in groups.items():
+                share = kinds * favoured[name] / (sum(favoured.values()) * sum(items[n].weight for n in inside))
+                often |= {n: share * items[n].weight for n in inside}
+        kept = [items[number] for number in often]
+        lengths = [min(item.frames, window) for item in kept]
+        spans = [_starts(item, length) for item, length in zip(kept, lengths)]
+        return Pool(
+            np.array(list(often), dtype=np.int64),
+            np.cumsum(list(often.values())),
+            np.array(lengths, dtype=np.int64),
+            np.array(spans, dtype=np.int64).reshape(-1, 2),
+            Ragged.of([_rests(item, length) for item, length in zip(kept, lengths)]),
+            Ragged.of([item.texts for item in kept]),
+            np.array([item.group in CLIMBS for item in kept], dtype=bool),
+        )
+
+    def draw(self, rng: np.random.Generator, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """First frames, lengths, sentences, and whether they are lowered to the floor, (rows,) each."""
+        chosen = np.minimum(
+            np.searchsorted(self.often, rng.random(rows) * self.often[-1], "right"), len(self.often) - 1
+        )
+        first, end = self.spans[chosen].T
+        starts = first + (rng.random(rows) * (end - first)).astype(np.int64)
+        before = rng.integers(2, 11, rows)
+        rest, repeats = self.rests.draw(rng, chosen)
+        starts = np.where(repeats, np.maximum(first, rest - before), starts)
+        return starts, self.lengths[chosen], self.texts.draw(rng, chosen)[0], self.climbs[chosen]
+
+
+class Ragged(NamedTuple):
+    """Rows of whole numbers of different lengths, end to end."""
+
+    values: np.ndarray
+    begins: np.ndarray
+    """(rows + 1,) where each row begins in ``values``."""
+
+    @staticmethod
+    def of(rows: Sequence[Sequence[int]]) -> "Ragged":
+        """The rows in one."""
+        values = np.array([value for row in rows for value in row] or [0], dtype=np.int64)
+        return Ragged(values, np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64))
+
+    def draw(self, rng: np.random.Generator, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """One value of each of some rows, and whether a row has any."""
+        first, count = self.begins[rows], self.begins[rows + 1] - self.begins[rows]
+        at = first + (rng.random(len(rows)) * count).astype(np.int64)
+        return self.values[np.minimum(at, len(self.values) - 1)], count > 0
+
+
+def _favour(name: str, favour: Mapping[str, float]) -> float:
+    usual = 0.4 if "+" in name else MADE_SHARE if name.startswith(PREFIX + MADE) else 1.0
+    return favour.get(name, usual)
 
 
 CLIMBS = {"climb", "climb stairs", f"{PREFIX}climb ladder", f"{PREFIX}stairs"}
@@ -402,13 +453,10 @@ BEFORE, ABOUT = 16, 2
 """Frames of a window before a change begins (people begin soon after they are told to), give or take so many."""
 
 
-def _start(item: Item, length: int, rng: np.random.Generator) -> int:
-    """Where a window of so many frames begins: a little before a repetition, or as `_starts` says."""
+def _rests(item: Item, length: int) -> list[int]:
+    """The repetitions before which a window of so many frames may begin."""
     low, high = item.start, item.start + item.frames - length
-    fitting = [rest for rest in item.rests if low <= rest - 2 <= high]
-    if fitting:
-        return max(low, fitting[rng.integers(len(fitting))] - int(rng.integers(2, 11)))
-    return int(rng.integers(*_starts(item, length)))
+    return [rest for rest in item.rests if low <= rest - 2 <= high]
 
 
 def _starts(item: Item, length: int) -> tuple[int, int]:
