@@ -21,6 +21,7 @@ import torch
 import torch.distributed as dist
 from torch import Tensor, nn
 from torch.nn.attention import SDPBackend, sdpa_kernel
+from torch.optim.swa_utils import get_ema_multi_avg_fn
 
 from motionloom.errors import MotionloomError
 from motionloom.io.tensors import save_tensors
@@ -74,7 +75,8 @@ class Average:
         """Take in the weights after ``step``."""
         decay = min(self.decay, (step + 1) / (step + 10))
         now = net.state_dict()
-        torch._foreach_lerp_([self.weights[k] for k in self.smoothed], [now[k] for k in self.smoothed], 1 - decay)
+        towards = get_ema_multi_avg_fn(decay)
+        towards([self.weights[k] for k in self.smoothed], [now[k] for k in self.smoothed], None)
         for key in now.keys() - set(self.smoothed):
             self.weights[key].copy_(now[key])
 
