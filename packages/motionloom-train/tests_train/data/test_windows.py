@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from motionloom_train.data.made import GESTURES, perform
 from motionloom_train.data.windows import label_clip, label_window
 from tests.kinematics import people
 
@@ -82,3 +83,36 @@ def test_who_goes_forward_meanwhile_takes_the_stairs(way: int, label: str) -> No
     heights = np.linspace(0, 1.2, 80)[::way]
     stairs = people.walking(0.8, 4.0)[:80] + heights[:, None, None] * [0, 1, 0]
     assert label in label_window(stairs, 20, "climb stairs")
+
+
+@pytest.mark.parametrize(
+    ("text", "label"),
+    [
+        ("climbs stairs", "climb stairs"),
+        ("climbs a ladder", "climb"),
+        ("climbs up on a playground, steps up on a stair", "climb"),
+        ("climbs onto a big box", "climb"),
+    ],
+)
+def test_what_is_climbed_is_in_the_words(text: str, label: str) -> None:
+    """Playgrounds and boxes are climbed with bent trunks and on hands; that is no way up the stairs."""
+    up = people.walking(0.8, 4.0)[:80] + np.linspace(0, 1.2, 80)[:, None, None] * [0, 1, 0]
+    found = label_window(up, FPS, text)
+    assert label in found
+    assert ("climb stairs" in found) == (label == "climb stairs")
+
+
+@pytest.mark.parametrize(("name", "label"), [("wave", True), ("wave both", False)])
+def test_who_waves_has_one_hand_down(name: str, label: bool) -> None:
+    waving = perform(people.standing(), GESTURES[name], "right", fps=FPS, begin=0.4, rng=np.random.default_rng(0))
+    assert ("wave" in label_window(waving, FPS, "waves hello")) == label
+
+
+def test_acrobats_and_dancers_are_no_kickers() -> None:
+    kick = people.standing()
+    swing = np.clip(np.sin(2 * np.pi * np.arange(len(kick)) / 12), 0, None)
+    kick[:, [8, 11]] += swing[:, None, None] * [0.0, 0.8, 1.0]
+    assert "kick" in label_window(kick, FPS, "kicks")
+    assert "kick ball" in label_window(kick, FPS, "kicks a ball")
+    assert "kick" not in label_window(kick, FPS, "does handstand kicks, breakdancing")
+    assert "kick ball" not in label_window(kick, FPS, "kicks like a ballerina")

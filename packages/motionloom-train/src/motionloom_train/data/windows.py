@@ -85,6 +85,7 @@ def _limb_measures(p: Array, velocity: Array, body: Array, fps: float) -> Measur
         "right_punch": float(thrust[:, 1].max()),
         "both_over_head": float((p[:, _WRISTS, 1].min(axis=1) - p[:, 15, 1]).max()),
         "hand_over_neck": float((p[:, _WRISTS, 1] - p[:, 12:13, 1]).max()),
+        "both_raised": float((raised.min(axis=1) > 0).mean()),
         "hands_up": longest(p[:, _WRISTS, 1].min(axis=1) > p[:, 12, 1]) / fps,
         "wave_swings": float(max(_swings(body[:, w, 0][raised[:, k] > 0], 0.07) for k, w in enumerate(_WRISTS))),
         "stir": float(np.percentile(np.linalg.norm(velocity, axis=-1).max(axis=1), 90)),
@@ -165,6 +166,8 @@ def _comparisons(text: str) -> tuple[tuple[str, Callable[[float, float], bool], 
 _KICK, _KICKED = r"kick|geri|karate|martial", "kick_height > 0.5, foot_speed > 4.4"
 _PUNCH = r"punch|strike|boxing|oiduki"
 _JUMP, _JUMPED = r"jump|hop|leap|exercise", "jump_rise > 0.2, jump_clearance > 0.16"
+_ACROBAT = r"danc|ballet|handstand|capoeira|flip"
+_STEPS, _CLIMBED = r"stair|\bup .{0,12}steps|steps up", r"playground|hang|\bbox"
 _STAIRS, _SEAT, _UPRIGHT = r"climb|stair|steps|ladder", r"\bsit|seat|chair|stool", ("squat", "crouch", "bend")
 
 ALONE = (
@@ -177,20 +180,27 @@ GESTURES = (
     Rule("punch,punch left", "left_punch > 1.4, right_punch < 0.9", (_PUNCH,), choice="punch"),
     Rule("punch,punch right", "right_punch > 1.4, left_punch < 0.9", (_PUNCH,), choice="punch"),
     Rule("punch", "punch_speed > 1.4", (_PUNCH,), choice="punch"),
-    Rule("kick ball", _KICKED, (_KICK, r"soccer|ball"), choice="kick"),
-    Rule("kick,kick left", f"{_KICKED}, left_kick > 0.5, right_kick < 0.25", (_KICK,), choice="kick"),
-    Rule("kick,kick right", f"{_KICKED}, right_kick > 0.5, left_kick < 0.25", (_KICK,), choice="kick"),
-    Rule("kick", _KICKED, (_KICK,), choice="kick"),
+    Rule("kick ball", _KICKED, (_KICK, r"soccer|\bball\b"), choice="kick"),
+    Rule("kick,kick left", f"{_KICKED}, left_kick > 0.5, right_kick < 0.25", (_KICK,), _ACROBAT, choice="kick"),
+    Rule("kick,kick right", f"{_KICKED}, right_kick > 0.5, left_kick < 0.25", (_KICK,), _ACROBAT, choice="kick"),
+    Rule("kick", _KICKED, (_KICK,), _ACROBAT, choice="kick"),
     Rule("kick ball", "kick_height > 0.3, foot_speed > 5.0", (r"soccer",), choice="kick"),
     Rule("hop", "hops >= 3, flights >= 3", (_JUMP, r"hop|one foot|one leg"), choice="jump"),
     Rule("jump repeatedly", f"{_JUMPED}, flights >= 3, off_place < 0", (_JUMP,), choice="jump"),
     Rule("jump forward", f"{_JUMPED}, advance > 0.8", (_JUMP,), choice="jump"),
     Rule("jump", _JUMPED, (_JUMP,), choice="jump"),
-    Rule("wave", "wave_swings >= 4, hand_over_neck > -0.1, travel < 2", (r"wav|traffic|bye",)),
+    Rule(
+        "wave",
+        "wave_swings >= 4, hand_over_neck > -0.1, both_raised < 0.3, travel < 2",
+        (r"wav|traffic|bye",),
+        r"danc|karate|sword|object",
+    ),
     Rule("climb", "rise > 0.35, advance < 0.5", (_STAIRS,), choice="climb"),
-    Rule("climb stairs", "rise > 0.35", (_STAIRS,), choice="climb"),
+    Rule("climb stairs", "rise > 0.35", (_STEPS,), _CLIMBED, choice="climb"),
+    Rule("climb", "rise > 0.35", (_STAIRS,), choice="climb"),
     Rule("climb down", "rise < -0.35, advance < 0.5", (_STAIRS,), choice="climb"),
-    Rule("descend", "rise < -0.35", (_STAIRS,), choice="climb"),
+    Rule("descend", "rise < -0.35", (_STEPS,), _CLIMBED, choice="climb"),
+    Rule("climb down", "rise < -0.35", (_STAIRS,), choice="climb"),
     Rule("dance", "mean_stir > 0.45", (r"danc|salsa|ballet|pirouette",)),
     Rule("balance", "one_leg > 1.5, travel < 1.0", (r"balance|one leg",)),
     # changes are seen whole: upright before sitting down, crouching and bending, upright behind standing up
