@@ -18,7 +18,7 @@ from tests.work import ends
     [
         (("a person sits down on a chair", "a standing person takes a seat"), "sit down"),
         (("someone stands up", "a person stands up from a chair"), "stand up"),
-        (("a person sits down on a chair and stands up again, several times",), "sit down and stand up"),
+        (("a person sits down on a chair and stands up again",), "sit down and stand up"),
         (("a person gets up from lying on the back",), "get up"),
         (("a person lies down on the back",), "lie down"),
         (("a person walks, turns around and walks back",), "walk turn around"),
@@ -40,6 +40,14 @@ def test_captions_name_the_action_that_people_read_in_them(captions: tuple[str, 
     found = action_of(captions)
     assert found is not None
     assert found.name == name
+
+
+@pytest.mark.parametrize(
+    "caption",
+    ["sitting down and standing up, over and over", "a person waves both arms", "he waves his hands in the air"],
+)
+def test_what_is_said_of_more_than_one_time_or_hand_is_not_said_of_one(caption: str) -> None:
+    assert action_of([caption]) is None
 
 
 WORDS = [
