@@ -43,6 +43,7 @@ from motionloom_train.data.derived import (
     made_clips,
     mixed_clips,
     posture_clips,
+    sat_and_risen,
     there_and_back,
 )
 from motionloom_train.data.idle import find_idle
@@ -393,7 +394,7 @@ def _derived(clips: Sequence[Clip], mixed: int) -> Iterator[Clip]:
         longer = [held for clip in held_clips(same, idle) for held in _with_mirror(clip)]
         yield from longer
         same += longer
-        for derive in (mixed_clips, laid_down, joined_clips, made_clips, posture_clips, there_and_back):
+        for derive in (mixed_clips, laid_down, sat_and_risen, joined_clips, made_clips, posture_clips, there_and_back):
             for clip in derive(same, round(mixed * share), seed, idle):
                 yield from (clip,) if derive is mixed_clips else _with_mirror(clip)
 

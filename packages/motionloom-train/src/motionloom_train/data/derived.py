@@ -36,6 +36,10 @@ POSTURES = (
 """Actions that end (and begin) in a posture which people keep, though many a recording is cut a moment before."""
 BRIEFLY = 20
 """Frames for which a pose is held in which nobody stays."""
+LYING = 80
+"""Frames, at least, for which somebody stays who has lain down."""
+SHOWN = 80
+"""Frames that a recording goes on for, at least, on which a gesture is made."""
 SEATED = ("sit down", "stand up", "sit down and stand up")
 
 
@@ -100,14 +104,24 @@ def _held(
     rng = np.random.default_rng(seed)
     room = max(150 - len(shown), 30)
     before = int(rng.integers(8, min(55, room))) if start else 0
-    after = max(room - before, 25) if end else 0
+    lies = kind == PREFIX + "lie down"
+    after = max(room - before, LYING if lies else 25) if end else 0
     if not posture:  # nobody stays in the middle of a movement
         before = before if augment.stands_on(shown[0], idle) else min(before, BRIEFLY)
         after = after if augment.stands_on(shown[-1], idle) else min(after, BRIEFLY)
     longer = augment.held(shown, before, after, fps=FPS, seed=seed, idle=idle)
     features = hml.encode(at_origin(hml.uniform(longer)), heading="corrected")
     whole = (max(before - 3, 0), min(before + len(shown) + 2, len(features)))
-    yield _derived(clip, features, "held", (Note(0, len(features), kind, texts, whole),))
+    notes = [Note(0, len(features), kind, texts, whole)]
+    if lies and len(features) - whole[1] >= SHORTEST and faces_up(shown[-1]):
+        notes.append(Note(whole[1], len(features), PREFIX + "lie", sentences(ACTIONS["lie"])))
+    yield _derived(clip, features, "held", tuple(notes))
+
+
+def faces_up(pose: Array) -> bool:
+    """Whether the chest of a pose (22, 3) in metres points up, as on somebody who lies on the back."""
+    front = np.cross(pose[16] - pose[17], pose[12] - pose[0])
+    return bool(front[1] > 0.6 * np.linalg.norm(front))
 
 
 def _derived(clip: Clip, features: np.ndarray, way: str, notes: tuple[Note, ...]) -> Clip:
@@ -141,6 +155,31 @@ def laid_down(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = aug
             for longer in _held(clip, shown, PREFIX + name, texts, seed=seed * 100_003 + int(number), idle=idle):
                 yield replace(longer, name=f"joined_{seed}_{name.replace(' ', '_')}{made}", way="joined")
         made += 1
+
+
+def sat_and_risen(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
+    """A seat taken and left again: sitting down, a moment on the seat, and the same film backwards.
+
+    Recordings hold several of them in a row. At most ``count``; training clips of one licence.
+    """
+    rng, made = np.random.default_rng(seed), 0
+    for number, (clip, note) in enumerate(_by_action(clips).get("sit down", [])):
+        if made >= count or clip.way != "plain":
+            continue
+        first, last = note.core or (note.first, note.last)
+        shown = hml.decode_positions(clip.features[first:last].astype(np.float64))
+        shown = lower_arms(shown) if hands_up(shown) else shown
+        if not (28 <= len(shown) <= 60 and augment.can_hold(shown, FPS, end=True, fastest=1.2)):
+            continue
+        sat = augment.held(shown, 0, int(rng.integers(12, 24)), fps=FPS, seed=seed * 100_003 + number)
+        both = augment.joined(sat, augment.reversed_in_time(shown), limit=0.3)
+        if both is None:
+            continue
+        texts = sentences(ACTIONS["sit down and stand up"])
+        kind = PREFIX + "sit down and stand up"
+        for longer in _held(clip, both, kind, texts, seed=seed * 100_003 + number, idle=idle):
+            yield replace(longer, name=f"joined_{seed}_sat{made}", way="joined")
+            made += 1
 
 
 def joined_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = augment.NO_IDLE) -> Iterator[Clip]:
@@ -207,22 +246,24 @@ def made_clips(clips: Sequence[Clip], count: int, seed: int = 0, idle: Idle = au
     """Gestures of the arms (`data.made`) on people who stand, sit or walk; training clips of one licence."""
     rng = np.random.default_rng(seed)
     bodies = _labelled(clips, ("stand", "walk", "sit"))
+    bodies["walk"] = [(clip, note) for clip, note in bodies.get("walk", []) if note.last - note.first >= SHOWN]
     leads = {"stand": "", "walk": "walks", "sit": "sits"}
     for number in range(count if bodies.get("stand") else 0):
         gesture = GESTURES[sorted(GESTURES)[number % len(GESTURES)]]
-        where = str(rng.choice([k for k in ("stand", "stand", "stand", "walk", "sit") if k in bodies]))
+        where = str(rng.choice([k for k in ("stand", "stand", "stand", "walk", "sit") if bodies.get(k)]))
         where = "stand" if gesture.times else where
         below, note = bodies[where][rng.integers(len(bodies[where]))]
-        length = min(note.last - note.first, int(rng.integers(70, 160)))
+        frames = int(rng.integers(SHOWN, 160))
+        length = min(note.last - note.first, frames)
         first = note.first + int(rng.integers(note.last - note.first - length + 1))
         side = str(rng.choice(["left", "right"]))
-        alive = idle.body(length, rng) if where == "stand" else None
+        alive = idle.body(frames, rng) if where == "stand" else None
         body = hml.decode_positions(below.features[first : first + length].astype(np.float64))
         body = at_origin(body if alive is None else alive)
         if where == "stand" and alive is None and rng.random() < 0.7:
             body = lower_arms(body)
         begin = float(rng.uniform(0.8, 1.0))
-        needed = round(FPS * (begin + 1.5 * gesture.times))
+        needed = max(round(FPS * (begin + 1.5 * gesture.times)), 0 if where == "walk" else SHOWN)
         if needed > len(body):
             body = augment.held(body, 0, needed - len(body), fps=FPS, seed=seed * 100_003 + number, idle=idle)
         positions = perform(body, gesture, side, fps=FPS, begin=begin, rng=rng)

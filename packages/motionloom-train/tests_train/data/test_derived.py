@@ -1,0 +1,69 @@
+"""Clips made from others: what their notes say is what they show."""
+
+import numpy as np
+
+from motionloom.features import humanml as hml
+from motionloom_train.data.clips import Clip, Note
+from motionloom_train.data.derived import faces_up, held_clips, made_clips, sat_and_risen
+from motionloom_train.data.idle import Idle
+from tests.kinematics import people
+
+NOBODY = Idle(())
+
+
+def clip(positions: np.ndarray, *notes: Note) -> Clip:
+    features = hml.encode(hml.canonical(positions), heading="corrected").astype(np.float32)
+    return Clip("a", "s", "free", "train", "plain", notes, features)
+
+
+def places(made: Clip) -> np.ndarray:
+    return hml.decode_positions(made.features.astype(np.float64))
+
+
+def laid(face: float) -> np.ndarray:
+    """Somebody who stands, turns about the ankles and lies after two seconds: on the back (1) or the face (-1)."""
+    p = people.standing(3.0)
+    angle = face * np.pi / 2 * np.clip(np.arange(len(p)) / 40, 0, 1)[:, None]
+    y, z = p[..., 1] + 0.1, p[..., 2].copy()
+    p[..., 1], p[..., 2] = np.cos(angle) * y + np.sin(angle) * z, np.cos(angle) * z - np.sin(angle) * y
+    return p - [0.0, p[..., 1].min(), 0.0]
+
+
+def test_who_has_lain_down_on_the_back_is_seen_to_lie() -> None:
+    said = Note(0, 59, "action:lie down", ("a person lies down",), (0, 59))
+    back = [n for made in held_clips([clip(laid(1.0), said)], NOBODY) for n in made.notes]
+    assert [n.kind for n in back if n.kind == "action:lie"] == ["action:lie"]
+    (lies,) = (n for n in back if n.kind == "action:lie")
+    assert lies.last - lies.first >= 70
+    made = next(m for m in held_clips([clip(laid(1.0), said)], NOBODY) if len(m.notes) == 2)
+    shown = places(made)[lies.first : lies.last]
+    assert shown[:, 0, 1].max() < 0.4
+    assert all(map(faces_up, shown))
+    face = [n.kind for made in held_clips([clip(laid(-1.0), said)], NOBODY) for n in made.notes]
+    assert "action:lie down" in face
+    assert "action:lie" not in face
+
+
+def test_a_seat_is_taken_and_left_within_one_window() -> None:
+    p = people.standing(2.0)
+    down = 0.35 * np.clip(np.arange(len(p)) / 34, 0, 1)[:, None]
+    above = [0, 1, 2, 3, 4, 5, 6, 9, *range(12, 22)]
+    p[:, above, 1] -= down
+    (made,) = sat_and_risen([clip(p, Note(0, 39, "action:sit down", ("a person sits down",)))], 4)
+    (note,) = made.notes
+    assert note.kind == "action:sit down and stand up"
+    height = places(made)[:, 0, 1]
+    first, last = note.core or (0, 0)
+    assert last - first <= 147
+    assert height[first:last].min() < height[0] - 0.3
+    assert abs(height[-1] - height[0]) < 0.05
+    assert list(sat_and_risen([clip(p, Note(0, 39, "action:crouch", ("a person crouches",)))], 4)) == []
+
+
+def test_gestures_go_on_for_four_seconds() -> None:
+    """Windows of standing last two and a half, in which hands hardly arrive before they leave again."""
+    stands = clip(people.standing(2.6), Note(0, 51, "stand"))
+    walks = clip(people.walking(1.2, 2.6), Note(0, 51, "walk"))
+    made = list(made_clips([stands, walks], 60, seed=1))
+    assert len(made) > 40
+    assert min(len(one.features) for one in made) >= 79
