@@ -139,6 +139,14 @@ def test_the_core_of_somebody_who_never_changes_is_everything() -> None:
     assert core(np.repeat(people.standing(0.1)[:1], 50, axis=0), 20.0) == (0, 50)
 
 
+def test_kicks_on_the_hands_are_no_kicks() -> None:
+    for name in ("cmu_85_05", "cmu_85_06", "cmu_85_07"):
+        found = action_of(["kicks"], name)
+        assert found is not None
+        assert found.name == "breakdance"
+    assert action_of(["a person does a twisting jump"], "cmu_85_01") == ACTIONS["twisting jump"]
+
+
 def test_the_name_of_a_recording_overrules_its_captions() -> None:
     captions = ("a person grabbed something and moved backwards",)
     assert action_of(captions) is None

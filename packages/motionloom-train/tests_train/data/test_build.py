@@ -12,13 +12,14 @@ import pytest
 
 from motionloom.errors import MotionloomError
 from motionloom.features import humanml as hml
+from motionloom_train.data import augment
 from motionloom_train.data import build as building
 from motionloom_train.data.actions import ACTIONS, sentences
 from motionloom_train.data.build import _mirrored_texts, _with_mirror, build, join_spans
 from motionloom_train.data.clips import Clip, Note, read_clip, write_clip
 from motionloom_train.data.derived import mixed_clips
 from motionloom_train.data.sets import Batches, load_set, read_clips
-from motionloom_train.data.sources import BANDAI_LICENCE, CMU_LICENCE, UNKNOWN_LICENCE, find_takes
+from motionloom_train.data.sources import BANDAI_LICENCE, CMU_LICENCE, UNKNOWN_LICENCE, Take, find_takes
 from tests.kinematics import people
 from tests_train.data import people as made
 
@@ -387,3 +388,12 @@ def test_the_mirror_image_of_a_sway_is_not_shown() -> None:
     plain, mirrored = _with_mirror(Clip("posture_0", "cmu", "free", "train", "made", notes, features, "made"))
     assert [note.kind for note in plain.notes] == ["action:sway", "walk"]
     assert [note.kind for note in mirrored.notes] == ["walk"]
+
+
+def test_who_stands_in_a_bent_clip_does_not_turn_around() -> None:
+    """The curve is added to every frame: who does not walk is turned like a statue."""
+    features = augment.bend(hml.encode(hml.canonical(people.standing(6.0)), heading="corrected"), 1.0 / 20)
+    take = Take("a", "cmu", "free", "train", (), lambda: features)
+    kinds = {way: {n.kind for n in building._clip(take, features, way).notes} for way in ("plain", "bent")}
+    assert "turn around" in kinds["plain"]
+    assert not any(kind.startswith("turn ") for kind in kinds["bent"])

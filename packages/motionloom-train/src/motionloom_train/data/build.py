@@ -125,6 +125,8 @@ def _clip(take: Take, features: np.ndarray, way: str, *, spans: bool = True) -> 
             notes += _action_notes(span, features[first:last], first, name=take.name)
     said = " | ".join(text for span in take.spans for text in span.texts)
     found = label_clip(hml.decode_positions(features.astype(np.float64)), FPS, said)
+    if way == "bent":  # who stands there is turned like a statue
+        found = [(a, b, label) for a, b, label in found if not label.startswith("turn ")]
     notes += [Note(a, b, label) for a, b, label in join_spans(found)]
     suffix = "" if way == "plain" else f"_{way}"
     return Clip(take.name + suffix, take.source, take.licence, take.split, way, tuple(notes), features, take.kind)
