@@ -112,6 +112,9 @@ def _held(
     longer = augment.held(shown, before, after, fps=FPS, seed=seed, idle=idle)
     features = hml.encode(at_origin(hml.uniform(longer)), heading="corrected")
     whole = (max(before - 3, 0), min(before + len(shown) + 2, len(features)))
+    low = {"lie down": shown[-1], "get up": shown[0]}.get(kind.removeprefix(PREFIX))
+    if low is not None and not faces_up(low):
+        texts = tuple(text for text in texts if "the back" not in text) or sentences(ACTIONS[kind.removeprefix(PREFIX)])
     notes = [Note(0, len(features), kind, texts, whole)]
     if lies and len(features) - whole[1] >= SHORTEST and faces_up(shown[-1]):
         notes.append(Note(whole[1], len(features), PREFIX + "lie", sentences(ACTIONS["lie"])))
