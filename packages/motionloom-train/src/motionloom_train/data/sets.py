@@ -38,6 +38,8 @@ FAVOUR: dict[str, float] = {
     **dict.fromkeys(("kick left", "kick right"), 4.0),
     **dict.fromkeys(("punch left", "punch right"), 2.0),
     **dict.fromkeys(("sit down", "stand up", "jog", "turn left", "turn right"), 1.5),
+    # recorded waves: one man who directs traffic with one arm and then the other; made ones show a wave
+    "wave": 0.3,
     # windows of many squats (made ones show one and two), and a body that lies knotted
     **dict.fromkeys(("squat once", "squat twice", "action:lie with crossed legs"), 0.02),
     **{
