@@ -10,8 +10,9 @@ import torch
 
 from motionloom.diffusion import SCHEDULES
 from motionloom.features import humanml as hml
+from motionloom_train.data.batches import Batches
 from motionloom_train.data.clips import Clip, Note, write_clip
-from motionloom_train.data.sets import Batches, load_set
+from motionloom_train.data.sets import load_set
 from motionloom_train.loop import World, train
 from motionloom_train.nets.prior import NetConfig, PriorNet
 from motionloom_train.objectives import CleanError, Conditioned, WordBank

@@ -15,7 +15,8 @@ from motionloom.skeleton import SMPL22
 from motionloom.weights.adapter import Adapter
 from motionloom.weights.prior import Prior, read_tensors, save_prior
 from motionloom_train.control import ControlledError, train_control
-from motionloom_train.data.sets import Batches, load_set
+from motionloom_train.data.batches import Batches
+from motionloom_train.data.sets import load_set
 from motionloom_train.low_rank import adapted, show
 from motionloom_train.masks import CONTROLS, NOTHING, draw_masks, some_frames
 from motionloom_train.modules import prior_module

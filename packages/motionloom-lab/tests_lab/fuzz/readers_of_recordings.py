@@ -286,7 +286,8 @@ def built(folder: Path) -> None:
 
 
 def read_built(folder: Path) -> None:
-    from motionloom_train.data.sets import Batches, load_set, summary
+    from motionloom_train.data.batches import Batches
+    from motionloom_train.data.sets import load_set, summary
 
     summary(folder / "set")
     data = load_set(folder / "set")

@@ -18,7 +18,8 @@ from motionloom.errors import MotionloomError
 from motionloom.runtime.text.protocol import TextEncoder
 from motionloom.weights.adapter import Adapter, fingerprint
 from motionloom.weights.prior import Card, Prior, save_prior
-from motionloom_train.data.sets import FAVOUR, Batches, MotionSet, load_set, read_clips
+from motionloom_train.data.batches import FAVOUR, Batches
+from motionloom_train.data.sets import MotionSet, load_set, read_clips
 from motionloom_train.loop import Average, Log, World, changed, train
 from motionloom_train.low_rank import AdapterNet, adapted, show, tensors_of
 from motionloom_train.masks import check_control, draw_masks

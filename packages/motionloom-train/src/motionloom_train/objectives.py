@@ -11,7 +11,7 @@ from motionloom.diffusion import Schedule
 from motionloom.features.humanml import displacements
 from motionloom.features.layout import FEET, LAYOUT
 from motionloom.runtime.text.protocol import TextEncoder
-from motionloom_train.data.sets import Batch, Batches
+from motionloom_train.data.batches import Batch, Batches
 from motionloom_train.low_rank import AdapterNet
 from motionloom_train.nets.prior import Condition, PriorNet, condition
 from motionloom_train.tensors import noised, tensor

@@ -19,7 +19,8 @@ from motionloom.weights.prior import (
     load_prior,
     save_prior,
 )
-from motionloom_train.data.sets import FAVOUR, Batches, MotionSet, load_set
+from motionloom_train.data.batches import FAVOUR, Batches
+from motionloom_train.data.sets import MotionSet, load_set
 from motionloom_train.known import known_table
 from motionloom_train.loop import Average, Log, World, changed, train
 from motionloom_train.modules import prior_module, prior_session

@@ -36,7 +36,7 @@ class Recipe:
     shares: list[float] = field(default_factory=lambda: [0.2, 0.3, 0.35, 0.15])
     """How often each length is drawn."""
     favour: dict[str, Any] = field(default_factory=dict)
-    """How often measured labels are drawn, 1 being usual; empty: `motionloom_train.data.sets.FAVOUR`."""
+    """How often measured labels are drawn, 1 being usual; empty: `motionloom_train.data.batches.FAVOUR`."""
     rate: float = 8e-4
     """Learning rate after the warm-up."""
     warmup: int = 300

@@ -15,10 +15,11 @@ from motionloom.features import humanml as hml
 from motionloom_train.data import augment
 from motionloom_train.data import build as building
 from motionloom_train.data.actions import ACTIONS, sentences
+from motionloom_train.data.batches import Batches
 from motionloom_train.data.build import _mirrored_texts, _with_mirror, build, join_spans
 from motionloom_train.data.clips import Clip, Note, read_clip, write_clip
 from motionloom_train.data.derived import mixed_clips
-from motionloom_train.data.sets import Batches, load_set, read_clips
+from motionloom_train.data.sets import load_set, read_clips
 from motionloom_train.data.sources import BANDAI_LICENCE, CMU_LICENCE, UNKNOWN_LICENCE, Take, find_takes
 from tests.kinematics import people
 from tests_train.data import people as made

@@ -7,8 +7,9 @@ import numpy as np
 import torch
 
 from motionloom.features import humanml as hml
+from motionloom_train.data.batches import Batches, _starts
 from motionloom_train.data.clips import Clip, Note, write_clip
-from motionloom_train.data.sets import Batches, Item, _starts, load_set
+from motionloom_train.data.sets import Item, load_set
 from tests.kinematics import people
 
 

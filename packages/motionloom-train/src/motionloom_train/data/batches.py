@@ -1,0 +1,280 @@
+"""Training batches: which windows of a set are drawn, and how often."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from motionloom.errors import MotionloomError
+from motionloom.features.layout import LAYOUT
+from motionloom_train.data.actions import PREFIX
+from motionloom_train.data.clips import MADE
+from motionloom_train.data.sets import Item, MotionSet
+
+SHARE = {"action": 0.74, "human": 0.06, "index": 0.02, "label": 0.18}
+"""How often a training sample shows a named action, a written caption, an index description, a measured label."""
+
+FAVOUR: dict[str, float] = {
+    **dict.fromkeys(("climb", "climb stairs", "descend", "kick", "walk slow", "punch"), 2.5),
+    "walk fast": 3.5,
+    **dict.fromkeys(("hop", "turn around", "turn around right"), 3.0),
+    **dict.fromkeys(("circle left", "jump"), 2.5),
+    "walk backward": 2.0,
+    **dict.fromkeys(("kick left", "kick right"), 4.0),
+    **dict.fromkeys(("punch left", "punch right"), 2.0),
+    **dict.fromkeys(("sit down", "stand up", "jog", "turn left", "turn right"), 1.5),
+    # recorded waves: one man who directs traffic with one arm and then the other; made ones show a wave
+    "wave": 0.3,
+    # windows of many squats (made ones show one and two), and a body that lies knotted
+    **dict.fromkeys(("squat once", "squat twice", "action:lie with crossed legs"), 0.02),
+    **{
+        f"action:{name}": weight
+        for weight, names in {
+            8.0: ("made punch", "made hands on hips", "made open door", "made swing arms", "lie down"),
+            7.0: ("get up", "walk turn around", "kick"),
+            5.0: (
+                "sit down",
+                "stand up",
+                "push-up",
+                "lunge",
+                "duck",
+                "sway",
+                "crouch",
+                "touch toes",
+                "punch",
+                "balance with arms out",
+                "hop",
+                "made drink",
+                "throw",
+                "high step",
+                "slow down",
+                "stop running",
+                "bow",
+                "pick up",
+                "cartwheel",
+                "run and jump",
+            ),
+            4.0: (
+                "kneel",
+                "sit down and stand up",
+                "stop walking",
+                "crawl",
+                "then",
+                "squat",
+                "made arm up twice",
+            ),
+            2.5: (
+                "climb ladder",
+                "start running",
+                "walk and pick up",
+                "made clap",
+                "made arms out",
+                "made arms up twice",
+                "raise arm",
+                "made arm up",
+                "kneel and rise",
+                "bend over",
+                "stairs",
+                "fall",
+                "leg raise",
+                "side lunge",
+                "dance",
+                "jump forward",
+                "jump up",
+                "start walking",
+                "made point",
+                "made wave",
+                "lie",
+                "one squat",
+                "two squats",
+                "three squats",
+            ),
+            0.5: ("sword", "basketball", "laugh", "wash", "arm back", "rotate arm", "soccer", "carry", "drink"),
+        }.items()
+        for name in names
+    },
+}
+"""Groups drawn more or less often than the others: what came out last, and what is asked for most. A mixture of two
+labels is drawn 0.4 times as often, a made gesture `MADE_SHARE` times."""
+MADE_SHARE = 0.6
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Windows of motion with their sentences."""
+
+    features: Tensor
+    """(rows, frames, 263) standardised; zeros behind each row's length; on the device of the set's features."""
+    lengths: Tensor
+    """(rows,) valid frames."""
+    texts: Tensor
+    """(rows,) numbers of sentences."""
+
+
+class Batches:
+    """Draws batches; the draw of a step depends on the seed and the step alone, so that training resumes exactly.
+
+    All rows of a batch share a window (one of ``windows`` frames, drawn by ``shares``); items shorter than the window
+    but at least 60 % of it are taken whole and padded. What an item needs to show what is said of it (`Item.core`) is
+    always within the window. Batches lie on the device of the set's features; what is random is drawn on the CPU.
+    """
+
+    def __init__(
+        self,
+        data: MotionSet,
+        *,
+        windows: Sequence[int] = (48, 80, 120, 196),
+        shares: Sequence[float] = (0.2, 0.3, 0.35, 0.15),
+        favour: Mapping[str, float] = FAVOUR,
+    ) -> None:
+        self.data, self.windows = data, tuple(windows)
+        self.shares = np.array(shares) / np.sum(shares)
+        self._pools = {w: Pool.of(data.items, w, favour) for w in self.windows}
+        for window, share in zip(self.windows, self.shares, strict=True):
+            if share > 0 and not len(self._pools[window].numbers):
+                raise MotionloomError(
+                    f"no described stretch of the set is long enough for windows of {window} frames (60 % is needed); "
+                    "give the recipe shorter windows"
+                )
+
+    def draw(self, seed: int, step: int, rows: int) -> Batch:
+        """The batch of one step."""
+        rng = np.random.default_rng((seed, step))
+        window = int(rng.choice(self.windows, p=self.shares))
+        starts, lengths, texts, climbs = (torch.from_numpy(part) for part in self._pools[window].draw(rng, rows))
+        features, place = self.data.features, self.data.features.device
+        frames = torch.arange(window)
+        taken = (starts[:, None] + frames).clamp(max=len(features) - 1).to(place)
+        shown = features[taken]
+        if bool(climbs.any()):
+            shown = torch.where(climbs.to(place)[:, None, None], self._from_floor(shown), shown)
+        return Batch(shown * (frames < lengths[:, None]).to(place)[..., None], lengths, texts)
+
+    def _from_floor(self, shown: Tensor) -> Tensor:
+        """Windows (rows, frames, 263) standardised, lowered so that their first frames touch the floor.
+
+        Windows begin anywhere in a climb. Were they as high as they are in the recording, some would begin four metres
+        up, and a motion of the same words would be drawn up to there.
+        """
+        mean, std = self.data.mean[HEIGHTS].to(shown.device), self.data.std[HEIGHTS].to(shown.device)
+        lowest = (shown[:, 0, HEIGHTS] * std + mean).amin(-1, keepdim=True).clamp(min=0)
+        lowered = shown.clone()
+        lowered[..., HEIGHTS] -= (lowest / std)[:, None]
+        return lowered
+
+
+class Pool(NamedTuple):
+    """The items that windows of one length may show, and how often each of them is drawn."""
+
+    numbers: np.ndarray
+    """(items,) their places in `MotionSet.items`."""
+    often: np.ndarray
+    """(items,) cumulative share of the draws."""
+    lengths: np.ndarray
+    """(items,) frames that a window shows of them."""
+    spans: np.ndarray
+    """(items, 2) the frames at which a window may begin, half-open."""
+    rests: "Ragged"
+    """Frames of repetitions at which a window may begin instead, a little before."""
+    texts: "Ragged"
+    climbs: np.ndarray
+    """(items,) bool: lowered to the floor."""
+
+    @staticmethod
+    def of(items: Sequence[Item], window: int, favour: Mapping[str, float]) -> "Pool":
+        """The kind of text is drawn first (`SHARE`), then for actions and measured labels the group, evenly but for
+        ``favour``, then the item by its weight: rare actions are seen as often as walks."""
+        fitting: dict[str, dict[str, list[int]]] = {}
+        for number, item in enumerate(items):
+            kind = item.group if item.group in SHARE else "action" if item.group.startswith(PREFIX) else "label"
+            if item.frames >= 0.6 * window and (item.core is None or item.core[1] - item.core[0] <= 1.05 * window):
+                fitting.setdefault(kind, {}).setdefault(item.group, []).append(number)
+        often: dict[int, float] = {}
+        for kind, groups in fitting.items():
+            kinds = SHARE[kind] / sum(SHARE[each] for each in fitting)
+            favoured = {name: _favour(name, favour) for name in groups}
+            for name, inside in groups.items():
+                share = kinds * favoured[name] / (sum(favoured.values()) * sum(items[n].weight for n in inside))
+                often |= {n: share * items[n].weight for n in inside}
+        kept = [items[number] for number in often]
+        lengths = [min(item.frames, window) for item in kept]
+        spans = [_starts(item, length) for item, length in zip(kept, lengths)]
+        return Pool(
+            np.array(list(often), dtype=np.int64),
+            np.cumsum(list(often.values())),
+            np.array(lengths, dtype=np.int64),
+            np.array(spans, dtype=np.int64).reshape(-1, 2),
+            Ragged.of([_rests(item, length) for item, length in zip(kept, lengths)]),
+            Ragged.of([item.texts for item in kept]),
+            np.array([item.group in CLIMBS for item in kept], dtype=bool),
+        )
+
+    def draw(self, rng: np.random.Generator, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """First frames, lengths, sentences, and whether they are lowered to the floor, (rows,) each."""
+        chosen = np.minimum(
+            np.searchsorted(self.often, rng.random(rows) * self.often[-1], "right"), len(self.often) - 1
+        )
+        first, end = self.spans[chosen].T
+        starts = first + (rng.random(rows) * (end - first)).astype(np.int64)
+        before = rng.integers(2, 11, rows)
+        rest, repeats = self.rests.draw(rng, chosen)
+        starts = np.where(repeats, np.maximum(first, rest - before), starts)
+        return starts, self.lengths[chosen], self.texts.draw(rng, chosen)[0], self.climbs[chosen]
+
+
+class Ragged(NamedTuple):
+    """Rows of whole numbers of different lengths, end to end."""
+
+    values: np.ndarray
+    begins: np.ndarray
+    """(rows + 1,) where each row begins in ``values``."""
+
+    @staticmethod
+    def of(rows: Sequence[Sequence[int]]) -> "Ragged":
+        """The rows in one."""
+        values = np.array([value for row in rows for value in row] or [0], dtype=np.int64)
+        return Ragged(values, np.concatenate([[0], np.cumsum([len(row) for row in rows])]).astype(np.int64))
+
+    def draw(self, rng: np.random.Generator, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """One value of each of some rows, and whether a row has any."""
+        first, count = self.begins[rows], self.begins[rows + 1] - self.begins[rows]
+        at = first + (rng.random(len(rows)) * count).astype(np.int64)
+        return self.values[np.minimum(at, len(self.values) - 1)], count > 0
+
+
+def _favour(name: str, favour: Mapping[str, float]) -> float:
+    usual = 0.4 if "+" in name else MADE_SHARE if name.startswith(PREFIX + MADE) else 1.0
+    return favour.get(name, usual)
+
+
+CLIMBS = {"climb", "climb stairs", f"{PREFIX}climb ladder", f"{PREFIX}stairs"}
+"""Groups of items that go up."""
+HEIGHTS = [LAYOUT["root_height"].start, *range(LAYOUT["ric"].start + 1, LAYOUT["ric"].stop, 3)]
+"""Features that are heights over the floor."""
+BEFORE, ABOUT = 16, 2
+"""Frames of a window before a change begins (people begin soon after they are told to), give or take so many."""
+
+
+def _rests(item: Item, length: int) -> list[int]:
+    """The repetitions before which a window of so many frames may begin."""
+    low, high = item.start, item.start + item.frames - length
+    return [rest for rest in item.rests if low <= rest - 2 <= high]
+
+
+def _starts(item: Item, length: int) -> tuple[int, int]:
+    """Where a window of so many frames may begin, half-open: within the item, with its core inside.
+
+    The core begins at about the same time in every window (`BEFORE`, give or take `ABOUT`): were it anywhere, the
+    average over what a window may show would be a person who stays halfway, and a small network under much noise draws
+    averages.
+    """
+    low, high = item.start, item.start + item.frames - length
+    if item.core is None:
+        return low, high + 1
+    first, end = item.core
+    low, high = max(low, min(end - length, high)), min(high, max(first, low))
+    begin, last = max(low, min(first - BEFORE - ABOUT, high)), min(high, max(first - BEFORE + ABOUT, low))
+    return begin, max(begin, last) + 1
