@@ -290,3 +290,11 @@ def test_a_decision_is_one_page_with_a_status(page: Path) -> None:
     assert title.startswith(f"# {page.name[:4]}: ")
     assert re.match(r"\*\*Status\*\*: (accepted|superseded by \[\d{4}\]\(\d{4})", status)
     assert len(page.read_text().splitlines()) <= 60
+
+
+@pytest.mark.parametrize("page", DECISIONS, ids=lambda path: path.stem)
+def test_the_figures_of_a_decision_name_their_weights(page: Path) -> None:
+    """Its status says by their hash of which weights they are, or that they do not depend on any."""
+    status = page.read_text().split("\n\n")[1]
+    if "igures " in status or "Sizes " in status:
+        assert re.search(r"`[0-9a-f]{12}`|depend", status), status

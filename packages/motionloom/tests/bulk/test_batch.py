@@ -356,6 +356,17 @@ def test_the_table_has_a_row_for_every_row(weights: str, folder: Path) -> None:
         assert (Store(out, "npz").data(row["shard"]) / f"{row['id']}.npz").exists()
 
 
+def test_half_a_letter_in_a_prompt_is_written_everywhere(weights: str, folder: Path) -> None:
+    """JSON allows half of a surrogate pair, UTF-8 does not: the record keeps it, the table has a '?' in its place."""
+    parquet = pytest.importorskip("pyarrow.parquet")
+    out = folder / "out"
+    asked = [{"prompt": "a person walks \ud800", "seconds": 0.6}, {"prompt": "", "id": "\udfff"}]
+    assert [one.state for one in batch(asked, out, options=options(weights), where=ONE)] == ["made", "failed"]
+    assert next(read_batch(out)).about["text"] == "a person walks \ud800"
+    table = parquet.read_table(out / "metadata.parquet").to_pylist()
+    assert [row["text"] for row in table] == ["a person walks ?", None]
+
+
 def test_memory_of_the_driver_does_not_grow_with_the_job(folder: Path) -> None:
     """A million rows are looked at with no more memory than ten thousand."""
     code = (

@@ -133,3 +133,18 @@ def test_a_folder_that_is_no_batch_or_that_somebody_works_in_is_not_verified(wei
     (OUT / ".work" / "driver-0-of-1.json").write_text(json.dumps(asdict(Driver.here())))
     with pytest.raises(MotionloomError, match=f"is being made by process {os.getpid()}"):
         verify(OUT)
+
+
+def test_counts_in_a_damaged_folder_are_not_counted_to(weights: str) -> None:
+    """A manifest of before there were hashes may say any number of rows, and so may the table's note."""
+    make(weights)
+    shown = [(one.row, one.state) for one in read_batch(OUT)]
+    manifest = json.loads((OUT / "manifest.json").read_text())
+    del manifest["sha256"]
+    (OUT / "manifest.json").write_text(json.dumps(manifest | {"rows": 2**64}))
+    table = json.loads((OUT / "records" / "table.json").read_text())
+    (OUT / "records" / "table.json").write_text(json.dumps(table | {"shards": 10**18}))
+    assert [(one.row, one.state) for one in read_batch(OUT)] == shown
+    found = verify(OUT)
+    assert (found.shards, found.of) == (3, 2**63)
+    assert found.damaged[0] == OUT / "records" / "000003.jsonl"

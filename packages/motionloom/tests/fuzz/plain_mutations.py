@@ -1,5 +1,6 @@
 """How bytes, text, JSON and XML are damaged."""
 
+import copy
 import gzip
 import json
 import random
@@ -267,11 +268,11 @@ def change(value: Any, rng: random.Random) -> Any:
     """One change of a value of dictionaries and lists."""
     places = _places(value, [])
     if not places:
-        return rng.choice(PLAIN)
+        return copy.deepcopy(rng.choice(PLAIN))
     inside, key = rng.choice(places)
     choice = rng.randrange(8)
     if choice <= 2:
-        inside[key] = rng.choice(PLAIN)
+        inside[key] = copy.deepcopy(rng.choice(PLAIN))  # later changes must not change the list itself
     elif choice == 3:
         del inside[key]
     elif choice == 4:
@@ -281,9 +282,10 @@ def change(value: Any, rng: random.Random) -> Any:
         )
     elif choice == 5 and isinstance(inside, list):
         most = LARGEST // len(json.dumps(inside[key])) + 1  # more would be cut off anyway
-        inside[key:key] = [inside[key]] * min(most, rng.choice((1, 10, 2000)))
+        one = json.dumps(inside[key])  # copies: one change of something that is there 2,000 times is not 2,000 changes
+        inside[key:key] = [json.loads(one) for _ in range(min(most, rng.choice((1, 10, 2000))))]
     elif choice == 5:
-        inside[rng.choice(("x", "", "\n", "a" * 2000, "__class__"))] = inside[key]
+        inside[rng.choice(("x", "", "\n", "a" * 2000, "__class__"))] = copy.deepcopy(inside[key])
     elif choice == 6:
         for _ in range(rng.choice((1, 30, 600))):
             inside[key] = [inside[key]] if rng.random() < 0.5 else {"a": inside[key]}

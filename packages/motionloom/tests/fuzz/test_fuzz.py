@@ -1,6 +1,7 @@
 """A short run of the fuzzer over every reader, and that it notices what it is there to notice."""
 
 import os
+import random
 import re
 import signal
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 from motionloom.errors import MotionloomError
 from tests.fuzz import machine, readers
 from tests.fuzz.machine import fuzz
+from tests.fuzz.mutations import mutated
 from tests.fuzz.readers import READERS, Reader
 
 
@@ -100,6 +102,13 @@ def test_more_than_a_gigabyte_is_a_failure(one) -> None:
     result = one(lambda folder: bytearray(machine.MEMORY + (64 << 20)), files=1)
     assert "MemoryError" in result.failures[0][2]
     assert not one(lambda folder: bytearray(machine.MEMORY // 2), files=1).failures
+
+
+def test_a_file_does_not_depend_on_those_that_were_damaged_before() -> None:
+    """What is put into a file is a copy: it is changed later, and grew from file to file until the memory was full."""
+    whole = b'{"a": [1, {"b": []}], "c": {"d": 2.5}}'
+    first = [mutated(whole, "json", random.Random(number)) for number in range(300)]
+    assert [mutated(whole, "json", random.Random(number)) for number in range(300)] == first
 
 
 def show(folder: Path) -> None:

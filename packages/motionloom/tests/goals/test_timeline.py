@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from motionloom import io
 from motionloom.errors import MotionloomError
-from motionloom.goals.timeline import SCHEMA, plain_timeline, read_timeline
+from motionloom.goals.segment import Segment
+from motionloom.goals.timeline import SCHEMA, plain_timeline, read_timeline, timeline_from
 from motionloom.io import lined_yaml
 from motionloom.motion import Motion
 from motionloom.requests.fields import specs
@@ -366,3 +367,12 @@ def test_the_document_explains_every_key_with_an_example_that_is_read(tmp_path):
         specs(SegmentKeys)
     )
     assert valid(SCHEMA, plain)
+
+
+def test_numbers_beyond_all_bounds_are_refused_wherever_they_are(tmp_path):
+    """JSON, unlike YAML here, gives whole numbers of thousands of digits, which no float holds."""
+    for value in (10**400, {"segments": 10**400}, {"segments": [10**400]}, {"segments": [{"text": 10**400}]}):
+        with pytest.raises(MotionloomError, match="got a number beyond all bounds"):
+            timeline_from(value, folder=tmp_path)
+    with pytest.raises(MotionloomError, match="has seconds a number beyond all bounds; give a number, at most"):
+        Segment("a person walks", 10**400)

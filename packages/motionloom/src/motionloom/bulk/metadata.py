@@ -15,7 +15,7 @@ from motionloom.bulk.folder import RECORDS, Entry, Store, damaged_shard, read_ma
 from motionloom.bulk.jobs import arrow, parquet
 from motionloom.bulk.measures import ROBOT
 from motionloom.bulk.row import hash_file
-from motionloom.bulk.writers import file_names, json_line, parquet_schema
+from motionloom.bulk.writers import file_names, json_line, parquet_schema, well_formed
 from motionloom.errors import MotionloomError
 from motionloom.io import load, load_scene
 from motionloom.io.atomic import atomic_path
@@ -85,7 +85,8 @@ def _write_parquet(path: Path, entries: Iterator[Entry]) -> None:
     schema = pa.schema([*((name, getattr(pa, kind)()) for name, kind in _ABOUT.items()), *known])
     with parquet().ParquetWriter(path, schema, compression="zstd") as file:
         while part := list(islice(entries, _BLOCK)):
-            file.write_table(pa.Table.from_pylist(part, schema=schema))
+            rows = [{name: well_formed(value) for name, value in entry.items()} for entry in part]
+            file.write_table(pa.Table.from_pylist(rows, schema=schema))
 
 
 def _all(store: Store, shards: int) -> Iterator[Entry]:
@@ -141,11 +142,11 @@ def read_batch(out: Path | str, *, motions: bool = True) -> Iterator[Result]:
         raise MotionloomError(f"{folder} holds no batch; name a folder that 'motionloom batch' made")
     store = Store(folder, manifest["files"])
     shards = -(-int(manifest["rows"]) // int(manifest["shard_rows"]))
-    for shard in range(shards):
-        if store.head(shard) is None:
-            if store.record(shard).exists():
-                raise damaged_shard(store, shard)
+    for shard in sorted(set(store.shards())):  # not those that the manifest counts, which may be any number
+        if shard >= shards or not store.record(shard).exists():
             continue
+        if store.head(shard) is None:
+            raise damaged_shard(store, shard)
         entries = list(store.entries(shard))
         made = {e["id"]: e.get("people", 1) for e in entries if e["state"] == "made" and "robot" not in e}
         read = _motions(store, shard, made) if motions else {}

@@ -199,7 +199,7 @@ def parquet_row(people: Sequence[Motion], about: dict[str, Any]) -> dict[str, An
     skeleton = people[0].skeleton  # both are on the same one
     return {
         **about,
-        "text": about["text"].encode("utf-8", "replace").decode(),
+        "text": well_formed(about["text"]),
         "joints": len(skeleton),
         "positions": flat(*(motion.positions() for motion in people)),
         "rotations": flat(*(motion.rotations for motion in people)),
@@ -208,6 +208,11 @@ def parquet_row(people: Sequence[Motion], about: dict[str, Any]) -> dict[str, An
         "parents": list(skeleton.parents),
         "offsets": flat(skeleton.offsets),
     }
+
+
+def well_formed(value: Any) -> Any:
+    """Text that has UTF-8: half of a surrogate pair becomes '?'; anything else as it is."""
+    return value.encode("utf-8", "replace").decode() if isinstance(value, str) else value
 
 
 def json_line(value: dict[str, Any]) -> bytes:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
-from motionloom.errors import MotionloomError, listed, meant
+from motionloom.errors import MotionloomError, kind_of, listed, meant
 from motionloom.io.lined_yaml import MAX_ITEMS, Lined, fail
 from motionloom.io.text import shown
 from motionloom.requests.fields import specs
@@ -46,7 +46,7 @@ class LinedFile:
             kind = f"a number of {unit}" if unit else "a number"
             self.fail(found.line, f"'{name}' must be {kind}; got {self.got(found)}")
         if not low <= value <= high:
-            self.fail(found.line, f"'{name}' must be {low:g} to {f'{high:g} {unit}'.strip()}; got {value:g}")
+            self.fail(found.line, f"'{name}' must be {low:g} to {f'{high:g} {unit}'.strip()}; got {kind_of(value)}")
         return value
 
     def field(self, given: Mapping[str, Lined], keys: type, name: str) -> Any:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from motionloom.errors import MotionloomError
+from motionloom.errors import MotionloomError, kind_of
 from motionloom.goals.adapters import Applied
 from motionloom.goals.goal import FPS, Goal
 from motionloom.requests.sampling import LARGEST_GUIDANCE
@@ -36,7 +36,7 @@ class Segment:
         )
         for name, value, most in limits:
             if value is not None and not abs(value) <= most:
-                raise MotionloomError(f"{said} has {name} {value:g}; give a number, at most {most:g}")
+                raise MotionloomError(f"{said} has {name} {kind_of(value)}; give a number, at most {most:g}")
         frames = round(self.seconds * FPS)
         if self.goal is not None and len(self.goal) != frames:
             raise MotionloomError(f"{said} has {frames} frames and its goal {len(self.goal)}; make them equally long")

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-from motionloom.errors import MotionloomError
+from motionloom.errors import MotionloomError, kind_of
 from motionloom.io.text import read_text, shown
 
 MAX_DEPTH = 32
@@ -55,7 +55,10 @@ class Lined:
             return "a list"
         if isinstance(self.value, dict):
             return "a mapping"
-        return shown(self.value) if isinstance(self.value, str) else f"the number {self.value:g}"
+        if isinstance(self.value, str):
+            return shown(self.value)
+        said = kind_of(self.value)
+        return said if said.startswith("a ") else f"the number {said}"
 
 
 def lined_of(value: Any) -> tuple[Lined, tuple[str, ...]]:

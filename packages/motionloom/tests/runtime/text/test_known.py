@@ -12,6 +12,7 @@ from motionloom.errors import MotionloomError
 from motionloom.goals.remarks import looked_up
 from motionloom.runtime.text.known import (
     Known,
+    Nearest,
     bare,
     known_sentences,
     nearest,
@@ -188,3 +189,7 @@ def test_whatever_the_description_is_it_is_read_or_refused(about: Any) -> None:
     except ValueError:
         return
     assert len(known.sentences) == len(known.vectors)
+
+
+def test_a_prompt_of_signs_alone_is_quoted_as_it_is() -> None:
+    assert Nearest(" ??? ", ("claps",), 0.1, 0.1).remark().startswith("these weights have seen nothing like '???'; ")

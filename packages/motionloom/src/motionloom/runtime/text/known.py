@@ -75,7 +75,8 @@ class Nearest:
     def remark(self) -> str:
         """One line for somebody whose prompt is not near to anything."""
         said = ", ".join(f"'{sentence}'" for sentence in self.sentences)
-        return one_line(f"these weights have seen nothing like '{_short(bare(self.prompt))}'; nearest: {said}")
+        prompt = _short(bare(self.prompt) or self.prompt.strip())
+        return one_line(f"these weights have seen nothing like '{prompt}'; nearest: {said}")
 
 
 def stem(word: str) -> str:
