@@ -7,6 +7,7 @@ import { beforeAll, describe, expect, test } from "vitest";
 import { Network, type Runtime } from "../src/prior/network";
 import { Noise } from "../src/prior/noise";
 import { type Body, placesOf } from "../src/prior/person";
+import { startOf } from "../src/prior/path";
 import { Prior, type Segment, finished, flat, sketched } from "../src/prior/prior";
 import { type Manifest, Packed } from "../src/prior/weights";
 
@@ -16,6 +17,7 @@ interface Expected {
   index: Record<string, [number, number]>;
   sentences: string[];
   chains: [string, number][][];
+  path: [number, number][];
   tokens: [string, number[]][];
 }
 
@@ -89,13 +91,15 @@ describe.skipIf(!FOLDER)("as Python draws", () => {
    * The walk adds up the last bits of 24 calls; so that no foot counts as planted here and not there, bodies are made of
    * Python's features.
    */
-  const drawn = async (name: string, segments: Segment[], seed: number): Promise<void> => {
+  const drawn = async (name: string, segments: Segment[], seed: number, path?: [number, number][]): Promise<void> => {
     const std = prior.network.packed.tensor("std");
     const theirs = wanted(`${name}.features`);
-    const [features] = await prior.features(segments, seed, 1);
+    const way = path && prior.way(segments, path);
+    const begin = way && startOf(way);
+    const [features] = await prior.features(segments, seed, 1, undefined, way);
     const unlike = off(features!, theirs, (n) => std[n % 263]! || 1);
-    const sketch = off(sketched(features!), sketched(theirs));
-    const body = finished(theirs, prior.fps);
+    const sketch = off(sketched(features!, begin), sketched(theirs, begin));
+    const body = finished(theirs, prior.fps, begin);
     const far = off(flat(placesOf(body)), wanted(`${name}.places`));
     const turned = apart(body, wanted(`${name}.turns`));
     expect(unlike, `${name}: features, standard deviations`).toBeLessThan(1e-2);
@@ -107,6 +111,24 @@ describe.skipIf(!FOLDER)("as Python draws", () => {
   test("sentences are the same motions", async () => {
     for (const [seed, text] of said.sentences.entries())
       await drawn(`sentence ${seed}`, [{ text, seconds: 2 + 0.35 * seed }], seed);
+  }, 600_000);
+
+  test("a path is followed as there, and kept to", async () => {
+    if (!("path.features" in said.index)) return;
+    const segments = [{ text: "a person walks", seconds: 5 }];
+    await drawn("path", segments, 4, said.path);
+    const places = wanted("path.places");
+    const { places: way } = prior.way(segments, said.path);
+    const far = way.map(([x, z], f) => Math.hypot(places[f * 66]! - x, places[f * 66 + 2]! - z));
+    expect(Math.max(...far), "metres from the path").toBeLessThan(0.02);
+  }, 600_000);
+
+  test("a chain follows a path as there", async () => {
+    if (!("path of a chain.seen" in said.index)) return;
+    const segments = said.chains[0]!.map(([text, seconds]) => ({ text, seconds }));
+    const way = prior.way(segments, said.path);
+    const [features] = await prior.features(segments, 4, 1, undefined, way);
+    expect(off(sketched(features!, startOf(way)), wanted("path of a chain.seen")), "metres").toBeLessThan(1e-3);
   }, 600_000);
 
   test("a chain is the same motion", async () => {

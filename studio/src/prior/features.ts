@@ -4,7 +4,7 @@ import type { Vec } from "./turns";
 
 /** Numbers per frame, and where the four contact flags begin. */
 export const WIDTH = 263;
-const CONTACTS = 259;
+export const CONTACTS = 259;
 
 /** On the ground: metres, and radians about +Y from +Z towards +X. */
 export interface GroundPose {

@@ -1,15 +1,17 @@
 /**
  * Sentences to motion, as `motionloom generate --literal` and `motionloom compose` draw it: takes of one sentence, or a
- * chain of several whose ends overlap.
+ * chain of several whose ends overlap, along a path on the ground if there is one.
  */
 
 import { bodyOf } from "./body";
-import { ORIGIN, WIDTH, contacts, decoded, smooth } from "./features";
+import { type GroundPose, ORIGIN, WIDTH, contacts, decoded, smooth } from "./features";
 import { cleanFeet } from "./feet";
 import { Noise } from "./noise";
 import type { Asked, Network } from "./network";
 import type { Body } from "./person";
+import { type Place, type Way, seenFrom, startOf, wayThrough } from "./path";
 import { cosine, levels, move } from "./schedule";
+import { Steering } from "./steering";
 import { type Vec, rounded } from "./turns";
 
 export interface Segment {
@@ -36,11 +38,32 @@ export class Prior {
     return this.network.packed.about.fps;
   }
 
-  /** Features (frames * 263) of each take; take i is sampled from `seed + i`. */
-  async features(segments: readonly Segment[], seed: number, takes: number, watch?: Watcher): Promise<Float32Array[]> {
+  /**
+   * Features (frames * 263) of each take; take i is sampled from `seed + i`. With a way the pelvis keeps to it, and the
+   * features begin at `startOf` it.
+   */
+  async features(
+    segments: readonly Segment[],
+    seed: number,
+    takes: number,
+    watch?: Watcher,
+    way?: Way | null,
+  ): Promise<Float32Array[]> {
     return segments.length === 1
-      ? this.single(segments[0]!, seed, takes, watch)
-      : this.chain(segments, seed, takes, watch);
+      ? this.single(segments[0]!, seed, takes, watch, way ?? null)
+      : this.chain(segments, seed, takes, watch, way ?? null);
+  }
+
+  /** The way through points on the ground (x, z in metres) for as long as segments last; an Error for one too long. */
+  way(segments: readonly Segment[], points: readonly Place[]): Way {
+    const each = segments.map(({ seconds }) =>
+      segments.length > 1 ? rounded(seconds * this.fps) : this.frames(seconds),
+    );
+    return wayThrough(
+      points,
+      each.reduce((sum, one) => sum + one, 0),
+      this.fps,
+    );
   }
 
   /** Frames of a motion of so many seconds. */
@@ -52,10 +75,12 @@ export class Prior {
     { text, seconds }: Segment,
     seed: number,
     takes: number,
-    watch?: Watcher,
+    watch: Watcher | undefined,
+    way: Way | null,
   ): Promise<Float32Array[]> {
-    const asked = await this.network.ask(text);
-    const rows = Array.from({ length: takes }, (_, n) => new Link(this.frames(seconds), 0, 0, asked, seed + n));
+    const [asked, frames] = [await this.network.ask(text), this.frames(seconds)];
+    const steering = way && this.steering(seenFrom(way, startOf(way)), frames, 0);
+    const rows = Array.from({ length: takes }, (_, n) => new Link(frames, 0, 0, asked, seed + n, steering));
     return await this.walk(rows, false, watch, (states) => states.map((state) => smooth(this.plain(state))));
   }
 
@@ -63,31 +88,51 @@ export class Prior {
     segments: readonly Segment[],
     seed: number,
     takes: number,
-    watch?: Watcher,
+    watch: Watcher | undefined,
+    way: Way | null,
   ): Promise<Float32Array[]> {
     const half = Math.max(1, rounded((TRANSITION * this.fps) / 2));
     const asked = await Promise.all(segments.map(({ text }) => this.network.ask(text)));
     const rows: Link[] = [];
     for (let take = 0; take < takes; take += 1) {
+      let first = 0;
       segments.forEach(({ text, seconds }, n) => {
         const [before, after, frames] = [n ? half : 0, n < segments.length - 1 ? half : 0, rounded(seconds * this.fps)];
         if (frames < before + after || frames < 2)
           throw new Error(
             `"${text.slice(0, 40)}" of ${seconds} s is shorter than half its transitions; make it longer`,
           );
-        rows.push(new Link(before + frames + after, before, after, asked[n]!, seed + take + n));
+        const length = before + frames + after;
+        const own = way && this.steering(seenFrom(way, poseOn(way, first), first, first + frames), length, before);
+        rows.push(new Link(length, before, after, asked[n]!, seed + take + n, own));
+        first += frames;
       });
     }
     const cut = (states: readonly Float32Array[]): Float32Array[] =>
-      Array.from({ length: takes }, (_, take) =>
-        joined(
-          segments.map((__, n) => {
-            const [row, state] = [rows[take * segments.length + n]!, states[take * segments.length + n]!];
-            return this.plain(state.subarray(row.before * WIDTH, (row.length - row.after) * WIDTH));
-          }),
-        ),
-      );
+      Array.from({ length: takes }, (_, take) => {
+        const pieces = segments.map((__, n) => {
+          const [row, state] = [rows[take * segments.length + n]!, states[take * segments.length + n]!];
+          return state.subarray(row.before * WIDTH, (row.length - row.after) * WIDTH);
+        });
+        return joined(way ? this.onWay(pieces, way) : pieces.map((piece) => this.plain(piece)));
+      });
     return this.walk(rows, true, watch, cut);
+  }
+
+  /** Pieces of a chain, each bent once more to its part of the way, so that errors do not add up. */
+  private onWay(pieces: readonly Float32Array[], way: Way): Float32Array[] {
+    let [pose, first] = [startOf(way), 0];
+    return pieces.map((piece) => {
+      const frames = piece.length / WIDTH;
+      const own = this.steering(seenFrom(way, pose, first, first + frames), frames, 0);
+      const features = this.plain(own.correct(piece, 0));
+      [pose, first] = [decoded(features, pose).end, first + frames];
+      return features;
+    });
+  }
+
+  private steering(way: Way, frames: number, first: number): Steering {
+    return new Steering(way, frames, first, this.mean, this.std);
   }
 
   /** Rows from noise to clean states; the ends of a chain's rows are kept alike at every level. */
@@ -103,7 +148,8 @@ export class Prior {
     for (let n = 0; n + 1 < way.length; n += 1) {
       const [t, s] = [way[n]!, way[n + 1]!];
       const last = n + 2 === way.length;
-      const clean = average && last ? await this.averaged(rows, states, t) : await this.estimated(rows, states, t);
+      const free = average && last ? await this.averaged(rows, states, t) : await this.estimated(rows, states, t);
+      const clean = free.map((one, r) => rows[r]!.steering?.correct(one, table.noise[t]!) ?? one);
       const [ofClean, ofState, ofNoise] = move(table, t, s);
       const fresh = noiseOf(rows);
       states = states.map((state, r) =>
@@ -154,6 +200,7 @@ class Link {
     readonly after: number,
     readonly asked: Asked,
     seed: number,
+    readonly steering: Steering | null,
   ) {
     this.noise = new Noise(seed);
   }
@@ -197,14 +244,20 @@ function joined(parts: readonly Float32Array[]): Float32Array {
   return all;
 }
 
-/** Features to a person with constant bones and still feet, who begins at the origin facing +Z. */
-export function finished(features: ArrayLike<number>, fps: number): Body {
-  return cleanFeet(bodyOf(decoded(features, ORIGIN).places, fps), contacts(features));
+/** Where somebody on a way is in a frame, and faces. */
+function poseOn(way: Way, frame: number): GroundPose {
+  const [x, z] = way.places[frame]!;
+  return { x, z, facing: way.facing?.[frame] ?? 0 };
+}
+
+/** Features to a person with constant bones and still feet; `begin`: the origin facing +Z, or `startOf` a way. */
+export function finished(features: ArrayLike<number>, fps: number, begin = ORIGIN): Body {
+  return cleanFeet(bodyOf(decoded(features, begin).places, fps), contacts(features));
 }
 
 /** Places that the network predicted, whose bones may breathe, (frames * 22 * 3) metres. */
-export function sketched(features: ArrayLike<number>): Float32Array {
-  return flat(decoded(features).places);
+export function sketched(features: ArrayLike<number>, begin = ORIGIN): Float32Array {
+  return flat(decoded(features, begin).places);
 }
 
 export function flat(places: readonly (readonly Vec[])[]): Float32Array {

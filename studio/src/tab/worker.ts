@@ -75,7 +75,7 @@ async function open(base: string): Promise<Prior> {
 
 async function draw(prior: Prior, { id, segments, seed, takes }: Draw): Promise<void> {
   const made = await prior.features(segments, seed, takes, async (done, of, clean) => {
-    say({ kind: "sketch", id, done, of, takes: done * 3 >= of ? clean().map(sketched) : [] });
+    say({ kind: "sketch", id, done, of, takes: done * 3 >= of ? clean().map((features) => sketched(features)) : [] });
     await new Promise((heard) => setTimeout(heard)); // lets a newer wish be heard
     if (newest !== id) throw new Superseded();
   });

@@ -1,6 +1,7 @@
 """What Python draws, written for `studio/tests/prior.test.ts` to compare with what the page's own code draws."""
 
 import json
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -8,12 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from motionloom.diffusion import generator, guide
+from motionloom.goals.goal import start_of
+from motionloom.goals.paths import root_path
 from motionloom.goals.segment import Segment
 from motionloom.motion import Motion
 from motionloom.requests.sampling import Sampling
 from motionloom.runtime.text.minilm import MiniLM
 from motionloom.runtime.text.protocol import as_rows
-from motionloom.tasks.long import compose, long_features
+from motionloom.tasks.control import moved, steered_features
+from motionloom.tasks.long import Track, compose, in_world, long_features
 from motionloom.tasks.text import sample_features, to_motion
 from motionloom.weights.prior import Prior
 
@@ -32,6 +36,8 @@ SENTENCES = (
 CHAINS: tuple[tuple[tuple[str, float], ...], ...] = (
     (("a person walks forward", 3.0), ("a person jumps up", 2.0), ("a person dances", 2.55)),
 )
+PATH = ((0.5, 1.0), (0.2, 2.6), (1.6, 3.9), (3.0, 3.4))
+"""Metres, x and z in the world."""
 ODD_TEXTS = (
     "",
     "  Ünïcode  CAFÉ—naïve\t(won't) stop!? 中文 x́y \u200b\x07 ﬁ İstanbul ΣΊΣΥΦΟΣ",
@@ -77,12 +83,14 @@ def write(prior: Prior, folder: Path, *, precise: bool, weights: dict[str, np.nd
     for number, chain in enumerate(CHAINS if precise else ()):
         _chain(prior, found, f"chain {number}", chain)
     if precise:
+        _paths(prior, found)
+    if precise:
         for seed in (0, 7, 2**40 + 5):
             found.add(f"noise {seed}", generator(seed).standard_normal(200_000, np.float32))
     np.concatenate(found.parts).tofile(folder / "expected.bin")
     assert isinstance(prior.text, MiniLM)
     texts = (*SENTENCES, *ODD_TEXTS)
-    said = {"index": found.index, "sentences": SENTENCES if precise else SENTENCES[:1], "chains": CHAINS}
+    said = {"index": found.index, "sentences": SENTENCES if precise else SENTENCES[:1], "chains": CHAINS, "path": PATH}
     tokens = [[text, prior.text.ids(text)] for text in as_rows(texts)]
     (folder / "expected.json").write_text(json.dumps({**said, "tokens": tokens, "precise": precise}))
 
@@ -103,3 +111,19 @@ def _chain(prior: Prior, found: Numbers, name: str, chain: Sequence[tuple[str, f
     found.add(f"{name}.features", np.concatenate(pieces))
     [motion] = compose(prior, segments, sampling=Sampling(seed=4))
     found.motion(name, motion)
+
+
+def _paths(prior: Prior, found: Numbers) -> None:
+    """One sentence along a path, as `control` steers it, and a chain along the same one, as `compose` does."""
+    goal = root_path(PATH, frames=100)
+    place = start_of(goal)
+    [features] = steered_features(prior, ["a person walks"], goal.seen_from(place), seeds=[4])
+    found.add("path.features", features)
+    found.motion("path", moved(to_motion(features.astype(np.float64), prior.fps), place))
+    segments = [Segment(text, seconds) for text, seconds in CHAINS[0]]
+    frames = [round(segment.seconds * prior.fps) for segment in segments]
+    track = Track.along(root_path(PATH, frames=sum(frames)), prior.fps)
+    asked = [track.asked(part, sum(frames[:n]), frames[n]) for n, part in enumerate(segments)]
+    pieces = long_features(prior, asked, sampling=Sampling(seed=4))
+    places = in_world(prior, pieces, deque([None] * len(asked)), track.place(0), track)
+    found.add("path of a chain.seen", np.concatenate([piece.positions for piece in places]))
