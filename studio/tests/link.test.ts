@@ -8,6 +8,10 @@ const PROJECT: Project = {
   ],
   seed: 2 ** 40,
   takes: 4,
+  path: [
+    [0.5, -1.25],
+    [2, 3],
+  ],
   weights: "0123456789ab",
 };
 
@@ -27,6 +31,10 @@ test("what is no project is refused", () => {
     ["s=10+jumps", "s=1e9+jumps", "has no length"],
     ["s=10+jumps", "s=1+jumps", "shorter than 2 s"],
     ["s=10+jumps", "s=2+jumps&".repeat(12), "13 sentences"],
+    ["p=0.5%2C-1.25+2%2C3", "p=1%2C2", "its path has 1 points"],
+    ["p=0.5%2C-1.25+2%2C3", "p=1%2C2+3", 'a point of its path is "3"'],
+    ["p=0.5%2C-1.25+2%2C3", "p=1%2C2+51%2C0", 'a point of its path is "51,0"'],
+    ["p=0.5%2C-1.25+2%2C3", `p=${"1%2C2+".repeat(41)}`, "its path has 41 points"],
     ["w=0123456789ab", "w=%22", "names no weights"],
   ];
   for (const [old, next, says] of bad) {

@@ -6,7 +6,7 @@ import { type GLTF, GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 /** What a character names outside of its own file is a white picture. */
 const WHITE =
   "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg==";
-const inside = new THREE.LoadingManager();
+export const inside = new THREE.LoadingManager();
 inside.setURLModifier((url) => (/^(blob|data):/.test(url) ? url : WHITE));
 
 export interface Actor {

@@ -4,7 +4,7 @@ import { Signal } from "../app/signal";
 import { type MotionClip, motionClip } from "../body/clip";
 import type { Body } from "../prior/person";
 import type { Project } from "./link";
-import type { About, Draw, Said } from "./messages";
+import type { About, Draw, Said, Stop } from "./messages";
 
 export interface Drawn {
   readonly project: Project;
@@ -52,8 +52,16 @@ export class Artist {
     this.asked = project;
     this.id += 1;
     if (this.state.value.about) this.state.update({ progress: 0, says: "drawing", error: "", sketch: [] });
-    const { segments, seed, takes } = project;
-    this.worker.postMessage({ id: this.id, segments, seed, takes } satisfies Draw);
+    const { segments, seed, takes, path } = project;
+    this.worker.postMessage({ id: this.id, segments, seed, takes, path } satisfies Draw);
+  }
+
+  /** Give up what is being drawn; what was drawn before is there again. */
+  stop(): void {
+    this.asked = null;
+    this.id += 1;
+    this.worker.postMessage({ stop: this.id } satisfies Stop);
+    if (this.state.value.about) this.state.update({ progress: null, says: "stopped", sketch: [] });
   }
 
   private hear(said: Said): void {

@@ -1,11 +1,14 @@
 /** The project in the page's address, behind the #, so that whoever opens it sees the same motion. */
 
+import type { Place } from "../prior/path";
 import type { Segment } from "../prior/prior";
 
 export interface Project {
   readonly segments: readonly Segment[];
   readonly seed: number;
   readonly takes: number;
+  /** Points on the floor, x and z in metres, that are walked at even speed; none: nobody asks where. */
+  readonly path: readonly Place[];
   /** Beginning of the digest of the weights it was drawn with; empty: never drawn. */
   readonly weights: string;
 }
@@ -14,18 +17,22 @@ export const FIRST: Project = {
   segments: [{ text: "a person walks forward and waves", seconds: 4 }],
   seed: 1,
   takes: 1,
+  path: [],
   weights: "",
 };
 
 export const [SHORTEST, LONGEST, MOST, LETTERS, LARGEST] = [0.5, 10, 12, 400, 2 ** 40] as const;
+/** Points of a path, and metres from the middle of the floor. */
+export const [MOST_POINTS, FARTHEST] = [40, 50] as const;
 /** A segment between two others shares a second with them. */
 export const SHORTEST_OF_SEVERAL = 2;
 const DIGEST = 12;
 
 /** Without the #. */
-export function toAddress({ segments, seed, takes, weights }: Project): string {
+export function toAddress({ segments, seed, takes, path, weights }: Project): string {
   const found = new URLSearchParams({ v: "1", seed: String(seed), takes: String(takes) });
   for (const { text, seconds } of segments) found.append("s", `${seconds} ${text}`);
+  if (path.length) found.set("p", path.map((at) => at.join(",")).join(" "));
   if (weights) found.set("w", weights.slice(0, DIGEST));
   return found.toString();
 }
@@ -57,5 +64,18 @@ export function ofAddress(hash: string): Project | null {
     refuse(`one of several sentences is shorter than ${SHORTEST_OF_SEVERAL} s`);
   const weights = said.get("w") ?? "";
   if (!/^[0-9a-f]{0,64}$/.test(weights)) refuse("it names no weights");
-  return { segments, seed: whole("seed", 0, LARGEST), takes: whole("takes", 1, 4), weights };
+  const path = (said.get("p") ?? "")
+    .split(" ")
+    .filter(Boolean)
+    .map((point): Place => {
+      const [, x, z] = /^(-?\d{1,2}(?:\.\d{1,3})?),(-?\d{1,2}(?:\.\d{1,3})?)$/.exec(point) ?? [];
+      if (x === undefined || Math.max(Math.abs(Number(x)), Math.abs(Number(z))) > FARTHEST)
+        refuse(
+          `a point of its path is ${JSON.stringify(point.slice(0, 20))}, not two numbers of at most ${FARTHEST} m`,
+        );
+      return [Number(x), Number(z)];
+    });
+  if (path.length === 1 || path.length > MOST_POINTS)
+    refuse(`its path has ${path.length} points, not 2 to ${MOST_POINTS}`);
+  return { segments, seed: whole("seed", 0, LARGEST), takes: whole("takes", 1, 4), path, weights };
 }

@@ -9,10 +9,11 @@ import { h, morph } from "../app/dom";
 import { Signal } from "../app/signal";
 import { icon } from "../panels/icons";
 import { textButton } from "../panels/parts";
+import type { Place } from "../prior/path";
 import type { Segment } from "../prior/prior";
 import { Artist } from "./artist";
-import { bvh } from "./bvh";
-import { glb } from "./glb";
+import type { Character } from "./character";
+import { exportButtons, nameOf } from "./exports";
 import {
   FIRST,
   LARGEST,
@@ -25,9 +26,12 @@ import {
   ofAddress,
   toAddress,
 } from "./link";
+import { chosenFile, onDrop } from "./files";
+import { unread } from "./numbers";
 import { Player } from "./player";
 
 const THEME = "motionloom-theme";
+const FLOOR = "Draw a line on the floor, or set points: arrow keys, Enter; Enter twice ends";
 
 const part = <T extends HTMLElement = HTMLElement>(id: string): T => document.getElementById(id) as T;
 const root = document.documentElement;
@@ -38,17 +42,25 @@ class Page {
   /** What the page says besides what is drawn, such as why a link was refused. */
   private readonly notice = new Signal("");
   private readonly artist = new Artist();
-  private readonly player = new Player(part<HTMLCanvasElement>("canvas"), part("player"), isDark());
+  private character: Character | null = null;
+  private readonly player = new Player(part<HTMLCanvasElement>("canvas"), part("player"), isDark(), (points) =>
+    this.onPath(points),
+  );
 
   constructor() {
     this.open(true);
     addEventListener("hashchange", () => this.open());
-    this.project.subscribe(() => this.show());
+    onDrop((file) => void this.own(file));
+    this.project.subscribe((now) => {
+      this.player.floor.show(now.path);
+      this.show();
+    });
+    this.player.floor.show(this.project.value.path);
     this.notice.subscribe(() => this.show());
     this.artist.state.subscribe((now, before) => {
-      if (now.sketch.length) this.player.show(now.sketch, true);
+      if (now.sketch.length) this.player.show(now.sketch);
       else if (now.drawn && now.drawn !== before.drawn) this.drawn();
-      else if (before.sketch.length) this.player.show(now.drawn?.clips ?? [], false);
+      else if (before.sketch.length) this.player.show(now.drawn?.clips ?? [], now.drawn?.bodies);
       this.show();
     });
     this.player.take.subscribe(() => this.show());
@@ -84,12 +96,12 @@ class Page {
   }
 
   private drawn(): void {
-    const { project, clips } = this.artist.state.value.drawn!;
+    const { project, clips, bodies } = this.artist.state.value.drawn!;
     const old = this.project.value.weights;
     if (old && !project.weights.startsWith(old))
       this.notice.value = "This link was made with other weights; the motion is not the one that was sent.";
     this.player.take.value = Math.min(this.player.take.value, clips.length - 1);
-    this.player.show(clips, false);
+    this.player.show(clips, bodies);
     if (toAddress({ ...this.project.value, weights: "" }) === toAddress({ ...project, weights: "" }))
       this.project.value = project;
     history.replaceState(null, "", `#${toAddress(project)}`);
@@ -134,6 +146,8 @@ class Page {
           { class: "line" },
           textButton("+ what comes next", () => this.more(), { disabled: segments.length >= MOST }),
         ),
+        this.floor(),
+        this.person(),
         h(
           "div",
           { class: "line" },
@@ -148,7 +162,12 @@ class Page {
             textButton(count > 1 ? "four" : "one", () => this.change({ takes: count }), { pressed: takes === count }),
           ),
         ),
-        textButton("Draw", () => this.draw(), { strong: true }),
+        h(
+          "div",
+          { class: "line" },
+          textButton("Draw", () => this.draw(), { strong: true }),
+          progress !== null && about && textButton("Stop", () => this.artist.stop(), { title: "Give it up" }),
+        ),
         h("progress", {
           max: 1,
           value: progress ?? 0,
@@ -157,7 +176,13 @@ class Page {
         }),
         h("p", { class: "quiet", id: "says", role: "status" }, says || (drawn ? "drawn" : about ? "ready" : "")),
         drawn && drawn.clips.length > 1 && this.choose(drawn.clips.length),
-        drawn && this.exports(),
+        ...unread(segments).map((one) => h("p", { class: "quiet" }, one)),
+        drawn &&
+          exportButtons(
+            drawn.bodies[this.player.take.value] ?? drawn.bodies[0]!,
+            nameOf(drawn.project),
+            this.character,
+          ),
         h("p", { class: "quiet foot" }, "The address of this page holds the motion: copy it to share it."),
       ].filter((one): one is HTMLElement => one instanceof HTMLElement),
     );
@@ -212,21 +237,65 @@ class Page {
     );
   }
 
-  private exports(): HTMLElement {
-    const { bodies, project } = this.artist.state.value.drawn!;
-    const body = bodies[this.player.take.value] ?? bodies[0]!;
-    const name =
-      project.segments[0]!.text.toLowerCase()
-        .replace(/[^a-z0-9]+/g, "_")
-        .slice(0, 40) || "motion";
-    const write = async (): Promise<void> => saved(`${name}.glb`, await glb(body, name));
+  /** The path on the floor: drawn, and taken away. */
+  private floor(): HTMLElement {
+    const { path } = this.project.value;
+    const { floor } = this.player;
+    const remove = (): void => {
+      this.change({ path: [] });
+      this.draw();
+    };
     return h(
       "div",
       { class: "line" },
-      h("span", { class: "quiet grow" }, "Save as"),
-      textButton("BVH", () => saved(`${name}.bvh`, bvh(body))),
-      textButton("GLB", () => void write()),
+      h("span", { class: "quiet grow" }, floor.active ? FLOOR : path.length ? "Follows its path" : "Path on the floor"),
+      textButton(floor.active ? "Cancel" : path.length ? "Draw another" : "Draw a path", () => {
+        if (floor.active) floor.stop(null);
+        else floor.start();
+        this.show();
+      }),
+      path.length > 0 && !floor.active && textButton("remove", remove, { title: "Remove the path" }),
     );
+  }
+
+  private onPath(points: readonly Place[] | null): void {
+    if (points) {
+      this.change({ path: points });
+      this.draw();
+    }
+    this.show();
+  }
+
+  /** Who is moved: the plain figure or somebody's own character. */
+  private person(): HTMLElement {
+    const { character } = this;
+    const choose = (): void =>
+      chosenFile(".glb,.vrm", (file) => {
+        void this.own(file);
+      });
+    return h(
+      "div",
+      { class: "line" },
+      h("span", { class: "quiet grow ellipsis" }, character ? character.name : "Character: plain figure"),
+      textButton(character ? "other" : "Own character", choose, { title: "Open a GLB or VRM file, or drop one" }),
+      character && textButton("remove", () => this.play(null), { title: "Back to the plain figure" }),
+    );
+  }
+
+  private async own(file: File): Promise<void> {
+    try {
+      const { Character } = await import("./character");
+      this.play(await Character.open(file));
+      this.notice.value = "";
+    } catch (error) {
+      this.notice.value = (error as Error).message;
+    }
+  }
+
+  private play(character: Character | null): void {
+    this.character = character;
+    this.player.play(character);
+    this.show();
   }
 
   private more(): void {
@@ -294,12 +363,6 @@ function number(
     change(next);
   };
   return h("label", {}, name, h("input", { type: "number", min, max, step, value: String(value), onchange: changed }));
-}
-
-function saved(name: string, content: string | ArrayBuffer): void {
-  const address = URL.createObjectURL(new Blob([content]));
-  (h("a", { href: address, download: name }) as HTMLAnchorElement).click();
-  setTimeout(() => URL.revokeObjectURL(address), 60_000);
 }
 
 root.dataset.theme =

@@ -1,6 +1,7 @@
 /** What the page and its worker say to each other. */
 
 import type { Body } from "../prior/person";
+import type { Place } from "../prior/path";
 import type { Segment } from "../prior/prior";
 
 export interface Draw {
@@ -8,6 +9,13 @@ export interface Draw {
   readonly segments: readonly Segment[];
   readonly seed: number;
   readonly takes: number;
+  /** On the ground; fewer than two points: none. */
+  readonly path: readonly Place[];
+}
+
+/** Give up what is being drawn. */
+export interface Stop {
+  readonly stop: number;
 }
 
 export interface About {

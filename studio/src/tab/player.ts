@@ -2,20 +2,31 @@
 
 import { h, morph } from "../app/dom";
 import { Signal } from "../app/signal";
+import type { Place } from "../prior/path";
 import { type MotionClip, jointAt } from "../body/clip";
 import { icon } from "../panels/icons";
+import type { Body } from "../prior/person";
+import { type Actor, placed } from "../stage/actor";
 import { Cast } from "../stage/cast";
 import { Scene } from "../stage/scene";
 import { DARK, GHOSTS, LIGHT } from "../stage/theme";
+import type { Character } from "./character";
+import { FloorPath } from "./floor";
 
 export class Player {
   /** Number of the take that is shown. */
   readonly take = new Signal(0);
   /** Whether the other takes are shown too. */
   readonly compare = new Signal(false);
+  readonly floor: FloorPath;
   private readonly scene: Scene;
   private readonly cast: Cast;
   private clips: readonly MotionClip[] = [];
+  private bodies: readonly Body[] = [];
+  private character: Character | null = null;
+  /** The character as it does what `acted` does. */
+  private actor: Actor | null = null;
+  private acted: Body | null = null;
   private time = 0;
   private playing = true;
   /** Whether what is shown is a guess that changes. */
@@ -25,10 +36,12 @@ export class Player {
     canvas: HTMLCanvasElement,
     private readonly bar: HTMLElement,
     dark: boolean,
+    drawnPath: (points: readonly Place[] | null) => void,
   ) {
     const theme = dark ? DARK : LIGHT;
     this.scene = new Scene(canvas, theme);
     this.cast = new Cast(this.scene.scene, theme);
+    this.floor = new FloorPath(this.scene, theme, drawnPath);
     this.scene.busy = () => this.rough;
     this.scene.step = (elapsed) => this.step(elapsed);
     this.take.subscribe(() => this.place());
@@ -42,9 +55,18 @@ export class Player {
     this.place();
   }
 
-  show(clips: readonly MotionClip[], rough: boolean): void {
+  /** `bodies`: of the same takes; none while they are guessed. */
+  show(clips: readonly MotionClip[], bodies: readonly Body[] = []): void {
+    const rough = clips.length > 0 && !bodies.length;
     if (!this.rough && rough) this.time = 0;
-    [this.clips, this.rough] = [clips, rough];
+    [this.clips, this.bodies, this.rough] = [clips, bodies, rough];
+    this.place();
+  }
+
+  /** Who is moved; null: the plain figure. */
+  play(character: Character | null): void {
+    this.leave();
+    this.character = character;
     this.place();
   }
 
@@ -52,6 +74,7 @@ export class Player {
     const theme = dark ? DARK : LIGHT;
     this.scene.look(theme);
     this.cast.look(theme);
+    this.floor.look(theme);
     this.place();
   }
 
@@ -66,7 +89,7 @@ export class Player {
 
   private step(elapsed: number): boolean {
     const { clip } = this;
-    if (!clip) return false;
+    if (!clip || this.floor.active) return false;
     if (this.playing) {
       this.time = (this.time + elapsed / 1000) % clip.seconds;
       this.place();
@@ -77,9 +100,29 @@ export class Player {
     return this.playing || before.distanceToSquared(this.scene.orbit.target) > 1e-7;
   }
 
+  /** The character, moved as the shown take is; null: nobody. */
+  private acting(): Actor | null {
+    const body = this.bodies[this.take.value] ?? this.bodies[0] ?? null;
+    if (body === this.acted && this.actor) return this.actor;
+    this.leave();
+    if (!this.character || !body) return null;
+    [this.actor, this.acted] = [this.character.actor(body), body];
+    this.scene.scene.add(this.actor.root);
+    this.scene.canvas.dataset.character = this.character.name;
+    return this.actor;
+  }
+
+  private leave(): void {
+    if (this.actor) this.scene.scene.remove(this.actor.root);
+    [this.actor, this.acted] = [null, null];
+    delete this.scene.canvas.dataset.character;
+  }
+
   private place(): void {
     const { clip, time } = this;
-    this.cast.show(clip, time);
+    const actor = this.acting();
+    this.cast.show(clip, time, actor !== null);
+    if (actor) placed([actor], time, true);
     const others = this.compare.value ? this.clips.filter((one) => one !== clip) : [];
     this.cast.showGhosts(
       others.map((one, n) => ({ clip: one, color: GHOSTS[n]! })),

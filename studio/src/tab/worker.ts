@@ -5,9 +5,10 @@ import glue from "onnxruntime-web/ort-wasm-simd-threaded.mjs?url";
 import wasm from "onnxruntime-web/ort-wasm-simd-threaded.wasm?url";
 import { Network, type Runtime } from "../prior/network";
 import { placesOf } from "../prior/person";
+import { startOf } from "../prior/path";
 import { Prior, finished, flat, sketched } from "../prior/prior";
 import { type Manifest, Packed } from "../prior/weights";
-import type { Draw, Said } from "./messages";
+import type { Draw, Said, Stop } from "./messages";
 
 /** Beyond so many threads such small products gain nothing. */
 const MOST_THREADS = 4;
@@ -73,23 +74,36 @@ async function open(base: string): Promise<Prior> {
   return prior;
 }
 
-async function draw(prior: Prior, { id, segments, seed, takes }: Draw): Promise<void> {
-  const made = await prior.features(segments, seed, takes, async (done, of, clean) => {
-    say({ kind: "sketch", id, done, of, takes: done * 3 >= of ? clean().map((features) => sketched(features)) : [] });
+async function draw(prior: Prior, { id, segments, seed, takes, path }: Draw): Promise<void> {
+  const way = path.length > 1 ? prior.way(segments, path) : null;
+  const begin = way ? startOf(way) : undefined;
+  const watch = async (done: number, of: number, clean: () => Float32Array[]): Promise<void> => {
+    say({
+      kind: "sketch",
+      id,
+      done,
+      of,
+      takes: done * 3 >= of ? clean().map((features) => sketched(features, begin)) : [],
+    });
     await new Promise((heard) => setTimeout(heard)); // lets a newer wish be heard
     if (newest !== id) throw new Superseded();
-  });
-  const bodies = made.map((features) => finished(features, prior.fps));
+  };
+  const made = await prior.features(segments, seed, takes, watch, way);
+  const bodies = made.map((features) => finished(features, prior.fps, begin));
   say({ kind: "drawn", id, bodies, takes: bodies.map((body) => flat(placesOf(body))) });
 }
 
 let prior: Promise<Prior> | null = null;
 let last: Promise<void> = Promise.resolve();
 
-onmessage = ({ data }: MessageEvent<string | Draw>) => {
+onmessage = ({ data }: MessageEvent<string | Draw | Stop>) => {
   if (typeof data === "string") {
     prior = open(data);
     prior.catch((error: Error) => say({ kind: "failed", id: null, message: error.message }));
+    return;
+  }
+  if ("stop" in data) {
+    newest = data.stop;
     return;
   }
   newest = data.id;
