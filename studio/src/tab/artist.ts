@@ -51,6 +51,7 @@ export class Artist {
   draw(project: Project): void {
     this.asked = project;
     this.id += 1;
+    performance.mark("asked");
     if (this.state.value.about) this.state.update({ progress: 0, says: "drawing", error: "", sketch: [] });
     const { segments, seed, takes, path } = project;
     this.worker.postMessage({ id: this.id, segments, seed, takes, path } satisfies Draw);
@@ -82,9 +83,11 @@ export class Artist {
     else if (said.kind === "failed") this.fail(said.message);
     else if (said.kind === "sketch") {
       const sketch = said.takes.map((places) => motionClip(FPS, [places]));
+      if (sketch.length && !this.state.value.sketch.length) performance.mark("preview");
       this.state.update({ progress: said.done / said.of, ...(sketch.length ? { sketch } : {}) });
     } else {
       const clips = said.takes.map((places) => motionClip(FPS, [places]));
+      performance.mark("drawn");
       const project = { ...this.asked!, weights: this.state.value.about!.weights };
       this.state.update({ progress: null, says: "", sketch: [], drawn: { project, bodies: said.bodies, clips } });
     }

@@ -44,12 +44,11 @@ export function ofVrm(bone: string): string | null {
 
 /** "left", "right" or "" and the word that is left of a name; no word: nothing that is looked for. */
 function read(name: string): [string, string] {
-  let tokens = (
-    name
-      .split(/[:|]/)
-      .at(-1)!
-      .match(/[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+/g) ?? []
-  ).map((one) => one.toLowerCase());
+  const bare = name
+    .split(/[:|]/)
+    .at(-1)!
+    .replace(/^bip(?:ed)?0*1?(?=[\s_])/i, "");
+  let tokens = (bare.match(/[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+/g) ?? []).map((one) => one.toLowerCase());
   let side = "";
   for (const [own, marks] of Object.entries(LETTERS)) {
     const at = tokens.findIndex((one) => (marks as readonly string[]).includes(one));

@@ -26,8 +26,8 @@ import {
 import type { Moves } from "./glbFile";
 import { type Pose, type Rig, WORLD, hung, unhung } from "./rig";
 
-/** Metres that a leg is long, of what is shown in its own size; others are shown as tall as the person. */
-const LEGS = [0.2, 2.5] as const;
+/** Metres from ankles to head of what is shown in its own size, and of what is not. */
+const [SHORT, TALL, PLAIN] = [0.5, 2.2, 1.5] as const;
 /** Bones that are laid along the person's: joint, and the joint that it ends at. */
 const LIMBS = [LEFT, RIGHT].flatMap(({ hip, knee, ankle, shoulder, elbow, wrist }) => [
   [hip, knee],
@@ -35,9 +35,12 @@ const LIMBS = [LEFT, RIGHT].flatMap(({ hip, knee, ankle, shoulder, elbow, wrist 
   [shoulder, elbow],
   [elbow, wrist],
 ]) as [number, number][];
-const LEG = LENGTHS[LEFT.knee]! + LENGTHS[LEFT.ankle]!;
-/** Metres over the floor, of the person's ankle at rest. */
-const ANKLE = -REST[LEFT.foot]![1];
+const LEG = [LEFT, RIGHT].reduce((sum, { knee, ankle }) => sum + (LENGTHS[knee]! + LENGTHS[ankle]!) / 2, 0);
+/** Metres over the floor, of the person's ankles at rest. */
+const ANKLE = [LEFT, RIGHT].reduce(
+  (sum, { hip, knee, ankle }) => sum + [PELVIS, hip, knee, ankle].reduce((y, j) => y + REST[j]![1], 0) / 2,
+  0,
+);
 
 /** How a character's bones follow those of the person. */
 export interface Fit {
@@ -63,7 +66,10 @@ export function fitOf(rig: Rig): Fit {
     throw new Error("it does not stand upright at rest; export it in a T-pose, +Y up");
   const across = add(minus(at("left_hip"), at("right_hip")), minus(at("left_shoulder"), at("right_shoulder")));
   const facing = aboutAxis([0, 1, 0], Math.atan2(across[2], across[0]));
-  const size = leg > LEGS[0] && leg < LEGS[1] ? 1 : LEG / leg;
+  const head = rig.parts.get("head");
+  const height =
+    (head === undefined ? mean(at("left_shoulder"), at("right_shoulder")) : rig.rest[head]!.place)[1] - feet[1];
+  const size = height > SHORT && height < TALL ? 1 : PLAIN / Math.max(height, leg);
   return { rig, ratio: (leg * size) / LEG, size, followers: followersOf(rig, facing) };
 }
 

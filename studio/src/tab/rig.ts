@@ -66,9 +66,9 @@ export function rigOf(content: Content, bind: ReadonlyMap<number, Pose>): Rig {
   }
   const rest = standing(bones, order, bind);
   const above = (n: number): number[] => (n < 0 ? [] : [n, ...above(bones[n]!.parent)]);
-  const [left, right] = [above(parts.get("left_hip")!), above(parts.get("right_hip")!)];
-  if (!parts.has("pelvis") || !left.includes(parts.get("pelvis")!)) {
-    const shared = left.slice(1).find((n) => right.includes(n));
+  const carried = ["left_hip", "right_hip", "left_shoulder"].map((part) => above(parts.get(part)!));
+  if (!parts.has("pelvis") || !carried.every((line) => line.slice(1).includes(parts.get("pelvis")!))) {
+    const shared = carried[0]!.slice(1).find((n) => carried.every((line) => line.includes(n)));
     if (shared === undefined) throw new Error("its legs hang on different skeletons; join them");
     parts.set("pelvis", shared);
   }
